@@ -1,0 +1,374 @@
+"""Equation (24), Nordkvist & Sanyal 2010: the rotation F nearest to I with F Jd - Jd F^T = hat(a), and what F does to vectors.
+
+Jd = tr(J)/2 I - J with J diagonal (principal axes). a and J may share any common factor: the host divides both by max J,
+which keeps the fourth powers of the quartic within the range of float32.
+
+A solver describes F by a parameter (a number or a vector) and is a handful of functions of it: the start value, the value
+of its equation, a Newton step, the excess of the residual over a tolerance, and the rotation that the parameter stands for.
+"""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lanes import (
+    absolute,
+    add,  # noqa: F401
+    any_positive,
+    cross,
+    div,  # noqa: F401
+    dot,
+    lane3,
+    least,
+    mul,  # noqa: F401
+    neg,  # noqa: F401
+    ones,
+    positive,
+    sub,  # noqa: F401
+    vec3,
+)
+
+
+@functools.cache
+def rotation_struct(width, real):
+    """A rotation matrix F of each vehicle, kept as its three rows."""
+    Lane3 = lane3(width, real)
+
+    @wp.struct
+    class Rotation:
+        row0: Lane3
+        row1: Lane3
+        row2: Lane3
+
+    return Rotation
+
+
+@wp.func
+def apply(F: Any, v: Any):
+    """F v."""
+    return vec3(dot(F.row0, v), dot(F.row1, v), dot(F.row2, v))
+
+
+@wp.func
+def transpose_apply(F: Any, v: Any):
+    """F^T v, which is also the row vector v^T F."""
+    return v.x * F.row0 + v.y * F.row1 + v.z * F.row2
+
+
+@wp.func
+def rodrigues(F: Any, v: Any, alpha: Any, beta: Any):
+    """F = I + alpha hat(v) + beta hat(v)^2."""
+    m = beta * v
+    w = alpha * v
+    diagonal = ones(alpha) - dot(v, m)
+    xy = v.x * m.y
+    xz = v.x * m.z
+    yz = v.y * m.z
+    F.row0 = vec3(diagonal + v.x * m.x, xy - w.z, xz + w.y)
+    F.row1 = vec3(xy + w.z, diagonal + v.y * m.y, yz - w.x)
+    F.row2 = vec3(xz - w.y, yz + w.x, diagonal + v.z * m.z)
+    return F
+
+
+@wp.func
+def solve3(r0: Any, r1: Any, r2: Any, v: Any):
+    """x with A x = v, for the 3x3 matrix A with rows r0, r1, r2 (Cramer's rule)."""
+    c0 = cross(r1, r2)
+    return (ones(v.x) / dot(r0, c0)) * (v.x * c0 + v.y * cross(r2, r0) + v.z * cross(r0, r1))
+
+
+@wp.func
+def reach(a: Any, J: Any):
+    """|J^-1 a|^2: a rotation F surely exists below 1, and on the principal axes only there."""
+    return dot(a * a, inverse_square(J))
+
+
+@wp.func
+def inverse_square(J: Any):
+    """1 / J^2, constant over the steps."""
+    return vec3(ones(J.x) / (J.x * J.x), ones(J.y) / (J.y * J.y), ones(J.z) / (J.z * J.z))
+
+
+# --- quartic: the scalar reduction. s = a.c is the smallest root of
+#     q(s) = s^4 - d1 s^3 + (d2 + 2A) s^2 - (d3 + d1 A) s + e + A^2, and F = cay(c), c = n / det.
+
+
+@wp.func
+def quartic_coefficients(a: Any, J: Any):
+    """(e + A^2, d3 + d1 A, d2 + 2A, d1), the coefficients of q from the constant one up."""
+    D = J + J
+    DD = vec3(D.y * D.z, D.z * D.x, D.x * D.y)
+    a2 = a * a
+    A = a2.x + a2.y + a2.z
+    d1 = D.x + D.y + D.z
+    return dot(a2, DD) + A * A, D.x * DD.x + d1 * A, DD.x + DD.y + DD.z + A + A, d1
+
+
+@wp.func
+def quartic_start(a: Any, J: Any):
+    """The root q0 / q1 of q's linear part, and a Newton step from it: together one division. Never past the root."""
+    q0, q1, q2, d1 = quartic_coefficients(a, J)
+    u = q0 * q0
+    v = q1 * q1
+    three_d1 = d1 + d1 + d1
+    twice_q0 = q0 + q0
+    value = u * (u - d1 * (q0 * q1) + q2 * v)
+    slope = v * (v - q2 * twice_q0) + u * (three_d1 * q1 - (twice_q0 + twice_q0))
+    return (q0 * slope + value) / (q1 * slope)
+
+
+@wp.func
+def quartic_linear(a: Any, J: Any):
+    """The root of q's linear part."""
+    q0, q1, q2, d1 = quartic_coefficients(a, J)
+    return q0 / q1
+
+
+@wp.func
+def quartic_value(s: Any, a: Any, J: Any):
+    """q(s). By (a.c - s) c = G(c) it is also the residual of equation (24): |G| = |q| |c| / det."""
+    q0, q1, q2, d1 = quartic_coefficients(a, J)
+    return (((s - d1) * s + q2) * s - q1) * s + q0
+
+
+@wp.func
+def quartic_newton(s: Any, value: Any, a: Any, J: Any):
+    """s - q(s) / q'(s)."""
+    q0, q1, q2, d1 = quartic_coefficients(a, J)
+    return s - value / (((s.dtype(4.0) * s - s.dtype(3.0) * d1) * s + q2 + q2) * s - q1)
+
+
+@wp.func
+def quartic_scale(J: Any):
+    """det |a| / |c|, nearly: det ~ 8 J1 J2 J3 and |c| < |a| / (2 J_min). A bound, constant over the steps."""
+    shortest = least(J.x, least(J.y, J.z))
+    return shortest.dtype(16.0) * (J.x * J.y * J.z * shortest)
+
+
+@wp.func
+def quartic_excess(value: Any, a: Any, J: Any, tolerance: Any):
+    """Positive where the relative residual exceeds the tolerance."""
+    return absolute(value) - tolerance * quartic_scale(J)
+
+
+@wp.func
+def quartic_residual2(value: Any, a: Any, J: Any):
+    """Square of the relative residual |G| / |a|."""
+    r = value / quartic_scale(J)
+    return r * r
+
+
+@wp.func
+def quartic_rotation(F: Any, s: Any, a: Any, J: Any):
+    """c = n / det, F = I + 2/(det^2 + n.n) (det hat(n) + hat(n)^2): orthogonal whatever s is."""
+    a2 = a * a
+    A = a2.x + a2.y + a2.z
+    b = J + J - vec3(s, s, s)
+    bb = vec3(b.y * b.z, b.z * b.x, b.x * b.y)
+    n = (bb + vec3(A, A, A)) * a + cross(b * a, a)
+    det = b.x * bb.x + dot(a2, b)
+    beta = (ones(s) + ones(s)) / (det * det + dot(n, n))
+    return rodrigues(F, n, det * beta, beta)
+
+
+# --- cayley: F = I + 2/(1 + c.c) (hat(c) + hat(c)^2), G(c) = a + a x c + c (a.c) - 2 J c = 0.
+
+
+@wp.func
+def cayley_start(a: Any, J: Any):
+    return a / (J + J)
+
+
+@wp.func
+def cayley_value(c: Any, a: Any, J: Any):
+    """G(c)."""
+    return a + cross(a, c) + dot(a, c) * c - (J + J) * c
+
+
+@wp.func
+def cayley_newton(c: Any, value: Any, a: Any, J: Any):
+    """c - dG^-1 G, dG = hat(a) + (a.c) I + c a^T - 2 J."""
+    s = dot(a, c)
+    d = vec3(s, s, s) - J - J
+    m0 = c.x * a
+    m1 = c.y * a
+    m2 = c.z * a
+    r0 = vec3(m0.x + d.x, m0.y - a.z, m0.z + a.y)
+    r1 = vec3(m1.x + a.z, m1.y + d.y, m1.z - a.x)
+    r2 = vec3(m2.x - a.y, m2.y + a.x, m2.z + d.z)
+    return c - solve3(r0, r1, r2, value)
+
+
+@wp.func
+def cayley_rotation(F: Any, c: Any, a: Any, J: Any):
+    beta = (ones(c.x) + ones(c.x)) / (ones(c.x) + dot(c, c))
+    return rodrigues(F, c, beta, beta)
+
+
+# --- newton, as the paper: F = exp(hat(f)), a = sin|f|/|f| J f + (1 - cos|f|)/|f|^2 f x J f.
+
+
+@wp.func
+def sinc_series(x: Any):
+    """alpha = sin|f|/|f|, beta = (1 - cos|f|)/|f|^2 and their derivatives by x = |f|^2.
+
+    The step angle of a solvable equation (24) is below 1.6 rad: twelve Taylor terms are exact to round-off there, need
+    no case for f = 0 and no call that would leave the SIMD lanes.
+    """
+    alpha = ones(x)
+    beta = ones(x)
+    dalpha = alpha - alpha
+    dbeta = dalpha
+    for i in range(11):
+        n = 11 - i
+        ka = x.dtype(1.0) / x.dtype(2 * n * (2 * n + 1))
+        kb = x.dtype(1.0) / x.dtype((2 * n + 1) * (2 * n + 2))
+        dalpha = -ka * (alpha + x * dalpha)
+        dbeta = -kb * (beta + x * dbeta)
+        alpha = ones(x) - ka * (x * alpha)
+        beta = ones(x) - kb * (x * beta)
+    half = x.dtype(0.5)
+    return alpha, half * beta, dalpha, half * dbeta
+
+
+@wp.func
+def newton_start(a: Any, J: Any):
+    return a / J
+
+
+@wp.func
+def newton_value(f: Any, a: Any, J: Any):
+    """Section III-G: sin|f|/|f| J f + (1 - cos|f|)/|f|^2 f x J f - a."""
+    alpha, beta, dalpha, dbeta = sinc_series(dot(f, f))
+    Jf = J * f
+    return alpha * Jf + beta * cross(f, Jf) - a
+
+
+@wp.func
+def newton_newton(f: Any, value: Any, a: Any, J: Any):
+    """f - (differential)^-1 value; the differential as printed in III-G."""
+    alpha, beta, dalpha, dbeta = sinc_series(dot(f, f))
+    Jf = J * f
+    k = (dalpha + dalpha) * Jf + (dbeta + dbeta) * cross(f, Jf)
+    d = alpha * J
+    # beta (hat(f) J - hat(J f)): row i, column j holds -+ f_k (J_j + ... ) written out
+    r0 = vec3(k.x * f.x + d.x, k.x * f.y + beta * (Jf.z - f.z * J.y), k.x * f.z + beta * (f.y * J.z - Jf.y))
+    r1 = vec3(k.y * f.x + beta * (f.z * J.x - Jf.z), k.y * f.y + d.y, k.y * f.z + beta * (Jf.x - f.x * J.z))
+    r2 = vec3(k.z * f.x + beta * (Jf.y - f.y * J.x), k.z * f.y + beta * (f.x * J.y - Jf.x), k.z * f.z + d.z)
+    return f - solve3(r0, r1, r2, value)
+
+
+@wp.func
+def newton_rotation(F: Any, f: Any, a: Any, J: Any):
+    """Rodrigues' formula, section III-G."""
+    alpha, beta, dalpha, dbeta = sinc_series(dot(f, f))
+    return rodrigues(F, f, alpha, beta)
+
+
+@wp.func
+def vector_excess(value: Any, a: Any, J: Any, tolerance: Any):
+    """Positive where the residual vector is longer than tolerance |a|."""
+    return dot(value, value) - (tolerance * tolerance) * dot(a, a)
+
+
+@wp.func
+def vector_residual2(value: Any, a: Any, J: Any):
+    """Square of the relative residual."""
+    return dot(value, value) / dot(a, a)
+
+
+# name -> start without a Newton step, start with one, value, newton, excess, residual2, rotation
+SOLVERS = {
+    "quartic": (
+        quartic_linear,
+        quartic_start,
+        quartic_value,
+        quartic_newton,
+        quartic_excess,
+        quartic_residual2,
+        quartic_rotation,
+    ),
+    "cayley": (
+        cayley_start,
+        None,
+        cayley_value,
+        cayley_newton,
+        vector_excess,
+        vector_residual2,
+        cayley_rotation,
+    ),
+    "newton": (
+        newton_start,
+        None,
+        newton_value,
+        newton_newton,
+        vector_excess,
+        vector_residual2,
+        newton_rotation,
+    ),
+}
+
+# At |J^-1 a| -> 1 the root is nearly double and a Newton step only halves the error: 40 steps exhaust float64.
+MOST_ITERATIONS = 40
+
+STEP_TOO_LARGE = 1
+NOT_CONVERGED = 2
+
+
+@functools.cache
+def make_solve(real, solver, iterations, adaptive, checked):
+    """The function (F, alarm, a, J, tolerance) -> (F, alarm) that solves equation (24) in every lane.
+
+    `iterations` Newton steps are made in all lanes. `adaptive` goes on, in the lanes that need it, until the residual is
+    below the tolerance: a lane's bits depend on that lane alone. `checked` raises the alarm of a lane whose equation has
+    no certain solution (STEP_TOO_LARGE) or whose residual stays above the tolerance (NOT_CONVERGED). Both happen behind
+    one test that a well-chosen step never passes.
+    """
+    start, started, value, newton, excess, residual2, rotation = SOLVERS[solver]
+    more = iterations
+    if started is not None and (iterations > 0 or adaptive):
+        start, more = started, max(iterations - 1, 0)
+    below_one = 1.0 - 2.0**-53 if real == wp.float64 else 1.0 - 2.0**-24
+
+    @wp.func
+    def beyond(far: Any, unit: Any):
+        """Positive where far >= 1."""
+        return far - unit.dtype(wp.static(below_one)) * ones(far)
+
+    @wp.func
+    def raise_alarm(alarm: Any, far: Any, e: Any, r2: Any, unit: Any):
+        """Note the first failure of each lane, and the square of what crossed its limit."""
+        unconverged = unit.dtype(wp.static(float(NOT_CONVERGED))) * ones(e)
+        too_large = unit.dtype(wp.static(float(STEP_TOO_LARGE))) * ones(e)
+        over = beyond(far, unit)
+        code = positive(over, too_large, positive(e, unconverged, e - e))
+        size = positive(code, positive(over, far, r2), ones(e) - ones(e))
+        alarm.size = positive(alarm.code, alarm.size, size)
+        alarm.code = positive(alarm.code, alarm.code, code)
+        return alarm
+
+    @wp.func
+    def solve(F: Any, alarm: Any, a: Any, J: Any, tolerance: Any):
+        u = start(a, J)
+        for _ in range(wp.static(more)):
+            u = newton(u, value(u, a, J), a, J)
+        if wp.static(adaptive or checked):
+            v = value(u, a, J)
+            e = excess(v, a, J, tolerance)
+            suspect = e
+            if wp.static(checked):
+                suspect = positive(e, e, beyond(reach(a, J), tolerance))
+            if any_positive(suspect):
+                if wp.static(adaptive):
+                    k = int(0)
+                    while k < wp.static(MOST_ITERATIONS) and any_positive(e):
+                        u = positive(e, newton(u, v, a, J), u)
+                        v = value(u, a, J)
+                        e = excess(v, a, J, tolerance)
+                        k += 1
+                if wp.static(checked):
+                    alarm = raise_alarm(alarm, reach(a, J), e, residual2(v, a, J), tolerance)
+        return rotation(F, u, a, J), alarm
+
+    return solve

@@ -1,0 +1,27 @@
+"""Restoring moment: mU = -B r x R^T e3, from the potential U = B r.R^T e3 (section IV of Nordkvist & Sanyal 2010)."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lanes import cross, lane3, sub  # noqa: F401
+
+
+@functools.cache
+def params(width, real):
+    """Params: moment, buoyancy times the lever B r [N m], r from the centre of gravity to that of buoyancy."""
+    Lane3 = lane3(width, real)
+
+    @wp.struct
+    class Restoring:
+        moment: Lane3
+
+    return Restoring
+
+
+@wp.func
+def law(w: Any, view: Any, p: Any):
+    """mU(b, R) = -B r x z."""
+    w.torque = w.torque - cross(p.moment, view.z)
+    return w

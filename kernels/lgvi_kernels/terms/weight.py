@@ -1,0 +1,27 @@
+"""Weight less buoyancy: f = net R^T e3, from the potential U = -net b3 (section IV of Nordkvist & Sanyal 2010)."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lanes import add, lane, mul  # noqa: F401
+
+
+@functools.cache
+def params(width, real):
+    """Params: net, weight less buoyancy (m - rho V) g [N], formed in float64 on the host because it cancels."""
+    Lane = lane(width, real)
+
+    @wp.struct
+    class Weight:
+        net: Lane
+
+    return Weight
+
+
+@wp.func
+def law(w: Any, view: Any, p: Any):
+    """f(b, R) = net z."""
+    w.force = w.force + p.net * view.z
+    return w

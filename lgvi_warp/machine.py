@@ -1,0 +1,82 @@
+"""What this machine can do: SIMD width, threads, peak of fused multiply-adds; and provenance of the software."""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+REGISTER_BYTES = {"avx512": 64, "avx2": 32, "other": 16}
+
+
+def simd() -> str:
+    """The widest SIMD extension: "avx512", "avx2" or "other"."""
+    from numpy._core._multiarray_umath import __cpu_features__ as features
+
+    if features.get("AVX512F"):
+        return "avx512"
+    return "avx2" if features.get("AVX2") else "other"
+
+
+def default_width(dtype: str) -> int:
+    """Vehicles per packet: one SIMD register of this dtype ("float64": 8 on AVX-512, 4 on AVX2, 2 elsewhere)."""
+    return REGISTER_BYTES[simd()] // np.dtype(dtype).itemsize
+
+
+def thread_count() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def cpu_name() -> str:
+    """The processor's name, as the system tells it."""
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        for line in info.read_text().splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    return platform.processor() or platform.machine()
+
+
+def memory_bytes() -> int | None:
+    """Physical memory, or None where the system does not tell."""
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return None
+
+
+def versions() -> dict[str, str]:
+    """Versions of what a result depends on."""
+    names = ("lgvi-warp", "warp-lang", "numpy")
+    return {"python": platform.python_version()} | {name: metadata.version(name) for name in names}
+
+
+def describe() -> dict[str, Any]:
+    """The machine, for provenance."""
+    return {"cpu": cpu_name(), "simd": simd(), "threads": thread_count(), "system": platform.system()}
+
+
+def fma_peak(dtype: str = "float64", width: int | None = None, rounds: int = 5, loops: int = 1_000_000) -> float:
+    """Fused multiply-adds per second of one core [1/s], the best of several rounds of a loop of nothing else."""
+    import warp as wp
+
+    from lgvi_kernels.peak import CHAINS, make_peak
+
+    real = wp.float64 if dtype == "float64" else wp.float32
+    width = width or default_width(dtype)
+    kernel, Lane = make_peak(width, real)
+    values = np.full((CHAINS + 3, width), 0.5, dtype=dtype)
+    data = wp.array(values, dtype=Lane, device="cpu")
+    command = wp.launch(kernel, dim=1, inputs=[data, loops], device="cpu", record_cmd=True)
+    best = 0.0
+    for _ in range(rounds):
+        start = time.perf_counter()
+        command.launch()
+        best = max(best, CHAINS * width * loops / (time.perf_counter() - start))
+    return best

@@ -1,0 +1,143 @@
+"""Methods as data: a program of sub-maps with coefficients, composed with itself by stage coefficients.
+
+Sub-maps (mathematics in the README's table): T and K the flows of kinetic energy p.M^-1 p / 2 and of the potential, D the
+discrete Moser-Veselov rotation of equation (24), Ab and Ap the two halves of T. The leftmost is applied first.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from lgvi_warp.errors import Faults
+
+Program = tuple[tuple[str, float], ...]
+
+# Phi: (10)-(14), Phi*: (19)-(23), Psi_h = Phi*_{h/2} after Phi_{h/2}, all of Nordkvist & Sanyal 2010 (conservative scenes).
+# Psi's two Ap(h/2) meet in the middle and act as one, since Ap changes neither p nor R.
+# psi_s, psi_1: symmetric splittings into symplectic flows, with two and with one solve of equation (24).
+PROGRAMS: dict[str, Program] = {
+    "phi": (("Ab", 1.0), ("D", 1.0), ("K", 1.0), ("Ap", 1.0)),
+    "phi_adjoint": (("Ap", 1.0), ("K", 1.0), ("D", 1.0), ("Ab", 1.0)),
+    "psi": (("Ab", 0.5), ("D", 0.5), ("K", 0.5), ("Ap", 1.0), ("K", 0.5), ("D", 0.5), ("Ab", 0.5)),
+    "psi_s": (("T", 0.5), ("D", 0.5), ("K", 1.0), ("D", 0.5), ("T", 0.5)),
+    "psi_1": (("K", 0.5), ("T", 0.5), ("D", 1.0), ("T", 0.5), ("K", 0.5)),
+}
+ORDERS = {"phi": 1, "phi_adjoint": 1, "psi": 2, "psi_s": 2, "psi_1": 2}
+
+# One sub-map of the letter may be divided in two, or two joined: each is the flow of something.
+FLOWS = ("T", "K", "Ab", "Ap")
+
+SOLVERS = ("quartic", "cayley", "newton")
+
+
+def _palindrome(*outer: float) -> tuple[float, ...]:
+    return (*outer, 1.0 - 2.0 * sum(outer), *reversed(outer))
+
+
+_G3 = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))
+_G5 = 1.0 / (4.0 - 4.0 ** (1.0 / 3.0))
+
+# name -> (order, stage coefficients), for a symmetric base of order 2. Hairer, Lubich & Wanner, Geometric Numerical
+# Integration, 2nd ed., II.4 (triple jump, Suzuki) and V.3.2 (Kahan & Li 1997).
+COMPOSITIONS: dict[str, tuple[int, tuple[float, ...]]] = {
+    "tj4": (4, _palindrome(_G3)),
+    "su4": (4, _palindrome(_G5, _G5)),
+    "kl6": (
+        6,
+        _palindrome(0.39216144400731413928, 0.33259913678935943860, -0.70624617255763935981, 0.08221359629355080023),
+    ),
+    "kl8": (
+        8,
+        _palindrome(
+            0.13020248308889008088,
+            0.56116298177510838456,
+            -0.38947496264484728641,
+            0.15884190655515560090,
+            -0.39590389413323757734,
+            0.18453964097831570709,
+            0.25837438768632204729,
+            0.29501172360931029887,
+        ),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method by name, and how equation (24) is solved inside it.
+
+    name: "phi", "phi_adjoint", "psi" (the paper's), "psi_s" (default), "psi_1", or a composition of a symmetric one:
+    "tj4(psi_s)", "su4(psi_s)", "kl6(psi_1)", "kl8(psi_s)", ...
+    solver: "quartic" (default), "cayley" or "newton" (the paper's, on the exponential map).
+    iterations: Newton steps of every solve, a whole number >= 0; None iterates each vehicle to the tolerance.
+    tolerance: relative residual of equation (24) above which a solve is not converged (default 1e-14 in float64 and
+    1e-6 in float32 when iterating to it; 1e-12 and 1e-5 for a fixed number of iterations).
+
+    Raises SceneError (a ValueError) naming every fault.
+    """
+
+    name: str = "psi_s"
+    solver: str = "quartic"
+    iterations: int | None = None
+    tolerance: float | None = None
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        base, composition = self._split()
+        faults.choice("method", base, PROGRAMS)
+        if composition is not None:
+            faults.choice("method composition", composition, COMPOSITIONS)
+            if ORDERS.get(base) == 1:
+                faults.add("method", self.name, "is a composition of a method that is not symmetric", "compose psi_s")
+        faults.choice("solver", self.solver, SOLVERS)
+        n = self.iterations
+        if n is not None and (isinstance(n, bool) or not isinstance(n, int) or not 0 <= n <= 100):
+            faults.add("iterations", n, "is not a whole number from 0 to 100", "give one, or None for the tolerance")
+        if self.tolerance is not None and not 0.0 < self.tolerance < 1.0:
+            faults.add("tolerance", self.tolerance, "is not between 0 and 1", "give a relative residual such as 1e-12")
+        faults.raise_if_any()
+
+    def _split(self) -> tuple[str, str | None]:
+        match = re.fullmatch(r"(\w+)\((\w+)\)", str(self.name))
+        return (match[2], match[1]) if match else (str(self.name), None)
+
+    @property
+    def program(self) -> Program:
+        """The sub-maps of one stage, the first applied first."""
+        return PROGRAMS[self._split()[0]]
+
+    @property
+    def stages(self) -> tuple[float, ...]:
+        """The stage coefficients g_i: one step is the program with g_1 h, then with g_2 h, ..."""
+        composition = self._split()[1]
+        return (1.0,) if composition is None else COMPOSITIONS[composition][1]
+
+    @property
+    def order(self) -> int:
+        """Order of convergence."""
+        base, composition = self._split()
+        return ORDERS[base] if composition is None else COMPOSITIONS[composition][0]
+
+    def residual_tolerance(self, dtype: str) -> float:
+        """The tolerance in force for this dtype."""
+        if self.tolerance is not None:
+            return self.tolerance
+        if self.iterations is None:
+            return 1e-14 if dtype == "float64" else 1e-6
+        return 1e-12 if dtype == "float64" else 1e-5
+
+
+def merged(program: Program) -> tuple[tuple[str, float] | None, Program]:
+    """(lead, maps): a flow that both opens and closes the program joins that of the next step; lead is its half."""
+    first, last = program[0], program[-1]
+    if len(program) > 1 and first == last and first[0] in FLOWS:
+        return first, program[1:-1]
+    return None, program
+
+
+def simplified(program: Program, isotropic: bool) -> Program:
+    """Without the Munk moment when M = m I: it is zero, and computing it would be pure round-off torque."""
+    if not isotropic:
+        return program
+    return tuple(("Ab" if letter == "T" else letter, c) for letter, c in program if letter != "Ap")

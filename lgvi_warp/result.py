@@ -1,0 +1,150 @@
+"""What a run leaves: samples, status, and everything they follow from."""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp import invariants, notation
+from lgvi_warp.status import StatusArray
+
+if TYPE_CHECKING:
+    import xarray
+
+UNITS = {
+    "position": "m",
+    "attitude": "1",
+    "quaternion_wxyz": "1",
+    "velocity": "m s-1",
+    "angular_velocity": "rad s-1",
+    "energy": "J",
+}
+MEANINGS = {
+    "position": "position in inertial axes, north east down",
+    "attitude": "rotation from body to inertial axes",
+    "quaternion_wxyz": "unit quaternion of the attitude, scalar first",
+    "velocity": "velocity in body axes",
+    "angular_velocity": "angular velocity in body axes",
+    "energy": "kinetic and potential energy",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """Samples of n members at k times; the initial state is sample 0. Arrays are float64 or float32, as asked.
+
+    time: (k,) [s]. samples: the fields that were kept, by name (also attributes: position (k, n, 3) [m, inertial],
+    attitude (k, n, 3, 3) body to inertial, velocity (k, n, 3) [m/s, body], angular_velocity (k, n, 3) [rad/s, body]).
+    status: (n,), see Status; failure_time: (n,) [s], the time of the last good state, NaN where there was no failure;
+    failure_value: (n,), the |J^-1 a| or relative residual that crossed its limit, 0 for a non-finite state.
+    messages: what the user should know; provenance: scene, settings, versions, seed, machine.
+    """
+
+    time: np.ndarray
+    samples: dict[str, np.ndarray]
+    status: StatusArray
+    failure_time: np.ndarray
+    failure_value: np.ndarray
+    parameters: dict[str, np.ndarray]
+    messages: tuple[str, ...]
+    provenance: dict[str, Any]
+    compile_seconds: float = field(default=0.0, compare=False)
+    run_seconds: float = field(default=0.0, compare=False)
+
+    def _kept(self, name: str) -> np.ndarray:
+        if name not in self.samples:
+            raise AttributeError(f"{name} was not kept: add {name!r} to SaveAt(fields=...)")
+        return self.samples[name]
+
+    @property
+    def position(self) -> np.ndarray:
+        """(k, n, 3) [m], inertial axes (north, east, down)."""
+        return self._kept("position")
+
+    @property
+    def attitude(self) -> np.ndarray:
+        """(k, n, 3, 3), body to inertial axes."""
+        return self._kept("attitude")
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """(k, n, 3) [m/s], body axes."""
+        return self._kept("velocity")
+
+    @property
+    def angular_velocity(self) -> np.ndarray:
+        """(k, n, 3) [rad/s], body axes."""
+        return self._kept("angular_velocity")
+
+    @functools.cached_property
+    def quaternion_wxyz(self) -> np.ndarray:
+        """(k, n, 4), unit quaternions of the attitude, scalar first and not negative."""
+        return notation.quaternion_from_matrix(self.attitude).astype(self.attitude.dtype)
+
+    @functools.cached_property
+    def energy(self) -> np.ndarray:
+        """(k, n) [J], kinetic and potential energy, float64."""
+        return invariants.energy(self)
+
+    @property
+    def members(self) -> int:
+        """n."""
+        return len(self.status)
+
+    @functools.cached_property
+    def dataset(self) -> xarray.Dataset:
+        """The samples as an xarray Dataset with dimensions time, realization, component (extra: store)."""
+        try:
+            import xarray as xr
+        except ImportError as error:
+            raise ImportError("result.dataset needs xarray: pip install 'lgvi-warp[store]'") from error
+        dims = {1: ("component",), 2: ("row", "column")}
+        names = [*self.samples] + ["energy"] * (len(self.samples) == 4)
+        data = {}
+        for name in names:
+            values = getattr(self, name)
+            attributes = {"units": UNITS[name], "long_name": MEANINGS[name]}
+            data[name] = (("time", "realization", *dims.get(values.ndim - 2, ())), values, attributes)
+        data["status"] = (("realization",), np.asarray(self.status), {"long_name": "0 ok, see lgvi_warp.Status"})
+        coordinates = {"time": ("time", self.time, {"units": "s", "long_name": "time since the start"})}
+        attributes = {"Conventions": "CF-1.11", "provenance": json.dumps(self.provenance)}
+        return xr.Dataset(data, coordinates, attributes)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write everything to an .npz file, whole or not at all. Returns its path. Raises OSError."""
+        target = Path(path)
+        part = target.with_name(target.name + ".part")
+        arrays = {"time": self.time, **self.samples, "status": np.asarray(self.status)}
+        arrays |= {"failure_time": self.failure_time, "failure_value": self.failure_value}
+        arrays |= {f"parameters/{name}": value for name, value in self.parameters.items()}
+        texts = {"messages": json.dumps(self.messages), "provenance": json.dumps(self.provenance)}
+        try:
+            with part.open("wb") as file:
+                np.savez(file, **arrays, **texts)  # type: ignore[arg-type]
+            part.replace(target)
+        finally:
+            part.unlink(missing_ok=True)
+        return target
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Result:
+        """Read what `save` wrote. Raises OSError or ValueError if it is not such a file."""
+        with np.load(Path(path), allow_pickle=False) as data:
+            content = {name: data[name] for name in data.files}
+        prefix = "parameters/"
+        return cls(
+            time=content["time"],
+            samples={name: content[name] for name in content if name in UNITS},
+            status=content["status"].view(StatusArray),
+            failure_time=content["failure_time"],
+            failure_value=content["failure_value"],
+            parameters={name.removeprefix(prefix): content[name] for name in content if name.startswith(prefix)},
+            messages=tuple(json.loads(str(content["messages"]))),
+            provenance=json.loads(str(content["provenance"])),
+        )

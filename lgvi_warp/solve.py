@@ -1,0 +1,180 @@
+"""The walk from an ensemble to a result."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp import machine, notation
+from lgvi_warp.ensemble import Ensemble
+from lgvi_warp.errors import Faults
+from lgvi_warp.executors import threads as thread_executor
+from lgvi_warp.method import Method
+from lgvi_warp.plan import Block, Packets, Plan, blocks
+from lgvi_warp.result import Result
+from lgvi_warp.saveat import SaveAt, time_grid
+from lgvi_warp.scene import Scene
+from lgvi_warp.status import StatusArray
+
+SHAPES: dict[str, tuple[int, ...]] = {
+    "position": (3,),
+    "attitude": (3, 3),
+    "velocity": (3,),
+    "angular_velocity": (3,),
+}
+
+
+def solve(
+    fleet: Ensemble | Scene,
+    method: str | Method = "psi_s",
+    h: float | None = None,
+    t1: float | None = None,
+    save: SaveAt | None = None,
+    dtype: str = "float64",
+    *,
+    threads: int | None = None,
+    width: int | None = None,
+    checks: str = "safe",
+    progress: Callable[[float], None] | None = None,
+) -> Result:
+    """Advance every member of the fleet from t = 0 to t1 and keep the samples asked for.
+
+    fleet: an Ensemble, or a Scene for its own ensemble (one vehicle if it has none).
+    method: a name or a Method. h, t1: step and end [s]; left out, the scene's [run] settings.
+    save: what to keep (default: every [run] save_every of the scene, else the start and the end).
+    dtype: "float64" or "float32". threads: default all cores. width: vehicles per packet, default from the CPU.
+    checks: "safe" gives each member a status and freezes it when it fails; "none" leaves that code out.
+    progress: called with the fraction of the work that is done, from the threads that do it.
+
+    Raises SceneError naming every fault of the arguments. Prints nothing. The same inputs give the same bits for any
+    number of threads, on one type of machine.
+    """
+    ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
+    plan = make_plan(ensemble, method, h, t1, save, dtype, width=width, checks=checks)
+    faults = Faults()
+    if threads is not None and (not isinstance(threads, int) or threads < 1):
+        faults.add("threads", threads, "is not a whole number above 0", "give 1 or more, or leave it out for all cores")
+    faults.raise_if_any()
+    return run_plan(plan, threads or machine.thread_count(), progress)
+
+
+def make_plan(
+    ensemble: Ensemble,
+    method: str | Method = "psi_s",
+    h: float | None = None,
+    t1: float | None = None,
+    save: SaveAt | None = None,
+    dtype: str = "float64",
+    *,
+    width: int | None = None,
+    checks: str = "safe",
+) -> Plan:
+    """Settle a run's settings, from the arguments and then from the scene's [run]. Raises SceneError."""
+    settings = ensemble.scene.run
+    h = settings.step if h is None else h
+    t1 = settings.duration if t1 is None else t1
+    faults = Faults()
+    if h is None:
+        faults.add("h", h, "is missing", "give the step in seconds: solve(..., h=0.01) or [run] step")
+    if t1 is None:
+        faults.add("t1", t1, "is missing", "give the end in seconds: solve(..., t1=150.0) or [run] duration")
+    faults.raise_if_any()
+    if save is None:
+        save = SaveAt(every=settings.save_every)
+    grid = time_grid(float(h), float(t1), save)  # type: ignore[arg-type]
+    chosen = method if isinstance(method, Method) else Method(method)
+    return Plan(ensemble, chosen, grid, save.fields, dtype, width, checks)
+
+
+class _Progress:
+    """Fraction of the vehicle-steps made so far, counted from several threads."""
+
+    def __init__(self, total: int, report: Callable[[float], None] | None):
+        self._total, self._done, self._report, self._lock = total, 0, report, threading.Lock()
+
+    def add(self, vehicle_steps: int) -> None:
+        if self._report is None:
+            return
+        with self._lock:
+            self._done += vehicle_steps
+            self._report(self._done / self._total)
+
+
+def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None = None) -> Result:
+    """Run every block of the plan and gather the result."""
+    compile_seconds = plan.compile()
+    n, k = plan.ensemble.members, len(plan.grid.times)
+    samples = {name: np.empty((k, n, *SHAPES[name]), plan.dtype) for name in plan.spec.fields}
+    status, failed_step, failed_size = np.zeros(n, np.uint8), np.zeros(n, np.int64), np.zeros(n)
+    counter = _Progress(n * plan.grid.steps, progress)
+
+    def work(block: Block) -> None:
+        members = plan.ensemble.select(block.first, block.stop)
+        packets = Packets(plan, members)
+        at = slice(block.first, block.stop)
+        for name, values in samples.items():
+            values[0, at] = getattr(members, name)
+        for k0, k1, s0, s1 in plan.segments(block.count):
+            _store(samples, at, s0, s1, packets.advance(k0, k1, s0, s1)[:, : block.count], packets.Q)
+            counter.add(block.count * (k1 - k0))
+        outcome = packets.outcome()
+        status[at], failed_step[at], failed_size[at] = outcome.status, outcome.failed_step, outcome.failed_size
+
+    start = time.perf_counter()
+    thread_executor.run(blocks(n), work, threads)
+    run_seconds = time.perf_counter() - start
+    failed = status != 0
+    return Result(
+        time=plan.grid.times,
+        samples=samples,
+        status=status.view(StatusArray),
+        failure_time=np.where(failed, failed_step * plan.grid.h, np.nan),
+        failure_value=np.where(failed, failed_size, np.nan),
+        parameters=plan.ensemble.parameters(0, n),
+        messages=plan.grid.messages + plan.ensemble.scene.vehicle.warnings,
+        provenance=provenance(plan),
+        compile_seconds=compile_seconds,
+        run_seconds=run_seconds,
+    )
+
+
+def _store(samples: dict[str, np.ndarray], at: slice, s0: int, s1: int, raw: np.ndarray, Q: np.ndarray) -> None:
+    """Turn raw samples (s1 - s0, members, numbers) from principal axes to the user's, into their places."""
+    turned = not np.array_equal(Q, np.broadcast_to(np.eye(3), Q.shape))
+    column = 0
+    for name, values in samples.items():
+        shape = SHAPES[name]
+        size = int(np.prod(shape))
+        part = raw[..., column : column + size].reshape(*raw.shape[:2], *shape)
+        column += size
+        if turned and name == "attitude":
+            part = part @ np.swapaxes(Q, -1, -2)
+        elif turned and name != "position":
+            part = notation.rotate_out(Q, part)
+        values[s0:s1, at] = part
+
+
+def provenance(plan: Plan) -> dict[str, Any]:
+    """Everything that the result follows from: scene, ensemble, settings, versions, machine."""
+    return {
+        "scene": plan.ensemble.scene.to_dict(),
+        "ensemble": plan.ensemble.to_dict(),
+        "method": {
+            "name": plan.method.name,
+            "solver": plan.method.solver,
+            "iterations": plan.method.iterations,
+            "tolerance": plan.method.residual_tolerance(plan.dtype),
+        },
+        "step": plan.grid.h,
+        "steps": plan.grid.steps,
+        "dtype": plan.dtype,
+        "width": plan.spec.width,
+        "checks": plan.checks,
+        "terms": list(plan.spec.terms),
+        "versions": machine.versions(),
+        "machine": machine.describe(),
+    }

@@ -1,0 +1,40 @@
+"""What became of each member, and what to do about it."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+
+
+class Status(IntEnum):
+    """Outcome of one member. A member that failed stays at its last good state; no other member notices."""
+
+    OK = 0
+    STEP_TOO_LARGE = 1
+    NOT_CONVERGED = 2
+    NON_FINITE = 3
+
+    @property
+    def text(self) -> str:
+        """What happened and the remedy, in a sentence."""
+        return _TEXT[self]
+
+
+_TEXT = {
+    Status.OK: "ran to the end",
+    Status.STEP_TOO_LARGE: "the step is too large: |J^-1 a| reached 1, where equation (24) may have no solution; "
+    "shorten the step below 1 / |angular velocity| (psi and psi_s: below 2 / |angular velocity|)",
+    Status.NOT_CONVERGED: "the solve of equation (24) kept a residual above the tolerance; "
+    "give more iterations, a larger tolerance or a shorter step",
+    Status.NON_FINITE: "a number of the state is not finite; check the start state, the parameters and the step",
+}
+
+
+class StatusArray(np.ndarray):
+    """Status of each member, shape (n,), uint8: compares with `Status` members; `counts()` sums up."""
+
+    def counts(self) -> dict[str, int]:
+        """Members by status name, those that occur, the most serious last."""
+        values, numbers = np.unique(np.asarray(self), return_counts=True)
+        return {Status(v).name.lower(): int(n) for v, n in zip(values, numbers, strict=True)}

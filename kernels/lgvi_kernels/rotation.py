@@ -339,11 +339,12 @@ def make_solve(real, solver, iterations, adaptive, checked):
     @wp.func
     def raise_alarm(alarm: Any, far: Any, e: Any, r2: Any, unit: Any):
         """Note the first failure of each lane, and the square of what crossed its limit."""
+        zero = ones(e) - ones(e)
         unconverged = unit.dtype(wp.static(float(NOT_CONVERGED))) * ones(e)
         too_large = unit.dtype(wp.static(float(STEP_TOO_LARGE))) * ones(e)
         over = beyond(far, unit)
-        code = positive(over, too_large, positive(e, unconverged, e - e))
-        size = positive(code, positive(over, far, r2), ones(e) - ones(e))
+        code = positive(over, too_large, positive(e, unconverged, zero))
+        size = positive(code, positive(over, far, r2), zero)
         alarm.size = positive(alarm.code, alarm.size, size)
         alarm.code = positive(alarm.code, alarm.code, code)
         return alarm

@@ -1,0 +1,61 @@
+"""lgvi_warp: many underwater vehicles at once, by a Lie group variational integrator in Warp kernels on CPU cores."""
+
+from typing import TYPE_CHECKING, Any
+
+from lgvi_warp.distributions import LogNormal, Normal, TruncatedNormal, Uniform
+from lgvi_warp.ensemble import Ensemble
+from lgvi_warp.errors import SceneError
+from lgvi_warp.method import Method
+from lgvi_warp.result import Result
+from lgvi_warp.saveat import SaveAt
+from lgvi_warp.scene import Environment, Scene, Start
+from lgvi_warp.status import Status
+from lgvi_warp.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from lgvi_warp.plan import Plan
+    from lgvi_warp.sinks.plots import plot
+    from lgvi_warp.sinks.rerun import log_rerun
+    from lgvi_warp.solve import solve
+
+__version__ = "0.1.0"
+
+# Loaded when first used: Warp takes a second to import, and a scene can be read and checked without it.
+_LAZY = {
+    "solve": "lgvi_warp.solve",
+    "Plan": "lgvi_warp.plan",
+    "plot": "lgvi_warp.sinks.plots",
+    "log_rerun": "lgvi_warp.sinks.rerun",
+}
+
+__all__ = [
+    "Ensemble",
+    "Environment",
+    "LogNormal",
+    "Method",
+    "Normal",
+    "Plan",
+    "Result",
+    "SaveAt",
+    "Scene",
+    "SceneError",
+    "Start",
+    "Status",
+    "TruncatedNormal",
+    "Uniform",
+    "Vehicle",
+    "log_rerun",
+    "plot",
+    "solve",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LAZY:
+        raise AttributeError(f"module 'lgvi_warp' has no attribute {name!r}")
+    from importlib import import_module
+
+    # `lgvi_warp.solve` is also the name of its module: bind the function over it, once.
+    value = getattr(import_module(_LAZY[name]), name)
+    globals()[name] = value
+    return value

@@ -1,0 +1,239 @@
+"""What varies from member to member, and the members' numbers, block by block."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp import scene as scenes
+from lgvi_warp.distributions import Distribution, uniforms
+from lgvi_warp.errors import Faults, closest
+from lgvi_warp.scene import Scene
+
+MATRICES = ("vehicle.added_mass", "vehicle.inertia")
+PARAMETERS = {
+    "vehicle.mass": (),
+    "vehicle.added_mass": (3, 3),
+    "vehicle.inertia": (3, 3),
+    "vehicle.buoyancy": (),
+    "vehicle.center_of_buoyancy": (3,),
+    "environment.gravity": (),
+}
+STATES = ("position", "attitude", "velocity", "angular_velocity")
+
+
+@dataclass(frozen=True, eq=False)
+class Members:
+    """A run of m members. Parameters have a leading dimension of 1 (shared) or m (varied), in the scene's names.
+
+    position (m, 3) [m], attitude (m, 3, 3) body to inertial, velocity (m, 3) [m/s], angular_velocity (m, 3) [rad/s].
+    """
+
+    parameters: dict[str, np.ndarray]
+    position: np.ndarray
+    attitude: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+
+    @property
+    def count(self) -> int:
+        """m."""
+        return len(self.position)
+
+
+class Ensemble:
+    """A scene and what varies in it.
+
+    scene: the Scene. members: how many, >= 1. seed: whole number >= 0. vary: name -> distribution; names are
+    "vehicle.mass", "vehicle.added_mass", "vehicle.inertia", "vehicle.buoyancy", "vehicle.center_of_buoyancy",
+    "environment.gravity" and what the scene's start gives ("start.position", "start.angular_velocity", ...).
+    A draw depends on the seed, the member's index and the name only.
+
+    Raises SceneError naming every fault; members that would be unphysical are counted and the first is shown.
+    """
+
+    def __init__(self, scene: Scene, members: int = 1, seed: int = 0, vary: Mapping[str, Distribution] | None = None):
+        settings = scenes.EnsembleSettings(members, seed, dict(vary or {}))
+        self._setup(scene, settings, {})
+
+    @classmethod
+    def from_scene(cls, scene: Scene) -> Ensemble:
+        """The ensemble that the scene file describes; one member if it describes none."""
+        settings = scene.ensemble_settings or scenes.EnsembleSettings()
+        return cls(scene, settings.members, settings.seed, settings.vary)
+
+    @classmethod
+    def from_states(
+        cls,
+        scene: Scene,
+        position: Any,
+        attitude: Any,
+        velocity: Any,
+        angular_velocity: Any,
+        parameters: Mapping[str, Any] | None = None,
+    ) -> Ensemble:
+        """Members with given states: (n, 3) [m], (n, 3, 3) body to inertial, (n, 3) [m/s, body], (n, 3) [rad/s, body].
+
+        parameters: name -> array of length n ("vehicle.inertia": (n, 3) or (n, 3, 3)). States that are not finite are
+        let through: the run gives such a member its status. Raises SceneError for wrong shapes and unphysical values.
+        """
+        faults = Faults()
+        states = dict(zip(STATES, (position, attitude, velocity, angular_velocity), strict=True))
+        explicit = {f"start.{key}": np.asarray(value, dtype=np.float64) for key, value in states.items()}
+        n = len(explicit["start.position"]) if explicit["start.position"].ndim else 0
+        if n == 0:
+            faults.add("position", position, "holds no member", "give arrays of length 1 or more")
+        for key, value in explicit.items():
+            shape = (n, 3, 3) if key == "start.attitude" else (n, 3)
+            if value.shape != shape:
+                faults.add(key, value, f"has shape {value.shape}", f"give an array of shape {shape}")
+        faults.keys("", parameters or {}, PARAMETERS)
+        faults.raise_if_any()
+        R = explicit["start.attitude"]
+        R = R[np.isfinite(R).all(axis=(1, 2))]
+        if len(R) and not scenes.is_rotation(R):
+            faults.add("attitude", "...", "holds a matrix that is not a rotation to 1e-9", "give R^T R = I, det R = 1")
+        for key, value in (parameters or {}).items():
+            explicit[key] = _explicit_parameter(faults, key, value, n)
+        faults.raise_if_any()
+        ensemble = cls.__new__(cls)
+        ensemble._setup(scene, scenes.EnsembleSettings(n), explicit)
+        return ensemble
+
+    def _setup(self, scene: Scene, settings: scenes.EnsembleSettings, explicit: dict[str, np.ndarray]) -> None:
+        self.scene, self.members, self.seed = scene, int(settings.members), int(settings.seed)
+        self.vary: dict[str, Distribution] = dict(settings.vary)
+        self._settings, self._explicit = settings, explicit
+        self._start = {f"start.{key}": value for key, value in scene.start.given().items()}
+        if explicit:
+            self._start = {key: value for key, value in explicit.items() if key.startswith("start.")}
+        self._base = _base(scene)
+        self._check_names()
+        self._check_physical()
+
+    def _check_names(self) -> None:
+        faults = Faults("ensemble.vary.")
+        known = [*PARAMETERS, *self._start]
+        for name, law in self.vary.items():
+            if name not in known:
+                others = [key for key in known if key.split(".")[0] == name.split(".")[0]]
+                hint = f"the scene gives {', '.join(others)}" if name[6:] in scenes.SHAPES else closest(name, known)
+                faults.add(f'"{name}"', law, "does not name what the scene has", hint)
+            elif not isinstance(law, Distribution):
+                faults.add(f'"{name}"', law, "is not a distribution", "give lw.Normal(std=...) or another")
+            elif name == "start.attitude":
+                faults.add(f'"{name}"', law, "cannot vary entry by entry", "give rotation_vector or euler_deg and vary it")
+            elif name in MATRICES and np.any(self._base[name] - np.diag(np.diag(self._base[name]))):
+                faults.add(f'"{name}"', law, "would vary a full matrix", "give arrays: Ensemble.from_states(parameters=...)")
+            else:
+                self._check_shape(faults, name, law)
+        faults.raise_if_any()
+
+    def _check_shape(self, faults: Faults, name: str, law: Distribution) -> None:
+        shape = self._drawn_base(name).shape
+        try:
+            good = law.quantile(np.full((1, *shape), 0.5), self._drawn_base(name)).shape == (1, *shape)
+        except ValueError:
+            good = False
+        if not good:
+            wanted = f"numbers or {shape[0]} per component" if shape else "numbers"
+            faults.add(f'"{name}"', law, f"does not fit a quantity of shape {shape}", f"give {wanted}")
+
+    def _check_physical(self) -> None:
+        if not (set(self.vary) | set(self._explicit)) & set(PARAMETERS):
+            return
+        faults = Faults()
+        p = self.parameters(0, self.members)
+        mass = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
+        checks = {
+            "vehicle.mass": ~(p["vehicle.mass"] > 0.0),
+            "vehicle.inertia": ~_positive_definite(p["vehicle.inertia"]),
+            "vehicle.mass + vehicle.added_mass": ~_positive_definite(mass),
+            "vehicle.buoyancy": ~(p["vehicle.buoyancy"] >= 0.0),
+            "environment.gravity": ~(p["environment.gravity"] >= 0.0),
+            "vehicle.center_of_buoyancy": ~np.isfinite(p["vehicle.center_of_buoyancy"]).all(axis=1),
+        }
+        for key, bad in checks.items():
+            if bad.any():
+                first = int(np.argmax(bad))
+                value = mass[first] if "+" in key else p[key][first]
+                faults.add(f"{key} of member {first}", value, f"is unphysical ({int(bad.sum())} of {len(bad)} members)",
+                           "use a smaller spread, TruncatedNormal or LogNormal")
+        faults.raise_if_any()
+
+    def _drawn_base(self, name: str) -> np.ndarray:
+        """The scene's value of a quantity that is drawn: of a diagonal matrix, its diagonal."""
+        base = np.asarray(self._start[name] if name in self._start else self._base[name])
+        return np.diag(base) if name in MATRICES else base
+
+    def _value(self, name: str, first: int, stop: int) -> np.ndarray:
+        """Values of the members first to stop, or of all as one: a leading dimension of stop - first, or of 1."""
+        if name in self._explicit:
+            return self._explicit[name][first:stop]
+        if name not in self.vary:
+            return np.asarray(self._start[name] if name in self._start else self._base[name])[None]
+        base = self._drawn_base(name)
+        u = uniforms(self.seed, name, first, stop - first, max(1, base.size)).reshape(stop - first, *base.shape)
+        drawn = self.vary[name].quantile(u, base)
+        return drawn[:, :, None] * np.eye(3) if name in MATRICES else drawn
+
+    def parameters(self, first: int, stop: int) -> dict[str, np.ndarray]:
+        """Parameters of the members first to stop, shared ones with a leading dimension of 1."""
+        return {name: self._value(name, first, stop) for name in PARAMETERS}
+
+    def select(self, first: int, stop: int) -> Members:
+        """The numbers of the members first to stop."""
+        m = stop - first
+        start = {key.removeprefix("start."): self._value(key, first, stop) for key in self._start}
+        R = np.broadcast_to(scenes.resolve_attitude(start), (m, 3, 3))
+        if "velocity_inertial" in start:
+            v = np.broadcast_to(start["velocity_inertial"], (m, 3))
+            nu = np.einsum("nji,nj->ni", R, v)
+        else:
+            nu = start["velocity"]
+        position, nu, Om = (np.broadcast_to(x, (m, 3)) for x in (start["position"], nu, start["angular_velocity"]))
+        return Members(self.parameters(first, stop), position, R, nu, Om)
+
+    def subset(self, indices: Sequence[int]) -> Ensemble:
+        """These members, in this order, as an ensemble of its own with the same numbers."""
+        chosen = [self.select(int(i), int(i) + 1) for i in indices]
+        states = [np.concatenate([getattr(one, name) for one in chosen]) for name in STATES]
+        varied = [name for name in PARAMETERS if name in self.vary or name in self._explicit]
+        parameters = {name: np.concatenate([one.parameters[name] for one in chosen]) for name in varied}
+        return Ensemble.from_states(self.scene, *states, parameters)
+
+    def to_dict(self) -> dict[str, Any]:
+        """members, seed and vary as in a scene file, and the names that were given as arrays."""
+        return self._settings.to_dict() | ({"explicit": sorted(self._explicit)} if self._explicit else {})
+
+
+def _base(scene: Scene) -> dict[str, np.ndarray]:
+    values = {}
+    for name in PARAMETERS:
+        owner, attribute = name.split(".")
+        values[name] = np.asarray(getattr(getattr(scene, owner), attribute), dtype=np.float64)
+    return values
+
+
+def _explicit_parameter(faults: Faults, key: str, value: Any, n: int) -> np.ndarray:
+    array = np.asarray(value, dtype=np.float64)
+    if key in MATRICES and array.shape == (n, 3):
+        return array[:, :, None] * np.eye(3)
+    shape = (n, *PARAMETERS[key])
+    if array.shape != shape:
+        also = f" or {(n, 3)}" if key in MATRICES else ""
+        faults.add(key, value, f"has shape {array.shape}", f"give an array of shape {shape}{also}")
+    elif key in MATRICES and np.any(np.abs(array - np.swapaxes(array, 1, 2)) > 1e-9 * np.abs(array).max()):
+        faults.add(key, "...", "holds a matrix that is not symmetric", "give symmetric matrices")
+    return array
+
+
+def _positive_definite(matrices: np.ndarray) -> np.ndarray:
+    """Sylvester's criterion for symmetric (n, 3, 3); False where a number is not finite."""
+    a = matrices
+    minor = a[:, 0, 0] * a[:, 1, 1] - a[:, 0, 1] * a[:, 1, 0]
+    with np.errstate(invalid="ignore"):
+        return np.isfinite(a).all(axis=(1, 2)) & (a[:, 0, 0] > 0.0) & (minor > 0.0) & (np.linalg.det(a) > 0.0)

@@ -1,0 +1,122 @@
+"""Faults of a scene: all of them in one message, each with its key, its value and the remedy."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+
+class SceneError(ValueError):
+    """A scene, an ensemble or a setting that is refused. `faults` holds one text per fault."""
+
+    def __init__(self, faults: Iterable[str]):
+        self.faults = tuple(faults)
+        head = "" if len(self.faults) == 1 else f"{len(self.faults)} faults:\n  "
+        super().__init__(head + "\n  ".join(self.faults))
+
+
+def closest(word: str, known: Iterable[str]) -> str:
+    """ "did you mean ..." or the list of what is known."""
+    names = [str(name) for name in known]
+    near = difflib.get_close_matches(str(word), names, n=1, cutoff=0.6)
+    return f"did you mean {near[0]!r}?" if near else f"known: {', '.join(names)}"
+
+
+def shown(value: Any) -> str:
+    """A value on one line, cut where it is long."""
+    text = " ".join(repr(value.tolist() if isinstance(value, np.ndarray) else value).split())
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+class Faults:
+    """Collects faults, so that a user sees all of them at once."""
+
+    def __init__(self, prefix: str = ""):
+        self._prefix, self._found = prefix, list[str]()
+
+    def add(self, key: str, value: Any, what: str, remedy: str) -> None:
+        """Note a fault: key = value: what is wrong; how to mend it."""
+        self._found.append(f"{self._prefix}{key} = {shown(value)}: {what}; {remedy}")
+
+    def include(self, error: SceneError) -> None:
+        """Take over the faults of another object."""
+        self._found.extend(error.faults)
+
+    def raise_if_any(self) -> None:
+        """Raise SceneError with every fault noted."""
+        if self._found:
+            raise SceneError(self._found)
+
+    def choice(self, key: str, value: Any, known: Iterable[Any]) -> bool:
+        """The value must be one of those known."""
+        known = list(known)
+        good = any(value == k and type(value) is type(k) for k in known)
+        if not good:
+            self.add(key, value, "is not known", closest(value, known))
+        return good
+
+    def keys(self, key: str, given: Iterable[str], known: Iterable[str]) -> None:
+        """Every given key must be one of those known."""
+        known = list(known)
+        for name in given:
+            if name not in known:
+                self.add(f"{key}.{name}" if key else name, "...", "is an unknown key", closest(name, known))
+
+    def finite(self, key: str, value: Any, shape: tuple[int, ...] | None = None, unit: str = "") -> np.ndarray | None:
+        """A finite float64 array, of this shape if one is given; None after noting a fault."""
+        wanted = "a number" if shape == () else f"numbers of shape {shape}" if shape else "numbers"
+        remedy = f"give {wanted}" + (f" [{unit}]" if unit else "")
+        try:
+            array = np.array(value)
+            if array.dtype == bool or array.dtype.kind not in "iuf":
+                raise ValueError
+            array = array.astype(np.float64)
+        except (ValueError, TypeError):
+            self.add(key, value, "is not numeric", remedy)
+            return None
+        if shape is not None and array.shape != shape:
+            self.add(key, value, f"has shape {array.shape}", remedy)
+        elif not np.all(np.isfinite(array)):
+            self.add(key, value, "is not finite", remedy)
+        else:
+            array.setflags(write=False)
+            return array
+        return None
+
+    def number(self, key: str, value: Any, unit: str = "", least: float = -np.inf) -> float | None:
+        """A finite number not below `least`; None after noting a fault."""
+        array = self.finite(key, value, (), unit)
+        if array is None:
+            return None
+        if array < least:
+            self.add(key, value, f"is below {least:g}", f"give a number [{unit}] from {least:g}")
+            return None
+        return float(array)
+
+    def positive(self, key: str, value: Any, unit: str = "s") -> float | None:
+        """A finite number above 0; None after noting a fault."""
+        array = self.finite(key, value, (), unit)
+        if array is not None and array <= 0.0:
+            self.add(key, value, "is not positive", f"give a number above 0 [{unit}]")
+            return None
+        return None if array is None else float(array)
+
+    def symmetric(self, key: str, value: Any, unit: str) -> np.ndarray | None:
+        """A symmetric 3x3 matrix, or the diagonal of one as a 3-vector; None after noting a fault."""
+        array = np.asarray(value, dtype=object) if isinstance(value, list | tuple) else np.asarray(value)
+        if array.shape == (3,):
+            diagonal = self.finite(key, value, (3,), unit)
+            return None if diagonal is None else np.diag(diagonal)
+        if array.shape != (3, 3):
+            self.add(key, value, f"has shape {array.shape}", f"give 3 numbers or a symmetric 3x3 matrix [{unit}]")
+            return None
+        matrix = self.finite(key, value, (3, 3), unit)
+        if matrix is None:
+            return None
+        if np.abs(matrix - matrix.T).max() > 1e-9 * np.abs(matrix).max():
+            self.add(key, value, "is not symmetric", "give a symmetric matrix")
+            return None
+        return 0.5 * (matrix + matrix.T)

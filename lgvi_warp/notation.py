@@ -1,0 +1,101 @@
+"""The border between the user's notation and axes (Fossen's) and the paper's: momenta, principal axes, attitudes.
+
+velocity = nu, angular_velocity = Om, position = b, attitude = R (body to inertial); p = M nu, pi = J Om.
+Every function works on any leading dimensions; matrices and vectors of a leading dimension 1 are shared.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+# A matrix whose off-diagonal elements are below this fraction of its largest is diagonal as given.
+DIAGONAL = 1e-14
+
+
+def to_momenta(M: np.ndarray, J: np.ndarray, nu: np.ndarray, Om: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """p = M nu [N s], pi = J Om [N m s]."""
+    return (M @ nu[..., None])[..., 0], (J @ Om[..., None])[..., 0]
+
+
+def from_momenta(M: np.ndarray, J: np.ndarray, p: np.ndarray, pi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """nu = M^-1 p [m/s], Om = J^-1 pi [rad/s]."""
+    return np.linalg.solve(M, p[..., None])[..., 0], np.linalg.solve(J, pi[..., None])[..., 0]
+
+
+def principal_axes(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(Q, d) with J = Q diag(d) Q^T and det Q = +1, for J (n, 3, 3). A diagonal J keeps its axes and their order."""
+    off = np.abs(J[:, ~np.eye(3, dtype=bool)]).max(axis=1)
+    turned = off > DIAGONAL * np.abs(J).max(axis=(1, 2))
+    Q = np.repeat(np.eye(3)[None], len(J), axis=0)
+    d = np.einsum("nii->ni", J).copy()
+    if turned.any():
+        d[turned], Q[turned] = np.linalg.eigh(J[turned])
+        Q[turned, :, 2] *= np.sign(np.linalg.det(Q[turned]))[:, None]
+    return Q, d
+
+
+def rotate_into(Q: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Q^T v: body vectors from the user's axes into the axes Q."""
+    return np.matmul(np.swapaxes(Q, -1, -2), vectors[..., None])[..., 0]
+
+
+def rotate_out(Q: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Q v: body vectors from the axes Q into the user's."""
+    return np.matmul(Q, vectors[..., None])[..., 0]
+
+
+def matrix_from_rotation_vector(f: np.ndarray) -> np.ndarray:
+    """exp(hat(f)), Rodrigues' formula; exact to round-off at f = 0."""
+    f = np.asarray(f, dtype=np.float64)
+    angle = np.linalg.norm(f, axis=-1)[..., None, None]
+    a = np.sinc(angle / np.pi)
+    b = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
+    hat = np.zeros((*f.shape[:-1], 3, 3))
+    hat[..., 0, 1], hat[..., 0, 2], hat[..., 1, 2] = -f[..., 2], f[..., 1], -f[..., 0]
+    hat -= np.swapaxes(hat, -1, -2)
+    return np.eye(3) + a * hat + b * (hat @ hat)
+
+
+def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
+    """Rotation matrix of a quaternion, scalar first; any length but 0."""
+    q = np.asarray(q, dtype=np.float64)
+    w, v = q[..., :1, None], q[..., 1:]
+    norm = np.sum(q * q, axis=-1)[..., None, None]
+    hat = np.zeros((*v.shape[:-1], 3, 3))
+    hat[..., 0, 1], hat[..., 0, 2], hat[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    hat -= np.swapaxes(hat, -1, -2)
+    return np.eye(3) + 2.0 * (w * hat + hat @ hat) / norm
+
+
+def quaternion_from_matrix(R: np.ndarray) -> np.ndarray:
+    """Unit quaternion, scalar first and not negative (Shepperd 1978: divide by the largest of the four)."""
+    R = np.asarray(R, dtype=np.float64)
+    xx, yy, zz = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
+    trace = xx + yy + zz
+    four = np.stack([1 + trace, 1 + 2 * xx - trace, 1 + 2 * yy - trace, 1 + 2 * zz - trace], axis=-1)
+    x, y, z = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
+    xy, xz, yz = R[..., 0, 1] + R[..., 1, 0], R[..., 0, 2] + R[..., 2, 0], R[..., 1, 2] + R[..., 2, 1]
+    rows = np.stack(
+        [
+            np.stack([four[..., 0], x, y, z], axis=-1),
+            np.stack([x, four[..., 1], xy, xz], axis=-1),
+            np.stack([y, xy, four[..., 2], yz], axis=-1),
+            np.stack([z, xz, yz, four[..., 3]], axis=-1),
+        ],
+        axis=-2,
+    )
+    best = np.argmax(np.where(np.isnan(four), -1.0, four), axis=-1)
+    q = np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    return np.where(q[..., :1] < 0.0, -q, q)
+
+
+def matrix_from_euler_deg(angles: np.ndarray) -> np.ndarray:
+    """Rz(yaw) Ry(pitch) Rx(roll) of (roll, pitch, yaw) [deg]: Fossen's zyx convention."""
+    roll, pitch, yaw = np.moveaxis(np.deg2rad(np.asarray(angles, dtype=np.float64)), -1, 0)
+    zero = np.zeros_like(roll)
+
+    def about(*axis: np.ndarray) -> np.ndarray:
+        return matrix_from_rotation_vector(np.stack(axis, axis=-1))
+
+    return about(zero, zero, yaw) @ about(zero, pitch, zero) @ about(roll, zero, zero)

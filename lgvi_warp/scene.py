@@ -1,0 +1,209 @@
+"""A scene: one vehicle, its environment, the terms that act and the state it starts from."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp import notation
+from lgvi_warp.errors import Faults
+from lgvi_warp.vehicle import Vehicle
+
+ATTITUDES = ("attitude", "rotation_vector", "quaternion_wxyz", "euler_deg")
+VELOCITIES = ("velocity", "velocity_inertial")
+SHAPES = {
+    "position": (3,),
+    "attitude": (3, 3),
+    "rotation_vector": (3,),
+    "quaternion_wxyz": (4,),
+    "euler_deg": (3,),
+    "velocity": (3,),
+    "velocity_inertial": (3,),
+    "angular_velocity": (3,),
+}
+UNITS = {"position": "m", "rotation_vector": "rad", "euler_deg": "deg", "velocity": "m/s", "velocity_inertial": "m/s",
+         "angular_velocity": "rad/s"}  # fmt: skip
+# How far from orthogonal an attitude may be: the round-off of printing one with ten digits, and no more.
+ORTHOGONAL = 1e-9
+
+
+@dataclass(frozen=True)
+class Environment:
+    """gravity [m/s2] (may be 0), water_density [kg/m3]. Raises SceneError for values that are negative or not finite."""
+
+    gravity: float = 9.80665
+    water_density: float = 1025.0
+
+    def __post_init__(self) -> None:
+        faults = Faults("environment.")
+        faults.number("gravity", self.gravity, "m/s2", least=0.0)
+        faults.positive("water_density", self.water_density, "kg/m3")
+        faults.raise_if_any()
+
+    def to_dict(self) -> dict[str, float]:
+        """As in a scene file."""
+        return {"gravity": float(self.gravity), "water_density": float(self.water_density)}
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """The state at t = 0. What is left out is zero, or no rotation.
+
+    position (3,) [m], inertial (north, east, down). Attitude, body to inertial, in one of four ways: attitude (3, 3),
+    rotation_vector (3,) [rad], quaternion_wxyz (4,) (any length), euler_deg (roll, pitch, yaw) [deg]. Velocity in one
+    of two: velocity (3,) [m/s, body axes] or velocity_inertial (3,) [m/s]. angular_velocity (3,) [rad/s, body axes].
+
+    Raises SceneError naming every fault.
+    """
+
+    position: Any = None
+    attitude: Any = None
+    rotation_vector: Any = None
+    quaternion_wxyz: Any = None
+    euler_deg: Any = None
+    velocity: Any = None
+    velocity_inertial: Any = None
+    angular_velocity: Any = None
+
+    def __post_init__(self) -> None:
+        faults = Faults("start.")
+        for names in (ATTITUDES, VELOCITIES):
+            given = [name for name in names if getattr(self, name) is not None]
+            if len(given) > 1:
+                faults.add(" and ".join(given), "...", "say the same thing twice", "keep one of them")
+        for name, shape in SHAPES.items():
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, faults.finite(name, value, shape, UNITS.get(name, "")))
+        self._check_attitude(faults)
+        faults.raise_if_any()
+
+    def _check_attitude(self, faults: Faults) -> None:
+        R, q = self.attitude, self.quaternion_wxyz
+        if R is not None and not is_rotation(R):
+            faults.add("attitude", R, "is not a rotation (R^T R = I, det R = 1, to 1e-9)",
+                       "give more digits, or quaternion_wxyz")
+        if q is not None and not np.any(q):
+            faults.add("quaternion_wxyz", q, "is zero", "give a quaternion that is not")
+
+    def given(self) -> dict[str, np.ndarray]:
+        """What the user gave, and zeros for the rest: position, one attitude, one velocity, angular_velocity."""
+        chosen = {name: getattr(self, name) for name in SHAPES if getattr(self, name) is not None}
+        for names in (("position",), ATTITUDES[1:], VELOCITIES, ("angular_velocity",)):
+            alternatives = ATTITUDES if names == ATTITUDES[1:] else names
+            if not any(name in chosen for name in alternatives):
+                chosen[names[0]] = np.zeros(SHAPES[names[0]])
+        return chosen
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in a scene file: what was given."""
+        return {name: getattr(self, name).tolist() for name in SHAPES if getattr(self, name) is not None}
+
+
+def is_rotation(R: np.ndarray) -> bool:
+    """Whether every matrix of R (..., 3, 3) is a rotation to ORTHOGONAL."""
+    close = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max() <= ORTHOGONAL
+    return bool(close and np.all(np.linalg.det(R) > 0.0))
+
+
+def resolve_attitude(values: Mapping[str, np.ndarray]) -> np.ndarray:
+    """R (n, 3, 3), body to inertial, from whichever way the attitude was given, each (n, ...)."""
+    if "attitude" in values:
+        return np.asarray(values["attitude"])
+    if "quaternion_wxyz" in values:
+        return notation.matrix_from_quaternion(values["quaternion_wxyz"])
+    if "euler_deg" in values:
+        return notation.matrix_from_euler_deg(values["euler_deg"])
+    return notation.matrix_from_rotation_vector(values["rotation_vector"])
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """The [run] section of a scene file: method, step [s], duration [s], save_every [s], dtype. Raises SceneError."""
+
+    method: str = "psi_s"
+    step: float | None = None
+    duration: float | None = None
+    save_every: float | None = None
+    dtype: str = "float64"
+
+    def __post_init__(self) -> None:
+        faults = Faults("run.")
+        for name in ("step", "duration", "save_every"):
+            if getattr(self, name) is not None:
+                faults.positive(name, getattr(self, name))
+        faults.choice("dtype", self.dtype, ("float64", "float32"))
+        faults.raise_if_any()
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in a scene file."""
+        return {key: value for key, value in vars(self).items() if value is not None}
+
+
+@dataclass(frozen=True)
+class EnsembleSettings:
+    """The [ensemble] section of a scene file: members, seed, and what varies (name -> distribution). Raises SceneError."""
+
+    members: int = 1
+    seed: int = 0
+    vary: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        faults = Faults("ensemble.")
+        for name, least in (("members", 1), ("seed", 0)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+                faults.add(name, value, f"is not a whole number from {least}", f"give {least} or more")
+        faults.raise_if_any()
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in a scene file."""
+        vary = {name: distribution.to_dict() for name, distribution in self.vary.items()}
+        return {"members": int(self.members), "seed": int(self.seed)} | ({"vary": vary} if vary else {})
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything that one simulated vehicle needs. Weight, buoyancy and restoring moment follow from the vehicle.
+
+    terms and controller: further laws by name; this version knows none, and says so. run, ensemble_settings: what a
+    scene file holds besides. Raises SceneError naming every fault.
+    """
+
+    vehicle: Vehicle
+    environment: Environment = field(default_factory=Environment)
+    terms: Sequence[Any] = ()
+    start: Start = field(default_factory=Start)
+    controller: Any = None
+    run: RunSettings = field(default_factory=RunSettings)
+    ensemble_settings: EnsembleSettings | None = None
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        remedy = "leave it out: weight, buoyancy and restoring moment follow from the vehicle, other laws are not modelled"
+        if len(self.terms):
+            faults.add("terms", list(self.terms), "is not known to this version", remedy)
+        if self.controller is not None:
+            faults.add("controller", self.controller, "is not known to this version", remedy)
+        faults.raise_if_any()
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None) -> Scene:
+        """Read a scene file (TOML). overrides: dotted key -> value, replacing what the file says. Raises SceneError."""
+        from lgvi_warp import scenefile
+
+        return scenefile.load(path, overrides)
+
+    def to_dict(self) -> dict[str, Any]:
+        """In the shape of a scene file."""
+        content = {
+            "vehicle": self.vehicle.to_dict(),
+            "environment": self.environment.to_dict(),
+            "start": self.start.to_dict(),
+            "run": self.run.to_dict(),
+        }
+        return content | ({"ensemble": self.ensemble_settings.to_dict()} if self.ensemble_settings else {})

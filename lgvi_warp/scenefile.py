@@ -1,0 +1,128 @@
+"""The scene file: TOML in, Scene out, every fault of every section in one message."""
+
+from __future__ import annotations
+
+import inspect
+import os
+import tomllib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from lgvi_warp import distributions
+from lgvi_warp.errors import Faults, SceneError
+from lgvi_warp.scene import EnsembleSettings, Environment, RunSettings, Scene, Start
+from lgvi_warp.vehicle import Vehicle
+
+SECTIONS = ("vehicle", "environment", "start", "ensemble", "run", "terms", "controller")
+
+
+def load(path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None) -> Scene:
+    """Read a scene file; overrides (dotted key -> value) replace what it says. Raises SceneError naming every fault."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise SceneError([f"scene file {os.fspath(path)}: {error}; give the path of a TOML file"]) from None
+    return loads(text, overrides, os.fspath(path))
+
+
+def loads(text: str, overrides: Mapping[str, Any] | None = None, name: str = "scene") -> Scene:
+    """The same from a text."""
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError([f"{name} is not TOML: {error}; mend that line"]) from None
+    for key, value in (overrides or {}).items():
+        override(content, key, value)
+    return from_dict(content)
+
+
+def override(content: dict[str, Any], key: str, value: Any) -> None:
+    """Set a dotted key, such as vehicle.mass or ensemble.members; a text is read as TOML if it is TOML."""
+    if isinstance(value, str):
+        try:
+            value = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            pass
+    section, _, rest = key.partition(".")
+    if not rest:
+        raise SceneError([f"{key}: is not a dotted key; write section.key=value, such as vehicle.mass=120"])
+    table = content.setdefault(section, {})
+    if section == "ensemble" and rest.startswith("vary."):
+        table, rest = table.setdefault("vary", {}), rest.removeprefix("vary.")
+    if not isinstance(table, dict):
+        raise SceneError([f"{key}: {section} is not a table; write section.key=value"])
+    table[rest] = value
+
+
+def from_dict(content: Mapping[str, Any]) -> Scene:
+    """A Scene from the tables of a scene file. Raises SceneError naming every fault."""
+    faults = Faults()
+    faults.keys("", content, SECTIONS)
+    tables: dict[str, Any] = {}
+    for name in SECTIONS[:5]:
+        tables[name] = content.get(name, {})
+        if not isinstance(tables[name], Mapping):
+            faults.add(name, tables[name], "is not a table", f"write [{name}] and its keys below")
+            tables[name] = {}
+    if not tables["vehicle"]:
+        faults.add("vehicle", "", "is missing", "write [vehicle] with mass and inertia")
+    vehicle = _build(faults, "vehicle", Vehicle, tables["vehicle"]) if tables["vehicle"] else None
+    environment = _build(faults, "environment", Environment, tables["environment"])
+    start = _build(faults, "start", Start, tables["start"])
+    run = _build(faults, "run", RunSettings, tables["run"])
+    settings = _build(faults, "ensemble", EnsembleSettings, _with_laws(faults, tables["ensemble"]))
+    scene = None
+    try:
+        if vehicle is not None and environment is not None and start is not None and run is not None:
+            terms, controller = content.get("terms", ()), content.get("controller")
+            scene = Scene(vehicle, environment, terms, start, controller, run, settings if tables["ensemble"] else None)
+    except SceneError as error:
+        faults.include(error)
+    faults.raise_if_any()
+    assert scene is not None
+    _check_ensemble(scene)
+    return scene
+
+
+def _check_ensemble(scene: Scene) -> None:
+    """What varies must fit the scene: found here, before anything runs."""
+    from lgvi_warp.ensemble import Ensemble
+
+    Ensemble.from_scene(scene)
+
+
+def _build(faults: Faults, name: str, kind: Callable[..., Any], table: Mapping[str, Any]) -> Any:
+    """Construct a section's object, or note what is wrong with it."""
+    signature = [key for key in inspect.signature(kind).parameters]
+    required = [key for key, p in inspect.signature(kind).parameters.items() if p.default is inspect.Parameter.empty]
+    faults.keys(name, table, signature)
+    missing = [key for key in required if key not in table]
+    for key in missing:
+        faults.add(f"{name}.{key}", "", "is missing", "give it")
+    known = {key: value for key, value in table.items() if key in signature}
+    try:
+        # What is missing is stood in for, so that the faults of what is there are found as well.
+        made = kind(**{key: _STAND_INS[key] for key in missing} | known)
+    except SceneError as error:
+        faults.include(error)
+        return None
+    return None if missing else made
+
+
+_STAND_INS = {"mass": 1.0, "inertia": (1.0, 1.0, 1.0)}
+
+
+def _with_laws(faults: Faults, table: Mapping[str, Any]) -> dict[str, Any]:
+    """The [ensemble] table with its distributions made."""
+    laws = {}
+    vary = table.get("vary", {})
+    if not isinstance(vary, Mapping):
+        faults.add("ensemble.vary", vary, "is not a table", 'write [ensemble.vary] and "vehicle.mass" = {...} below')
+        vary = {}
+    for key, value in vary.items():
+        try:
+            laws[key] = distributions.from_dict(f'ensemble.vary."{key}"', value)
+        except SceneError as error:
+            faults.include(error)
+    return {key: value for key, value in table.items() if key != "vary"} | {"vary": laws}

@@ -59,6 +59,10 @@ class Distribution:
             faults.add("low and high", (low, high), "are not in order", "give low < high")
         faults.raise_if_any()
 
+    def numbers(self) -> list[Any]:
+        """The numbers that were given."""
+        return [getattr(self, item.name) for item in fields(self) if getattr(self, item.name) is not None]
+
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
         """Values at the levels u (n, *shape) of a quantity whose scene value is base (*shape)."""
         raise TypeError(f"{type(self).__name__} is abstract")

@@ -135,11 +135,11 @@ class Ensemble:
     def _check_shape(self, faults: Faults, name: str, law: Distribution) -> None:
         shape = self._drawn_base(name).shape
         try:
-            good = law.quantile(np.full((1, *shape), 0.5), self._drawn_base(name)).shape == (1, *shape)
+            good = np.broadcast_shapes(shape, *(np.shape(number) for number in law.numbers())) == shape
         except ValueError:
             good = False
         if not good:
-            wanted = f"numbers or {shape[0]} per component" if shape else "numbers"
+            wanted = f"one number or {shape[0]}, one per component" if shape else "one number"
             faults.add(f'"{name}"', law, f"does not fit a quantity of shape {shape}", f"give {wanted}")
 
     def _check_physical(self) -> None:

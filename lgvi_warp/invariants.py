@@ -13,8 +13,12 @@ if TYPE_CHECKING:
 
 
 def _times(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Matrices (1 or n, 3, 3) times vectors (k, n, 3)."""
-    return np.matmul(matrix, vectors.astype(np.float64)[..., None])[..., 0]
+    """Matrices (1 or n, 3, 3) or (k, n, 3, 3) times vectors (k, n, 3)."""
+    diagonal = matrix.ndim == 3 and not np.any(matrix[:, ~np.eye(3, dtype=bool)])
+    if diagonal:
+        return np.einsum("nii->ni", matrix) * vectors
+    rows = (sum(matrix[..., i, j] * vectors[..., j] for j in range(3)) for i in range(3))
+    return np.stack(list(rows), axis=-1)  # type: ignore[arg-type]
 
 
 def _mass_matrix(parameters: terms.Parameters) -> np.ndarray:
@@ -35,13 +39,15 @@ def energy(result: Result) -> np.ndarray:
 
 def linear_momentum(result: Result) -> np.ndarray:
     """R M nu in inertial axes, (k, n, 3) [N s]. Without a potential it is conserved."""
-    return _times(result.attitude.astype(np.float64), _times(_mass_matrix(result.parameters), result.velocity))
+    p = _times(_mass_matrix(result.parameters), result.velocity.astype(np.float64))
+    return _times(result.attitude.astype(np.float64), p)
 
 
 def angular_momentum(result: Result) -> np.ndarray:
     """R J Om + b x R M nu about the inertial origin, (k, n, 3) [N m s]. Without a potential it is conserved."""
-    spin = _times(result.parameters["vehicle.inertia"], result.angular_velocity)
-    orbit = np.cross(result.position.astype(np.float64), linear_momentum(result))
+    spin = _times(result.parameters["vehicle.inertia"], result.angular_velocity.astype(np.float64))
+    b, P = (np.moveaxis(x, -1, 0) for x in (result.position.astype(np.float64), linear_momentum(result)))
+    orbit = np.stack([b[1] * P[2] - b[2] * P[1], b[2] * P[0] - b[0] * P[2], b[0] * P[1] - b[1] * P[0]], axis=-1)
     return _times(result.attitude.astype(np.float64), spin) + orbit
 
 

@@ -67,7 +67,9 @@ def fma_peak(dtype: str = "float64", width: int | None = None, rounds: int = 5, 
     import warp as wp
 
     from lgvi_kernels.peak import CHAINS, make_peak
+    from lgvi_warp import warp_setup
 
+    warp_setup.start()
     real = wp.float64 if dtype == "float64" else wp.float32
     width = width or default_width(dtype)
     kernel, Lane = make_peak(width, real)

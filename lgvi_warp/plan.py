@@ -13,7 +13,7 @@ import warp as wp
 
 from lgvi_kernels.advance import CHUNK, SAMPLE_FIELDS, STATE_FIELDS, Advance, Spec, make_advance
 from lgvi_kernels.lanes import WIDTHS, int_lane
-from lgvi_warp import notation, terms
+from lgvi_warp import notation, terms, warp_setup
 from lgvi_warp.ensemble import Ensemble, Members
 from lgvi_warp.errors import Faults
 from lgvi_warp.machine import default_width
@@ -145,6 +145,7 @@ class Plan:
     def compile(self) -> float:
         """Load the kernel, compiling it if Warp's cache has none. Returns the seconds it took."""
         start = time.perf_counter()
+        warp_setup.start()
         with _build:
             wp.load_module(self.advance.kernel.module, device="cpu")
         return time.perf_counter() - start

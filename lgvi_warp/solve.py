@@ -30,11 +30,11 @@ SHAPES: dict[str, tuple[int, ...]] = {
 
 def solve(
     fleet: Ensemble | Scene,
-    method: str | Method = "psi_s",
+    method: str | Method | None = None,
     h: float | None = None,
     t1: float | None = None,
     save: SaveAt | None = None,
-    dtype: str = "float64",
+    dtype: str | None = None,
     *,
     threads: int | None = None,
     width: int | None = None,
@@ -44,9 +44,9 @@ def solve(
     """Advance every member of the fleet from t = 0 to t1 and keep the samples asked for.
 
     fleet: an Ensemble, or a Scene for its own ensemble (one vehicle if it has none).
-    method: a name or a Method. h, t1: step and end [s]; left out, the scene's [run] settings.
-    save: what to keep (default: every [run] save_every of the scene, else the start and the end).
-    dtype: "float64" or "float32". threads: default all cores. width: vehicles per packet, default from the CPU.
+    method: a name or a Method. h, t1: step and end [s]. dtype: "float64" or "float32". What is left out is taken from
+    the scene's [run] section (method "psi_s" and float64 where it says nothing).
+    save: what to keep (default: every [run] save_every of the scene, else the start and the end). threads: default all cores. width: vehicles per packet, default from the CPU.
     checks: "safe" gives each member a status and freezes it when it fails; "none" leaves that code out.
     progress: called with the fraction of the work that is done, from the threads that do it.
 
@@ -64,11 +64,11 @@ def solve(
 
 def make_plan(
     ensemble: Ensemble,
-    method: str | Method = "psi_s",
+    method: str | Method | None = None,
     h: float | None = None,
     t1: float | None = None,
     save: SaveAt | None = None,
-    dtype: str = "float64",
+    dtype: str | None = None,
     *,
     width: int | None = None,
     checks: str = "safe",
@@ -86,8 +86,8 @@ def make_plan(
     if save is None:
         save = SaveAt(every=settings.save_every)
     grid = time_grid(float(h), float(t1), save)  # type: ignore[arg-type]
-    chosen = method if isinstance(method, Method) else Method(method)
-    return Plan(ensemble, chosen, grid, save.fields, dtype, width, checks)
+    chosen = method if isinstance(method, Method) else Method(method or settings.method)
+    return Plan(ensemble, chosen, grid, save.fields, dtype or settings.dtype, width, checks)
 
 
 class _Progress:

@@ -179,7 +179,9 @@ def summary(result: Any, files: list[Path], seconds: float) -> str:
         failed = (result.status == code).nonzero()[0]
         if code and len(failed):
             first = int(failed[0])
-            lines.append(f"  {code.name.lower()}: {code.text} (first: member {first} at {result.failure_time[first]:g} s)")
+            lines.append(
+                f"  {code.name.lower()}: {code.text} (first: member {first} at {result.failure_time[first]:g} s)"
+            )
     lines += [f"file        {path} ({path.stat().st_size / 1e6:.1f} MB)" for path in files]
     return "\n".join(lines)
 
@@ -222,7 +224,9 @@ def info(chosen: argparse.Namespace) -> int:
     print("versions    " + ", ".join(f"{name} {version}" for name, version in machine.versions().items()))
     for dtype in ("float64", "float32"):
         peak = machine.fma_peak(dtype)
-        print(f"{dtype}     {machine.default_width(dtype)} vehicles per packet; one core's peak {peak / 1e9:.1f} GFMA/s")
+        print(
+            f"{dtype}     {machine.default_width(dtype)} vehicles per packet; one core's peak {peak / 1e9:.1f} GFMA/s"
+        )
     return 0
 
 

@@ -46,22 +46,27 @@ class Distribution:
         faults = Faults(f"{self.kind}.")
         given = [name for name in self.widths if getattr(self, name) is not None]
         if self.widths and len(given) != 1:
-            faults.add(" and ".join(given) or "width", "...", f"{len(given)} given", f"give one of {', '.join(self.widths)}")
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if value is None:
-                continue
-            array = faults.finite(item.name, value)
-            if array is not None and item.name not in ("mean", "median", "low", "high") and np.any(array < 0.0):
-                faults.add(item.name, value, "is negative", "give a spread from 0")
-        low, high = getattr(self, "low", None), getattr(self, "high", None)
-        if low is not None and high is not None and not np.all(np.less(low, high)):
-            faults.add("low and high", (low, high), "are not in order", "give low < high")
+            remedy = f"give one of {', '.join(self.widths)}"
+            faults.add(" and ".join(given) or "width", "...", f"{len(given)} given", remedy)
+        values = {name: faults.finite(name, value) for name, value in self._given().items()}
+        for name, array in values.items():
+            if array is not None and name not in ("mean", "median", "low", "high") and np.any(array < 0.0):
+                faults.add(name, array, "is negative", "give a spread from 0")
+        low, high = values.get("low"), values.get("high")
+        if low is not None and high is not None and not ordered(low, high):
+            faults.add("low and high", (low.tolist(), high.tolist()), "are not in order", "give low < high")
+        self._check_more(faults)
         faults.raise_if_any()
+
+    def _given(self) -> dict[str, Any]:
+        return {item.name: getattr(self, item.name) for item in fields(self) if getattr(self, item.name) is not None}
+
+    def _check_more(self, faults: Faults) -> None:
+        """Note what else is wrong with this kind of law."""
 
     def numbers(self) -> list[Any]:
         """The numbers that were given."""
-        return [getattr(self, item.name) for item in fields(self) if getattr(self, item.name) is not None]
+        return list(self._given().values())
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
         """Values at the levels u (n, *shape) of a quantity whose scene value is base (*shape)."""
@@ -69,8 +74,15 @@ class Distribution:
 
     def to_dict(self) -> dict[str, Any]:
         """As in a scene file: { normal = { std = ... } }."""
-        values = {item.name: getattr(self, item.name) for item in fields(self)}
-        return {self.kind: {key: np.asarray(v).tolist() for key, v in values.items() if v is not None}}
+        return {self.kind: {key: np.asarray(value).tolist() for key, value in self._given().items()}}
+
+
+def ordered(low: np.ndarray, high: np.ndarray) -> bool:
+    """Whether low < high in every component; False where their shapes do not fit each other."""
+    try:
+        return bool(np.all(low < high))
+    except ValueError:
+        return False
 
 
 def _width(std: Spread | None, relative: Spread | None, base: np.ndarray) -> np.ndarray:
@@ -107,10 +119,11 @@ class Uniform(Distribution):
     kind: ClassVar[str] = "uniform"
     widths: ClassVar[tuple[str, ...]] = ("high", "half_width", "relative")
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if (self.low is None) != (self.high is None):
-            raise SceneError(["uniform.low and uniform.high: one is missing; give both, or half_width, or relative"])
+    def _check_more(self, faults: Faults) -> None:
+        if self.low is not None and self.high is None:
+            faults.add("low", self.low, "is given without high", "give both, or half_width, or relative")
+        if self.high is not None and self.low is None:
+            faults.add("high", self.high, "is given without low", "give both, or half_width, or relative")
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
         """low + (high - low) u."""
@@ -137,32 +150,45 @@ class LogNormal(Distribution):
 
 @dataclass(frozen=True)
 class TruncatedNormal(Distribution):
-    """Normal kept between low and high (absolute), or within `width` standard deviations of its mean (default 3)."""
+    """Normal kept between low and high (absolute; one alone leaves the other side open), or within `width` standard
+    deviations of its mean (default 3).
+    """
 
     std: Spread | None = None
     relative: Spread | None = None
     mean: Spread | None = None
     low: Spread | None = None
     high: Spread | None = None
-    width: float = 3.0
+    width: Spread | None = None
     kind: ClassVar[str] = "truncated_normal"
     widths: ClassVar[tuple[str, ...]] = ("std", "relative")
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """The normal's quantile at a level between those of the bounds; the upper half by symmetry, for the far tail."""
+        """The normal's quantile at a level between those of the bounds; upper tails by symmetry, to keep their digits."""
         from scipy.special import ndtr, ndtri
 
         mean = base if self.mean is None else np.asarray(self.mean)
         std = _width(self.std, self.relative, base)
         scale = np.where(std > 0.0, std, 1.0)
-        a = -self.width if self.low is None else (np.asarray(self.low) - mean) / scale
-        b = self.width if self.high is None else (np.asarray(self.high) - mean) / scale
-        a, b = np.broadcast_arrays(np.asarray(a, dtype=float), np.asarray(b, dtype=float))
+        low, high, width = self._bounds()
+        a = np.maximum((low - mean) / scale, -width)
+        b = np.minimum((high - mean) / scale, width)
         flip = a > 0.0
-        low, high = np.where(flip, -b, a), np.where(flip, -a, b)
-        level = ndtr(low) + (ndtr(high) - ndtr(low)) * np.where(flip, 1.0 - u, u)
-        z = np.clip(ndtri(level), low, high)
-        return mean + std * np.where(flip, -z, z)
+        a, b = np.where(flip, -b, a), np.where(flip, -a, b)
+        level = ndtr(a) + (ndtr(b) - ndtr(a)) * np.where(flip, 1.0 - u, u)
+        z = np.clip(ndtri(level), a, b)
+        return np.clip(mean + std * np.where(flip, -z, z), low, high)
+
+    def _check_more(self, faults: Faults) -> None:
+        if self.width is not None and (self.low is not None or self.high is not None):
+            faults.add("width", self.width, "is given with low or high", "keep either width or the bounds")
+
+    def _bounds(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """low, high, width, infinite where not given; width is 3 if none is."""
+        width = 3.0 if self.width is None and self.low is None and self.high is None else self.width
+        open_ended = ((self.low, -np.inf), (self.high, np.inf), (width, np.inf))
+        low, high, width = (np.asarray(default if value is None else value) for value, default in open_ended)
+        return low, high, width
 
 
 KINDS: dict[str, type[Distribution]] = {law.kind: law for law in (Normal, Uniform, LogNormal, TruncatedNormal)}

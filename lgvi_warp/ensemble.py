@@ -82,7 +82,8 @@ class Ensemble:
         """
         faults = Faults()
         states = dict(zip(STATES, (position, attitude, velocity, angular_velocity), strict=True))
-        explicit = {f"start.{key}": np.asarray(value, dtype=np.float64) for key, value in states.items()}
+        explicit = {f"start.{key}": _floats(faults, key, value) for key, value in states.items()}
+        faults.raise_if_any()
         n = len(explicit["start.position"]) if explicit["start.position"].ndim else 0
         if n == 0:
             faults.add("position", position, "holds no member", "give arrays of length 1 or more")
@@ -93,9 +94,10 @@ class Ensemble:
         faults.keys("", parameters or {}, PARAMETERS)
         faults.raise_if_any()
         R = explicit["start.attitude"]
-        R = R[np.isfinite(R).all(axis=(1, 2))]
-        if len(R) and not scenes.is_rotation(R):
-            faults.add("attitude", "...", "holds a matrix that is not a rotation to 1e-9", "give R^T R = I, det R = 1")
+        bad = np.isfinite(R).all(axis=(1, 2)) & ~scenes.rotations(R)
+        if bad.any():
+            what = f"is not a rotation to 1e-9 ({bad.sum()} of {n} members)"
+            faults.add(f"attitude of member {bad.argmax()}", R[bad.argmax()], what, "give R^T R = I, det R = 1")
         for key, value in (parameters or {}).items():
             explicit[key] = _explicit_parameter(faults, key, value, n)
         faults.raise_if_any()
@@ -125,9 +127,9 @@ class Ensemble:
             elif not isinstance(law, Distribution):
                 faults.add(f'"{name}"', law, "is not a distribution", "give lw.Normal(std=...) or another")
             elif name == "start.attitude":
-                faults.add(f'"{name}"', law, "cannot vary entry by entry", "give rotation_vector or euler_deg and vary it")
+                faults.add(f'"{name}"', law, "cannot vary by entry", "give rotation_vector or euler_deg and vary it")
             elif name in MATRICES and np.any(self._base[name] - np.diag(np.diag(self._base[name]))):
-                faults.add(f'"{name}"', law, "would vary a full matrix", "give arrays: Ensemble.from_states(parameters=...)")
+                faults.add(f'"{name}"', law, "would vary a full matrix", "give from_states(parameters=...) its values")
             else:
                 self._check_shape(faults, name, law)
         faults.raise_if_any()
@@ -160,8 +162,10 @@ class Ensemble:
             if bad.any():
                 first = int(np.argmax(bad))
                 value = mass[first] if "+" in key else p[key][first]
-                faults.add(f"{key} of member {first}", value, f"is unphysical ({int(bad.sum())} of {len(bad)} members)",
-                           "use a smaller spread, TruncatedNormal or LogNormal")
+                drawn = any(name in self.vary for name in key.split(" + "))
+                remedy = "use a smaller spread, TruncatedNormal or LogNormal" if drawn else "give a positive value"
+                what = f"is unphysical ({int(bad.sum())} of {len(bad)} members)"
+                faults.add(f"{key} of member {first}", value, what, remedy)
         faults.raise_if_any()
 
     def _drawn_base(self, name: str) -> np.ndarray:
@@ -185,13 +189,16 @@ class Ensemble:
         return {name: self._value(name, first, stop) for name in PARAMETERS}
 
     def select(self, first: int, stop: int) -> Members:
-        """The numbers of the members first to stop."""
+        """The numbers of the members first to stop (not included). Raises IndexError where there are none."""
+        if not 0 <= first < stop <= self.members:
+            raise IndexError(f"members {first} to {stop} of {self.members}")
         m = stop - first
         start = {key.removeprefix("start."): self._value(key, first, stop) for key in self._start}
         R = np.broadcast_to(scenes.resolve_attitude(start), (m, 3, 3))
         if "velocity_inertial" in start:
-            v = np.broadcast_to(start["velocity_inertial"], (m, 3))
-            nu = np.einsum("nji,nj->ni", R, v)
+            # Written out: the sum's order, and so the bits, must not depend on how many members are asked for.
+            v = start["velocity_inertial"]
+            nu = R[:, 0] * v[:, :1] + R[:, 1] * v[:, 1:2] + R[:, 2] * v[:, 2:]
         else:
             nu = start["velocity"]
         position, nu, Om = (np.broadcast_to(x, (m, 3)) for x in (start["position"], nu, start["angular_velocity"]))
@@ -218,8 +225,27 @@ def _base(scene: Scene) -> dict[str, np.ndarray]:
     return values
 
 
+def _floats(faults: Faults, key: str, value: Any) -> np.ndarray:
+    """A float64 copy, which may hold NaN: the caller's later writes to his array do not reach the ensemble."""
+    try:
+        return np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        faults.add(key, value, "is not numeric", "give an array of numbers")
+        return np.empty(0)
+
+
+def check_names(vary: Mapping[str, Distribution]) -> None:
+    """Refuse names that no scene has. Raises SceneError."""
+    faults = Faults("ensemble.vary.")
+    known = [*PARAMETERS, *(f"start.{name}" for name in scenes.SHAPES)]
+    for name, law in vary.items():
+        if name not in known:
+            faults.add(f'"{name}"', law, "does not name what a scene has", closest(name, known))
+    faults.raise_if_any()
+
+
 def _explicit_parameter(faults: Faults, key: str, value: Any, n: int) -> np.ndarray:
-    array = np.asarray(value, dtype=np.float64)
+    array = _floats(faults, key, value)
     if key in MATRICES and array.shape == (n, 3):
         return array[:, :, None] * np.eye(3)
     shape = (n, *PARAMETERS[key])

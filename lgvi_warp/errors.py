@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,11 @@ def shown(value: Any) -> str:
     return text if len(text) <= 80 else text[:77] + "..."
 
 
+def holds_bool(value: Any) -> bool:
+    """Whether a truth value hides among numbers: [true, 1.0] would pass for [1.0, 1.0]."""
+    return isinstance(value, bool) or (isinstance(value, list | tuple) and any(holds_bool(item) for item in value))
+
+
 class Faults:
     """Collects faults, so that a user sees all of them at once."""
 
@@ -41,9 +47,13 @@ class Faults:
         """Note a fault: key = value: what is wrong; how to mend it."""
         self._found.append(f"{self._prefix}{key} = {shown(value)}: {what}; {remedy}")
 
-    def include(self, error: SceneError) -> None:
-        """Take over the faults of another object."""
-        self._found.extend(error.faults)
+    @contextlib.contextmanager
+    def including(self) -> Iterator[None]:
+        """Take over the faults that are raised inside, and go on."""
+        try:
+            yield
+        except SceneError as error:
+            self._found.extend(error.faults)
 
     def raise_if_any(self) -> None:
         """Raise SceneError with every fault noted."""
@@ -59,11 +69,12 @@ class Faults:
         return good
 
     def keys(self, key: str, given: Iterable[str], known: Iterable[str]) -> None:
-        """Every given key must be one of those known."""
+        """Every given key must be one of those known; a mapping's values are shown."""
         known = list(known)
         for name in given:
             if name not in known:
-                self.add(f"{key}.{name}" if key else name, "...", "is an unknown key", closest(name, known))
+                value = given[name] if isinstance(given, Mapping) else "..."
+                self.add(f"{key}.{name}" if key else name, value, "is an unknown key", closest(name, known))
 
     def finite(self, key: str, value: Any, shape: tuple[int, ...] | None = None, unit: str = "") -> np.ndarray | None:
         """A finite float64 array, of this shape if one is given; None after noting a fault."""
@@ -71,7 +82,7 @@ class Faults:
         remedy = f"give {wanted}" + (f" [{unit}]" if unit else "")
         try:
             array = np.array(value)
-            if array.dtype == bool or array.dtype.kind not in "iuf":
+            if array.dtype.kind not in "iuf" or holds_bool(value):
                 raise ValueError
             array = array.astype(np.float64)
         except (ValueError, TypeError):

@@ -59,6 +59,7 @@ def matrix_from_rotation_vector(f: np.ndarray) -> np.ndarray:
 def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
     """Rotation matrix of a quaternion, scalar first; any length but 0."""
     q = np.asarray(q, dtype=np.float64)
+    q = q / np.abs(q).max(axis=-1, keepdims=True)  # its square neither overflows nor vanishes
     w, v = q[..., :1, None], q[..., 1:]
     norm = np.sum(q * q, axis=-1)[..., None, None]
     hat = np.zeros((*v.shape[:-1], 3, 3))

@@ -188,7 +188,8 @@ class Packets:
             packed = np.repeat(values[:, :, None], width, axis=2)
         else:
             packed = pack(values, width)
-        return packed.astype(self.plan.dtype)
+        with np.errstate(over="ignore"):  # what float32 cannot hold is infinite there, and gets its status
+            return packed.astype(self.plan.dtype)
 
     def _inertia(self) -> np.ndarray:
         J, M, scale = np.broadcast_arrays(self.J[:, :, None], self.M, self.scale[:, None, None])
@@ -197,15 +198,16 @@ class Packets:
         data = np.zeros(len(rows), self.plan.advance.Inertia.numpy_dtype())
         _set_vector(data["J"], rows)
         data["inverse_scale"] = self._lanes(1.0 / scale[:, 0, :1])[:, 0]
-        diagonal = self._lanes(np.einsum("nii->ni", inverse))
-        if self.plan.spec.mass == "isotropic":
-            data["inverse_mass"] = diagonal[:, 0]
-        elif self.plan.spec.mass == "diagonal":
-            _set_vector(data["inverse_mass"], diagonal)
-        else:
-            _set_vector(data["inverse_mass"]["diagonal"], diagonal)
-            off = np.stack([inverse[:, 1, 2], inverse[:, 2, 0], inverse[:, 0, 1]], axis=1)
-            _set_vector(data["inverse_mass"]["off_diagonal"], self._lanes(off))
+        mean = np.einsum("nii->n", inverse) / 3.0
+        data["mean"] = self._lanes(mean[:, None])[:, 0]
+        deviation = inverse - mean[:, None, None] * np.eye(3)
+        diagonal = self._lanes(np.einsum("nii->ni", deviation))
+        if self.plan.spec.mass == "diagonal":
+            _set_vector(data["anisotropy"], diagonal)
+        elif self.plan.spec.mass == "full":
+            _set_vector(data["anisotropy"]["diagonal"], diagonal)
+            off = np.stack([deviation[:, 1, 2], deviation[:, 2, 0], deviation[:, 0, 1]], axis=1)
+            _set_vector(data["anisotropy"]["off_diagonal"], self._lanes(off))
         return data
 
     def _params(self) -> np.ndarray:
@@ -233,7 +235,8 @@ class Packets:
         rows[:, 9:12] = m.position
         rows[:, 12:15] = np.einsum("nij,nj->ni", np.broadcast_to(self.M, (m.count, 3, 3)), nu)
         rows[:, 15:] = self.J / self.scale[:, None] * Om
-        return pack(rows, self.plan.spec.width).astype(self.plan.dtype)
+        with np.errstate(over="ignore"):
+            return pack(rows, self.plan.spec.width).astype(self.plan.dtype)
 
     def _times(self) -> None:
         real, grid = self.plan.spec.real, self.plan.grid

@@ -87,14 +87,22 @@ def time_grid(h: float, t1: float, save: SaveAt) -> TimeGrid:
     times = sorted(wanted)
     spacing = Fraction(0)
     for t in {b - a for a, b in zip(times, times[1:], strict=False)}:
-        spacing = Fraction(math.gcd(spacing.numerator * t.denominator, t.numerator * spacing.denominator),
-                           spacing.denominator * t.denominator)
+        spacing = Fraction(
+            math.gcd(spacing.numerator * t.denominator, t.numerator * spacing.denominator),
+            spacing.denominator * t.denominator,
+        )
     step = spacing / math.ceil(spacing / meant)
     if meant / step > MOST_SHORTENING:
-        faults.add("step", h, f"would have to shrink to {float(step):.3g} s to meet every sample time and the end",
-                   "choose sample times and a duration that are multiples of the step")
+        faults.add(
+            "step",
+            h,
+            f"would have to shrink to {float(step):.3g} s to meet every sample time and the end",
+            "choose sample times and a duration that are multiples of the step",
+        )
     if end / step >= 2**31 - 1:
-        faults.add("step", h, f"needs {int(end / step)} steps", "at most 2,147,483,646 steps can be made: use a longer step")
+        faults.add(
+            "step", h, f"needs {int(end / step)} steps", "at most 2,147,483,646 steps can be made: use a longer step"
+        )
     faults.raise_if_any()
     messages: tuple[str, ...] = ()
     if step != meant:

@@ -33,7 +33,7 @@ ORTHOGONAL = 1e-9
 
 @dataclass(frozen=True)
 class Environment:
-    """gravity [m/s2] (may be 0), water_density [kg/m3]. Raises SceneError for values that are negative or not finite."""
+    """gravity [m/s2] (may be 0), water_density [kg/m3]. Raises SceneError for what is negative or not finite."""
 
     gravity: float = 9.80665
     water_density: float = 1025.0
@@ -84,9 +84,13 @@ class Start:
 
     def _check_attitude(self, faults: Faults) -> None:
         R, q = self.attitude, self.quaternion_wxyz
-        if R is not None and not is_rotation(R):
-            faults.add("attitude", R, "is not a rotation (R^T R = I, det R = 1, to 1e-9)",
-                       "give more digits, or quaternion_wxyz")
+        if R is not None and not rotations(R):
+            faults.add(
+                "attitude",
+                R,
+                "is not a rotation (R^T R = I, det R = 1, to 1e-9)",
+                "give more digits, or quaternion_wxyz",
+            )
         if q is not None and not np.any(q):
             faults.add("quaternion_wxyz", q, "is zero", "give a quaternion that is not")
 
@@ -104,10 +108,11 @@ class Start:
         return {name: getattr(self, name).tolist() for name in SHAPES if getattr(self, name) is not None}
 
 
-def is_rotation(R: np.ndarray) -> bool:
-    """Whether every matrix of R (..., 3, 3) is a rotation to ORTHOGONAL."""
-    close = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max() <= ORTHOGONAL
-    return bool(close and np.all(np.linalg.det(R) > 0.0))
+def rotations(R: np.ndarray) -> np.ndarray:
+    """Which matrices of R (..., 3, 3) are rotations to ORTHOGONAL; False where a number is not finite."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        close = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2)) <= ORTHOGONAL
+        return np.asarray(close & (np.linalg.det(R) > 0.0))
 
 
 def resolve_attitude(values: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -137,6 +142,8 @@ class RunSettings:
             if getattr(self, name) is not None:
                 faults.positive(name, getattr(self, name))
         faults.choice("dtype", self.dtype, ("float64", "float32"))
+        if not isinstance(self.method, str):
+            faults.add("method", self.method, "is not a text", 'give the name of a method, such as "psi_s"')
         faults.raise_if_any()
 
     def to_dict(self) -> dict[str, Any]:
@@ -146,7 +153,7 @@ class RunSettings:
 
 @dataclass(frozen=True)
 class EnsembleSettings:
-    """The [ensemble] section of a scene file: members, seed, and what varies (name -> distribution). Raises SceneError."""
+    """The [ensemble] section: members, seed, and what varies (name -> distribution). Raises SceneError."""
 
     members: int = 1
     seed: int = 0
@@ -184,11 +191,14 @@ class Scene:
 
     def __post_init__(self) -> None:
         faults = Faults()
-        remedy = "leave it out: weight, buoyancy and restoring moment follow from the vehicle, other laws are not modelled"
-        if len(self.terms):
-            faults.add("terms", list(self.terms), "is not known to this version", remedy)
+        remedy = "leave it out: weight, buoyancy and restoring moment follow from the vehicle; no other law is modelled"
+        if not isinstance(self.terms, list | tuple) or len(self.terms):
+            faults.add("terms", self.terms, "is not known to this version", remedy)
         if self.controller is not None:
             faults.add("controller", self.controller, "is not known to this version", remedy)
+        for name, kind in (("vehicle", Vehicle), ("environment", Environment), ("start", Start), ("run", RunSettings)):
+            if not isinstance(getattr(self, name), kind):
+                faults.add(name, getattr(self, name), f"is no {kind.__name__}", f"give lw.{kind.__name__}(...)")
         faults.raise_if_any()
 
     @classmethod

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import inspect
 import os
 import tomllib
@@ -40,16 +41,14 @@ def loads(text: str, overrides: Mapping[str, Any] | None = None, name: str = "sc
 def override(content: dict[str, Any], key: str, value: Any) -> None:
     """Set a dotted key, such as vehicle.mass or ensemble.members; a text is read as TOML if it is TOML."""
     if isinstance(value, str):
-        try:
+        with contextlib.suppress(tomllib.TOMLDecodeError):
             value = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
-            pass
     section, _, rest = key.partition(".")
     if not rest:
         raise SceneError([f"{key}: is not a dotted key; write section.key=value, such as vehicle.mass=120"])
     table = content.setdefault(section, {})
-    if section == "ensemble" and rest.startswith("vary."):
-        table, rest = table.setdefault("vary", {}), rest.removeprefix("vary.")
+    if section == "ensemble" and rest.startswith("vary.") and isinstance(table, dict):
+        table, rest = table.setdefault("vary", {}), rest.removeprefix("vary.").strip("\"'")
     if not isinstance(table, dict):
         raise SceneError([f"{key}: {section} is not a table; write section.key=value"])
     table[rest] = value
@@ -71,25 +70,30 @@ def from_dict(content: Mapping[str, Any]) -> Scene:
     environment = _build(faults, "environment", Environment, tables["environment"])
     start = _build(faults, "start", Start, tables["start"])
     run = _build(faults, "run", RunSettings, tables["run"])
-    settings = _build(faults, "ensemble", EnsembleSettings, _with_laws(faults, tables["ensemble"]))
+    laws = _laws(faults, tables["ensemble"].get("vary", {}))
+    settings = _build(faults, "ensemble", EnsembleSettings, {**tables["ensemble"], "vary": laws})
     scene = None
-    try:
-        if vehicle is not None and environment is not None and start is not None and run is not None:
-            terms, controller = content.get("terms", ()), content.get("controller")
-            scene = Scene(vehicle, environment, terms, start, controller, run, settings if tables["ensemble"] else None)
-    except SceneError as error:
-        faults.include(error)
+    with faults.including():
+        # Another stands in for a section that failed, so that the faults of the rest are found as well.
+        scene = Scene(
+            vehicle or Vehicle(**_STAND_INS), environment or Environment(), content.get("terms", ()), start or Start(),
+            content.get("controller"), run or RunSettings(), settings if tables["ensemble"] else None,
+        )  # fmt: skip
+    with faults.including():
+        _check_ensemble(settings or EnsembleSettings(vary=laws), scene if vehicle and environment and start else None)
     faults.raise_if_any()
     assert scene is not None
-    _check_ensemble(scene)
     return scene
 
 
-def _check_ensemble(scene: Scene) -> None:
-    """What varies must fit the scene: found here, before anything runs."""
-    from lgvi_warp.ensemble import Ensemble
+def _check_ensemble(settings: EnsembleSettings, scene: Scene | None) -> None:
+    """What varies must fit the scene: found here, before anything runs. Names alone if the scene has faults itself."""
+    from lgvi_warp.ensemble import Ensemble, check_names
 
-    Ensemble.from_scene(scene)
+    if scene is None:
+        check_names(settings.vary)
+    else:
+        Ensemble(scene, settings.members, settings.seed, settings.vary)
 
 
 def _build(faults: Faults, name: str, kind: Callable[..., Any], table: Mapping[str, Any]) -> Any:
@@ -101,28 +105,23 @@ def _build(faults: Faults, name: str, kind: Callable[..., Any], table: Mapping[s
     for key in missing:
         faults.add(f"{name}.{key}", "", "is missing", "give it")
     known = {key: value for key, value in table.items() if key in signature}
-    try:
+    made = None
+    with faults.including():
         # What is missing is stood in for, so that the faults of what is there are found as well.
         made = kind(**{key: _STAND_INS[key] for key in missing} | known)
-    except SceneError as error:
-        faults.include(error)
-        return None
     return None if missing else made
 
 
 _STAND_INS = {"mass": 1.0, "inertia": (1.0, 1.0, 1.0)}
 
 
-def _with_laws(faults: Faults, table: Mapping[str, Any]) -> dict[str, Any]:
-    """The [ensemble] table with its distributions made."""
+def _laws(faults: Faults, vary: Any) -> dict[str, Any]:
+    """The distributions of the [ensemble.vary] table."""
     laws = {}
-    vary = table.get("vary", {})
     if not isinstance(vary, Mapping):
         faults.add("ensemble.vary", vary, "is not a table", 'write [ensemble.vary] and "vehicle.mass" = {...} below')
         vary = {}
     for key, value in vary.items():
-        try:
+        with faults.including():
             laws[key] = distributions.from_dict(f'ensemble.vary."{key}"', value)
-        except SceneError as error:
-            faults.include(error)
-    return {key: value for key, value in table.items() if key != "vary"} | {"vary": laws}
+    return laws

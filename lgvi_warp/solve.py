@@ -84,7 +84,9 @@ def make_plan(
         faults.add("t1", t1, "is missing", "give the end in seconds: solve(..., t1=150.0) or [run] duration")
     faults.raise_if_any()
     if save is None:
-        save = SaveAt(every=settings.save_every)
+        # A spacing that the scene gave for its own duration says nothing about a shorter run.
+        every = settings.save_every
+        save = SaveAt(every=every if every is None or every <= float(t1) else None)  # type: ignore[arg-type]
     grid = time_grid(float(h), float(t1), save)  # type: ignore[arg-type]
     chosen = method if isinstance(method, Method) else Method(method or settings.method)
     return Plan(ensemble, chosen, grid, save.fields, dtype or settings.dtype, width, checks)
@@ -117,7 +119,8 @@ def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None 
         packets = Packets(plan, members)
         at = slice(block.first, block.stop)
         for name, values in samples.items():
-            values[0, at] = getattr(members, name)
+            with np.errstate(over="ignore"):
+                values[0, at] = getattr(members, name)
         for k0, k1, s0, s1 in plan.segments(block.count):
             _store(samples, at, s0, s1, packets.advance(k0, k1, s0, s1)[:, : block.count], packets.Q)
             counter.add(block.count * (k1 - k0))

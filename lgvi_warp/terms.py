@@ -58,9 +58,7 @@ def _restoring_potential(own: Mapping[str, np.ndarray], position: np.ndarray, do
 
 
 KINDS = (
-    TermKind(
-        "weight", ("vehicle.mass", "environment.gravity", "vehicle.buoyancy"), _weight, (), _weight_potential
-    ),
+    TermKind("weight", ("vehicle.mass", "environment.gravity", "vehicle.buoyancy"), _weight, (), _weight_potential),
     TermKind(
         "restoring",
         ("vehicle.buoyancy", "vehicle.center_of_buoyancy"),

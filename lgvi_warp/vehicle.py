@@ -38,8 +38,12 @@ class Vehicle:
         if inertia is not None and np.linalg.eigvalsh(inertia)[0] <= 0.0:
             faults.add("inertia", self.inertia, "is not positive definite", "give principal inertias above 0 [kg m2]")
         if mass is not None and added is not None and np.linalg.eigvalsh(mass * np.eye(3) + added)[0] <= 0.0:
-            faults.add("added_mass", self.added_mass, "with the mass is not positive definite",
-                       "added mass is positive here: minus Fossen's X_udot, Y_vdot, Z_wdot [kg]")
+            faults.add(
+                "added_mass",
+                self.added_mass,
+                "with the mass is not positive definite",
+                "added mass is positive here: minus Fossen's X_udot, Y_vdot, Z_wdot [kg]",
+            )
         faults.raise_if_any()
         values = {"mass": mass, "added_mass": added, "inertia": inertia, "buoyancy": buoyancy}
         for name, value in (values | {"center_of_buoyancy": center, "warnings": unusual(inertia)}).items():
@@ -74,5 +78,5 @@ def unusual(inertia: Any) -> tuple[str, ...]:
     small, middle, large = np.linalg.eigvalsh(inertia)
     if small + middle >= large * (1.0 - 1e-12):
         return ()
-    text = f"vehicle.inertia: principal inertias {small:.6g} + {middle:.6g} < {large:.6g} [kg m2] belong to no rigid body"
-    return (text + "; that is right only if added inertia makes the difference",)
+    text = f"vehicle.inertia: principal inertias {small:.6g} + {middle:.6g} < {large:.6g} [kg m2]"
+    return (text + ": no rigid body has these; that is right only if added inertia makes the difference",)

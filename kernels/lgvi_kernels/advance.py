@@ -23,7 +23,7 @@ from lgvi_kernels.lanes import (
 )
 from lgvi_kernels.rotation import make_solve, rotation_struct
 from lgvi_kernels.state import alarm_struct, inertia_struct, state_struct, view_struct, wrench_struct
-from lgvi_kernels.submaps import Ab, Ap, T, fold, make_D, make_K, rotate
+from lgvi_kernels.submaps import Ap, T, anisotropic_velocity, fold, isotropic_velocity, make_Ab, make_D, make_K
 
 NON_FINITE = 3
 
@@ -136,9 +136,10 @@ def make_advance(spec):
         params: Params
         tolerance: real
 
+    velocity = isotropic_velocity if spec.mass == "isotropic" else anisotropic_velocity
     solve = make_solve(real, spec.solver, spec.iterations, spec.adaptive, checked)
     letters = {
-        "Ab": Ab,
+        "Ab": make_Ab(velocity),
         "Ap": Ap,
         "T": T,
         "D": make_D(rotation_struct(width, real), solve),
@@ -184,7 +185,7 @@ def make_advance(spec):
             put(out, i, o + 6, x.R2)
             o += 9
         if wp.static("velocity" in fields):
-            put(out, i, o, c.inertia.inverse_mass * x.p)
+            put(out, i, o, velocity(c.inertia, x.p))
             o += 3
         if wp.static("angular_velocity" in fields):
             put(out, i, o, x.pi / c.inertia.J)

@@ -32,7 +32,10 @@ from lgvi_kernels.lanes import (
 
 @functools.cache
 def rotation_struct(width, real):
-    """A rotation matrix F of each vehicle, kept as its three rows."""
+    """A rotation F of each vehicle, kept as the rows of F - I.
+
+    F - I is of the size of the step, so its rounding errors are too: applying F rounds a vector once, not three times.
+    """
     Lane3 = lane3(width, real)
 
     @wp.struct
@@ -45,15 +48,9 @@ def rotation_struct(width, real):
 
 
 @wp.func
-def apply(F: Any, v: Any):
-    """F v."""
-    return vec3(dot(F.row0, v), dot(F.row1, v), dot(F.row2, v))
-
-
-@wp.func
 def transpose_apply(F: Any, v: Any):
     """F^T v, which is also the row vector v^T F."""
-    return v.x * F.row0 + v.y * F.row1 + v.z * F.row2
+    return v + v.x * F.row0 + v.y * F.row1 + v.z * F.row2
 
 
 @wp.func
@@ -61,13 +58,15 @@ def rodrigues(F: Any, v: Any, alpha: Any, beta: Any):
     """F = I + alpha hat(v) + beta hat(v)^2."""
     m = beta * v
     w = alpha * v
-    diagonal = ones(alpha) - dot(v, m)
+    xx = v.x * m.x
+    yy = v.y * m.y
+    zz = v.z * m.z
     xy = v.x * m.y
     xz = v.x * m.z
     yz = v.y * m.z
-    F.row0 = vec3(diagonal + v.x * m.x, xy - w.z, xz + w.y)
-    F.row1 = vec3(xy + w.z, diagonal + v.y * m.y, yz - w.x)
-    F.row2 = vec3(xz - w.y, yz + w.x, diagonal + v.z * m.z)
+    F.row0 = vec3(-(yy + zz), xy - w.z, xz + w.y)
+    F.row1 = vec3(xy + w.z, -(zz + xx), yz - w.x)
+    F.row2 = vec3(xz - w.y, yz + w.x, -(xx + yy))
     return F
 
 

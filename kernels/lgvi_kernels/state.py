@@ -6,9 +6,6 @@ import warp as wp
 
 from lgvi_kernels.lanes import lane, lane3, symmetric3
 
-# How M^-1 is kept, by the shape of M: m I, diagonal in the principal axes of J, or full.
-MASSES = ("isotropic", "diagonal", "full")
-
 
 @functools.cache
 def alarm_struct(width, real):
@@ -69,14 +66,29 @@ def view_struct(width, real):
 
 @functools.cache
 def inertia_struct(width, real, mass):
-    """J / max J in principal axes, 1 / max J [1/(kg m2)], and M^-1 [1/kg]: a number, a diagonal or a symmetric matrix."""
+    """J / max J in principal axes, 1 / max J [1/(kg m2)], and M^-1 [1/kg] = mean I + anisotropy.
+
+    The anisotropy, a diagonal or a symmetric matrix, is absent for M = m I. Apart from the mean it keeps its own
+    precision: the Munk moment p x M^-1 p sees the anisotropy alone, which may be a small part of M^-1.
+    """
     Lane, Lane3 = lane(width, real), lane3(width, real)
-    Inverse = {"isotropic": Lane, "diagonal": Lane3, "full": symmetric3(width, real)}[mass]
+    if mass == "isotropic":
+
+        @wp.struct
+        class Inertia:
+            J: Lane3
+            inverse_scale: Lane
+            mean: Lane
+
+        return Inertia
+
+    Matrix = {"diagonal": Lane3, "full": symmetric3(width, real)}[mass]
 
     @wp.struct
-    class Inertia:
+    class AnisotropicInertia:
         J: Lane3
         inverse_scale: Lane
-        inverse_mass: Inverse
+        mean: Lane
+        anisotropy: Matrix
 
-    return Inertia
+    return AnisotropicInertia

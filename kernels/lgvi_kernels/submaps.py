@@ -19,24 +19,41 @@ def rotate(x: Any, v: Any):
 
 
 @wp.func
-def Ab(x: Any, c: Any, h: Any):
-    """Eq. (12) and (23), Nordkvist & Sanyal 2010: b <- b + h R nu."""
-    x.b = x.b + rotate(x, h * (c.inertia.inverse_mass * x.p))
-    return x
+def isotropic_velocity(inertia: Any, p: Any):
+    """nu = M^-1 p for M = m I."""
+    return inertia.mean * p
+
+
+@wp.func
+def anisotropic_velocity(inertia: Any, p: Any):
+    """nu = M^-1 p."""
+    return inertia.mean * p + inertia.anisotropy * p
+
+
+def make_Ab(velocity):
+    """The drift of the position."""
+
+    @wp.func
+    def Ab(x: Any, c: Any, h: Any):
+        """Eq. (12) and (23), Nordkvist & Sanyal 2010: b <- b + h R nu."""
+        x.b = x.b + rotate(x, h * velocity(c.inertia, x.p))
+        return x
+
+    return Ab
 
 
 @wp.func
 def Ap(x: Any, c: Any, h: Any):
     """The Munk moment of eq. (14) and (19): pi <- pi + h p x nu. Absent for M = m I, where it is zero."""
-    x.pi = x.pi + (h * c.inertia.inverse_scale) * cross(x.p, c.inertia.inverse_mass * x.p)
+    x.pi = x.pi + (h * c.inertia.inverse_scale) * cross(x.p, c.inertia.anisotropy * x.p)
     return x
 
 
 @wp.func
 def T(x: Any, c: Any, h: Any):
     """Ab and Ap together: the exact flow of the kinetic energy p.M^-1 p / 2."""
-    d = h * (c.inertia.inverse_mass * x.p)
-    x.b = x.b + rotate(x, d)
+    d = h * (c.inertia.anisotropy * x.p)
+    x.b = x.b + rotate(x, (h * c.inertia.mean) * x.p + d)
     x.pi = x.pi + c.inertia.inverse_scale * cross(x.p, d)
     return x
 

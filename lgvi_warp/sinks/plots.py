@@ -32,7 +32,7 @@ def plot(result: Result, path: str | os.PathLike[str]) -> Path:
         raise ValueError("every member failed: there is nothing to draw; see result.status and result.failure_time")
     figure = Figure(figsize=(15.0, 4.8))
     depth, energy, paths = figure.subplots(1, 3)
-    figure.subplots_adjust(left=0.05, right=0.985, bottom=0.12, top=0.85, wspace=0.2)
+    figure.subplots_adjust(left=0.05, right=0.985, bottom=0.12, top=0.85, wspace=0.26)
     fan(depth, result.time, result.position[:, good, 2])
     depth.set(title="Depth", xlabel="time [s]", ylabel="depth b3 [m], down")
     depth.invert_yaxis()

@@ -83,7 +83,18 @@ def _body(rr: Any, size: float, color: tuple[int, int, int]) -> Any:
     """A spindle along the body's x axis, with a bright nose and a fin on its upper side: attitude can be read off it."""
     s = 0.18 * size
     points = [(size, 0, 0), (0, s, 0), (0, 0, s), (0, -s, 0), (0, 0, -s), (-size, 0, 0), (-size, 0, -2.5 * s)]
-    faces = [(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 1), (5, 2, 1), (5, 3, 2), (5, 4, 3), (5, 1, 4), (4, 6, 5), (4, 5, 6)]
+    faces = [
+        (0, 1, 2),
+        (0, 2, 3),
+        (0, 3, 4),
+        (0, 4, 1),
+        (5, 2, 1),
+        (5, 3, 2),
+        (5, 4, 3),
+        (5, 1, 4),
+        (4, 6, 5),
+        (4, 5, 6),
+    ]
     colors = [(255, 255, 255)] + [color] * 5 + [(255, 200, 60)]
     return rr.Mesh3D(vertex_positions=points, triangle_indices=faces, vertex_colors=colors)
 

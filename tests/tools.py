@@ -1,0 +1,84 @@
+"""What several tests need: vehicles, one-scene ensembles, states of results and of the reference."""
+
+import numpy as np
+
+import lgvi_warp as lw
+import lgvi_warp.notation
+from lgvi_warp.reference.submaps import Body, State
+from lgvi_warp.reference.terms import Restoring, Weight
+
+METHODS = ("phi", "phi_adjoint", "psi", "psi_s", "psi_1")
+GRAVITY = 9.8
+
+# A turn of the body axes that is no symmetry of anything.
+TURN = lw.notation.matrix_from_rotation_vector(np.array([0.4, -0.7, 0.2]))
+
+
+def vehicle(M=(1.0, 2.0, 3.0), J=(1.0, 2.0, 2.5), net=0.0, moment=(0.0, 0.0, 0.0)):
+    """A scene's vehicle with mass matrix M, inertia J (3-vectors or matrices), net weight [N] and B r [N m]."""
+    M = np.diag(M) if np.ndim(M) == 1 else np.asarray(M)
+    mass = 0.5 * np.linalg.eigvalsh(M)[0]
+    buoyancy = mass * GRAVITY - net
+    center = np.asarray(moment) / buoyancy if np.any(moment) else (0.0, 0.0, 0.0)
+    return lw.Vehicle(mass, J, M - mass * np.eye(3), buoyancy, center)
+
+
+def scene_of(*arguments, **named):
+    """A scene with that vehicle."""
+    return lw.Scene(vehicle(*arguments, **named), lw.Environment(gravity=GRAVITY))
+
+
+def body_of(scene):
+    """The reference's body for a scene."""
+    v, g = scene.vehicle, scene.environment.gravity
+    terms = (Weight(v.mass * g - v.buoyancy), Restoring(v.buoyancy * v.center_of_buoyancy))
+    return Body(v.mass_matrix, v.inertia, terms)
+
+
+def one(scene, b=(0.0, 0.0, 0.0), R=None, nu=(0.0, 0.0, 0.0), Om=(0.0, 0.0, 0.0)):
+    """An ensemble of one member, or of as many as the arrays hold."""
+    R = np.eye(3) if R is None else R
+    states = [np.reshape(np.asarray(x, dtype=float), (-1, *shape)) for x, shape in zip((b, R, nu, Om), SHAPES)]
+    n = max(len(x) for x in states)
+    return lw.Ensemble.from_states(scene, *(np.broadcast_to(x, (n, *x.shape[1:])) for x in states))
+
+
+SHAPES = ((3,), (3, 3), (3,), (3,))
+
+
+def random_states(seed, n, speed=1.0, spin=1.0):
+    """b, R, nu, Om of n random states."""
+    rng = np.random.default_rng(seed)
+    R = lw.notation.matrix_from_rotation_vector(rng.normal(size=(n, 3)))
+    return rng.normal(size=(n, 3)), R, speed * rng.normal(size=(n, 3)), spin * rng.normal(size=(n, 3))
+
+
+def last(result, member=0):
+    """b, R, nu, Om of the last sample of a member."""
+    fields = (result.position, result.attitude, result.velocity, result.angular_velocity)
+    return tuple(np.asarray(field[-1, member], dtype=np.float64) for field in fields)
+
+
+def to_state(body, b, R, nu, Om):
+    """The reference's state."""
+    return State(np.asarray(b), np.asarray(R), body.M @ nu, body.J @ Om)
+
+
+def from_state(body, x):
+    """b, R, nu, Om of the reference's state."""
+    return x.b, x.R, np.linalg.solve(body.M, x.p), np.linalg.solve(body.J, x.pi)
+
+
+def expected(entry):
+    """b, R, nu, Om of an entry of paper_example.json."""
+    return tuple(np.array(entry[key]) for key in ("b", "R", "nu", "Omega"))
+
+
+def difference(x, y):
+    """Largest difference of two states (b, R, nu, Om), each relative to the size of its quantity, at least 1."""
+    return max(np.abs(u - v).max() / max(1.0, np.abs(v).max()) for u, v in zip(x, y, strict=True))
+
+
+def slope(h, error):
+    """Fitted order of convergence."""
+    return np.polyfit(np.log(h), np.log(error), 1)[0]

@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from lgvi_warp.plan import Plan
     from lgvi_warp.sinks.plots import plot
     from lgvi_warp.sinks.rerun import log_rerun
-    from lgvi_warp.solve import solve
+    from lgvi_warp.solving import solve
 
 __version__ = "0.1.0"
 
 # Loaded when first used: Warp takes a second to import, and a scene can be read and checked without it.
 _LAZY = {
-    "solve": "lgvi_warp.solve",
+    "solve": "lgvi_warp.solving",
     "Plan": "lgvi_warp.plan",
     "plot": "lgvi_warp.sinks.plots",
     "log_rerun": "lgvi_warp.sinks.rerun",
@@ -55,7 +55,6 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'lgvi_warp' has no attribute {name!r}")
     from importlib import import_module
 
-    # `lgvi_warp.solve` is also the name of its module: bind the function over it, once.
     value = getattr(import_module(_LAZY[name]), name)
     globals()[name] = value
     return value

@@ -101,7 +101,7 @@ def run(chosen: argparse.Namespace) -> int:
     out: Path = chosen.out or Path("runs") / Path(chosen.scene).stem
     out.mkdir(parents=True, exist_ok=True)
     warm = _import_in_background()
-    from lgvi_warp.solve import solve
+    from lgvi_warp.solving import solve
 
     progress = None if chosen.quiet else Progress(sys.stderr)
     result = solve(scene, threads=chosen.threads, width=chosen.width, progress=progress)

@@ -145,7 +145,9 @@ class LogNormal(Distribution):
         """median * exp(sigma Phi^-1(u))."""
         from scipy.special import ndtri
 
-        return (base if self.median is None else np.asarray(self.median)) * np.exp(np.asarray(self.sigma) * ndtri(u))
+        median = base if self.median is None else np.asarray(self.median)
+        with np.errstate(over="ignore"):  # what is too large is refused by the ensemble, or marked by the run
+            return median * np.exp(np.asarray(self.sigma) * ndtri(u))
 
 
 @dataclass(frozen=True)
@@ -164,7 +166,7 @@ class TruncatedNormal(Distribution):
     widths: ClassVar[tuple[str, ...]] = ("std", "relative")
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """The normal's quantile at a level between those of the bounds; upper tails by symmetry, to keep their digits."""
+        """The normal's quantile at a level between those of the bounds; upper tails by symmetry, for their digits."""
         from scipy.special import ndtr, ndtri
 
         mean = base if self.mean is None else np.asarray(self.mean)

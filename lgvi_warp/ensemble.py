@@ -148,22 +148,26 @@ class Ensemble:
         if not (set(self.vary) | set(self._explicit)) & set(PARAMETERS):
             return
         faults = Faults()
-        p = self.parameters(0, self.members)
-        mass = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
-        checks = {
-            "vehicle.mass": ~(p["vehicle.mass"] > 0.0),
-            "vehicle.inertia": ~_positive_definite(p["vehicle.inertia"]),
-            "vehicle.mass + vehicle.added_mass": ~_positive_definite(mass),
-            "vehicle.buoyancy": ~(p["vehicle.buoyancy"] >= 0.0),
-            "environment.gravity": ~(p["environment.gravity"] >= 0.0),
-            "vehicle.center_of_buoyancy": ~np.isfinite(p["vehicle.center_of_buoyancy"]).all(axis=1),
-        }
+        with np.errstate(over="ignore", invalid="ignore"):
+            p = self.parameters(0, self.members)
+            mass = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
+            heavy = np.isfinite(p["vehicle.mass"]) & (p["vehicle.mass"] > 0.0)
+            checks = {
+                "vehicle.mass": ~heavy,
+                "vehicle.inertia": ~_positive_definite(p["vehicle.inertia"]),
+                "vehicle.mass + vehicle.added_mass": heavy & ~_positive_definite(mass),
+                "vehicle.center_of_buoyancy": ~np.isfinite(p["vehicle.center_of_buoyancy"]).all(axis=1),
+            }
+            for key in ("vehicle.buoyancy", "environment.gravity"):
+                checks[key] = ~(np.isfinite(p[key]) & (p[key] >= 0.0))
         for key, bad in checks.items():
             if bad.any():
                 first = int(np.argmax(bad))
                 value = mass[first] if "+" in key else p[key][first]
                 drawn = any(name in self.vary for name in key.split(" + "))
-                remedy = "use a smaller spread, TruncatedNormal or LogNormal" if drawn else "give a positive value"
+                remedy = (
+                    "use a smaller spread, TruncatedNormal or LogNormal" if drawn else "give finite, positive values"
+                )
                 what = f"is unphysical ({int(bad.sum())} of {len(bad)} members)"
                 faults.add(f"{key} of member {first}", value, what, remedy)
         faults.raise_if_any()
@@ -207,10 +211,10 @@ class Ensemble:
     def subset(self, indices: Sequence[int]) -> Ensemble:
         """These members, in this order, as an ensemble of its own with the same numbers."""
         chosen = [self.select(int(i), int(i) + 1) for i in indices]
-        states = [np.concatenate([getattr(one, name) for one in chosen]) for name in STATES]
+        b, R, nu, Om = (np.concatenate([getattr(one, name) for one in chosen]) for name in STATES)
         varied = [name for name in PARAMETERS if name in self.vary or name in self._explicit]
         parameters = {name: np.concatenate([one.parameters[name] for one in chosen]) for name in varied}
-        return Ensemble.from_states(self.scene, *states, parameters)
+        return Ensemble.from_states(self.scene, b, R, nu, Om, parameters)
 
     def to_dict(self) -> dict[str, Any]:
         """members, seed and vary as in a scene file, and the names that were given as arrays."""
@@ -260,6 +264,6 @@ def _explicit_parameter(faults: Faults, key: str, value: Any, n: int) -> np.ndar
 def _positive_definite(matrices: np.ndarray) -> np.ndarray:
     """Sylvester's criterion for symmetric (n, 3, 3); False where a number is not finite."""
     a = matrices
-    minor = a[:, 0, 0] * a[:, 1, 1] - a[:, 0, 1] * a[:, 1, 0]
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
+        minor = a[:, 0, 0] * a[:, 1, 1] - a[:, 0, 1] * a[:, 1, 0]
         return np.isfinite(a).all(axis=(1, 2)) & (a[:, 0, 0] > 0.0) & (minor > 0.0) & (np.linalg.det(a) > 0.0)

@@ -22,13 +22,14 @@ class SceneError(ValueError):
 def closest(word: str, known: Iterable[str]) -> str:
     """ "did you mean ..." or the list of what is known."""
     names = [str(name) for name in known]
-    near = difflib.get_close_matches(str(word), names, n=1, cutoff=0.6)
+    near = [name for name in names if name.endswith(f".{word}")]
+    near = near or difflib.get_close_matches(str(word), names, n=1, cutoff=0.6)
     return f"did you mean {near[0]!r}?" if near else f"known: {', '.join(names)}"
 
 
 def shown(value: Any) -> str:
     """A value on one line, cut where it is long."""
-    text = " ".join(repr(value.tolist() if isinstance(value, np.ndarray) else value).split())
+    text = " ".join(repr(value.tolist() if isinstance(value, np.ndarray | np.generic) else value).split())
     return text if len(text) <= 80 else text[:77] + "..."
 
 

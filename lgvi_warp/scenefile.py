@@ -112,7 +112,7 @@ def _build(faults: Faults, name: str, kind: Callable[..., Any], table: Mapping[s
     return None if missing else made
 
 
-_STAND_INS = {"mass": 1.0, "inertia": (1.0, 1.0, 1.0)}
+_STAND_INS: dict[str, Any] = {"mass": 1.0, "inertia": (1.0, 1.0, 1.0)}
 
 
 def _laws(faults: Faults, vary: Any) -> dict[str, Any]:

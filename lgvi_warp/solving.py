@@ -114,18 +114,22 @@ def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None 
     status, failed_step, failed_size = np.zeros(n, np.uint8), np.zeros(n, np.int64), np.zeros(n)
     counter = _Progress(n * plan.grid.steps, progress)
 
-    def work(block: Block) -> None:
+    def advance(block: Block) -> None:
         members = plan.ensemble.select(block.first, block.stop)
         packets = Packets(plan, members)
         at = slice(block.first, block.stop)
         for name, values in samples.items():
-            with np.errstate(over="ignore"):
-                values[0, at] = getattr(members, name)
+            values[0, at] = getattr(members, name)
         for k0, k1, s0, s1 in plan.segments(block.count):
             _store(samples, at, s0, s1, packets.advance(k0, k1, s0, s1)[:, : block.count], packets.Q)
             counter.add(block.count * (k1 - k0))
         outcome = packets.outcome()
         status[at], failed_step[at], failed_size[at] = outcome.status, outcome.failed_step, outcome.failed_size
+
+    def work(block: Block) -> None:
+        # A member that is not finite, or not within float32, gets its status from the kernel; NumPy need not remark.
+        with np.errstate(invalid="ignore", over="ignore"):
+            advance(block)
 
     start = time.perf_counter()
     thread_executor.run(blocks(n), work, threads)

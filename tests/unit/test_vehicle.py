@@ -1,0 +1,114 @@
+"""Vehicle: what is kept, what is refused, and that all faults come in one message."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+
+GOOD = {"mass": 123.8, "added_mass": (65.0, 70.0, 75.0), "inertia": (5.46, 5.29, 5.72), "buoyancy": 1215.8}
+
+
+def refused(**changes):
+    """The message that refuses GOOD with these changes; it must be one fault."""
+    with pytest.raises(lw.SceneError) as caught:
+        lw.Vehicle(**GOOD | changes)
+    assert len(caught.value.faults) == 1
+    return str(caught.value)
+
+
+def test_diagonals_become_matrices():
+    v = lw.Vehicle(**GOOD)
+    np.testing.assert_array_equal(v.inertia, np.diag([5.46, 5.29, 5.72]))
+    # M = mass I + added mass
+    np.testing.assert_array_equal(v.mass_matrix, np.diag([123.8 + 65.0, 123.8 + 70.0, 123.8 + 75.0]))
+    np.testing.assert_array_equal(v.center_of_buoyancy, np.zeros(3))
+    assert v.warnings == ()
+
+
+def test_full_matrices_are_kept():
+    J = np.array([[5.0, 0.3, 0.1], [0.3, 6.0, -0.2], [0.1, -0.2, 7.0]])
+    v = lw.Vehicle(**GOOD | {"inertia": J, "added_mass": J})
+    np.testing.assert_array_equal(v.inertia, J)
+    np.testing.assert_array_equal(v.mass_matrix, 123.8 * np.eye(3) + J)
+    assert v.to_dict()["inertia"] == J.tolist()
+
+
+def test_it_is_frozen_and_apart_from_the_callers_arrays():
+    given = np.array([5.46, 5.29, 5.72])
+    v = lw.Vehicle(**GOOD | {"inertia": given})
+    given[0] = -1.0
+    assert v.inertia[0, 0] == 5.46
+    for array in (v.inertia, v.added_mass, v.center_of_buoyancy):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0.0
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        v.mass = 1.0
+    assert dataclasses.replace(v, mass=100.0).mass_matrix[0, 0] == 165.0
+
+
+@pytest.mark.parametrize("mass", [0.0, -1.0])
+def test_mass_must_be_positive(mass):
+    message = refused(mass=mass)
+    assert "vehicle.mass" in message and str(mass) in message and "above 0" in message
+
+
+@pytest.mark.parametrize("key", ["mass", "buoyancy", "inertia", "added_mass", "center_of_buoyancy"])
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_what_is_not_finite_is_refused(key, bad):
+    value = bad if key in ("mass", "buoyancy") else (1.0, bad, 1.0)
+    message = refused(**{key: value})
+    assert f"vehicle.{key}" in message and "finite" in message
+
+
+@pytest.mark.parametrize("key", ["mass", "buoyancy", "inertia", "added_mass", "center_of_buoyancy"])
+@pytest.mark.parametrize("bad", ["heavy", True, None, [[1.0, 2.0], [3.0]], [True, 1.0, 1.0], [1.0, 2.0]])
+def test_what_is_no_number_or_of_the_wrong_shape_is_refused(key, bad):
+    assert f"vehicle.{key}" in refused(**{key: bad})
+
+
+def test_negative_buoyancy_is_refused():
+    assert "vehicle.buoyancy = -1.0" in refused(buoyancy=-1.0)
+
+
+def test_matrices_must_be_symmetric():
+    J = np.diag([5.0, 6.0, 7.0])
+    J[0, 1] = 0.1
+    assert "vehicle.inertia" in refused(inertia=J) and "not symmetric" in refused(inertia=J)
+    assert "vehicle.added_mass" in refused(added_mass=J)
+
+
+def test_inertia_must_be_positive_definite():
+    assert "not positive definite" in refused(inertia=(1.0, 0.0, 1.0))
+    # Positive diagonal, yet eigenvalues 3 and -1 in the plane of x and y.
+    assert "not positive definite" in refused(inertia=[[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+def test_the_mass_matrix_must_be_positive_definite():
+    message = refused(added_mass=(-200.0, 0.0, 0.0))
+    assert "vehicle.added_mass" in message and "X_udot" in message
+    lw.Vehicle(**GOOD | {"added_mass": (-10.0, 0.0, 0.0)})  # mass + added mass is positive: allowed
+
+
+def test_triangle_inequality_warns():
+    v = lw.Vehicle(**GOOD | {"inertia": (1.0, 1.0, 2.5)})
+    assert len(v.warnings) == 1 and "vehicle.inertia" in v.warnings[0] and "2.5" in v.warnings[0]
+    # A flat plate fulfils J_1 + J_2 = J_3: no warning, in whatever axes it is given.
+    assert lw.Vehicle(**GOOD | {"inertia": (0.1, 0.2, 0.1 + 0.2)}).warnings == ()
+
+
+def test_all_faults_come_in_one_message():
+    with pytest.raises(lw.SceneError) as caught:
+        lw.Vehicle(mass=-1.0, added_mass="no", inertia=(1.0, 1.0), buoyancy=np.nan, center_of_buoyancy=3.0)
+    assert len(caught.value.faults) == 5
+    for key in ("mass", "added_mass", "inertia", "buoyancy", "center_of_buoyancy"):
+        assert f"vehicle.{key} = " in str(caught.value)
+    assert isinstance(caught.value, ValueError)
+
+
+def test_to_dict_makes_the_same_vehicle():
+    v = lw.Vehicle(**GOOD | {"center_of_buoyancy": (0.0, 0.0, -0.007)})
+    again = lw.Vehicle(**v.to_dict())
+    assert again.to_dict() == v.to_dict()
+    assert v.to_dict()["inertia"] == [5.46, 5.29, 5.72]

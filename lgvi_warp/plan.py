@@ -150,18 +150,23 @@ class Plan:
             wp.load_module(self.advance.kernel.module, device="cpu")
         return time.perf_counter() - start
 
-    def segments(self, count: int) -> Iterator[tuple[int, int, int, int]]:
-        """(k0, k1, s0, s1): launches from step k0 to k1 that write samples s0 to s1, for a block of `count` members."""
+    def due(self, k0: int, k1: int) -> tuple[int, int]:
+        """(s0, s1): the samples s0 to s1 fall due after step k0 and up to step k1."""
+        s0, s1 = np.searchsorted(self.grid.sample_steps, (k0, k1), side="right")
+        return int(s0), int(s1)
+
+    def segments(self, count: int) -> Iterator[tuple[int, int]]:
+        """(k0, k1): launches from step k0 to step k1, for a block of `count` members."""
         due = self.grid.sample_steps
         per_sample = sum(SAMPLE_FIELDS[name] for name in self.spec.fields) * count * np.dtype(self.dtype).itemsize
         most_samples = max(1, SEGMENT_SAMPLE_BYTES // max(per_sample, 1))
         most_steps = max(CHUNK, SEGMENT_VEHICLE_STEPS // count // CHUNK * CHUNK)
-        k, s = 0, 1
+        k = 0
         while k < self.grid.steps:
-            k1 = min(k + most_steps, int(due[min(s + most_samples, len(due)) - 1]))
-            s1 = int(np.searchsorted(due, k1, side="right"))
-            yield k, k1, s, s1
-            k, s = k1, s1
+            last = self.due(k, k)[1] + most_samples
+            k1 = min(k + most_steps, int(due[min(last, len(due)) - 1]))
+            yield k, k1
+            k = k1
 
 
 class Packets:
@@ -244,9 +249,10 @@ class Packets:
         due = np.append(grid.sample_steps, 2**31 - 1).astype(np.int32)
         self.sample_step = wp.array(due, dtype=wp.int32, device="cpu")
 
-    def advance(self, k0: int, k1: int, s0: int, s1: int) -> np.ndarray:
-        """Make steps k0 to k1. Returns the samples s0 to s1, (s1 - s0, packets * width, numbers of a sample)."""
+    def advance(self, k0: int, k1: int) -> np.ndarray:
+        """Make the steps k0 to k1. Returns the samples due then, (s1 - s0, packets * width, numbers of a sample)."""
         plan = self.plan
+        s0, s1 = plan.due(k0, k1)
         numbers = sum(SAMPLE_FIELDS[name] for name in plan.spec.fields)
         packets, width = self.state.shape[0], plan.spec.width
         out = wp.empty((packets, max(1, (s1 - s0) * numbers)), dtype=plan.advance.Lane, device="cpu")

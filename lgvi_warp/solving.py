@@ -120,8 +120,9 @@ def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None 
         at = slice(block.first, block.stop)
         for name, values in samples.items():
             values[0, at] = getattr(members, name)
-        for k0, k1, s0, s1 in plan.segments(block.count):
-            _store(samples, at, s0, s1, packets.advance(k0, k1, s0, s1)[:, : block.count], packets.Q)
+        for k0, k1 in plan.segments(block.count):
+            raw = packets.advance(k0, k1)[:, : block.count]
+            _store(samples, slice(*plan.due(k0, k1)), at, raw, packets.Q)
             counter.add(block.count * (k1 - k0))
         outcome = packets.outcome()
         status[at], failed_step[at], failed_size[at] = outcome.status, outcome.failed_step, outcome.failed_size
@@ -149,8 +150,8 @@ def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None 
     )
 
 
-def _store(samples: dict[str, np.ndarray], at: slice, s0: int, s1: int, raw: np.ndarray, Q: np.ndarray) -> None:
-    """Turn raw samples (s1 - s0, members, numbers) from principal axes to the user's, into their places."""
+def _store(samples: dict[str, np.ndarray], when: slice, at: slice, raw: np.ndarray, Q: np.ndarray) -> None:
+    """Turn raw samples (samples, members, numbers) from principal axes to the user's, into their places."""
     turned = not np.array_equal(Q, np.broadcast_to(np.eye(3), Q.shape))
     column = 0
     for name, values in samples.items():
@@ -162,7 +163,7 @@ def _store(samples: dict[str, np.ndarray], at: slice, s0: int, s1: int, raw: np.
             part = part @ np.swapaxes(Q, -1, -2)
         elif turned and name != "position":
             part = notation.rotate_out(Q, part)
-        values[s0:s1, at] = part
+        values[when, at] = part
 
 
 def provenance(plan: Plan) -> dict[str, Any]:

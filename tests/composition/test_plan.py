@@ -107,9 +107,10 @@ def test_pack_fills_up_with_the_last_member():
 def test_segments_are_contiguous_and_their_buffer_is_bounded(scene):
     plan = make_plan(lw.Ensemble(scene, 4096), h=0.01, t1=1000.0, save=lw.SaveAt(every=0.01))
     segments = list(plan.segments(4096))
-    assert segments[0][0] == 0 and segments[-1][1] == plan.grid.steps and segments[-1][3] == len(plan.grid.times)
-    assert all(a[1] == b[0] and a[3] == b[2] for a, b in zip(segments, segments[1:], strict=False))
-    assert max(s1 - s0 for _, _, s0, s1 in segments) * 4096 * 18 * 8 <= SEGMENT_SAMPLE_BYTES
+    samples = [plan.due(k0, k1) for k0, k1 in segments]
+    assert segments[0][0] == 0 and segments[-1][1] == plan.grid.steps and samples[-1][1] == len(plan.grid.times)
+    assert all(a[1] == b[0] for runs in (segments, samples) for a, b in zip(runs, runs[1:], strict=False))
+    assert max(s1 - s0 for s0, s1 in samples) * 4096 * 18 * 8 <= SEGMENT_SAMPLE_BYTES
 
 
 def test_segments_change_no_bit(scene, monkeypatch):

@@ -96,6 +96,19 @@ def choose(test: Any, yes: Any, no: Any):
 
 
 @wp.func
+def at_rest(x: Any):
+    """The same vehicles at rest at the origin: where frozen lanes wait, so that they raise no more alarms."""
+    zero = ones(x.b.x) - ones(x.b.x)
+    x.b = vec3(zero, zero, zero)
+    x.p = x.b
+    x.pi = x.b
+    x.R0 = vec3(ones(zero), zero, zero)
+    x.R1 = vec3(zero, ones(zero), zero)
+    x.R2 = vec3(zero, zero, ones(zero))
+    return x
+
+
+@wp.func
 def probe(x: Any):
     """Zero in the lanes that are finite, not a number in the others."""
     s = x.R0 + x.R1 + x.R2 + x.b + x.p + x.pi
@@ -227,6 +240,9 @@ def make_advance(spec):
             for j in range(wp.static(width)):
                 frozen[j] = real(status[i][j])
             any_frozen = any_positive(frozen)
+        kept = x
+        if any_frozen:
+            x = choose(frozen, at_rest(x), x)
         if wp.static(has_lead):
             if k0 == 0:
                 x = lead(x, c, real(wp.static(lead_coefficient)) * stage_h[0])
@@ -256,10 +272,11 @@ def make_advance(spec):
                                 status[i][j] = int(code[j])
                                 failed_step[i][j] = k
                                 failed_size[i][j] = x.alarm.size[j]
+                        kept = choose(code, good, kept)
                         frozen = frozen + code
                         any_frozen = True
                 if any_frozen:
-                    x = choose(frozen, good, x)
+                    x = choose(frozen, at_rest(x), x)
             if repeat > 0:
                 x = good
                 singles = repeat
@@ -269,13 +286,17 @@ def make_advance(spec):
                     singles -= 1
                 if wp.static(renormalised):
                     if k % wp.static(CHUNK) == 0:
-                        x = choose(frozen, x, renormalise(x, tolerance))
+                        x = renormalise(x, tolerance)
                 if k == sample_step[s]:
                     y = x
+                    if any_frozen:
+                        y = choose(frozen, kept, x)
                     if wp.static(has_lead):
-                        y = lead(x, c, -(real(wp.static(lead_coefficient)) * stage_h[0]))
+                        y = lead(y, c, -(real(wp.static(lead_coefficient)) * stage_h[0]))
                     sample(out, i, (s - s0) * wp.static(per_sample), y, c)
                     s += 1
+        if any_frozen:
+            x = choose(frozen, kept, x)
         write(state, i, x)
 
     return Advance(advance, Lane, Inertia, Params)

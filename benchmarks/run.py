@@ -1,7 +1,7 @@
 """Run the benchmarks: each prints JSON lines, every figure a ratio to a peer or a limit measured in the same run.
 
-    python benchmarks/run.py             all cases
-    python benchmarks/run.py kernel      one of them; --quick for fewer members and steps
+python benchmarks/run.py             all cases
+python benchmarks/run.py kernel      one of them; --quick for fewer members and steps
 """
 
 import argparse

@@ -134,11 +134,11 @@ def _import_in_background() -> threading.Thread:
 
 
 def write(result: Any, out: Path) -> tuple[list[Path], list[str]]:
-    """Write result.npz, fleet.png and fleet.rrd side by side. Returns the files, and a text for each that could not be written."""
+    """Write result.npz, fleet.png and fleet.rrd side by side. Returns the files, and a text for each that failed."""
+    from concurrent.futures import ThreadPoolExecutor
+
     from lgvi_warp.sinks.plots import plot
     from lgvi_warp.sinks.rerun import log_rerun
-
-    from concurrent.futures import ThreadPoolExecutor
 
     files, faults = [], []
     writers: dict[str, Callable[[Path], Path]] = {

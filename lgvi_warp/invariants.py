@@ -18,7 +18,7 @@ def _times(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     if diagonal:
         return np.einsum("nii->ni", matrix) * vectors
     rows = (sum(matrix[..., i, j] * vectors[..., j] for j in range(3)) for i in range(3))
-    return np.stack(list(rows), axis=-1)  # type: ignore[arg-type]
+    return np.stack(list(rows), axis=-1)
 
 
 def _mass_matrix(parameters: terms.Parameters) -> np.ndarray:

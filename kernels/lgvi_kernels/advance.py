@@ -28,7 +28,7 @@ from lgvi_kernels.submaps import Ap, T, anisotropic_velocity, fold, isotropic_ve
 NON_FINITE = 3
 
 # Steps between two looks at the alarms. A chunk with an alarm is repeated one step at a time by the same code.
-CHUNK = 16
+CHUNK = 128
 
 # Numbers of a packet's state in `state[packet, field]`: R row by row, b, p, pi.
 STATE_FIELDS = 18

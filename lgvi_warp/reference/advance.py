@@ -1,28 +1,53 @@
 """Programs of sub-maps, run step by step."""
 
-from lgvi_warp.reference.rotation import newton
-from lgvi_warp.reference.submaps import SUBMAPS
+from collections.abc import Sequence
+
+from lgvi_warp.reference.rotation import Solver, newton
+from lgvi_warp.reference.submaps import SUBMAPS, Body, State
+
+# (letter, coefficient) of each sub-map, the first applied first.
+Program = Sequence[tuple[str, float]]
 
 
-def step(x, body, program, h, stages=(1.0,), solve=newton):
-    """One step: the program with g h for each stage coefficient g. program: (letter, coefficient), first applied first."""
+def step(
+    x: State, body: Body, program: Program, h: float, stages: Sequence[float] = (1.0,), solve: Solver = newton
+) -> State:
+    """One step of h [s]: the program with g h for each stage coefficient g."""
     for g in stages:
         for letter, coefficient in program:
             x = SUBMAPS[letter](x, body, coefficient * g * h, solve)
     return x
 
 
-def advance(x, body, program, h, steps, stages=(1.0,), solve=newton):
+def advance(
+    x: State,
+    body: Body,
+    program: Program,
+    h: float,
+    steps: int,
+    stages: Sequence[float] = (1.0,),
+    solve: Solver = newton,
+) -> State:
     """The state after so many steps."""
     for _ in range(steps):
         x = step(x, body, program, h, stages, solve)
     return x
 
 
-def trajectory(x, body, program, h, steps, every=1, stages=(1.0,), solve=newton):
-    """The states after 0, every, 2 every, ... steps."""
+def trajectory(
+    x: State,
+    body: Body,
+    program: Program,
+    h: float,
+    steps: int,
+    every: int = 1,
+    stages: Sequence[float] = (1.0,),
+    solve: Solver = newton,
+) -> list[State]:
+    """The states after 0, every, 2 every, ..., steps steps. Raises ValueError if `every` does not divide `steps`."""
+    if steps % every:
+        raise ValueError(f"every = {every} does not divide steps = {steps}")
     states = [x]
     for _ in range(steps // every):
-        x = advance(x, body, program, h, every, stages, solve)
-        states.append(x)
+        states.append(advance(states[-1], body, program, h, every, stages, solve))
     return states

@@ -1,24 +1,32 @@
 """The classical integrators that the paper compares with, on the continuous equations (1) and (3)."""
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 
-from lgvi_warp.reference.rotation import exp, hat, sinc
+from lgvi_warp.reference.paper import Motion
+from lgvi_warp.reference.rotation import Array, cross, exp, hat, norm, sinc
+from lgvi_warp.reference.submaps import Body
+
+# nu, Om and their rates at a stage.
+Stage = tuple[Array, Array, Array, Array]
 
 
-def rates(b, R, nu, Om, body):
+def rates(b: Array, R: Array, nu: Array, Om: Array, body: Body) -> tuple[Array, Array, Array]:
     """Eq. (1) and (3): db/dt in inertial axes, then dnu/dt and dOm/dt in body axes."""
     force, torque = body.wrench(b, R)
     p, pi = body.M @ nu, body.J @ Om
-    nu_rate = np.linalg.solve(body.M, np.cross(p, Om) + force)
-    Om_rate = np.linalg.solve(body.J, np.cross(pi, Om) + np.cross(p, nu) + torque)
+    nu_rate = np.linalg.solve(body.M, cross(p, Om) + force)
+    Om_rate = np.linalg.solve(body.J, cross(pi, Om) + cross(p, nu) + torque)
     return R @ nu, nu_rate, Om_rate
 
 
-def along_screw(b, R, d, theta):
+def along_screw(b: Array, R: Array, d: Array, theta: Array) -> tuple[Array, Array]:
     """(b, R) exp of the twist (d, theta) in SE(3): b + R V d and R exp(hat(theta)), V the integral of exp."""
-    n = np.linalg.norm(theta)
-    third = (n - np.sin(n)) / n**3 if n > 1e-2 else 1.0 / 6.0 - n**2 / 120.0 + n**4 / 5040.0
-    V = np.eye(3) + 0.5 * sinc(0.5 * n) ** 2 * hat(theta) + third * hat(theta) @ hat(theta)
+    n, H = norm(theta), hat(theta)
+    third = (n - math.sin(n)) / n**3 if n > 1e-2 else 1.0 / 6.0 - n**2 / 120.0 + n**4 / 5040.0
+    V = np.eye(3) + 0.5 * sinc(0.5 * n) ** 2 * H + third * H @ H
     return b + R @ V @ d, R @ exp(theta)
 
 
@@ -27,10 +35,10 @@ CG3_A = ((), (-1.0 / 24.0,), (161.0 / 24.0, -6.0))
 CG3_B = (1.0, -2.0 / 3.0, 2.0 / 3.0)
 
 
-def cg3(b, R, nu, Om, body, h):
+def cg3(b: Array, R: Array, nu: Array, Om: Array, body: Body, h: float) -> Motion:
     """Crouch-Grossman, order 3, on SE(3) x R6: R <- R exp(h b1 Om1) exp(h b2 Om2) exp(h b3 Om3), and b by the same
     screws. Returns b, R, nu, Om at k + 1."""
-    stages = []
+    stages: list[Stage] = []
     for row in CG3_A:
         bi, Ri, nui, Omi = crouch_grossman_row(b, R, nu, Om, h, row, stages)
         _, nu_rate, Om_rate = rates(bi, Ri, nui, Omi, body)
@@ -38,7 +46,9 @@ def cg3(b, R, nu, Om, body, h):
     return crouch_grossman_row(b, R, nu, Om, h, CG3_B, stages)
 
 
-def crouch_grossman_row(b, R, nu, Om, h, row, stages):
+def crouch_grossman_row(
+    b: Array, R: Array, nu: Array, Om: Array, h: float, row: Sequence[float], stages: list[Stage]
+) -> Motion:
     """From the state at k along the frozen twists of the stages so far, with the weights of one row of the tableau."""
     for weight, (nui, Omi, nu_rate, Om_rate) in zip(row, stages, strict=True):
         b, R = along_screw(b, R, h * weight * nui, h * weight * Omi)
@@ -51,15 +61,16 @@ RK4_C = (0.0, 0.5, 0.5, 1.0)
 RK4_B = (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
 
 
-def inverse_dexp(theta, Om):
+def inverse_dexp(theta: Array, Om: Array) -> Array:
     """d exp^-1 to order 3, for R = R_k exp(hat(theta)): theta' = Om + theta x Om / 2 + theta x (theta x Om) / 12."""
-    return Om + 0.5 * hat(theta) @ Om + hat(theta) @ hat(theta) @ Om / 12.0
+    return Om + 0.5 * cross(theta, Om) + cross(theta, cross(theta, Om)) / 12.0
 
 
-def rkmk4(b, R, nu, Om, body, h):
+def rkmk4(b: Array, R: Array, nu: Array, Om: Array, body: Body, h: float) -> Motion:
     """Runge-Kutta-Munthe-Kaas, order 4 (HLW IV.8.2): RK4 for the rotation vector. Returns b, R, nu, Om at k + 1."""
     theta = np.zeros(3)
-    rate = total = (np.zeros(3),) * 4
+    rate: tuple[Array, ...] = (np.zeros(3),) * 4
+    total = rate
     for c, weight in zip(RK4_C, RK4_B, strict=True):
         stage = [x + h * c * r for x, r in zip((b, theta, nu, Om), rate, strict=True)]
         b_rate, nu_rate, Om_rate = rates(stage[0], R @ exp(stage[1]), stage[2], stage[3], body)

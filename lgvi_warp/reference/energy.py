@@ -2,19 +2,21 @@
 
 import numpy as np
 
+from lgvi_warp.reference.rotation import Array, cross
+from lgvi_warp.reference.submaps import Body, State
 
-def energy(x, body):
+
+def energy(x: State, body: Body) -> float:
     """p.M^-1 p / 2 + pi.J^-1 pi / 2 + U(b, R) [J]."""
-    z = x.R.T @ np.array([0.0, 0.0, 1.0])
     kinetic = 0.5 * x.p @ np.linalg.solve(body.M, x.p) + 0.5 * x.pi @ np.linalg.solve(body.J, x.pi)
-    return kinetic + sum(term.potential(z, x.b) for term in body.terms)
+    return float(kinetic) + body.potential(x.b, x.R)
 
 
-def linear_momentum(x):
+def linear_momentum(x: State) -> Array:
     """R p in inertial axes [N s]: conserved by every sub-map but K."""
     return x.R @ x.p
 
 
-def angular_momentum(x):
+def angular_momentum(x: State) -> Array:
     """R pi + b x R p about the inertial origin [N m s]: conserved by T and by D."""
-    return x.R @ x.pi + np.cross(x.b, x.R @ x.p)
+    return x.R @ x.pi + cross(x.b, x.R @ x.p)

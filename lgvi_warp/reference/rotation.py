@@ -5,89 +5,125 @@ Five solvers. `newton` is the paper's; `moser_veselov` the explicit solution it 
 the axes are turned and turned back.
 """
 
+import math
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.floating]
+Function = Callable[[Array], Array]
+# (a, J) -> F; those of SOLVERS take a number of iterations as well.
+Solver = Callable[[Array, Array], Array]
 
 # A Newton iteration that has not settled after this many steps will not.
 MOST_ITERATIONS = 60
 # A residual above this fraction of |a| is no solution.
 RESIDUAL = 1e-9
+# Explicit solutions: a matrix of condition 1 / SINGULAR is singular; a root that is imaginary up to the square root of
+# round-off, IMAGINARY, counts as such; F may miss SO(3) by LOST_DIGITS (Moser-Veselov near a sphere: 1e-5), not more.
+SINGULAR = 1e-12
+IMAGINARY = 1e-8
+LOST_DIGITS = 1e-4
 
 
-class NoSolution(ValueError):
+class NoSolution(ValueError):  # noqa: N818
     """Equation (24) has no solution, or this solver does not find it."""
 
 
-def hat(a):
-    """The skew matrix with hat(a) x = a x x."""
+def hat(a: Array) -> Array:
+    """The skew matrix (3, 3) with hat(a) x = a x x."""
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
-def vee(A):
-    """The vector of a skew matrix."""
+def vee(A: Array) -> Array:
+    """The vector (3,) of a skew matrix."""
     return np.array([A[2, 1], A[0, 2], A[1, 0]])
 
 
-def sinc(x):
+def cross(x: Array, y: Array) -> Array:
+    """x x y of two vectors (3,): numpy.cross takes ten times as long."""
+    (x1, x2, x3), (y1, y2, y3) = x.tolist(), y.tolist()
+    return np.array([x2 * y3 - x3 * y2, x3 * y1 - x1 * y3, x1 * y2 - x2 * y1])
+
+
+def norm(x: Array) -> float:
+    """|x| of a vector."""
+    return math.sqrt(x @ x)
+
+
+def sinc(x: float) -> float:
     """sin(x) / x, 1 at 0."""
-    return np.sinc(x / np.pi)
+    return math.sin(x) / x if x else 1.0
 
 
-def exp(f):
-    """Rodrigues' formula, section III-G: exp(hat(f)) = I + sin|f|/|f| hat(f) + (1 - cos|f|)/|f|^2 hat(f)^2."""
-    angle = np.linalg.norm(f)
-    return np.eye(3) + sinc(angle) * hat(f) + 0.5 * sinc(0.5 * angle) ** 2 * (hat(f) @ hat(f))
+def exp(f: Array) -> Array:
+    """Rodrigues' formula, section III-G: exp(hat(f)) = I + sin|f|/|f| hat(f) + (1 - cos|f|)/|f|^2 hat(f)^2.
+
+    The half angle in (1 - cos|f|)/|f|^2 = sinc(|f|/2)^2 / 2 keeps it exact near 0.
+    """
+    angle, H = norm(f), hat(f)
+    return np.eye(3) + sinc(angle) * H + 0.5 * sinc(0.5 * angle) ** 2 * (H @ H)
 
 
-def cay(c):
+def cay(c: Array) -> Array:
     """The rotation with tan(angle / 2) = |c| about c: I + 2/(1 + c.c) (hat(c) + hat(c)^2)."""
-    return np.eye(3) + 2.0 / (1.0 + c @ c) * (hat(c) + hat(c) @ hat(c))
+    H = hat(c)
+    return np.eye(3) + 2.0 / (1.0 + c @ c) * (H + H @ H)
 
 
-def modified_inertia(J):
+def modified_inertia(J: Array) -> Array:
     """Jd = tr(J)/2 I - J, defined before equation (5)."""
     return 0.5 * np.trace(J) * np.eye(3) - J
 
 
-def residual(F, a, J):
-    """|F Jd - Jd F^T - hat(a)| / |a|, equation (24) as a number."""
+def residual(F: Array, a: Array, J: Array) -> float:
+    """|F Jd - Jd F^T - hat(a)| / |a|, equation (24) as a number; not divided where a = 0."""
     Jd = modified_inertia(J)
-    return np.linalg.norm(vee(F @ Jd - Jd @ F.T) - a) / np.linalg.norm(a)
+    return norm(vee(F @ Jd - Jd @ F.T) - a) / (norm(a) or 1.0)
 
 
-def in_principal_axes(solve):
-    """A solver for diagonal J, given as its three numbers, made one for any symmetric J."""
+def in_principal_axes(solve: Callable[[Array, Array, int | None], Array]) -> Callable[..., Array]:
+    """A solver for diagonal J, given as its three numbers, made one for any symmetric J (3, 3)."""
 
-    def solve_any(a, J, iterations=None):
-        if np.array_equal(J, np.diag(np.diag(J))):
+    def solve_any(a: Array, J: Array, iterations: int | None = None) -> Array:
+        if J[0, 1] == J[0, 2] == J[1, 2] == 0.0:
             return solve(a, np.diag(J), iterations)
         d, Q = np.linalg.eigh(J)
+        # hat(Q a) = Q hat(a) Q^T for a rotation; eigh also returns reflections, under which hat(a) changes its sign.
+        Q = Q * np.sign(np.linalg.det(Q))
         return Q @ solve(Q.T @ a, d, iterations) @ Q.T
 
     solve_any.__doc__, solve_any.__name__ = solve.__doc__, solve.__name__
     return solve_any
 
 
-def iterate(step, value, x, a, iterations):
-    """Newton steps: so many, or until the residual no longer shrinks (near |J^-1 a| = 1 it never reaches round-off)."""
+def iterate(value: Function, differential: Function, x: Array, a: Array, iterations: int | None) -> Array:
+    """Newton steps on value(x) = 0: so many, or until the residual no longer shrinks.
+
+    A test against round-off alone would never end: near |J^-1 a| = 1 the residual stagnates above it. Raises NoSolution
+    if it stays large; LinAlgError (a ValueError) if a fixed count meets a singular differential, beyond that bound only.
+    """
     if iterations is not None:
         for _ in range(iterations):
-            x = step(x)
+            x = x - np.linalg.solve(differential(x), value(x))
         return x
-    size = np.linalg.norm(value(x))
+    v = value(x)
     for _ in range(MOST_ITERATIONS):
-        new = step(x)
-        new_size = np.linalg.norm(value(new))
-        if not new_size < size:
+        try:
+            new = x - np.linalg.solve(differential(x), v)
+        except np.linalg.LinAlgError:
             break
-        x, size = new, new_size
-    if not size <= RESIDUAL * np.linalg.norm(a):
-        raise NoSolution(f"equation (24): residual {size:.3g} for |a| = {np.linalg.norm(a):.3g}; shorten the step")
+        new_v = value(new)
+        if not new_v @ new_v < v @ v:
+            break
+        x, v = new, new_v
+    if not norm(v) <= RESIDUAL * norm(a):
+        raise NoSolution(f"equation (24): residual {norm(v):.3g} for |a| = {norm(a):.3g}; shorten the step")
     return x
 
 
-def newton(a, J, iterations=None):
+def newton(a: Array, J: Array, iterations: int | None = None) -> Array:
     """Section III-G: Newton-Raphson on a = sin|f|/|f| J f + (1 - cos|f|)/|f|^2 f x J f, F = exp(hat(f)).
 
     iterations: that many steps from J^-1 a, or None for round-off. Raises NoSolution.
@@ -95,22 +131,22 @@ def newton(a, J, iterations=None):
     if not np.any(a):
         return np.eye(3)
 
-    def value(f):
-        n = np.linalg.norm(f)
-        return sinc(n) * J @ f + 0.5 * sinc(0.5 * n) ** 2 * np.cross(f, J @ f) - a
+    def value(f: Array) -> Array:
+        n, Jf = norm(f), J @ f
+        return sinc(n) * Jf + 0.5 * sinc(0.5 * n) ** 2 * cross(f, Jf) - a
 
-    def step(f):
-        return f - np.linalg.solve(newton_differential(f, J), value(f))
+    def differential(f: Array) -> Array:
+        return newton_differential(f, J)
 
-    return exp(iterate(step, value, np.linalg.solve(J, a), a, iterations))
+    return exp(iterate(value, differential, np.linalg.solve(J, a), a, iterations))
 
 
-def newton_differential(f, J):
+def newton_differential(f: Array, J: Array) -> Array:
     """The differential as printed in section III-G, with the series of its two quotients for small |f|."""
-    n = np.linalg.norm(f)
+    n = norm(f)
     if n > 1e-2:
-        first = np.cos(n) / n**2 - np.sin(n) / n**3
-        second = np.sin(n) / n**3 - 2.0 * (1.0 - np.cos(n)) / n**4
+        first = math.cos(n) / n**2 - math.sin(n) / n**3
+        second = math.sin(n) / n**3 - 2.0 * (1.0 - math.cos(n)) / n**4
     else:
         first = -1.0 / 3.0 + n**2 / 30.0 - n**4 / 840.0
         second = -1.0 / 12.0 + n**2 / 180.0 - n**4 / 6720.0
@@ -119,11 +155,16 @@ def newton_differential(f, J):
         sinc(n) * J
         + first * np.outer(Jf, f)
         + 0.5 * sinc(0.5 * n) ** 2 * (hat(f) @ J - hat(Jf))
-        + second * np.outer(np.cross(f, Jf), f)
+        + second * np.outer(cross(f, Jf), f)
     )
 
 
-def cayley(a, J, iterations=None):
+def cayley_value(c: Array, a: Array, J: Array) -> Array:
+    """G(c) = a + a x c + c (a.c) - 2 J c, equation (24) for F = cay(c)."""
+    return a + cross(a, c) + c * (a @ c) - 2.0 * J @ c
+
+
+def cayley(a: Array, J: Array, iterations: int | None = None) -> Array:
     """Newton on G(c) = a + a x c + c (a.c) - 2 J c = 0, F = cay(c); dG = hat(a) + (a.c) I + c a^T - 2 J.
 
     iterations: that many steps from (2 J)^-1 a, or None for round-off. Raises NoSolution.
@@ -131,104 +172,122 @@ def cayley(a, J, iterations=None):
     if not np.any(a):
         return np.eye(3)
 
-    def value(c):
-        return a + np.cross(a, c) + c * (a @ c) - 2.0 * J @ c
+    def value(c: Array) -> Array:
+        return cayley_value(c, a, J)
 
-    def step(c):
-        return c - np.linalg.solve(hat(a) + (a @ c) * np.eye(3) + np.outer(c, a) - 2.0 * J, value(c))
+    def differential(c: Array) -> Array:
+        return hat(a) + (a @ c) * np.eye(3) + np.outer(c, a) - 2.0 * J
 
-    return cay(iterate(step, value, np.linalg.solve(2.0 * J, a), a, iterations))
+    return cay(iterate(value, differential, np.linalg.solve(2.0 * J, a), a, iterations))
 
 
-def quartic_coefficients(a, J):
+def quartic_coefficients(a: Array, J: Array) -> tuple[float, float, float, float]:
     """(q0, q1, q2, d1) of q(s) = s^4 - d1 s^3 + q2 s^2 - q1 s + q0, whose smallest root is s = a.c. J: (3,)."""
-    D = 2.0 * J
-    A = a @ a
-    d1, d3 = D.sum(), D.prod()
-    d2 = d3 * (1.0 / D).sum()
-    e = a**2 @ (d3 / D)
+    D1, D2, D3 = (2.0 * J).tolist()
+    a1, a2, a3 = (a * a).tolist()
+    A = a1 + a2 + a3
+    d1, d2, d3 = D1 + D2 + D3, D1 * D2 + D2 * D3 + D3 * D1, D1 * D2 * D3
+    e = a1 * D2 * D3 + a2 * D1 * D3 + a3 * D1 * D2
     return e + A**2, d3 + d1 * A, d2 + 2.0 * A, d1
 
 
-def quartic_parameter(a, J, s):
+def quartic_root(a: Array, J: Array, iterations: int | None) -> float:
+    """The smallest root by Newton steps from q0 / q1, the root of q's linear part; None: until they no longer climb.
+
+    q is convex and falls up to that root, so every step from its near side stays there, until round-off.
+    """
+    q0, q1, q2, d1 = quartic_coefficients(a, J)
+    s = q0 / q1
+    for _ in range(MOST_ITERATIONS if iterations is None else iterations):
+        value = (((s - d1) * s + q2) * s - q1) * s + q0
+        new = s - value / (((4.0 * s - 3.0 * d1) * s + 2.0 * q2) * s - q1)
+        if iterations is None and not new > s:
+            break
+        s = new
+    return s
+
+
+def quartic_parameter(a: Array, J: Array, s: float) -> Array:
     """c = n / det for the diagonal J (3,) and the root s; for any s, G(c) = (a.c - s) c: the residual for free."""
     b = 2.0 * J - s
-    n = (np.array([b[1] * b[2], b[2] * b[0], b[0] * b[1]]) + a @ a) * a + np.cross(b * a, a)
-    return n / (b.prod() + a**2 @ b)
+    b1, b2, b3 = b.tolist()
+    n = (np.array([b2 * b3, b3 * b1, b1 * b2]) + a @ a) * a + cross(b * a, a)
+    return n / (b1 * b2 * b3 + (a * a) @ b)
 
 
 @in_principal_axes
-def quartic(a, J, iterations=None):
+def quartic(a: Array, J: Array, iterations: int | None = None) -> Array:
     """The scalar reduction: s = a.c is the smallest root of a quartic, then c is rational in s and F = cay(c).
 
-    iterations: Newton steps from the root q0 / q1 of q's linear part, or None for round-off. From there every step
-    stays on the near side of the root, q being convex up to it. Raises NoSolution.
+    iterations: Newton steps on the quartic, or None for round-off. F is a rotation whatever s is. Raises NoSolution.
     """
-    q0, q1, q2, d1 = quartic_coefficients(a, J)
+    s = quartic_root(a, J, iterations)
+    c = quartic_parameter(a, J, s)
+    if iterations is None and not norm(cayley_value(c, a, np.diag(J))) <= RESIDUAL * norm(a):
+        raise NoSolution(f"equation (24): the quartic has no small root for |a| = {norm(a):.3g}; shorten the step")
+    return cay(c)
 
-    def value(s):
-        return (((s - d1) * s + q2) * s - q1) * s + q0
 
-    s = q0 / q1
-    for _ in range(MOST_ITERATIONS if iterations is None else iterations):
-        s -= value(s) / (((4.0 * s - 3.0 * d1) * s + 2.0 * q2) * s - q1)
-    F = cay(quartic_parameter(a, J, s))
-    if iterations is None and np.any(a) and not residual(F, a, np.diag(J)) <= RESIDUAL:
-        raise NoSolution(f"equation (24): the quartic has no small root for |a| = {np.linalg.norm(a):.3g}")
+def rotation_or_raise(F: Array, name: str) -> Array:
+    """F, if it is a rotation up to the digits that an explicit solution may lose. Raises NoSolution."""
+    if not np.linalg.det(F) > 0.0 or not np.abs(F.T @ F - np.eye(3)).max() < LOST_DIGITS:
+        raise NoSolution(f"{name}: the explicit solution is not a rotation")
     return F
 
 
+def moser_veselov_roots(a: Array, w: Array) -> Array:
+    """The roots lambda_i with positive real part of det(I - lambda hat(a) - lambda^2 diag(w)), w = Jd^2 (3,); complex.
+
+    With beta = lambda^2 the determinant is prod(1 - beta w_i) + beta sum a_i^2 (1 - beta w_i). Raises NoSolution.
+    """
+    e1, e2, e3 = w.sum(), w[0] * w[1] + w[1] * w[2] + w[2] * w[0], w.prod()
+    if e3 <= SINGULAR**2 * w.max() ** 3:
+        raise NoSolution("Moser-Veselov: Jd is singular (a plate)")
+    lambdas = np.sqrt(np.roots([-e3, e2 - a**2 @ w, -e1 + a @ a, 1.0]).astype(complex))
+    if np.any(lambdas.real <= IMAGINARY * np.abs(lambdas)):
+        raise NoSolution("Moser-Veselov: a root is real and negative; the step is too large")
+    return lambdas
+
+
 @in_principal_axes
-def moser_veselov(a, J, iterations=None):
+def moser_veselov(a: Array, J: Array, iterations: int | None = None) -> Array:
     """Section III-G, after Moser & Veselov: P(lambda) = det(I - lambda hat(a) - lambda^2 Jd^2), a cubic in lambda^2.
 
     v_i spans the kernel of I - lambda_i hat(a) - lambda_i^2 Jd^2, and F = (Jd psi Lambda psi^-1)^T (every J of the
     printed text is Jd). Explicit: iterations means nothing here. Raises NoSolution where roots coincide (near a sphere,
-    a = 0), where none has a positive real part, and where the answer is no rotation.
+    a = 0), where none has a positive real part, where Jd is singular, and where the answer is no rotation.
     """
     Jd = np.diag(modified_inertia(np.diag(J)))
-    w = Jd**2
-    # det(I - beta diag(w) - lambda hat(a)) = prod(1 - beta w_i) + beta sum a_i^2 (1 - beta w_i), beta = lambda^2
-    e1, e2, e3 = w.sum(), w[0] * w[1] + w[1] * w[2] + w[2] * w[0], w.prod()
-    betas = np.roots([-e3, e2 - a**2 @ w, -e1 + a @ a, 1.0]).astype(complex)
-    lambdas = np.sqrt(betas)
-    lambdas = np.where(lambdas.real < 0.0, -lambdas, lambdas)
-    if np.any(lambdas.real <= 1e-12 * np.abs(lambdas)):
-        raise NoSolution("Moser-Veselov: a root is real and negative; the step is too large")
-    psi = np.empty((3, 3), complex)
-    for i, root in enumerate(lambdas):
-        psi[:, i] = np.linalg.svd(np.eye(3) - root * hat(a) - root**2 * np.diag(w))[2][-1].conj()
-    if np.linalg.cond(psi) > 1e12:
+    lambdas = moser_veselov_roots(a, Jd**2)
+    # The kernel of a matrix known to round-off only: its last right singular vector.
+    P = [np.eye(3) - root * hat(a) - root**2 * np.diag(Jd**2) for root in lambdas]
+    psi = np.linalg.svd(np.array(P))[2][:, -1].conj().T
+    if not np.linalg.cond(psi) < 1.0 / SINGULAR:
         raise NoSolution("Moser-Veselov: roots coincide (J near a sphere, or a near 0)")
     F = (np.diag(Jd) @ psi @ np.diag(lambdas) @ np.linalg.inv(psi)).T.real
-    if not np.linalg.det(F) > 0.0 or np.abs(F.T @ F - np.eye(3)).max() > 1e-3:
-        raise NoSolution("Moser-Veselov: the explicit solution is not a rotation")
-    return F
+    return rotation_or_raise(F, "Moser-Veselov")
 
 
-def riccati(a, J, iterations=None):
+def riccati(a: Array, J: Array, iterations: int | None = None) -> Array:
     """F = (A + S) Jd^-1 with A = hat(a)/2 and S^2 + S A - A S = A^2 + Jd^2, S symmetric (Cardoso & Leite 2003).
 
-    S comes from the stable invariant subspace of the Riccati equation's Hamiltonian matrix. Explicit: iterations means
-    nothing here. Raises NoSolution where the subspace is not 3-dimensional or F is no rotation (Jd singular: plates).
+    The columns of (I, S) span an invariant subspace of H, on which H acts as A + S = F Jd: the one of the three
+    eigenvalues with positive real part. Explicit: iterations means nothing here. Raises NoSolution where that subspace
+    does not give an S or F is no rotation, and where Jd is singular (plates).
     """
     A, Jd = 0.5 * hat(a), modified_inertia(J)
-    if np.linalg.cond(Jd) > 1e12:
+    if not np.linalg.cond(Jd) < 1.0 / SINGULAR:
         raise NoSolution("Riccati: Jd is singular (a plate)")
-    # S^2 + S A + A^T S - (A^2 + Jd^2) = 0
     H = np.block([[A, np.eye(3)], [A @ A + Jd @ Jd, A]])
     values, vectors = np.linalg.eig(H)
-    chosen = vectors[:, np.argsort(values.real)[3:]]
-    if np.linalg.cond(chosen[:3]) > 1e12:
-        raise NoSolution("Riccati: no solution is selected by the eigenvalues; the step is too large")
+    chosen = vectors[:, values.real > IMAGINARY * np.abs(values).max()]
+    if chosen.shape[1] != 3 or not np.linalg.cond(chosen[:3]) < 1.0 / SINGULAR:
+        raise NoSolution("Riccati: the eigenvalues select no solution; the step is too large")
     S = (chosen[3:] @ np.linalg.inv(chosen[:3])).real
-    F = (A + 0.5 * (S + S.T)) @ np.linalg.inv(Jd)
-    if not np.linalg.det(F) > 0.0 or np.abs(F.T @ F - np.eye(3)).max() > 1e-3:
-        raise NoSolution("Riccati: the solution is not a rotation; the step is too large")
-    return F
+    return rotation_or_raise((A + 0.5 * (S + S.T)) @ np.linalg.inv(Jd), "Riccati")
 
 
-SOLVERS: dict[str, Callable] = {
+SOLVERS: dict[str, Callable[..., Array]] = {
     "newton": newton,
     "cayley": cayley,
     "quartic": quartic,

@@ -36,8 +36,7 @@ def plot(result: Result, path: str | os.PathLike[str]) -> Path:
     fan(depth, result.time, result.position[:, good, 2])
     depth.set(title="Depth", xlabel="time [s]", ylabel="depth b3 [m], down")
     depth.invert_yaxis()
-    error = result.energy[:, good] - result.energy[:1, good]
-    fan(energy, result.time, error)
+    fan(energy, result.time, result.energy[:, good] - result.energy[:1, good])
     energy.set(title="Energy error", xlabel="time [s]", ylabel="E(t) - E(0) [J]")
     energy.axhline(0.0, color="black", linewidth=0.5)
     _paths(paths, result.position[:, good])

@@ -59,9 +59,10 @@ def test_psi_keeps_neither_but_within_the_square_of_the_step():
     assert slope(steps, changes) == pytest.approx(2.0, abs=0.3)
 
 
-@pytest.mark.parametrize(("dtype", "bound"), [("float64", 1e-12), ("float32", 1e-6)])
+@pytest.mark.parametrize(("dtype", "bound"), [("float64", 1e-12), ("float32", 3e-6)])
 def test_attitude_stays_orthogonal(dtype, bound, scene):
-    # float64: raw products, 1e6 steps (mathematics, section 5). float32: renormalised, so a few round-offs of 6e-8.
+    # float64: raw products, 1e6 steps (mathematics, section 5). float32: renormalised every 128 steps,
+    # each of two products rounded to 6e-8: 6e-8 sqrt(256) = 1e-6 an element, and three of them in R^T R.
     result = lw.solve(lw.Ensemble(scene, members=8), h=0.001, t1=1000.0, dtype=dtype)
     R = result.attitude[-1].astype(np.float64)
     assert np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max() < bound

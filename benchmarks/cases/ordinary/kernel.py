@@ -139,7 +139,9 @@ def command(states, M, J, net, moment, h, steps, method="psi", dtype="float64"):
     real = wp.float64 if dtype == "float64" else wp.float32
     mat33, vec3 = wp.types.matrix((3, 3), real), wp.types.vector(3, real)
     types = (vec3, mat33, vec3, vec3)
-    arrays = [wp.array(np.ascontiguousarray(x, dtype), dtype=t, device="cpu") for x, t in zip(states, types, strict=True)]
+    arrays = [
+        wp.array(np.ascontiguousarray(x, dtype), dtype=t, device="cpu") for x, t in zip(states, types, strict=True)
+    ]
     constants = [mat33(x) for x in (M, np.linalg.inv(M), J, np.linalg.inv(J))]
     inputs = [*arrays, *constants, real(net), vec3(*moment), real(h), steps]
     launch = wp.launch(make_ordinary(real, method), len(states[0]), inputs=inputs, device="cpu", record_cmd=True)

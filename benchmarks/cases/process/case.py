@@ -9,8 +9,8 @@ from pathlib import Path
 from statistics import median
 
 from lgvi_warp import machine
-from lgvi_warp.scene import Scene
 from lgvi_warp.ensemble import Ensemble
+from lgvi_warp.scene import Scene
 from lgvi_warp.solving import make_plan, run_plan
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -42,5 +42,3 @@ def run(quick):
         "kernel_s": round(kernel, 2),
         "over_twice_imports_plus_twice_kernel": round(whole / (2 * bare + 2 * kernel), 2),
     }
-
-

@@ -9,7 +9,9 @@ def run(quick):
     members, steps = (512, 100) if quick else (4096, 400)
     fleet = speed.fleet(members)
     for dtype in ("float64", "float32"):
-        methods = [Method("psi_s", solver, k, None if k is None else 0.5) for solver in SOLVERS for k in (None, 0, 1, 2)]
+        methods = [
+            Method("psi_s", solver, k, None if k is None else 0.5) for solver in SOLVERS for k in (None, 0, 1, 2)
+        ]
         plans = [make_plan(fleet, method, h=0.01, t1=0.01 * steps, dtype=dtype) for method in methods]
         seconds = speed.interleaved([speed.stepper(plan) for plan in plans])
         for method, one in zip(methods, seconds, strict=True):

@@ -4,17 +4,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lgvi_warp.reference.rotation import Array, cross
+
 
 @dataclass(frozen=True)
 class Restoring:
     """moment: buoyancy times the lever B r, (3,) [N m], r from the centre of gravity to that of buoyancy."""
 
-    moment: np.ndarray
+    moment: Array
 
-    def wrench(self, z, b):
+    def wrench(self, z: Array, b: Array) -> tuple[Array, Array]:
         """No force and the torque mU(b, R) = -B r x z, z = R^T e3."""
-        return np.zeros(3), -np.cross(self.moment, z)
+        return np.zeros(3), -cross(self.moment, z)
 
-    def potential(self, z, b):
+    def potential(self, z: Array, b: Array) -> float:
         """U = B r.z [J]."""
-        return self.moment @ z
+        return float(self.moment @ z)

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lgvi_warp.reference.rotation import Array
+
 
 @dataclass(frozen=True)
 class Weight:
@@ -11,10 +13,10 @@ class Weight:
 
     net: float
 
-    def wrench(self, z, b):
+    def wrench(self, z: Array, b: Array) -> tuple[Array, Array]:
         """Force f(b, R) = net z and no torque, z = R^T e3."""
         return self.net * z, np.zeros(3)
 
-    def potential(self, z, b):
+    def potential(self, z: Array, b: Array) -> float:
         """U = -net b3 [J]."""
-        return -self.net * b[2]
+        return -self.net * float(b[2])

@@ -1,0 +1,34 @@
+"""A first dive: 1,000 vehicles that differ a little, 60 seconds, a picture and a recording."""
+
+import lgvi_warp as lw
+
+vehicle = lw.Vehicle(
+    mass=123.8,  # kg
+    added_mass=[65.0, 70.0, 75.0],  # kg
+    inertia=[5.46, 5.29, 5.72],  # kg m2
+    buoyancy=1215.8,  # N
+    center_of_buoyancy=[0.0, 0.0, -0.007],  # m
+)
+start = lw.Start(
+    position=[0.0, 0.0, 10.0],  # m: north, east, down
+    euler_deg=[0.0, 10.0, 0.0],  # roll, pitch, yaw
+    velocity=[1.0, 0.0, 0.0],  # m/s: ahead
+    angular_velocity=[0.0, 0.0, 0.1],  # rad/s
+)
+scene = lw.Scene(vehicle=vehicle, environment=lw.Environment(gravity=9.8), start=start)
+fleet = lw.Ensemble(
+    scene,
+    members=1000,
+    seed=1,
+    vary={
+        "vehicle.mass": lw.TruncatedNormal(relative=0.001),
+        "start.angular_velocity": lw.Normal(std=[0.01, 0.01, 0.02]),
+    },
+)
+
+if __name__ == "__main__":
+    result = lw.solve(fleet, method="psi_s", h=0.02, t1=60.0, save=lw.SaveAt(every=0.5))
+    depth = result.position[-1, :, 2]
+    print(result.status.counts())
+    print(f"depth after 60 s: {depth.mean():.2f} m on average, from {depth.min():.2f} to {depth.max():.2f} m")
+    print(lw.plot(result, "first_dive.png"), lw.log_rerun(result, "first_dive.rrd"))

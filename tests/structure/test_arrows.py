@@ -1,0 +1,182 @@
+"""The arrows between modules point one way (architecture, Layout), read from the source: lazy imports count as well."""
+
+import ast
+import graphlib
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SOURCE_ROOTS = {"lgvi_warp": ROOT, "lgvi_kernels": ROOT / "kernels"}
+FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
+
+# What pyproject.toml declares, by import name; the optional ones take long to import, or may be absent.
+OPTIONAL = {"matplotlib", "rerun", "xarray"}
+DEPENDENCIES = {"numpy", "scipy", "warp"} | OPTIONAL
+
+
+class Import(NamedTuple):
+    """One imported name: `lgvi_warp.machine` for `from lgvi_warp import machine`; lazy when inside a function."""
+
+    name: str
+    lazy: bool
+
+
+def is_type_checking(node):
+    """Whether the node is `if TYPE_CHECKING:`, which never runs."""
+    return isinstance(node, ast.If) and ast.unparse(node.test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING")
+
+
+def names(node, package):
+    """Absolute names that an import statement asks for."""
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    base = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+    return [".".join([*base, *filter(None, [node.module]), alias.name]) for alias in node.names]
+
+
+def imports(node, package="", lazy=False):
+    """Every Import below a node."""
+    if isinstance(node, (ast.Import, ast.ImportFrom)):
+        return [Import(name, lazy) for name in names(node, package)]
+    below = node.orelse if is_type_checking(node) else ast.iter_child_nodes(node)
+    return [found for child in below for found in imports(child, package, lazy or isinstance(node, FUNCTIONS))]
+
+
+def read_modules():
+    """{module name: its imports} of both packages."""
+    found = {}
+    for package, root in SOURCE_ROOTS.items():
+        for path in sorted((root / package).rglob("*.py")):
+            parts = path.relative_to(root).with_suffix("").parts
+            own = parts[:-1] if parts[-1] == "__init__" else parts
+            found[".".join(own)] = imports(ast.parse(path.read_text()), ".".join(parts[:-1]))
+    return found
+
+
+MODULES = read_modules()
+
+
+def within(name, package):
+    """Whether a name is the package or lies in it."""
+    return name == package or name.startswith(f"{package}.")
+
+
+def part(package):
+    """The modules of one package."""
+    return {module: found for module, found in MODULES.items() if within(module, package)}
+
+
+def strangers(package, allowed):
+    """(module, name) for every import in a package from outside the allowed ones."""
+    return [
+        (module, found.name)
+        for module, all_of_it in part(package).items()
+        for found in all_of_it
+        if not any(within(found.name, one) for one in allowed)
+    ]
+
+
+def importers(package, lazy=True):
+    """Modules outside a package that import something of it; lazy=False leaves imports inside functions out."""
+    return {
+        module
+        for module, all_of_it in MODULES.items()
+        for found in all_of_it
+        if within(found.name, package) and not within(module, package) and (lazy or not found.lazy)
+    }
+
+
+def module_of(name):
+    """The module that an imported name is, or lies in; None for a foreign one."""
+    while name and name not in MODULES:
+        name = name.rpartition(".")[0]
+    return name or None
+
+
+def loaded_by(module):
+    """Modules of ours that importing this one names at once, without those named inside functions."""
+    return {module_of(found.name) for found in MODULES[module] if not found.lazy} - {None, module}
+
+
+def closure(module):
+    """A module and all of ours that importing it brings in, parent packages included."""
+    seen, waiting = set(), {module}
+    while waiting:
+        one = waiting.pop()
+        seen.add(one)
+        waiting |= (loaded_by(one) | ({one.rpartition(".")[0]} & MODULES.keys())) - seen
+    return seen
+
+
+def test_the_reader_finds_both_packages():
+    assert {"lgvi_warp", "lgvi_warp.plan", "lgvi_warp.reference.rotation", "lgvi_kernels.advance"} <= MODULES.keys()
+    assert all(part(package) for package in ("lgvi_warp.reference", "lgvi_warp.sinks", "lgvi_kernels.terms"))
+
+
+@pytest.mark.parametrize(
+    ("source", "expected"),
+    [
+        ("import rerun as rr", [("rerun", False)]),
+        ("def f():\n    import rerun", [("rerun", True)]),
+        ("class A:\n    import rerun", [("rerun", False)]),
+        ("try:\n    from rerun import Mesh3D\nexcept ImportError:\n    pass", [("rerun.Mesh3D", False)]),
+        ("if TYPE_CHECKING:\n    import rerun\nelse:\n    import xarray", [("xarray", False)]),
+        ("from lgvi_warp import sinks", [("lgvi_warp.sinks", False)]),
+        ("from . import plots", [("lgvi_warp.sinks.plots", False)]),
+        ("from ..result import Result", [("lgvi_warp.result.Result", False)]),
+    ],
+)
+def test_the_reader_sees_an_import(source, expected):
+    assert imports(ast.parse(source), "lgvi_warp.sinks") == expected
+
+
+def test_device_code_imports_warp_only():
+    assert strangers("lgvi_kernels", {"lgvi_kernels", "warp", "functools", "typing"}) == []
+
+
+def test_the_reference_imports_numpy_only():
+    assert strangers("lgvi_warp.reference", {"lgvi_warp.reference", "numpy"} | sys.stdlib_module_names) == []
+
+
+def test_the_product_imports_what_it_declares():
+    assert strangers("lgvi_warp", {"lgvi_warp", "lgvi_kernels"} | DEPENDENCIES | sys.stdlib_module_names) == []
+
+
+def test_only_the_plan_and_the_machine_know_the_kernels():
+    assert importers("lgvi_kernels") == {"lgvi_warp.plan", "lgvi_warp.machine"}
+
+
+def test_nothing_of_the_product_uses_the_reference():
+    assert importers("lgvi_warp.reference") == set()
+
+
+def test_only_the_command_line_asks_for_sinks_and_late():
+    assert importers("lgvi_warp.sinks", lazy=False) == set()
+    assert importers("lgvi_warp.sinks") <= {"lgvi_warp.cli"}
+
+
+@pytest.mark.parametrize("name", sorted(OPTIONAL | {"pandas"}))
+def test_optional_packages_are_imported_late(name):
+    assert importers(name, lazy=False) == set()
+
+
+@pytest.mark.parametrize("module", ["lgvi_warp", "lgvi_warp.cli", "lgvi_warp.scenefile", "lgvi_warp.ensemble"])
+def test_a_scene_is_read_without_warp(module):
+    assert {"lgvi_warp.scene", "lgvi_warp.vehicle"} <= closure(module)
+    assert closure(module) & (importers("warp", lazy=False) | part("lgvi_kernels").keys()) == set()
+
+
+def test_the_walk_has_no_circle():
+    # A package's __init__ runs first whatever is asked of it: what it gathers is no arrow back.
+    packages = {module for module in MODULES if any(other.startswith(f"{module}.") for other in MODULES)}
+    graph = {module: loaded_by(module) - packages for module in MODULES}
+    graphlib.TopologicalSorter(graph).prepare()  # raises CycleError, naming the circle
+
+
+def test_lower_modules_do_not_know_the_plan():
+    lower = {"scene", "scenefile", "ensemble", "method", "saveat", "terms", "vehicle", "distributions", "notation"}
+    for upper in ("plan", "solving", "executors", "result", "cli"):
+        assert importers(f"lgvi_warp.{upper}") & {f"lgvi_warp.{name}" for name in lower} == set()

@@ -1,0 +1,150 @@
+"""The command: what it writes, what it says, and how it refuses."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp import cli
+from tests.conftest import ROOT
+
+PAPER = str(ROOT / "examples" / "paper.toml")
+SMALL = ["--members", "20", "--duration", "2", "--set", "run.save_every=0.5"]
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A small run in a process of its own: its folder and what it printed."""
+    out = tmp_path_factory.mktemp("runs") / "paper"
+    code = "from lgvi_warp.cli import entry; import sys; sys.argv = ['lgvi-warp', *sys.argv[1:]]; entry()"
+    arguments = [sys.executable, "-c", code, "run", PAPER, "--out", str(out), *SMALL]
+    return out, subprocess.run(arguments, capture_output=True, text=True, cwd=out.parent)
+
+
+def test_run_writes_three_files_and_a_summary(finished):
+    out, done = finished
+    assert (done.returncode, done.stderr) == (0, "")
+    assert sorted(path.name for path in out.iterdir()) == ["fleet.png", "fleet.rrd", "result.npz"]
+    for word in ("members     20", "psi_s", "vehicle-steps per second", "ok 20", "energy", "momentum", "result.npz"):
+        assert word in done.stdout
+
+
+def test_the_result_is_that_of_solve(finished, scene):
+    result = lw.Result.load(finished[0] / "result.npz")
+    fleet = lw.Ensemble(scene, 20, 1, scene.ensemble_settings.vary)
+    same = lw.solve(fleet, h=0.01, t1=2.0, save=lw.SaveAt(every=0.5))
+    assert result.position.tobytes() == same.position.tobytes()
+    assert result.provenance["ensemble"]["members"] == 20
+
+
+def test_the_picture_is_not_empty(finished):
+    from matplotlib.image import imread
+
+    picture = imread(finished[0] / "fleet.png")
+    assert picture.shape[0] > 400 and picture.shape[1] > 1200
+    assert all(third.std() > 0.05 for third in np.array_split(picture[..., :3], 3, axis=1))
+
+
+def test_the_recording_holds_every_pose(finished):
+    import rerun as rr  # noqa: F401  (the chunk module needs it)
+    from rerun.chunk import RrdReader
+
+    rows = 0
+    for chunk in RrdReader(finished[0] / "fleet.rrd").stream().filter(content="/world/fleet"):
+        batch = chunk.to_record_batch()
+        column = next((name for name in batch.schema.names if name.endswith("translations")), None)
+        if column and "sim_time" in batch.schema.names:
+            rows += batch.num_rows
+            poses = batch.column(column).to_pylist()
+            assert all(len(frame) == 20 and np.isfinite(frame).all() for frame in poses)
+    assert rows == 5
+
+
+def test_quiet_says_nothing(tmp_path, capfd):
+    assert cli.main(["run", PAPER, "--out", str(tmp_path), *SMALL, "--quiet"]) == 0
+    assert capfd.readouterr() == ("", "")
+
+
+def test_options_reach_the_run(tmp_path, capsys):
+    options = [
+        "--method",
+        "psi",
+        "--step",
+        "0.02",
+        "--dtype",
+        "float32",
+        "--threads",
+        "1",
+        "--width",
+        "4",
+        "--seed",
+        "9",
+    ]
+    assert cli.main(["run", PAPER, "--out", str(tmp_path), *SMALL, *options, "--set", "vehicle.mass=124"]) == 0
+    p = lw.Result.load(tmp_path / "result.npz").provenance
+    assert (p["method"]["name"], p["step"], p["dtype"], p["width"]) == ("psi", 0.02, "float32", 4)
+    assert p["ensemble"]["seed"] == 9 and p["scene"]["vehicle"]["mass"] == 124
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--set", "vehicle.mas=1"], ["vehicle.mas", "did you mean 'mass'"]),
+        (["--step", "-1", "--members", "0", "--set", "vehicle.mass=-2"], ["3 faults", "step", "members", "mass"]),
+        (["--method", "psy"], ["psy", "did you mean"]),
+        (["--set", "nonsense"], ["--set nonsense", "vehicle.mass=120"]),
+        (["--dtype", "float16"], ["float16"]),
+        (["--width", "5"], ["width = 5"]),
+        (["--threads", "0"], ["threads = 0"]),
+    ],
+)
+def test_a_bad_argument_is_refused_with_the_remedy(arguments, words, tmp_path, capsys):
+    assert cli.main(["run", PAPER, "--out", str(tmp_path / "out"), *arguments]) == 2
+    text = capsys.readouterr().err
+    assert all(word in text for word in words) and "Traceback" not in text
+
+
+def test_a_missing_scene_is_named(tmp_path, capsys):
+    assert cli.main(["run", str(tmp_path / "none.toml"), "--out", str(tmp_path)]) == 2
+    assert "none.toml" in capsys.readouterr().err
+
+
+def test_an_output_that_cannot_be_written_is_named(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert cli.main(["run", PAPER, "--out", str(tmp_path / "file" / "out"), *SMALL]) == 1
+    assert "file" in capsys.readouterr().err
+
+
+def test_every_member_failing_is_an_exit_code_and_a_reason(tmp_path, capsys):
+    fast = ["--set", "start.angular_velocity=[900.0, 0.0, 0.0]", "--step", "0.1"]
+    assert cli.main(["run", PAPER, "--out", str(tmp_path), *SMALL, *fast]) == 1
+    out = capsys.readouterr()
+    assert "step_too_large 20" in out.out and "shorten the step" in out.out
+    assert "fleet.png was not written" in out.err and (tmp_path / "result.npz").exists()
+
+
+def test_progress_tells_the_time_left():
+    import io
+
+    stream = io.StringIO()
+    progress = cli.Progress(stream)
+    progress._interval = 0.0
+    progress(0.25)
+    progress.close()
+    assert stream.getvalue().startswith(" 25.0%, ") and "s left" in stream.getvalue()
+
+
+def test_info(capsys):
+    assert cli.main(["info"]) == 0
+    out = capsys.readouterr().out
+    assert all(word in out for word in ("cpu", "threads", "warp-lang 1.19", "vehicles per packet", "GFMA/s"))
+
+
+def test_bench(capsys):
+    assert cli.main(["bench", "--members", "64", "--steps", "10"]) == 0
+    records = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [r["dtype"] for r in records] == ["float64", "float32"]
+    assert all(r["ns_per_vehicle_step"] > 0 and r["part_of_peak"] > 0 for r in records)

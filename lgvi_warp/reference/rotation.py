@@ -102,7 +102,7 @@ def iterate(value: Function, differential: Function, x: Array, a: Array, iterati
     """Newton steps on value(x) = 0: so many, or until the residual no longer shrinks.
 
     A test against round-off alone would never end: near |J^-1 a| = 1 the residual stagnates above it. Raises NoSolution
-    if it stays large; LinAlgError (a ValueError) if a fixed count meets a singular differential, beyond that bound only.
+    if it stays large; LinAlgError (a ValueError) if a fixed count meets a singular differential, beyond that bound.
     """
     if iterations is not None:
         for _ in range(iterations):

@@ -129,7 +129,7 @@ def test_principal_axis(solver, axis):
     for x in (0.4, 0.99, 0.9999, 0.99999999):
         F = SOLVERS[solver](x * J * e, np.diag(J))
         assert np.abs(F - rotation.exp(np.arcsin(x) * e)).max() < 100 * ROUND_OFF / np.sqrt(1 - x)
-    for x in (1.0001, 1.05, 2.0, 10.0):
+    for x in (1.00001, 1.0001, 1.05, 2.0, 10.0):
         with pytest.raises(rotation.NoSolution):
             SOLVERS[solver](x * J * e, np.diag(J))
 

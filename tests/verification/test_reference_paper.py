@@ -100,8 +100,8 @@ def test_truth_at_five_seconds(example, body, start):
     assert errors(state, expected(example["truth"]["5"])).max() < 1e-10
 
 
-# Mathematics, section 4: errors of b, R, nu, Om at t = 2 for h = .0125. psi_s is printed there with 2.9e-5 for Om; it is
-# 2.845e-5 by kl8 and by RKMK4 alike, so 2.8e-5 stands here.
+# Mathematics, section 4: errors of b, R, nu, Om at t = 2 for h = .0125. There psi_s has 2.9e-5 for Om; it is 2.845e-5 by
+# kl8 and by RKMK4 alike, so 2.8e-5 stands here.
 ERRORS = {
     "phi": ("5e-4", "5e-3", "4e-3", "6e-4"),
     "psi": ("3.5e-7", "2.1e-5", "1.5e-5", "3.6e-5"),

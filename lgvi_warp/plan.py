@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import threading
 import time
 from collections.abc import Iterator
@@ -50,7 +51,7 @@ class Block:
 def blocks(members: int) -> list[Block]:
     """Runs of 256 to 4096 members, a power of two. Depends on the number of members only, so bits and files do too."""
     size = 256
-    while size < 4096 and size * 128 <= members:
+    while size < 4096 and size * 64 <= members:
         size *= 2
     return [Block(i, min(i + size, members)) for i in range(0, members, size)]
 
@@ -148,7 +149,24 @@ class Plan:
         warp_setup.start()
         with _build:
             wp.load_module(self.advance.kernel.module, device="cpu")
+        _ = self.dtypes, self.times  # made here, before threads ask for them
         return time.perf_counter() - start
+
+    @functools.cached_property
+    def dtypes(self) -> tuple[np.dtype, np.dtype]:
+        """NumPy's types of the kernel's Inertia and Params."""
+        return np.dtype(self.advance.Inertia.numpy_dtype()), np.dtype(self.advance.Params.numpy_dtype())
+
+    @functools.cached_property
+    def times(self) -> tuple[Any, Any, Any]:
+        """Kernel arguments that all blocks share: stage_h, lead_h and sample_step."""
+        g = np.array(self.method.stages)
+        due = np.append(self.grid.sample_steps, 2**31 - 1).astype(np.int32)
+        return (
+            wp.array(g * self.grid.h, dtype=self.spec.real, device="cpu"),
+            wp.array((g + np.roll(g, -1)) * self.grid.h, dtype=self.spec.real, device="cpu"),
+            wp.array(due, dtype=wp.int32, device="cpu"),
+        )
 
     def due(self, k0: int, k1: int) -> tuple[int, int]:
         """(s0, s1): the samples s0 to s1 fall due after step k0 and up to step k1."""
@@ -184,7 +202,6 @@ class Packets:
         self.status = wp.zeros(packets, dtype=int_lane(width), device="cpu")
         self.failed_step = wp.zeros(packets, dtype=int_lane(width), device="cpu")
         self.failed_size = wp.zeros(packets, dtype=Lane, device="cpu")
-        self._times()
 
     def _lanes(self, values: np.ndarray) -> np.ndarray:
         """Rows (1 or m, d) as (1 or packets, d, width) of the plan's dtype."""
@@ -199,7 +216,7 @@ class Packets:
         J, M, scale = np.broadcast_arrays(self.J[:, :, None], self.M, self.scale[:, None, None])
         inverse = np.linalg.inv(M)
         rows = self._lanes(J[:, :, 0] / scale[:, :, 0])
-        data = np.zeros(len(rows), self.plan.advance.Inertia.numpy_dtype())
+        data = np.zeros(len(rows), self.plan.dtypes[0])
         _set_vector(data["J"], rows)
         data["inverse_scale"] = self._lanes(1.0 / scale[:, 0, :1])[:, 0]
         mean = np.einsum("nii->n", inverse) / 3.0
@@ -218,7 +235,7 @@ class Packets:
         own = [kind.in_axes(self.members.parameters, self.Q) for kind in self.plan.kinds]
         varied = any(len(value) > 1 for values in own for value in values.values())
         packets = -(-self.members.count // self.plan.spec.width)
-        data = np.zeros(packets if varied else 1, self.plan.advance.Params.numpy_dtype())
+        data = np.zeros(packets if varied else 1, self.plan.dtypes[1])
         node = data
         for values in own:
             for key, value in values.items():
@@ -241,14 +258,6 @@ class Packets:
         rows[:, 15:] = self.J / self.scale[:, None] * Om
         return pack(rows, self.plan.spec.width).astype(self.plan.dtype)
 
-    def _times(self) -> None:
-        real, grid = self.plan.spec.real, self.plan.grid
-        g = np.array(self.plan.method.stages)
-        self.stage_h = wp.array(g * grid.h, dtype=real, device="cpu")
-        self.lead_h = wp.array((g + np.roll(g, -1)) * grid.h, dtype=real, device="cpu")
-        due = np.append(grid.sample_steps, 2**31 - 1).astype(np.int32)
-        self.sample_step = wp.array(due, dtype=wp.int32, device="cpu")
-
     def advance(self, k0: int, k1: int) -> np.ndarray:
         """Make the steps k0 to k1. Returns the samples due then, (s1 - s0, packets * width, numbers of a sample)."""
         plan = self.plan
@@ -257,7 +266,8 @@ class Packets:
         packets, width = self.state.shape[0], plan.spec.width
         out = wp.empty((packets, max(1, (s1 - s0) * numbers)), dtype=plan.advance.Lane, device="cpu")
         inputs = [self.inertia, self.params, plan.spec.real(plan.method.residual_tolerance(plan.dtype))]
-        inputs += [self.stage_h, self.lead_h, k0, k1, s0, self.sample_step]
+        stage_h, lead_h, sample_step = plan.times
+        inputs += [stage_h, lead_h, k0, k1, s0, sample_step]
         inputs += [self.state, self.status, self.failed_step, self.failed_size, out]
         with _build:
             command: Any = wp.launch(plan.advance.kernel, dim=packets, inputs=inputs, device="cpu", record_cmd=True)

@@ -15,8 +15,13 @@ import warp as wp
 @contextlib.contextmanager
 def _native_stderr_closed() -> Iterator[None]:
     """Send what native code writes to file descriptor 2 nowhere."""
-    sys.stderr.flush()
-    kept = os.dup(2)
+    if sys.stderr is not None:
+        sys.stderr.flush()
+    try:
+        kept = os.dup(2)
+    except OSError:  # it is closed already
+        yield
+        return
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(nowhere, 2)

@@ -277,7 +277,8 @@ def vector_residual2(value: Any, a: Any, J: Any):
     return dot(value, value) / dot(a, a)
 
 
-# name -> start of a fixed number of Newton steps, start of an iteration to the tolerance, value, newton, excess, residual2, rotation
+# name -> start of a fixed number of Newton steps, start of an iteration to the tolerance, then value, newton, excess,
+# residual2 and rotation as above
 SOLVERS = {
     "quartic": (
         quartic_linear,

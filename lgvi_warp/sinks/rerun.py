@@ -20,7 +20,12 @@ TRAILS = 40
 # Frames per chunk of columns: large enough to be quick to write, small enough to seek in.
 FRAMES = 20
 TIMELINE = "sim_time"
-CURVES = ("lowest", "median", "highest")
+# Name, quantile and colour of each curve.
+CURVES = (
+    ("smallest", 0.0, (120, 150, 190)),
+    ("median", 0.5, (255, 200, 60)),
+    ("largest", 1.0, (190, 120, 120)),
+)
 
 
 def log_rerun(result: Result, path: str | os.PathLike[str]) -> Path:
@@ -39,7 +44,7 @@ def log_rerun(result: Result, path: str | os.PathLike[str]) -> Path:
     shown = np.flatnonzero(finite)
     shown = shown[np.unique(np.linspace(0, len(shown) - 1, min(MOST_BODIES, len(shown))).astype(int))]
     position = result.position[:, shown].astype(np.float32)
-    recording.save(target, default_blueprint=_blueprint(position))
+    recording.save(target, default_blueprint=_blueprint(result.time, position))
     _world(recording, rr, result, shown, position)
     _curves(recording, rr, result)
     text = "```json\n" + json.dumps(result.provenance, indent=2) + "\n```"
@@ -69,7 +74,7 @@ def _world(recording: Any, rr: Any, result: Result, shown: np.ndarray, position:
             recording.send_columns(f"world/{name}", [rr.TimeColumn(TIMELINE, duration=times)], columns, strict=True)
     trails = np.unique(np.linspace(0, len(shown) - 1, min(TRAILS, len(shown))).astype(int))
     strips = position[:, trails].transpose(1, 0, 2)
-    lines = rr.LineStrips3D(list(strips), radii=size * 0.04, colors=(160, 160, 160))
+    lines = rr.LineStrips3D(list(strips), radii=size * 0.05, colors=(130, 150, 160))
     recording.log("world/trails", lines, static=True, strict=True)
 
 
@@ -100,35 +105,43 @@ def _body(rr: Any, size: float, color: tuple[int, int, int]) -> Any:
 
 
 def _curves(recording: Any, rr: Any, result: Result) -> None:
-    """Lowest, median and highest depth and energy error of the members that did not fail."""
+    """Smallest, median and largest depth and energy error of the members that did not fail."""
     good = np.asarray(result.status) == 0
     if not good.any():
         return
     error = result.energy[:, good] - result.energy[:1, good]
     for name, values in (("depth", result.position[:, good, 2]), ("energy_error", error)):
-        for curve, q in zip(CURVES, np.quantile(values.astype(np.float64), (0.0, 0.5, 1.0), axis=1), strict=True):
+        for curve, quantile, color in CURVES:
             entity = f"{name}/{curve}"
-            recording.log(entity, rr.SeriesLines(names=curve), static=True, strict=True)
-            columns = rr.Scalars.columns(scalars=q)
+            recording.log(entity, rr.SeriesLines(names=curve, colors=color, widths=2.0), static=True, strict=True)
+            columns = rr.Scalars.columns(scalars=np.quantile(values.astype(np.float64), quantile, axis=1))
             recording.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=result.time)], columns, strict=True)
 
 
-def _blueprint(position: np.ndarray) -> Any:
+def _blueprint(time: np.ndarray, position: np.ndarray) -> Any:
     """What is seen first: the fleet from the side and above on the left, the curves and the run's facts on the right."""
     import rerun.blueprint as rrb
 
     flat = position.reshape(-1, 3)
     centre, extent = (flat.max(axis=0) + flat.min(axis=0)) / 2.0, _extent(position)
-    # z points down: a negative z offset is a view from above.
-    eye = centre + np.linalg.norm(extent) * np.array([-0.75, -0.85, -0.55])
+    # From the side of the way the fleet goes, and a little above: z points down.
+    way = np.mean(position[-1] - position[0], axis=0)[:2]
+    east, north = way / np.linalg.norm(way) if np.any(way) else (0.0, 1.0)
+    eye = centre + np.linalg.norm(extent) * np.array([0.8 * north, -0.8 * east, -0.2])
     world = rrb.Spatial3DView(
         origin="world",
         name="Fleet (north, east, down)",
         eye_controls=rrb.EyeControls3D(position=eye, look_target=centre, eye_up=(0.0, 0.0, -1.0)),
     )
+    whole = rrb.TimeAxis(
+        view_range=rrb.TimeRange(
+            start=rrb.TimeRangeBoundary.absolute(seconds=float(time[0])),
+            end=rrb.TimeRangeBoundary.absolute(seconds=float(time[-1])),
+        )
+    )
     side = rrb.Vertical(
-        rrb.TimeSeriesView(origin="depth", name="Depth [m]"),
-        rrb.TimeSeriesView(origin="energy_error", name="Energy error [J]"),
+        rrb.TimeSeriesView(origin="depth", name="Depth [m]", axis_x=whole),
+        rrb.TimeSeriesView(origin="energy_error", name="Energy error [J]", axis_x=whole),
         rrb.TextDocumentView(origin="run", name="Run"),
     )
     return rrb.Blueprint(

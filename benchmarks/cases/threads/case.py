@@ -1,18 +1,18 @@
-"""Thread scaling on 10^5 members: time of one thread over time of n threads and n, the whole solve without samples."""
+"""Thread scaling on 10^5 members: time of one thread over time of n threads and n, the whole solve, start and end kept."""
 
 from lgvi_warp import machine, speed
 from lgvi_warp.solving import make_plan, run_plan
 
 
 def run(quick):
-    members, steps = (10_000, 100) if quick else (100_000, 400)
+    members, steps = (10_000, 100) if quick else (100_000, 2000)
     plan = make_plan(speed.fleet(members), "psi_s", h=0.01, t1=0.01 * steps)
     counts = sorted({1, *(n for n in (2, 3, 4, 8, 16, 32, 64) if n < machine.thread_count()), machine.thread_count()})
 
     def solve(threads):
         return lambda: speed.void(run_plan(plan, threads))
 
-    seconds = speed.interleaved([solve(n) for n in counts])
+    seconds = speed.interleaved([solve(n) for n in counts], 1 if quick else 3)
     for threads, one in zip(counts, seconds, strict=True):
         yield {
             "threads": threads,

@@ -178,9 +178,11 @@ for _real in REALS:
 
 @wp.func
 def dot(a: Any, b: Any):
+    """a.b, lane by lane."""
     return a.x * b.x + a.y * b.y + a.z * b.z
 
 
 @wp.func
 def cross(a: Any, b: Any):
+    """a x b, lane by lane."""
     return vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)

@@ -5,6 +5,7 @@ which keeps the fourth powers of the quartic within the range of float32.
 
 A solver describes F by a parameter (a number or a vector) and is a handful of functions of it: the start value, the value
 of its equation, a Newton step, the excess of the residual over a tolerance, and the rotation that the parameter stands for.
+solve.py puts them together.
 """
 
 import functools
@@ -15,7 +16,6 @@ import warp as wp
 from lgvi_kernels.lanes import (
     absolute,
     add,  # noqa: F401
-    any_positive,
     cross,
     div,  # noqa: F401
     dot,
@@ -24,7 +24,6 @@ from lgvi_kernels.lanes import (
     mul,  # noqa: F401
     neg,  # noqa: F401
     ones,
-    positive,
     sub,  # noqa: F401
     vec3,
 )
@@ -176,6 +175,7 @@ def quartic_rotation(F: Any, s: Any, a: Any, J: Any):
 
 @wp.func
 def cayley_start(a: Any, J: Any):
+    """The root of G's linear part in c."""
     return a / (J + J)
 
 
@@ -201,6 +201,7 @@ def cayley_newton(c: Any, value: Any, a: Any, J: Any):
 
 @wp.func
 def cayley_rotation(F: Any, c: Any, a: Any, J: Any):
+    """F = cay(c)."""
     beta = (ones(c.x) + ones(c.x)) / (ones(c.x) + dot(c, c))
     return rodrigues(F, c, beta, beta)
 
@@ -233,6 +234,7 @@ def sinc_series(x: Any):
 
 @wp.func
 def newton_start(a: Any, J: Any):
+    """f = J^-1 a, the rate times the step."""
     return a / J
 
 
@@ -275,99 +277,3 @@ def vector_excess(value: Any, a: Any, J: Any, tolerance: Any):
 def vector_residual2(value: Any, a: Any, J: Any):
     """Square of the relative residual."""
     return dot(value, value) / dot(a, a)
-
-
-# name -> start of a fixed number of Newton steps, start of an iteration to the tolerance, then value, newton, excess,
-# residual2 and rotation as above
-SOLVERS = {
-    "quartic": (
-        quartic_linear,
-        quartic_series,
-        quartic_value,
-        quartic_newton,
-        quartic_excess,
-        quartic_residual2,
-        quartic_rotation,
-    ),
-    "cayley": (
-        cayley_start,
-        cayley_start,
-        cayley_value,
-        cayley_newton,
-        vector_excess,
-        vector_residual2,
-        cayley_rotation,
-    ),
-    "newton": (
-        newton_start,
-        newton_start,
-        newton_value,
-        newton_newton,
-        vector_excess,
-        vector_residual2,
-        newton_rotation,
-    ),
-}
-
-# At |J^-1 a| -> 1 the root is nearly double and a Newton step only halves the error: 40 steps exhaust float64.
-MOST_ITERATIONS = 40
-
-STEP_TOO_LARGE = 1
-NOT_CONVERGED = 2
-
-
-@functools.cache
-def make_solve(real, solver, iterations, adaptive, checked):
-    """The function (F, alarm, a, J, tolerance) -> (F, alarm) that solves equation (24) in every lane.
-
-    `iterations` Newton steps are made in all lanes. `adaptive` goes on, in the lanes that need it, until the residual is
-    below the tolerance: a lane's bits depend on that lane alone. `checked` raises the alarm of a lane whose equation has
-    no certain solution (STEP_TOO_LARGE) or whose residual stays above the tolerance (NOT_CONVERGED). Both happen behind
-    one test that a well-chosen step never passes.
-    """
-    fixed_start, adaptive_start, value, newton, excess, residual2, rotation = SOLVERS[solver]
-    start = adaptive_start if adaptive else fixed_start
-    below_one = 1.0 - 2.0**-53 if real == wp.float64 else 1.0 - 2.0**-24
-
-    @wp.func
-    def beyond(far: Any, unit: Any):
-        """Positive where far >= 1."""
-        return far - unit.dtype(wp.static(below_one)) * ones(far)
-
-    @wp.func
-    def raise_alarm(alarm: Any, far: Any, e: Any, r2: Any, unit: Any):
-        """Note the first failure of each lane, and the square of what crossed its limit."""
-        zero = ones(e) - ones(e)
-        unconverged = unit.dtype(wp.static(float(NOT_CONVERGED))) * ones(e)
-        too_large = unit.dtype(wp.static(float(STEP_TOO_LARGE))) * ones(e)
-        over = beyond(far, unit)
-        code = positive(over, too_large, positive(e, unconverged, zero))
-        size = positive(code, positive(over, far, r2), zero)
-        alarm.size = positive(alarm.code, alarm.size, size)
-        alarm.code = positive(alarm.code, alarm.code, code)
-        return alarm
-
-    @wp.func
-    def solve(F: Any, alarm: Any, a: Any, J: Any, tolerance: Any):
-        u = start(a, J)
-        for _ in range(wp.static(iterations)):
-            u = newton(u, value(u, a, J), a, J)
-        if wp.static(adaptive or checked):
-            v = value(u, a, J)
-            e = excess(v, a, J, tolerance)
-            suspect = e
-            if wp.static(checked):
-                suspect = positive(e, e, beyond(reach(a, J), tolerance))
-            if any_positive(suspect):
-                if wp.static(adaptive):
-                    k = int(0)
-                    while k < wp.static(MOST_ITERATIONS) and any_positive(e):
-                        u = positive(e, newton(u, v, a, J), u)
-                        v = value(u, a, J)
-                        e = excess(v, a, J, tolerance)
-                        k += 1
-                if wp.static(checked):
-                    alarm = raise_alarm(alarm, reach(a, J), e, residual2(v, a, J), tolerance)
-        return rotation(F, u, a, J), alarm
-
-    return solve

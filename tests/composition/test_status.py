@@ -107,3 +107,10 @@ def test_checks_none_leaves_the_code_out(scene):
 
 def test_every_status_says_what_to_do():
     assert all(len(status.text) > 10 for status in Status)
+
+
+def test_codes_are_those_of_the_kernel():
+    from lgvi_kernels import packet, solve
+
+    kernel = (solve.STEP_TOO_LARGE, solve.NOT_CONVERGED, packet.NON_FINITE)
+    assert kernel == (Status.STEP_TOO_LARGE, Status.NOT_CONVERGED, Status.NON_FINITE)

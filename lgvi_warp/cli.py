@@ -42,7 +42,12 @@ def parser() -> argparse.ArgumentParser:
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
     run = verbs.add_parser("run", help="run a scene's ensemble: result.npz, fleet.png, fleet.rrd and a summary")
     run.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
-    run.add_argument("--out", metavar="DIR", type=Path, help="folder for the files (default: runs/NAME of the scene)")
+    run.add_argument(
+        "--out",
+        metavar="DIR",
+        type=Path,
+        help="folder for the files, replaced if they exist (default: runs/NAME of the scene)",
+    )
     run.add_argument("--method", help="psi_s, psi_1, psi, phi, phi_adjoint, or a composition such as kl6(psi_s)")
     run.add_argument("--step", metavar="S", help="time step [s]")
     run.add_argument("--duration", metavar="S", help="end of the run [s]")

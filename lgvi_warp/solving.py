@@ -115,6 +115,8 @@ def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None 
     status, failed_step, failed_size = np.zeros(n, np.uint8), np.zeros(n, np.int64), np.zeros(n)
     counter = _Progress(n * plan.grid.steps, progress)
 
+    stop = threading.Event()
+
     def advance(block: Block) -> None:
         members = plan.ensemble.select(block.first, block.stop)
         packets = Packets(plan, members)
@@ -122,6 +124,8 @@ def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None 
         for name, values in samples.items():
             values[0, at] = getattr(members, name)
         for k0, k1 in plan.segments(block.count):
+            if stop.is_set():
+                return
             raw = packets.advance(k0, k1)[:, : block.count]
             _store(samples, slice(*plan.due(k0, k1)), at, raw, packets.Q)
             counter.add(block.count * (k1 - k0))
@@ -134,7 +138,7 @@ def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None 
             advance(block)
 
     start = time.perf_counter()
-    thread_executor.run(blocks(n), work, threads)
+    thread_executor.run(blocks(n), work, threads, stop)
     run_seconds = time.perf_counter() - start
     failed = status != 0
     return Result(

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 
 from lgvi_warp.plan import Block
 
 
-def run(blocks: Sequence[Block], work: Callable[[Block], None], threads: int) -> None:
-    """Do the work of every block, on this many threads. The first exception stops the blocks that have not begun."""
+def run(blocks: Sequence[Block], work: Callable[[Block], None], threads: int, stop: threading.Event) -> None:
+    """Do the work of every block, on this many threads.
+
+    The first exception, an interrupt from the keyboard among them, sets `stop`, which work looks at now and then; blocks
+    that have not begun are dropped, and the exception is raised.
+    """
     if threads == 1:
         for block in blocks:
             work(block)
@@ -18,9 +23,10 @@ def run(blocks: Sequence[Block], work: Callable[[Block], None], threads: int) ->
         futures = [pool.submit(work, block) for block in blocks]
         try:
             wait(futures, return_when=FIRST_EXCEPTION)
-        finally:
             for future in futures:
-                future.cancel()
-        for future in futures:
-            if not future.cancelled():
-                future.result()
+                if future.done():
+                    future.result()
+        except BaseException:
+            stop.set()
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise

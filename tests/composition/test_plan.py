@@ -147,6 +147,20 @@ def test_settings_are_refused(scene, named, text):
         lw.solve(lw.Ensemble(scene), **({"h": 0.01, "t1": 1.0} | named))
 
 
+@pytest.mark.parametrize("threads", [1, 3])
+def test_an_exception_on_the_way_stops_the_run(scene, threads):
+    seen = []
+
+    def interrupt(fraction):
+        seen.append(fraction)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        lw.solve(lw.Ensemble(scene, 5000), h=0.01, t1=0.1, threads=threads, progress=interrupt)
+    # Each thread meets it at most once and takes up no further block; 20 blocks are there.
+    assert len(seen) <= 2 * threads
+
+
 def test_solve_prints_nothing(scene, capfd):
     lw.solve(lw.Ensemble(scene, 3), h=0.013, t1=0.1)
     lw.solve(scene_of(), h=0.01, t1=0.1)

@@ -26,7 +26,7 @@ OPTIONS = {
 
 EPILOG = """examples:
   lgvi-warp run examples/paper.toml --out runs/paper
-  lgvi-warp run examples/paper.toml --members 100000 --dtype float32 --set vehicle.mass=120
+  lgvi-warp run examples/paper.toml --members 20000 --dtype float32 --set vehicle.mass=120
   lgvi-warp info
 """
 

@@ -60,8 +60,9 @@ class TimeGrid:
 
 
 def _exact(x: float) -> Fraction:
-    """The decimal number that was meant: 0.1 + 0.2 is 3/10."""
-    return Fraction(repr(float(x))).limit_denominator(10**9)
+    """The number that was meant: 0.1 + 0.2 is 3/10, 0.3333333333333333 is 1/3, 1e-12 is itself."""
+    simple = Fraction(repr(float(x))).limit_denominator(10**6)
+    return simple if abs(float(simple) - x) <= 1e-15 * abs(x) else Fraction(f"{x:.15g}")
 
 
 def time_grid(h: float, t1: float, save: SaveAt) -> TimeGrid:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -84,11 +85,15 @@ def make_plan(
     if t1 is None:
         faults.add("t1", t1, "is missing", "give the end in seconds: solve(..., t1=150.0) or [run] duration")
     faults.raise_if_any()
+    every = settings.save_every
+    # A spacing that the scene gave for its own duration says nothing about a shorter run.
+    dropped = save is None and every is not None and every > float(t1)  # type: ignore[arg-type]
     if save is None:
-        # A spacing that the scene gave for its own duration says nothing about a shorter run.
-        every = settings.save_every
-        save = SaveAt(every=every if every is None or every <= float(t1) else None)  # type: ignore[arg-type]
+        save = SaveAt(every=None if dropped else every)
     grid = time_grid(float(h), float(t1), save)  # type: ignore[arg-type]
+    if dropped:
+        text = f"run.save_every = {every} s is longer than the run, {t1} s: only the start and the end are kept"
+        grid = replace(grid, messages=(*grid.messages, text))
     chosen = method if isinstance(method, Method) else Method(method or settings.method)
     return Plan(ensemble, chosen, grid, save.fields, dtype or settings.dtype, width, checks)
 

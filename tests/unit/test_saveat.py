@@ -39,6 +39,14 @@ def test_a_step_that_does_not_fit_is_shortened_with_a_message(h, t1, save, step)
 def test_decimals_are_taken_as_meant():
     grid = time_grid(0.1, 0.1 + 0.2, lw.SaveAt())
     assert grid.steps == 3 and grid.h == 0.1
+    assert time_grid(1.0 / 3.0, 2.0, lw.SaveAt()).steps == 6
+    assert time_grid(1e-12, 1e-9, lw.SaveAt(every=1e-10)).steps == 1000
+    assert time_grid(1e6, 1e8, lw.SaveAt()).steps == 100
+
+
+def test_a_spacing_of_the_scene_longer_than_the_run_is_dropped_with_a_message(scene):
+    result = lw.solve(lw.Ensemble(scene), h=0.01, t1=0.1)
+    assert list(result.time) == [0.0, 0.1] and "save_every" in result.messages[0]
 
 
 def test_the_message_reaches_the_result(scene):
@@ -55,6 +63,8 @@ def test_the_message_reaches_the_result(scene):
         (0.1, 1.0, lw.SaveAt(every=3.0), "longer"),
         (0.1, 1.0, lw.SaveAt(at=[0.123456]), "shrink"),
         (1e-9, 1e3, lw.SaveAt(), "steps"),
+        (1e-12, 1.0, lw.SaveAt(), "steps"),
+        (1e-320, 1.0, lw.SaveAt(), "steps"),
         (float("inf"), 1.0, lw.SaveAt(), "finite"),
     ],
 )

@@ -9,19 +9,13 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp import scene as scenes
+from lgvi_warp import vehicle as vehicles
 from lgvi_warp.distributions import Distribution, uniforms
 from lgvi_warp.errors import Faults, closest
 from lgvi_warp.scene import Scene
 
-MATRICES = ("vehicle.added_mass", "vehicle.inertia")
-PARAMETERS = {
-    "vehicle.mass": (),
-    "vehicle.added_mass": (3, 3),
-    "vehicle.inertia": (3, 3),
-    "vehicle.buoyancy": (),
-    "vehicle.center_of_buoyancy": (3,),
-    "environment.gravity": (),
-}
+# Parameters that are symmetric matrices, and stay so when they vary.
+MATRICES = tuple(f"vehicle.{name}" for name in vehicles.SYMMETRIC)
 STATES = ("position", "attitude", "velocity", "angular_velocity")
 
 
@@ -30,6 +24,7 @@ class Members:
     """A run of m members. Parameters have a leading dimension of 1 (shared) or m (varied), in the scene's names.
 
     position (m, 3) [m], attitude (m, 3, 3) body to inertial, velocity (m, 3) [m/s], angular_velocity (m, 3) [rad/s].
+    indices (m,): which members they are, and seed: what their random numbers are keyed by, in a subset as in the whole.
     """
 
     parameters: dict[str, np.ndarray]
@@ -37,6 +32,8 @@ class Members:
     attitude: np.ndarray
     velocity: np.ndarray
     angular_velocity: np.ndarray
+    indices: np.ndarray
+    seed: int
 
     @property
     def count(self) -> int:
@@ -47,10 +44,11 @@ class Members:
 class Ensemble:
     """A scene and what varies in it.
 
-    scene: the Scene. members: how many, >= 1. seed: whole number >= 0. vary: name -> distribution; names are
-    "vehicle.mass", "vehicle.added_mass", "vehicle.inertia", "vehicle.buoyancy", "vehicle.center_of_buoyancy",
-    "environment.gravity" and what the scene's start gives ("start.position", "start.angular_velocity", ...).
-    A draw depends on the seed, the member's index and the name only.
+    scene: the Scene. members: how many, >= 1. seed: whole number >= 0. vary: name -> distribution; names are every number
+    that the scene has: "vehicle.mass", "drag.quadratic", "current.velocity" (a term's name or type, and its field), ...
+    (`scene.parameters()` lists them), and what the scene's start gives ("start.position", "start.angular_velocity", ...).
+    One law varies every entry; of a symmetric matrix, the entries on and above the diagonal (of a diagonal one, those on
+    it). A draw depends on the seed, the member's index and the name only.
 
     Raises SceneError naming every fault; members that would be unphysical are counted and the first is shown.
     """
@@ -77,7 +75,7 @@ class Ensemble:
     ) -> Ensemble:
         """Members with given states: (n, 3) [m], (n, 3, 3) body to inertial, (n, 3) [m/s, body], (n, 3) [rad/s, body].
 
-        parameters: name -> array of length n ("vehicle.inertia": (n, 3) or (n, 3, 3)). States that are not finite are
+        parameters: name -> array of length n ("vehicle.inertia": (n, 3) or (n, 3, 3)), names as in `vary`. States that are not finite are
         let through: the run gives such a member its status. Raises SceneError for wrong shapes and unphysical values.
         """
         faults = Faults()
@@ -91,7 +89,8 @@ class Ensemble:
             shape = (n, 3, 3) if key == "start.attitude" else (n, 3)
             if value.shape != shape:
                 faults.add(key, value, f"has shape {value.shape}", f"give an array of shape {shape}")
-        faults.keys("", parameters or {}, PARAMETERS)
+        base = scene.parameters()
+        faults.keys("", parameters or {}, base)
         faults.raise_if_any()
         R = explicit["start.attitude"]
         bad = np.isfinite(R).all(axis=(1, 2)) & ~scenes.rotations(R)
@@ -99,7 +98,7 @@ class Ensemble:
             what = f"is not a rotation to 1e-9 ({bad.sum()} of {n} members)"
             faults.add(f"attitude of member {bad.argmax()}", R[bad.argmax()], what, "give R^T R = I, det R = 1")
         for key, value in (parameters or {}).items():
-            explicit[key] = _explicit_parameter(faults, key, value, n)
+            explicit[key] = _explicit_parameter(faults, key, value, (n, *base[key].shape))
         faults.raise_if_any()
         ensemble = cls.__new__(cls)
         ensemble._setup(scene, scenes.EnsembleSettings(n), explicit)
@@ -112,13 +111,14 @@ class Ensemble:
         self._start = {f"start.{key}": value for key, value in scene.start.given().items()}
         if explicit:
             self._start = {key: value for key, value in explicit.items() if key.startswith("start.")}
-        self._base = _base(scene)
+        self._base = scene.parameters()
+        self.indices = np.arange(self.members)
         self._check_names()
         self._check_physical()
 
     def _check_names(self) -> None:
         faults = Faults("ensemble.vary.")
-        known = [*PARAMETERS, *self._start]
+        known = [*self._base, *self._start]
         for name, law in self.vary.items():
             if name not in known:
                 others = [key for key in known if key.split(".")[0] == name.split(".")[0]]
@@ -128,8 +128,6 @@ class Ensemble:
                 faults.add(f'"{name}"', law, "is not a distribution", "give lw.Normal(std=...) or another")
             elif name == "start.attitude":
                 faults.add(f'"{name}"', law, "cannot vary by entry", "give rotation_vector or euler_deg and vary it")
-            elif name in MATRICES and np.any(self._base[name] - np.diag(np.diag(self._base[name]))):
-                faults.add(f'"{name}"', law, "would vary a full matrix", "give from_states(parameters=...) its values")
             else:
                 self._check_shape(faults, name, law)
         faults.raise_if_any()
@@ -141,56 +139,61 @@ class Ensemble:
         except ValueError:
             good = False
         if not good:
-            wanted = f"one number or {shape[0]}, one per component" if shape else "one number"
+            wanted = f"one number or {' x '.join(map(str, shape))}, one per component" if shape else "one number"
             faults.add(f'"{name}"', law, f"does not fit a quantity of shape {shape}", f"give {wanted}")
 
     def _check_physical(self) -> None:
-        if not (set(self.vary) | set(self._explicit)) & set(PARAMETERS):
+        varied = {name for name in (*self.vary, *self._explicit) if name in self._base}
+        if not varied:
             return
         faults = Faults()
         with np.errstate(over="ignore", invalid="ignore"):
             p = self.parameters(0, self.members)
-            mass = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
-            heavy = np.isfinite(p["vehicle.mass"]) & (p["vehicle.mass"] > 0.0)
-            checks = {
-                "vehicle.mass": ~heavy,
-                "vehicle.inertia": ~_positive_definite(p["vehicle.inertia"]),
-                "vehicle.mass + vehicle.added_mass": heavy & ~_positive_definite(mass),
-                "vehicle.center_of_buoyancy": ~np.isfinite(p["vehicle.center_of_buoyancy"]).all(axis=1),
-            }
-            for key in ("vehicle.buoyancy", "environment.gravity"):
-                checks[key] = ~(np.isfinite(p[key]) & (p[key] >= 0.0))
+            checks = _vehicle_checks(p, varied)
+            for one in (*self.scene.terms, *self.scene.events):
+                own = self.own(one, p)
+                if any(f"{one.key}.{name}" in varied for name in own):
+                    checks |= {f"{one.key}.{name}": bad for name, bad in one.unphysical(own).items()}
         for key, bad in checks.items():
-            if bad.any():
-                first = int(np.argmax(bad))
-                value = mass[first] if "+" in key else p[key][first]
-                drawn = any(name in self.vary for name in key.split(" + "))
-                remedy = (
-                    "use a smaller spread, TruncatedNormal or LogNormal" if drawn else "give finite, positive values"
-                )
-                what = f"is unphysical ({int(bad.sum())} of {len(bad)} members)"
-                faults.add(f"{key} of member {first}", value, what, remedy)
+            if np.any(bad):
+                self._note_unphysical(faults, key, np.broadcast_to(bad, max(len(bad), 1)), p)
         faults.raise_if_any()
 
+    def _note_unphysical(self, faults: Faults, key: str, bad: np.ndarray, p: dict[str, np.ndarray]) -> None:
+        first = int(np.argmax(bad))
+        value = sum(p[name][first % len(p[name])] for name in key.split(" + ") if p[name].ndim == p[key.split(" + ")[-1]].ndim)
+        drawn = any(name in self.vary for name in key.split(" + "))
+        remedy = "use a smaller spread, TruncatedNormal or LogNormal" if drawn else "give finite, physical values"
+        what = f"is unphysical ({int(bad.sum())} of {len(bad)} members)"
+        faults.add(f"{key} of member {first}", value, what, remedy)
+
+    @staticmethod
+    def own(term: Any, parameters: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """A term's own numbers, by field, out of all parameters."""
+        return {name: parameters[f"{term.key}.{name}"] for name in term.parameters()}
+
     def _drawn_base(self, name: str) -> np.ndarray:
-        """The scene's value of a quantity that is drawn: of a diagonal matrix, its diagonal."""
+        """The scene's value of a quantity that is drawn: of a symmetric matrix, its upper triangle or its diagonal."""
         base = np.asarray(self._start[name] if name in self._start else self._base[name])
-        return np.diag(base) if name in MATRICES else base
+        if name not in MATRICES:
+            return base
+        return np.diag(base) if _diagonal(base) else base[np.triu_indices(len(base))]
 
     def _value(self, name: str, first: int, stop: int) -> np.ndarray:
         """Values of the members first to stop, or of all as one: a leading dimension of stop - first, or of 1."""
         if name in self._explicit:
             return self._explicit[name][first:stop]
+        whole = np.asarray(self._start[name] if name in self._start else self._base[name])
         if name not in self.vary:
-            return np.asarray(self._start[name] if name in self._start else self._base[name])[None]
+            return whole[None]
         base = self._drawn_base(name)
         u = uniforms(self.seed, name, first, stop - first, max(1, base.size)).reshape(stop - first, *base.shape)
         drawn = self.vary[name].quantile(u, base)
-        return drawn[:, :, None] * np.eye(3) if name in MATRICES else drawn
+        return _matrices(drawn, _diagonal(whole), len(whole)) if name in MATRICES else drawn
 
     def parameters(self, first: int, stop: int) -> dict[str, np.ndarray]:
         """Parameters of the members first to stop, shared ones with a leading dimension of 1."""
-        return {name: self._value(name, first, stop) for name in PARAMETERS}
+        return {name: self._value(name, first, stop) for name in self._base}
 
     def select(self, first: int, stop: int) -> Members:
         """The numbers of the members first to stop (not included). Raises IndexError where there are none."""
@@ -206,27 +209,59 @@ class Ensemble:
         else:
             nu = start["velocity"]
         position, nu, Om = (np.broadcast_to(x, (m, 3)) for x in (start["position"], nu, start["angular_velocity"]))
-        return Members(self.parameters(first, stop), position, R, nu, Om)
+        return Members(self.parameters(first, stop), position, R, nu, Om, self.indices[first:stop], self.seed)
 
     def subset(self, indices: Sequence[int]) -> Ensemble:
         """These members, in this order, as an ensemble of its own with the same numbers."""
         chosen = [self.select(int(i), int(i) + 1) for i in indices]
         b, R, nu, Om = (np.concatenate([getattr(one, name) for one in chosen]) for name in STATES)
-        varied = [name for name in PARAMETERS if name in self.vary or name in self._explicit]
+        varied = [name for name in self._base if name in self.vary or name in self._explicit]
         parameters = {name: np.concatenate([one.parameters[name] for one in chosen]) for name in varied}
-        return Ensemble.from_states(self.scene, b, R, nu, Om, parameters)
+        ensemble = Ensemble.from_states(self.scene, b, R, nu, Om, parameters)
+        ensemble.indices, ensemble.seed = self.indices[np.asarray(indices, dtype=int)], self.seed
+        return ensemble
 
     def to_dict(self) -> dict[str, Any]:
         """members, seed and vary as in a scene file, and the names that were given as arrays."""
         return self._settings.to_dict() | ({"explicit": sorted(self._explicit)} if self._explicit else {})
 
 
-def _base(scene: Scene) -> dict[str, np.ndarray]:
-    values = {}
-    for name in PARAMETERS:
-        owner, attribute = name.split(".")
-        values[name] = np.asarray(getattr(getattr(scene, owner), attribute), dtype=np.float64)
-    return values
+def _vehicle_checks(p: Mapping[str, np.ndarray], varied: set[str]) -> dict[str, np.ndarray]:
+    """Name -> (n,), which members' numbers of vehicle and environment are unphysical."""
+    checks = {}
+    if "vehicle.mass" in p:
+        mass = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
+        heavy = np.isfinite(p["vehicle.mass"]) & (p["vehicle.mass"] > 0.0)
+        checks |= {
+            "vehicle.mass": ~heavy,
+            "vehicle.inertia": ~_positive_definite(p["vehicle.inertia"]),
+            "vehicle.mass + vehicle.added_mass": heavy & ~_positive_definite(mass),
+        }
+    else:
+        rigid, added = "vehicle.rigid_body_mass_matrix", "vehicle.added_mass_matrix"
+        checks |= {rigid: ~_positive_definite(p[rigid]), f"{rigid} + {added}": ~_positive_definite(p[rigid] + p[added])}
+    for key in ("vehicle.center_of_buoyancy", "vehicle.center_of_gravity"):
+        if key in p:
+            checks[key] = ~np.isfinite(p[key]).all(axis=1)
+    for key in ("vehicle.buoyancy", "vehicle.weight", "environment.gravity"):
+        if key in p:
+            checks[key] = ~(np.isfinite(p[key]) & (p[key] >= 0.0))
+    checks["environment.water_density"] = ~(np.isfinite(p["environment.water_density"]) & (p["environment.water_density"] > 0))
+    return {key: bad for key, bad in checks.items() if any(name in varied for name in key.split(" + "))}
+
+
+def _diagonal(matrix: np.ndarray) -> bool:
+    return not np.any(matrix - np.diag(np.diag(matrix)))
+
+
+def _matrices(drawn: np.ndarray, diagonal: bool, size: int) -> np.ndarray:
+    """Symmetric matrices (n, size, size) from their drawn diagonals or upper triangles."""
+    if diagonal:
+        return drawn[:, :, None] * np.eye(size)
+    upper = np.zeros((len(drawn), size, size))
+    rows, columns = np.triu_indices(size)
+    upper[:, rows, columns] = upper[:, columns, rows] = drawn
+    return upper
 
 
 def _floats(faults: Faults, key: str, value: Any) -> np.ndarray:
@@ -238,23 +273,22 @@ def _floats(faults: Faults, key: str, value: Any) -> np.ndarray:
         return np.empty(0)
 
 
-def check_names(vary: Mapping[str, Distribution]) -> None:
-    """Refuse names that no scene has. Raises SceneError."""
+def check_names(vary: Mapping[str, Distribution], parameters: Sequence[str]) -> None:
+    """Refuse names that a scene with these parameters has not. Raises SceneError."""
     faults = Faults("ensemble.vary.")
-    known = [*PARAMETERS, *(f"start.{name}" for name in scenes.SHAPES)]
+    known = [*parameters, *(f"start.{name}" for name in scenes.SHAPES)]
     for name, law in vary.items():
         if name not in known:
             faults.add(f'"{name}"', law, "does not name what a scene has", closest(name, known))
     faults.raise_if_any()
 
 
-def _explicit_parameter(faults: Faults, key: str, value: Any, n: int) -> np.ndarray:
+def _explicit_parameter(faults: Faults, key: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     array = _floats(faults, key, value)
-    if key in MATRICES and array.shape == (n, 3):
-        return array[:, :, None] * np.eye(3)
-    shape = (n, *PARAMETERS[key])
+    if key in MATRICES and array.shape == shape[:2]:
+        return array[:, :, None] * np.eye(shape[1])
     if array.shape != shape:
-        also = f" or {(n, 3)}" if key in MATRICES else ""
+        also = f" or {shape[:2]}" if key in MATRICES else ""
         faults.add(key, value, f"has shape {array.shape}", f"give an array of shape {shape}{also}")
     elif key in MATRICES and np.any(np.abs(array - np.swapaxes(array, 1, 2)) > 1e-9 * np.abs(array).max()):
         faults.add(key, "...", "holds a matrix that is not symmetric", "give symmetric matrices")
@@ -262,8 +296,7 @@ def _explicit_parameter(faults: Faults, key: str, value: Any, n: int) -> np.ndar
 
 
 def _positive_definite(matrices: np.ndarray) -> np.ndarray:
-    """Sylvester's criterion for symmetric (n, 3, 3); False where a number is not finite."""
-    a = matrices
-    with np.errstate(invalid="ignore", over="ignore"):
-        minor = a[:, 0, 0] * a[:, 1, 1] - a[:, 0, 1] * a[:, 1, 0]
-        return np.isfinite(a).all(axis=(1, 2)) & (a[:, 0, 0] > 0.0) & (minor > 0.0) & (np.linalg.det(a) > 0.0)
+    """Which symmetric matrices (n, d, d) are positive definite; False where a number is not finite."""
+    finite = np.isfinite(matrices).all(axis=(1, 2))
+    safe = np.where(finite[:, None, None], matrices, np.eye(matrices.shape[-1]))
+    return np.asarray(finite & (np.linalg.eigvalsh(safe)[:, 0] > 0.0))

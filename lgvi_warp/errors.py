@@ -116,19 +116,24 @@ class Faults:
             return None
         return None if array is None else float(array)
 
-    def symmetric(self, key: str, value: Any, unit: str) -> np.ndarray | None:
-        """A symmetric 3x3 matrix, or the diagonal of one as a 3-vector; None after noting a fault."""
+    def symmetric(self, key: str, value: Any, unit: str, size: int = 3) -> np.ndarray | None:
+        """A symmetric matrix, or the diagonal of one; None after noting a fault."""
         array = np.asarray(value, dtype=object) if isinstance(value, list | tuple) else np.asarray(value)
-        if array.shape == (3,):
-            diagonal = self.finite(key, value, (3,), unit)
+        if array.shape == (size,):
+            diagonal = self.finite(key, value, (size,), unit)
             return None if diagonal is None else np.diag(diagonal)
-        if array.shape != (3, 3):
-            self.add(key, value, f"has shape {array.shape}", f"give 3 numbers or a symmetric 3x3 matrix [{unit}]")
+        if array.shape != (size, size):
+            wanted = f"{size} numbers or a symmetric {size}x{size} matrix [{unit}]"
+            self.add(key, value, f"has shape {array.shape}", f"give {wanted}")
             return None
-        matrix = self.finite(key, value, (3, 3), unit)
+        matrix = self.finite(key, value, (size, size), unit)
         if matrix is None:
             return None
         if np.abs(matrix - matrix.T).max() > 1e-9 * np.abs(matrix).max():
             self.add(key, value, "is not symmetric", "give a symmetric matrix")
             return None
         return 0.5 * (matrix + matrix.T)
+
+    def __bool__(self) -> bool:
+        """Whether a fault was noted."""
+        return bool(self._found)

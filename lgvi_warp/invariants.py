@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lgvi_warp import terms
+from lgvi_warp import terms, vehicle
 
 if TYPE_CHECKING:
     from lgvi_warp.result import Result
@@ -21,31 +21,43 @@ def _times(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     return np.stack(list(rows), axis=-1)
 
 
-def _mass_matrix(parameters: terms.Parameters) -> np.ndarray:
-    return parameters["vehicle.mass"][:, None, None] * np.eye(3) + parameters["vehicle.added_mass"]
+def _relative(result: Result) -> np.ndarray:
+    """(nu, Om) relative to the water, (k, n, 6), body axes about the user's origin."""
+    nu = result.velocity.astype(np.float64)
+    position, time = result.position.astype(np.float64), result.time
+    for term in result.terms:
+        if hasattr(term, "water"):
+            water = term.water(result.own(term), position, time)
+            nu = nu - _times(np.swapaxes(result.attitude.astype(np.float64), -1, -2), water)
+    return np.concatenate([nu, result.angular_velocity.astype(np.float64)], axis=-1)
+
+
+def _momenta(result: Result) -> np.ndarray:
+    """(p, pi) about the user's origin, (k, n, 6)."""
+    return np.einsum("nij,knj->kni", *_broadcast(vehicle.inertia6(result.parameters), _relative(result)))
+
+
+def _broadcast(matrices: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return np.broadcast_to(matrices, (vectors.shape[1], *matrices.shape[1:])), vectors
 
 
 def energy(result: Result) -> np.ndarray:
-    """nu.M nu / 2 + Om.J Om / 2 + U(b, R), (k, n) [J]."""
-    parameters = result.parameters
-    nu, Om = result.velocity.astype(np.float64), result.angular_velocity.astype(np.float64)
-    total = 0.5 * np.sum(nu * _times(_mass_matrix(parameters), nu), axis=-1)
-    total += 0.5 * np.sum(Om * _times(parameters["vehicle.inertia"], Om), axis=-1)
-    down = result.attitude[..., 2, :].astype(np.float64)
-    for kind in terms.present(parameters):
-        total += kind.potential(kind.values(parameters), result.position.astype(np.float64), down)
-    return total
+    """Kinetic energy relative to the water, (nu, Om).I6 (nu, Om) / 2, and the potential of every term, (k, n) [J]."""
+    total = 0.5 * np.sum(_relative(result) * _momenta(result), axis=-1)
+    position, attitude = result.position.astype(np.float64), result.attitude.astype(np.float64)
+    for term in (*terms.IMPLIED, *result.terms):
+        total = total + term.potential(result.own(term), position, attitude, result.parameters)
+    return np.asarray(total)
 
 
 def linear_momentum(result: Result) -> np.ndarray:
-    """R M nu in inertial axes, (k, n, 3) [N s]. Without a potential it is conserved."""
-    p = _times(_mass_matrix(result.parameters), result.velocity.astype(np.float64))
-    return _times(result.attitude.astype(np.float64), p)
+    """R p in inertial axes, (k, n, 3) [N s]. Without a potential it is conserved."""
+    return _times(result.attitude.astype(np.float64), _momenta(result)[..., :3])
 
 
 def angular_momentum(result: Result) -> np.ndarray:
-    """R J Om + b x R M nu about the inertial origin, (k, n, 3) [N m s]. Without a potential it is conserved."""
-    spin = _times(result.parameters["vehicle.inertia"], result.angular_velocity.astype(np.float64))
+    """R pi + b x R p about the inertial origin, (k, n, 3) [N m s]. Without a potential it is conserved."""
+    spin = _momenta(result)[..., 3:]
     b, P = (np.moveaxis(x, -1, 0) for x in (result.position.astype(np.float64), linear_momentum(result)))
     orbit = np.stack([b[1] * P[2] - b[2] * P[1], b[2] * P[0] - b[0] * P[2], b[0] * P[1] - b[1] * P[0]], axis=-1)
     return _times(result.attitude.astype(np.float64), spin) + orbit

@@ -22,8 +22,21 @@ PROGRAMS: dict[str, Program] = {
     "psi": (("Ab", 0.5), ("D", 0.5), ("K", 0.5), ("Ap", 1.0), ("K", 0.5), ("D", 0.5), ("Ab", 0.5)),
     "psi_s": (("T", 0.5), ("D", 0.5), ("K", 1.0), ("D", 0.5), ("T", 0.5)),
     "psi_1": (("K", 0.5), ("T", 0.5), ("D", 1.0), ("T", 0.5), ("K", 0.5)),
+    # Turns about the axes instead of D, which solves no equation; R2 twice as often for slender bodies (psi_x8).
+    "psi_x": (("T", 0.5), ("R1", 0.5), ("R2", 0.5), ("R3", 0.5), ("K", 1.0), ("R3", 0.5), ("R2", 0.5), ("R1", 0.5),
+              ("T", 0.5)),
+    "psi_x8": (("T", 0.5), ("R1", 0.5), ("R2", 0.25), ("R3", 0.5), ("R2", 0.25), ("K", 1.0), ("R2", 0.25), ("R3", 0.5),
+               ("R2", 0.25), ("R1", 0.5), ("T", 0.5)),
+    # The coupled Moser-Veselov rotation W: as D, for M and J coupled.
+    "psi_w": (("T", 0.5), ("W", 0.5), ("K", 1.0), ("W", 0.5), ("T", 0.5)),
+}  # fmt: skip
+# With nonconservative forces the paper's own maps, whole: equations (15), (16).
+FORCED: dict[str, Program] = {
+    "phi": (("Phi", 1.0),),
+    "phi_adjoint": (("Phi*", 1.0),),
+    "psi": (("Phi", 0.5), ("Phi*", 0.5)),
 }
-ORDERS = {"phi": 1, "phi_adjoint": 1, "psi": 2, "psi_s": 2, "psi_1": 2}
+ORDERS = {"phi": 1, "phi_adjoint": 1, "psi": 2, "psi_s": 2, "psi_1": 2, "psi_x": 2, "psi_x8": 2, "psi_w": 2}
 
 # One sub-map of the letter may be divided in two, or two joined: each is the flow of something.
 FLOWS = ("T", "K", "Ab", "Ap")
@@ -71,6 +84,8 @@ class Method:
     "tj4(psi_s)", "su4(psi_s)", "kl6(psi_1)", "kl8(psi_s)", ...
     solver: "quartic" (default), "cayley" or "newton" (the paper's, on the exponential map).
     iterations: Newton steps of every solve, a whole number >= 0; None iterates each vehicle to the tolerance.
+    alpha, beta: weight of the old configuration in the averages of equations (15) and (16), 0 to 1, for nonconservative
+    forces and torques in phi, phi_adjoint and psi (their conservative forces, and the other methods, have no such choice).
     tolerance: relative residual of equation (24) above which a solve is not converged (default 1e-14 in float64 and
     1e-6 in float32 when iterating to it; 1e-12 and 1e-5 for a fixed number of iterations).
 
@@ -81,6 +96,8 @@ class Method:
     solver: str = "quartic"
     iterations: int | None = None
     tolerance: float | None = None
+    alpha: float = 0.5
+    beta: float = 0.5
 
     def __post_init__(self) -> None:
         faults = Faults()
@@ -94,6 +111,10 @@ class Method:
         n = self.iterations
         if n is not None and (isinstance(n, bool) or not isinstance(n, int) or not 0 <= n <= 100):
             faults.add("iterations", n, "is not a whole number from 0 to 100", "give one, or None for the tolerance")
+        for name in ("alpha", "beta"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1.0:
+                faults.add(name, value, "is not a number from 0 to 1", "give the weight of the old configuration")
         if self.tolerance is not None and not 0.0 < self.tolerance < 1.0:
             faults.add("tolerance", self.tolerance, "is not between 0 and 1", "give a relative residual such as 1e-12")
         faults.raise_if_any()
@@ -103,9 +124,19 @@ class Method:
         return (match[2], match[1]) if match else (str(self.name), None)
 
     @property
+    def base(self) -> str:
+        """The method that is composed, or that this is."""
+        return self._split()[0]
+
+    @property
     def program(self) -> Program:
         """The sub-maps of one stage, the first applied first."""
-        return PROGRAMS[self._split()[0]]
+        return PROGRAMS[self.base]
+
+    @property
+    def turns(self) -> bool:
+        """Whether it turns about the axes one after the other, instead of solving equation (24)."""
+        return any(letter[0] == "R" for letter, _ in self.program)
 
     @property
     def stages(self) -> tuple[float, ...]:
@@ -118,6 +149,10 @@ class Method:
         """Order of convergence."""
         base, composition = self._split()
         return ORDERS[base] if composition is None else COMPOSITIONS[composition][0]
+
+    def force_tolerance(self, dtype: str) -> float:
+        """Relative change of the momenta below which the iteration for the forces of Phi* has settled."""
+        return 1e-14 if dtype == "float64" else 1e-6
 
     def residual_tolerance(self, dtype: str) -> float:
         """The tolerance in force for this dtype."""
@@ -134,6 +169,27 @@ def merged(program: Program) -> tuple[tuple[str, float] | None, Program]:
     if len(program) > 1 and first == last and first[0] in FLOWS:
         return first, program[1:-1]
     return None, program
+
+
+def with_hops(program: Program) -> Program:
+    """With the hops between the origins of the axes, where inertia is coupled: each turn is about its own."""
+    hopped: list[tuple[str, float]] = []
+    here = 1
+    for letter, coefficient in program:
+        if letter[0] == "R":
+            there = int(letter[1])
+            while here != there:
+                step = 1 if there > here else -1
+                hopped.append((f"h{here}{here + step}", 1.0))
+                here += step
+        hopped.append((letter, coefficient))
+    return tuple(hopped)
+
+
+def middle_axis(program: Program) -> int:
+    """The axis (1 to 3) at whose origin a program of turns kicks: that of the turn before K."""
+    letters = [letter for letter, _ in program]
+    return int(letters[letters.index("K") - 1][1])
 
 
 def simplified(program: Program, isotropic: bool) -> Program:

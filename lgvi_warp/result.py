@@ -13,6 +13,7 @@ import numpy as np
 
 from lgvi_warp import invariants, notation
 from lgvi_warp.status import StatusArray
+from lgvi_warp.terms import Term, from_list
 
 if TYPE_CHECKING:
     import xarray
@@ -54,6 +55,7 @@ class Result:
     parameters: dict[str, np.ndarray]
     messages: tuple[str, ...]
     provenance: dict[str, Any]
+    terms: tuple[Term, ...] = ()
     compile_seconds: float = field(default=0.0, compare=False)
     run_seconds: float = field(default=0.0, compare=False)
 
@@ -91,6 +93,10 @@ class Result:
     def energy(self) -> np.ndarray:
         """(k, n) [J], kinetic and potential energy, float64."""
         return invariants.energy(self)
+
+    def own(self, term: Term) -> dict[str, np.ndarray]:
+        """A term's numbers, by field, with a leading dimension of 1 or n."""
+        return {name: self.parameters[f"{term.key}.{name}"] for name in term.parameters()}
 
     @property
     def members(self) -> int:
@@ -146,5 +152,6 @@ class Result:
             failure_value=content["failure_value"],
             parameters={name.removeprefix(prefix): content[name] for name in content if name.startswith(prefix)},
             messages=tuple(json.loads(str(content["messages"]))),
-            provenance=json.loads(str(content["provenance"])),
+            provenance=(provenance := json.loads(str(content["provenance"]))),
+            terms=from_list(provenance["scene"].get("terms", ())),
         )

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp import notation
+from lgvi_warp import events, notation, terms
 from lgvi_warp.errors import Faults
 from lgvi_warp.vehicle import Vehicle
 
@@ -177,8 +177,9 @@ class EnsembleSettings:
 class Scene:
     """Everything that one simulated vehicle needs. Weight, buoyancy and restoring moment follow from the vehicle.
 
-    terms and controller: further laws by name; this version knows none, and says so. run, ensemble_settings: what a
-    scene file holds besides. Raises SceneError naming every fault.
+    terms: what else acts, such as lw.Drag(...), or tables as in a scene file. events: what stops a member, such as
+    lw.Surface(). controller: this version knows none, and says so. run, ensemble_settings: what a scene file holds
+    besides. Raises SceneError naming every fault.
     """
 
     vehicle: Vehicle
@@ -188,18 +189,30 @@ class Scene:
     controller: Any = None
     run: RunSettings = field(default_factory=RunSettings)
     ensemble_settings: EnsembleSettings | None = None
+    events: Sequence[Any] = ()
 
     def __post_init__(self) -> None:
         faults = Faults()
-        remedy = "leave it out: weight, buoyancy and restoring moment follow from the vehicle; no other law is modelled"
-        if not isinstance(self.terms, list | tuple) or len(self.terms):
-            faults.add("terms", self.terms, "is not known to this version", remedy)
+        with faults.including():
+            object.__setattr__(self, "terms", terms.from_list(self.terms))
+        with faults.including():
+            object.__setattr__(self, "events", events.from_list(self.events))
         if self.controller is not None:
+            remedy = "leave it out; a held or scheduled wrench and thrusters' commands are terms"
             faults.add("controller", self.controller, "is not known to this version", remedy)
         for name, kind in (("vehicle", Vehicle), ("environment", Environment), ("start", Start), ("run", RunSettings)):
             if not isinstance(getattr(self, name), kind):
                 faults.add(name, getattr(self, name), f"is no {kind.__name__}", f"give lw.{kind.__name__}(...)")
         faults.raise_if_any()
+
+    def parameters(self) -> dict[str, np.ndarray]:
+        """Every number that may vary by member, by name: "vehicle.mass", "drag.quadratic", ..., as this scene has it."""
+        values = {f"vehicle.{name}": value for name, value in self.vehicle.parameters().items()}
+        values["environment.gravity"] = np.asarray(float(self.environment.gravity))
+        values["environment.water_density"] = np.asarray(float(self.environment.water_density))
+        for one in (*self.terms, *self.events):
+            values |= {f"{one.key}.{name}": value for name, value in one.parameters().items()}
+        return values
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None) -> Scene:
@@ -210,10 +223,14 @@ class Scene:
 
     def to_dict(self) -> dict[str, Any]:
         """In the shape of a scene file."""
-        content = {
+        content: dict[str, Any] = {
             "vehicle": self.vehicle.to_dict(),
             "environment": self.environment.to_dict(),
             "start": self.start.to_dict(),
             "run": self.run.to_dict(),
         }
+        if self.terms:
+            content["terms"] = [term.to_dict() for term in self.terms]
+        if self.events:
+            content["events"] = [event.to_dict() for event in self.events]
         return content | ({"ensemble": self.ensemble_settings.to_dict()} if self.ensemble_settings else {})

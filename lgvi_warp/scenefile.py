@@ -6,7 +6,7 @@ import contextlib
 import inspect
 import os
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.scene import EnsembleSettings, Environment, RunSettings, Scene, Start
 from lgvi_warp.vehicle import Vehicle
 
-SECTIONS = ("vehicle", "environment", "start", "ensemble", "run", "terms", "controller")
+SECTIONS = ("vehicle", "environment", "start", "ensemble", "run", "terms", "events", "controller")
 
 
 def load(path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None) -> Scene:
@@ -78,20 +78,24 @@ def from_dict(content: Mapping[str, Any]) -> Scene:
         scene = Scene(
             vehicle or Vehicle(**_STAND_INS), environment or Environment(), content.get("terms", ()), start or Start(),
             content.get("controller"), run or RunSettings(), settings if tables["ensemble"] else None,
+            content.get("events", ()),
         )  # fmt: skip
-    with faults.including():
-        _check_ensemble(settings or EnsembleSettings(vary=laws), scene if vehicle and environment and start else None)
+    names = tuple(scene.parameters()) if scene else ()
+    if names:
+        with faults.including():
+            whole = scene if vehicle and environment and start else None
+            _check_ensemble(settings or EnsembleSettings(vary=laws), whole, names)
     faults.raise_if_any()
     assert scene is not None
     return scene
 
 
-def _check_ensemble(settings: EnsembleSettings, scene: Scene | None) -> None:
+def _check_ensemble(settings: EnsembleSettings, scene: Scene | None, parameters: Sequence[str]) -> None:
     """What varies must fit the scene: found here, before anything runs. Names alone if the scene has faults itself."""
     from lgvi_warp.ensemble import Ensemble, check_names
 
     if scene is None:
-        check_names(settings.vary)
+        check_names(settings.vary, parameters)
     else:
         Ensemble(scene, settings.members, settings.seed, settings.vary)
 
@@ -99,17 +103,11 @@ def _check_ensemble(settings: EnsembleSettings, scene: Scene | None) -> None:
 def _build(faults: Faults, name: str, kind: Callable[..., Any], table: Mapping[str, Any]) -> Any:
     """Construct a section's object, or note what is wrong with it."""
     signature = [key for key in inspect.signature(kind).parameters]
-    required = [key for key, p in inspect.signature(kind).parameters.items() if p.default is inspect.Parameter.empty]
     faults.keys(name, table, signature)
-    missing = [key for key in required if key not in table]
-    for key in missing:
-        faults.add(f"{name}.{key}", "", "is missing", "give it")
     known = {key: value for key, value in table.items() if key in signature}
-    made = None
     with faults.including():
-        # What is missing is stood in for, so that the faults of what is there are found as well.
-        made = kind(**{key: _STAND_INS[key] for key in missing} | known)
-    return None if missing else made
+        return kind(**known)
+    return None
 
 
 _STAND_INS: dict[str, Any] = {"mass": 1.0, "inertia": (1.0, 1.0, 1.0)}

@@ -15,7 +15,9 @@ from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults
 from lgvi_warp.executors import threads as thread_executor
 from lgvi_warp.method import Method
-from lgvi_warp.plan import Block, Packets, Plan, blocks
+from lgvi_warp.inertia import Frame
+from lgvi_warp.packets import Packets
+from lgvi_warp.plan import Block, Plan, blocks
 from lgvi_warp.result import Result
 from lgvi_warp.saveat import SaveAt, time_grid
 from lgvi_warp.scene import Scene
@@ -132,7 +134,7 @@ def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None 
             if stop.is_set():
                 return
             raw = packets.advance(k0, k1)[:, : block.count]
-            _store(samples, slice(*plan.due(k0, k1)), at, raw, packets.Q)
+            _store(samples, slice(*plan.due(k0, k1)), at, unpacked(plan.spec.fields, raw, packets.frame))
             counter.add(block.count * (k1 - k0))
         outcome = packets.outcome()
         status[at], failed_step[at], failed_size[at] = outcome.status, outcome.failed_step, outcome.failed_size
@@ -155,25 +157,41 @@ def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None 
         parameters=plan.ensemble.parameters(0, n),
         messages=plan.grid.messages + plan.ensemble.scene.vehicle.warnings,
         provenance=provenance(plan),
+        terms=plan.ensemble.scene.terms,
         compile_seconds=compile_seconds,
         run_seconds=run_seconds,
     )
 
 
-def _store(samples: dict[str, np.ndarray], when: slice, at: slice, raw: np.ndarray, Q: np.ndarray) -> None:
-    """Turn raw samples (samples, members, numbers) from principal axes to the user's, into their places."""
-    turned = not np.array_equal(Q, np.broadcast_to(np.eye(3), Q.shape))
+def _store(
+    samples: dict[str, np.ndarray], when: slice, at: slice, parts: dict[str, np.ndarray]
+) -> None:
+    """Put the samples of a block into their places."""
+    for name, values in parts.items():
+        samples[name][when, at] = values
+
+
+def unpacked(fields: tuple[str, ...], raw: np.ndarray, frame: Frame) -> dict[str, np.ndarray]:
+    """Raw samples (samples, members, numbers) as fields, from the kernel's origin and axes to the user's."""
+    parts: dict[str, np.ndarray] = {}
     column = 0
-    for name, values in samples.items():
+    for name in fields:
         shape = SHAPES[name]
         size = int(np.prod(shape))
-        part = raw[..., column : column + size].reshape(*raw.shape[:2], *shape)
+        parts[name] = raw[..., column : column + size].reshape(*raw.shape[:2], *shape)
         column += size
-        if turned and name == "attitude":
-            part = part @ np.swapaxes(Q, -1, -2)
-        elif turned and name != "position":
-            part = notation.rotate_out(Q, part)
-        values[when, at] = part
+    if not np.array_equal(frame.Q, np.broadcast_to(np.eye(3), frame.Q.shape)):
+        turns = {"attitude": lambda R: R @ np.swapaxes(frame.Q, -1, -2)}
+        for name in parts.keys() - {"position"}:
+            turn = turns.get(name, lambda v: notation.rotate_out(frame.Q, v))
+            parts[name] = turn(parts[name])
+    if np.any(frame.origin):
+        o = np.broadcast_to(frame.origin, (raw.shape[1], 3))
+        if "position" in parts:
+            parts["position"] = parts["position"] - np.einsum("knij,nj->kni", parts["attitude"], o)
+        if "velocity" in parts:
+            parts["velocity"] = parts["velocity"] - np.cross(parts["angular_velocity"], o)
+    return parts
 
 
 def provenance(plan: Plan) -> dict[str, Any]:
@@ -186,13 +204,14 @@ def provenance(plan: Plan) -> dict[str, Any]:
             "solver": plan.method.solver,
             "iterations": plan.method.iterations,
             "tolerance": plan.method.residual_tolerance(plan.dtype),
-        },
+        }
+        | ({"alpha": plan.method.alpha, "beta": plan.method.beta} if plan.spec.averages else {}),
         "step": plan.grid.h,
         "steps": plan.grid.steps,
         "dtype": plan.dtype,
         "width": plan.spec.width,
         "checks": plan.checks,
-        "terms": list(plan.spec.terms),
+        "terms": [term.type for term, _ in plan.model.laws],
         "versions": machine.versions(),
         "machine": machine.describe(),
     }

@@ -13,7 +13,8 @@ import numpy as np
 from lgvi_warp import machine
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.method import Method
-from lgvi_warp.plan import Packets, Plan
+from lgvi_warp.packets import Packets
+from lgvi_warp.plan import Plan
 from lgvi_warp.scene import Environment, Scene, Start
 from lgvi_warp.solving import make_plan
 from lgvi_warp.vehicle import Vehicle

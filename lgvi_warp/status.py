@@ -14,6 +14,17 @@ class Status(IntEnum):
     STEP_TOO_LARGE = 1
     NOT_CONVERGED = 2
     NON_FINITE = 3
+    FORCES_NOT_CONVERGED = 4
+    SURFACE = 16
+    FLOOR = 17
+    BOX = 18
+    TIME = 19
+    CONDITION = 20
+
+    @property
+    def stopped(self) -> bool:
+        """Whether an event of the scene stopped the member: an outcome, no failure."""
+        return self >= Status.SURFACE
 
     @property
     def text(self) -> str:
@@ -27,6 +38,13 @@ _TEXT = {
     "shorten the step below 1 / |angular velocity| (psi and psi_s: below 2 / |angular velocity|)",
     Status.NOT_CONVERGED: "the solve of equation (24) kept a residual above the tolerance; "
     "give more iterations, a larger tolerance or a shorter step",
+    Status.FORCES_NOT_CONVERGED: "the iteration for nonconservative forces in Phi* did not settle: they are stiff; "
+    "shorten the step, or use psi_s or psi_x, which treat drag implicitly",
+    Status.SURFACE: "stopped by an event: rose to the surface",
+    Status.FLOOR: "stopped by an event: sank to the sea floor",
+    Status.BOX: "stopped by an event: left the box",
+    Status.TIME: "stopped by an event: its time was over",
+    Status.CONDITION: "stopped by an event: a condition of the user",
     Status.NON_FINITE: "a number of the state is not finite; check the start state, the parameters and the step",
 }
 

@@ -8,7 +8,8 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.reference.submaps import Body, State
-from lgvi_warp.reference.terms import Restoring, Weight
+from lgvi_warp.reference.terms.restoring import Restoring
+from lgvi_warp.reference.terms.weight import Weight
 
 ROOT = Path(__file__).parent.parent
 

@@ -5,7 +5,8 @@ import numpy as np
 import lgvi_warp as lw
 import lgvi_warp.notation
 from lgvi_warp.reference.submaps import Body, State
-from lgvi_warp.reference.terms import Restoring, Weight
+from lgvi_warp.reference.terms.restoring import Restoring
+from lgvi_warp.reference.terms.weight import Weight
 
 METHODS = ("phi", "phi_adjoint", "psi", "psi_s", "psi_1")
 GRAVITY = 9.8

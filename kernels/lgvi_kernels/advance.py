@@ -1,11 +1,12 @@
-"""The one fused kernel: a packet of vehicles through all its steps, with only the terms that the scene has."""
+"""The one fused kernel: a packet of vehicles through all its steps, with only what the scene has."""
 
 import functools
 from typing import Any, NamedTuple
 
 import warp as wp
 
-from lgvi_kernels.compose import superpose
+from lgvi_kernels.compose import params_of, superpose
+from lgvi_kernels.events import make_watch
 from lgvi_kernels.flags import CPU_FLAGS
 from lgvi_kernels.lanes import (
     add,  # noqa: F401
@@ -16,14 +17,14 @@ from lgvi_kernels.lanes import (
     mul,  # noqa: F401
     neg,  # noqa: F401
     ones,
+    positive,
     sub,  # noqa: F401
     vec3,
 )
+from lgvi_kernels.method import make_method
 from lgvi_kernels.packet import at_rest, choose, failures, put, renormalise
-from lgvi_kernels.rotation import rotation_struct
-from lgvi_kernels.solve import make_solve
-from lgvi_kernels.state import alarm_struct, inertia_struct, state_struct, view_struct, wrench_struct
-from lgvi_kernels.submaps import Ap, T, anisotropic_velocity, fold, isotropic_velocity, make_Ab, make_D, make_K
+from lgvi_kernels.state import alarm_struct, inertia_struct, state_struct, struct, view_struct
+from lgvi_kernels.terms import drag
 
 # Steps between two looks at the alarms. A chunk with an alarm is repeated one step at a time by the same code.
 CHUNK = 128
@@ -39,20 +40,34 @@ class Spec(NamedTuple):
     """Everything that decides what code a kernel holds.
 
     maps: the sub-maps after the leading one, as (letter, coefficient); lead: the sub-map that opens a step and merges with
-    the end of the step before, or None; terms: names of laws; mass: shape of M ("isotropic", "diagonal", "full").
+    the end of the step before, or None; laws: modules of laws, drag by its exact flow first if it is there;
+    events: modules of events; drag: the parts of drag by its exact flow, or none; mass: shape of M ("isotropic",
+    "diagonal", "full"); parts: what the inertia holds besides (see inertia_struct); coupling: which of U12, U13, U23 and of
+    the three pitches some member has; flow: "none", "steady" (uniform, the same for ever), "uniform", "varying";
+    timed: whether a law looks at the time; averages: alpha and beta of (15), (16), or None for conservative maps;
+    lead_time: the part of a step that the lead drifts for.
     """
 
     width: int
     real: Any
     maps: tuple
     lead: tuple | None
-    terms: tuple
+    laws: tuple
     mass: str
     solver: str
     iterations: int
     adaptive: bool
     checked: bool
     fields: tuple
+    events: tuple = ()
+    drag: tuple = ()
+    parts: tuple = ()
+    coupling: tuple = (False,) * 6
+    flow: str = "none"
+    timed: bool = False
+    memory: bool = False
+    averages: tuple | None = None
+    lead_time: float = 0.0
 
 
 class Advance(NamedTuple):
@@ -62,6 +77,7 @@ class Advance(NamedTuple):
     Lane: Any
     Inertia: Any
     Params: Any
+    Events: Any
 
 
 @functools.cache
@@ -70,28 +86,32 @@ def make_advance(spec):
     width, real, checked = spec.width, spec.real, spec.checked
     Lane, Ints = lane(width, real), int_lane(width)
     State, Alarm, View = (make(width, real) for make in (state_struct, alarm_struct, view_struct))
-    Inertia = inertia_struct(width, real, spec.mass)
-    law, Params = superpose(spec.terms, width, real)
-
-    @wp.struct
-    class Constants:
-        inertia: Inertia
-        params: Params
-        tolerance: real
-
-    velocity = isotropic_velocity if spec.mass == "isotropic" else anisotropic_velocity
-    solve = make_solve(real, spec.solver, spec.iterations, spec.adaptive, checked)
-    letters = {
-        "Ab": make_Ab(velocity),
-        "Ap": Ap,
-        "T": T,
-        "D": make_D(rotation_struct(width, real), solve),
-        "K": make_K(View, wrench_struct(width, real), law),
-    }
-    step = fold(tuple((letters[letter], coefficient) for letter, coefficient in spec.maps))
-    has_lead = spec.lead is not None
-    lead = letters[spec.lead[0]] if has_lead else step
+    Inertia = inertia_struct(width, real, spec.mass, spec.parts)
+    Params, Events = params_of(spec.laws, width, real), params_of(spec.events, width, real)
+    DragFlow = drag.flow_struct(width, real)
+    dragged, remembers, timed = bool(spec.drag), spec.memory, spec.timed
+    Constants = struct(
+        "Constants",
+        inertia=Inertia,
+        params=Params,
+        tolerance=real,
+        force_tolerance=real,
+        table=wp.array2d(dtype=Lane),
+        memory=wp.array2d(dtype=Lane),
+        packet=wp.int32,
+        entry=wp.int32,
+        **({"events": Events} if spec.events else {}),
+        **({"drag": DragFlow} if dragged else {}),
+    )
+    method = make_method(spec)
+    step, lead, velocities, prepare = method.step, method.lead, method.velocities, method.prepare
+    flow = superpose(spec.laws, "flow")
+    has_lead, drifts, watched = spec.lead is not None, flow is not None, bool(spec.events)
+    watch, passage = make_watch(spec.events, View) if watched else (step, step)
     lead_coefficient = spec.lead[1] if has_lead else 0.0
+    # A drift that leads has passed half of its time when a step begins; with stages, of the first one's.
+    lead_time = spec.lead_time if has_lead and spec.lead[0] in ("Ab", "T") else 0.0
+    water_velocity = method.water_velocity
     renormalised = real == wp.float32
     fields, per_sample = spec.fields, sum(SAMPLE_FIELDS[name] for name in spec.fields)
 
@@ -116,8 +136,23 @@ def make_advance(spec):
         put(state, i, 15, x.pi)
 
     @wp.func
-    def sample(out: wp.array2d(dtype=Lane), i: int, first: int, x: State, c: Constants):
-        """Write the chosen fields of one sample: b, R, nu = M^-1 p, Om = J^-1 pi."""
+    def at_step(x: State, k: int, h: wp.float64):
+        """The number of step k and the time after its lead, exact: never summed up."""
+        if wp.static(timed):
+            x.time = wp.float64(k) * h + wp.float64(wp.static(lead_time)) * h
+            x.step = k
+        return x
+
+    @wp.func
+    def opened(x: State, c: Constants, part: real):
+        """The lead of the first step; with -1 for `part`, the state at the end of a step without that of the next."""
+        if wp.static(has_lead):
+            x = lead(x, c, real(wp.static(lead_coefficient)) * part)
+        return x
+
+    @wp.func
+    def sample(out: wp.array2d(dtype=Lane), i: int, first: int, x: State, c: Constants, h: real):
+        """Write the chosen fields of one sample: b, R, nu (that of the water added), Om."""
         o = first
         if wp.static("position" in fields):
             put(out, i, o, x.b)
@@ -127,19 +162,33 @@ def make_advance(spec):
             put(out, i, o + 3, x.R1)
             put(out, i, o + 6, x.R2)
             o += 9
+        nu, Om = velocities(c.inertia, x.p, x.pi)
         if wp.static("velocity" in fields):
-            put(out, i, o, velocity(c.inertia, x.p))
+            if wp.static(drifts):
+                nu = nu + water_velocity(x, c, h)
+            put(out, i, o, nu)
             o += 3
         if wp.static("angular_velocity" in fields):
-            put(out, i, o, x.pi / c.inertia.J)
+            put(out, i, o, Om)
+
+    @wp.func
+    def back_up(memory: wp.array2d(dtype=Lane), i: int, source: int, target: int):
+        """Copy the rows that laws remember."""
+        rows = memory.shape[1] // 2
+        for j in range(rows):
+            memory[i, target * rows + j] = memory[i, source * rows + j]
 
     @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": CPU_FLAGS})
     def advance(
-        # vehicles and laws, one entry (shared) or one a packet
+        # vehicles, laws and events, one entry (shared) or one a packet
         inertia: wp.array(dtype=Inertia),
         params: wp.array(dtype=Params),
+        events: wp.array(dtype=Events),
+        table: wp.array2d(dtype=Lane),
         tolerance: real,
-        # method: h g_i of each stage, and the merged lead's h (g_i + g_i+1); the lead of the first stage comes first
+        force_tolerance: real,
+        # method: h g_i of each stage, and the merged lead's h (g_i + g_i+1) after it
+        h: wp.float64,
         stage_h: wp.array(dtype=real),
         lead_h: wp.array(dtype=real),
         # time: this launch makes steps k0 to k1, and writes the samples due after the steps sample_step[s0:]
@@ -149,6 +198,7 @@ def make_advance(spec):
         sample_step: wp.array(dtype=int),
         # in and out
         state: wp.array2d(dtype=Lane),
+        memory: wp.array2d(dtype=Lane),
         status: wp.array(dtype=Ints),
         failed_step: wp.array(dtype=Ints),
         failed_size: wp.array(dtype=Lane),
@@ -160,7 +210,17 @@ def make_advance(spec):
         c.inertia = inertia[i % inertia.shape[0]]
         c.params = params[i % params.shape[0]]
         c.tolerance = tolerance
+        c.force_tolerance = force_tolerance
+        c.table = table
+        c.memory = memory
+        c.packet = i
+        c.entry = i % table.shape[0]
+        if wp.static(watched):
+            c.events = events[i % events.shape[0]]
+        if wp.static(dragged):
+            c.drag = prepare(DragFlow(), c.params.own, real(h))
         stages = stage_h.shape[0]
+        first_h = real(1.0) * stage_h[0]
         x = read(state, i)
         one = ones(x.b.x)
         zero = one - one
@@ -173,9 +233,8 @@ def make_advance(spec):
         kept = x
         if any_frozen:
             x = choose(frozen, at_rest(x), x)
-        if wp.static(has_lead):
-            if k0 == 0:
-                x = lead(x, c, real(wp.static(lead_coefficient)) * stage_h[0])
+        if k0 == 0:
+            x = opened(x, c, first_h)
         k = k0
         s = s0
         singles = int(0)
@@ -184,12 +243,17 @@ def make_advance(spec):
             if singles > 0:
                 n = 1
             good = x
+            if wp.static(remembers and checked):
+                back_up(memory, i, 0, 1)
             x.alarm = Alarm()
             for j in range(n):
+                x = at_step(x, k + j, h)
                 for g in range(stages):
                     x = step(x, c, stage_h[g])
                     if wp.static(has_lead):
                         x = lead(x, c, real(wp.static(lead_coefficient)) * lead_h[g])
+                if wp.static(watched):
+                    x = watch(x, c, real(h))
             repeat = int(0)
             if wp.static(checked):
                 code = failures(x, frozen)
@@ -197,6 +261,8 @@ def make_advance(spec):
                     if n > 1:
                         repeat = n
                     else:
+                        if wp.static(watched):
+                            x.alarm.size = positive(x.alarm.size, x.alarm.size, passage(at_step(good, k, h), x, c, real(h)))
                         for j in range(wp.static(width)):
                             if code[j] > real(0.0):
                                 status[i][j] = int(code[j])
@@ -210,6 +276,8 @@ def make_advance(spec):
             if repeat > 0:
                 x = good
                 singles = repeat
+                if wp.static(remembers and checked):
+                    back_up(memory, i, 1, 0)
             else:
                 k += n
                 if singles > 0:
@@ -221,12 +289,11 @@ def make_advance(spec):
                     y = x
                     if any_frozen:
                         y = choose(frozen, kept, x)
-                    if wp.static(has_lead):
-                        y = lead(y, c, -(real(wp.static(lead_coefficient)) * stage_h[0]))
-                    sample(out, i, (s - s0) * wp.static(per_sample), y, c)
+                    y = opened(at_step(y, k, h), c, -first_h)
+                    sample(out, i, (s - s0) * wp.static(per_sample), y, c, real(h))
                     s += 1
         if any_frozen:
             x = choose(frozen, kept, x)
         write(state, i, x)
 
-    return Advance(advance, Lane, Inertia, Params)
+    return Advance(advance, Lane, Inertia, Params, Events)

@@ -5,35 +5,52 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.terms import LAWS
+from lgvi_kernels.state import struct
+
+
+def plays(law, role):
+    """The function of a law's module for this role, or None.
+
+    A role is the name of a function: "law", "damping", "flow", "evolve", "distance". "potential" and "force" are those of
+    "law" that follow from a potential, and those that do not.
+    """
+    if role in ("potential", "force"):
+        wanted = getattr(law, "POTENTIAL", False) == (role == "potential")
+        return getattr(law, "law", None) if wanted else None
+    return getattr(law, role, None)
 
 
 @functools.cache
-def superpose(names, width, real):
-    """Fold the named laws into one. Returns (law, Params), the parameters nested as `own` and `rest`."""
-    if not names:
+def params_of(laws, width, real):
+    """The parameters of several laws, nested as `own` and `rest`."""
+    if not laws:
+        return struct("NoParams", unused=wp.uint8)
+    return struct("Params", own=laws[0].params(width, real), rest=params_of(laws[1:], width, real))
 
-        @wp.struct
-        class NoParams:
-            unused: wp.uint8
+
+@functools.cache
+def superpose(laws, role):
+    """Fold the functions of this role into one, (sum, view, params) -> sum. None if no law has it."""
+    if not any(plays(law, role) for law in laws):
+        return None
+    function, rest = plays(laws[0], role), superpose(laws[1:], role)
+    if function is None:
 
         @wp.func
-        def none(w: Any, view: Any, p: Any):
-            return w
+        def others(w: Any, view: Any, p: Any):
+            return rest(w, view, p.rest)
 
-        return none, NoParams
+        return others
+    if rest is None:
 
-    module = LAWS[names[0]]
-    law, Own = module.law, module.params(width, real)
-    rest_law, Rest = superpose(names[1:], width, real)
+        @wp.func
+        def alone(w: Any, view: Any, p: Any):
+            return function(w, view, p.own)
 
-    @wp.struct
-    class Params:
-        own: Own
-        rest: Rest
+        return alone
 
     @wp.func
     def total(w: Any, view: Any, p: Any):
-        return law(rest_law(w, view, p.rest), view, p.own)
+        return function(rest(w, view, p.rest), view, p.own)
 
-    return total, Params
+    return total

@@ -1,6 +1,6 @@
 """The sub-maps that every method is a program of (Ab, Ap, T, D, K), each advancing a packet by h.
 
-With p = M nu and pi = J Om; pi and J carry the factor 1 / max J throughout. R is kept as its rows R0, R1, R2.
+p = M nu and pi = J Om, and M and J themselves, carry the factor 1 / max J throughout. R is kept as its rows R0, R1, R2.
 """
 
 import functools
@@ -10,6 +10,7 @@ import warp as wp
 
 from lgvi_kernels.lanes import add, cross, dot, mul, vec3  # noqa: F401
 from lgvi_kernels.rotation import transpose_apply
+from lgvi_kernels.water import acceleration_wrench
 
 
 @wp.func
@@ -30,14 +31,27 @@ def anisotropic_velocity(inertia: Any, p: Any):
     return inertia.mean * p + inertia.anisotropy * p
 
 
-def make_Ab(velocity):
+def make_clock(timed):
+    """What a drift does to the time that laws see: nothing, where none looks at it."""
+
+    @wp.func
+    def passed(x: Any, h: Any):
+        if wp.static(timed):
+            x.time = x.time + wp.float64(h)
+        return x
+
+    return passed
+
+
+def make_Ab(velocity, timed):
     """The drift of the position."""
+    passed = make_clock(timed)
 
     @wp.func
     def Ab(x: Any, c: Any, h: Any):
         """Eq. (12) and (23), Nordkvist & Sanyal 2010: b <- b + h R nu."""
         x.b = x.b + rotate(x, h * velocity(c.inertia, x.p))
-        return x
+        return passed(x, h)
 
     return Ab
 
@@ -45,17 +59,23 @@ def make_Ab(velocity):
 @wp.func
 def Ap(x: Any, c: Any, h: Any):
     """The Munk moment of eq. (14) and (19): pi <- pi + h p x nu. Absent for M = m I, where it is zero."""
-    x.pi = x.pi + (h * c.inertia.inverse_scale) * cross(x.p, c.inertia.anisotropy * x.p)
+    x.pi = x.pi + h * cross(x.p, c.inertia.anisotropy * x.p)
     return x
 
 
-@wp.func
-def T(x: Any, c: Any, h: Any):
-    """Ab and Ap together: the exact flow of the kinetic energy p.M^-1 p / 2."""
-    d = h * (c.inertia.anisotropy * x.p)
-    x.b = x.b + rotate(x, (h * c.inertia.mean) * x.p + d)
-    x.pi = x.pi + c.inertia.inverse_scale * cross(x.p, d)
-    return x
+def make_T(timed):
+    """Drift and Munk moment."""
+    passed = make_clock(timed)
+
+    @wp.func
+    def T(x: Any, c: Any, h: Any):
+        """Ab and Ap together: the exact flow of the kinetic energy p.M^-1 p / 2."""
+        d = h * (c.inertia.anisotropy * x.p)
+        x.b = x.b + rotate(x, (h * c.inertia.mean) * x.p + d)
+        x.pi = x.pi + cross(x.p, d)
+        return passed(x, h)
+
+    return T
 
 
 def make_D(Rotation, solve):
@@ -76,18 +96,77 @@ def make_D(Rotation, solve):
     return D
 
 
-def make_K(View, Wrench, law):
-    """The kick by this law."""
+@wp.func
+def look(view: Any, x: Any, c: Any, h: Any):
+    """What a law sees of the state, for a kick of h."""
+    view.north = x.R0
+    view.east = x.R1
+    view.down = x.R2
+    view.b = x.b
+    view.t = h.dtype(x.time)
+    view.h = h
+    view.step = x.step
+    view.table = c.table
+    view.memory = c.memory
+    view.packet = c.packet
+    view.entry = c.entry
+    return view
+
+
+@wp.func
+def kicked(x: Any, c: Any, h: Any, w: Any):
+    """p <- p + h f, pi <- pi + h m."""
+    k = h * c.inertia.inverse_scale
+    x.p = x.p + k * w.force
+    x.pi = x.pi + k * w.torque
+    return x
+
+
+def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, E, V):
+    """The kick by these laws, each of them None where a scene has none.
+
+    law: forces from position and time; evolve: laws that remember, before and after; flow: the water carries the vehicle,
+    and where it varies in space or time also pushes it; E: exact flow of drag; V: velocity-dependent laws. E or V stands
+    between two half kicks and the water's drift is taken half before and half after, so the order is 2.
+    """
+    drifts, damped = flow is not None, E is not None or V is not None
 
     @wp.func
     def K(x: Any, c: Any, h: Any):
-        """The potential's part of eq. (13), (14), (19), (20): p <- p + h f(b, R), pi <- pi + h mU(b, R)."""
-        view = View()
-        view.z = x.R2
-        view.b = x.b
-        w = law(Wrench(), view, c.params)
-        x.p = x.p + h * w.force
-        x.pi = x.pi + (h * c.inertia.inverse_scale) * w.torque
+        """The potential's part of eq. (13), (14), (19), (20), p <- p + h f(b, R), pi <- pi + h mU(b, R), and the rest."""
+        view = look(View(), x, c, h)
+        half = h.dtype(0.5) * h
+        if wp.static(evolve is not None):
+            view = evolve(view, view, c.params)
+        if wp.static(drifts):
+            start = x.b
+            water = flow(Flow(), view, c.params)
+            x.b = start + half * water.velocity
+            view.b = x.b
+            if wp.static(flow_varies):
+                water = flow(Flow(), view, c.params)
+        w = Wrench()
+        if wp.static(law is not None):
+            w = law(w, view, c.params)
+        if wp.static(flow_varies):
+            w = acceleration_wrench(w, view, c.inertia, water)
+        if wp.static(damped):
+            x = kicked(x, c, half, w)
+            if wp.static(E is not None):
+                x = E(x, c, h)
+            if wp.static(V is not None):
+                if wp.static(drifts):
+                    x = V(x, view, water, c, h)
+                else:
+                    x = V(x, view, Flow(), c, h)
+            x = kicked(x, c, half, w)
+        else:
+            x = kicked(x, c, h, w)
+        if wp.static(drifts):
+            x.b = start + h * water.velocity
+        if wp.static(evolve is not None):
+            view.second = 1
+            view = evolve(view, view, c.params)
         return x
 
     return K

@@ -1,6 +1,7 @@
 """Programs of sub-maps, run step by step."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from lgvi_warp.reference.rotation import Solver, newton
 from lgvi_warp.reference.submaps import SUBMAPS, Body, State
@@ -30,7 +31,8 @@ def advance(
 ) -> State:
     """The state after so many steps."""
     for _ in range(steps):
-        x = step(x, body, program, h, stages, solve)
+        x = step(replace(x, t=x.step * h), body, program, h, stages, solve)
+        x = replace(x, step=x.step + 1)
     return x
 
 

@@ -1,42 +1,73 @@
 """The sub-maps that every method is a program of (Ab, Ap, T, D, K), on one vehicle."""
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from lgvi_warp.reference.rotation import Array, Solver, cross, newton
-from lgvi_warp.reference.terms import Law
+from lgvi_warp.reference.terms import STILL, Flow, Law, View
+from lgvi_warp.reference.terms.drag import Drag
+
+# Alexander (1977): the two-stage L-stable scheme of order 2.
+GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
 
 @dataclass(frozen=True)
 class State:
-    """b (3,) [m], R (3, 3) body to inertial, p = M nu (3,) [N s], pi = J Om (3,) [N m s]."""
+    """b (3,) [m], R (3, 3) body to inertial, p (3,) [N s] and pi (3,) [N m s] relative to the water; t [s]; step.
+
+    memory: what each of the body's laws remembers, in their order.
+    """
 
     b: Array
     R: Array
     p: Array
     pi: Array
+    t: float = 0.0
+    step: int = 0
+    memory: tuple[Array, ...] = ()
 
 
 @dataclass(frozen=True)
 class Body:
-    """M (3, 3) [kg], J (3, 3) [kg m2], both symmetric, and the laws that act."""
+    """M (3, 3) [kg], J (3, 3) [kg m2], both symmetric, and the laws that act.
+
+    excess: displaced mass less mass [kg], and excess_lever (3,) [kg m], the same times their levers: water that
+    accelerates pushes them. exact_drag: whether drag, if it is the only velocity-dependent law, acts by its exact flow.
+    """
 
     M: Array
     J: Array
     terms: tuple[Law, ...] = ()
+    excess: float = 0.0
+    excess_lever: Array = field(default_factory=lambda: np.zeros(3))
+    exact_drag: bool = True
+    member: int = 0
 
-    def wrench(self, b: Array, R: Array) -> tuple[Array, Array]:
-        """Sum of the laws: force f(b, R) = -R^T dU/db and torque mU(b, R), body axes."""
+    @property
+    def I6(self) -> Array:
+        """The inertia (6, 6)."""
+        return np.block([[self.M, np.zeros((3, 3))], [np.zeros((3, 3)), self.J]])
+
+    def wrench(self, b: Array, R: Array, views: tuple[View, ...] = (), potential: bool | None = None) -> tuple[Array, Array]:
+        """Sum of the laws' wrenches; only those that follow from a potential, or only the others, if so asked."""
         force, torque = np.zeros(3), np.zeros(3)
-        for term in self.terms:
-            f, m = term.wrench(vertical(R), b)
-            force, torque = force + f, torque + m
+        views = views or tuple(View(R, b, np.zeros(3), np.zeros(3)) for _ in self.terms)
+        for term, view in zip(self.terms, views, strict=True):
+            if potential is None or term.potential_force == potential:
+                f, m = term.wrench(view)
+                force, torque = force + f, torque + m
         return force, torque
 
     def potential(self, b: Array, R: Array) -> float:
         """U(b, R), the sum of the laws [J]."""
-        return sum(term.potential(vertical(R), b) for term in self.terms)
+        return sum(term.potential(View(R, b, np.zeros(3), np.zeros(3))) for term in self.terms)
+
+
+def start(body: Body, b: Array, R: Array, p: Array, pi: Array) -> State:
+    """The state at t = 0, with what the laws remember."""
+    return State(b, R, p, pi, memory=tuple(term.start() for term in body.terms))
 
 
 def vertical(R: Array) -> Array:
@@ -49,9 +80,16 @@ def velocity(body: Body, p: Array) -> Array:
     return np.linalg.solve(body.M, p)
 
 
+def look(x: State, body: Body, h: float) -> tuple[View, ...]:
+    """What each law sees."""
+    nu, Om = velocity(body, x.p), np.linalg.solve(body.J, x.pi)
+    memory = x.memory or (np.zeros(0),) * len(body.terms)
+    return tuple(View(x.R, x.b, nu, Om, x.t, h, x.step, body.member, one) for one in memory)
+
+
 def Ab(x: State, body: Body, h: float, solve: Solver = newton) -> State:
     """Eq. (12) and (23), Nordkvist & Sanyal 2010: b <- b + h R nu."""
-    return replace(x, b=x.b + h * x.R @ velocity(body, x.p))
+    return replace(x, b=x.b + h * x.R @ velocity(body, x.p), t=x.t + h)
 
 
 def Ap(x: State, body: Body, h: float, solve: Solver = newton) -> State:
@@ -67,13 +105,82 @@ def T(x: State, body: Body, h: float, solve: Solver = newton) -> State:
 def D(x: State, body: Body, h: float, solve: Solver = newton) -> State:
     """Eq. (10), (11): F = S(h pi), R <- R F; of (13), (14): p <- F^T p, pi <- F^T pi. Adjoint: (19)-(22)."""
     F = solve(h * x.pi, body.J)
-    return State(b=x.b, R=x.R @ F, p=F.T @ x.p, pi=F.T @ x.pi)
+    return replace(x, R=x.R @ F, p=F.T @ x.p, pi=F.T @ x.pi)
+
+
+def water(views: tuple[View, ...], body: Body) -> Flow:
+    """The sum of all currents."""
+    return sum((term.flow(view) for term, view in zip(body.terms, views, strict=True)), STILL)
+
+
+def acceleration_wrench(R: Array, body: Body, flow: Flow) -> tuple[Array, Array]:
+    """(rho V - m) R^T Du/Dt at the centres of buoyancy and gravity: the push of water that accelerates."""
+    a = R.T @ (flow.rate + flow.gradient @ flow.velocity)
+    return body.excess * a, cross(body.excess_lever, a)
+
+
+def remembered(x: State, body: Body, h: float, second: bool) -> State:
+    """What the laws remember, half a kick later."""
+    views = look(x, body, h)
+    return replace(x, memory=tuple(term.evolve(view, second) for term, view in zip(body.terms, views, strict=True)))
+
+
+def damping(x: State, body: Body, h: float, nu: Array, Om: Array, flow: Flow) -> Array:
+    """D (6, 6): the sum of the damping laws, and M R^T G R for water that varies in space."""
+    views = tuple(replace(view, nu=nu, Om=Om) for view in look(x, body, h))
+    total = sum((term.damping(view) for term, view in zip(body.terms, views, strict=True)), np.zeros((6, 6)))
+    total[:, :3] += body.I6[:, :3] @ x.R.T @ flow.gradient @ x.R
+    return np.asarray(total)
+
+
+def V(x: State, body: Body, h: float, flow: Flow) -> State:
+    """Velocity-dependent laws, -D(nu) nu, by the linearly implicit step of order 2 with D frozen at the predicted middle."""
+    I6, P = body.I6, np.concatenate([x.p, x.pi])
+    start = np.linalg.solve(I6, P)
+    half = np.linalg.solve(I6 + 0.5 * h * damping(x, body, h, start[:3], start[3:], flow), P)
+    Dm = damping(x, body, h, half[:3], half[3:], flow)
+    factor = I6 + GAMMA * h * Dm
+    P = P - (1.0 - GAMMA) * h * Dm @ np.linalg.solve(factor, P)
+    P = P - GAMMA * h * Dm @ np.linalg.solve(factor, P)
+    return replace(x, p=P[:3], pi=P[3:])
+
+
+def E(x: State, body: Body, h: float, flow: Flow) -> State:
+    """Drag by its exact flow."""
+    (drag,) = (term for term in body.terms if isinstance(term, Drag))
+    P = drag.exact(np.concatenate([x.p, x.pi]), np.diag(body.I6), h)
+    return replace(x, p=P[:3], pi=P[3:])
+
+
+def dissipated(x: State, body: Body, h: float, flow: Flow) -> State:
+    """E where drag stands alone on principal axes, V otherwise."""
+    damped = [term for term in body.terms if type(term).damping is not Law.damping]
+    alone = len(damped) == 1 and isinstance(damped[0], Drag) and body.exact_drag and not np.any(flow.gradient)
+    if alone:
+        return E(x, body, h, flow)
+    return V(x, body, h, flow) if damped or np.any(flow.gradient) else x
+
+
+def kicked(x: State, h: float, wrench: tuple[Array, Array]) -> State:
+    """p <- p + h f, pi <- pi + h m."""
+    return replace(x, p=x.p + h * wrench[0], pi=x.pi + h * wrench[1])
 
 
 def K(x: State, body: Body, h: float, solve: Solver = newton) -> State:
-    """The potential's part of eq. (13), (14), (19), (20): p <- p + h f(b, R), pi <- pi + h mU(b, R)."""
-    force, torque = body.wrench(x.b, x.R)
-    return replace(x, p=x.p + h * force, pi=x.pi + h * torque)
+    """The potential's part of eq. (13), (14), (19), (20), p <- p + h f(b, R), pi <- pi + h mU(b, R), and the other laws.
+
+    Half of what the laws remember and of the water's drift, half the kick, drag, and the other halves: order 2.
+    """
+    x = remembered(x, body, h, second=False)
+    b = x.b
+    x = replace(x, b=b + 0.5 * h * water(look(x, body, h), body).velocity)
+    views = look(x, body, h)
+    flow = water(views, body)
+    wrench = tuple(w + a for w, a in zip(body.wrench(x.b, x.R, views), acceleration_wrench(x.R, body, flow), strict=True))
+    x = kicked(x, 0.5 * h, wrench)
+    x = dissipated(x, body, h, flow)
+    x = kicked(x, 0.5 * h, wrench)
+    return remembered(replace(x, b=b + h * flow.velocity), body, h, second=True)
 
 
 SUBMAPS = {"Ab": Ab, "Ap": Ap, "T": T, "D": D, "K": K}

@@ -10,7 +10,8 @@ import pytest
 import lgvi_warp.reference
 from lgvi_warp.reference import advance, energy, rotation
 from lgvi_warp.reference.submaps import Body, State
-from lgvi_warp.reference.terms import Restoring, Weight
+from lgvi_warp.reference.terms.restoring import Restoring
+from lgvi_warp.reference.terms.weight import Weight
 from tests.tools import TURN
 
 

@@ -8,7 +8,8 @@ import pytest
 from lgvi_warp.method import COMPOSITIONS, PROGRAMS
 from lgvi_warp.reference import advance, classical, energy, paper, rotation
 from lgvi_warp.reference.submaps import Body
-from lgvi_warp.reference.terms import Restoring, Weight
+from lgvi_warp.reference.terms.restoring import Restoring
+from lgvi_warp.reference.terms.weight import Weight
 from tests.tools import TURN, difference, expected, from_state, slope, to_state
 
 KEYS = {

@@ -8,7 +8,8 @@ import pytest
 from lgvi_warp.method import PROGRAMS
 from lgvi_warp.reference import advance, energy, rotation
 from lgvi_warp.reference.submaps import Body, State
-from lgvi_warp.reference.terms import Restoring, Weight
+from lgvi_warp.reference.terms.restoring import Restoring
+from lgvi_warp.reference.terms.weight import Weight
 from tests.tools import METHODS, TURN, difference, from_state, slope
 
 SYMMETRIC = ("psi", "psi_s", "psi_1")

@@ -13,7 +13,8 @@ import numpy as np
 import lgvi_warp as lw
 from lgvi_warp.reference import classical
 from lgvi_warp.reference.submaps import Body
-from lgvi_warp.reference.terms import Restoring, Weight
+from lgvi_warp.reference.terms.restoring import Restoring
+from lgvi_warp.reference.terms.weight import Weight
 
 SCENE = Path(__file__).resolve().parents[2] / "paper.toml"
 H, SHORT, LONG = 0.01, 5.0, 150.0

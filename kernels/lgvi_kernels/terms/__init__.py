@@ -1,5 +1,32 @@
-"""The laws a scene may name: one file each, with `params(width, real)`, the struct it reads, and `law(w, view, p)`."""
+"""The laws a scene may name, one file each: `params(width, real)`, the struct it reads, and one or more of
 
-from lgvi_kernels.terms import restoring, weight
+law(w, view, p): a force and torque from position, attitude and time, POTENTIAL if they follow from a potential;
+damping(D, view, p): a matrix D, from velocities as well, of the force and torque -D (nu; Om);
+flow(f, view, p): how the water moves; evolve(view, view, p): what the law remembers, advanced by half a kick.
+"""
 
-LAWS = {"weight": weight, "restoring": restoring}
+from lgvi_kernels.terms import (
+    current,
+    current_profile,
+    drag,
+    drag_matrix,
+    restoring,
+    tether,
+    thrusters,
+    weight,
+    wrench,
+    wrench_schedule,
+)
+
+LAWS = {
+    "weight": weight,
+    "restoring": restoring,
+    "drag": drag,
+    "drag_matrix": drag_matrix,
+    "current": current,
+    "current_profile": current_profile,
+    "tether": tether,
+    "thrusters": thrusters,
+    "wrench": wrench,
+    "wrench_schedule": wrench_schedule,
+}

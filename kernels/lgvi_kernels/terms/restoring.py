@@ -7,10 +7,12 @@ import warp as wp
 
 from lgvi_kernels.lanes import cross, lane3, sub  # noqa: F401
 
+POTENTIAL = True
+
 
 @functools.cache
 def params(width, real):
-    """Params: moment, buoyancy times the lever B r [N m], r from the centre of gravity to that of buoyancy."""
+    """Params: moment [N m], buoyancy times its lever less weight times its own, from the origin of the forces."""
     Lane3 = lane3(width, real)
 
     @wp.struct
@@ -22,6 +24,6 @@ def params(width, real):
 
 @wp.func
 def law(w: Any, view: Any, p: Any):
-    """mU(b, R) = -B r x z."""
-    w.torque = w.torque - cross(p.moment, view.z)
+    """mU(b, R) = -B r x R^T e3."""
+    w.torque = w.torque - cross(p.moment, view.down)
     return w

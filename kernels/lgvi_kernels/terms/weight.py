@@ -7,6 +7,8 @@ import warp as wp
 
 from lgvi_kernels.lanes import add, lane, mul  # noqa: F401
 
+POTENTIAL = True
+
 
 @functools.cache
 def params(width, real):
@@ -22,6 +24,6 @@ def params(width, real):
 
 @wp.func
 def law(w: Any, view: Any, p: Any):
-    """f(b, R) = net z."""
-    w.force = w.force + p.net * view.z
+    """f(b, R) = net R^T e3."""
+    w.force = w.force + p.net * view.down
     return w

@@ -1,23 +1,77 @@
-"""Laws: frozen parameters with `wrench(z, b)`, the force and torque in body axes, and `potential(z, b)`.
+"""Laws of one vehicle, in the user's body axes and about his origin: frozen parameters and the methods of `Law`."""
 
-z = R^T e3 (3,) is the downward vertical in body axes, b (3,) the position [m] in inertial axes.
-"""
+from dataclasses import dataclass, field
 
-from typing import Protocol
+import numpy as np
 
 from lgvi_warp.reference.rotation import Array
-from lgvi_warp.reference.terms.restoring import Restoring
-from lgvi_warp.reference.terms.weight import Weight
 
 
-class Law(Protocol):
-    """What a body sums."""
+@dataclass(frozen=True)
+class View:
+    """What a law may look at.
 
-    def wrench(self, z: Array, b: Array) -> tuple[Array, Array]:
-        """f(b, R) (3,) [N] and mU(b, R) (3,) [N m], body axes."""
+    R (3, 3) body to inertial; b (3,) [m] of the body's origin; nu (3,) [m/s] and Om (3,) [rad/s], body axes, relative to
+    the water; t [s]; h [s], the length of the kick; step and member, which key random numbers; memory (rows,), what the
+    law itself remembers.
+    """
 
-    def potential(self, z: Array, b: Array) -> float:
+    R: Array
+    b: Array
+    nu: Array
+    Om: Array
+    t: float = 0.0
+    h: float = 0.0
+    step: int = 0
+    member: int = 0
+    memory: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def down(self) -> Array:
+        """z = R^T e3, the downward vertical in body axes."""
+        return self.R[2]
+
+
+@dataclass(frozen=True)
+class Flow:
+    """The water: velocity u (3,) [m/s], du/dt (3,) [m/s2] and gradient G_ij = du_i/db_j (3, 3) [1/s], inertial axes."""
+
+    velocity: Array
+    rate: Array
+    gradient: Array
+
+    def __add__(self, other: "Flow") -> "Flow":
+        return Flow(self.velocity + other.velocity, self.rate + other.rate, self.gradient + other.gradient)
+
+
+STILL = Flow(np.zeros(3), np.zeros(3), np.zeros((3, 3)))
+
+
+class Law:
+    """A law that does nothing; each overrides what it does."""
+
+    potential_force = False  # whether `wrench` follows from `potential`
+
+    def wrench(self, view: View) -> tuple[Array, Array]:
+        """Force [N] and torque [N m] from position, attitude and time, body axes."""
+        return np.zeros(3), np.zeros(3)
+
+    def damping(self, view: View) -> Array:
+        """D (6, 6) with (force; torque) = -D (nu; Om)."""
+        return np.zeros((6, 6))
+
+    def flow(self, view: View) -> Flow:
+        """How the water moves at view.b."""
+        return STILL
+
+    def potential(self, view: View) -> float:
         """U(b, R) [J]."""
+        return 0.0
 
+    def start(self) -> Array:
+        """What it remembers at t = 0."""
+        return np.zeros(0)
 
-__all__ = ["Law", "Restoring", "Weight"]
+    def evolve(self, view: View, second: bool) -> Array:
+        """What it remembers after the first or second half of a kick of view.h, view.t being the middle of the kick."""
+        return view.memory

@@ -5,18 +5,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from lgvi_warp.reference.rotation import Array, cross
+from lgvi_warp.reference.terms import Law, View
 
 
 @dataclass(frozen=True)
-class Restoring:
-    """moment: buoyancy times the lever B r, (3,) [N m], r from the centre of gravity to that of buoyancy."""
+class Restoring(Law):
+    """moment: buoyancy times the lever B r (less weight times its own), (3,) [N m], from the body's origin."""
 
     moment: Array
+    potential_force = True
 
-    def wrench(self, z: Array, b: Array) -> tuple[Array, Array]:
+    def wrench(self, view: View) -> tuple[Array, Array]:
         """No force and the torque mU(b, R) = -B r x z, z = R^T e3."""
-        return np.zeros(3), -cross(self.moment, z)
+        return np.zeros(3), -cross(self.moment, view.down)
 
-    def potential(self, z: Array, b: Array) -> float:
+    def potential(self, view: View) -> float:
         """U = B r.z [J]."""
-        return float(self.moment @ z)
+        return float(self.moment @ view.down)

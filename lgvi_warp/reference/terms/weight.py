@@ -5,18 +5,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from lgvi_warp.reference.rotation import Array
+from lgvi_warp.reference.terms import Law, View
 
 
 @dataclass(frozen=True)
-class Weight:
+class Weight(Law):
     """net: weight less buoyancy (m - rho V) g [N]."""
 
     net: float
+    potential_force = True
 
-    def wrench(self, z: Array, b: Array) -> tuple[Array, Array]:
+    def wrench(self, view: View) -> tuple[Array, Array]:
         """Force f(b, R) = net z and no torque, z = R^T e3."""
-        return self.net * z, np.zeros(3)
+        return self.net * view.down, np.zeros(3)
 
-    def potential(self, z: Array, b: Array) -> float:
+    def potential(self, view: View) -> float:
         """U = -net b3 [J]."""
-        return -self.net * float(b[2])
+        return -self.net * float(view.b[2])

@@ -1,0 +1,145 @@
+"""A method's step from its sub-maps, for what the scene has: which laws act where, and how velocities follow."""
+
+from typing import Any, NamedTuple
+
+import warp as wp
+
+from lgvi_kernels import turns
+from lgvi_kernels.compose import superpose
+from lgvi_kernels.dissipation import make_V
+from lgvi_kernels.lanes import add, div, mul, sub  # noqa: F401
+from lgvi_kernels.matrix3 import apply, factor_struct, transpose_times
+from lgvi_kernels.paper import make_forces, make_phi
+from lgvi_kernels.rotation import rotation_struct
+from lgvi_kernels.solve import make_solve
+from lgvi_kernels.state import damping_struct, flow_struct, matrix3_struct, view_struct, wrench_struct
+from lgvi_kernels.submaps import (
+    Ap,
+    anisotropic_velocity,
+    fold,
+    isotropic_velocity,
+    look,
+    make_Ab,
+    make_D,
+    make_K,
+    make_T,
+)
+from lgvi_kernels.terms.drag import make_E
+from lgvi_kernels.view import to_body
+from lgvi_kernels.water import make_shear
+
+
+class Step(NamedTuple):
+    """Functions of a method: one stage without its lead, the lead, the velocities of a state, E's set-up, the current."""
+
+    step: Any
+    lead: Any
+    velocities: Any
+    prepare: Any
+    water_velocity: Any
+
+
+def make_velocities(velocity, coupled):
+    """(inertia, p, pi) -> (nu, Om) at the origin of the state, and the same at that of the forces."""
+    if not coupled:
+
+        @wp.func
+        def velocities(inertia: Any, p: Any, pi: Any):
+            """nu = M^-1 p, Om = J^-1 pi."""
+            return velocity(inertia, p), pi / inertia.J
+
+        return velocities, velocities
+
+    @wp.func
+    def velocities_of_state(inertia: Any, p: Any, pi: Any):
+        """Om = Js^-1 (pi - E^T p), nu = M^-1 p - E Om."""
+        Om = (pi - transpose_times(inertia.E, p)) / inertia.J
+        return velocity(inertia, p) - apply(inertia.E, Om), Om
+
+    @wp.func
+    def velocities_of_forces(inertia: Any, p: Any, pi: Any):
+        """The same where the forces act."""
+        Om = (pi - transpose_times(inertia.E_forces, p)) / inertia.J
+        return velocity(inertia, p) - apply(inertia.E_forces, Om), Om
+
+    return velocities_of_state, velocities_of_forces
+
+
+def make_damping(laws, shear):
+    """D of the damping laws, and of water that varies in space. None if there is neither."""
+    damping = superpose(laws, "damping")
+    if damping is None and shear is None:
+        return None
+
+    @wp.func
+    def total(D: Any, view: Any, water: Any, c: Any):
+        if wp.static(damping is not None):
+            D = damping(D, view, c.params)
+        if wp.static(shear is not None):
+            D = shear(D, view, c.inertia, water)
+        return D
+
+    return total
+
+
+def make_method(spec):
+    """The functions of a method for this Spec."""
+    width, real = spec.width, spec.real
+    structs = (make(width, real) for make in (view_struct, wrench_struct, flow_struct, damping_struct))
+    View, Wrench, Flow, Damping = structs
+    coupled = "coupled" in spec.parts
+    velocity = isotropic_velocity if spec.mass == "isotropic" else anisotropic_velocity
+    velocities, velocities_of_forces = make_velocities(velocity, coupled)
+    laws = spec.laws
+    law, flow, evolve = (superpose(laws, role) for role in ("law", "flow", "evolve"))
+    varies = spec.flow in ("uniform", "varying")
+    shear = make_shear(matrix3_struct(width, real), coupled) if spec.flow == "varying" else None
+    damping = make_damping(laws, shear)
+    prepare, exact = make_E(spec.drag) if spec.drag else (None, None)
+
+    @wp.func
+    def E(x: Any, c: Any, h: Any):
+        """Drag by its exact flow; its constants are at hand for the whole step, and made for any other."""
+        if h == c.drag.h:
+            x = exact(x, c.drag)
+        else:
+            x = exact(x, prepare(c.drag, c.params.own, h))
+        return x
+
+    @wp.func
+    def water_velocity(x: Any, c: Any, h: Any):
+        """R^T u where the vehicle is."""
+        view = look(View(), x, c, h)
+        return to_body(view, flow(Flow(), view, c.params).velocity)
+
+    V = None
+    if damping is not None and spec.averages is None:
+        V = make_V(damping, velocities_of_forces, Damping, factor_struct(width, real), coupled)
+    solve = make_solve(real, spec.solver, spec.iterations, spec.adaptive, spec.checked)
+    used = {letter for letter, _ in spec.maps} | ({spec.lead[0]} if spec.lead else set())
+    letters = {
+        "Ab": make_Ab(velocity, spec.timed),
+        "Ap": Ap,
+        "T": make_T(spec.timed),
+        "D": make_D(rotation_struct(width, real), solve),
+    }
+    if "K" in used:
+        letters["K"] = make_K(View, Wrench, Flow, law, evolve, flow, varies, E if spec.drag else None, V)
+    U12, U13, U23, *pitched = spec.coupling
+    for letter in used:
+        if letter[0] == "R":
+            axis = int(letter[1]) - 1
+            letters[letter] = turns.make_turn(axis, pitched[axis])
+        elif letter[0] == "h":
+            letters[letter] = turns.make_hop(int(letter[1]) - 1, int(letter[2]) - 1, U12, U13, U23)
+    if spec.averages is not None:
+        force, potential = superpose(laws, "force"), superpose(laws, "potential")
+        forces, current = make_forces(View, Wrench, Flow, Damping, force, damping, flow, varies)
+        maps = (letters["Ab"], None if spec.mass == "isotropic" else Ap, letters["D"])
+        functions = (View, Wrench, potential, forces, current, evolve, velocities)
+        letters["Phi"], letters["Phi*"] = make_phi(maps, functions, *spec.averages)
+    step = fold(tuple((letters[letter], coefficient) for letter, coefficient in spec.maps))
+    lead = letters[spec.lead[0]] if spec.lead else step
+    return Step(step, lead, velocities, prepare, water_velocity)
+
+

@@ -1,0 +1,93 @@
+"""Drag per axis, -(l + q|v|) v, by its exact flow E: v -> v e^-x / (1 + (h q|v|/I) (1 - e^-x)/x), x = h l / I.
+
+E is the solution of I v' = -(l + q|v|) v on one axis, exact at any h, and exact altogether where the axes of drag are
+principal axes of M and J. (Where they are not, the same drag acts as a damping matrix: terms/drag_matrix.py.)
+"""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lane_math import decay
+from lgvi_kernels.lanes import absolute, add, div, lane3, mul, ones, sub, vec3  # noqa: F401
+from lgvi_kernels.state import struct
+
+PARTS = ("linear_force", "linear_torque", "quadratic_force", "quadratic_torque")
+
+
+@functools.cache
+def params(width, real):
+    """Params: l / I [1/s] of force and torque, and q / I per momentum divided by max J, as it is kept."""
+    return struct("Drag", **{part: lane3(width, real) for part in PARTS})
+
+
+@functools.cache
+def flow_struct(width, real):
+    """Per axis, for one length of step: e^-x and (h q/I) (1 - e^-x)/x, of force and torque."""
+    Lane3 = lane3(width, real)
+    return struct("DragFlow", decay_force=Lane3, decay_torque=Lane3, gain_force=Lane3, gain_torque=Lane3, h=real)
+
+
+@wp.func
+def decay3(x: Any):
+    """(1 - e^-x)/x on three axes."""
+    return vec3(decay(x.x), decay(x.y), decay(x.z))
+
+
+def make_E(parts):
+    """(prepare, E) with the parts of PARTS that some member has."""
+    linear_force, linear_torque, quadratic_force, quadratic_torque = (part in parts for part in PARTS)
+
+    @wp.func
+    def prepare(e: Any, p: Any, h: Any):
+        """The constants of E for steps of h."""
+        e.h = h
+        if wp.static(linear_force):
+            x = h * p.linear_force
+            s = decay3(x)
+            e.decay_force = vec3(ones(x.x), ones(x.x), ones(x.x)) - x * s
+            if wp.static(quadratic_force):
+                e.gain_force = h * (p.quadratic_force * s)
+        else:
+            if wp.static(quadratic_force):
+                e.gain_force = h * p.quadratic_force
+        if wp.static(linear_torque):
+            y = h * p.linear_torque
+            t = decay3(y)
+            e.decay_torque = vec3(ones(y.x), ones(y.x), ones(y.x)) - y * t
+            if wp.static(quadratic_torque):
+                e.gain_torque = h * (p.quadratic_torque * t)
+        else:
+            if wp.static(quadratic_torque):
+                e.gain_torque = h * p.quadratic_torque
+        return e
+
+    @wp.func
+    def slowed(v: Any, gain: Any):
+        """v / (1 + gain |v|) per axis."""
+        one = ones(v.x)
+        return vec3(
+            v.x / (one + gain.x * absolute(v.x)),
+            v.y / (one + gain.y * absolute(v.y)),
+            v.z / (one + gain.z * absolute(v.z)),
+        )
+
+    @wp.func
+    def E(x: Any, e: Any):
+        """The exact flow of drag alone over e.h."""
+        p = x.p
+        pi = x.pi
+        if wp.static(quadratic_force):
+            p = slowed(p, e.gain_force)
+        if wp.static(linear_force):
+            p = e.decay_force * p
+        if wp.static(quadratic_torque):
+            pi = slowed(pi, e.gain_torque)
+        if wp.static(linear_torque):
+            pi = e.decay_torque * pi
+        x.p = p
+        x.pi = pi
+        return x
+
+    return prepare, E

@@ -1,0 +1,68 @@
+"""Thrusters: quadratic thrust curve with dead band and saturation, after a first-order lag."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lane_math import clamp, exponential, greatest
+from lgvi_kernels.lanes import absolute, add, div, mul, neg, ones, positive, sub, vec3  # noqa: F401
+from lgvi_kernels.state import struct
+from lgvi_kernels.view import row1, row3, table1
+
+# Rows of one thruster: force and torque per newton (6), coefficient forward and backward, dead band, limit, 1 / lag.
+ROWS = 11
+
+
+@functools.cache
+def params(width, real):
+    """Params: count of thrusters and of knots of their commands; first row of the table and of the memory.
+
+    Rows: for each thruster ROWS numbers, then for each its table of commands over time (see view.table1).
+    Memory: one row a thruster, its lagged command.
+    """
+    return struct("Thrusters", first=wp.int32, memory=wp.int32, count=wp.int32, knots=wp.int32, lagged=wp.int32)
+
+
+@wp.func
+def commanded(view: Any, p: Any, i: int, t: Any):
+    """The command of thruster i at time t, within its limit."""
+    first = p.first + wp.static(ROWS) * p.count + i * (1 + 3 * p.knots)
+    limit = row1(view, p.first + wp.static(ROWS) * i + 9)
+    return clamp(table1(view, first, p.knots, t), -limit, limit)
+
+
+@wp.func
+def evolve(state: Any, view: Any, p: Any):
+    """n' = (command - n) / time constant, exactly over half a kick, the command held at the middle of that half."""
+    if p.lagged > 0:
+        quarter = view.h.dtype(0.25) * view.h
+        t = view.t - quarter
+        if view.second > 0:
+            t = view.t + quarter
+        for i in range(p.count):
+            n = view.memory[view.packet, p.memory + i] * view.h.dtype(1.0)
+            u = commanded(view, p, i, t * ones(n))
+            rate = row1(view, p.first + wp.static(ROWS) * i + 10)
+            view.memory[view.packet, p.memory + i] = u + exponential(-(quarter + quarter) * rate) * (n - u)
+    return state
+
+
+@wp.func
+def law(w: Any, view: Any, p: Any):
+    """Thrust = c+ max(n - band, 0)^2 - c- max(-n - band, 0)^2 along each thruster."""
+    zero = ones(view.b.x) - ones(view.b.x)
+    for i in range(p.count):
+        at = p.first + wp.static(ROWS) * i
+        n = zero
+        if p.lagged > 0:
+            n = view.memory[view.packet, p.memory + i] * view.h.dtype(1.0)
+        else:
+            n = commanded(view, p, i, view.t * ones(zero))
+        band = row1(view, at + 8)
+        ahead = greatest(n - band, zero)
+        astern = greatest(-n - band, zero)
+        thrust = row1(view, at + 6) * (ahead * ahead) - row1(view, at + 7) * (astern * astern)
+        w.force = w.force + thrust * row3(view, at)
+        w.torque = w.torque + thrust * row3(view, at + 3)
+    return w

@@ -1,0 +1,213 @@
+"""What a scene needs of a kernel: the frame, the laws that act and how each enters, the method's program for them.
+
+Decided once for a run, from the numbers of all members; the members' own numbers come later, block by block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp import inertia, terms, vehicle
+from lgvi_warp.ensemble import Ensemble
+from lgvi_warp.errors import Faults
+from lgvi_warp.inertia import Frame
+from lgvi_warp.method import FORCED, Method, Program, merged, middle_axis, simplified, with_hops
+from lgvi_warp.terms.base import Setting, Term
+from lgvi_warp.terms.drag import Drag, has_exact_flow
+
+Parameters = Mapping[str, np.ndarray]
+
+# Off-diagonal elements below this fraction of the largest element are the round-off of turning the axes.
+DIAGONAL = 1e-14
+# A coupling norm below this is the round-off of moving the origin.
+UNCOUPLED = 1e-9
+
+
+def shape_of_mass(M: np.ndarray) -> str:
+    """ "isotropic", "diagonal" or "full": the simplest that holds every matrix of M (n, 3, 3)."""
+    off = np.abs(M[:, ~np.eye(3, dtype=bool)]).max(axis=1)
+    diagonal = np.einsum("nii->ni", M)
+    if np.any(off > DIAGONAL * np.abs(diagonal).max(axis=1)):
+        return "full"
+    return "isotropic" if np.all(diagonal == diagonal[:, :1]) else "diagonal"
+
+
+def frame_of(method: Method, parameters: Parameters) -> tuple[Frame, np.ndarray]:
+    """The frame that the method wants, and U (n, 3, 3) of the turns (zero without)."""
+    I6 = vehicle.inertia6(parameters)
+    if method.turns:
+        return inertia.turns_frame(I6, middle_axis(method.program))
+    if method.base == "psi_w":
+        frame = inertia.symmetric_frame(I6)
+    else:
+        frame, _ = inertia.uncoupled_frame(I6)
+    return frame, np.zeros_like(frame.M)
+
+
+@dataclass(frozen=True)
+class Model:
+    """The choices for one run.
+
+    frame: of all members. laws: (term, module of its device code); drag by its exact flow first where it is used, and
+    `drag` its parts. flow: "none", "steady", "uniform" or "varying". coupling: which of U12, U13, U23 and of the pitches
+    are there. program: sub-maps of one stage. averages: alpha and beta of (15), (16), or None.
+    """
+
+    method: Method
+    frame: Frame
+    laws: tuple[tuple[Term, Any], ...]
+    events: tuple[tuple[Term, Any], ...]
+    mass: str
+    drag: tuple[str, ...]
+    flow: str
+    parts: tuple[str, ...]
+    coupling: tuple[bool, ...]
+    timed: bool
+    memory: bool
+    program: Program
+    lead: tuple[str, float] | None
+    averages: tuple[float, float] | None
+
+
+def make_model(ensemble: Ensemble, method: Method, h: float, laws: Mapping[str, Any], stops: Mapping[str, Any]) -> Model:
+    """Decide. laws, stops: name -> module of device code. Raises SceneError where a method cannot do what a scene asks."""
+    p = ensemble.parameters(0, ensemble.members)
+    frame, U = frame_of(method, p)
+    setting = Setting(p, frame, ensemble.indices, ensemble.seed, h)
+    acting = _acting(ensemble, p, setting, laws)
+    events = tuple((one, _module(one, stops, "distance")) for one in ensemble.scene.events)
+    damping = any(hasattr(module, "damping") for term, module in acting if not isinstance(term, Drag))
+    flow = _flow([module for _, module in acting])
+    drags = [(term, module) for term, module in acting if isinstance(term, Drag)]
+    nonconservative = any(not getattr(module, "POTENTIAL", False) and module is not laws["current"] for _, module in acting)
+    forced = method.base in FORCED and nonconservative
+    exact = len(drags) == 1 and not damping and flow != "varying" and not forced and has_exact_flow(frame)
+    drag: tuple[str, ...] = ()
+    if exact:
+        term = drags[0][0]
+        assert isinstance(term, Drag)
+        drag = term.parts(ensemble.own(term, p))
+        acting = [(term, laws["drag"]), *((t, m) for t, m in acting if t is not term)]
+    dense = (damping or bool(drags) or flow == "varying") and not exact
+    memory = any(term.memory for term, _ in acting)
+    _check(ensemble, method, frame, p, dense=dense, flow=flow, memory=memory, modules=[module for _, module in acting])
+    mass = shape_of_mass(frame.M)
+    coupled = frame.coupled
+    program = FORCED[method.base] if forced else simplified(method.program, mass == "isotropic" and not coupled)
+    if method.turns and coupled:
+        program = with_hops(program)
+    lead, maps = merged(program)
+    # A kick that cannot be undone must not be divided between two steps, nor what events look at.
+    undone = all(getattr(module, "POTENTIAL", False) for _, module in acting)
+    if events or (lead is not None and lead[0] == "K" and not undone):
+        lead, maps = None, program
+    asked = {"turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
+             "dense": dense, "water": flow in ("uniform", "varying"),
+             "origin": bool(events) and bool(np.any(frame.origin))}  # fmt: skip
+    return Model(
+        method=method,
+        frame=frame,
+        laws=tuple(acting),
+        events=events,
+        mass="full" if coupled and mass == "isotropic" else mass,
+        drag=drag,
+        flow=flow,
+        parts=tuple(name for name, wanted in asked.items() if wanted),
+        coupling=tuple(bool(np.any(U[:, i, j])) for i, j in ((0, 1), (0, 2), (1, 2), (0, 0), (1, 1), (2, 2))),
+        timed=any(one.timed for one, _ in (*acting, *events)),
+        memory=memory,
+        program=maps,
+        lead=lead,
+        averages=(method.alpha, method.beta) if forced else None,
+    )
+
+
+def _module(term: Term, known: Mapping[str, Any], *roles: str) -> Any:
+    """The device code of a term. Raises SceneError where it lacks what it must have."""
+    module = known.get(term.device) if isinstance(term.device, str) else term.device
+    faults = Faults()
+    if module is None:
+        faults.add(f"{term.key}.device", term.device, "is not known", "give a module, or the name of a built-in one")
+    elif not callable(getattr(module, "params", None)):
+        faults.add(f"{term.key}.device", module, "has no params(width, real)", "see docs/add_a_law.md")
+    elif not any(hasattr(module, role) for role in roles):
+        faults.add(f"{term.key}.device", module, f"has none of {', '.join(roles)}", "see docs/add_a_law.md")
+    else:
+        for role in roles:
+            _check_signature(faults, term, module, role)
+    faults.raise_if_any()
+    return module
+
+
+def _check_signature(faults: Faults, term: Term, module: Any, role: str) -> None:
+    """A law must be a Warp function of the arguments that it is called with."""
+    function = getattr(module, role, None)
+    if function is None:
+        return
+    wanted = 2 if role == "distance" else 3
+    names = list(getattr(function, "input_types", {}))
+    if not names:
+        faults.add(f"{term.key}.{role}", function, "is not a Warp function", "decorate it with @wp.func")
+    elif len(names) != wanted:
+        given = "(view, p)" if wanted == 2 else "(w, view, p)"
+        faults.add(f"{term.key}.{role}", f"({', '.join(names)})", f"takes {len(names)} arguments", f"write {role}{given}")
+
+
+ROLES = ("law", "damping", "flow", "evolve")
+
+
+def _acting(ensemble: Ensemble, p: Parameters, setting: Setting, laws: Mapping[str, Any]) -> list[tuple[Term, Any]]:
+    """The terms that some member feels, with their device code, in a fixed order."""
+    acting: list[tuple[Term, Any]] = []
+    for term in terms.IMPLIED:
+        if any(np.any(value) for value in term.packed({}, setting).values.values()):
+            acting.append((term, laws[term.device]))
+    for term in ensemble.scene.terms:
+        module = _module(term, laws, *ROLES)
+        if term.present(ensemble.own(term, p)):
+            acting.append((term, module))
+    return acting
+
+
+def _flow(modules: list[Any]) -> str:
+    """How the water moves, by the law that says most."""
+    order = ("none", "steady", "uniform", "varying")
+    return max((getattr(module, "FLOW", "none") for module in modules), key=order.index, default="none")
+
+
+def _check(
+    ensemble: Ensemble,
+    method: Method,
+    frame: Frame,
+    p: Parameters,
+    *,
+    dense: bool,
+    flow: str,
+    memory: bool,
+    modules: list[Any],
+) -> None:
+    """Refuse what a method cannot do, with the reason."""
+    faults = Faults()
+    if not method.turns and method.base != "psi_w":
+        left = inertia.uncoupled_frame(vehicle.inertia6(p))[1]
+        if left.max() > UNCOUPLED:
+            k = f"coupling norm up to {left.max():.3g} at the best origin"
+            remedy = "use psi_x, psi_x8 or psi_w, which take any 6x6 inertia"
+            faults.add("method", method.name, f"cannot couple velocities and rates ({k})", remedy)
+    composed = len(method.stages) > 1
+    noisy = any(getattr(module, "NOISE", False) for module in modules)
+    if composed and (dense or flow in ("uniform", "varying") or memory or noisy):
+        what = "a damping matrix" if dense else "water that varies" if flow != "none" else "a term that remembers"
+        faults.add("method", method.name, f"keeps its order only for maps that undo themselves, which {what} does not",
+                   f"use {method.base}")  # fmt: skip
+    kicks = sum(letter in ("K", "Phi", "Phi*") for letter, _ in method.program)
+    if noisy and not composed and kicks != 1:
+        faults.add("method", method.name, "would draw noise more than once a step", "use psi_s, psi_x or psi_w")
+    if flow in ("uniform", "varying") and np.any(p["environment.gravity"] == 0.0) and np.any(p["vehicle.buoyancy"]):
+        faults.add("environment.gravity", 0.0, "leaves the displaced mass unknown, which water that accelerates pushes",
+                   "give gravity, or buoyancy = 0")  # fmt: skip
+    faults.raise_if_any()

@@ -1,0 +1,260 @@
+"""One block's members in lanes, ready to launch: their numbers as the kernel's arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from lgvi_kernels.advance import SAMPLE_FIELDS, STATE_FIELDS
+from lgvi_kernels.lanes import int_lane
+from lgvi_warp import inertia, model, notation, vehicle
+from lgvi_warp.ensemble import Ensemble, Members
+from lgvi_warp.events import Event
+from lgvi_warp.plan import Plan, build_lock
+from lgvi_warp.status import Status
+from lgvi_warp.terms.base import Packed, Setting
+
+
+@dataclass
+class Outcome:
+    """What a block's members came to: arrays over its members, and their samples by field, (k, count, ...)."""
+
+    status: np.ndarray
+    failed_step: np.ndarray
+    failed_size: np.ndarray
+
+
+def pack(values: np.ndarray, width: int) -> np.ndarray:
+    """Members' rows (m, d) as packets (ceil(m / width), d, width); the last packet is filled up with its last member."""
+    m, d = values.shape
+    packets = -(-m // width)
+    filled = np.concatenate([values, np.repeat(values[-1:], packets * width - m, axis=0)])
+    return np.ascontiguousarray(filled.reshape(packets, width, d).transpose(0, 2, 1))
+
+
+def _set_vector(target: np.ndarray, values: np.ndarray) -> None:
+    """Fill a Lane3 field of a structured array from packed rows (packets, 3, width)."""
+    for i, axis in enumerate("xyz"):
+        target[axis] = values[:, i]
+
+
+def _symmetric(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Diagonal and off-diagonal 23, 31, 12 of (n, 3, 3)."""
+    off = np.stack([matrix[:, 1, 2], matrix[:, 2, 0], matrix[:, 0, 1]], axis=1)
+    return np.einsum("nii->ni", matrix), off
+
+
+class Packets:
+    """One block's members in lanes, ready to launch."""
+
+    def __init__(self, plan: Plan, members: Members):
+        self.plan, self.members = plan, members
+        self.frame, self.U = model.frame_of(plan.method, members.parameters)
+        self.scale = self.frame.J.max(axis=1)
+        width, Lane = plan.spec.width, plan.advance.Lane
+        self.count = -(-members.count // width)
+        Inertia, Params, Events = plan.advance.Inertia, plan.advance.Params, plan.advance.Events
+        setting = Setting(members.parameters, self.frame, members.indices, members.seed, plan.grid.h)
+        params, table, memory = self._laws(setting)
+        self.inertia = wp.array(self._inertia(), dtype=Inertia, device="cpu")
+        self.params = wp.array(params, dtype=Params, device="cpu")
+        self.events = wp.array(self._events(setting), dtype=Events, device="cpu")
+        self.table = _rows(table, Lane)
+        self.memory = _rows(memory, Lane)
+        self.state = _rows(self._state(), Lane)
+        self.status = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
+        self.failed_step = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
+        self.failed_size = wp.zeros(self.count, dtype=Lane, device="cpu")
+
+    def _lanes(self, values: np.ndarray) -> np.ndarray:
+        """Rows (1 or m, d) as (1 or packets, d, width) of the plan's dtype."""
+        width = self.plan.spec.width
+        packed = np.repeat(values[:, :, None], width, axis=2) if len(values) == 1 else pack(values, width)
+        return packed.astype(self.plan.dtype)
+
+    def _inertia(self) -> np.ndarray:
+        frame, parts = self.frame, self.plan.spec.parts
+        n = max(len(frame.M), len(frame.J))
+        M, J = np.broadcast_to(frame.M, (n, 3, 3)), np.broadcast_to(frame.J, (n, 3))
+        scale = np.broadcast_to(self.scale, n)
+        inverse = np.linalg.inv(M) * scale[:, None, None]
+        mean = np.einsum("nii->n", inverse) / 3.0
+        deviation = inverse - mean[:, None, None] * np.eye(3)
+        fields: dict[str, Any] = {"J": J / scale[:, None], "inverse_scale": 1.0 / scale, "mean": mean}
+        if self.plan.spec.mass == "diagonal":
+            fields["anisotropy"] = np.einsum("nii->ni", deviation)
+        elif self.plan.spec.mass == "full":
+            fields["anisotropy"] = _symmetric(deviation)
+        if "turns" in parts:
+            fields["half_over_J"] = 0.5 * scale[:, None] / J
+        if "x" in parts:
+            fields["pitch"] = np.einsum("nii->ni", self.U)
+            fields |= {f"U{i + 1}{j + 1}": self.U[:, i, j] for i, j in ((0, 1), (0, 2), (1, 2))}
+        if "w" in parts:
+            fields["S"] = _symmetric(frame.E)
+        if "coupled" in parts:
+            fields |= {"E": frame.E, "E_forces": frame.E_forces}
+        if "dense" in parts:
+            Md, C, Jd = (block / scale[:, None, None] for block in inertia.blocks(frame.inertia_at(frame.E_forces)))
+            fields |= {"M": _symmetric(Md), "C": C, "J_forces": _symmetric(Jd)}
+        if "water" in parts:
+            fields |= self._water()
+        if "origin" in parts:
+            fields["user_origin"] = -frame.vector(frame.origin)
+        return self._filled(self.plan.dtypes[0], fields)
+
+    def _water(self) -> dict[str, np.ndarray]:
+        """What water that accelerates pushes: displaced mass less mass, at their centres."""
+        p = self.members.parameters
+        displaced, dry = vehicle.displaced_mass(p), vehicle.dry_mass(p)
+        lever = displaced[:, None] * p["vehicle.center_of_buoyancy"] - (dry[:, None] * vehicle.center_of_mass(p))
+        excess = displaced - dry
+        about = self.frame.vector(lever - excess[:, None] * self.frame.forces)
+        return {"excess": excess, "excess_lever": about}
+
+    def _filled(self, dtype: np.dtype, fields: dict[str, Any]) -> np.ndarray:
+        """A structured array with one entry, or one a packet where some field varies."""
+        varied = any(len(leaf) > 1 for leaf in _leaves(fields))
+        data = np.zeros(self.count if varied else 1, dtype)
+        for key, value in fields.items():
+            self._fill(data[key], value)
+        return data
+
+    def _fill(self, target: np.ndarray, value: Any) -> None:
+        names = target.dtype.names or ()
+        if isinstance(value, tuple):
+            for name, part in zip(("diagonal", "off_diagonal"), value, strict=True):
+                _set_vector(target[name], self._lanes(part))
+        elif names == ("x", "y", "z"):
+            _set_vector(target, self._lanes(value))
+        elif names:
+            for i, name in enumerate(("row0", "row1", "row2")):
+                _set_vector(target[name], self._lanes(value[:, i]))
+        elif np.ndim(value) == 0:
+            target[...] = value
+        elif value.dtype.kind in "iu":
+            target[...] = pack(value[:, None], self.plan.spec.width)[:, 0]
+        else:
+            target[...] = self._lanes(value[:, None])[:, 0]
+
+    def _laws(self, setting: Setting) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Params, table and memory: each term's numbers, one after the other."""
+        packed: list[Packed] = []
+        for i, (term, _) in enumerate(self.plan.model.laws):
+            own = Ensemble.own(term, setting.parameters)
+            exact = i == 0 and bool(self.plan.spec.drag)
+            packed.append(term.packed_exact(own, self.frame) if exact else term.packed(own, setting))  # type: ignore[attr-defined]
+        dtype = self.plan.dtypes[1]
+        varied = any(len(leaf) > 1 for one in packed for leaf in _leaves(one.values))
+        data = np.zeros(self.count if varied else 1, dtype)
+        rows, memory = [np.zeros((1, 1))], [np.zeros((1, 0))]
+        node: Any = data
+        for one in packed:
+            values = dict(one.values)
+            if one.rows is not None:
+                values["first"] = sum(part.shape[1] for part in rows)
+                rows.append(one.rows)
+            if one.memory is not None:
+                values["memory"] = sum(part.shape[1] for part in memory)
+                memory.append(one.memory)
+            for key, value in values.items():
+                self._fill(node["own"][key], value)
+            node = node["rest"]
+        table = self._lanes(_side_by_side(rows))
+        start = np.broadcast_to(_side_by_side(memory), (self.members.count, sum(m.shape[1] for m in memory)))
+        # The second half is the copy that a repeated chunk starts from.
+        return data, table, np.concatenate([self._lanes_each(start)] * 2, axis=1)
+
+    def _lanes_each(self, values: np.ndarray) -> np.ndarray:
+        """Rows (m, d) as (packets, d, width), one entry a packet even for one member."""
+        return pack(values, self.plan.spec.width).astype(self.plan.dtype)
+
+    def _events(self, setting: Setting) -> np.ndarray:
+        packed = [one.packed(Ensemble.own(one, setting.parameters), setting) for one, _ in self.plan.model.events]
+        varied = any(len(leaf) > 1 for one in packed for leaf in _leaves(one.values))
+        data = np.zeros(self.count if varied else 1, self.plan.dtypes[2])
+        node: Any = data
+        for one in packed:
+            for key, value in one.values.items():
+                self._fill(node["own"][key], value)
+            node = node["rest"]
+        return data
+
+    def _state(self) -> np.ndarray:
+        m, frame = self.members, self.frame
+        n = m.count
+        R = m.attitude @ frame.Q
+        nu = m.velocity + np.cross(m.angular_velocity, np.broadcast_to(frame.origin, (n, 3)))
+        nu = nu - self._water_at_start()
+        twist = np.concatenate([notation.rotate_into(frame.Q, nu), notation.rotate_into(frame.Q, m.angular_velocity)], 1)
+        momenta = np.einsum("nij,nj->ni", np.broadcast_to(frame.inertia_at(frame.E), (n, 6, 6)), twist)
+        rows = np.empty((n, STATE_FIELDS))
+        rows[:, :9] = R.reshape(-1, 9)
+        rows[:, 9:12] = m.position + notation.rotate_out(m.attitude, np.broadcast_to(frame.origin, (n, 3)))
+        rows[:, 12:] = momenta / self.scale[:, None]
+        return self._lanes_each(rows)
+
+    def _water_at_start(self) -> np.ndarray:
+        """R^T u (m, 3) [m/s], user's axes, where each member starts."""
+        m = self.members
+        position = m.position + notation.rotate_out(m.attitude, np.broadcast_to(self.frame.origin, m.position.shape))
+        total = np.zeros_like(position)
+        for term, _ in self.plan.model.laws:
+            if hasattr(term, "water"):
+                own = Ensemble.own(term, m.parameters)
+                total = total + term.water(own, position[None], np.zeros(1))[0]
+        return notation.rotate_into(m.attitude, total)
+
+    def advance(self, k0: int, k1: int) -> np.ndarray:
+        """Make the steps k0 to k1. Returns the samples due then, (s1 - s0, packets * width, numbers of a sample)."""
+        plan = self.plan
+        s0, s1 = plan.due(k0, k1)
+        numbers = sum(SAMPLE_FIELDS[name] for name in plan.spec.fields)
+        width = plan.spec.width
+        out = wp.empty((self.count, max(1, (s1 - s0) * numbers)), dtype=plan.advance.Lane, device="cpu")
+        real, dtype = plan.spec.real, plan.dtype
+        stage_h, lead_h, sample_step = plan.times
+        inputs = [self.inertia, self.params, self.events, self.table]
+        inputs += [real(plan.method.residual_tolerance(dtype)), real(plan.method.force_tolerance(dtype))]
+        inputs += [wp.float64(plan.grid.h), stage_h, lead_h, k0, k1, s0, sample_step]
+        inputs += [self.state, self.memory, self.status, self.failed_step, self.failed_size, out]
+        with build_lock:
+            command: Any = wp.launch(plan.advance.kernel, dim=self.count, inputs=inputs, device="cpu", record_cmd=True)
+        command.launch()
+        samples = out.numpy()[:, : (s1 - s0) * numbers].reshape(self.count, s1 - s0, numbers, width)
+        return samples.transpose(1, 0, 3, 2).reshape(s1 - s0, self.count * width, numbers)
+
+    def outcome(self) -> Outcome:
+        """Status, steps made before the failure and the value that crossed its limit, of each member."""
+        m = self.members.count
+        status = self.status.numpy().reshape(-1)[:m].astype(np.uint8)
+        for number, (event, _) in reversed(list(enumerate(self.plan.model.events))):
+            assert isinstance(event, Event)
+            status[self.status.numpy().reshape(-1)[:m] == Status.SURFACE + number] = event.status
+        return Outcome(
+            status,
+            self.failed_step.numpy().reshape(-1)[:m].astype(np.int64),
+            np.sqrt(self.failed_size.numpy().reshape(-1)[:m].astype(np.float64)),
+        )
+
+
+def _leaves(fields: dict[str, Any]) -> list[np.ndarray]:
+    """The arrays of a term's numbers."""
+    flat = [part for value in fields.values() for part in (value if isinstance(value, tuple) else (value,))]
+    return [part for part in flat if np.ndim(part) > 0]
+
+
+def _rows(values: np.ndarray, Lane: Any) -> Any:
+    """A Warp array of lanes, two-dimensional, from (entries, rows, width)."""
+    return wp.array(values, dtype=Lane, shape=values.shape[:2], device="cpu")
+
+
+def _side_by_side(parts: list[np.ndarray]) -> np.ndarray:
+    """Rows (1 or n, d) joined along d."""
+    n = max(len(part) for part in parts)
+    return np.concatenate([np.broadcast_to(part, (n, part.shape[1])) for part in parts], axis=1)
+
+

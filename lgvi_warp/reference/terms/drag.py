@@ -1,0 +1,38 @@
+"""Drag per axis, and by 6x6 matrices."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lgvi_warp.reference.rotation import Array
+from lgvi_warp.reference.terms import Law, View
+
+
+@dataclass(frozen=True)
+class Drag(Law):
+    """linear (6,) [N s/m, N m s]; quadratic (6,) [N s2/m2, N m s2]: -(l + q|v|) v on each axis."""
+
+    linear: Array
+    quadratic: Array
+
+    def damping(self, view: View) -> Array:
+        """The diagonal matrix l + q|v|."""
+        return np.diag(self.linear + self.quadratic * np.abs(np.concatenate([view.nu, view.Om])))
+
+    def exact(self, p: Array, inertia: Array, h: float) -> Array:
+        """The momenta (6,) after h of drag alone: v e^-x / (1 + (h q|v|/I) (1 - e^-x)/x), x = h l / I."""
+        v, x = p / inertia, h * self.linear / inertia
+        mean = np.where(x == 0.0, 1.0, -np.expm1(-x) / np.where(x == 0.0, 1.0, x))
+        return np.asarray(inertia * v * np.exp(-x) / (1.0 + h * self.quadratic * np.abs(v) / inertia * mean))
+
+
+@dataclass(frozen=True)
+class DragMatrix(Law):
+    """linear (6, 6), quadratic (6, 6): force_i = -sum_j (linear_ij + quadratic_ij |v_j|) v_j."""
+
+    linear: Array
+    quadratic: Array
+
+    def damping(self, view: View) -> Array:
+        """Each column of the quadratic matrix by its own speed."""
+        return np.asarray(self.linear + self.quadratic * np.abs(np.concatenate([view.nu, view.Om])))

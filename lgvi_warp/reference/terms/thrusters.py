@@ -1,0 +1,55 @@
+"""Thrusters: a quadratic thrust curve with dead band and saturation, after a first-order lag."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from lgvi_warp.reference.rotation import Array, cross
+from lgvi_warp.reference.terms import Law, View
+from lgvi_warp.reference.terms.wrench import at_time
+
+
+@dataclass(frozen=True)
+class Thrusters(Law):
+    """position, direction (n, 3) [m, 1]; forward, backward (n,) [N per command squared]; dead_band, limit (n,);
+    time_constant (n,) [s], 0 for none; times (k,) [s] and command (k, n)."""
+
+    position: Array
+    direction: Array
+    forward: Array
+    backward: Array
+    dead_band: Array
+    limit: Array
+    time_constant: Array
+    times: Array
+    command: Array
+
+    @property
+    def lagged(self) -> bool:
+        """Whether some thruster has a lag: then all remember."""
+        return bool(np.any(self.time_constant > 0.0))
+
+    def commanded(self, t: float) -> Array:
+        """Commands (n,) at t, within their limits."""
+        return np.clip(at_time(t, self.times, self.command, False), -self.limit, self.limit)
+
+    def start(self) -> Array:
+        """The commands at t = 0, or none."""
+        return self.commanded(0.0) if self.lagged else np.zeros(0)
+
+    def evolve(self, view: View, second: bool) -> Array:
+        """n' = (command - n) / time constant over half a kick, the command that of the middle of the half."""
+        if not self.lagged:
+            return view.memory
+        u = self.commanded(view.t + (0.25 if second else -0.25) * view.h)
+        kept = [math.exp(-0.5 * view.h / tau) if tau > 0.0 else 0.0 for tau in self.time_constant]
+        return np.asarray(u + np.array(kept) * (view.memory - u))
+
+    def wrench(self, view: View) -> tuple[Array, Array]:
+        """c+ max(n - band, 0)^2 - c- max(-n - band, 0)^2 along each."""
+        n = view.memory if self.lagged else self.commanded(view.t)
+        ahead, astern = np.maximum(n - self.dead_band, 0.0), np.maximum(-n - self.dead_band, 0.0)
+        forces = (self.forward * ahead**2 - self.backward * astern**2)[:, None] * self.direction
+        torque = sum((cross(r, f) for r, f in zip(self.position, forces, strict=True)), np.zeros(3))
+        return forces.sum(axis=0), torque

@@ -1,0 +1,100 @@
+"""The terms that a scene may name, one file each: weight, drag, currents, tethers, thrusters, fins, waves and noise."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
+
+from lgvi_warp.errors import Faults, SceneError, closest
+from lgvi_warp.terms.base import Packed, Setting, Term, quantity
+from lgvi_warp.terms.current import Current, CurrentProfile
+from lgvi_warp.terms.drag import Drag, DragMatrix
+from lgvi_warp.terms.hydrostatics import Restoring, Weight
+from lgvi_warp.terms.tether import Tether
+from lgvi_warp.terms.thrusters import Thrusters
+from lgvi_warp.terms.wrench import Wrench, WrenchSchedule
+
+AnyTerm = TypeVar("AnyTerm", bound=Term)
+
+# The types of a scene file.
+TYPES: dict[str, type[Term]] = {}
+
+# Follow from the vehicle; refused in a list of terms.
+IMPLIED: tuple[Term, ...] = (Weight(), Restoring())
+
+
+def register(kind: type[Term]) -> type[Term]:
+    """Make a user's Term known to scene files by its `type`. Usable as a decorator. Raises ValueError if it is taken."""
+    if not kind.type or kind.type in TYPES or kind.type in ("weight", "restoring"):
+        raise ValueError(f"{kind.__name__}.type = {kind.type!r}: give a type that no other term has")
+    TYPES[kind.type] = kind
+    return kind
+
+
+for _kind in (Drag, DragMatrix, Current, CurrentProfile, Tether, Thrusters, Wrench, WrenchSchedule):
+    register(_kind)
+
+
+def from_list(given: Any) -> tuple[Term, ...]:
+    """Terms from tables of a scene file or Term objects. Raises SceneError naming every fault."""
+    faults = Faults()
+    if not isinstance(given, Sequence) or isinstance(given, str):
+        raise SceneError([f"terms = {given!r}: is no list; write [[terms]] and type = ... below, or terms=[lw.Drag(...)]"])
+    terms: list[Term] = []
+    for i, one in enumerate(given):
+        with faults.including():
+            terms.append(one if isinstance(one, Term) else _from_table(f"terms[{i}]", one))
+    keys = [term.key for term in terms]
+    for key in sorted({key for key in keys if keys.count(key) > 1}):
+        faults.add("terms", key, f"is the name of {keys.count(key)} terms", f'give each a name of its own: name = "{key}_2"')
+    faults.raise_if_any()
+    return tuple(terms)
+
+
+def _from_table(where: str, table: Any) -> Term:
+    if not isinstance(table, Mapping):
+        remedy = "write a table with type = ..., or give a term such as lw.Drag(quadratic=...)"
+        raise SceneError([f"{where} = {table!r}: is no term; {remedy}"])
+    kind = TYPES.get(table.get("type", ""))
+    if kind is None:
+        implied = table.get("type") in ("weight", "restoring", "buoyancy")
+        remedy = "leave it out: it follows from the vehicle" if implied else closest(table.get("type", ""), TYPES)
+        raise SceneError([f"{where}.type = {table.get('type', '')!r}: is not known; {remedy}"])
+    return build(where, kind, table)
+
+
+def build(where: str, kind: type[AnyTerm], table: Mapping[str, Any]) -> AnyTerm:
+    """A term of this kind from its table in a scene file. Raises SceneError naming every fault."""
+    faults = Faults()
+    fields = {one.name: one for one in dataclasses.fields(kind) if one.init}
+    given = {key: value for key, value in table.items() if key != "type"}
+    faults.keys(where, given, fields)
+    for name, one in fields.items():
+        if one.default is dataclasses.MISSING and name not in given:
+            faults.add(f"{where}.{name}", "", "is missing", f"give it [{one.metadata.get('unit', '')}]")
+    faults.raise_if_any()
+    return kind(**given)
+
+
+__all__ = [
+    "IMPLIED",
+    "TYPES",
+    "Current",
+    "CurrentProfile",
+    "Drag",
+    "DragMatrix",
+    "Packed",
+    "Restoring",
+    "Setting",
+    "Term",
+    "Tether",
+    "Thrusters",
+    "Weight",
+    "Wrench",
+    "WrenchSchedule",
+    "build",
+    "from_list",
+    "quantity",
+    "register",
+]

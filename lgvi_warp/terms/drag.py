@@ -1,0 +1,147 @@
+"""Drag: by its exact flow where the axes allow it, else as a damping matrix; and full 6x6 drag matrices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.errors import Faults
+from lgvi_warp.inertia import Frame, motion_from
+from lgvi_warp.terms.base import Numbers, Packed, Setting, Term, quantity
+
+ZEROS = (0.0,) * 6
+# Off-diagonal elements below this fraction of the largest are the round-off of turning the axes.
+DIAGONAL = 1e-12
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Drag(Term):
+    """Per axis: force = -(linear + quadratic |v|) v, torque likewise (Fossen 2021, 8.1).
+
+    linear: (6,) [N s/m, N m s]; quadratic: (6,) [N s2/m2, N m s2]; none negative. Velocities are relative to the water.
+    """
+
+    type: ClassVar[str] = "drag"
+    device: ClassVar[str] = "drag_matrix"
+
+    linear: Any = quantity((6,), "N s/m, N m s", ZEROS, least=0.0)
+    quadratic: Any = quantity((6,), "N s2/m2, N m s2", ZEROS, least=0.0)
+
+    def present(self, own: Numbers) -> bool:
+        """Whether some coefficient is not zero."""
+        return bool(np.any(own["linear"]) or np.any(own["quadratic"]))
+
+    def parts(self, own: Numbers) -> tuple[str, ...]:
+        """Which parts of the exact flow some member has."""
+        halves = {"force": slice(0, 3), "torque": slice(3, 6)}
+        return tuple(
+            f"{kind}_{where}"
+            for kind in ("linear", "quadratic")
+            for where, part in halves.items()
+            if np.any(own[kind][:, part])
+        )
+
+    def packed_exact(self, own: Numbers, frame: Frame) -> Packed:
+        """For the exact flow: l / I [1/s], and q / I per momentum that is kept divided by max J."""
+        scale = frame.J.max(axis=1)[:, None]
+        inertia = {"force": np.einsum("nii->ni", frame.M), "torque": frame.J}
+        values = {}
+        for where, half in (("force", slice(0, 3)), ("torque", slice(3, 6))):
+            linear, quadratic = (_turned(frame.Q, own[kind][:, half]) for kind in ("linear", "quadratic"))
+            values[f"linear_{where}"] = linear / inertia[where]
+            values[f"quadratic_{where}"] = quadratic * scale / inertia[where] ** 2
+        return Packed(values)
+
+    def packed(self, own: Numbers, setting: Setting) -> Packed:
+        """As the matrix that it is the diagonal of."""
+        matrices = {kind: own[kind][:, :, None] * np.eye(6) for kind in ("linear", "quadratic")}
+        return packed_matrix(matrices["linear"], matrices["quadratic"], setting.frame)
+
+
+def _turned(Q: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
+    """The diagonal of Q^T diag Q, for axes that are the same but for their order."""
+    return np.einsum("nji,nj->ni", np.broadcast_to(Q, (max(len(Q), len(diagonal)), 3, 3)) ** 2, diagonal + 0.0 * Q[:, 0])
+
+
+def has_exact_flow(frame: Frame) -> bool:
+    """Whether the user's axes are principal axes of M and J, in any order, about the same origin."""
+    M, Q = frame.M, np.abs(frame.Q)
+    off = np.abs(M[:, ~np.eye(3, dtype=bool)]).max(axis=1)
+    diagonal = off <= DIAGONAL * np.abs(np.einsum("nii->ni", M)).max(axis=1)
+    aligned = np.all((Q == 0.0) | (Q == 1.0), axis=(1, 2))
+    return bool(np.all(diagonal) and np.all(aligned) and not np.any(frame.forces) and not frame.coupled)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DragMatrix(Term):
+    """force_i = -sum_j (linear_ij + quadratic_ij |v_j|) v_j, forces and torques, velocities and rates (Fossen 2021, 8.1).
+
+    linear: (6, 6) [N s/m, N s, N m s]; quadratic: (6, 6) [N s2/m2 and so on]. Refused if they create energy: the
+    symmetric part of the linear matrix must not be negative, nor that of the quadratic at any velocity tried.
+    """
+
+    type: ClassVar[str] = "drag_matrix"
+    device: ClassVar[str] = "drag_matrix"
+
+    linear: Any = quantity((6, 6), "N s/m, N s, N m s", ((0.0,) * 6,) * 6)
+    quadratic: Any = quantity((6, 6), "N s2/m2, N s2, N m s2", ((0.0,) * 6,) * 6)
+
+    def check(self, faults: Faults) -> None:
+        """Drag must not create energy."""
+        remedy = "drag opposes motion: positive on the diagonal (minus Fossen's X_u, X_u|u| ...), small beside it"
+        for kind in ("linear", "quadratic"):
+            matrix = getattr(self, kind)
+            bad = _creates_energy(matrix, kind == "quadratic")
+            if bad is not None:
+                faults.add(kind, matrix, f"creates energy at the velocity {np.round(bad, 3).tolist()}", remedy)
+
+    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+        """Also where a member's linear matrix creates energy."""
+        bad = super().unphysical(own)
+        with np.errstate(invalid="ignore"):
+            A = np.nan_to_num(own["linear"])
+            lowest = np.linalg.eigvalsh(A + np.swapaxes(A, 1, 2))[:, 0]
+            bad["linear"] = bad["linear"] | (lowest < -1e-9 * np.abs(A).max(axis=(1, 2)))
+        return bad
+
+    def present(self, own: Numbers) -> bool:
+        """Whether some coefficient is not zero."""
+        return bool(np.any(own["linear"]) or np.any(own["quadratic"]))
+
+    def packed(self, own: Numbers, setting: Setting) -> Packed:
+        """In the axes and about the origin of the forces."""
+        return packed_matrix(own["linear"], own["quadratic"], setting.frame)
+
+
+def _creates_energy(matrix: np.ndarray, quadratic: bool) -> np.ndarray | None:
+    """A velocity (6,) at which this drag would speed the vehicle up, or None.
+
+    nu.D nu for the linear matrix by its eigenvalues; for the quadratic one, nu.D(|nu|) nu at 4,000 fixed directions.
+    """
+    tiny = 1e-9 * max(np.abs(matrix).max(), 1e-300)
+    if not quadratic:
+        values, vectors = np.linalg.eigh(matrix + matrix.T)
+        return vectors[:, 0] if values[0] < -tiny else None
+    directions = np.random.default_rng(0).normal(size=(4000, 6))
+    directions = np.concatenate([np.eye(6), directions / np.abs(directions).max(axis=1, keepdims=True)])
+    power = np.einsum("ki,ij,kj->k", directions, matrix, np.abs(directions) * directions)
+    return directions[power.argmin()] if power.min() < -tiny else None
+
+
+def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, frame: Frame) -> Packed:
+    """Rows: the linear matrix; then, for each velocity that has a quadratic column, its twist (6) and its wrench (6)."""
+    # The user's velocities from those at the origin of the forces in the kernel's axes.
+    X = motion_from(frame.forces, frame.Q)
+    n = max(len(linear), len(quadratic), len(X))
+    X = np.broadcast_to(X, (n, 6, 6))
+    XT = np.swapaxes(X, 1, 2)
+    constant = XT @ linear @ X
+    columns = [j for j in range(6) if np.any(quadratic[:, :, j])]
+    rows = [constant.reshape(n, 36)]
+    for j in columns:
+        rows += [X[:, j, :], np.einsum("nij,nj->ni", XT, np.broadcast_to(quadratic[:, :, j], (n, 6)))]
+    has_linear = int(np.any(linear))
+    return Packed({"constant": has_linear, "count": len(columns)}, np.concatenate(rows, axis=1))
+

@@ -1,0 +1,84 @@
+"""Each term of a scene beside its twin: what the parity, order and bits tests of tests/parity/test_terms.py run over."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+import lgvi_warp as lw
+from lgvi_warp import terms
+from lgvi_warp.reference.terms.current import Current, CurrentProfile
+from lgvi_warp.reference.terms.drag import Drag, DragMatrix
+from lgvi_warp.reference.terms.tether import Tether
+from lgvi_warp.reference.terms.thrusters import Thrusters
+from lgvi_warp.reference.terms.wrench import Wrench, WrenchSchedule
+
+
+class Case(NamedTuple):
+    """The terms of a scene and the same laws of the twin. smooth: whether an order of convergence can be seen."""
+
+    terms: tuple
+    laws: tuple
+    smooth: bool = True
+
+
+def matrix(seed, size=1.0):
+    """A symmetric positive definite matrix (6, 6) that couples everything."""
+    A = np.random.default_rng(seed).normal(size=(6, 6))
+    return size * (A @ A.T / 6.0 + np.eye(6))
+
+
+def case(host, twin, **numbers):
+    """A Case of one term whose fields have the same names on both sides."""
+    return Case((host(**numbers),), (twin(**{key: np.asarray(value) for key, value in numbers.items()}),))
+
+
+LINEAR, QUADRATIC = (3.0, 4.0, 5.0, 0.3, 0.4, 0.5), (10.0, 30.0, 40.0, 1.0, 2.0, 3.0)
+TABLE = dict(
+    times=(0.0, 0.3, 0.7, 1.5),
+    force=((0.0, 0.0, 0.0), (5.0, -2.0, 1.0), (-3.0, 4.0, 2.0), (1.0, 1.0, 1.0)),
+    torque=((0.0, 0.1, 0.0), (0.2, -0.2, 0.1), (-0.3, 0.1, 0.2), (0.0, 0.0, 0.1)),
+)
+THRUSTERS = dict(
+    position=((-0.5, 0.2, 0.0), (-0.5, -0.2, 0.0), (0.1, 0.0, 0.3)),
+    direction=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.6, 0.8)),
+    dead_band=(0.1, 0.1, 0.05),
+    limit=(0.9, 0.8, 1.0),
+    time_constant=(0.2, 0.1, 0.3),
+)
+COMMANDS = dict(times=(0.0, 0.5, 1.5), command_schedule=((0.3, 0.8, -0.7), (0.7, -0.9, 0.9), (0.5, 0.5, -1.5)))
+
+CASES = {
+    "linear drag": case(terms.Drag, Drag, linear=LINEAR, quadratic=(0.0,) * 6),
+    "quadratic drag": case(terms.Drag, Drag, linear=(0.0,) * 6, quadratic=QUADRATIC),
+    "drag": case(terms.Drag, Drag, linear=LINEAR, quadratic=QUADRATIC),
+    "drag matrix": case(terms.DragMatrix, DragMatrix, linear=matrix(1, 3.0), quadratic=0.1 * matrix(2) + np.diag(QUADRATIC)),
+    "current": case(terms.Current, Current, velocity=(0.3, -0.2, 0.1)),
+    "current profile": case(
+        terms.CurrentProfile,
+        CurrentProfile,
+        depths=(-100.0, 100.0),
+        velocities=((-30.0, 20.0, -10.0), (30.0, -20.0, 10.0)),
+    ),
+    "tether": case(terms.Tether, Tether, anchor=(1.0, 2.0, 3.0), stiffness=5.0, attachment=(0.5, -0.1, 0.2), rest_length=2.0),
+    "slack tether": case(terms.Tether, Tether, anchor=(0.0, 0.0, 10.0), stiffness=5.0, attachment=(0.1, 0.0, 0.0), rest_length=50.0),
+    "wrench": case(terms.Wrench, Wrench, force=(1.0, -2.0, 0.5), torque=(0.1, 0.2, -0.3)),
+    "wrench schedule": Case((terms.WrenchSchedule(**TABLE),), (WrenchSchedule(**{k: np.array(v) for k, v in TABLE.items()}),), False),
+    "wrench in steps": Case(
+        (terms.WrenchSchedule(**TABLE, interpolation="steps"),),
+        (WrenchSchedule(**{k: np.array(v) for k, v in TABLE.items()}, steps=True),),
+        False,
+    ),
+    "thrusters": Case(
+        (terms.Thrusters(**THRUSTERS, **COMMANDS, coefficient=(20.0, 20.0, 10.0), coefficient_astern=(15.0, 15.0, 8.0)),),
+        (
+            Thrusters(
+                **{k: np.array(v) for k, v in THRUSTERS.items()},
+                forward=np.array((20.0, 20.0, 10.0)),
+                backward=np.array((15.0, 15.0, 8.0)),
+                times=np.array(COMMANDS["times"]),
+                command=np.array(COMMANDS["command_schedule"]),
+            ),
+        ),
+        False,
+    ),
+}  # fmt: skip

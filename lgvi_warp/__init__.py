@@ -5,14 +5,33 @@ from typing import TYPE_CHECKING, Any
 from lgvi_warp.distributions import LogNormal, Normal, TruncatedNormal, Uniform
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import SceneError
+from lgvi_warp.events import Box, Event, Floor, StopTime, Surface
 from lgvi_warp.method import Method
 from lgvi_warp.result import Result
 from lgvi_warp.saveat import SaveAt
 from lgvi_warp.scene import Environment, Scene, Start
 from lgvi_warp.status import Status
+from lgvi_warp.terms import (
+    Current,
+    CurrentProfile,
+    Drag,
+    DragMatrix,
+    Packed,
+    Restoring,
+    Setting,
+    Term,
+    Tether,
+    Thrusters,
+    Weight,
+    Wrench,
+    WrenchSchedule,
+    quantity,
+    register,
+)
 from lgvi_warp.vehicle import Vehicle
 
 if TYPE_CHECKING:
+    from lgvi_warp.law_check import check_law
     from lgvi_warp.plan import Plan
     from lgvi_warp.sinks.plots import plot
     from lgvi_warp.sinks.rerun import log_rerun
@@ -26,26 +45,48 @@ _LAZY = {
     "Plan": "lgvi_warp.plan",
     "plot": "lgvi_warp.sinks.plots",
     "log_rerun": "lgvi_warp.sinks.rerun",
+    "check_law": "lgvi_warp.law_check",
 }
 
 __all__ = [
+    "Box",
+    "Current",
+    "CurrentProfile",
+    "Drag",
+    "DragMatrix",
     "Ensemble",
     "Environment",
+    "Event",
+    "Floor",
     "LogNormal",
     "Method",
     "Normal",
+    "Packed",
     "Plan",
+    "Restoring",
     "Result",
     "SaveAt",
     "Scene",
     "SceneError",
+    "Setting",
     "Start",
     "Status",
+    "StopTime",
+    "Surface",
+    "Term",
+    "Tether",
+    "Thrusters",
     "TruncatedNormal",
     "Uniform",
     "Vehicle",
+    "Weight",
+    "Wrench",
+    "WrenchSchedule",
+    "check_law",
     "log_rerun",
     "plot",
+    "quantity",
+    "register",
     "solve",
 ]
 

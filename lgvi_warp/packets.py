@@ -201,10 +201,13 @@ class Packets:
         """R^T u (m, 3) [m/s], user's axes, where each member starts."""
         m = self.members
         position = m.position + notation.rotate_out(m.attitude, np.broadcast_to(self.frame.origin, m.position.shape))
+        setting = Setting(m.parameters, self.frame, m.indices, m.seed, self.plan.grid.h)
         total = np.zeros_like(position)
         for term, _ in self.plan.model.laws:
-            if hasattr(term, "water"):
-                own = Ensemble.own(term, m.parameters)
+            own = Ensemble.own(term, m.parameters)
+            if hasattr(term, "water_at_start"):
+                total = total + term.water_at_start(own, position, setting)
+            elif hasattr(term, "water"):
                 total = total + term.water(own, position[None], np.zeros(1))[0]
         return notation.rotate_into(m.attitude, total)
 

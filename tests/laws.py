@@ -82,3 +82,7 @@ CASES = {
         False,
     ),
 }  # fmt: skip
+
+from tests.laws_water import CASES as _water  # noqa: E402
+
+CASES |= _water

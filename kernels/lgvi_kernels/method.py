@@ -6,6 +6,7 @@ import warp as wp
 
 from lgvi_kernels import turns
 from lgvi_kernels.compose import superpose
+from lgvi_kernels.coupled import make_W
 from lgvi_kernels.dissipation import make_V
 from lgvi_kernels.lanes import add, div, mul, sub  # noqa: F401
 from lgvi_kernels.matrix3 import apply, factor_struct, transpose_times
@@ -23,6 +24,7 @@ from lgvi_kernels.submaps import (
     make_D,
     make_K,
     make_T,
+    rotate,
 )
 from lgvi_kernels.terms.drag import make_E
 from lgvi_kernels.view import to_body
@@ -125,6 +127,8 @@ def make_method(spec):
     }
     if "K" in used:
         letters["K"] = make_K(View, Wrench, Flow, law, evolve, flow, varies, E if spec.drag else None, V)
+    if "W" in used:
+        letters["W"] = make_W(rotation_struct(width, real), rotate, spec.iterations, spec.adaptive, spec.checked)
     U12, U13, U23, *pitched = spec.coupling
     for letter in used:
         if letter[0] == "R":

@@ -112,13 +112,22 @@ def make_turn(axis, pitched):
         one = ones(x.b.x)
         g = h * component(c.inertia.half_over_J)
         t = tangent(g * component(x.pi), h)
+        s = t + t
         if wp.static(pitched):
             k = component(c.inertia.pitch)
-            t2 = -(g * (k * component(x.p)))
-            length = (g + g) * k * (k * component(x.p) - component(x.pi) / (one + t2 * t2))
-            x = shift(x, length)
-            t = (t + t2) / (one - t * t2)
-        s = (t + t) / (one + t * t)
+            kp = k * component(x.p)
+            t2 = -(g * kp)
+            # (1 - t t2)^2 + (t + t2)^2 = (1 + t^2)(1 + t2^2): one division serves the slide and the turn.
+            sum_t = t + t2
+            m = one - t * t2
+            q1 = one + t * t
+            q2 = one + t2 * t2
+            inverse = one / (q1 * (q2 * m))
+            x = shift(x, (g + g) * k * (kp - (inverse * (q1 * m)) * component(x.pi)))
+            t = (inverse * (q1 * q2)) * sum_t
+            s = (m * m) * (inverse * (sum_t + sum_t))
+        else:
+            s = s / (one + t * t)
         x.p = turn(x.p, t, s)
         x.pi = turn(x.pi, t, s)
         x.R0 = turn(x.R0, t, s)

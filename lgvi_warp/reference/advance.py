@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from lgvi_warp.reference.paper import FORCED
 from lgvi_warp.reference.rotation import Solver, newton
 from lgvi_warp.reference.submaps import SUBMAPS, Body, State
 
@@ -16,7 +17,7 @@ def step(
     """One step of h [s]: the program with g h for each stage coefficient g."""
     for g in stages:
         for letter, coefficient in program:
-            x = SUBMAPS[letter](x, body, coefficient * g * h, solve)
+            x = (SUBMAPS | FORCED)[letter](x, body, coefficient * g * h, solve)
     return x
 
 

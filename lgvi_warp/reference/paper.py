@@ -1,13 +1,17 @@
-"""The integrators of Nordkvist & Sanyal (2010) as printed, for conservative scenes, one function for each equation.
+"""The integrators of Nordkvist & Sanyal (2010) as printed, one function for each equation.
+
+phi, phi_adjoint, psi: conservative. Phi, Phi_adjoint: with the nonconservative phi and tau of (15), (16).
 
 State b, R, nu, Om; `body` holds M, J and the laws. F_k belongs to Phi, and G = F_{k+1}^T to its adjoint, where the
 printed text needs parentheses: the whole bracket is turned by F_{k+1}, not its first term only.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
-from lgvi_warp.reference.rotation import Array, Solver, cross, newton
-from lgvi_warp.reference.submaps import Body
+from lgvi_warp.reference.rotation import Array, NoSolution, Solver, cross, newton, norm
+from lgvi_warp.reference.submaps import Body, State, acceleration_wrench, damping, look, remembered, water
 
 # b (3,) [m], R (3, 3), nu (3,) [m/s], Om (3,) [rad/s].
 Motion = tuple[Array, Array, Array, Array]
@@ -99,3 +103,93 @@ def phi_adjoint(
 def psi(b_k: Array, R_k: Array, nu_k: Array, Om_k: Array, body: Body, h: float, solve: Solver = newton) -> Motion:
     """Psi_h = Phi*_{h/2} o Phi_{h/2}, section III-F: Phi first, each over half the step."""
     return phi_adjoint(*phi(b_k, R_k, nu_k, Om_k, body, 0.5 * h, solve), body, 0.5 * h, solve)
+
+
+# phi_k, tau_k: force (3,) [N] and torque (3,) [N m] in body axes.
+Wrench = tuple[Array, Array]
+
+
+def forces(x: State, body: Body, h: float, nu: Array, Om: Array) -> Wrench:
+    """phi(b, nu, R, Om) and tau(b, nu, R, Om): all laws that do not follow from a potential."""
+    views = look(x, body, h)
+    flow = water(views, body)
+    force, torque = body.wrench(x.b, x.R, views, potential=False)
+    pushed, turned = acceleration_wrench(x.R, body, flow)
+    drag = damping(x, body, h, nu, Om, flow) @ np.concatenate([nu, Om])
+    return force + pushed - drag[:3], torque + turned - drag[3:]
+
+
+def equation_15(old: Wrench, new: Wrench, alpha: float) -> Array:
+    """Eq. (15): phi_k = alpha phi(b_k, nu_k, R_k, Om_k) + (1 - alpha) phi(b_{k+1}, nu_k, R_{k+1}, Om_k)."""
+    return alpha * old[0] + (1.0 - alpha) * new[0]
+
+
+def equation_16(old: Wrench, new: Wrench, beta: float) -> Array:
+    """Eq. (16): tau_k = beta tau(b_k, nu_k, R_k, Om_k) + (1 - beta) tau(b_{k+1}, nu_k, R_{k+1}, Om_k)."""
+    return beta * old[1] + (1.0 - beta) * new[1]
+
+
+def velocities(x: State, body: Body) -> tuple[Array, Array]:
+    """nu and Om of a state."""
+    return np.linalg.solve(body.M, x.p), np.linalg.solve(body.J, x.pi)
+
+
+def drift(x: State, body: Body, h: float) -> Array:
+    """h u: how far the water carries the vehicle."""
+    return h * water(look(x, body, h), body).velocity
+
+
+def Phi(x: State, body: Body, h: float, solve: Solver = newton, alpha: float = 0.5, beta: float = 0.5) -> State:
+    """Phi_h with (15), (16): (10)-(14) in the order they appear. What laws remember is advanced first."""
+    x = at_time(remembered_over(at_time(x, x.t + 0.5 * h), body, h), x.t)
+    nu, Om = velocities(x, body)
+    old = forces(x, body, h, nu, Om)
+    F = equation_10(Om, body, h, solve)
+    x = replace(x, R=equation_11(x.R, F), b=equation_12(x.b, x.R, nu, h) + drift(x, body, h), t=x.t + h)
+    new = forces(x, body, h, nu, Om)
+    f, m = body.wrench(x.b, x.R, look(x, body, h), potential=True)
+    p = F.T @ x.p + h * (f + equation_15(old, new, alpha))
+    pi = F.T @ x.pi + h * (cross(p, np.linalg.solve(body.M, p)) + m + equation_16(old, new, beta))
+    return replace(x, p=p, pi=pi)
+
+
+def Phi_adjoint(
+    x: State, body: Body, h: float, solve: Solver = newton, alpha: float = 0.5, beta: float = 0.5
+) -> State:
+    """Phi*_h: (19)-(23) with phi*_k, tau*_k, which are (15), (16) with k and k + 1 interchanged; by iteration.
+
+    Raises NoSolution where it does not settle.
+    """
+    nu, Om = velocities(x, body)
+    f, m = body.wrench(x.b, x.R, look(x, body, h), potential=True)
+    star: Wrench = forces(x, body, h, nu, Om)
+    moved = drift(x, body, h)
+    for _ in range(200):
+        q = x.pi + h * (cross(x.p, nu) + m + star[1])
+        F = equation_19(q, body, h, solve)
+        p, pi = F @ (x.p + h * (f + star[0])), F @ q
+        R = equation_22(x.R, F)
+        b = equation_23(x.b, R, np.linalg.solve(body.M, p), h) + moved
+        y = replace(x, b=b, R=R, p=p, pi=pi, t=x.t + h)
+        nu_k1, Om_k1 = velocities(y, body)
+        ends = forces(y, body, h, nu_k1, Om_k1), forces(x, body, h, nu_k1, Om_k1)
+        new = equation_15(*ends, alpha), equation_16(*ends, beta)
+        change = h * norm(np.concatenate([new[0] - star[0], new[1] - star[1]]))
+        change = change + norm(drift(y, body, h) - moved)
+        star, moved = new, drift(y, body, h)
+        if change <= 1e-15 * (norm(p) + norm(pi)):
+            return at_time(remembered_over(at_time(y, y.t - 0.5 * h), body, h), y.t)
+    raise NoSolution(f"Phi*: the forces change by {change:.3g} N s from one iteration to the next; shorten the step")
+
+
+def at_time(x: State, t: float) -> State:
+    """The state at another time."""
+    return replace(x, t=t)
+
+
+def remembered_over(x: State, body: Body, h: float) -> State:
+    """What laws remember, over all of h; x.t is the middle of it."""
+    return remembered(remembered(x, body, h, second=False), body, h, second=True)
+
+
+FORCED = {"Phi": Phi, "Phi*": Phi_adjoint}

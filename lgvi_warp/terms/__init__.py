@@ -9,11 +9,16 @@ from typing import Any, TypeVar
 from lgvi_warp.errors import Faults, SceneError, closest
 from lgvi_warp.terms.base import Packed, Setting, Term, quantity
 from lgvi_warp.terms.current import Current, CurrentProfile
+from lgvi_warp.terms.current_harmonics import CurrentHarmonics
 from lgvi_warp.terms.drag import Drag, DragMatrix
+from lgvi_warp.terms.gauss_markov_current import GaussMarkovCurrent
 from lgvi_warp.terms.hydrostatics import Restoring, Weight
+from lgvi_warp.terms.stratification import Stratification
 from lgvi_warp.terms.tether import Tether
 from lgvi_warp.terms.thrusters import Thrusters
+from lgvi_warp.terms.waves import Waves
 from lgvi_warp.terms.wrench import Wrench, WrenchSchedule
+from lgvi_warp.terms.wrench_noise import WrenchNoise
 
 AnyTerm = TypeVar("AnyTerm", bound=Term)
 
@@ -32,7 +37,21 @@ def register(kind: type[Term]) -> type[Term]:
     return kind
 
 
-for _kind in (Drag, DragMatrix, Current, CurrentProfile, Tether, Thrusters, Wrench, WrenchSchedule):
+for _kind in (
+    Drag,
+    DragMatrix,
+    Current,
+    CurrentProfile,
+    Tether,
+    Thrusters,
+    Wrench,
+    WrenchSchedule,
+    CurrentHarmonics,
+    Waves,
+    GaussMarkovCurrent,
+    WrenchNoise,
+    Stratification,
+):
     register(_kind)
 
 
@@ -81,17 +100,22 @@ __all__ = [
     "IMPLIED",
     "TYPES",
     "Current",
+    "CurrentHarmonics",
     "CurrentProfile",
     "Drag",
     "DragMatrix",
+    "GaussMarkovCurrent",
     "Packed",
     "Restoring",
     "Setting",
+    "Stratification",
     "Term",
     "Tether",
     "Thrusters",
+    "Waves",
     "Weight",
     "Wrench",
+    "WrenchNoise",
     "WrenchSchedule",
     "build",
     "from_list",

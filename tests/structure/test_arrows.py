@@ -146,7 +146,8 @@ def test_the_product_imports_what_it_declares():
 
 
 def test_only_the_plan_and_the_machine_know_the_kernels():
-    assert importers("lgvi_kernels") == {"lgvi_warp.plan", "lgvi_warp.machine"}
+    those = {"lgvi_warp.plan", "lgvi_warp.packets", "lgvi_warp.machine", "lgvi_warp.law_check"}
+    assert importers("lgvi_kernels") == those
 
 
 def test_nothing_of_the_product_uses_the_reference():

@@ -7,14 +7,19 @@ flow(f, view, p): how the water moves; evolve(view, view, p): what the law remem
 
 from lgvi_kernels.terms import (
     current,
+    current_harmonics,
     current_profile,
     drag,
     drag_matrix,
+    gauss_markov_current,
     restoring,
+    stratification,
     tether,
     thrusters,
+    waves,
     weight,
     wrench,
+    wrench_noise,
     wrench_schedule,
 )
 
@@ -29,4 +34,9 @@ LAWS = {
     "thrusters": thrusters,
     "wrench": wrench,
     "wrench_schedule": wrench_schedule,
+    "current_harmonics": current_harmonics,
+    "waves": waves,
+    "gauss_markov_current": gauss_markov_current,
+    "wrench_noise": wrench_noise,
+    "stratification": stratification,
 }

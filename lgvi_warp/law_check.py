@@ -1,0 +1,401 @@
+"""Is a law right? Its device code at random views, against finite differences and linear algebra."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import numpy as np
+import warp as wp
+
+from lgvi_kernels.examine import COLUMNS, OUT_FIELDS, make_examine
+from lgvi_kernels.stops import STOPS
+from lgvi_kernels.terms import LAWS
+from lgvi_warp import inertia, model, notation, vehicle, warp_setup
+from lgvi_warp.errors import SceneError
+from lgvi_warp.events import Event
+from lgvi_warp.inertia import Frame
+from lgvi_warp.machine import default_width
+from lgvi_warp.packets import Packets, pack
+from lgvi_warp.plan import build_lock
+from lgvi_warp.scene import Environment, Scene
+from lgvi_warp.terms.base import Setting, Term
+from lgvi_warp.vehicle import Vehicle
+
+EPS = float(np.finfo(np.float64).eps)
+# How many roundings of a law's largest number may add up in it.
+ROUNDINGS = 64.0
+# Length [s] and number of the kick that the views are of.
+KICK, STEP = 0.01, 3
+FLOWS = ("steady", "uniform", "varying")
+
+
+class Check(NamedTuple):
+    """One thing that was checked: the worst value found, what is allowed there, and where it was found, or a remedy."""
+
+    name: str
+    worst: float
+    allowed: float
+    ok: bool
+    text: str
+
+
+@dataclass(frozen=True)
+class LawReport:
+    """What check_law found about a term. `ok`: whether every check passed; print it for a table."""
+
+    term: Term
+    checks: tuple[Check, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether every check passed."""
+        return all(one.ok for one in self.checks)
+
+    def __str__(self) -> str:
+        head = f"{type(self.term).__name__} ({self.term.key}): {'ok' if self.ok else 'WRONG'}"
+        rows = [(one.name, f"{one.worst:.2e}", f"{one.allowed:.2e}", "ok" if one.ok else "WRONG", one.text) for one in self.checks]
+        rows = [("check", "worst", "allowed", "", ""), *rows]
+        widths = [max(len(row[i]) for row in rows) for i in range(4)]
+        lines = ("  ".join([*(text.ljust(n) for text, n in zip(row, widths)), row[4]]).rstrip() for row in rows)
+        return "\n  ".join([head, *lines])
+
+
+@dataclass(frozen=True)
+class Views:
+    """k views: attitude (k, 3, 3), position (k, 3) [m], velocity and rate (k, 3), time (k,) [s], one for a packet."""
+
+    attitude: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    rate: np.ndarray
+    time: np.ndarray
+
+    def changed(self, **new: Any) -> Views:
+        """The same views but for what is named."""
+        return Views(**(vars(self) | new))
+
+    def moved(self, axis: int, by: float) -> Views:
+        """Every position moved along an inertial axis [m]."""
+        return self.changed(position=self.position + by * np.eye(3)[axis])
+
+    def turned(self, axis: int, by: float) -> Views:
+        """Every attitude turned about its own body axis [rad]."""
+        return self.changed(attitude=self.attitude @ notation.matrix_from_rotation_vector(by * np.eye(3)[axis]))
+
+    def told(self, i: int) -> str:
+        """One view in words."""
+        turn = notation.quaternion_from_matrix(self.attitude[i])
+        return f"at position {_short(self.position[i])} m, quaternion {_short(turn)}, t = {self.time[i]:.3g} s"
+
+
+def check_law(term: Term, *, scene: Scene | None = None, samples: int = 64, seed: int = 0, step: float = 1e-5) -> LawReport:
+    """Check the device code of a term, built-in or the user's, against its own host code, at random views.
+
+    scene: whose vehicle and environment the law gets (a simple vehicle by default). samples: how many views: any attitude,
+    positions within some metres, velocities and rates of order 1, times from 0 to 10 s. step [m, rad, s]: of the finite
+    differences. Compiles one small kernel for each new law. What is checked, each where the law has it:
+
+    law: finite; blind to velocities, and to the time unless `timed`; with POTENTIAL, the derivatives of potential().
+    damping: nu.D nu >= 0; where the term says `dissipative = False`, its least value is told and is no fault.
+    flow: rate and gradient are the derivatives of velocity, and water() gives the same velocity; FLOW is what it does.
+    All: lanes do not mix; numbers that vary by member give what shared ones do; packed() fills what params() names.
+
+    Raises SceneError where the device code lacks something, has a wrong signature or does not compile.
+    """
+    known, roles = (STOPS, ("distance",)) if isinstance(term, Event) else (LAWS, model.ROLES)
+    module = model._module(term, known, *roles)
+    bench = Bench(term, module, scene or simple_scene(), -(-samples // default_width("float64")), seed)
+    checks = [*bench.numbers()]
+    if all(one.ok for one in checks):
+        for part in (_whole, _potential, _damping, _flow):
+            checks += part(bench, step)
+    return LawReport(term, tuple(checks))
+
+
+def simple_scene() -> Scene:
+    """A vehicle of 20 kg whose numbers all differ, a little heavy, its centre of buoyancy off all axes."""
+    body = Vehicle(20.0, (5.0, 22.0, 25.0), (1.5, 4.0, 4.5), 190.0, (0.01, 0.005, -0.02))
+    return Scene(body, Environment())
+
+
+class Bench:
+    """A term with its numbers packed as for a run, ready to be evaluated at views."""
+
+    def __init__(self, term: Term, module: Any, scene: Scene, packets: int, seed: int):
+        self.term, self.module, self.width = term, module, default_width("float64")
+        self.noisy = bool(getattr(module, "NOISE", False))
+        self.roles = tuple(role for role in COLUMNS if hasattr(module, role))
+        given = scene.parameters() | {f"{term.key}.{name}": value for name, value in term.parameters().items()}
+        self.parameters = {name: np.asarray(value)[None] for name, value in given.items()}
+        self.own = {name: self.parameters[f"{term.key}.{name}"] for name in term.parameters()}
+        self.count = packets * self.width
+        self.seed = seed
+        self.views = random_views(packets, self.width, seed)
+        warp_setup.start()
+        self.examine = _built(term, module, self.width)
+        self.Params = np.dtype(self.examine.Params.numpy_dtype())
+
+    def numbers(self) -> Iterator[Check]:
+        """Whether packed() fills what params() names; then packs, and lets the law remember once."""
+        setting = self.setting(self.parameters)
+        packed = self.term.packed(self.own, setting)
+        given = set(packed.values) | ({"first"} if packed.rows is not None else set())
+        given |= {"memory"} if packed.memory is not None else set()
+        wanted = set(self.Params["own"].names or ()) - {"unused"}
+        wrong = [f"{name} is not in packed().values" for name in sorted(wanted - given)]
+        wrong += [f"{name} is no field of params()" for name in sorted(given - wanted - {"first", "memory"})]
+        yield Check("numbers", len(wrong), 0.0, not wrong, "; ".join(wrong))
+        if wrong:
+            return
+        remembers = packed.memory is not None and packed.memory.size > 0
+        good = remembers == bool(self.term.memory)
+        text = "" if good else f"{type(self.term).__name__}.memory must say whether packed() gives memory"
+        yield Check("memory", float(not good), 0.0, good, text)
+        self.packets = Bank(self, setting)
+
+    def setting(self, parameters: Mapping[str, np.ndarray]) -> Setting:
+        """What packed() may look at: the axes of the kernel are those of the user."""
+        I6 = vehicle.inertia6(parameters)
+        M, _, Js = inertia.schur(I6)
+        n = len(I6)
+        none, zero = np.zeros((n, 3, 3)), np.zeros((n, 3))
+        frame = Frame(np.broadcast_to(np.eye(3), (n, 3, 3)), zero, zero, M, np.einsum("nii->ni", Js), none, none)
+        return Setting(parameters, frame, np.arange(self.count), self.seed, KICK)
+
+    def at(self, views: Views) -> dict[str, np.ndarray]:
+        """What every role of the law gives at k views, by role: (k, numbers)."""
+        return self.packets.evaluate(views)
+
+
+class Bank(Packets):
+    """A term's parameters, table and memory as Packets makes them for a run, without a run's kernel."""
+
+    def __init__(self, bench: Bench, setting: Setting):
+        # What Packets asks of a Plan and of Members to pack laws.
+        plan: Any = SimpleNamespace(
+            model=SimpleNamespace(laws=((bench.term, bench.module),)),
+            spec=SimpleNamespace(width=bench.width, drag=()),
+            dtypes=(None, bench.Params, None),
+            dtype="float64",
+        )
+        members: Any = SimpleNamespace(count=bench.count, parameters=setting.parameters, indices=setting.members)
+        self.plan, self.members, self.frame, self.bench = plan, members, setting.frame, bench
+        self.count = bench.count // bench.width
+        params, table, memory = self._laws(setting)
+        Lane = bench.examine.Lane
+        self.params = wp.array(params, dtype=bench.examine.Params, device="cpu")
+        self.table, self.memory = (wp.array(x, dtype=Lane, shape=x.shape[:2], device="cpu") for x in (table, memory))
+        self._launch(bench.views, 0)
+
+    def evaluate(self, views: Views) -> dict[str, np.ndarray]:
+        """What the law gives at views as many as the bench has, by role: (k, numbers)."""
+        out = self._launch(views, -1)
+        return {role: out[:, COLUMNS[role][0] : sum(COLUMNS[role])] for role in self.bench.roles}
+
+    def _launch(self, views: Views, second: int) -> np.ndarray:
+        width, Lane = self.bench.width, self.bench.examine.Lane
+        flat = [views.attitude.reshape(-1, 9), views.position, views.velocity, views.rate]
+        rows = pack(np.concatenate(flat, axis=1), width)
+        given = wp.array(rows, dtype=Lane, shape=rows.shape[:2], device="cpu")
+        times = wp.array(views.time[::width], dtype=wp.float64, device="cpu")
+        out = wp.zeros((self.count, OUT_FIELDS), dtype=Lane, device="cpu")
+        inputs = [self.params, self.table, given, times, wp.float64(KICK), STEP, second, self.memory, out]
+        with build_lock:
+            wp.launch(self.bench.examine.kernel, dim=self.count, inputs=inputs, device="cpu")
+        return np.asarray(out.numpy().transpose(0, 2, 1).reshape(-1, OUT_FIELDS))
+
+
+def _built(term: Term, module: Any, width: int) -> Any:
+    """The kernel, compiled. Raises SceneError with Warp's words where it cannot be."""
+    remedy = "a law may use lanes, their operators (import them in its module) and lane_math only: docs/add_a_law.md"
+    try:
+        examine = make_examine(module, width, wp.float64)
+        with build_lock:
+            wp.load_module(examine.kernel.module, device="cpu")
+    except Exception as error:
+        words = " ".join(str(error).split())
+        raise SceneError([f"{term.key}.device = {module!r}: does not compile: {words}; {remedy}"]) from error
+    return examine
+
+
+def random_views(packets: int, width: int, seed: int) -> Views:
+    """Random views, the lanes of a packet at one time."""
+    rng = np.random.default_rng(seed)
+    k = packets * width
+    quaternion, position, velocity, rate = rng.normal(size=(k, 4)), *rng.normal(size=(3, k, 3))
+    R = notation.matrix_from_quaternion(quaternion)
+    return Views(R, 4.0 * position, velocity, rate, np.repeat(rng.uniform(0.0, 10.0, packets), width))
+
+
+def _short(values: np.ndarray) -> str:
+    return str(np.round(np.asarray(values), 3).tolist())
+
+
+def _worst(name: str, difference: np.ndarray, allowed: np.ndarray | float, views: Views, text: str = "") -> Check:
+    """A Check of differences (k,) or (k, d): the one that is worst beside what is allowed."""
+    k = len(difference)
+    worst = np.abs(difference).reshape(k, -1)
+    limit = np.broadcast_to(np.reshape(allowed, (-1, 1)) if np.ndim(allowed) == 1 else allowed, worst.shape)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(np.isfinite(worst), np.where(worst <= limit, worst / np.maximum(limit, 1e-300), 1.0 + worst), np.inf)
+    i, j = np.unravel_index(ratio.argmax(), ratio.shape)
+    good = bool(np.all(worst <= limit))
+    return Check(name, float(worst[i, j]), float(limit[i, j]), good, (text if good else f"{views.told(int(i))}; {text}").strip("; "))
+
+
+def _whole(bench: Bench, step: float) -> Iterator[Check]:
+    """What holds for every law: finite, blind to what it must not look at, lanes apart, varied as shared."""
+    views, width = bench.views, bench.width
+    here = bench.at(views)
+    finite = np.stack([np.isfinite(value).all(axis=1) for value in here.values()] or [np.ones(len(views.time), bool)])
+    yield _worst("finite", (~finite).any(axis=0).astype(float), 0.0, views)
+    size = {role: ROUNDINGS * EPS * max(np.abs(value).max(), 1e-300) for role, value in here.items()}
+    faster = bench.at(views.changed(velocity=2.0 * views.velocity + 1.0, rate=1.0 - views.rate))
+    later = bench.at(views.changed(time=views.time + 3.7))
+    turned = np.arange(bench.count).reshape(-1, width)[:, ::-1].reshape(-1)
+    mixed = bench.at(Views(**{name: value[turned] for name, value in vars(views).items()}))
+    varied = _varied(bench)
+    for role, value in here.items():
+        if role != "damping":
+            remedy = "only damping(D, view, p) may look at view.nu and view.Om"
+            yield _worst(f"{role}: blind to velocity", faster[role] - value, 0.0, views, "" if _same(faster, here, role) else remedy)
+        if not bench.term.timed and not bench.noisy:
+            remedy = f"write timed = True in {type(bench.term).__name__}, or it gets no time"
+            yield _worst(f"{role}: blind to time", later[role] - value, 0.0, views, "" if _same(later, here, role) else remedy)
+        if not bench.noisy:
+            yield _worst(f"{role}: lanes apart", mixed[role][turned] - value, 0.0, views)
+            if isinstance(varied, str):
+                yield Check(f"{role}: varied numbers", np.inf, 0.0, False, varied)
+            else:
+                yield _worst(f"{role}: varied numbers", varied[role] - value, size[role], views)
+
+
+def _same(one: dict[str, np.ndarray], other: dict[str, np.ndarray], role: str) -> bool:
+    return bool(np.array_equal(one[role], other[role]))
+
+
+def _varied(bench: Bench) -> dict[str, np.ndarray] | str:
+    """What the law gives when every number of scene and term is given member by member; words where that fails."""
+    n = bench.count
+    each = {name: np.repeat(value, n, axis=0) for name, value in bench.parameters.items()}
+    try:
+        return Bank(bench, bench.setting(each)).evaluate(bench.views)
+    except Exception as error:
+        return f"packed() fails where numbers have one entry a member: {type(error).__name__}: {error}"
+
+
+class Slope(NamedTuple):
+    """A central difference (k, ...) and how far it may be wrong: by its step, seen at twice the step, and by rounding."""
+
+    value: np.ndarray
+    allowed: np.ndarray
+
+
+def _slope(values: Any, step: float, reach: np.ndarray) -> Slope:
+    """From values(by) at by = +-step, +-2 step. reach (k,): the size of what is stepped in, whose rounding shows."""
+    near, far = [(np.asarray(values(by)), np.asarray(values(-by))) for by in (step, 2.0 * step)]
+    first, second = (near[0] - near[1]) / (2.0 * step), (far[0] - far[1]) / (4.0 * step)
+    size = np.maximum.reduce([np.abs(value) for value in (*near, *far)])
+    rounded = ROUNDINGS * EPS * (size + reach.reshape(-1, *(1,) * (size.ndim - 1)) * np.abs(first)) / step
+    # The error of the step is a third of the difference; where the slope jumps nearby, as much as that.
+    return Slope(first, 2.0 * np.abs(second - first) + rounded)
+
+
+def _potential(bench: Bench, step: float) -> Iterator[Check]:
+    """force = -R^T dU/db, torque = -dU/dR, left-trivialised."""
+    if "law" not in bench.roles or not getattr(bench.module, "POTENTIAL", False):
+        return
+    views, term = bench.views, bench.term
+    reach = np.linalg.norm(views.position, axis=1) + 1.0
+
+    def U(at: Views) -> np.ndarray:
+        value = term.potential(bench.own, at.position[:, None], at.attitude[:, None], bench.parameters)
+        return np.broadcast_to(value, (len(at.position), 1))[:, 0]
+
+    moves, turns = ([_slope(lambda by, f=f, i=i: U(f(i, by)), step, reach) for i in range(3)] for f in (views.moved, views.turned))
+    R = views.attitude
+    force = -notation.rotate_into(R, np.stack([one.value for one in moves], axis=1))
+    allowed = np.linalg.norm([one.allowed for one in moves], axis=0)
+    torque = -np.stack([one.value for one in turns], axis=1)
+    wrench = bench.at(views)["law"]
+    remedy = "is it the gradient of potential()?"
+    if not np.any(U(views)):
+        remedy = "potential() gives 0 everywhere: write it, or drop POTENTIAL"
+    yield _judged("law: force = -R^T dU/db", wrench[:, :3] - force, allowed, views, remedy)
+    limits = np.stack([one.allowed for one in turns], axis=1)
+    yield _judged("law: torque = -dU/dR", wrench[:, 3:] - torque, limits, views, remedy)
+
+
+def _judged(name: str, difference: np.ndarray, allowed: np.ndarray | float, views: Views, remedy: str) -> Check:
+    """A Check with a remedy where it failed."""
+    found = _worst(name, difference, allowed, views)
+    return found if found.ok else found._replace(text=f"{found.text}; {remedy}")
+
+
+def _damping(bench: Bench, step: float) -> Iterator[Check]:
+    """nu.D nu >= 0 at the views' velocities, and at those that the D found there would speed up most."""
+    if "damping" not in bench.roles:
+        return
+    views = bench.views
+    D = bench.at(views)["damping"].reshape(-1, 6, 6)
+    if not np.isfinite(D).all():
+        return
+    weakest = np.linalg.eigh(D + np.swapaxes(D, 1, 2))[1][:, :, 0]
+    tried = [views, *(views.changed(velocity=s * weakest[:, :3], rate=s * weakest[:, 3:]) for s in (1.0, -1.0))]
+    power, allowed, twist = (np.concatenate(x) for x in zip(*(_power(bench, one) for one in tried), strict=True))
+    i = int((power + allowed).argmin()) if (power + allowed).min() < 0.0 else int(power.argmin())
+    least, limit = float(power[i]), float(allowed[i])
+    where = f"least power {least:.3g} W at velocity {_short(twist[i, :3])} m/s, rate {_short(twist[i, 3:])} rad/s"
+    if not getattr(bench.term, "dissipative", True):
+        yield Check("damping: power", max(-least, 0.0), np.inf, True, f"note: {where} (dissipative = False)")
+        return
+    good = bool(np.all(power >= -allowed))
+    text = where if good else f"{where}; D creates energy: write dissipative = False if it may"
+    yield Check("damping: power >= 0", max(-least, 0.0), limit, good, text)
+
+
+def _power(bench: Bench, views: Views) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """nu.D nu (k,) [W], what rounding may make of it, and the velocities (k, 6)."""
+    D = bench.at(views)["damping"].reshape(-1, 6, 6)
+    twist = np.concatenate([views.velocity, views.rate], axis=1)
+    power = np.einsum("ki,kij,kj->k", twist, D, twist)
+    return power, ROUNDINGS * EPS * np.einsum("ki,kij,kj->k", np.abs(twist), np.abs(D), np.abs(twist)), twist
+
+
+def _flow(bench: Bench, step: float) -> Iterator[Check]:
+    """du/dt and du/db are the derivatives of u; the host's water() is the same; FLOW says what u does."""
+    if "flow" not in bench.roles or bench.noisy:
+        return
+    views, term, kind = bench.views, bench.term, getattr(bench.module, "FLOW", None)
+    found = bench.at(views)["flow"]
+
+    def u(at: Views) -> np.ndarray:
+        return bench.at(at)["flow"][:, :3]
+
+    reach = np.linalg.norm(views.position, axis=1) + 1.0
+    moves = [_slope(lambda by, i=i: u(views.moved(i, by)), step, reach) for i in range(3)]
+    passes = _slope(lambda by: u(views.changed(time=views.time + by)), step, views.time + 1.0)
+    yield _judged("flow: rate = du/dt", found[:, 3:6] - passes.value, passes.allowed, views, "add it to f.rate")
+    for i, name in enumerate(("by_north", "by_east", "by_depth")):
+        got = found[:, 6 + 3 * i : 9 + 3 * i]
+        yield _judged(f"flow: {name} = du/db{i + 1}", got - moves[i].value, moves[i].allowed, views, f"add it to f.{name}")
+    yield _flow_kind(kind, moves, passes)
+    if not hasattr(term, "water"):
+        text = f"write water(own, position, time) in {type(term).__name__}: start and energy need it"
+        yield Check("flow: water()", np.inf, 0.0, False, text)
+        return
+    host = term.water(bench.own, views.position[:, None], views.time)[:, 0]
+    limit = ROUNDINGS * EPS * (max(np.abs(host).max(), 1e-300) + sum(reach * np.abs(one.value).max(axis=1) for one in moves))
+    yield _judged("flow: water()", found[:, :3] - host, limit, views, "the host's water() must be what flow() gives")
+
+
+def _flow_kind(kind: Any, moves: list[Slope], passes: Slope) -> Check:
+    """Whether FLOW allows what the velocity does."""
+    varies = any(np.any(np.abs(one.value) > one.allowed) for one in moves)
+    changes = bool(np.any(np.abs(passes.value) > passes.allowed))
+    least = "varying" if varies else "uniform" if changes else "steady"
+    good = kind in FLOWS and FLOWS.index(kind) >= FLOWS.index(least)
+    return Check("flow: FLOW", float(not good), 0.0, good, f"FLOW = {kind!r}" + ("" if good else f": write FLOW = {least!r}"))

@@ -1,0 +1,37 @@
+"""Cross-flow drag of a slender hull along the body's x axis, by two Gauss points a segment."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from lgvi_warp.reference.rotation import Array
+from lgvi_warp.reference.terms import Law, View
+
+
+@dataclass(frozen=True)
+class CrossFlow(Law):
+    """stations, diameters (k,) [m]; drag_coefficient (k,); density [kg/m3]."""
+
+    stations: Array
+    diameters: Array
+    drag_coefficient: Array
+    density: float
+
+    def points(self) -> list[tuple[float, float]]:
+        """(x, weight times Cd D) of each Gauss point, Cd D linear in each segment."""
+        strength, found = self.drag_coefficient * self.diameters, []
+        for i in range(len(self.stations) - 1):
+            middle, half = 0.5 * (self.stations[i] + self.stations[i + 1]), 0.5 * (self.stations[i + 1] - self.stations[i])
+            for x in (middle - half / math.sqrt(3.0), middle + half / math.sqrt(3.0)):
+                part = (x - self.stations[i]) / (2.0 * half)
+                found.append((x, half * ((1.0 - part) * strength[i] + part * strength[i + 1])))
+        return found
+
+    def damping(self, view: View) -> Array:
+        """Sum of c |w| A^T A, w = A (nu; Om) = (v + x r, w - x q)."""
+        D, twist = np.zeros((6, 6)), np.concatenate([view.nu, view.Om])
+        for x, weight in self.points():
+            A = np.array([[0.0, 1.0, 0.0, 0.0, 0.0, x], [0.0, 0.0, 1.0, 0.0, -x, 0.0]])
+            D += 0.5 * self.density * weight * math.hypot(*(A @ twist)) * A.T @ A
+        return D

@@ -1,0 +1,59 @@
+"""Fins, fixed and turned by a command: each seen from its own chord and normal."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from lgvi_warp.reference.rotation import Array, cross
+from lgvi_warp.reference.terms import Law, View
+
+
+@dataclass(frozen=True)
+class Fins(Law):
+    """position, chord, normal (n, 3) [m, 1, 1]; area (n,) [m2]; lift_slope, drag, drag_normal (n,); density [kg/m3]."""
+
+    position: Array
+    chord: Array
+    normal: Array
+    area: Array
+    lift_slope: Array
+    drag: Array
+    drag_normal: Array
+    density: float
+
+    def deflection(self, view: View) -> Array:
+        """None."""
+        return np.zeros(len(self.area))
+
+    def damping(self, view: View) -> Array:
+        """Sum over fins."""
+        angles = self.deflection(view)
+        return np.asarray(sum((self.one(i, angle, view) for i, angle in enumerate(angles)), np.zeros((6, 6))))
+
+    def one(self, i: int, angle: float, view: View) -> Array:
+        """D (6, 6) of a fin: -l (uc n - un c) - d (uc c + un n), l = kl uc un / V, d = kd V + kn un^2 / V."""
+        c, n = turned(*orthonormal(self.chord[i], self.normal[i]), angle)
+        chord, normal = (np.concatenate([e, cross(self.position[i], e)]) for e in (c, n))
+        twist = np.concatenate([view.nu, view.Om])
+        uc, un = chord @ twist, normal @ twist
+        V = math.hypot(uc, un)
+        if V == 0.0:
+            return np.zeros((6, 6))
+        half = 0.5 * self.density * self.area[i]
+        lift = half * self.lift_slope[i] * uc * un / V
+        drag = half * (self.drag[i] * V + self.drag_normal[i] * un**2 / V)
+        along, across = np.outer(chord, chord) + np.outer(normal, normal), np.outer(normal, chord) - np.outer(chord, normal)
+        return np.asarray(drag * along + lift * across)
+
+
+def orthonormal(chord: Array, normal: Array) -> tuple[Array, Array]:
+    """Unit vectors along the chord, and along the part of the normal that is across it."""
+    c = np.asarray(chord) / math.sqrt(np.dot(chord, chord))
+    n = normal - np.dot(normal, c) * c
+    return c, n / math.sqrt(np.dot(n, n))
+
+
+def turned(c: Array, n: Array, angle: float) -> tuple[Array, Array]:
+    """c' = cos c + sin n, n' = cos n - sin c."""
+    return math.cos(angle) * c + math.sin(angle) * n, math.cos(angle) * n - math.sin(angle) * c

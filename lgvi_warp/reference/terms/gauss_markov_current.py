@@ -1,0 +1,40 @@
+"""A uniform current that wanders: a first-order Gauss-Markov process."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from lgvi_warp.reference.random import normals
+from lgvi_warp.reference.rotation import Array
+from lgvi_warp.reference.terms import Flow, Law, View
+
+
+@dataclass(frozen=True)
+class GaussMarkovCurrent(Law):
+    """standard_deviation (3,) [m/s], inertial; time_constant [s]; the key of its noise; initial (3,) [m/s]."""
+
+    standard_deviation: Array
+    time_constant: float
+    channel: int = 0
+    seed0: int = 0
+    seed1: int = 0
+    initial: Array = field(default_factory=lambda: np.zeros(3))
+
+    def start(self) -> Array:
+        """u during a kick, u at its end, du/dt."""
+        return np.concatenate([self.initial, self.initial, np.zeros(3)])
+
+    def evolve(self, view: View, second: bool) -> Array:
+        """Exact over a kick (Gillespie 1996); during it, the mean of the old and the new."""
+        _, old, rate = np.split(view.memory, 3)
+        if second:
+            return np.concatenate([old, old, rate])
+        xi = normals(self.seed0, self.seed1, view.member, view.step, self.channel)[:3]
+        decay = math.exp(-view.h / self.time_constant)
+        new = decay * old + self.standard_deviation * math.sqrt(1.0 - decay**2) * xi
+        return np.concatenate([0.5 * (old + new), new, (new - old) / view.h])
+
+    def flow(self, view: View) -> Flow:
+        """As remembered."""
+        return Flow(view.memory[:3], view.memory[6:], np.zeros((3, 3)))

@@ -1,0 +1,89 @@
+"""Control fins: fins that turn about their span to a command."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.errors import Faults
+from lgvi_warp.terms.base import Numbers, Packed, Setting, knots, quantity
+from lgvi_warp.terms.fins import Fins, fin_rows, side_by_side
+from lgvi_warp.terms.wrench import rising
+
+# rad/s: from here on a limit of the rate is none.
+UNLIMITED = 1e6
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ControlFins(Fins):
+    """Fins that are turned about their span by a deflection, positive where the flow from ahead then lifts along +normal.
+
+    As Fins, with limit: (n,) [rad] of the deflection either way; rate_limit: (n,) [rad/s], by default none; command: (n,)
+    [rad], held, or with times (k,) [s], rising: command_schedule (k, n), linear between. The deflection is the command
+    within its limit, followed no faster than the rate limit; at t = 0 it is there.
+    """
+
+    type: ClassVar[str] = "control_fins"
+    device: ClassVar[str] = "control_fins"
+    timed: ClassVar[bool] = True
+
+    limit: Any = quantity(("n",), "rad", 0.35, least=0.0)
+    rate_limit: Any = quantity(("n",), "rad/s", UNLIMITED, least=0.0)
+    command: Any = quantity(("n",), "rad", None)
+    times: Any = quantity(("k",), "s", None)
+    command_schedule: Any = quantity(("k", "n"), "rad", None)
+
+    def __post_init__(self) -> None:
+        both = self.command_schedule is not None and self.command is not None
+        object.__setattr__(self, "_both", both)
+        if self.command is None:
+            first = 0.0 if self.command_schedule is None else np.asarray(self.command_schedule)[:1].reshape(-1)
+            object.__setattr__(self, "command", first)
+        self.repeat("limit", "rate_limit", "command")
+        if self.command_schedule is None:
+            object.__setattr__(self, "command_schedule", np.asarray(self.command)[None])
+            object.__setattr__(self, "times", [0.0] if self.times is None else self.times)
+        super().__post_init__()
+
+    def check(self, faults: Faults) -> None:
+        """Also, times must rise and a command is given in one way."""
+        super().check(faults)
+        rising(faults, "times", self.times)
+        if self.__dict__["_both"]:
+            faults.add("command", self.command, "is given beside command_schedule", "keep one of them")
+
+    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+        """Also where a member has a limited rate and the scene has none: its deflections would not be kept."""
+        bad = super().unphysical(own)
+        if not self.memory:
+            bad["rate_limit"] = bad["rate_limit"] | np.any(own["rate_limit"] < UNLIMITED, axis=1)
+        return bad
+
+    @property
+    def memory(self) -> bool:
+        """Whether some fin's rate is limited."""
+        return bool(np.any(self.rate_limit < UNLIMITED))
+
+    def packed(self, own: Numbers, setting: Setting) -> Packed:
+        """Rows as the device code has them: each fin's, then each one's commands."""
+        fins = side_by_side([fin_rows(own, setting), own["limit"][..., None], own["rate_limit"][..., None]])
+        schedule = own["command_schedule"]
+        if schedule.shape[1] == 1:
+            schedule = own["command"][:, None, :]
+        count = schedule.shape[2]
+        tables = [knots(own["times"], schedule[:, :, i : i + 1]) for i in range(count)]
+        rows = side_by_side([fins.reshape(len(fins), -1), *tables])
+        values = {"count": count, "knots": own["times"].shape[1] - 1, "limited": int(self.memory), "memory": 0}
+        if not self.memory:
+            return Packed(values, rows)
+        start = np.clip(_at_start(own["times"], schedule), -own["limit"], own["limit"])
+        return Packed(values, rows, start)
+
+
+def _at_start(times: np.ndarray, schedule: np.ndarray) -> np.ndarray:
+    """The commands (n, fins) at t = 0."""
+    n = max(len(times), len(schedule))
+    both = zip(np.broadcast_to(times, (n, *times.shape[1:])), np.broadcast_to(schedule, (n, *schedule.shape[1:])))
+    return np.array([[np.interp(0.0, t, column) for column in commands.T] for t, commands in both])

@@ -161,7 +161,9 @@ class Ensemble:
 
     def _note_unphysical(self, faults: Faults, key: str, bad: np.ndarray, p: dict[str, np.ndarray]) -> None:
         first = int(np.argmax(bad))
-        value = sum(p[name][first % len(p[name])] for name in key.split(" + ") if p[name].ndim == p[key.split(" + ")[-1]].ndim)
+        value = sum(
+            p[name][first % len(p[name])] for name in key.split(" + ") if p[name].ndim == p[key.split(" + ")[-1]].ndim
+        )
         drawn = any(name in self.vary for name in key.split(" + "))
         remedy = "use a smaller spread, TruncatedNormal or LogNormal" if drawn else "give finite, physical values"
         what = f"is unphysical ({int(bad.sum())} of {len(bad)} members)"
@@ -246,7 +248,9 @@ def _vehicle_checks(p: Mapping[str, np.ndarray], varied: set[str]) -> dict[str, 
     for key in ("vehicle.buoyancy", "vehicle.weight", "environment.gravity"):
         if key in p:
             checks[key] = ~(np.isfinite(p[key]) & (p[key] >= 0.0))
-    checks["environment.water_density"] = ~(np.isfinite(p["environment.water_density"]) & (p["environment.water_density"] > 0))
+    checks["environment.water_density"] = ~(
+        np.isfinite(p["environment.water_density"]) & (p["environment.water_density"] > 0)
+    )
     return {key: bad for key, bad in checks.items() if any(name in varied for name in key.split(" + "))}
 
 

@@ -73,7 +73,9 @@ class Box(Event):
     def check(self, faults: Faults) -> None:
         """The corners must span a box."""
         if np.any(self.upper <= self.lower):
-            faults.add("upper", self.upper, f"is not above lower = {self.lower.tolist()}", "give upper > lower on each axis")
+            faults.add(
+                "upper", self.upper, f"is not above lower = {self.lower.tolist()}", "give upper > lower on each axis"
+            )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -99,7 +101,9 @@ def from_list(given: Any) -> tuple[Event, ...]:
     from lgvi_warp.terms import build
 
     if not isinstance(given, Sequence) or isinstance(given, str):
-        raise SceneError([f"events = {given!r}: is no list; write [[events]] and type = ... below, or events=[lw.Surface()]"])
+        raise SceneError(
+            [f"events = {given!r}: is no list; write [[events]] and type = ... below, or events=[lw.Surface()]"]
+        )
     faults, found = Faults(), list[Event]()
     for i, one in enumerate(given):
         with faults.including():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -13,7 +13,7 @@ import warp as wp
 from lgvi_kernels.examine import COLUMNS, OUT_FIELDS, make_examine
 from lgvi_kernels.stops import STOPS
 from lgvi_kernels.terms import LAWS
-from lgvi_warp import inertia, model, notation, vehicle, warp_setup
+from lgvi_warp import inertia, model, notation, terms, vehicle, warp_setup
 from lgvi_warp.errors import SceneError
 from lgvi_warp.events import Event
 from lgvi_warp.inertia import Frame
@@ -30,6 +30,9 @@ ROUNDINGS = 64.0
 # Length [s] and number of the kick that the views are of.
 KICK, STEP = 0.01, 3
 FLOWS = ("steady", "uniform", "varying")
+# Other axes and another origin [m] that a method might choose: what a law does must not depend on them.
+TURN = notation.matrix_from_rotation_vector(np.array([0.4, -0.7, 1.2]))
+ORIGIN = np.array([0.1, -0.2, 0.15])
 
 
 class Check(NamedTuple):
@@ -56,10 +59,15 @@ class LawReport:
 
     def __str__(self) -> str:
         head = f"{type(self.term).__name__} ({self.term.key}): {'ok' if self.ok else 'WRONG'}"
-        rows = [(one.name, f"{one.worst:.2e}", f"{one.allowed:.2e}", "ok" if one.ok else "WRONG", one.text) for one in self.checks]
+        rows = [
+            (one.name, f"{one.worst:.2e}", f"{one.allowed:.2e}", "ok" if one.ok else "WRONG", one.text)
+            for one in self.checks
+        ]
         rows = [("check", "worst", "allowed", "", ""), *rows]
         widths = [max(len(row[i]) for row in rows) for i in range(4)]
-        lines = ("  ".join([*(text.ljust(n) for text, n in zip(row, widths)), row[4]]).rstrip() for row in rows)
+        lines = (
+            "  ".join([*(text.ljust(n) for text, n in zip(row, widths, strict=False)), row[4]]).rstrip() for row in rows
+        )
         return "\n  ".join([head, *lines])
 
 
@@ -85,29 +93,45 @@ class Views:
         """Every attitude turned about its own body axis [rad]."""
         return self.changed(attitude=self.attitude @ notation.matrix_from_rotation_vector(by * np.eye(3)[axis]))
 
+    def elsewhere(self) -> Views:
+        """The same views of the axes TURN at ORIGIN."""
+        return Views(
+            self.attitude @ TURN,
+            self.position + notation.rotate_out(self.attitude, ORIGIN[None]),
+            (self.velocity + np.cross(self.rate, ORIGIN)) @ TURN,
+            self.rate @ TURN,
+            self.time,
+        )
+
     def told(self, i: int) -> str:
         """One view in words."""
         turn = notation.quaternion_from_matrix(self.attitude[i])
         return f"at position {_short(self.position[i])} m, quaternion {_short(turn)}, t = {self.time[i]:.3g} s"
 
 
-def check_law(term: Term, *, scene: Scene | None = None, samples: int = 64, seed: int = 0, step: float = 1e-5) -> LawReport:
+def check_law(
+    term: Term, *, scene: Scene | None = None, samples: int = 64, seed: int = 0, step: float = 1e-5
+) -> LawReport:
     """Check the device code of a term, built-in or the user's, against its own host code, at random views.
 
     scene: whose vehicle and environment the law gets (a simple vehicle by default). samples: how many views: any attitude,
-    positions within some metres, velocities and rates of order 1, times from 0 to 10 s. step [m, rad, s]: of the finite
-    differences. Compiles one small kernel for each new law. What is checked, each where the law has it:
+    positions some metres around the scene's start, velocities and rates of order 1, times from 0 to 10 s.
+    step [m, rad, s]: of the finite differences. Compiles one small kernel for each new law. What is checked, each where
+    the law has it:
 
     law: finite; blind to velocities, and to the time unless `timed`; with POTENTIAL, the derivatives of potential().
     damping: nu.D nu >= 0; where the term says `dissipative = False`, its least value is told and is no fault.
     flow: rate and gradient are the derivatives of velocity, and water() gives the same velocity; FLOW is what it does.
-    All: lanes do not mix; numbers that vary by member give what shared ones do; packed() fills what params() names.
+    All: lanes do not mix; numbers that vary by member give what shared ones do; packed() fills what params() names, and
+    gives the same law whatever axes and origin of the body the method works in.
 
     Raises SceneError where the device code lacks something, has a wrong signature or does not compile.
     """
+    if not isinstance(term, Term):
+        raise SceneError([f"term = {term!r}: is no term; give an object such as lw.Drag(...), not its class"])
     known, roles = (STOPS, ("distance",)) if isinstance(term, Event) else (LAWS, model.ROLES)
     module = model._module(term, known, *roles)
-    bench = Bench(term, module, scene or simple_scene(), -(-samples // default_width("float64")), seed)
+    bench = Bench(term, module, scene or simple_scene(), max(1, -(-samples // default_width("float64"))), seed)
     checks = [*bench.numbers()]
     if all(one.ok for one in checks):
         for part in (_whole, _potential, _damping, _flow):
@@ -133,7 +157,7 @@ class Bench:
         self.own = {name: self.parameters[f"{term.key}.{name}"] for name in term.parameters()}
         self.count = packets * self.width
         self.seed = seed
-        self.views = random_views(packets, self.width, seed)
+        self.views = random_views(packets, self.width, seed, scene.start.given()["position"])
         warp_setup.start()
         self.examine = _built(term, module, self.width)
         self.Params = np.dtype(self.examine.Params.numpy_dtype())
@@ -154,15 +178,17 @@ class Bench:
         good = remembers == bool(self.term.memory)
         text = "" if good else f"{type(self.term).__name__}.memory must say whether packed() gives memory"
         yield Check("memory", float(not good), 0.0, good, text)
-        self.packets = Bank(self, setting)
+        self.packets = Bank(self, setting, self.views)
 
-    def setting(self, parameters: Mapping[str, np.ndarray]) -> Setting:
-        """What packed() may look at: the axes of the kernel are those of the user."""
+    def setting(self, parameters: Mapping[str, np.ndarray], elsewhere: bool = False) -> Setting:
+        """What packed() may look at: the kernel's axes are the user's, or TURN at ORIGIN."""
         I6 = vehicle.inertia6(parameters)
+        n, none = len(I6), np.zeros((len(I6), 3, 3))
+        Q = np.broadcast_to(TURN if elsewhere else np.eye(3), (n, 3, 3))
+        origin = np.broadcast_to(ORIGIN if elsewhere else np.zeros(3), (n, 3))
         M, _, Js = inertia.schur(I6)
-        n = len(I6)
-        none, zero = np.zeros((n, 3, 3)), np.zeros((n, 3))
-        frame = Frame(np.broadcast_to(np.eye(3), (n, 3, 3)), zero, zero, M, np.einsum("nii->ni", Js), none, none)
+        M, Js = (np.swapaxes(Q, 1, 2) @ A @ Q for A in (M, Js))
+        frame = Frame(Q, origin, origin, M, np.einsum("nii->ni", Js), none, none)
         return Setting(parameters, frame, np.arange(self.count), self.seed, KICK)
 
     def at(self, views: Views) -> dict[str, np.ndarray]:
@@ -173,7 +199,7 @@ class Bench:
 class Bank(Packets):
     """A term's parameters, table and memory as Packets makes them for a run, without a run's kernel."""
 
-    def __init__(self, bench: Bench, setting: Setting):
+    def __init__(self, bench: Bench, setting: Setting, views: Views):
         # What Packets asks of a Plan and of Members to pack laws.
         plan: Any = SimpleNamespace(
             model=SimpleNamespace(laws=((bench.term, bench.module),)),
@@ -188,7 +214,7 @@ class Bank(Packets):
         Lane = bench.examine.Lane
         self.params = wp.array(params, dtype=bench.examine.Params, device="cpu")
         self.table, self.memory = (wp.array(x, dtype=Lane, shape=x.shape[:2], device="cpu") for x in (table, memory))
-        self._launch(bench.views, 0)
+        self._launch(views, 0)
 
     def evaluate(self, views: Views) -> dict[str, np.ndarray]:
         """What the law gives at views as many as the bench has, by role: (k, numbers)."""
@@ -210,6 +236,11 @@ class Bank(Packets):
 
 def _built(term: Term, module: Any, width: int) -> Any:
     """The kernel, compiled. Raises SceneError with Warp's words where it cannot be."""
+    try:
+        hash(module)
+    except TypeError:
+        remedy = "give a module, or a class that holds the functions"
+        raise SceneError([f"{term.key}.device = {module!r}: cannot be a key of the kernels made; {remedy}"]) from None
     remedy = "a law may use lanes, their operators (import them in its module) and lane_math only: docs/add_a_law.md"
     try:
         examine = make_examine(module, width, wp.float64)
@@ -221,70 +252,108 @@ def _built(term: Term, module: Any, width: int) -> Any:
     return examine
 
 
-def random_views(packets: int, width: int, seed: int) -> Views:
-    """Random views, the lanes of a packet at one time."""
+def random_views(packets: int, width: int, seed: int, around: np.ndarray) -> Views:
+    """Random views some metres around a position, the lanes of a packet at one time."""
     rng = np.random.default_rng(seed)
     k = packets * width
     quaternion, position, velocity, rate = rng.normal(size=(k, 4)), *rng.normal(size=(3, k, 3))
     R = notation.matrix_from_quaternion(quaternion)
-    return Views(R, 4.0 * position, velocity, rate, np.repeat(rng.uniform(0.0, 10.0, packets), width))
+    return Views(R, around + 4.0 * position, velocity, rate, np.repeat(rng.uniform(0.0, 10.0, packets), width))
 
 
 def _short(values: np.ndarray) -> str:
     return str(np.round(np.asarray(values), 3).tolist())
 
 
-def _worst(name: str, difference: np.ndarray, allowed: np.ndarray | float, views: Views, text: str = "") -> Check:
-    """A Check of differences (k,) or (k, d): the one that is worst beside what is allowed."""
+def _judged(name: str, difference: np.ndarray, allowed: np.ndarray | float, views: Views, remedy: str) -> Check:
+    """A Check of differences (k,) or (k, d): the one that is worst beside what is allowed, and where, if it is too large."""
     k = len(difference)
     worst = np.abs(difference).reshape(k, -1)
     limit = np.broadcast_to(np.reshape(allowed, (-1, 1)) if np.ndim(allowed) == 1 else allowed, worst.shape)
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(np.isfinite(worst), np.where(worst <= limit, worst / np.maximum(limit, 1e-300), 1.0 + worst), np.inf)
+        ratio = np.where(
+            np.isfinite(worst), np.where(worst <= limit, worst / np.maximum(limit, 1e-300), 1.0 + worst), np.inf
+        )
     i, j = np.unravel_index(ratio.argmax(), ratio.shape)
     good = bool(np.all(worst <= limit))
-    return Check(name, float(worst[i, j]), float(limit[i, j]), good, (text if good else f"{views.told(int(i))}; {text}").strip("; "))
+    text = "" if good else f"{views.told(int(i))}; {remedy}"
+    return Check(name, float(worst[i, j]), float(limit[i, j]), good, text)
 
 
 def _whole(bench: Bench, step: float) -> Iterator[Check]:
     """What holds for every law: finite, blind to what it must not look at, lanes apart, varied as shared."""
-    views, width = bench.views, bench.width
+    views, kind = bench.views, type(bench.term).__name__
     here = bench.at(views)
-    finite = np.stack([np.isfinite(value).all(axis=1) for value in here.values()] or [np.ones(len(views.time), bool)])
-    yield _worst("finite", (~finite).any(axis=0).astype(float), 0.0, views)
-    size = {role: ROUNDINGS * EPS * max(np.abs(value).max(), 1e-300) for role, value in here.items()}
+    finite = np.all([np.isfinite(value).all(axis=1) for value in here.values()], axis=0)
+    found = _judged("finite", (~finite).astype(float), 0.0, views, "guard divisions and roots")
+    asleep = not any(np.any(value) for value in here.values())
+    note = "note: zero at every view, so little was checked; give a scene that starts where the law acts"
+    yield found._replace(text=note) if asleep else found
     faster = bench.at(views.changed(velocity=2.0 * views.velocity + 1.0, rate=1.0 - views.rate))
     later = bench.at(views.changed(time=views.time + 3.7))
-    turned = np.arange(bench.count).reshape(-1, width)[:, ::-1].reshape(-1)
-    mixed = bench.at(Views(**{name: value[turned] for name, value in vars(views).items()}))
-    varied = _varied(bench)
     for role, value in here.items():
         if role != "damping":
             remedy = "only damping(D, view, p) may look at view.nu and view.Om"
-            yield _worst(f"{role}: blind to velocity", faster[role] - value, 0.0, views, "" if _same(faster, here, role) else remedy)
+            yield _judged(f"{role}: blind to velocity", faster[role] - value, 0.0, views, remedy)
         if not bench.term.timed and not bench.noisy:
-            remedy = f"write timed = True in {type(bench.term).__name__}, or it gets no time"
-            yield _worst(f"{role}: blind to time", later[role] - value, 0.0, views, "" if _same(later, here, role) else remedy)
-        if not bench.noisy:
-            yield _worst(f"{role}: lanes apart", mixed[role][turned] - value, 0.0, views)
-            if isinstance(varied, str):
-                yield Check(f"{role}: varied numbers", np.inf, 0.0, False, varied)
-            else:
-                yield _worst(f"{role}: varied numbers", varied[role] - value, size[role], views)
+            remedy = f"write timed = True in {kind}, or it gets no time"
+            yield _judged(f"{role}: blind to time", later[role] - value, 0.0, views, remedy)
+    if not bench.noisy:
+        yield from _packing(bench, here)
 
 
-def _same(one: dict[str, np.ndarray], other: dict[str, np.ndarray], role: str) -> bool:
-    return bool(np.array_equal(one[role], other[role]))
+def _packing(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
+    """The same law whatever lane it is in, however its numbers are given, in whatever axes."""
+    views = bench.views
+    back = np.arange(bench.count).reshape(-1, bench.width)[:, ::-1].reshape(-1)
+    mixed = bench.at(Views(**{name: value[back] for name, value in vars(views).items()}))
+    each = {name: np.repeat(value, bench.count, axis=0) for name, value in bench.parameters.items()}
+    varied = _tried(bench, bench.setting(each), views, "where numbers have one entry a member")
+    for role, value in here.items():
+        yield _judged(f"{role}: lanes apart", mixed[role][back] - value, 0.0, views, "a lane must not look at others")
+        if isinstance(varied, str):
+            yield Check(f"{role}: varied numbers", np.inf, 0.0, False, varied)
+        else:
+            limit = ROUNDINGS * EPS * np.abs(value).max()
+            remedy = "packed() must give n entries where its numbers have n"
+            yield _judged(f"{role}: varied numbers", varied[role] - value, limit, views, remedy)
+    # Weight and restoring moment keep their promise together, not each.
+    if not any(isinstance(bench.term, type(one)) for one in terms.IMPLIED):
+        yield from _axes(bench, here)
 
 
-def _varied(bench: Bench) -> dict[str, np.ndarray] | str:
-    """What the law gives when every number of scene and term is given member by member; words where that fails."""
-    n = bench.count
-    each = {name: np.repeat(value, n, axis=0) for name, value in bench.parameters.items()}
+def _tried(bench: Bench, setting: Setting, views: Views, where: str) -> dict[str, np.ndarray] | str:
+    """What the law gives in another setting; words where packed() fails in it."""
     try:
-        return Bank(bench, bench.setting(each)).evaluate(bench.views)
+        return Bank(bench, setting, views).evaluate(views)
     except Exception as error:
-        return f"packed() fails where numbers have one entry a member: {type(error).__name__}: {error}"
+        return f"packed() fails {where}: {type(error).__name__}: {error}"
+
+
+def _axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
+    """The same wrench from a frame with other axes and origin."""
+    views, other = bench.views, bench.views.elsewhere()
+    there = _tried(bench, bench.setting(bench.parameters, True), other, "in other axes of the body")
+    for role in set(here) & {"law", "damping"}:
+        if isinstance(there, str):
+            yield Check(f"{role}: any axes", np.inf, 0.0, False, there)
+            continue
+        mine, its = _wrench(role, here[role], views), _wrench(role, there[role], other)
+        force = its[:, :3] @ TURN.T
+        torque = its[:, 3:] @ TURN.T + np.cross(ORIGIN, force)
+        difference = np.concatenate([force, torque], axis=1) - mine
+        # Moving the origin and turning add up numbers as large as these.
+        limit = ROUNDINGS * EPS * max(np.abs(here[role]).max(), np.abs(there[role]).max(), np.abs(mine).max()) * 100.0
+        remedy = "turn vectors by setting.frame.vector(), points by .point(), torques by .torque() in packed()"
+        yield _judged(f"{role}: any axes", difference, limit, views, remedy)
+
+
+def _wrench(role: str, value: np.ndarray, views: Views) -> np.ndarray:
+    """(force; torque) (k, 6) of a law, or of a damping matrix at the views' velocities."""
+    if role == "law":
+        return value
+    twist = np.concatenate([views.velocity, views.rate], axis=1)
+    return np.asarray(-np.einsum("kij,kj->ki", value.reshape(-1, 6, 6), twist))
 
 
 class Slope(NamedTuple):
@@ -315,7 +384,9 @@ def _potential(bench: Bench, step: float) -> Iterator[Check]:
         value = term.potential(bench.own, at.position[:, None], at.attitude[:, None], bench.parameters)
         return np.broadcast_to(value, (len(at.position), 1))[:, 0]
 
-    moves, turns = ([_slope(lambda by, f=f, i=i: U(f(i, by)), step, reach) for i in range(3)] for f in (views.moved, views.turned))
+    moves, turns = (
+        [_slope(lambda by, f=f, i=i: U(f(i, by)), step, reach) for i in range(3)] for f in (views.moved, views.turned)
+    )
     R = views.attitude
     force = -notation.rotate_into(R, np.stack([one.value for one in moves], axis=1))
     allowed = np.linalg.norm([one.allowed for one in moves], axis=0)
@@ -327,12 +398,6 @@ def _potential(bench: Bench, step: float) -> Iterator[Check]:
     yield _judged("law: force = -R^T dU/db", wrench[:, :3] - force, allowed, views, remedy)
     limits = np.stack([one.allowed for one in turns], axis=1)
     yield _judged("law: torque = -dU/dR", wrench[:, 3:] - torque, limits, views, remedy)
-
-
-def _judged(name: str, difference: np.ndarray, allowed: np.ndarray | float, views: Views, remedy: str) -> Check:
-    """A Check with a remedy where it failed."""
-    found = _worst(name, difference, allowed, views)
-    return found if found.ok else found._replace(text=f"{found.text}; {remedy}")
 
 
 def _damping(bench: Bench, step: float) -> Iterator[Check]:
@@ -350,11 +415,11 @@ def _damping(bench: Bench, step: float) -> Iterator[Check]:
     least, limit = float(power[i]), float(allowed[i])
     where = f"least power {least:.3g} W at velocity {_short(twist[i, :3])} m/s, rate {_short(twist[i, 3:])} rad/s"
     if not getattr(bench.term, "dissipative", True):
-        yield Check("damping: power", max(-least, 0.0), np.inf, True, f"note: {where} (dissipative = False)")
+        yield Check("damping: power", max(0.0, -least), np.inf, True, f"note: {where} (dissipative = False)")
         return
     good = bool(np.all(power >= -allowed))
     text = where if good else f"{where}; D creates energy: write dissipative = False if it may"
-    yield Check("damping: power >= 0", max(-least, 0.0), limit, good, text)
+    yield Check("damping: power >= 0", max(0.0, -least), limit, good, text)
 
 
 def _power(bench: Bench, views: Views) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -369,7 +434,7 @@ def _flow(bench: Bench, step: float) -> Iterator[Check]:
     """du/dt and du/db are the derivatives of u; the host's water() is the same; FLOW says what u does."""
     if "flow" not in bench.roles or bench.noisy:
         return
-    views, term, kind = bench.views, bench.term, getattr(bench.module, "FLOW", None)
+    views, kind = bench.views, getattr(bench.module, "FLOW", None)
     found = bench.at(views)["flow"]
 
     def u(at: Views) -> np.ndarray:
@@ -381,15 +446,26 @@ def _flow(bench: Bench, step: float) -> Iterator[Check]:
     yield _judged("flow: rate = du/dt", found[:, 3:6] - passes.value, passes.allowed, views, "add it to f.rate")
     for i, name in enumerate(("by_north", "by_east", "by_depth")):
         got = found[:, 6 + 3 * i : 9 + 3 * i]
-        yield _judged(f"flow: {name} = du/db{i + 1}", got - moves[i].value, moves[i].allowed, views, f"add it to f.{name}")
+        yield _judged(
+            f"flow: {name} = du/db{i + 1}", got - moves[i].value, moves[i].allowed, views, f"add it to f.{name}"
+        )
     yield _flow_kind(kind, moves, passes)
-    if not hasattr(term, "water"):
+    yield _water(bench, u, sum(reach * np.abs(one.value).max(axis=1) for one in moves))
+
+
+def _water(bench: Bench, u: Callable[[Views], np.ndarray], rounded: np.ndarray) -> Check:
+    """water(), or water_at_start() at t = 0, is what flow() gives. rounded (k,): what a position's rounding moves."""
+    term, views = bench.term, bench.views
+    if hasattr(term, "water"):
+        host = term.water(bench.own, views.position[:, None], views.time)[:, 0]
+    elif hasattr(term, "water_at_start"):
+        views = views.changed(time=0.0 * views.time)
+        host = term.water_at_start(bench.own, views.position, bench.setting(bench.parameters))
+    else:
         text = f"write water(own, position, time) in {type(term).__name__}: start and energy need it"
-        yield Check("flow: water()", np.inf, 0.0, False, text)
-        return
-    host = term.water(bench.own, views.position[:, None], views.time)[:, 0]
-    limit = ROUNDINGS * EPS * (max(np.abs(host).max(), 1e-300) + sum(reach * np.abs(one.value).max(axis=1) for one in moves))
-    yield _judged("flow: water()", found[:, :3] - host, limit, views, "the host's water() must be what flow() gives")
+        return Check("flow: water()", np.inf, 0.0, False, text)
+    limit = ROUNDINGS * EPS * (max(np.abs(host).max(), 1e-300) + rounded)
+    return _judged("flow: water()", u(views) - host, limit, views, "the host's water() must be what flow() gives")
 
 
 def _flow_kind(kind: Any, moves: list[Slope], passes: Slope) -> Check:
@@ -398,4 +474,6 @@ def _flow_kind(kind: Any, moves: list[Slope], passes: Slope) -> Check:
     changes = bool(np.any(np.abs(passes.value) > passes.allowed))
     least = "varying" if varies else "uniform" if changes else "steady"
     good = kind in FLOWS and FLOWS.index(kind) >= FLOWS.index(least)
-    return Check("flow: FLOW", float(not good), 0.0, good, f"FLOW = {kind!r}" + ("" if good else f": write FLOW = {least!r}"))
+    return Check(
+        "flow: FLOW", float(not good), 0.0, good, f"FLOW = {kind!r}" + ("" if good else f": write FLOW = {least!r}")
+    )

@@ -73,7 +73,9 @@ class Model:
     averages: tuple[float, float] | None
 
 
-def make_model(ensemble: Ensemble, method: Method, h: float, laws: Mapping[str, Any], stops: Mapping[str, Any]) -> Model:
+def make_model(
+    ensemble: Ensemble, method: Method, h: float, laws: Mapping[str, Any], stops: Mapping[str, Any]
+) -> Model:
     """Decide. laws, stops: name -> module of device code. Raises SceneError where a method cannot do what a scene asks."""
     p = ensemble.parameters(0, ensemble.members)
     frame, U = frame_of(method, p)
@@ -83,15 +85,18 @@ def make_model(ensemble: Ensemble, method: Method, h: float, laws: Mapping[str, 
     damping = any(hasattr(module, "damping") for term, module in acting if not isinstance(term, Drag))
     flow = _flow([module for _, module in acting])
     drags = [(term, module) for term, module in acting if isinstance(term, Drag)]
-    nonconservative = any(not getattr(module, "POTENTIAL", False) and module is not laws["current"] for _, module in acting)
+    nonconservative = any(
+        not getattr(module, "POTENTIAL", False) and module is not laws["current"] for _, module in acting
+    )
     forced = method.base in FORCED and nonconservative
-    exact = len(drags) == 1 and not damping and flow != "varying" and not forced and has_exact_flow(frame)
+    exact = len(drags) == 1 and not damping and flow != "varying" and not forced
     drag: tuple[str, ...] = ()
     if exact:
         term = drags[0][0]
         assert isinstance(term, Drag)
         drag = term.parts(ensemble.own(term, p))
-        acting = [(term, laws["drag"]), *((t, m) for t, m in acting if t is not term)]
+        module = laws["drag" if has_exact_flow(frame) else "drag_directions"]
+        acting = [(term, module), *((t, m) for t, m in acting if t is not term)]
     dense = (damping or bool(drags) or flow == "varying") and not exact
     memory = any(term.memory for term, _ in acting)
     _check(ensemble, method, frame, p, dense=dense, flow=flow, memory=memory, modules=[module for _, module in acting])
@@ -107,7 +112,7 @@ def make_model(ensemble: Ensemble, method: Method, h: float, laws: Mapping[str, 
         lead, maps = None, program
     asked = {"turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
              "dense": dense, "water": flow in ("uniform", "varying"),
-             "origin": bool(events) and bool(np.any(frame.origin))}  # fmt: skip
+             "origin": (bool(events) or flow != "none") and bool(np.any(frame.origin) or np.any(frame.forces))}  # fmt: skip
     return Model(
         method=method,
         frame=frame,
@@ -154,7 +159,9 @@ def _check_signature(faults: Faults, term: Term, module: Any, role: str) -> None
         faults.add(f"{term.key}.{role}", function, "is not a Warp function", "decorate it with @wp.func")
     elif len(names) != wanted:
         given = "(view, p)" if wanted == 2 else "(w, view, p)"
-        faults.add(f"{term.key}.{role}", f"({', '.join(names)})", f"takes {len(names)} arguments", f"write {role}{given}")
+        faults.add(
+            f"{term.key}.{role}", f"({', '.join(names)})", f"takes {len(names)} arguments", f"write {role}{given}"
+        )
 
 
 ROLES = ("law", "damping", "flow", "evolve")

@@ -10,12 +10,14 @@ import warp as wp
 
 from lgvi_kernels.advance import SAMPLE_FIELDS, STATE_FIELDS
 from lgvi_kernels.lanes import int_lane
+from lgvi_kernels.terms import LAWS
 from lgvi_warp import inertia, model, notation, vehicle
 from lgvi_warp.ensemble import Ensemble, Members
 from lgvi_warp.events import Event
 from lgvi_warp.plan import Plan, build_lock
 from lgvi_warp.status import Status
 from lgvi_warp.terms.base import Packed, Setting
+from lgvi_warp.terms.drag import Drag
 
 
 @dataclass
@@ -104,6 +106,7 @@ class Packets:
             fields |= self._water()
         if "origin" in parts:
             fields["user_origin"] = -frame.vector(frame.origin)
+            fields["user_origin_forces"] = -frame.vector(frame.forces)
         return self._filled(self.plan.dtypes[0], fields)
 
     def _water(self) -> dict[str, np.ndarray]:
@@ -143,10 +146,14 @@ class Packets:
     def _laws(self, setting: Setting) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Params, table and memory: each term's numbers, one after the other."""
         packed: list[Packed] = []
-        for i, (term, _) in enumerate(self.plan.model.laws):
+        for i, (term, module) in enumerate(self.plan.model.laws):
             own = Ensemble.own(term, setting.parameters)
-            exact = i == 0 and bool(self.plan.spec.drag)
-            packed.append(term.packed_exact(own, self.frame) if exact else term.packed(own, setting))  # type: ignore[attr-defined]
+            if i == 0 and self.plan.spec.drag:
+                assert isinstance(term, Drag)
+                by_axes = module is LAWS["drag"]
+                packed.append(term.packed_exact(own, self.frame) if by_axes else term.packed_directions(own, setting))
+            else:
+                packed.append(term.packed(own, setting))
         dtype = self.plan.dtypes[1]
         varied = any(len(leaf) > 1 for one in packed for leaf in _leaves(one.values))
         data = np.zeros(self.count if varied else 1, dtype)
@@ -189,7 +196,9 @@ class Packets:
         R = m.attitude @ frame.Q
         nu = m.velocity + np.cross(m.angular_velocity, np.broadcast_to(frame.origin, (n, 3)))
         nu = nu - self._water_at_start()
-        twist = np.concatenate([notation.rotate_into(frame.Q, nu), notation.rotate_into(frame.Q, m.angular_velocity)], 1)
+        twist = np.concatenate(
+            [notation.rotate_into(frame.Q, nu), notation.rotate_into(frame.Q, m.angular_velocity)], 1
+        )
         momenta = np.einsum("nij,nj->ni", np.broadcast_to(frame.inertia_at(frame.E), (n, 6, 6)), twist)
         rows = np.empty((n, STATE_FIELDS))
         rows[:, :9] = R.reshape(-1, 9)
@@ -200,15 +209,14 @@ class Packets:
     def _water_at_start(self) -> np.ndarray:
         """R^T u (m, 3) [m/s], user's axes, where each member starts."""
         m = self.members
-        position = m.position + notation.rotate_out(m.attitude, np.broadcast_to(self.frame.origin, m.position.shape))
         setting = Setting(m.parameters, self.frame, m.indices, m.seed, self.plan.grid.h)
-        total = np.zeros_like(position)
+        total = np.zeros_like(m.position)
         for term, _ in self.plan.model.laws:
             own = Ensemble.own(term, m.parameters)
             if hasattr(term, "water_at_start"):
-                total = total + term.water_at_start(own, position, setting)
+                total = total + term.water_at_start(own, m.position, setting)
             elif hasattr(term, "water"):
-                total = total + term.water(own, position[None], np.zeros(1))[0]
+                total = total + term.water(own, m.position[None], np.zeros(1))[0]
         return notation.rotate_into(m.attitude, total)
 
     def advance(self, k0: int, k1: int) -> np.ndarray:
@@ -259,5 +267,3 @@ def _side_by_side(parts: list[np.ndarray]) -> np.ndarray:
     """Rows (1 or n, d) joined along d."""
     n = max(len(part) for part in parts)
     return np.concatenate([np.broadcast_to(part, (n, part.shape[1])) for part in parts], axis=1)
-
-

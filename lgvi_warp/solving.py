@@ -163,9 +163,7 @@ def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None 
     )
 
 
-def _store(
-    samples: dict[str, np.ndarray], when: slice, at: slice, parts: dict[str, np.ndarray]
-) -> None:
+def _store(samples: dict[str, np.ndarray], when: slice, at: slice, parts: dict[str, np.ndarray]) -> None:
     """Put the samples of a block into their places."""
     for name, values in parts.items():
         samples[name][when, at] = values

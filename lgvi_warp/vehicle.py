@@ -105,7 +105,9 @@ class Vehicle:
     def _full(self, faults: Faults) -> dict[str, Any]:
         for name in ("mass", "inertia", "added_mass"):
             if getattr(self, name) is not None:
-                faults.add(name, getattr(self, name), "says again what the 6x6 matrices say", "keep one of the two forms")
+                faults.add(
+                    name, getattr(self, name), "says again what the 6x6 matrices say", "keep one of the two forms"
+                )
         rigid = faults.symmetric("rigid_body_mass_matrix", self.rigid_body_mass_matrix, UNITS["mass"], 6)
         zeros = np.zeros((6, 6))
         given = zeros if self.added_mass_matrix is None else self.added_mass_matrix
@@ -137,7 +139,9 @@ class Vehicle:
         if center is None:
             return implied, self._unusual(rigid, implied, m)
         if np.abs(center - implied).max() > 1e-3 * max(np.abs(center).max(), np.sqrt(np.trace(rigid[3:, 3:]) / m)):
-            text = f"center_of_gravity {center.tolist()} m, where the rigid body's matrix has it at {implied.tolist()} m"
+            text = (
+                f"center_of_gravity {center.tolist()} m, where the rigid body's matrix has it at {implied.tolist()} m"
+            )
             return center, (f"vehicle.{text}: weight acts at the first, inertia at the second",)
         return center, self._unusual(rigid, implied, m)
 

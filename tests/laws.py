@@ -86,3 +86,7 @@ CASES = {
 from tests.laws_water import CASES as _water  # noqa: E402
 
 CASES |= _water
+
+from tests.laws_lift import CASES as _lift  # noqa: E402
+
+CASES |= _lift

@@ -15,7 +15,9 @@ from tests.laws import Case, case
 GRAVITY, BUOYANCY, CENTER_OF_BUOYANCY = 9.8, 21.5 * 9.8, np.array((0.01, 0.005, -0.02))
 
 HARMONICS = dict(
-    amplitudes=((0.3, -0.2, 0.0), (0.1, 0.2, -0.1), (-0.05, 0.1, 0.02)), periods=(7.0, 3.1, 1.3), phases=(0.3, -1.2, 2.0)
+    amplitudes=((0.3, -0.2, 0.0), (0.1, 0.2, -0.1), (-0.05, 0.1, 0.02)),
+    periods=(7.0, 3.1, 1.3),
+    phases=(0.3, -1.2, 2.0),
 )
 WAVES = dict(
     amplitudes=(0.4, 0.3, 0.1), periods=(5.0, 3.5, 2.5), headings_deg=(20.0, -110.0, 200.0), phases=(0.5, -0.9, 2.5)

@@ -107,7 +107,7 @@ def make_advance(spec):
     step, lead, velocities, prepare = method.step, method.lead, method.velocities, method.prepare
     flow = superpose(spec.laws, "flow")
     has_lead, drifts, watched = spec.lead is not None, flow is not None, bool(spec.events)
-    watch, passage = make_watch(spec.events, View) if watched else (step, step)
+    watch, passage = make_watch(spec.events, View, "origin" in spec.parts) if watched else (step, step)
     lead_coefficient = spec.lead[1] if has_lead else 0.0
     # A drift that leads has passed half of its time when a step begins; with stages, of the first one's.
     lead_time = spec.lead_time if has_lead and spec.lead[0] in ("Ab", "T") else 0.0
@@ -262,7 +262,9 @@ def make_advance(spec):
                         repeat = n
                     else:
                         if wp.static(watched):
-                            x.alarm.size = positive(x.alarm.size, x.alarm.size, passage(at_step(good, k, h), x, c, real(h)))
+                            x.alarm.size = positive(
+                                x.alarm.size, x.alarm.size, passage(at_step(good, k, h), x, c, real(h))
+                            )
                         for j in range(wp.static(width)):
                             if code[j] > real(0.0):
                                 status[i][j] = int(code[j])

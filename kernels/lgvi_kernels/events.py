@@ -5,28 +5,36 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes import div, mul, ones, positive, sub  # noqa: F401
-from lgvi_kernels.submaps import look
+from lgvi_kernels.lanes import add, div, mul, ones, positive, sub  # noqa: F401
+from lgvi_kernels.submaps import look, rotate
 
 # Status of the first event of a scene; the next have the next numbers.
 FIRST = 16
 
 
-def make_watch(events, View):
+def make_watch(events, View, shifted):
     """(watch, passage) for these events, each a module with `distance`; their parameters are nested in `c.events`."""
     reached, passed = _chain(events, 0)
 
     @wp.func
+    def see(x: Any, c: Any, h: Any):
+        """The view from the user's origin."""
+        view = look(View(), x, c, h)
+        if wp.static(shifted):
+            view.b = x.b + rotate(x, c.inertia.user_origin)
+        return view
+
+    @wp.func
     def watch(x: Any, c: Any, h: Any):
         """Raise the alarm of the lanes where a distance is no longer positive: the number of the event."""
-        code = reached(look(View(), x, c, h), c.events)
+        code = reached(see(x, c, h), c.events)
         x.alarm.code = positive(x.alarm.code, x.alarm.code, code)
         return x
 
     @wp.func
     def passage(before: Any, x: Any, c: Any, h: Any):
         """Square of the part of the step that was made when the event came, by linear interpolation of its distance."""
-        f = passed(look(View(), before, c, h), look(View(), x, c, h), c.events)
+        f = passed(see(before, c, h), see(x, c, h), c.events)
         return f * f
 
     return watch, passage

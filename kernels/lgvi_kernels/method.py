@@ -26,7 +26,7 @@ from lgvi_kernels.submaps import (
     make_T,
     rotate,
 )
-from lgvi_kernels.terms.drag import make_E
+from lgvi_kernels.terms import drag, drag_directions
 from lgvi_kernels.view import to_body
 from lgvi_kernels.water import make_shear
 
@@ -89,29 +89,34 @@ def make_method(spec):
     width, real = spec.width, spec.real
     structs = (make(width, real) for make in (view_struct, wrench_struct, flow_struct, damping_struct))
     View, Wrench, Flow, Damping = structs
-    coupled = "coupled" in spec.parts
+    coupled, shifted = "coupled" in spec.parts, "origin" in spec.parts
     velocity = isotropic_velocity if spec.mass == "isotropic" else anisotropic_velocity
     velocities, velocities_of_forces = make_velocities(velocity, coupled)
     laws = spec.laws
     law, flow, evolve = (superpose(laws, role) for role in ("law", "flow", "evolve"))
     varies = spec.flow in ("uniform", "varying")
-    shear = make_shear(matrix3_struct(width, real), coupled) if spec.flow == "varying" else None
+    shear = make_shear(matrix3_struct(width, real), coupled, shifted) if spec.flow == "varying" else None
     damping = make_damping(laws, shear)
-    prepare, exact = make_E(spec.drag) if spec.drag else (None, None)
+    prepare, exact = None, None
+    if spec.drag:
+        by_axes = laws[0] is drag
+        prepare, exact = drag.make_E(spec.drag) if by_axes else drag_directions.make_E(spec.drag, velocities_of_forces)
 
     @wp.func
     def E(x: Any, c: Any, h: Any):
         """Drag by its exact flow; its constants are at hand for the whole step, and made for any other."""
         if h == c.drag.h:
-            x = exact(x, c.drag)
+            x = exact(x, c.drag, c)
         else:
-            x = exact(x, prepare(c.drag, c.params.own, h))
+            x = exact(x, prepare(c.drag, c.params.own, h), c)
         return x
 
     @wp.func
     def water_velocity(x: Any, c: Any, h: Any):
         """R^T u where the vehicle is."""
         view = look(View(), x, c, h)
+        if wp.static(shifted):
+            view.b = x.b + rotate(x, c.inertia.user_origin)
         return to_body(view, flow(Flow(), view, c.params).velocity)
 
     V = None
@@ -126,7 +131,7 @@ def make_method(spec):
         "D": make_D(rotation_struct(width, real), solve),
     }
     if "K" in used:
-        letters["K"] = make_K(View, Wrench, Flow, law, evolve, flow, varies, E if spec.drag else None, V)
+        letters["K"] = make_K(View, Wrench, Flow, law, evolve, flow, varies, shifted, E if spec.drag else None, V)
     if "W" in used:
         letters["W"] = make_W(rotation_struct(width, real), rotate, spec.iterations, spec.adaptive, spec.checked)
     U12, U13, U23, *pitched = spec.coupling
@@ -145,5 +150,3 @@ def make_method(spec):
     step = fold(tuple((letters[letter], coefficient) for letter, coefficient in spec.maps))
     lead = letters[spec.lead[0]] if spec.lead else step
     return Step(step, lead, velocities, prepare, water_velocity)
-
-

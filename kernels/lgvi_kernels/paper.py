@@ -29,6 +29,7 @@ MOST_ITERATIONS = 60
 
 def make_forces(View, Wrench, Flow, Damping, force, damping, flow, flow_varies):
     """phi and tau: the nonconservative laws of a scene at a configuration, for given velocities."""
+
     @wp.func
     def water_at(view: Any, c: Any):
         water = Flow()

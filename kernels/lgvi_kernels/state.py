@@ -91,7 +91,7 @@ def inertia_struct(width, real, mass, parts=()):
     "w": S, the symmetric coupling of the coupled Moser-Veselov step;
     "coupled": E = M^-1 C at the origin of the state and at that of the forces, 3x3;
     "dense": the inertia at the origin of the forces as M and J (and C where coupled), for velocity-dependent laws;
-    "origin": the user's origin from that of the state, for events;
+    "origin": the user's origin from that of the state, and from that of the forces, where events and water are taken;
     "water": displaced mass less mass, and displaced mass times its lever less mass times its own, by max J.
     """
     Lane, Lane3 = lane(width, real), lane3(width, real)
@@ -112,5 +112,5 @@ def inertia_struct(width, real, mass, parts=()):
     if "water" in parts:
         fields |= {"excess": Lane, "excess_lever": Lane3}
     if "origin" in parts:
-        fields |= {"user_origin": Lane3}
+        fields |= {"user_origin": Lane3, "user_origin_forces": Lane3}
     return struct("Inertia", **fields)

@@ -122,14 +122,21 @@ def kicked(x: Any, c: Any, h: Any, w: Any):
     return x
 
 
-def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, E, V):
+def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):
     """The kick by these laws, each of them None where a scene has none.
 
-    law: forces from position and time; evolve: laws that remember, before and after; flow: the water carries the vehicle,
+    law: forces from position and time; shifted: the origin of the forces is not the user's; evolve: laws that remember, before and after; flow: the water carries the vehicle,
     and where it varies in space or time also pushes it; E: exact flow of drag; V: velocity-dependent laws. E or V stands
     between two half kicks and the water's drift is taken half before and half after, so the order is 2.
     """
     drifts, damped = flow is not None, E is not None or V is not None
+
+    @wp.func
+    def at_user_origin(view: Any, x: Any, c: Any):
+        """Water is taken where the user has his origin, whatever the method's is."""
+        if wp.static(shifted):
+            view.b = x.b + rotate(x, c.inertia.user_origin_forces)
+        return view
 
     @wp.func
     def K(x: Any, c: Any, h: Any):
@@ -140,11 +147,11 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, E, V):
             view = evolve(view, view, c.params)
         if wp.static(drifts):
             start = x.b
-            water = flow(Flow(), view, c.params)
+            water = flow(Flow(), at_user_origin(view, x, c), c.params)
             x.b = start + half * water.velocity
             view.b = x.b
             if wp.static(flow_varies):
-                water = flow(Flow(), view, c.params)
+                water = flow(Flow(), at_user_origin(view, x, c), c.params)
         w = Wrench()
         if wp.static(law is not None):
             w = law(w, view, c.params)

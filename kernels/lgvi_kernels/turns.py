@@ -10,6 +10,7 @@ import warp as wp
 
 from lgvi_kernels.lanes import add, div, mul, neg, ones, sub, vec3  # noqa: F401
 
+
 @wp.func
 def shear_pair(a: Any, b: Any, t: Any, s: Any):
     """(a, b) turned by the angle with tan(half) = t and sine s, as three shears: what rounding leaves is still a turn."""

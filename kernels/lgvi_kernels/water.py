@@ -39,17 +39,32 @@ def gradient_in_body(m: Any, view: Any, water: Any):
     return transposed(m)
 
 
-def make_shear(Matrix3, coupled):
-    """What the water's variation in space adds to the damping matrix."""
+@wp.func
+def about(m: Any, r: Any):
+    """-m hat(r): what a matrix that acts on the velocity at the point r does to rates about the origin."""
+    m.row0 = cross(r, m.row0)
+    m.row1 = cross(r, m.row1)
+    m.row2 = cross(r, m.row2)
+    return m
+
+
+def make_shear(Matrix3, coupled, shifted):
+    """What the water's variation in space adds to the damping matrix. shifted: it is taken at another point."""
 
     @wp.func
     def shear(D: Any, view: Any, inertia: Any, water: Any):
         """D + I6 (R^T G R, 0): force M R^T G R nu and, where M and J are coupled, torque C^T R^T G R nu."""
         scale = ones(inertia.mean) / inertia.inverse_scale
         X = gradient_in_body(Matrix3(), view, water)
-        D.force_velocity = combine(D.force_velocity, scale, product(symmetric(Matrix3(), inertia.M), X))
+        MX = product(symmetric(Matrix3(), inertia.M), X)
+        D.force_velocity = combine(D.force_velocity, scale, MX)
+        if wp.static(shifted):
+            D.force_rate = combine(D.force_rate, scale, about(MX, inertia.user_origin_forces))
         if wp.static(coupled):
-            D.torque_velocity = combine(D.torque_velocity, scale, product(transposed(inertia.C), X))
+            CX = product(transposed(inertia.C), X)
+            D.torque_velocity = combine(D.torque_velocity, scale, CX)
+            if wp.static(shifted):
+                D.torque_rate = combine(D.torque_rate, scale, about(CX, inertia.user_origin_forces))
         return D
 
     return shear

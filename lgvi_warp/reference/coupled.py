@@ -1,4 +1,4 @@
-"""The step for a full 6x6 inertia, of one vehicle: shared/design/coupled_inertia.md in its symbols.
+"""The step for a full 6x6 inertia, of one vehicle, in the symbols of docs/coupled_inertia.md.
 
 I6 = [[M, C], [C^T, J]] at the user's origin O in the user's axes; E = M^-1 C, Js = J - C^T M^-1 C, and
 H = p.M^-1 p / 2 + (pi - E^T p).Js^-1 (pi - E^T p) / 2 + U. The turns want Js diagonal, ascending, and E upper
@@ -15,6 +15,8 @@ from lgvi_warp.reference.rotation import Array, NoSolution, cay, cross, hat, mod
 
 # wrench(b, R) -> force (3,) [N] and torque (3,) [N m] about the user's origin, in the user's axes.
 Wrench = Callable[[Array, Array], tuple[Array, Array]]
+# kick(b, R, p, pi, h) -> b, R, p, pi: at the user's origin, in his axes.
+Kick = Callable[[Array, Array, Array, Array, float], tuple[Array, Array, Array, Array]]
 # (letter, coefficient) of each sub-map, the first applied first.
 Program = Sequence[tuple[str, float]]
 
@@ -75,6 +77,16 @@ class Reduced:
         Om_1, nu_1 = self.Q.T @ Om, self.Q.T @ (nu + cross(Om, self.o[0]))
         p = self.M @ (nu_1 + self.E @ Om_1)
         return CoupledState(b + R @ self.o[0], R @ self.Q, p, self.Js * Om_1 + self.E.T @ p)
+
+    def momenta_about_user(self, x: CoupledState, i: int) -> tuple[Array, Array, Array, Array]:
+        """b, R, p, pi at the user's origin, in the user's axes, of a state told at o_i."""
+        R, p = x.R @ self.Q.T, self.Q @ x.p
+        return x.b - R @ self.o[i - 1], R, p, self.Q @ x.pi + cross(self.o[i - 1], p)
+
+    def momenta_about(self, i: int, b: Array, R: Array, p: Array, pi: Array) -> CoupledState:
+        """And back: the state told at o_i."""
+        o = self.o[i - 1]
+        return CoupledState(b + R @ o, R @ self.Q, self.Q.T @ p, self.Q.T @ (pi - cross(o, p)))
 
     def from_reduced(self, x: CoupledState) -> tuple[Array, Array, Array, Array]:
         """b, R, nu, Om at the user's origin, in the user's axes."""
@@ -348,12 +360,18 @@ def step(
     program: Program,
     wrench: Wrench,
     newtons: int | None = None,
+    kick: Kick | None = None,
 ) -> CoupledState:
-    """One step of h [s] from o_1 to o_1: a turn R_i is entered by the hop to o_i. newtons: see W."""
+    """One step of h [s] from o_1 to o_1: a turn R_i is entered by the hop to o_i. newtons: see W.
+
+    kick: what happens instead of K by the wrench, told in the user's frame.
+    """
     at = 1
     for letter, coefficient in program:
         if letter == "T":
             x = T(x, body, coefficient * h)
+        elif letter == "K" and kick is not None:
+            x = body.momenta_about(at, *kick(*body.momenta_about_user(x, at), coefficient * h))
         elif letter == "K":
             x = K(x, body, coefficient * h, wrench, at)
         elif isinstance(body, ReducedW):

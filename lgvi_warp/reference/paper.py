@@ -153,9 +153,7 @@ def Phi(x: State, body: Body, h: float, solve: Solver = newton, alpha: float = 0
     return replace(x, p=p, pi=pi)
 
 
-def Phi_adjoint(
-    x: State, body: Body, h: float, solve: Solver = newton, alpha: float = 0.5, beta: float = 0.5
-) -> State:
+def Phi_adjoint(x: State, body: Body, h: float, solve: Solver = newton, alpha: float = 0.5, beta: float = 0.5) -> State:
     """Phi*_h: (19)-(23) with phi*_k, tau*_k, which are (15), (16) with k and k + 1 interchanged; by iteration.
 
     Raises NoSolution where it does not settle.

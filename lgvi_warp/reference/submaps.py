@@ -34,7 +34,7 @@ class Body:
     """M (3, 3) [kg], J (3, 3) [kg m2], both symmetric, and the laws that act.
 
     excess: displaced mass less mass [kg], and excess_lever (3,) [kg m], the same times their levers: water that
-    accelerates pushes them. exact_drag: whether drag, if it is the only velocity-dependent law, acts by its exact flow.
+    accelerates pushes them. C (3, 3) [kg m], the coupling of M and J, for K alone: the other sub-maps of this file want it zero.
     """
 
     M: Array
@@ -42,15 +42,17 @@ class Body:
     terms: tuple[Law, ...] = ()
     excess: float = 0.0
     excess_lever: Array = field(default_factory=lambda: np.zeros(3))
-    exact_drag: bool = True
     member: int = 0
+    C: Array = field(default_factory=lambda: np.zeros((3, 3)))
 
     @property
     def I6(self) -> Array:
         """The inertia (6, 6)."""
-        return np.block([[self.M, np.zeros((3, 3))], [np.zeros((3, 3)), self.J]])
+        return np.block([[self.M, self.C], [self.C.T, self.J]])
 
-    def wrench(self, b: Array, R: Array, views: tuple[View, ...] = (), potential: bool | None = None) -> tuple[Array, Array]:
+    def wrench(
+        self, b: Array, R: Array, views: tuple[View, ...] = (), potential: bool | None = None
+    ) -> tuple[Array, Array]:
         """Sum of the laws' wrenches; only those that follow from a potential, or only the others, if so asked."""
         force, torque = np.zeros(3), np.zeros(3)
         views = views or tuple(View(R, b, np.zeros(3), np.zeros(3)) for _ in self.terms)
@@ -82,7 +84,7 @@ def velocity(body: Body, p: Array) -> Array:
 
 def look(x: State, body: Body, h: float) -> tuple[View, ...]:
     """What each law sees."""
-    nu, Om = velocity(body, x.p), np.linalg.solve(body.J, x.pi)
+    nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, x.pi])), 2)
     memory = x.memory or (np.zeros(0),) * len(body.terms)
     return tuple(View(x.R, x.b, nu, Om, x.t, h, x.step, body.member, one) for one in memory)
 
@@ -146,16 +148,21 @@ def V(x: State, body: Body, h: float, flow: Flow) -> State:
 
 
 def E(x: State, body: Body, h: float, flow: Flow) -> State:
-    """Drag by its exact flow."""
+    """Drag by its exact flow; where the inertia is not diagonal, by that of one axis after the other."""
     (drag,) = (term for term in body.terms if isinstance(term, Drag))
-    P = drag.exact(np.concatenate([x.p, x.pi]), np.diag(body.I6), h)
+    P = np.concatenate([x.p, x.pi])
+    if np.array_equal(body.I6, np.diag(np.diag(body.I6))):
+        P = drag.exact(P, np.diag(body.I6), h)
+    else:
+        inverse = np.linalg.inv(body.I6)
+        P = body.I6 @ drag.by_directions(inverse @ P, inverse, h)
     return replace(x, p=P[:3], pi=P[3:])
 
 
 def dissipated(x: State, body: Body, h: float, flow: Flow) -> State:
-    """E where drag stands alone on principal axes, V otherwise."""
+    """E where drag is the only velocity-dependent law, V otherwise."""
     damped = [term for term in body.terms if type(term).damping is not Law.damping]
-    alone = len(damped) == 1 and isinstance(damped[0], Drag) and body.exact_drag and not np.any(flow.gradient)
+    alone = len(damped) == 1 and isinstance(damped[0], Drag) and not np.any(flow.gradient)
     if alone:
         return E(x, body, h, flow)
     return V(x, body, h, flow) if damped or np.any(flow.gradient) else x
@@ -176,7 +183,9 @@ def K(x: State, body: Body, h: float, solve: Solver = newton) -> State:
     x = replace(x, b=b + 0.5 * h * water(look(x, body, h), body).velocity)
     views = look(x, body, h)
     flow = water(views, body)
-    wrench = tuple(w + a for w, a in zip(body.wrench(x.b, x.R, views), acceleration_wrench(x.R, body, flow), strict=True))
+    wrench = tuple(
+        w + a for w, a in zip(body.wrench(x.b, x.R, views), acceleration_wrench(x.R, body, flow), strict=True)
+    )
     x = kicked(x, 0.5 * h, wrench)
     x = dissipated(x, body, h, flow)
     x = kicked(x, 0.5 * h, wrench)

@@ -8,11 +8,15 @@ from typing import Any, TypeVar
 
 from lgvi_warp.errors import Faults, SceneError, closest
 from lgvi_warp.terms.base import Packed, Setting, Term, quantity
+from lgvi_warp.terms.control_fins import ControlFins
+from lgvi_warp.terms.cross_flow import CrossFlow
 from lgvi_warp.terms.current import Current, CurrentProfile
 from lgvi_warp.terms.current_harmonics import CurrentHarmonics
 from lgvi_warp.terms.drag import Drag, DragMatrix
+from lgvi_warp.terms.fins import Fins
 from lgvi_warp.terms.gauss_markov_current import GaussMarkovCurrent
 from lgvi_warp.terms.hydrostatics import Restoring, Weight
+from lgvi_warp.terms.lift import BodyLift
 from lgvi_warp.terms.stratification import Stratification
 from lgvi_warp.terms.tether import Tether
 from lgvi_warp.terms.thrusters import Thrusters
@@ -51,6 +55,10 @@ for _kind in (
     GaussMarkovCurrent,
     WrenchNoise,
     Stratification,
+    Fins,
+    ControlFins,
+    CrossFlow,
+    BodyLift,
 ):
     register(_kind)
 
@@ -59,14 +67,18 @@ def from_list(given: Any) -> tuple[Term, ...]:
     """Terms from tables of a scene file or Term objects. Raises SceneError naming every fault."""
     faults = Faults()
     if not isinstance(given, Sequence) or isinstance(given, str):
-        raise SceneError([f"terms = {given!r}: is no list; write [[terms]] and type = ... below, or terms=[lw.Drag(...)]"])
+        raise SceneError(
+            [f"terms = {given!r}: is no list; write [[terms]] and type = ... below, or terms=[lw.Drag(...)]"]
+        )
     terms: list[Term] = []
     for i, one in enumerate(given):
         with faults.including():
             terms.append(one if isinstance(one, Term) else _from_table(f"terms[{i}]", one))
     keys = [term.key for term in terms]
     for key in sorted({key for key in keys if keys.count(key) > 1}):
-        faults.add("terms", key, f"is the name of {keys.count(key)} terms", f'give each a name of its own: name = "{key}_2"')
+        faults.add(
+            "terms", key, f"is the name of {keys.count(key)} terms", f'give each a name of its own: name = "{key}_2"'
+        )
     faults.raise_if_any()
     return tuple(terms)
 
@@ -99,11 +111,15 @@ def build(where: str, kind: type[AnyTerm], table: Mapping[str, Any]) -> AnyTerm:
 __all__ = [
     "IMPLIED",
     "TYPES",
+    "BodyLift",
+    "ControlFins",
+    "CrossFlow",
     "Current",
     "CurrentHarmonics",
     "CurrentProfile",
     "Drag",
     "DragMatrix",
+    "Fins",
     "GaussMarkovCurrent",
     "Packed",
     "Restoring",

@@ -121,7 +121,9 @@ class Term:
         """Its numbers in the kernel's axes."""
         raise NotImplementedError
 
-    def potential(self, own: Numbers, position: np.ndarray, attitude: np.ndarray, setting: Numbers) -> np.ndarray | float:
+    def potential(
+        self, own: Numbers, position: np.ndarray, attitude: np.ndarray, setting: Numbers
+    ) -> np.ndarray | float:
         """Potential energy (k, n) [J] at positions (k, n, 3) and attitudes (k, n, 3, 3); 0 for laws without one."""
         return 0.0
 
@@ -135,9 +137,7 @@ class Term:
         return content
 
 
-def _checked(
-    faults: Faults, one: dataclasses.Field[Any], value: Any, lengths: dict[str, int]
-) -> np.ndarray | None:
+def _checked(faults: Faults, one: dataclasses.Field[Any], value: Any, lengths: dict[str, int]) -> np.ndarray | None:
     """The value of a field as an array of its shape, or None after noting a fault."""
     meta = one.metadata
     shape, unit = meta["shape"], meta["unit"]
@@ -156,7 +156,9 @@ def _checked(
         array = faults.finite(one.name, value, shape, unit)
     if array is not None and (np.any(array < meta["least"]) or np.any(array > meta["most"])):
         low, high = meta["least"], meta["most"]
-        bounds = f"from {low:g}" + (f" to {high:g}" if np.isfinite(high) else "") if np.isfinite(low) else f"to {high:g}"
+        bounds = (
+            f"from {low:g}" + (f" to {high:g}" if np.isfinite(high) else "") if np.isfinite(low) else f"to {high:g}"
+        )
         faults.add(one.name, value, "is out of bounds", f"give numbers {bounds} [{unit}]")
         return None
     return array

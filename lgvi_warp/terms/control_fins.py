@@ -36,14 +36,14 @@ class ControlFins(Fins):
     command_schedule: Any = quantity(("k", "n"), "rad", None)
 
     def __post_init__(self) -> None:
-        both = self.command_schedule is not None and self.command is not None
-        object.__setattr__(self, "_both", both)
+        first = _first(self.command_schedule)
+        given = self.command is not None and self.command_schedule is not None
+        object.__setattr__(self, "_both", given and not np.array_equal(first, self.command))
         if self.command is None:
-            first = 0.0 if self.command_schedule is None else np.asarray(self.command_schedule)[:1].reshape(-1)
             object.__setattr__(self, "command", first)
         self.repeat("limit", "rate_limit", "command")
         if self.command_schedule is None:
-            object.__setattr__(self, "command_schedule", np.asarray(self.command)[None])
+            object.__setattr__(self, "command_schedule", [self.command])
             object.__setattr__(self, "times", [0.0] if self.times is None else self.times)
         super().__post_init__()
 
@@ -82,8 +82,18 @@ class ControlFins(Fins):
         return Packed(values, rows, start)
 
 
+def _first(schedule: Any) -> Any:
+    """The commands at the schedule's first time; 0 where there is none, or none that could be read."""
+    try:
+        return np.atleast_2d(np.array(schedule, dtype=np.float64))[0] if schedule is not None else 0.0
+    except (TypeError, ValueError):
+        return 0.0
+
+
 def _at_start(times: np.ndarray, schedule: np.ndarray) -> np.ndarray:
     """The commands (n, fins) at t = 0."""
     n = max(len(times), len(schedule))
-    both = zip(np.broadcast_to(times, (n, *times.shape[1:])), np.broadcast_to(schedule, (n, *schedule.shape[1:])))
-    return np.array([[np.interp(0.0, t, column) for column in commands.T] for t, commands in both])
+    times, schedule = (np.broadcast_to(one, (n, *one.shape[1:])) for one in (times, schedule))
+    return np.array(
+        [[np.interp(0.0, t, column) for column in commands.T] for t, commands in zip(times, schedule, strict=True)]
+    )

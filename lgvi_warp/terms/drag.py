@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp import vehicle
 from lgvi_warp.errors import Faults
 from lgvi_warp.inertia import Frame, motion_from
 from lgvi_warp.terms.base import Numbers, Packed, Setting, Term, quantity
@@ -54,6 +55,22 @@ class Drag(Term):
             values[f"quadratic_{where}"] = quadratic * scale / inertia[where] ** 2
         return Packed(values)
 
+    def packed_directions(self, own: Numbers, setting: Setting) -> Packed:
+        """For one axis after the other: the columns of the inverse inertia, each divided by its diagonal element L."""
+        frame = setting.frame
+        scale = frame.J.max(axis=1)
+        inverse = np.linalg.inv(vehicle.inertia6(setting.parameters))
+        L = np.einsum("nii->ni", inverse)
+        columns = inverse / L[:, None, :]
+        values = {"turn": frame.Q, "origin": frame.forces}
+        for where, half in (("force", slice(0, 3)), ("torque", slice(3, 6))):
+            values[f"mass_{where}"] = 1.0 / (L[:, half] * scale[:, None])
+            for kind in ("linear", "quadratic"):
+                values[f"{kind}_{where}"] = own[kind][:, half] * L[:, half]
+        for j, axis in enumerate("uvwpqr"):
+            values[f"velocity_{axis}"], values[f"rate_{axis}"] = columns[:, :3, j], columns[:, 3:, j]
+        return Packed(values)
+
     def packed(self, own: Numbers, setting: Setting) -> Packed:
         """As the matrix that it is the diagonal of."""
         matrices = {kind: own[kind][:, :, None] * np.eye(6) for kind in ("linear", "quadratic")}
@@ -62,7 +79,9 @@ class Drag(Term):
 
 def _turned(Q: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
     """The diagonal of Q^T diag Q, for axes that are the same but for their order."""
-    return np.einsum("nji,nj->ni", np.broadcast_to(Q, (max(len(Q), len(diagonal)), 3, 3)) ** 2, diagonal + 0.0 * Q[:, 0])
+    return np.einsum(
+        "nji,nj->ni", np.broadcast_to(Q, (max(len(Q), len(diagonal)), 3, 3)) ** 2, diagonal + 0.0 * Q[:, 0]
+    )
 
 
 def has_exact_flow(frame: Frame) -> bool:
@@ -144,4 +163,3 @@ def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, frame: Frame) -> Pa
         rows += [X[:, j, :], np.einsum("nij,nj->ni", XT, np.broadcast_to(quadratic[:, :, j], (n, 6)))]
     has_linear = int(np.any(linear))
     return Packed({"constant": has_linear, "count": len(columns)}, np.concatenate(rows, axis=1))
-

@@ -59,5 +59,9 @@ class WrenchNoise(Term):
         for i, axis in enumerate("xyz"):
             force, torque = (own[name] * np.eye(3)[i] for name in ("force", "torque"))
             moment = frame.torque(none + 0.0 * force, force)
-            values |= {f"force{axis}": frame.vector(force), f"moment{axis}": moment, f"torque{axis}": frame.vector(torque)}
+            values |= {
+                f"force{axis}": frame.vector(force),
+                f"moment{axis}": moment,
+                f"torque{axis}": frame.vector(torque),
+            }
         return Packed(values)

@@ -61,7 +61,10 @@ def test_a_hundred_steps(name):
     assert difference(kernel, twin) < 2e-12
 
 
-@pytest.mark.parametrize("method", ["phi", "phi_adjoint", "psi"])
+# psi, which holds both of its halves, with every law; the halves alone in test-long.
+@pytest.mark.parametrize(
+    "method", ["psi", *(pytest.param(name, marks=pytest.mark.slow) for name in ("phi", "phi_adjoint"))]
+)
 @pytest.mark.parametrize("name", [name for name in CASES if "noise" not in name and "Gauss" not in name])
 def test_the_papers_forces(name, method):
     # Phi* is iterated to 1e-14 of the momenta; a contraction by 1/10 or better leaves about 1e-15 of that, each step.

@@ -74,7 +74,7 @@ def make_E(parts):
         )
 
     @wp.func
-    def E(x: Any, e: Any):
+    def E(x: Any, e: Any, c: Any):
         """The exact flow of drag alone over e.h."""
         p = x.p
         pi = x.pi

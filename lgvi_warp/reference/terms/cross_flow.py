@@ -22,7 +22,10 @@ class CrossFlow(Law):
         """(x, weight times Cd D) of each Gauss point, Cd D linear in each segment."""
         strength, found = self.drag_coefficient * self.diameters, []
         for i in range(len(self.stations) - 1):
-            middle, half = 0.5 * (self.stations[i] + self.stations[i + 1]), 0.5 * (self.stations[i + 1] - self.stations[i])
+            middle, half = (
+                0.5 * (self.stations[i] + self.stations[i + 1]),
+                0.5 * (self.stations[i + 1] - self.stations[i]),
+            )
             for x in (middle - half / math.sqrt(3.0), middle + half / math.sqrt(3.0)):
                 part = (x - self.stations[i]) / (2.0 * half)
                 found.append((x, half * ((1.0 - part) * strength[i] + part * strength[i + 1])))

@@ -25,6 +25,16 @@ class Drag(Law):
         mean = np.where(x == 0.0, 1.0, -np.expm1(-x) / np.where(x == 0.0, 1.0, x))
         return np.asarray(inertia * v * np.exp(-x) / (1.0 + h * self.quadratic * np.abs(v) / inertia * mean))
 
+    def by_directions(self, nu: Array, inverse: Array, h: float) -> Array:
+        """The velocities (6,) after h / 2 of drag along each axis alone, and again in reversed order; inverse: I6^-1."""
+        for j in (*range(6), *reversed(range(6))):
+            L = inverse[j, j]
+            x = 0.5 * h * L * self.linear[j]
+            mean = -np.expm1(-x) / x if x else 1.0
+            w = nu[j] * np.exp(-x) / (1.0 + 0.5 * h * L * self.quadratic[j] * abs(nu[j]) * mean)
+            nu = nu + (w - nu[j]) / L * inverse[:, j]
+        return nu
+
 
 @dataclass(frozen=True)
 class DragMatrix(Law):

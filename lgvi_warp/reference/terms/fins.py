@@ -43,7 +43,10 @@ class Fins(Law):
         half = 0.5 * self.density * self.area[i]
         lift = half * self.lift_slope[i] * uc * un / V
         drag = half * (self.drag[i] * V + self.drag_normal[i] * un**2 / V)
-        along, across = np.outer(chord, chord) + np.outer(normal, normal), np.outer(normal, chord) - np.outer(chord, normal)
+        along, across = (
+            np.outer(chord, chord) + np.outer(normal, normal),
+            np.outer(normal, chord) - np.outer(chord, normal),
+        )
         return np.asarray(drag * along + lift * across)
 
 

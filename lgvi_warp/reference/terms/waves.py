@@ -31,6 +31,8 @@ class Waves(Law):
         along = np.array([math.cos(heading), math.sin(heading), 0.0])
         depth = view.b[2]
         theta = k * along @ view.b - omega * view.t + phase
-        wave = (along - 1j * np.array([0.0, 0.0, 1.0])) * a * omega * math.exp(-k * max(depth, 0.0)) * np.exp(-1j * theta)
+        wave = (
+            (along - 1j * np.array([0.0, 0.0, 1.0])) * a * omega * math.exp(-k * max(depth, 0.0)) * np.exp(-1j * theta)
+        )
         by_place = -1j * k * along + np.array([0.0, 0.0, -k if depth > 0.0 else 0.0])
         return Flow(wave.real, (1j * omega * wave).real, np.outer(wave, by_place).real)

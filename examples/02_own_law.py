@@ -1,0 +1,183 @@
+"""Laws of one's own: a dock that draws vehicles in, and water that grows thick near the sea floor."""
+
+import functools
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import warp as wp
+
+import lgvi_warp as lw
+from lgvi_kernels.lane_math import exponential
+from lgvi_kernels.lanes import add, cross, div, dot, lane, lane3, mul, neg, ones, sub, vec3  # noqa: F401
+from lgvi_kernels.state import struct
+from lgvi_kernels.view import add_outer, add_rows, to_body, to_inertial
+
+# 1. A law with a potential: U = -energy exp(-|d|^2 / (2 reach^2)), d from the dock to the vehicle's nose.
+
+
+@functools.cache
+def dock_params(width, real):
+    """Params: position [m, inertial], nose [m, body axes], energy [J], inverse_square = 1 / reach^2 [1/m2]."""
+    numbers = {"energy": lane(width, real), "inverse_square": lane(width, real)}
+    return struct("Dock", position=lane3(width, real), nose=lane3(width, real), **numbers)
+
+
+@wp.func
+def dock_law(w: Any, view: Any, p: Any):
+    """f = -energy / reach^2 exp(...) d at the nose."""
+    d = view.b + to_inertial(view, p.nose) - p.position
+    size = view.h.dtype(0.5) * p.inverse_square * dot(d, d)
+    f = to_body(view, -(p.energy * p.inverse_square * exponential(-size)) * d)
+    w.force = w.force + f
+    w.torque = w.torque + cross(p.nose, f)
+    return w
+
+
+class DockOnDevice:
+    """What a module of lgvi_kernels.terms would hold."""
+
+    POTENTIAL = True
+    params = staticmethod(dock_params)
+    law = dock_law
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Dock(lw.Term):
+    """A dock that draws the nose in, out to a few times its reach."""
+
+    type: ClassVar[str] = "dock"
+    device: ClassVar[Any] = DockOnDevice
+
+    position: Any = lw.quantity((3,), "m")
+    nose: Any = lw.quantity((3,), "m", (0.0, 0.0, 0.0))
+    energy: Any = lw.quantity((), "J", least=0.0)
+    reach: Any = lw.quantity((), "m", least=1e-3)
+
+    def packed(self, own, setting):
+        """As dock_params() has them: the nose from the origin of the forces, in the kernel's axes."""
+        values = {"position": own["position"], "energy": own["energy"], "inverse_square": own["reach"] ** -2.0}
+        return lw.Packed(values | {"nose": setting.frame.point(own["nose"])})
+
+    def potential(self, own, position, attitude, setting):
+        """U [J]."""
+        nose = position + (attitude @ own["nose"][..., None])[..., 0]
+        d = nose - own["position"]
+        return -own["energy"] * np.exp(-0.5 * np.sum(d * d, axis=-1) / own["reach"] ** 2)
+
+
+# 2. A damping law: force -c v at the centre of drag, which moves at v, and torque -angular Om, both times e^(depth / height).
+
+
+@functools.cache
+def mud_params(width, real):
+    """Params: center [m, body axes]; floor, height [m]; linear [N s/m]; angular [N m s]."""
+    numbers = {name: lane(width, real) for name in ("floor", "height", "linear", "angular")}
+    return struct("Mud", center=lane3(width, real), **numbers)
+
+
+@wp.func
+def along(D: Any, c: Any, angular: Any, r: Any, e: Any):
+    """Drag along one body axis e at the point r, and about it."""
+    arm = cross(r, e)
+    D = add_outer(D, c * e, c * arm, e, arm)
+    D.torque_rate = add_rows(D.torque_rate, angular * e, e)
+    return D
+
+
+@wp.func
+def mud_damping(D: Any, view: Any, p: Any):
+    """D (nu; Om) is the drag at the centre."""
+    depth = view.b.z + dot(view.down, p.center)
+    thick = exponential((depth - p.floor) / p.height)
+    one = ones(thick)
+    zero = one - one
+    D = along(D, p.linear * thick, p.angular * thick, p.center, vec3(one, zero, zero))
+    D = along(D, p.linear * thick, p.angular * thick, p.center, vec3(zero, one, zero))
+    return along(D, p.linear * thick, p.angular * thick, p.center, vec3(zero, zero, one))
+
+
+class MudOnDevice:
+    """The same for the second law."""
+
+    params = staticmethod(mud_params)
+    damping = mud_damping
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Mud(lw.Term):
+    """Drag that grows towards the sea floor: by e every `height` metres, to what linear and angular say at the floor."""
+
+    type: ClassVar[str] = "mud"
+    device: ClassVar[Any] = MudOnDevice
+
+    floor: Any = lw.quantity((), "m")
+    height: Any = lw.quantity((), "m", least=1e-3)
+    linear: Any = lw.quantity((), "N s/m", 0.0, least=0.0)
+    angular: Any = lw.quantity((), "N m s", 0.0, least=0.0)
+    center: Any = lw.quantity((3,), "m", (0.0, 0.0, 0.0))
+
+    def packed(self, own, setting):
+        """The centre from the origin of the forces; the rest as it is."""
+        return lw.Packed(dict(own) | {"center": setting.frame.point(own["center"])})
+
+
+# 3. A fleet that feels both.
+
+FLOOR, DOCK = 30.0, (8.0, 0.0, 20.0)
+dock = Dock(position=DOCK, nose=[0.6, 0.0, 0.0], energy=40.0, reach=4.0)
+mud = Mud(floor=FLOOR, height=4.0, linear=150.0, angular=40.0)
+vehicle = lw.Vehicle(
+    mass=31.0,  # kg
+    added_mass=[1.0, 30.0, 30.0],  # kg
+    inertia=[0.2, 8.0, 8.0],  # kg m2
+    buoyancy=31.0 * 9.8,  # N
+    center_of_buoyancy=[0.0, 0.0, -0.02],  # m
+)
+start = lw.Start(position=[0.0, -1.0, 17.0], velocity=[0.6, 0.0, 0.0])
+drag = lw.Drag(linear=[2.0, 20.0, 20.0, 0.5, 5.0, 5.0], quadratic=[4.0, 100.0, 100.0, 0.0, 20.0, 20.0])
+
+
+def fleet(terms, members=500):
+    """Vehicles that pass the dock, each a little otherwise; the dock's energy differs as well, where there is one."""
+    scene = lw.Scene(vehicle=vehicle, environment=lw.Environment(gravity=9.8), start=start, terms=terms)
+    vary = {"start.position": lw.Normal(std=[0.5, 1.5, 1.5]), "start.velocity": lw.Normal(std=[0.1, 0.02, 0.02])}
+    if dock in terms:
+        vary["dock.energy"] = lw.LogNormal(0.2)
+    return lw.Ensemble(scene, members=members, seed=2, vary=vary)
+
+
+def plot(runs, path):
+    """Distance to the dock over time: median and the middle 80 %."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.0, 4.5), layout="constrained")
+    axes = figure.subplots()
+    for name, result in runs.items():
+        low, middle, high = np.quantile(distance(result), (0.1, 0.5, 0.9), axis=1)
+        (line,) = axes.plot(result.time, middle, label=name)
+        axes.fill_between(result.time, low, high, color=line.get_color(), alpha=0.2, linewidth=0)
+    axes.set(xlabel="time [s]", ylabel="distance of the nose to the dock [m]", ylim=(0.0, None))
+    axes.legend()
+    figure.savefig(path, dpi=100)
+    return path
+
+
+def distance(result):
+    """From nose to dock (k, n) [m]."""
+    return np.linalg.norm(result.position + result.attitude @ dock.nose - np.array(DOCK), axis=-1)
+
+
+if __name__ == "__main__":
+    for law in (dock, mud):
+        report = lw.check_law(law, scene=fleet([]).scene)
+        print(report)
+        assert report.ok
+    runs = {"drag": fleet([drag]), "drag and dock": fleet([drag, dock]), "drag, dock and mud": fleet([drag, dock, mud])}
+    runs = {name: lw.solve(one, h=0.02, t1=60.0, save=lw.SaveAt(every=0.25)) for name, one in runs.items()}
+    for name, result in runs.items():
+        early, late = (np.mean(distance(result)[result.time == t] < 1.0) for t in (20.0, 60.0))
+        print(
+            f"{name}: {result.status.counts()}, within 1 m of the dock: {early:.0%} after 20 s, {late:.0%} after 60 s"
+        )
+    print(plot(runs, "own_law.png"))

@@ -132,10 +132,11 @@ def check_law(
     known, roles = (STOPS, ("distance",)) if isinstance(term, Event) else (LAWS, model.ROLES)
     module = model._module(term, known, *roles)
     bench = Bench(term, module, scene or simple_scene(), max(1, -(-samples // default_width("float64"))), seed)
-    checks = [*bench.numbers()]
-    if all(one.ok for one in checks):
-        for part in (_whole, _potential, _damping, _flow):
-            checks += part(bench, step)
+    checks: list[Check] = []
+    for part in (_numbers, _finite, _whole, _potential, _damping, _flow):
+        checks += part(bench, step)
+        if part in (_numbers, _finite) and not all(one.ok for one in checks):
+            break
     return LawReport(term, tuple(checks))
 
 
@@ -147,6 +148,8 @@ def simple_scene() -> Scene:
 
 class Bench:
     """A term with its numbers packed as for a run, ready to be evaluated at views."""
+
+    packets: Bank
 
     def __init__(self, term: Term, module: Any, scene: Scene, packets: int, seed: int):
         self.term, self.module, self.width = term, module, default_width("float64")
@@ -161,24 +164,6 @@ class Bench:
         warp_setup.start()
         self.examine = _built(term, module, self.width)
         self.Params = np.dtype(self.examine.Params.numpy_dtype())
-
-    def numbers(self) -> Iterator[Check]:
-        """Whether packed() fills what params() names; then packs, and lets the law remember once."""
-        setting = self.setting(self.parameters)
-        packed = self.term.packed(self.own, setting)
-        given = set(packed.values) | ({"first"} if packed.rows is not None else set())
-        given |= {"memory"} if packed.memory is not None else set()
-        wanted = set(self.Params["own"].names or ()) - {"unused"}
-        wrong = [f"{name} is not in packed().values" for name in sorted(wanted - given)]
-        wrong += [f"{name} is no field of params()" for name in sorted(given - wanted - {"first", "memory"})]
-        yield Check("numbers", len(wrong), 0.0, not wrong, "; ".join(wrong))
-        if wrong:
-            return
-        remembers = packed.memory is not None and packed.memory.size > 0
-        good = remembers == bool(self.term.memory)
-        text = "" if good else f"{type(self.term).__name__}.memory must say whether packed() gives memory"
-        yield Check("memory", float(not good), 0.0, good, text)
-        self.packets = Bank(self, setting, self.views)
 
     def setting(self, parameters: Mapping[str, np.ndarray], elsewhere: bool = False) -> Setting:
         """What packed() may look at: the kernel's axes are the user's, or TURN at ORIGIN."""
@@ -280,15 +265,37 @@ def _judged(name: str, difference: np.ndarray, allowed: np.ndarray | float, view
     return Check(name, float(worst[i, j]), float(limit[i, j]), good, text)
 
 
-def _whole(bench: Bench, step: float) -> Iterator[Check]:
-    """What holds for every law: finite, blind to what it must not look at, lanes apart, varied as shared."""
-    views, kind = bench.views, type(bench.term).__name__
-    here = bench.at(views)
+def _numbers(bench: Bench, step: float) -> Iterator[Check]:
+    """Whether packed() fills what params() names; then packs, and lets the law remember once."""
+    term, setting = bench.term, bench.setting(bench.parameters)
+    packed = term.packed(bench.own, setting)
+    given = set(packed.values) | ({"first"} if packed.rows is not None else set())
+    given |= {"memory"} if packed.memory is not None else set()
+    wanted = set(bench.Params["own"].names or ()) - {"unused"}
+    wrong = [f"{name} is not in packed().values" for name in sorted(wanted - given)]
+    wrong += [f"{name} is no field of params()" for name in sorted(given - wanted - {"first", "memory"})]
+    yield Check("numbers", len(wrong), 0.0, not wrong, "; ".join(wrong))
+    remembers = packed.memory is not None and packed.memory.size > 0
+    good = remembers == bool(term.memory)
+    text = "" if good else f"{type(term).__name__}.memory must say whether packed() gives memory"
+    yield Check("memory", float(not good), 0.0, good, text)
+    if good and not wrong:
+        bench.packets = Bank(bench, setting, bench.views)
+
+
+def _finite(bench: Bench, step: float) -> Iterator[Check]:
+    """Numbers at every view; a law that is zero at all of them is told."""
+    here = bench.at(bench.views)
     finite = np.all([np.isfinite(value).all(axis=1) for value in here.values()], axis=0)
-    found = _judged("finite", (~finite).astype(float), 0.0, views, "guard divisions and roots")
+    found = _judged("finite", (~finite).astype(float), 0.0, bench.views, "guard divisions and roots")
     asleep = not any(np.any(value) for value in here.values())
     note = "note: zero at every view, so little was checked; give a scene that starts where the law acts"
     yield found._replace(text=note) if asleep else found
+
+
+def _whole(bench: Bench, step: float) -> Iterator[Check]:
+    """What holds for every law: blind to what it must not look at, lanes apart, varied as shared."""
+    views, kind, here = bench.views, type(bench.term).__name__, bench.at(bench.views)
     faster = bench.at(views.changed(velocity=2.0 * views.velocity + 1.0, rate=1.0 - views.rate))
     later = bench.at(views.changed(time=views.time + 3.7))
     for role, value in here.items():
@@ -406,8 +413,6 @@ def _damping(bench: Bench, step: float) -> Iterator[Check]:
         return
     views = bench.views
     D = bench.at(views)["damping"].reshape(-1, 6, 6)
-    if not np.isfinite(D).all():
-        return
     weakest = np.linalg.eigh(D + np.swapaxes(D, 1, 2))[1][:, :, 0]
     tried = [views, *(views.changed(velocity=s * weakest[:, :3], rate=s * weakest[:, 3:]) for s in (1.0, -1.0))]
     power, allowed, twist = (np.concatenate(x) for x in zip(*(_power(bench, one) for one in tried), strict=True))

@@ -221,6 +221,18 @@ class Scene:
 
         return scenefile.load(path, overrides)
 
+    @classmethod
+    def named(cls, name: str, **sections: Any) -> Scene:
+        """A scene of a vehicle that comes with the package (`lw.vehicles()` lists them), with its own terms and water.
+
+        sections: as in a scene file; vehicle={...} and environment={...} replace single keys, a term in terms=[...]
+        replaces the vehicle's of the same name or type or is added; start={...}, run={...}, events=[...].
+        Raises SceneError naming every fault.
+        """
+        from lgvi_warp import scenefile
+
+        return scenefile.from_dict({**sections, "vehicle": {**sections.get("vehicle", {}), "name": name}})
+
     def to_dict(self) -> dict[str, Any]:
         """In the shape of a scene file."""
         content: dict[str, Any] = {

@@ -15,7 +15,7 @@ from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.scene import EnsembleSettings, Environment, RunSettings, Scene, Start
 from lgvi_warp.vehicle import Vehicle
 
-SECTIONS = ("vehicle", "environment", "start", "ensemble", "run", "terms", "events", "controller")
+SECTIONS = ("vehicle", "environment", "start", "ensemble", "run", "terms", "events", "controller", "source")
 
 
 def load(path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None) -> Scene:
@@ -56,6 +56,7 @@ def override(content: dict[str, Any], key: str, value: Any) -> None:
 
 def from_dict(content: Mapping[str, Any]) -> Scene:
     """A Scene from the tables of a scene file. Raises SceneError naming every fault."""
+    content = with_named_vehicle(content)
     faults = Faults()
     faults.keys("", content, SECTIONS)
     tables: dict[str, Any] = {}
@@ -88,6 +89,36 @@ def from_dict(content: Mapping[str, Any]) -> Scene:
     faults.raise_if_any()
     assert scene is not None
     return scene
+
+
+def with_named_vehicle(content: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The same with what [vehicle] name = "remus_100" stands for: that vehicle, its terms and the water it was given for.
+
+    Keys beside the name replace the vehicle's own, a term of the same name or type replaces its term. Raises SceneError.
+    """
+    table = content.get("vehicle")
+    if not isinstance(table, Mapping) or "name" not in table:
+        return content
+    from lgvi_warp.coefficients import vehicle_file
+
+    known = tomllib.loads(vehicle_file(str(table["name"])).read_text(encoding="utf-8"))
+    merged = dict(content)
+    for section in ("vehicle", "environment"):
+        own = content.get(section, {})
+        if isinstance(own, Mapping):
+            merged[section] = known.get(section, {}) | {key: value for key, value in own.items() if key != "name"}
+    terms = content.get("terms", [])
+    if isinstance(terms, list | tuple):
+        names = {_name_of(term) for term in terms}
+        merged["terms"] = [term for term in known.get("terms", []) if _name_of(term) not in names] + list(terms)
+    return merged
+
+
+def _name_of(term: Any) -> Any:
+    """What a term is called by: its name, or its type."""
+    if isinstance(term, Mapping):
+        return term.get("name") or term.get("type")
+    return getattr(term, "key", None)
 
 
 def _check_ensemble(settings: EnsembleSettings, scene: Scene | None, parameters: Sequence[str]) -> None:

@@ -83,10 +83,10 @@ CASES = {
     ),
 }  # fmt: skip
 
-from tests.laws_water import CASES as _water  # noqa: E402
+from tests.laws_water import CASES as _water  # noqa: E402, N811
 
 CASES |= _water
 
-from tests.laws_lift import CASES as _lift  # noqa: E402
+from tests.laws_lift import CASES as _lift  # noqa: E402, N811
 
 CASES |= _lift

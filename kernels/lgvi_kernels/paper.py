@@ -164,7 +164,10 @@ def make_phi(maps, laws, alpha, beta):
             u_1 = current(y, c, h)
             d = u_1 - u
             size = h * c.inertia.inverse_scale
-            kick = (size * size) * change(new, w_star) - tolerance * (dot(y.p, y.p) + dot(y.pi, y.pi))
+            # Round-off is relative to the impulse of the forces, which may be all there is.
+            impulse = (size * size) * (dot(new.force, new.force) + dot(new.torque, new.torque))
+            momenta = dot(y.p, y.p) + dot(y.pi, y.pi)
+            kick = (size * size) * change(new, w_star) - tolerance * (momenta + impulse)
             drift = dot(d, d) - tolerance * dot(u, u)
             w_star.force = positive(pending, new.force, w_star.force)
             w_star.torque = positive(pending, new.torque, w_star.torque)

@@ -175,7 +175,7 @@ def Phi_adjoint(x: State, body: Body, h: float, solve: Solver = newton, alpha: f
         change = h * norm(np.concatenate([new[0] - star[0], new[1] - star[1]]))
         change = change + norm(drift(y, body, h) - moved)
         star, moved = new, drift(y, body, h)
-        if change <= 1e-15 * (norm(p) + norm(pi)):
+        if change <= 1e-15 * (norm(p) + norm(pi) + h * norm(np.concatenate(new))):
             return at_time(remembered_over(at_time(y, y.t - 0.5 * h), body, h), y.t)
     raise NoSolution(f"Phi*: the forces change by {change:.3g} N s from one iteration to the next; shorten the step")
 

@@ -19,16 +19,18 @@ EXAMPLE = ROOT / "examples" / "02_own_law.py"
 STEPS = (0.1, 0.05, 0.025)
 
 
-def load():
-    """The example as a module, as a user would import his own."""
-    spec = importlib.util.spec_from_file_location("own_law", EXAMPLE)
+def load(path, code=None):
+    """A file as a module, as a user would import his own; written first, if its code is given."""
+    if code is not None:
+        path.write_text(code)
+    spec = importlib.util.spec_from_file_location(path.stem.lstrip("0123456789_"), path)
     module = importlib.util.module_from_spec(spec)
-    sys.modules["own_law"] = module
+    sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     return module
 
 
-own_law = load()
+own_law = load(EXAMPLE)
 DOCK = dict(position=(2.0, 1.0, 3.0), nose=(0.6, 0.1, 0.0), energy=40.0, reach=2.0)
 MUD = dict(floor=5.0, height=2.0, linear=30.0, angular=8.0)
 START = {"b": (0.0, 0.0, 2.0), "nu": (0.5, 0.2, 0.1), "Om": (0.1, 0.3, -0.2)}
@@ -57,7 +59,7 @@ def test_each_law_is_right():
 
 def test_the_dock_draws_and_the_mud_brakes():
     free, docked = solve([]), solve([own_law.Dock(**DOCK)])
-    muddy = solve([own_law.Mud(**MUD)])
+    muddy = solve([own_law.Mud(**MUD | {"linear": 150.0})])
     assert np.abs(docked.position - free.position).max() > 0.1
     speeds = [np.linalg.norm(run.velocity[-1, 0]) for run in (free, muddy)]
     assert speeds[1] < 0.5 * speeds[0]
@@ -157,6 +159,15 @@ def test_a_scene_file_without_them_is_refused():
 def test_a_type_is_taken_once(registered):
     with pytest.raises(ValueError, match="no other term has"):
         terms.register(own_law.Dock)
+
+
+def test_the_law_on_the_page_is_right(tmp_path):
+    lines = (ROOT / "docs" / "add_a_law.md").read_text().split("## Five roles")[0].splitlines()
+    code = "\n".join(line[4:] for line in lines if line.startswith("    ") or not line)
+    page = load(tmp_path / "page.py", code)
+    assert lw.check_law(page.spring, scene=lw.Scene(own_law.vehicle, start=lw.Start(position=[0.0, 0.0, 20.0]))).ok
+    energy = solve([page.spring], save=lw.SaveAt(every=1.0)).energy[:, 0]
+    assert np.abs(energy - energy[0]).max() < 1e-3 * energy[0]
 
 
 def test_the_example_runs_as_a_script(tmp_path):

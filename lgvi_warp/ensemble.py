@@ -75,8 +75,9 @@ class Ensemble:
     ) -> Ensemble:
         """Members with given states: (n, 3) [m], (n, 3, 3) body to inertial, (n, 3) [m/s, body], (n, 3) [rad/s, body].
 
-        parameters: name -> array of length n ("vehicle.inertia": (n, 3) or (n, 3, 3)), names as in `vary`. States that are not finite are
-        let through: the run gives such a member its status. Raises SceneError for wrong shapes and unphysical values.
+        parameters: name -> array of length n ("vehicle.inertia": (n, 3) or (n, 3, 3)), names as in `vary`. States that
+        are not finite are let through: the run gives such a member its status. Raises SceneError for wrong shapes and
+        unphysical values.
         """
         faults = Faults()
         states = dict(zip(STATES, (position, attitude, velocity, angular_velocity), strict=True))
@@ -230,7 +231,7 @@ class Ensemble:
 
 def _vehicle_checks(p: Mapping[str, np.ndarray], varied: set[str]) -> dict[str, np.ndarray]:
     """Name -> (n,), which members' numbers of vehicle and environment are unphysical."""
-    checks = {}
+    checks: dict[str, np.ndarray] = {}
     if "vehicle.mass" in p:
         mass = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
         heavy = np.isfinite(p["vehicle.mass"]) & (p["vehicle.mass"] > 0.0)

@@ -101,7 +101,8 @@ class Frame:
 
         The angular part of a twist that measures a velocity moves in the same way.
         """
-        return self.vector(torque - np.cross(np.broadcast_to(_expanded(self.forces, force), force.shape), force))
+        arm, torque, force = np.broadcast_arrays(_expanded(self.forces, force), torque, force)
+        return self.vector(torque - np.cross(arm, force))
 
 
 def _expanded(origin: np.ndarray, like: np.ndarray) -> np.ndarray:
@@ -126,7 +127,7 @@ def uncoupled_frame(I6: np.ndarray) -> tuple[Frame, np.ndarray]:
 
     The coupling vanishes there if and only if E is skew; its largest remaining value tells whether it does.
     """
-    M, E, Js = schur(I6)
+    _, E, Js = schur(I6)
     origin = -vee(E)
     Q, J = notation.principal_axes(Js)
     rest = moved(I6, origin, Q)

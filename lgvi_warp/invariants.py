@@ -26,8 +26,8 @@ def _relative(result: Result) -> np.ndarray:
     nu = result.velocity.astype(np.float64)
     position, time = result.position.astype(np.float64), result.time
     for term in result.terms:
-        if hasattr(term, "water"):
-            water = term.water(result.own(term), position, time)
+        water = term.water(result.own(term), position, time, result.parameters)
+        if water is not None:
             nu = nu - _times(np.swapaxes(result.attitude.astype(np.float64), -1, -2), water)
     return np.concatenate([nu, result.angular_velocity.astype(np.float64)], axis=-1)
 

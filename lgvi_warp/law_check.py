@@ -461,14 +461,15 @@ def _flow(bench: Bench, step: float) -> Iterator[Check]:
 def _water(bench: Bench, u: Callable[[Views], np.ndarray], rounded: np.ndarray) -> Check:
     """water(), or water_at_start() at t = 0, is what flow() gives. rounded (k,): what a position's rounding moves."""
     term, views = bench.term, bench.views
-    if hasattr(term, "water"):
-        host = term.water(bench.own, views.position[:, None], views.time)[:, 0]
-    elif hasattr(term, "water_at_start"):
+    given = term.water(bench.own, views.position[:, None], views.time, bench.parameters)
+    if given is None and type(term).water_at_start is Term.water_at_start:
+        text = f"write water(own, position, time, parameters) in {type(term).__name__}: start and energy need it"
+        return Check("flow: water()", np.inf, 0.0, False, text)
+    if given is None:
         views = views.changed(time=0.0 * views.time)
         host = term.water_at_start(bench.own, views.position, bench.setting(bench.parameters))
     else:
-        text = f"write water(own, position, time) in {type(term).__name__}: start and energy need it"
-        return Check("flow: water()", np.inf, 0.0, False, text)
+        host = given[:, 0]
     limit = ROUNDINGS * EPS * (max(np.abs(host).max(), 1e-300) + rounded)
     return _judged("flow: water()", u(views) - host, limit, views, "the host's water() must be what flow() gives")
 

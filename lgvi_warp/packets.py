@@ -213,10 +213,7 @@ class Packets:
         total = np.zeros_like(m.position)
         for term, _ in self.plan.model.laws:
             own = Ensemble.own(term, m.parameters)
-            if hasattr(term, "water_at_start"):
-                total = total + term.water_at_start(own, m.position, setting)
-            elif hasattr(term, "water"):
-                total = total + term.water(own, m.position[None], np.zeros(1))[0]
+            total = total + term.water_at_start(own, m.position, setting)
         return notation.rotate_into(m.attitude, total)
 
     def advance(self, k0: int, k1: int) -> np.ndarray:

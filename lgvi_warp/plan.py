@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from lgvi_kernels.advance import CHUNK, SAMPLE_FIELDS, STATE_FIELDS, Advance, Spec, make_advance
+from lgvi_kernels.advance import CHUNK, SAMPLE_FIELDS, Advance, Spec, make_advance
 from lgvi_kernels.lanes import WIDTHS
 from lgvi_kernels.stops import STOPS
 from lgvi_kernels.terms import LAWS
@@ -128,7 +128,7 @@ class Plan:
     def dtypes(self) -> tuple[np.dtype, np.dtype, np.dtype]:
         """NumPy's types of the kernel's Inertia, Params and Events."""
         types = (self.advance.Inertia, self.advance.Params, self.advance.Events)
-        return tuple(np.dtype(one.numpy_dtype()) for one in types)  # type: ignore[return-value]
+        return tuple(np.dtype(one.numpy_dtype()) for one in types)
 
     @functools.cached_property
     def times(self) -> tuple[Any, Any, Any]:

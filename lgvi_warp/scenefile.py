@@ -81,11 +81,15 @@ def from_dict(content: Mapping[str, Any]) -> Scene:
             content.get("controller"), run or RunSettings(), settings if tables["ensemble"] else None,
             content.get("events", ()),
         )  # fmt: skip
-    names = tuple(scene.parameters()) if scene else ()
-    if names:
-        with faults.including():
-            whole = scene if vehicle and environment and start else None
-            _check_ensemble(settings or EnsembleSettings(vary=laws), whole, names)
+    with faults.including():
+        if scene is None:
+            # What varies of a term that has a fault itself cannot be told: the names of the rest are looked at.
+            sections = ("vehicle.", "environment.", "start.")
+            laws = {name: law for name, law in laws.items() if str(name).startswith(sections)}
+            settings = EnsembleSettings(vary=laws)
+        whole = scene if vehicle and environment and start else None
+        names = (scene or Scene(vehicle or Vehicle(**_STAND_INS))).parameters()
+        _check_ensemble(settings or EnsembleSettings(vary=laws), whole, tuple(names))
     faults.raise_if_any()
     assert scene is not None
     return scene

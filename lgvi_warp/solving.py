@@ -14,8 +14,8 @@ from lgvi_warp import machine, notation
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults
 from lgvi_warp.executors import threads as thread_executor
-from lgvi_warp.method import Method
 from lgvi_warp.inertia import Frame
+from lgvi_warp.method import Method
 from lgvi_warp.packets import Packets
 from lgvi_warp.plan import Block, Plan, blocks
 from lgvi_warp.result import Result
@@ -157,7 +157,7 @@ def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None 
         parameters=plan.ensemble.parameters(0, n),
         messages=plan.grid.messages + plan.ensemble.scene.vehicle.warnings,
         provenance=provenance(plan),
-        terms=plan.ensemble.scene.terms,
+        terms=tuple(plan.ensemble.scene.terms),
         compile_seconds=compile_seconds,
         run_seconds=run_seconds,
     )

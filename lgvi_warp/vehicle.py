@@ -113,7 +113,8 @@ class Vehicle:
         given = zeros if self.added_mass_matrix is None else self.added_mass_matrix
         added = faults.symmetric("added_mass_matrix", given, UNITS["mass"], 6)
         weight = None if self.weight is None else faults.number("weight", self.weight, "N", least=0.0)
-        center, warnings = None, ()
+        center: np.ndarray | None = None
+        warnings: tuple[str, ...] = ()
         if self.center_of_gravity is not None:
             center = faults.finite("center_of_gravity", self.center_of_gravity, (3,), "m")
         if rigid is not None:
@@ -155,7 +156,7 @@ class Vehicle:
         """Mass and added mass of translation, (3, 3) [kg]."""
         if self.full:
             return np.asarray(self.rigid_body_mass_matrix + self.added_mass_matrix)[:3, :3]
-        return np.asarray(self.mass * np.eye(3) + self.added_mass)
+        return np.asarray(np.asarray(self.mass) * np.eye(3) + self.added_mass)
 
     def parameters(self) -> dict[str, np.ndarray]:
         """What may vary by member, by name. The weight of a 6x6 vehicle is there only if it was given."""

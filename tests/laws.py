@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-import lgvi_warp as lw
 from lgvi_warp import terms
 from lgvi_warp.reference.terms.current import Current, CurrentProfile
 from lgvi_warp.reference.terms.drag import Drag, DragMatrix
@@ -38,6 +37,7 @@ TABLE = dict(
     force=((0.0, 0.0, 0.0), (5.0, -2.0, 1.0), (-3.0, 4.0, 2.0), (1.0, 1.0, 1.0)),
     torque=((0.0, 0.1, 0.0), (0.2, -0.2, 0.1), (-0.3, 0.1, 0.2), (0.0, 0.0, 0.1)),
 )
+TWIN_TABLE = {key: np.array(value) for key, value in TABLE.items()}
 THRUSTERS = dict(
     position=((-0.5, 0.2, 0.0), (-0.5, -0.2, 0.0), (0.1, 0.0, 0.3)),
     direction=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.6, 0.8)),
@@ -59,13 +59,17 @@ CASES = {
         depths=(-100.0, 100.0),
         velocities=((-30.0, 20.0, -10.0), (30.0, -20.0, 10.0)),
     ),
-    "tether": case(terms.Tether, Tether, anchor=(1.0, 2.0, 3.0), stiffness=5.0, attachment=(0.5, -0.1, 0.2), rest_length=2.0),
-    "slack tether": case(terms.Tether, Tether, anchor=(0.0, 0.0, 10.0), stiffness=5.0, attachment=(0.1, 0.0, 0.0), rest_length=50.0),
+    "tether": case(
+        terms.Tether, Tether, anchor=(1.0, 2.0, 3.0), stiffness=5.0, attachment=(0.5, -0.1, 0.2), rest_length=2.0
+    ),
+    "slack tether": case(
+        terms.Tether, Tether, anchor=(0.0, 0.0, 10.0), stiffness=5.0, attachment=(0.1, 0.0, 0.0), rest_length=50.0
+    ),
     "wrench": case(terms.Wrench, Wrench, force=(1.0, -2.0, 0.5), torque=(0.1, 0.2, -0.3)),
-    "wrench schedule": Case((terms.WrenchSchedule(**TABLE),), (WrenchSchedule(**{k: np.array(v) for k, v in TABLE.items()}),), False),
+    "wrench schedule": Case((terms.WrenchSchedule(**TABLE),), (WrenchSchedule(**TWIN_TABLE),), False),
     "wrench in steps": Case(
         (terms.WrenchSchedule(**TABLE, interpolation="steps"),),
-        (WrenchSchedule(**{k: np.array(v) for k, v in TABLE.items()}, steps=True),),
+        (WrenchSchedule(**TWIN_TABLE, steps=True),),
         False,
     ),
     "thrusters": Case(

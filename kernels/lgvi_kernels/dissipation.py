@@ -5,7 +5,6 @@ gamma = 1 - 1/sqrt(2) (Alexander 1977) solve I6 nu' = -D nu. Stiff drag decays, 
 kinetic energy never grows. Nothing is iterated.
 """
 
-import math
 from typing import Any
 
 import warp as wp
@@ -13,7 +12,7 @@ import warp as wp
 from lgvi_kernels.lanes import add, mul, sub  # noqa: F401
 from lgvi_kernels.matrix3 import apply, combine, factorise, solve6, symmetric, transposed
 
-GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
+GAMMA = 1.0 - 0.5**0.5
 
 
 @wp.func

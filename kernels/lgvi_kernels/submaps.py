@@ -125,9 +125,9 @@ def kicked(x: Any, c: Any, h: Any, w: Any):
 def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):
     """The kick by these laws, each of them None where a scene has none.
 
-    law: forces from position and time; shifted: the origin of the forces is not the user's; evolve: laws that remember, before and after; flow: the water carries the vehicle,
-    and where it varies in space or time also pushes it; E: exact flow of drag; V: velocity-dependent laws. E or V stands
-    between two half kicks and the water's drift is taken half before and half after, so the order is 2.
+    law: forces from position and time; evolve: laws that remember, half before and half after; flow: the water carries
+    the vehicle, half before and half after, and where it varies in space or time also pushes it; shifted: the origin of
+    the forces is not the user's; E: exact flow of drag, or V: velocity-dependent laws, between two half kicks. Order 2.
     """
     drifts, damped = flow is not None, E is not None or V is not None
 

@@ -34,7 +34,8 @@ class Body:
     """M (3, 3) [kg], J (3, 3) [kg m2], both symmetric, and the laws that act.
 
     excess: displaced mass less mass [kg], and excess_lever (3,) [kg m], the same times their levers: water that
-    accelerates pushes them. C (3, 3) [kg m], the coupling of M and J, for K alone: the other sub-maps of this file want it zero.
+    accelerates pushes them.
+    C (3, 3) [kg m], the coupling of M and J, for K alone: the other sub-maps of this file want it zero.
     """
 
     M: Array
@@ -183,9 +184,9 @@ def K(x: State, body: Body, h: float, solve: Solver = newton) -> State:
     x = replace(x, b=b + 0.5 * h * water(look(x, body, h), body).velocity)
     views = look(x, body, h)
     flow = water(views, body)
-    wrench = tuple(
-        w + a for w, a in zip(body.wrench(x.b, x.R, views), acceleration_wrench(x.R, body, flow), strict=True)
-    )
+    force, torque = body.wrench(x.b, x.R, views)
+    pushed, turned = acceleration_wrench(x.R, body, flow)
+    wrench = (force + pushed, torque + turned)
     x = kicked(x, 0.5 * h, wrench)
     x = dissipated(x, body, h, flow)
     x = kicked(x, 0.5 * h, wrench)

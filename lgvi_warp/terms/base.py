@@ -58,7 +58,8 @@ class Term:
     """A law that a scene names. Its fields made by `quantity` are arrays after construction.
 
     type: the name in a scene file; device: its module in lgvi_kernels.terms, by name, or any object with the same
-    functions; timed: whether the law looks at the time. name tells two terms of one type apart in "name.field".
+    functions; timed: whether the law looks at the time; dissipative: whether its
+    damping never creates energy. name tells two terms of one type apart in "name.field".
 
     Raises SceneError naming every fault.
     """
@@ -66,6 +67,7 @@ class Term:
     type: ClassVar[str] = ""
     device: ClassVar[Any] = ""
     timed: ClassVar[bool] = False
+    dissipative: ClassVar[bool] = True
 
     name: str = ""
 
@@ -121,6 +123,18 @@ class Term:
         """Its numbers in the kernel's axes."""
         raise NotImplementedError
 
+    def water(self, own: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray | None:
+        """Velocity of the water (k, n, 3) [m/s] at positions (k, n, 3) and times (k,) [s].
+
+        None for laws that move none, or whose water is not known after the run.
+        """
+        return None
+
+    def water_at_start(self, own: Numbers, position: np.ndarray, setting: Setting) -> np.ndarray:
+        """Velocity of the water (n, 3) [m/s] where members start."""
+        still = self.water(own, position[None], np.zeros(1), setting.parameters)
+        return np.zeros_like(position) if still is None else still[0]
+
     def potential(
         self, own: Numbers, position: np.ndarray, attitude: np.ndarray, setting: Numbers
     ) -> np.ndarray | float:
@@ -146,7 +160,9 @@ def _checked(faults: Faults, one: dataclasses.Field[Any], value: Any, lengths: d
         if array is None:
             return None
         wanted = tuple(lengths.get(size, size) if isinstance(size, str) else size for size in shape)
-        fits = array.ndim == len(shape) and all(isinstance(w, str) or w == g for w, g in zip(wanted, array.shape))
+        fits = array.ndim == len(shape) and all(
+            isinstance(w, str) or w == g for w, g in zip(wanted, array.shape, strict=True)
+        )
         if not fits or 0 in array.shape:
             text = " x ".join(str(size) for size in wanted)
             faults.add(one.name, value, f"has shape {array.shape}", f"give {text} numbers [{unit}]")

@@ -32,7 +32,7 @@ class Current(Term):
         """As it is: inertial axes are not turned."""
         return Packed({"velocity": own["velocity"]})
 
-    def water(self, own: Numbers, position: np.ndarray, time: np.ndarray) -> np.ndarray:
+    def water(self, own: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
         """Velocity of the water (k, n, 3) [m/s]."""
         return np.broadcast_to(own["velocity"], position.shape)
 
@@ -58,7 +58,7 @@ class CurrentProfile(Term):
         """The table, knot by knot."""
         return Packed({"count": own["depths"].shape[1] - 1}, knots(own["depths"], own["velocities"]))
 
-    def water(self, own: Numbers, position: np.ndarray, time: np.ndarray) -> np.ndarray:
+    def water(self, own: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
         """Velocity of the water (k, n, 3) [m/s]."""
         depths, velocities = own["depths"], own["velocities"]
         result = np.empty(position.shape)

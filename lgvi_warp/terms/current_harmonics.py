@@ -68,7 +68,7 @@ class CurrentHarmonics(Term):
         rows = np.concatenate([np.broadcast_to(part, (n, *part.shape[1:])) for part in parts], axis=2)
         return Packed({"count": rows.shape[1]}, rows.reshape(n, -1))
 
-    def water(self, own: Numbers, position: np.ndarray, time: np.ndarray) -> np.ndarray:
+    def water(self, own: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
         """Velocity of the water (k, n, 3) [m/s]."""
         total = np.zeros(position.shape)
         for j in range(own["periods"].shape[1]):

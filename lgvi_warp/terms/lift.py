@@ -21,6 +21,7 @@ class BodyLift(Term):
 
     type: ClassVar[str] = "body_lift"
     device: ClassVar[str] = "lift"
+    dissipative: ClassVar[bool] = False
 
     matrix: Any = quantity((6, 6), "kg/m, kg, kg m")
 

@@ -42,7 +42,7 @@ class Thrusters(Term):
         defaults = {"coefficient_astern": self.coefficient, "dead_band": np.zeros(n), "limit": np.full(n, 1e6),
                     "time_constant": np.zeros(n)}  # fmt: skip
         scheduled = self.command_schedule is not None
-        both = scheduled and self.command is not None
+        both = scheduled and self.command is not None and not np.array_equal(self.command, self.command_schedule[0])
         if scheduled:
             defaults["command"] = np.asarray(self.command_schedule)[:1].reshape(-1)
         else:
@@ -64,7 +64,7 @@ class Thrusters(Term):
             faults.add(f"direction[{zero[0]}]", self.direction[zero[0]], "has zero length", remedy)
         rising(faults, "times", self.times)
         if self.__dict__["_both"]:
-            faults.add("command", self.command, "is given beside command_schedule", "keep one of them")
+            faults.add("command", self.command, "differs from the first of command_schedule", "keep one of them")
 
     @property
     def memory(self) -> bool:

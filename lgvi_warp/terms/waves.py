@@ -58,8 +58,9 @@ class Waves(Term):
         rows = np.stack(np.broadcast_arrays(*_components(own, g)), axis=-1)
         return Packed({"count": rows.shape[1]}, rows.reshape(len(rows), -1))
 
-    def velocity(self, own: Numbers, gravity: np.ndarray, position: np.ndarray, time: np.ndarray) -> np.ndarray:
-        """Velocity of the water (k, n, 3) [m/s] at positions (k, n, 3) and times (k,), gravity (1 or n,)."""
+    def water(self, own: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
+        """Velocity of the water (k, n, 3) [m/s]."""
+        gravity = parameters["environment.gravity"]
         total = np.zeros(position.shape)
         x, y, depth = np.moveaxis(position, -1, 0)
         for j in range(own["periods"].shape[1]):
@@ -69,10 +70,6 @@ class Waves(Term):
             cosine, sine = e * np.cos(theta), e * np.sin(theta)
             total = total + np.stack([cosine * speed[0], cosine * speed[1], -sine * speed[2]], axis=-1)
         return total
-
-    def water_at_start(self, own: Numbers, position: np.ndarray, setting: Setting) -> np.ndarray:
-        """Velocity of the water (m, 3) [m/s] where members start."""
-        return self.velocity(own, setting.parameters["environment.gravity"], position[None], np.zeros(1))[0]
 
 
 def _components(own: Numbers, gravity: np.ndarray) -> tuple[np.ndarray, ...]:

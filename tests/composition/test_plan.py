@@ -8,6 +8,7 @@ import warp as wp
 
 import lgvi_warp as lw
 from lgvi_kernels.advance import make_advance
+from lgvi_kernels.terms import restoring, weight
 from lgvi_warp.method import Method
 from lgvi_warp.model import shape_of_mass
 from lgvi_warp.packets import pack
@@ -36,10 +37,10 @@ def test_an_absent_term_is_no_code(tmp_path):
 
 
 def test_terms_are_those_of_the_scene():
-    assert plan_of(scene_of()).spec.terms == ()
-    assert plan_of(scene_of(net=1.0)).spec.terms == ("weight",)
-    assert plan_of(scene_of(moment=(0.0, 0.0, 1.0))).spec.terms == ("restoring",)
-    assert plan_of(scene_of(net=1.0, moment=(0.0, 0.0, 1.0))).spec.terms == ("weight", "restoring")
+    assert plan_of(scene_of()).spec.laws == ()
+    assert plan_of(scene_of(net=1.0)).spec.laws == (weight,)
+    assert plan_of(scene_of(moment=(0.0, 0.0, 1.0))).spec.laws == (restoring,)
+    assert plan_of(scene_of(net=1.0, moment=(0.0, 0.0, 1.0))).spec.laws == (weight, restoring)
 
 
 def test_an_absent_term_is_no_parameter():
@@ -170,7 +171,8 @@ def test_solve_prints_nothing(scene, capfd):
 
 
 def test_method_is_data():
-    assert dataclasses.asdict(Method()) == {"name": "psi_s", "solver": "quartic", "iterations": None, "tolerance": None}
+    settings = {"solver": "quartic", "iterations": None, "tolerance": None, "alpha": 0.5, "beta": 0.5}
+    assert dataclasses.asdict(Method()) == {"name": "psi_s"} | settings
     assert Method("kl8(psi_1)").order == 8 and len(Method("kl8(psi_1)").stages) == 17
     for name in ("tj4", "su4", "kl6", "kl8"):
         stages = Method(f"{name}(psi_s)").stages

@@ -250,11 +250,12 @@ def test_an_attitude_matrix_cannot_vary_by_entry(scene):
     assert "rotation_vector" in faults(lw.Ensemble, other, 4, 0, {"start.attitude": lw.Normal(std=0.1)})[0]
 
 
-def test_a_law_on_a_full_matrix_is_refused(scene):
+def test_a_full_matrix_varies_and_stays_symmetric(scene):
     other = dataclasses.replace(scene, vehicle=dataclasses.replace(scene.vehicle, inertia=FULL))
-    (fault,) = faults(lw.Ensemble, other, 4, 0, {"vehicle.inertia": lw.Normal(relative=0.1)})
-    assert "full matrix" in fault and "from_states" in fault
-    lw.Ensemble(other, 4, 0, {"vehicle.added_mass": lw.Normal(relative=0.01)})
+    J = lw.Ensemble(other, 4, 0, {"vehicle.inertia": lw.Normal(relative=0.01)}).parameters(0, 4)["vehicle.inertia"]
+    np.testing.assert_array_equal(J, np.swapaxes(J, 1, 2))
+    assert len(np.unique(J.reshape(4, 9)[:, [0, 1, 2, 4, 5, 8]])) == 24
+    np.testing.assert_allclose(J, np.broadcast_to(FULL, J.shape), rtol=0.05)
 
 
 @pytest.mark.parametrize(

@@ -121,7 +121,9 @@ def test_bad_ensemble_settings(key, bads):
 
 def test_other_laws_are_refused_with_the_reason():
     (fault,) = faults(lw.Scene, VEHICLE, terms=["drag"])
-    assert "terms" in fault and "drag" in fault and "follow from the vehicle" in fault
+    assert "terms[0]" in fault and "drag" in fault and "lw.Drag" in fault
+    (fault,) = faults(lw.Scene, VEHICLE, terms=[{"type": "buoyancy"}])
+    assert "follows from the vehicle" in fault
     assert "controller" in faults(lw.Scene, VEHICLE, controller="pid")[0]
     lw.Scene(VEHICLE, terms=[])
 

@@ -106,7 +106,7 @@ def test_unknown_names_are_told_what_was_meant():
 
 def test_what_is_missing_is_named():
     assert "vehicle" in only_fault("") and "mass and inertia" in only_fault("")
-    assert only_fault("[vehicle]\nmass = 1.0\n").startswith("vehicle.inertia = '': is missing")
+    assert only_fault("[vehicle]\nmass = 1.0\n").startswith("vehicle.inertia = None: is missing")
 
 
 def test_toml_errors_name_the_file_and_line(tmp_path):

@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 from lgvi_warp.reference import advance, coupled, rotation, submaps
 from lgvi_warp.reference.coupled import PROGRAMS, CoupledState, Direction
 from lgvi_warp.reference.rotation import cay, cross, hat
+from lgvi_warp.reference.terms import Law
 from tests.tools import TURN, difference, slope
 
 EXPLICIT = ("x6", "x8", "x10")
@@ -502,11 +503,11 @@ def test_coupling_to_zero(name):
     np.testing.assert_allclose(found[1e-6], found[0.0], rtol=5e-5)
 
 
-class Hydrostatics:
+class Hydrostatics(Law):
     """The same forces as a law of the uncoupled twin."""
 
-    def wrench(self, z, b):
-        return (MG - BUOYANCY) * z, cross(MOMENT, z)
+    def wrench(self, view):
+        return (MG - BUOYANCY) * view.down, cross(MOMENT, view.down)
 
 
 @pytest.mark.parametrize(("name", "program"), [("psi_w", "TDKDT"), ("psi_1_w", "KTDTK")])

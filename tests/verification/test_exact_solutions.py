@@ -110,9 +110,9 @@ def test_a_neutral_body_at_rest_goes_with_accelerating_water():
 
 
 def test_shear_turns_into_relative_speed():
-    # A neutral body that falls through a linear profile u = s z at its own constant speed w (kept by inertia alone):
-    # M nu_r' = -M s w with isotropic M, so nu_r = -s w t: over ground it keeps the speed that it had.
-    s, w = 0.1, 0.5
+    # A neutral body that falls through a linear profile u = 0.1 b3 at its own constant speed w (kept by inertia alone):
+    # M nu_r' = -M 0.1 w with isotropic M, so nu_r = -0.1 w t: over ground it keeps the speed that it had.
+    w = 0.5
     profile = terms.CurrentProfile(depths=(-1000.0, 1000.0), velocities=((-100.0, 0.0, 0.0), (100.0, 0.0, 0.0)))
     r = run(sphere(), [profile], {"nu": (0.0, 0.0, w)}, 0.05, 10.0)
     assert r.velocity[-1, 0] == pytest.approx((0.0, 0.0, w), abs=1e-12)

@@ -115,6 +115,5 @@ def test_energy_of_crouch_grossman(body, start):
 
 def _energy(x, body):
     b, R, nu, Om = x
-    z = R.T @ np.array([0.0, 0.0, 1.0])
-    potential = sum(term.potential(z, b) for term in body.terms)
+    potential = body.potential(b, R)
     return 0.5 * nu @ body.M @ nu + 0.5 * Om @ body.J @ Om + potential

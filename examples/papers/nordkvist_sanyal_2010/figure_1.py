@@ -46,8 +46,7 @@ def crouch_grossman(scene):
 def total_energy(x, body):
     """nu.M nu / 2 + Om.J Om / 2 + U(b, R)."""
     b, R, nu, Om = x
-    z = R[2]
-    return 0.5 * nu @ body.M @ nu + 0.5 * Om @ body.J @ Om + sum(term.potential(z, b) for term in body.terms)
+    return 0.5 * nu @ body.M @ nu + 0.5 * Om @ body.J @ Om + body.potential(b, R)
 
 
 def numbers(t, change):

@@ -419,7 +419,7 @@ def _damping(bench: Bench, step: float) -> Iterator[Check]:
     i = int((power + allowed).argmin()) if (power + allowed).min() < 0.0 else int(power.argmin())
     least, limit = float(power[i]), float(allowed[i])
     where = f"least power {least:.3g} W at velocity {_short(twist[i, :3])} m/s, rate {_short(twist[i, 3:])} rad/s"
-    if not getattr(bench.term, "dissipative", True):
+    if not bench.term.dissipative:
         yield Check("damping: power", max(0.0, -least), np.inf, True, f"note: {where} (dissipative = False)")
         return
     good = bool(np.all(power >= -allowed))

@@ -42,8 +42,9 @@ class Result:
 
     time: (k,) [s]. samples: the fields that were kept, by name (also attributes: position (k, n, 3) [m, inertial],
     attitude (k, n, 3, 3) body to inertial, velocity (k, n, 3) [m/s, body], angular_velocity (k, n, 3) [rad/s, body]).
-    status: (n,), see Status; failure_time: (n,) [s], the time of the last good state, NaN where there was no failure;
-    failure_value: (n,), the |J^-1 a| or relative residual that crossed its limit, 0 for a non-finite state.
+    status: (n,), see Status; failure_time: (n,) [s], the time of the last good state, for an event its own
+    time, interpolated within the step; NaN where there was neither. failure_value: (n,), the |J^-1 a| or relative residual
+    that crossed its limit, 0 for a non-finite state and for an event.
     messages: what the user should know; provenance: scene, settings, versions, seed, machine.
     """
 

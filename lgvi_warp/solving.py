@@ -21,7 +21,7 @@ from lgvi_warp.plan import Block, Plan, blocks
 from lgvi_warp.result import Result
 from lgvi_warp.saveat import SaveAt, time_grid
 from lgvi_warp.scene import Scene
-from lgvi_warp.status import StatusArray
+from lgvi_warp.status import Status, StatusArray
 
 SHAPES: dict[str, tuple[int, ...]] = {
     "position": (3,),
@@ -147,13 +147,15 @@ def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None 
     start = time.perf_counter()
     thread_executor.run(blocks(n), work, threads, stop)
     run_seconds = time.perf_counter() - start
-    failed = status != 0
+    failed, stopped = status != 0, status >= Status.SURFACE
+    # An event's size is the part of its step that was made before it.
+    steps_made = failed_step + np.where(stopped, failed_size, 0.0)
     return Result(
         time=plan.grid.times,
         samples=samples,
         status=status.view(StatusArray),
-        failure_time=np.where(failed, failed_step * plan.grid.h, np.nan),
-        failure_value=np.where(failed, failed_size, np.nan),
+        failure_time=np.where(failed, steps_made * plan.grid.h, np.nan),
+        failure_value=np.where(failed, np.where(stopped, 0.0, failed_size), np.nan),
         parameters=plan.ensemble.parameters(0, n),
         messages=plan.grid.messages + plan.ensemble.scene.vehicle.warnings,
         provenance=provenance(plan),

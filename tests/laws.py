@@ -94,3 +94,13 @@ CASES |= _water
 from tests.laws_lift import CASES as _lift  # noqa: E402, N811
 
 CASES |= _lift
+
+# One of each type.
+_ALL = (
+    "drag matrix", "current", "current profile", "current harmonics", "waves", "Gauss-Markov current", "tether", "wrench",
+    "wrench schedule", "wrench noise", "thrusters", "fins", "control fins with rates", "cross-flow", "body lift",
+    "stratification",
+)  # fmt: skip
+CASES["all together"] = Case(
+    sum((CASES[name].terms for name in _ALL), ()), sum((CASES[name].laws for name in _ALL), ()), False
+)

@@ -178,6 +178,6 @@ def make_phi(maps, laws, alpha, beta):
         failed = h.dtype(wp.static(float(FORCES_NOT_CONVERGED))) * ones(zero)
         y.alarm.size = positive(y.alarm.code, y.alarm.size, positive(pending, pending, y.alarm.size))
         y.alarm.code = positive(y.alarm.code, y.alarm.code, positive(pending, failed, zero))
-        return remember(y, c, h, h.dtype(wp.static(-0.5)) * h)
+        return remember(y, c, h, h.dtype(-0.5) * h)
 
     return Phi, Phi_adjoint

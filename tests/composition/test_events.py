@@ -111,7 +111,10 @@ def test_a_users_condition():
 
     r = lw.solve(fleet(50, [FarAway(radius=2.0)]), h=0.05, t1=5.0)
     assert r.status.counts().keys() == {"ok", "condition"}
-    assert (r.position[-1, :, 0] < 2.0).all()
+    away = r.position[0, :, 0] < 2.0
+    assert away.sum() > 40 and (r.position[-1, away, 0] < 2.0).all()
+    # A member that starts beyond stops at once.
+    assert (r.failure_time[~away] == 0.0).all()
 
 
 def test_events_need_checks():
@@ -124,7 +127,7 @@ def test_events_need_checks():
     [
         ({"type": "box", "lower": [0, 0, 0], "upper": [1, -1, 1]}, ("upper", "lower")),
         ({"type": "flor", "depth": 3}, ("flor", "floor")),
-        ({"type": "floor"}, ("floor", "depth", "missing")),
+        ({"type": "floor"}, ("depth", "missing")),
         ({"type": "time", "at": -1.0}, ("at", "-1.0", "from 0")),
         ("surface", ("surface",)),
     ],

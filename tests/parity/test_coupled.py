@@ -10,6 +10,7 @@ from lgvi_warp.inertia import hat
 from lgvi_warp.reference import coupled
 from lgvi_warp.reference.submaps import Body, K, State, look, start, water
 from lgvi_warp.reference.terms.restoring import Restoring
+from lgvi_warp.reference.terms.stratification import Stratification
 from lgvi_warp.reference.terms.weight import Weight
 from tests.laws import CASES
 from tests.tools import difference, last, one
@@ -41,6 +42,9 @@ def body_of(laws):
     displaced = BUOYANCY / GRAVITY
     moment = BUOYANCY * LIFT - WEIGHT * CENTER
     M, C, J = coupled.blocks(INERTIA)
+    # This law's numbers are partly the vehicle's.
+    own = {"buoyancy": BUOYANCY, "center_of_buoyancy": LIFT}
+    laws = tuple(replace(law, **own) if isinstance(law, Stratification) else law for law in laws)
     laws = (Weight(WEIGHT - BUOYANCY), Restoring(moment), *laws)
     return Body(M, J, laws, displaced - MASS, displaced * LIFT - MASS * CENTER, C=C)
 

@@ -39,5 +39,5 @@ def whole_numbers(node):
     text = ast.unparse(node)
     return (
         any(isinstance(sub, ast.Constant) and isinstance(sub.value, int) for sub in ast.walk(node))
-        or text[1:].isdigit()
+        or text[1:].replace(".", "").isdigit()
     )

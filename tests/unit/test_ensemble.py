@@ -16,6 +16,7 @@ EVERYTHING = {
     "vehicle.buoyancy": lw.TruncatedNormal(std=1.0),
     "vehicle.center_of_buoyancy": lw.Normal(std=(0.001, 0.001, 0.002)),
     "environment.gravity": lw.Uniform(low=9.78, high=9.83),
+    "environment.water_density": lw.Uniform(low=1020.0, high=1030.0),
     "start.position": lw.Normal(std=0.5),
     "start.rotation_vector": lw.Normal(std=0.1),
     "start.velocity_inertial": lw.Normal(std=0.05),
@@ -25,7 +26,8 @@ EVERYTHING = {
 
 def numbers(m):
     """Everything in a Members, by name."""
-    return m.parameters | {f.name: getattr(m, f.name) for f in dataclasses.fields(m) if f.name != "parameters"}
+    names = [f.name for f in dataclasses.fields(m) if f.name not in ("parameters", "indices", "seed")]
+    return m.parameters | {name: getattr(m, name) for name in names}
 
 
 def assert_same(m, whole, indices):
@@ -60,6 +62,7 @@ def test_nothing_varied_is_shared(scene):
         "vehicle.buoyancy": (1,),
         "vehicle.center_of_buoyancy": (1, 3),
         "environment.gravity": (1,),
+        "environment.water_density": (1,),
     }
     assert (m.position.shape, m.attitude.shape) == ((3, 3), (3, 3, 3))
     np.testing.assert_array_equal(m.position, np.tile([0.0, 0.0, 10.0], (3, 1)))

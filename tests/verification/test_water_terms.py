@@ -83,7 +83,7 @@ def test_the_host_knows_the_same_waves():
     twin, host, rng = Waves(**arrays(WAVES), gravity=GRAVITY), terms.Waves(**WAVES), np.random.default_rng(6)
     own = {name: value[None] for name, value in host.parameters().items()}
     b, t = rng.uniform(-2.0, 8.0, (4, 3, 3)), rng.uniform(0.0, 50.0, 4)
-    got = host.velocity(own, np.array([GRAVITY]), b, t)
+    got = host.water(own, b, t, {"environment.gravity": np.array([GRAVITY])})
     expected = [[flow_at(twin, place, when).velocity for place in row] for row, when in zip(b, t, strict=True)]
     np.testing.assert_allclose(got, expected, rtol=0.0, atol=1e-14)
 

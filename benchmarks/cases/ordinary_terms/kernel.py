@@ -164,7 +164,7 @@ def make_ordinary(real):
     def segment(t: real, times: numbers):
         """The segment of a table that t is in, or the nearest one."""
         last = times.shape[0] - 2
-        i = int(0)
+        i = int(0)  # noqa: RUF046, UP018  a variable of the kernel, not a constant
         while i < last and t >= times[i + 1]:
             i += 1
         return i
@@ -518,9 +518,7 @@ def _water(laws, g, h):
 
 
 def _wrenches(laws, vehicle):
-    tether, held, schedule, strata = (
-        laws[name] for name in ("tether", "wrench", "wrench_schedule", "stratification")
-    )
+    tether, held, schedule, strata = (laws[name] for name in ("tether", "wrench", "wrench_schedule", "stratification"))
     noise = laws.get("wrench_noise")
     return {
         "anchor": tether.anchor,

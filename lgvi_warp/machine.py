@@ -23,9 +23,14 @@ def simd() -> str:
     return "avx2" if features.get("AVX2") else "other"
 
 
-def default_width(dtype: str) -> int:
-    """Vehicles per packet: one SIMD register of this dtype ("float64": 8 on AVX-512, 4 on AVX2, 2 elsewhere)."""
-    return REGISTER_BYTES[simd()] // np.dtype(dtype).itemsize
+def default_width(dtype: str, *, chained: bool = False) -> int:
+    """Vehicles per packet: one SIMD register of this dtype ("float64": 8 on AVX-512, 4 on AVX2, 2 elsewhere).
+
+    chained: a step whose operations mostly wait for one another takes two registers, where there are enough of them
+    (AVX-512), so that one vehicle's operation is made while another's waits.
+    """
+    registers = 2 if chained and simd() == "avx512" else 1
+    return registers * REGISTER_BYTES[simd()] // np.dtype(dtype).itemsize
 
 
 def thread_count() -> int:

@@ -84,9 +84,11 @@ class Plan:
         if self.checks == "none" and self.ensemble.scene.events:
             faults.add("checks", self.checks, "leaves events unseen", 'use checks="safe", or drop the events')
         faults.raise_if_any()
-        if self.width is None:
-            object.__setattr__(self, "width", default_width(self.dtype))
         object.__setattr__(self, "model", make_model(self.ensemble, self.method, self.grid.h, LAWS, STOPS))
+        if self.width is None:
+            # The turns of psi_x follow one another; the implicit step V of damping laws fills the registers by itself.
+            chained = self.method.turns and "dense" not in self.model.parts
+            object.__setattr__(self, "width", default_width(self.dtype, chained=chained))
         object.__setattr__(self, "spec", self._spec())
         object.__setattr__(self, "advance", make_advance(self.spec))
 
@@ -112,6 +114,7 @@ class Plan:
             timed=model.timed,
             memory=model.memory,
             averages=model.averages,
+            composed=len(self.method.stages) > 1,
             lead_time=model.lead[1] * self.method.stages[0] if model.lead else 0.0,
         )
 

@@ -45,6 +45,7 @@ class Spec(NamedTuple):
     "diagonal", "full"); parts: what the inertia holds besides (see inertia_struct); coupling: which of U12, U13, U23 and of
     the three pitches some member has; flow: "none", "steady" (uniform, the same for ever), "uniform", "varying";
     timed: whether a law looks at the time; averages: alpha and beta of (15), (16), or None for conservative maps;
+    composed: more than one stage a step, or one, whose constants then are made once for all steps;
     lead_time: the part of a step that the lead drifts for.
     """
 
@@ -67,6 +68,7 @@ class Spec(NamedTuple):
     timed: bool = False
     memory: bool = False
     averages: tuple | None = None
+    composed: bool = False
     lead_time: float = 0.0
 
 
@@ -112,7 +114,7 @@ def make_advance(spec):
     # A drift that leads has passed half of its time when a step begins; with stages, of the first one's.
     lead_time = spec.lead_time if has_lead and spec.lead[0] in ("Ab", "T") else 0.0
     water_velocity = method.water_velocity
-    renormalised = real == wp.float32
+    renormalised, composed = real == wp.float32, spec.composed
     fields, per_sample = spec.fields, sum(SAMPLE_FIELDS[name] for name in spec.fields)
 
     @wp.func
@@ -221,6 +223,7 @@ def make_advance(spec):
             c.drag = prepare(DragFlow(), c.params.own, real(h))
         stages = stage_h.shape[0]
         first_h = real(1.0) * stage_h[0]
+        lead_first = real(wp.static(lead_coefficient)) * lead_h[0]
         x = read(state, i)
         one = ones(x.b.x)
         zero = one - one
@@ -248,10 +251,15 @@ def make_advance(spec):
             x.alarm = Alarm()
             for j in range(n):
                 x = at_step(x, k + j, h)
-                for g in range(stages):
-                    x = step(x, c, stage_h[g])
+                if wp.static(composed):
+                    for g in range(stages):
+                        x = step(x, c, stage_h[g])
+                        if wp.static(has_lead):
+                            x = lead(x, c, real(wp.static(lead_coefficient)) * lead_h[g])
+                else:
+                    x = step(x, c, first_h)
                     if wp.static(has_lead):
-                        x = lead(x, c, real(wp.static(lead_coefficient)) * lead_h[g])
+                        x = lead(x, c, lead_first)
                 if wp.static(watched):
                     x = watch(x, c, real(h))
             repeat = int(0)

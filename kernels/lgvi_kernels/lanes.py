@@ -13,7 +13,7 @@ from typing import Any
 
 import warp as wp
 
-WIDTHS = (1, 2, 4, 8, 16)
+WIDTHS = (1, 2, 4, 8, 16, 32)
 REALS = (wp.float32, wp.float64)
 
 

@@ -136,10 +136,7 @@ def make_method(spec):
         letters["W"] = make_W(rotation_struct(width, real), rotate, spec.iterations, spec.adaptive, spec.checked)
     U12, U13, U23, *pitched = spec.coupling
     for letter in used:
-        if letter[0] == "R":
-            axis = int(letter[1]) - 1
-            letters[letter] = turns.make_turn(axis, pitched[axis])
-        elif letter[0] == "h":
+        if letter[0] == "h":
             letters[letter] = turns.make_hop(int(letter[1]) - 1, int(letter[2]) - 1, U12, U13, U23)
     if spec.averages is not None:
         force, potential = superpose(laws, "force"), superpose(laws, "potential")
@@ -147,6 +144,14 @@ def make_method(spec):
         maps = (letters["Ab"], None if spec.mass == "isotropic" else Ap, letters["D"])
         functions = (View, Wrench, potential, forces, current, evolve, velocities)
         letters["Phi"], letters["Phi*"] = make_phi(maps, functions, *spec.averages)
-    step = fold(tuple((letters[letter], coefficient) for letter, coefficient in spec.maps))
+    maps = []
+    for i, (letter, coefficient) in enumerate(spec.maps):
+        if letter[0] == "R":
+            axes = [int(other[1]) - 1 for other, _ in (*spec.maps[i:], *spec.maps[:i]) if other[0] == "R"]
+            following = next((axis for axis in axes if axis != axes[0]), axes[0])
+            maps.append((turns.make_turn(axes[0], pitched[axes[0]], following), coefficient))
+        else:
+            maps.append((letters[letter], coefficient))
+    step = fold(tuple(maps))
     lead = letters[spec.lead[0]] if spec.lead else step
     return Step(step, lead, velocities, prepare, water_velocity)

@@ -129,7 +129,7 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):
     the vehicle, half before and half after, and where it varies in space or time also pushes it; shifted: the origin of
     the forces is not the user's; E: exact flow of drag, or V: velocity-dependent laws, between two half kicks. Order 2.
     """
-    drifts, damped = flow is not None, E is not None or V is not None
+    drifts, damped, forced = flow is not None, E is not None or V is not None, law is not None or flow_varies
 
     @wp.func
     def at_user_origin(view: Any, x: Any, c: Any):
@@ -152,13 +152,17 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):
             view.b = x.b
             if wp.static(flow_varies):
                 water = flow(Flow(), at_user_origin(view, x, c), c.params)
-        w = Wrench()
-        if wp.static(law is not None):
-            w = law(w, view, c.params)
-        if wp.static(flow_varies):
-            w = acceleration_wrench(w, view, c.inertia, water)
+        if wp.static(forced):
+            w = Wrench()
+            if wp.static(law is not None):
+                w = law(w, view, c.params)
+            if wp.static(flow_varies):
+                w = acceleration_wrench(w, view, c.inertia, water)
+            if wp.static(damped):
+                x = kicked(x, c, half, w)
+            else:
+                x = kicked(x, c, h, w)
         if wp.static(damped):
-            x = kicked(x, c, half, w)
             if wp.static(E is not None):
                 x = E(x, c, h)
             if wp.static(V is not None):
@@ -166,9 +170,8 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):
                     x = V(x, view, water, c, h)
                 else:
                     x = V(x, view, Flow(), c, h)
-            x = kicked(x, c, half, w)
-        else:
-            x = kicked(x, c, h, w)
+            if wp.static(forced):
+                x = kicked(x, c, half, w)
         if wp.static(drifts):
             x.b = start + h * water.velocity
         if wp.static(evolve is not None):

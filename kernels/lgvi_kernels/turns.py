@@ -20,24 +20,30 @@ def shear_pair(a: Any, b: Any, t: Any, s: Any):
 
 
 @wp.func
-def turn_x(v: Any, t: Any, s: Any):
-    """F^T v for a turn about x."""
-    y, z = shear_pair(v.y, v.z, t, s)
-    return vec3(v.x, y, z)
+def shear_pair_back(a: Any, b: Any, t: Any, s: Any):
+    """The same with the shears in the other order: here the first of the pair is ready first."""
+    u = b - t * a
+    v = a + s * u
+    return v, u - t * v
 
 
-@wp.func
-def turn_y(v: Any, t: Any, s: Any):
-    """F^T v for a turn about y."""
-    z, x = shear_pair(v.z, v.x, t, s)
-    return vec3(x, v.y, z)
+def make_turn_of_vector(axis, early):
+    """F^T v for a turn about an axis; the component that is ready one shear sooner is the early one."""
+    pair = shear_pair_back if early == (axis + 1) % 3 else shear_pair
 
+    @wp.func
+    def turn(v: Any, t: Any, s: Any):
+        if wp.static(axis == 0):
+            y, z = pair(v.y, v.z, t, s)
+            return vec3(v.x, y, z)
+        elif wp.static(axis == 1):
+            z, x = pair(v.z, v.x, t, s)
+            return vec3(x, v.y, z)
+        else:
+            x, y = pair(v.x, v.y, t, s)
+            return vec3(x, y, v.z)
 
-@wp.func
-def turn_z(v: Any, t: Any, s: Any):
-    """F^T v for a turn about z."""
-    x, y = shear_pair(v.x, v.y, t, s)
-    return vec3(x, y, v.z)
+    return turn
 
 
 @wp.func
@@ -76,12 +82,12 @@ def slide_z(pi: Any, p: Any, length: Any):
     return vec3(pi.x + length * p.y, pi.y - length * p.x, pi.z)
 
 
-AXES = ((component_x, turn_x, slide_x), (component_y, turn_y, slide_y), (component_z, turn_z, slide_z))
+AXES = ((component_x, slide_x), (component_y, slide_y), (component_z, slide_z))
 
 
 def make_shift(axis):
     """The origin moves by a length along an axis of the body."""
-    component, _, slide = AXES[axis]
+    component, slide = AXES[axis]
 
     @wp.func
     def shift(x: Any, length: Any):
@@ -97,14 +103,19 @@ SHIFTS = (make_shift(0), make_shift(1), make_shift(2))
 
 
 @wp.func
-def tangent(y: Any, one: Any):
+def tangent(y: Any, third: Any):
     """tan(y) to order 4, y + y^3 / 3. Any odd function keeps the map symplectic; this one makes steady spin accurate."""
-    return y + (one.dtype(1.0 / 3.0) * (y * y)) * y
+    return y + (y * y) * (third * y)
 
 
-def make_turn(axis, pitched):
-    """R_i: turn about one axis, for `pitched` with a slide along it (a screw)."""
-    component, turn, _ = AXES[axis]
+def make_turn(axis, pitched, following):
+    """R_i: turn about one axis, for `pitched` with a slide along it (a screw); following: the axis of the next turn.
+
+    A step is one chain of turns, each waiting for the momentum about its axis from the one before: what decides its time
+    is how soon that component is there, so all that need not wait is written apart from what must.
+    """
+    component, _ = AXES[axis]
+    turn = make_turn_of_vector(axis, following)
     shift = SHIFTS[axis]
 
     @wp.func
@@ -112,28 +123,31 @@ def make_turn(axis, pitched):
         """The exact flow of (pi_i - k_i p_i)^2 / (2 Js_i) with the tangent of half the angle replaced by its series."""
         one = ones(x.b.x)
         g = h * component(c.inertia.half_over_J)
-        t = tangent(g * component(x.pi), h)
-        s = t + t
+        y = g * component(x.pi)
+        t = tangent(y, h.dtype(1.0 / 3.0))
         if wp.static(pitched):
+            # t and -w are the tangents of half the angles by pi_i and by p_i. With n = t - w, m = 1 + t w,
+            # q = 1 + t^2, r = 1 + w^2: m^2 + n^2 = q r, and one division serves n / m, 2 n m / (q r) and the slide's 1 / r.
             k = component(c.inertia.pitch)
-            kp = k * component(x.p)
-            t2 = -(g * kp)
-            # (1 - t t2)^2 + (t + t2)^2 = (1 + t^2)(1 + t2^2): one division serves the slide and the turn.
-            sum_t = t + t2
-            m = one - t * t2
-            q1 = one + t * t
-            q2 = one + t2 * t2
-            inverse = one / (q1 * (q2 * m))
-            x = shift(x, (g + g) * k * (kp - (inverse * (q1 * m)) * component(x.pi)))
-            t = (inverse * (q1 * q2)) * sum_t
-            s = (m * m) * (inverse * (sum_t + sum_t))
+            k2 = k + k
+            w = (g * k) * component(x.p)
+            r = one + w * w
+            n = t - w
+            m = one + t * w
+            q = one + t * t
+            inverse = one / (q * (r + t * (w * r)))
+            t = (n * (q * r)) * inverse
+            s = ((n + n) * (m * m)) * inverse
+            length = k2 * (w - (y * (q * m)) * inverse)
         else:
-            s = s / (one + t * t)
+            s = (t + t) / (one + t * t)
         x.p = turn(x.p, t, s)
         x.pi = turn(x.pi, t, s)
         x.R0 = turn(x.R0, t, s)
         x.R1 = turn(x.R1, t, s)
         x.R2 = turn(x.R2, t, s)
+        if wp.static(pitched):
+            x = shift(x, length)
         return x
 
     return R_i

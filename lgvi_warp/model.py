@@ -103,6 +103,8 @@ def make_model(
     mass = shape_of_mass(frame.M)
     coupled = frame.coupled
     program = FORCED[method.base] if forced else simplified(method.program, mass == "isotropic" and not coupled)
+    if not acting:
+        program = tuple((letter, coefficient) for letter, coefficient in program if letter != "K")
     if method.turns and coupled:
         program = with_hops(program)
     lead, maps = merged(program)

@@ -53,7 +53,7 @@ def test_an_absent_term_is_no_parameter():
 
 
 def test_munk_moment_only_for_anisotropic_mass():
-    isotropic, diagonal = plan_of(scene_of((2.0, 2.0, 2.0))), plan_of(scene_of((1.0, 2.0, 3.0)))
+    isotropic, diagonal = plan_of(scene_of((2.0, 2.0, 2.0), net=1.0)), plan_of(scene_of((1.0, 2.0, 3.0)))
     assert isotropic.spec.mass == "isotropic" and "anisotropy" not in isotropic.advance.Inertia.numpy_dtype()["names"]
     assert {letter for letter, _ in (*isotropic.spec.maps, isotropic.spec.lead)} == {"Ab", "D", "K"}
     assert diagonal.spec.mass == "diagonal" and diagonal.spec.lead == ("T", 0.5)

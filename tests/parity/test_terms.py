@@ -65,7 +65,9 @@ def test_a_hundred_steps(name):
 @pytest.mark.parametrize(
     "method", ["psi", *(pytest.param(name, marks=pytest.mark.slow) for name in ("phi", "phi_adjoint"))]
 )
-@pytest.mark.parametrize("name", [name for name in CASES if not any(word in name for word in ("noise", "Gauss", "all"))])
+@pytest.mark.parametrize(
+    "name", [name for name in CASES if not any(word in name for word in ("noise", "Gauss", "all"))]
+)
 def test_the_papers_forces(name, method):
     # Phi* is iterated to 1e-14 of the momenta; a contraction by 1/10 or better leaves about 1e-15 of that, each step.
     kernel, twin = both(CASES[name], method, 0.01, 5)

@@ -150,7 +150,7 @@ def test_bytes_that_are_no_text(tmp_path):
         ('[ensemble.vary]\n"vehicle.mass" = { normal = { std = 20.0 } }', "vehicle.mass of member"),
         ("[environment]\ngravity = nan", "environment.gravity = nan"),
         ("[start]\nposition = [1.0, 2.0]", "start.position = [1.0, 2.0]"),
-        ('[[terms]]\ntype = "drag"', "terms = "),
+        ('[[terms]]\ntype = "drga"', "terms[0].type = 'drga'"),
         ('[controller]\ntype = "pid"', "controller = "),
     ],
 )
@@ -186,7 +186,7 @@ def test_all_faults_of_all_sections_come_in_one_message():
         "vehicle.mass" = { normal = { std = -1.0 } }
         "vehicle.volume" = { normal = { std = 1.0 } }
         [[terms]]
-        type = "drag"
+        type = "drga"
         [strat]
         x = 1
         """

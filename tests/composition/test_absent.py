@@ -1,0 +1,143 @@
+"""What a scene does not ask for leaves no code: asserted on the source that Warp generates; and varying compiles nothing."""
+
+import re
+
+import numpy as np
+import pytest
+import warp as wp
+
+import lgvi_warp as lw
+from lgvi_warp import terms
+from lgvi_warp.solving import make_plan
+from tests.laws import CASES
+from tests.parity.test_terms import STATE, VEHICLE, scene_of
+from tests.tools import one
+
+# What the generated source holds if a scene has this term, and only then.
+MARKS = {
+    "drag": r"make_E__locals__slowed", "drag matrix": r"add_three", "current": r"\bflow_0\(", "tether": r"rest_length",
+    "wrench": r"HeldWrench", "thrusters": r"commanded", "waves": r"Waves", "fins": r"Fins",
+}  # fmt: skip
+# Functions that some scenes need, and a bare one does not.
+NOT_THERE = (
+    "kicked",
+    "look",
+    "factorise",
+    "exponential",
+    "normals",
+    "passage",
+    "turn_x",
+    "back_up",
+    "decay3",
+    "to_body",
+)
+BARE = lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 20.0 * 9.8)
+
+
+def source(scene, folder, method="psi_s"):
+    """The C++ that Warp generates for a scene."""
+    plan = make_plan(one(scene, **STATE), method, h=0.01, t1=0.1)
+    wp.compile_aot_module(plan.advance.kernel.module, device="cpu", module_dir=str(folder))
+    (path,) = folder.glob("*.cpp")
+    return path.read_text()
+
+
+def laws_in(text):
+    """Functions of law modules that the source holds."""
+    return set(re.findall(r"^static \S+ (\w*(?:law|damping|flow|evolve)\w*)\(", text, re.MULTILINE))
+
+
+def test_a_bare_scene_has_no_law_at_all(tmp_path):
+    text = source(lw.Scene(BARE, lw.Environment(gravity=9.8)), tmp_path)
+    assert laws_in(text) == set()
+    for mark in NOT_THERE:
+        assert not re.search(rf"^static (?!.*adj_).*{mark}\w*\(", text, re.MULTILINE), mark
+
+
+@pytest.mark.parametrize("name", MARKS)
+def test_a_term_adds_its_code_and_no_other(name, tmp_path):
+    text = source(lw.Scene(BARE, lw.Environment(gravity=9.8), terms=list(CASES[name].terms)), tmp_path)
+    for other, mark in MARKS.items():
+        assert bool(re.search(mark, text)) == (other == name), other
+
+
+def test_a_term_of_zeros_is_absent():
+    zeros = [terms.Drag(), terms.Current(velocity=(0.0, 0.0, 0.0)), terms.Wrench(), terms.DragMatrix()]
+    plain = make_plan(one(lw.Scene(VEHICLE), **STATE), h=0.01, t1=0.1)
+    asked = make_plan(one(lw.Scene(VEHICLE, terms=zeros), **STATE), h=0.01, t1=0.1)
+    assert asked.spec == plain.spec and asked.advance is plain.advance
+
+
+VARIED = {
+    "vehicle.mass": lw.Normal(relative=0.01),
+    "vehicle.inertia": lw.Normal(relative=0.01),
+    "drag_matrix.linear": lw.Normal(relative=0.01),
+    "drag_matrix.quadratic": lw.Normal(relative=0.01),
+    "current.velocity": lw.Normal(std=0.1),
+    "tether.anchor": lw.Normal(std=0.1),
+    "tether.stiffness": lw.LogNormal(sigma=0.1),
+    "wrench.force": lw.Normal(std=(0.1, 0.0, 0.0)),
+    "thrusters.coefficient": lw.Uniform(relative=0.1),
+    "thrusters.position": lw.Normal(std=0.01),
+    "environment.gravity": lw.Uniform(low=9.78, high=9.83),
+}
+
+
+def scene():
+    """Several terms at once."""
+    chosen = [CASES[name].terms[0] for name in ("drag matrix", "current", "tether", "wrench", "thrusters")]
+    return lw.Scene(VEHICLE, lw.Environment(gravity=9.8), terms=chosen, start=lw.Start(velocity=(1.0, 0.0, 0.0)))
+
+
+def test_any_parameter_varies_and_compiles_nothing():
+    shared = make_plan(lw.Ensemble(scene(), 20), h=0.01, t1=0.1)
+    for name, law in VARIED.items():
+        varied = make_plan(lw.Ensemble(scene(), 20, 1, {name: law}), h=0.01, t1=0.1)
+        assert varied.advance is shared.advance, name
+    everything = make_plan(lw.Ensemble(scene(), 20, 1, VARIED), h=0.01, t1=0.1)
+    assert everything.advance is shared.advance
+
+
+@pytest.mark.parametrize("method", ["psi_s", "psi_x"])
+def test_a_varied_member_is_as_if_alone_with_its_numbers(method):
+    fleet = lw.Ensemble(scene(), 20, 1, VARIED)
+    together = lw.solve(fleet, method, h=0.02, t1=0.4)
+    p = fleet.parameters(0, 20)
+    for member in (0, 7, 19):
+        alone = lw.solve(fleet.subset([member]), method, h=0.02, t1=0.4)
+        for name in ("position", "attitude", "velocity", "angular_velocity"):
+            assert getattr(alone, name)[:, 0].tobytes() == getattr(together, name)[:, member].tobytes()
+        # And as a scene that has these numbers, to round-off: diagonal matrices are told in another way.
+        own = {
+            term.key: type(term)(**{
+                f.name: p[f"{term.key}.{f.name}"][member % len(p[f"{term.key}.{f.name}"])] for f in term.quantities()
+            })
+            for term in scene().terms
+        }  # fmt: skip
+        vehicle = lw.Vehicle(
+            p["vehicle.mass"][member], p["vehicle.inertia"][member], VEHICLE.added_mass, VEHICLE.buoyancy,
+            VEHICLE.center_of_buoyancy,
+        )  # fmt: skip
+        by_hand = lw.Scene(
+            vehicle, lw.Environment(gravity=p["environment.gravity"][member]), list(own.values()), scene().start
+        )
+        expected = lw.solve(by_hand, method, h=0.02, t1=0.4).position[-1, 0]
+        np.testing.assert_allclose(together.position[-1, member], expected, atol=1e-12)
+
+
+def test_unphysical_members_are_counted():
+    with pytest.raises(lw.SceneError, match=r"tether.stiffness of member \d+.*unphysical \(\d+ of 50"):
+        lw.Ensemble(scene(), 50, 1, {"tether.stiffness": lw.Normal(relative=2.0)})
+    with pytest.raises(lw.SceneError, match=r"did you mean 'current\.velocity'"):
+        lw.Ensemble(scene(), 50, 1, {"current.velocty": lw.Normal(std=0.1)})
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_the_same_bits_for_any_number_of_threads(dtype):
+    everything = scene_of(CASES["all together"])
+    fleet = lw.Ensemble(
+        everything, 700, 3, {"current.velocity": lw.Normal(std=0.1), "vehicle.mass": lw.Normal(relative=0.01)}
+    )
+    runs = [lw.solve(fleet, h=0.02, t1=0.5, dtype=dtype, threads=threads) for threads in (1, 2, 4)]
+    for name in ("position", "attitude", "velocity", "angular_velocity"):
+        assert len({getattr(run, name).tobytes() for run in runs}) == 1

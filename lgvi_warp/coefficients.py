@@ -171,7 +171,7 @@ class Name:
 
 def read_name(name: str) -> Name | None:
     """A hydrodynamic derivative's name in any of the usual spellings; None if it is none."""
-    text = re.sub(r"[\s_{}\\$,()*]", "", name)
+    text = re.sub(r"[\s_{}\\$,()*]", "", str(name))
     if len(text) < 2 or text[0] not in FORCES:
         return None
     row, tail = FORCES.index(text[0]), text[1:].lower()
@@ -236,7 +236,10 @@ def about_gravity(faults: Faults, body: Coefficients, inertia_about: str) -> Non
 
 def add_derivatives(faults: Faults, body: Coefficients, given: Mapping[str, Any], ignore: Iterable[str] = ()) -> None:
     """Put derivatives, by name, into the matrices of the body: minus their values."""
-    ignore = set(ignore)
+    if not isinstance(given, Mapping):
+        faults.add("coefficients", given, "is not a map of names", 'write {"X_udot": -30.0, "X_u": -4.0, ...}')
+        given = {}
+    ignore = {ignore} if isinstance(ignore, str) else set(ignore)
     matrices = {"dot": np.zeros((6, 6)), "linear": np.zeros((6, 6)), "quadratic": np.zeros((6, 6))}
     keys: dict[tuple[str, int, int], str] = {}
     for key, value in given.items():
@@ -345,10 +348,13 @@ def from_sdf(
     if buoyancy is None and volume is not None:
         density = water_density if water_density is not None else plugin_density(plugin)
         values = [faults.positive(*a) for a in (("volume", volume, "m3"), ("water_density", density, "kg/m3"))]
-        buoyancy = None if None in values else float(np.prod(np.array(values, dtype=float))) * gravity
+        values.append(faults.positive("gravity", gravity, "m/s2"))
+        buoyancy = None if None in values else float(np.prod(np.array(values, dtype=float)))
     center, turn = read_pose(faults, inertial.find("pose"))
     inertia = HALF_TURN[:, None] * (turn @ read_inertia(faults, inertial.find("inertia")) @ turn.T) * HALF_TURN
     at = turned((0.0, 0.0, 0.0) if center_of_buoyancy is None else center_of_buoyancy, HALF_TURN)
+    if not (inertial.findtext("mass") or "").strip():
+        faults.add("<mass>", "", "is missing", "give the mass of the link [kg]")
     mass = numbers(faults, inertial.find("mass"), 1, "1")[0]
     body = rigid_body(faults, mass, inertia, HALF_TURN * center, at, None, buoyancy, gravity)
     body.added_mass = read_fluid_added_mass(faults, inertial.find("fluid_added_mass"))
@@ -363,8 +369,8 @@ def read_text(source: str | os.PathLike[str], is_text: bool, what: str) -> str:
         return str(source)
     try:
         return Path(source).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise SceneError([f"{what} {os.fspath(source)}: {error}; give the path of a file, or its text"]) from None
+    except (OSError, UnicodeDecodeError, TypeError) as error:
+        raise SceneError([f"{what} {source}: {error}; give the path of a file, or its text"]) from None
 
 
 def parse_xml(source: str | os.PathLike[str]) -> ElementTree.Element:
@@ -553,7 +559,8 @@ def from_yaml(
     faults = Faults()
     for key, value in (("position_axes", position_axes), ("matrix_axes", matrix_axes)):
         faults.choice(key, value, ("flu", "frd"))
-    read = by_meaning(faults, parse_yaml(source), set(ignore)) | by_meaning(faults, given, set())
+    ignore = {ignore} if isinstance(ignore, str) else set(ignore)
+    read = by_meaning(faults, parse_yaml(source), ignore) | by_meaning(faults, given, set())
     positions = HALF_TURN if position_axes == "flu" else np.ones(3)
     matrices = HALF_TURN_6 if matrix_axes == "flu" else np.ones(6)
     body = yaml_body(faults, read, positions)
@@ -574,7 +581,7 @@ def parse_yaml(source: str | os.PathLike[str]) -> Mapping[str, Any]:
     try:
         yaml = importlib.import_module("yaml")
     except ImportError:
-        raise ImportError("reading YAML needs PyYAML: pip install pyyaml, or pip install 'lgvi-warp[yaml]'") from None
+        raise ImportError("reading YAML needs PyYAML: pip install 'lgvi-warp[yaml]'") from None
     text = read_text(source, isinstance(source, str) and ("\n" in source or ": " in source), "YAML file")
     try:
         content = yaml.safe_load(text)
@@ -617,7 +624,7 @@ def yaml_body(faults: Faults, read: Mapping[str, Any], positions: np.ndarray) ->
     gravity = read.get("gravity", STANDARD_GRAVITY)
     gravity = abs(gravity) if isinstance(gravity, int | float) else gravity
     for key in ("mass", "inertia"):
-        if key not in read:
+        if read.get(key) is None:
             faults.add(key, "", "is missing", f"add {key} to the file, or pass {key}=")
     square = Faults().symmetric("inertia", inertia, "") if inertia is not None else None
     if square is not None:
@@ -626,14 +633,14 @@ def yaml_body(faults: Faults, read: Mapping[str, Any], positions: np.ndarray) ->
     if buoyancy is None and "volume" in read:
         numbers_ = [
             faults.positive("volume", read["volume"], "m3"),
-            faults.positive("density", read.get("density"), "kg/m3 (with volume)"),
+            faults.positive("density", read.get("density", "not given"), "kg/m3 (with volume)"),
             faults.positive("gravity", gravity, "m/s2"),
         ]
         buoyancy = None if None in numbers_ else float(np.prod(np.array(numbers_, dtype=float)))
     zero = (0.0, 0.0, 0.0)
     gravity_at = turned(read.get("center_of_gravity", zero), positions)
     buoyancy_at = turned(read.get("center_of_buoyancy", zero), positions)
-    mass = read.get("mass", 1.0)
+    mass = 1.0 if read.get("mass") is None else read["mass"]
     inertia = np.eye(3) if inertia is None else inertia
     return rigid_body(faults, mass, inertia, gravity_at, buoyancy_at, read.get("weight"), buoyancy, gravity)
 

@@ -21,7 +21,7 @@ from lgvi_warp.machine import default_width
 from lgvi_warp.packets import Packets, pack
 from lgvi_warp.plan import build_lock
 from lgvi_warp.scene import Environment, Scene
-from lgvi_warp.terms.base import Setting, Term
+from lgvi_warp.terms.base import Packed, Setting, Term
 from lgvi_warp.vehicle import Vehicle
 
 EPS = float(np.finfo(np.float64).eps)
@@ -226,7 +226,10 @@ def _built(term: Term, module: Any, width: int) -> Any:
     except TypeError:
         remedy = "give a module, or a class that holds the functions"
         raise SceneError([f"{term.key}.device = {module!r}: cannot be a key of the kernels made; {remedy}"]) from None
-    remedy = "a law may use lanes, their operators (import them in its module) and lane_math only: docs/add_a_law.md"
+    remedy = (
+        "return what the role adds to (w, D, f, state); name fields as the View and params() do; import the operators of "
+        "lanes that are used; no `if` on a lane, no plain number times a lane: docs/add_a_law.md"
+    )
     try:
         examine = make_examine(module, width, wp.float64)
         with build_lock:
@@ -268,7 +271,15 @@ def _judged(name: str, difference: np.ndarray, allowed: np.ndarray | float, view
 def _numbers(bench: Bench, step: float) -> Iterator[Check]:
     """Whether packed() fills what params() names; then packs, and lets the law remember once."""
     term, setting = bench.term, bench.setting(bench.parameters)
-    packed = term.packed(bench.own, setting)
+    try:
+        packed = term.packed(bench.own, setting)
+    except Exception as error:
+        packed = f"fails: {type(error).__name__}: {error}"  # type: ignore[assignment]
+    if not isinstance(packed, Packed):
+        text = packed if isinstance(packed, str) else f"returns {packed!r:.60}"
+        remedy = "write packed(self, own, setting) that returns lw.Packed({name: numbers}), names as in params()"
+        yield Check("packed", 1.0, 0.0, False, f"packed() {text}; {remedy}")
+        return
     given = set(packed.values) | ({"first"} if packed.rows is not None else set())
     given |= {"memory"} if packed.memory is not None else set()
     wanted = set(bench.Params["own"].names or ()) - {"unused"}
@@ -280,7 +291,13 @@ def _numbers(bench: Bench, step: float) -> Iterator[Check]:
     text = "" if good else f"{type(term).__name__}.memory must say whether packed() gives memory"
     yield Check("memory", float(not good), 0.0, good, text)
     if good and not wrong:
-        bench.packets = Bank(bench, setting, bench.views)
+        packets = _attempt(lambda: Bank(bench, setting, bench.views), "with shared numbers")
+        if isinstance(packets, str):
+            yield Check(
+                "packed", 1.0, 0.0, False, f"{packets}; give arrays (1,), (1, 3) or (n,), (n, 3), and whole numbers"
+            )
+        else:
+            bench.packets = packets
 
 
 def _finite(bench: Bench, step: float) -> Iterator[Check]:
@@ -331,8 +348,13 @@ def _packing(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
 
 def _tried(bench: Bench, setting: Setting, views: Views, where: str) -> dict[str, np.ndarray] | str:
     """What the law gives in another setting; words where packed() fails in it."""
+    return _attempt(lambda: Bank(bench, setting, views).evaluate(views), where)
+
+
+def _attempt(make: Callable[[], Any], where: str) -> Any:
+    """What `make` gives; words where it fails."""
     try:
-        return Bank(bench, setting, views).evaluate(views)
+        return make()
     except Exception as error:
         return f"packed() fails {where}: {type(error).__name__}: {error}"
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from lgvi_warp import distributions
 from lgvi_warp.errors import Faults, SceneError
+from lgvi_warp.method import Method
 from lgvi_warp.scene import EnsembleSettings, Environment, RunSettings, Scene, Start
 from lgvi_warp.vehicle import Vehicle
 
@@ -22,8 +23,8 @@ def load(path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = Non
     """Read a scene file; overrides (dotted key -> value) replace what it says. Raises SceneError naming every fault."""
     try:
         text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise SceneError([f"scene file {os.fspath(path)}: {error}; give the path of a TOML file"]) from None
+    except (OSError, UnicodeDecodeError, TypeError) as error:
+        raise SceneError([f"scene file {path}: {error}; give the path of a TOML file"]) from None
     return loads(text, overrides, os.fspath(path))
 
 
@@ -65,12 +66,14 @@ def from_dict(content: Mapping[str, Any]) -> Scene:
         if not isinstance(tables[name], Mapping):
             faults.add(name, tables[name], "is not a table", f"write [{name}] and its keys below")
             tables[name] = {}
-    if not tables["vehicle"]:
+    if not tables["vehicle"] and isinstance(content.get("vehicle", {}), Mapping):
         faults.add("vehicle", "", "is missing", "write [vehicle] with mass and inertia")
     vehicle = _build(faults, "vehicle", Vehicle, tables["vehicle"]) if tables["vehicle"] else None
     environment = _build(faults, "environment", Environment, tables["environment"])
     start = _build(faults, "start", Start, tables["start"])
     run = _build(faults, "run", RunSettings, tables["run"])
+    if run is not None:
+        _check_method(faults, run.method)
     laws = _laws(faults, tables["ensemble"].get("vary", {}))
     settings = _build(faults, "ensemble", EnsembleSettings, {**tables["ensemble"], "vary": laws})
     scene = None
@@ -143,6 +146,15 @@ def _build(faults: Faults, name: str, kind: Callable[..., Any], table: Mapping[s
     with faults.including():
         return kind(**known)
     return None
+
+
+def _check_method(faults: Faults, name: str) -> None:
+    """Note what is wrong with [run] method."""
+    with faults.including():
+        try:
+            Method(name)
+        except SceneError as error:
+            raise SceneError(f"run.{fault}" for fault in error.faults) from None
 
 
 _STAND_INS: dict[str, Any] = {"mass": 1.0, "inertia": (1.0, 1.0, 1.0)}

@@ -108,10 +108,15 @@ class Vehicle:
                 faults.add(
                     name, getattr(self, name), "says again what the 6x6 matrices say", "keep one of the two forms"
                 )
-        rigid = faults.symmetric("rigid_body_mass_matrix", self.rigid_body_mass_matrix, UNITS["mass"], 6)
+        unit = UNITS["rigid_body_mass_matrix"]
+        rigid: np.ndarray | None = None
+        if self.rigid_body_mass_matrix is None:
+            faults.add("rigid_body_mass_matrix", None, "is missing", f"give it beside added_mass_matrix [{unit}]")
+        else:
+            rigid = faults.symmetric("rigid_body_mass_matrix", self.rigid_body_mass_matrix, unit, 6)
         zeros = np.zeros((6, 6))
         given = zeros if self.added_mass_matrix is None else self.added_mass_matrix
-        added = faults.symmetric("added_mass_matrix", given, UNITS["mass"], 6)
+        added = faults.symmetric("added_mass_matrix", given, unit, 6)
         weight = None if self.weight is None else faults.number("weight", self.weight, "N", least=0.0)
         center: np.ndarray | None = None
         warnings: tuple[str, ...] = ()
@@ -119,7 +124,7 @@ class Vehicle:
             center = faults.finite("center_of_gravity", self.center_of_gravity, (3,), "m")
         if rigid is not None:
             center, warnings = self._rigid(faults, rigid, center)
-        if rigid is not None and added is not None and not _definite(rigid + added):
+        if rigid is not None and added is not None and _definite(rigid) and not _definite(rigid + added):
             faults.add("added_mass_matrix", given, "with the rigid body's is not positive definite", SIGN)
         values = {"rigid_body_mass_matrix": rigid, "added_mass_matrix": added, "weight": weight}
         return values | {"center_of_gravity": center, "warnings": warnings}

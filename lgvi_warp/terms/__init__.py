@@ -29,15 +29,21 @@ AnyTerm = TypeVar("AnyTerm", bound=Term)
 # The types of a scene file.
 TYPES: dict[str, type[Term]] = {}
 
+# Would mix a term's numbers with those of the scene.
+RESERVED = ("vehicle", "environment", "start")
+
 # Follow from the vehicle; refused in a list of terms.
 IMPLIED: tuple[Term, ...] = (Weight(), Restoring())
 
 
-def register(kind: type[Term]) -> type[Term]:
-    """Make a user's Term known to scene files by its `type`. Usable as a decorator. Raises ValueError if it is taken."""
-    if not kind.type or kind.type in TYPES or kind.type in ("weight", "restoring"):
+def register(kind: type[AnyTerm]) -> type[AnyTerm]:
+    """Make a user's Term or Event known to scene files by its `type`; also as a decorator. ValueError if it is taken."""
+    from lgvi_warp import events
+
+    known: dict[str, Any] = events.TYPES if issubclass(kind, events.Event) else TYPES
+    if not kind.type or kind.type in known or kind.type in ("weight", "restoring"):
         raise ValueError(f"{kind.__name__}.type = {kind.type!r}: give a type that no other term has")
-    TYPES[kind.type] = kind
+    known[kind.type] = kind
     return kind
 
 
@@ -60,7 +66,7 @@ for _kind in (
     CrossFlow,
     BodyLift,
 ):
-    register(_kind)
+    TYPES[_kind.type] = _kind
 
 
 def from_list(given: Any) -> tuple[Term, ...]:
@@ -73,8 +79,10 @@ def from_list(given: Any) -> tuple[Term, ...]:
     terms: list[Term] = []
     for i, one in enumerate(given):
         with faults.including():
-            terms.append(one if isinstance(one, Term) else _from_table(f"terms[{i}]", one))
+            terms.append(_allowed(f"terms[{i}]", one) if isinstance(one, Term) else _from_table(f"terms[{i}]", one))
     keys = [term.key for term in terms]
+    for key in sorted({key for key in keys if key in RESERVED}):
+        faults.add("terms", key, "is the name of a section of the scene", f'give another name: name = "{key}_term"')
     for key in sorted({key for key in keys if keys.count(key) > 1}):
         faults.add(
             "terms", key, f"is the name of {keys.count(key)} terms", f'give each a name of its own: name = "{key}_2"'
@@ -83,15 +91,27 @@ def from_list(given: Any) -> tuple[Term, ...]:
     return tuple(terms)
 
 
+def _allowed(where: str, one: Term) -> Term:
+    """A Term object, unless it is none for this list."""
+    from lgvi_warp.events import Event
+
+    if isinstance(one, Event):
+        raise SceneError([f"{where} = {one.type!r}: is an event; give it in events=[...]"])
+    if type(one) in (Weight, Restoring):
+        raise SceneError([f"{where} = {one.type!r}: acts already; leave it out: it follows from the vehicle"])
+    return one
+
+
 def _from_table(where: str, table: Any) -> Term:
     if not isinstance(table, Mapping):
         remedy = "write a table with type = ..., or give a term such as lw.Drag(quadratic=...)"
         raise SceneError([f"{where} = {table!r}: is no term; {remedy}"])
-    kind = TYPES.get(table.get("type", ""))
+    word = table.get("type", "")
+    kind = TYPES.get(word) if isinstance(word, str) else None
     if kind is None:
-        implied = table.get("type") in ("weight", "restoring", "buoyancy")
-        remedy = "leave it out: it follows from the vehicle" if implied else closest(table.get("type", ""), TYPES)
-        raise SceneError([f"{where}.type = {table.get('type', '')!r}: is not known; {remedy}"])
+        implied = word in ("weight", "restoring", "buoyancy")
+        remedy = "leave it out: it follows from the vehicle" if implied else closest(word, TYPES)
+        raise SceneError([f"{where}.type = {word!r}: is not known; {remedy}"])
     return build(where, kind, table)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from lgvi_warp.errors import Faults
 from lgvi_warp.terms.base import Numbers, Packed, Setting, knots, quantity
 from lgvi_warp.terms.fins import Fins, fin_rows, side_by_side
-from lgvi_warp.terms.wrench import rising
+from lgvi_warp.terms.wrench import commands, first_row, not_rising, refuse_idle, rising
 
 # rad/s: from here on a limit of the rate is none.
 UNLIMITED = 1e6
@@ -36,7 +36,7 @@ class ControlFins(Fins):
     command_schedule: Any = quantity(("k", "n"), "rad", None)
 
     def __post_init__(self) -> None:
-        first = _first(self.command_schedule)
+        first = first_row(self.command_schedule)
         given = self.command is not None and self.command_schedule is not None
         object.__setattr__(self, "_both", given and not np.array_equal(first, self.command))
         if self.command is None:
@@ -55,10 +55,11 @@ class ControlFins(Fins):
             faults.add("command", self.command, "is given beside command_schedule", "keep one of them")
 
     def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
-        """Also where a member has a limited rate and the scene has none: its deflections would not be kept."""
+        """Also times that do not rise. Raises SceneError for numbers that would not act."""
         bad = super().unphysical(own)
-        if not self.memory:
-            bad["rate_limit"] = bad["rate_limit"] | np.any(own["rate_limit"] < UNLIMITED, axis=1)
+        bad["times"] = bad["times"] | not_rising(own["times"])
+        remedy = f"give {self.key}.rate_limit below {UNLIMITED:g} rad/s in the scene as well"
+        refuse_idle(self, own, "rate_limit", own["rate_limit"] < UNLIMITED, remedy)
         return bad
 
     @property
@@ -69,25 +70,15 @@ class ControlFins(Fins):
     def packed(self, own: Numbers, setting: Setting) -> Packed:
         """Rows as the device code has them: each fin's, then each one's commands."""
         fins = side_by_side([fin_rows(own, setting), own["limit"][..., None], own["rate_limit"][..., None]])
-        schedule = own["command_schedule"]
-        if schedule.shape[1] == 1:
-            schedule = own["command"][:, None, :]
+        times, schedule = commands(own)
         count = schedule.shape[2]
-        tables = [knots(own["times"], schedule[:, :, i : i + 1]) for i in range(count)]
+        tables = [knots(times, schedule[:, :, i : i + 1]) for i in range(count)]
         rows = side_by_side([fins.reshape(len(fins), -1), *tables])
-        values = {"count": count, "knots": own["times"].shape[1] - 1, "limited": int(self.memory), "memory": 0}
+        values = {"count": count, "knots": times.shape[1] - 1, "limited": int(self.memory), "memory": 0}
         if not self.memory:
             return Packed(values, rows)
-        start = np.clip(_at_start(own["times"], schedule), -own["limit"], own["limit"])
+        start = np.clip(_at_start(times, schedule), -own["limit"], own["limit"])
         return Packed(values, rows, start)
-
-
-def _first(schedule: Any) -> Any:
-    """The commands at the schedule's first time; 0 where there is none, or none that could be read."""
-    try:
-        return np.atleast_2d(np.array(schedule, dtype=np.float64))[0] if schedule is not None else 0.0
-    except (TypeError, ValueError):
-        return 0.0
 
 
 def _at_start(times: np.ndarray, schedule: np.ndarray) -> np.ndarray:

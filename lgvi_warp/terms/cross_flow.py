@@ -10,7 +10,7 @@ import numpy as np
 from lgvi_warp.errors import Faults
 from lgvi_warp.terms.base import Numbers, Packed, Setting, Term, quantity
 from lgvi_warp.terms.fins import side_by_side, twist
-from lgvi_warp.terms.wrench import rising
+from lgvi_warp.terms.wrench import not_rising, rising
 
 # Gauss' two points of a segment from 0 to 1.
 GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
@@ -47,7 +47,7 @@ class CrossFlow(Term):
     def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
         """Also where a member's stations do not rise."""
         bad = super().unphysical(own)
-        bad["stations"] = bad["stations"] | np.any(np.diff(np.nan_to_num(own["stations"])) <= 0.0, axis=1)
+        bad["stations"] = bad["stations"] | not_rising(own["stations"])
         return bad
 
     def present(self, own: Numbers) -> bool:

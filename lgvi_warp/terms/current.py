@@ -9,7 +9,7 @@ import numpy as np
 
 from lgvi_warp.errors import Faults
 from lgvi_warp.terms.base import Numbers, Packed, Setting, Term, knots, quantity
-from lgvi_warp.terms.wrench import rising
+from lgvi_warp.terms.wrench import not_rising, rising
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -53,6 +53,11 @@ class CurrentProfile(Term):
     def check(self, faults: Faults) -> None:
         """Depths must rise."""
         rising(faults, "depths", self.depths)
+
+    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+        """Also where a member's depths do not rise."""
+        bad = super().unphysical(own)
+        return bad | {"depths": bad["depths"] | not_rising(own["depths"])}
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
         """The table, knot by knot."""

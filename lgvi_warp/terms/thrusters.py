@@ -9,7 +9,7 @@ import numpy as np
 
 from lgvi_warp.errors import Faults
 from lgvi_warp.terms.base import Numbers, Packed, Setting, Term, knots, quantity
-from lgvi_warp.terms.wrench import rising
+from lgvi_warp.terms.wrench import commands, first_row, not_rising, refuse_idle, rising
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -42,16 +42,19 @@ class Thrusters(Term):
         defaults = {"coefficient_astern": self.coefficient, "dead_band": np.zeros(n), "limit": np.full(n, 1e6),
                     "time_constant": np.zeros(n)}  # fmt: skip
         scheduled = self.command_schedule is not None
-        both = scheduled and self.command is not None and not np.array_equal(self.command, self.command_schedule[0])
+        first = first_row(self.command_schedule)
+        both = scheduled and self.command is not None and not np.array_equal(self.command, first)
         if scheduled:
-            defaults["command"] = np.asarray(self.command_schedule)[:1].reshape(-1)
+            defaults["command"] = first
         else:
-            held = np.zeros(n) if self.command is None else self.command
-            defaults |= {"command": held, "times": [0.0], "command_schedule": np.asarray(held)[None]}
+            held = 0.0 if self.command is None else self.command
+            held = np.full(n, held) if np.ndim(np.asarray(held, dtype=object)) == 0 else held
+            defaults |= {"command": held, "times": [0.0], "command_schedule": [held]}
         for name, value in defaults.items():
             if getattr(self, name) is None:
-                object.__setattr__(self, name, value if np.ndim(value) else np.full(n, value))
-            elif np.ndim(getattr(self, name)) == 0:
+                alone = np.ndim(np.asarray(value, dtype=object)) == 0
+                object.__setattr__(self, name, np.full(n, value) if alone else value)
+            elif np.ndim(np.asarray(getattr(self, name), dtype=object)) == 0 and name != "command_schedule":
                 object.__setattr__(self, name, np.full(n, getattr(self, name)))
         object.__setattr__(self, "_both", both)
         super().__post_init__()
@@ -65,6 +68,15 @@ class Thrusters(Term):
         rising(faults, "times", self.times)
         if self.__dict__["_both"]:
             faults.add("command", self.command, "differs from the first of command_schedule", "keep one of them")
+
+    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+        """Also a direction without length and times that do not rise. Raises SceneError for numbers that would not act."""
+        bad = super().unphysical(own)
+        bad["direction"] = bad["direction"] | np.any(~np.any(own["direction"], axis=-1), axis=-1)
+        bad["times"] = bad["times"] | not_rising(own["times"])
+        remedy = f"give {self.key}.time_constant above 0 [s] in the scene as well"
+        refuse_idle(self, own, "time_constant", own["time_constant"] > 0.0, remedy)
+        return bad
 
     @property
     def memory(self) -> bool:
@@ -80,20 +92,18 @@ class Thrusters(Term):
             rate = np.where(own["time_constant"] > 0.0, 1.0 / own["time_constant"], FAST)
         numbers = [own[key] for key in ("coefficient", "coefficient_astern", "dead_band", "limit")]
         parts = [force, torque, *(x[..., None] for x in (*numbers, rate))]
-        n = max(*(len(part) for part in parts), len(own["times"]), len(own["command_schedule"]))
+        times, schedule = commands(own)
+        n = max(*(len(part) for part in parts), len(times), len(schedule))
         whole = [np.broadcast_to(part, (n, *part.shape[1:])) for part in parts]
         rows = [np.concatenate(whole, axis=2).reshape(n, -1)]
-        schedule = own["command_schedule"]
-        if "command" in own and schedule.shape[1] == 1:
-            schedule = own["command"][:, None, :]
         for i in range(schedule.shape[2]):
-            table = knots(own["times"], schedule[:, :, i : i + 1])
+            table = knots(times, schedule[:, :, i : i + 1])
             rows.append(np.broadcast_to(table, (n, table.shape[1])))
         count = schedule.shape[2]
-        values = {"count": count, "knots": own["times"].shape[1] - 1, "lagged": int(self.memory)}
+        values = {"count": count, "knots": times.shape[1] - 1, "lagged": int(self.memory)}
         if not self.memory:
             return Packed(values | {"memory": 0}, np.concatenate(rows, axis=1))
-        first = np.stack([np.interp(0.0, t, c) for t, c in _columns(own["times"], schedule)])
+        first = np.stack([np.interp(0.0, t, c) for t, c in _columns(times, schedule)])
         start = np.clip(first.reshape(-1, count), -own["limit"], own["limit"])
         return Packed(values, np.concatenate(rows, axis=1), start)
 

@@ -54,6 +54,12 @@ class Ensemble:
     """
 
     def __init__(self, scene: Scene, members: int = 1, seed: int = 0, vary: Mapping[str, Distribution] | None = None):
+        faults = Faults()
+        if not isinstance(scene, Scene):
+            faults.add("scene", scene, "is no Scene", "give lw.Scene(...) or lw.Scene.load(path)")
+        if vary is not None and not (isinstance(vary, Mapping) and all(isinstance(name, str) for name in vary)):
+            faults.add("vary", vary, "does not map names to distributions", 'give {"vehicle.mass": lw.Normal(...)}')
+        faults.raise_if_any()
         settings = scenes.EnsembleSettings(members, seed, dict(vary or {}))
         self._setup(scene, settings, {})
 

@@ -70,6 +70,12 @@ class Box(Event):
     lower: Any = quantity((3,), "m")
     upper: Any = quantity((3,), "m")
 
+    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+        """Also where a member's corners span no box."""
+        bad = super().unphysical(own)
+        crossed = np.any(own["upper"] <= own["lower"], axis=1)
+        return {"lower": bad["lower"] | crossed, "upper": bad["upper"] | crossed}
+
     def check(self, faults: Faults) -> None:
         """The corners must span a box."""
         if np.any(self.upper <= self.lower):
@@ -110,9 +116,9 @@ def from_list(given: Any) -> tuple[Event, ...]:
             if isinstance(one, Event):
                 found.append(one)
                 continue
-            kind = TYPES.get(one.get("type", "")) if isinstance(one, Mapping) else None
+            word = one.get("type", "") if isinstance(one, Mapping) else one
+            kind = TYPES.get(word) if isinstance(word, str) else None
             if kind is None:
-                word = one.get("type", "") if isinstance(one, Mapping) else one
                 faults.add(f"events[{i}].type", word, "is not known", closest(str(word), TYPES))
             else:
                 found.append(build(f"events[{i}]", kind, one))

@@ -13,7 +13,7 @@ import numpy as np
 
 from lgvi_warp import inertia, terms, vehicle
 from lgvi_warp.ensemble import Ensemble
-from lgvi_warp.errors import Faults
+from lgvi_warp.errors import Faults, closest
 from lgvi_warp.inertia import Frame
 from lgvi_warp.method import FORCED, Method, Program, merged, middle_axis, simplified, with_hops
 from lgvi_warp.terms.base import Setting, Term
@@ -146,6 +146,9 @@ def _module(term: Term, known: Mapping[str, Any], *roles: str) -> Any:
     else:
         for role in roles:
             _check_signature(faults, term, module, role)
+        flow = getattr(module, "FLOW", "none")
+        if flow not in FLOWS:
+            faults.add(f"{term.key}.FLOW", flow, "is not known", closest(str(flow), FLOWS))
     faults.raise_if_any()
     return module
 
@@ -167,6 +170,8 @@ def _check_signature(faults: Faults, term: Term, module: Any, role: str) -> None
 
 
 ROLES = ("law", "damping", "flow", "evolve")
+# How water may move, the least first.
+FLOWS = ("none", "steady", "uniform", "varying")
 
 
 def _acting(ensemble: Ensemble, p: Parameters, setting: Setting, laws: Mapping[str, Any]) -> list[tuple[Term, Any]]:
@@ -184,8 +189,7 @@ def _acting(ensemble: Ensemble, p: Parameters, setting: Setting, laws: Mapping[s
 
 def _flow(modules: list[Any]) -> str:
     """How the water moves, by the law that says most."""
-    order = ("none", "steady", "uniform", "varying")
-    return max((getattr(module, "FLOW", "none") for module in modules), key=order.index, default="none")
+    return max((getattr(module, "FLOW", "none") for module in modules), key=FLOWS.index, default="none")
 
 
 def _check(

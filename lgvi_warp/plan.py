@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import threading
 import time
@@ -18,7 +19,7 @@ from lgvi_kernels.stops import STOPS
 from lgvi_kernels.terms import LAWS
 from lgvi_warp import warp_setup
 from lgvi_warp.ensemble import Ensemble
-from lgvi_warp.errors import Faults
+from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.machine import default_width
 from lgvi_warp.method import Method
 from lgvi_warp.model import Model, make_model
@@ -90,7 +91,8 @@ class Plan:
             chained = self.method.turns and "dense" not in self.model.parts
             object.__setattr__(self, "width", default_width(self.dtype, chained=chained))
         object.__setattr__(self, "spec", self._spec())
-        object.__setattr__(self, "advance", make_advance(self.spec))
+        with self._laws_compile():
+            object.__setattr__(self, "advance", make_advance(self.spec))
 
     def _spec(self) -> Spec:
         model = self.model
@@ -118,11 +120,26 @@ class Plan:
             lead_time=model.lead[1] * self.method.stages[0] if model.lead else 0.0,
         )
 
+    @contextlib.contextmanager
+    def _laws_compile(self) -> Iterator[None]:
+        """Where a scene has laws of a user, what does not compile is theirs. Raises SceneError for it."""
+        try:
+            yield
+        except Exception as error:
+            known = (*LAWS.values(), *STOPS.values())
+            own = [term.key for term, module in (*self.model.laws, *self.model.events) if module not in known]
+            if not own:
+                raise
+            what = f"one of them does not compile ({type(error).__name__}: {error})"
+            raise SceneError(
+                [f"law {', '.join(own)}: {what}; lw.check_law(term) says where, docs/add_a_law.md how"]
+            ) from error
+
     def compile(self) -> float:
         """Load the kernel, compiling it if Warp's cache has none. Returns the seconds it took."""
         start = time.perf_counter()
         warp_setup.start()
-        with build_lock:
+        with build_lock, self._laws_compile():
             wp.load_module(self.advance.kernel.module, device="cpu")
         _ = self.dtypes, self.times  # made here, before threads ask for them
         return time.perf_counter() - start

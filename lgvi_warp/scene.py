@@ -197,6 +197,11 @@ class Scene:
             object.__setattr__(self, "terms", terms.from_list(self.terms))
         with faults.including():
             object.__setattr__(self, "events", events.from_list(self.events))
+        if not faults:
+            keys = [one.key for one in (*self.terms, *self.events)]
+            for key in sorted({one.key for one in self.events if keys.count(one.key) > 1}):
+                faults.add("events", key, "is the name of two events or of a term too",
+                           f'give each a name of its own: name = "{key}_2"')  # fmt: skip
         if self.controller is not None:
             remedy = "leave it out; a held or scheduled wrench and thrusters' commands are terms"
             faults.add("controller", self.controller, "is not known to this version", remedy)

@@ -12,7 +12,7 @@ import numpy as np
 
 from lgvi_warp import machine, notation
 from lgvi_warp.ensemble import Ensemble
-from lgvi_warp.errors import Faults
+from lgvi_warp.errors import Faults, SceneError, shown
 from lgvi_warp.executors import threads as thread_executor
 from lgvi_warp.inertia import Frame
 from lgvi_warp.method import Method
@@ -57,10 +57,14 @@ def solve(
     Raises SceneError naming every fault of the arguments. Prints nothing. The same inputs give the same bits for any
     number of threads, on one type of machine.
     """
+    if not isinstance(fleet, Ensemble | Scene):
+        raise SceneError(
+            [f"fleet = {shown(fleet)}: is neither an Ensemble nor a Scene; give lw.Scene(...) or lw.Ensemble(...)"]
+        )
     ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
     plan = make_plan(ensemble, method, h, t1, save, dtype, width=width, checks=checks)
     faults = Faults()
-    if threads is not None and (not isinstance(threads, int) or threads < 1):
+    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
         faults.add("threads", threads, "is not a whole number above 0", "give 1 or more, or leave it out for all cores")
     faults.raise_if_any()
     return run_plan(plan, threads or machine.thread_count(), progress)
@@ -84,8 +88,14 @@ def make_plan(
     faults = Faults()
     if h is None:
         faults.add("h", h, "is missing", "give the step in seconds: solve(..., h=0.01) or [run] step")
+    else:
+        h = faults.positive("h", h)
     if t1 is None:
         faults.add("t1", t1, "is missing", "give the end in seconds: solve(..., t1=150.0) or [run] duration")
+    else:
+        t1 = faults.positive("t1", t1)
+    if save is not None and not isinstance(save, SaveAt):
+        faults.add("save", save, "is no SaveAt", "give lw.SaveAt(every=1.0) or lw.SaveAt(at=[...])")
     faults.raise_if_any()
     every = settings.save_every
     # A spacing that the scene gave for its own duration says nothing about a shorter run.

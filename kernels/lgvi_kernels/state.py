@@ -11,8 +11,13 @@ import warp as wp
 from lgvi_kernels.lanes import lane, lane3, symmetric3
 
 
+@functools.cache
 def struct(name, **fields):
-    """A Warp struct from names and types: for structs whose fields depend on what a scene has."""
+    """A Warp struct from names and types: for structs whose fields depend on what a scene has.
+
+    The same names and types give the same struct, so that a law defined anew (a notebook's cell run twice) fits the kernel
+    that Warp keeps for its source.
+    """
     return wp.struct(type(name, (), {"__annotations__": fields, "__module__": __name__}))
 
 

@@ -121,7 +121,7 @@ class Term:
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
         """Its numbers in the kernel's axes."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} must define packed(own, setting): see docs/add_a_law.md")
 
     def water(self, own: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray | None:
         """Velocity of the water (k, n, 3) [m/s] at positions (k, n, 3) and times (k,) [s].

@@ -1,6 +1,7 @@
 """What a newcomer may get wrong: every message names the key, the value and the remedy, and all faults come at once."""
 
 import functools
+import importlib.util
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -367,8 +368,11 @@ SETTINGS = [
     (MATRIX, {"method": "psi_q"}, "method = 'psi_q'", "not known", "did you mean 'psi_"),
     (MATRIX, {"method": "kl6(phi)"}, "method = 'kl6(phi)'", "not symmetric", "compose psi_s"),
     (MATRIX, {"dtype": "float16"}, "dtype = 'float16'", "did you mean 'float64'?"),
-    (MATRIX, {"h": NAN}, "step = nan", "not finite", "[s]"),
-    (MATRIX, {"t1": -1.0}, "duration = -1.0", "not positive", "above 0 [s]"),
+    (MATRIX, {"h": NAN}, "h = nan", "not finite", "[s]"),
+    (MATRIX, {"t1": -1.0}, "t1 = -1.0", "not positive", "above 0 [s]"),
+    (MATRIX, {"h": "a"}, "h = 'a'", "not numeric", "[s]"),
+    (MATRIX, {"t1": [1.0]}, "t1 = [1.0]", "shape", "[s]"),
+    (MATRIX, {"save": 0.1}, "save = 0.1", "is no SaveAt", "lw.SaveAt("),
 ]
 
 
@@ -464,3 +468,67 @@ def test_numbers_of_the_wrong_shape():
     wrong = type("Bad", (Packs,), {"what": lw.Packed({"k": np.ones((1, 3))}), "__annotations__": {}})
     report = lw.check_law(wrong(k=1.0))
     assert not report.ok and "packed() fails" in str(report) and "give arrays (1,), (1, 3)" in str(report)
+
+
+def test_what_is_no_fleet():
+    for make in (lw.solve, lw.Ensemble):
+        (fault,) = refused(make, lw.Vehicle(1.0, 1.0 * np.ones(3), np.ones(3), 0.0))
+        assert "give lw.Scene(" in fault
+    (fault,) = refused(lw.Ensemble, from_table(MATRIX), 5, 0, [1])
+    assert "vary = [1]" in fault and "lw.Normal" in fault
+
+
+def test_two_events_of_one_name():
+    events = [lw.Floor(depth=1.0), lw.Floor(depth=2.0)]
+    (fault,) = refused(lw.Scene, from_table(MATRIX).vehicle, events=events)
+    assert "events = 'floor'" in fault and 'name = "floor_2"' in fault
+    second = lw.Floor(depth=2.0, name="lower")
+    assert len(lw.Scene(from_table(MATRIX).vehicle, events=[events[0], second]).events) == 2
+
+
+def test_a_quadratic_matrix_of_members_that_creates_energy():
+    scene = from_table({"type": "drag_matrix", "quadratic": np.eye(6).tolist()})
+    (fault,) = refused(lw.Ensemble, scene, 2000, 0, {"drag_matrix.quadratic": lw.Normal(std=1.0)})
+    assert "drag_matrix.quadratic of member" in fault and "unphysical" in fault
+    lw.Ensemble(scene, 2000, 0, {"drag_matrix.quadratic": lw.Uniform(relative=0.3)})
+
+
+def test_a_broken_law_in_solve():
+    broken = device(law=pull_silent)
+    Broken = type("Broken", (Pull,), {"device": broken})
+    with pytest.raises(lw.SceneError, match=r"(?s)law pull: .*does not compile.*lw.check_law"):
+        lw.solve(lw.Scene(from_table(MATRIX).vehicle, terms=[Broken(k=1.0)]), h=0.01, t1=0.1)
+    wavy = type("Wavy", (Pull,), {"device": device(law=pull_law, FLOW="wavy")})
+    (fault,) = refused(lw.solve, lw.Scene(from_table(MATRIX).vehicle, terms=[wavy(k=1.0)]), h=0.01, t1=0.1)
+    assert "pull.FLOW = 'wavy'" in fault and "varying" in fault
+
+
+NOTEBOOK_CELL = """
+import functools
+from typing import Any
+import warp as wp
+from lgvi_kernels.lanes import add, lane, mul
+from lgvi_kernels.state import struct
+
+@functools.cache
+def params(width, real):
+    return struct("Lift", k=lane(width, real))
+
+@wp.func
+def law(w: Any, view: Any, p: Any):
+    w.force = w.force + p.k * view.down
+    return w
+"""
+
+
+def test_a_law_defined_twice_as_in_a_notebook(tmp_path):
+    results = []
+    for i in range(2):
+        path = tmp_path / f"cell_{i}.py"
+        path.write_text(NOTEBOOK_CELL)
+        spec = importlib.util.spec_from_file_location("cell", path)
+        cell = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(cell)
+        Lift = type("Lift", (Pull,), {"device": cell, "packed": lambda self, own, setting: lw.Packed(dict(own))})
+        results.append(lw.solve(lw.Scene(from_table(MATRIX).vehicle, terms=[Lift(k=1.0)]), h=0.01, t1=0.1).position)
+    assert np.array_equal(*results)

@@ -117,7 +117,7 @@ def from_list(given: Any) -> tuple[Event, ...]:
                 found.append(one)
                 continue
             word = one.get("type", "") if isinstance(one, Mapping) else one
-            kind = TYPES.get(word) if isinstance(word, str) else None
+            kind = TYPES.get(word) if isinstance(one, Mapping) and isinstance(word, str) else None
             if kind is None:
                 faults.add(f"events[{i}].type", word, "is not known", closest(str(word), TYPES))
             else:

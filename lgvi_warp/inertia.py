@@ -79,6 +79,12 @@ class Frame:
     E_forces: np.ndarray
 
     @property
+    def aligned(self) -> bool:
+        """Whether the axes of every member are the user's, in any order or sense, and the origin of the forces his."""
+        Q = np.abs(self.Q)
+        return bool(np.all((Q == 0.0) | (Q == 1.0)) and not np.any(self.forces))
+
+    @property
     def coupled(self) -> bool:
         """Whether the velocities of some member are coupled at either origin."""
         return bool(np.any(self.E) or np.any(self.E_forces))

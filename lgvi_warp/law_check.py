@@ -130,7 +130,7 @@ def check_law(
     if not isinstance(term, Term):
         raise SceneError([f"term = {term!r}: is no term; give an object such as lw.Drag(...), not its class"])
     known, roles = (STOPS, ("distance",)) if isinstance(term, Event) else (LAWS, model.ROLES)
-    module = model._module(term, known, *roles)
+    module = model._module(term, term.device_in(False), known, *roles)
     bench = Bench(term, module, scene or simple_scene(), max(1, -(-samples // default_width("float64"))), seed)
     checks: list[Check] = []
     for part in (_numbers, _finite, _whole, _potential, _damping, _flow):
@@ -282,9 +282,10 @@ def _numbers(bench: Bench, step: float) -> Iterator[Check]:
         return
     given = set(packed.values) | ({"first"} if packed.rows is not None else set())
     given |= {"memory"} if packed.memory is not None else set()
+    given |= {"work"} if packed.work else set()
     wanted = set(bench.Params["own"].names or ()) - {"unused"}
     wrong = [f"{name} is not in packed().values" for name in sorted(wanted - given)]
-    wrong += [f"{name} is no field of params()" for name in sorted(given - wanted - {"first", "memory"})]
+    wrong += [f"{name} is no field of params()" for name in sorted(given - wanted - {"first", "memory", "work"})]
     yield Check("numbers", len(wrong), 0.0, not wrong, "; ".join(wrong))
     remembers = packed.memory is not None and packed.memory.size > 0
     good = remembers == bool(term.memory)

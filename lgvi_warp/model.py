@@ -52,13 +52,14 @@ def frame_of(method: Method, parameters: Parameters) -> tuple[Frame, np.ndarray]
 class Model:
     """The choices for one run.
 
-    frame: of all members. laws: (term, module of its device code); drag by its exact flow first where it is used, and
-    `drag` its parts. flow: "none", "steady", "uniform" or "varying". coupling: which of U12, U13, U23 and of the pitches
-    are there. program: sub-maps of one stage. averages: alpha and beta of (15), (16), or None.
+    frame: of all members; aligned: as Setting's. laws: (term, module of its device code); drag by its exact flow first
+    where it is used, and `drag` its parts. flow: "none", "steady", "uniform" or "varying". coupling: which of U12, U13, U23
+    and of the pitches are there. program: sub-maps of one stage. averages: alpha and beta of (15), (16), or None.
     """
 
     method: Method
     frame: Frame
+    aligned: bool
     laws: tuple[tuple[Term, Any], ...]
     events: tuple[tuple[Term, Any], ...]
     mass: str
@@ -79,9 +80,9 @@ def make_model(
     """Decide. laws, stops: name -> module of device code. Raises SceneError where a method cannot do what a scene asks."""
     p = ensemble.parameters(0, ensemble.members)
     frame, U = frame_of(method, p)
-    setting = Setting(p, frame, ensemble.indices, ensemble.seed, h)
+    setting = Setting(p, frame, ensemble.indices, ensemble.seed, h, frame.aligned)
     acting = _acting(ensemble, p, setting, laws)
-    events = tuple((one, _module(one, stops, "distance")) for one in ensemble.scene.events)
+    events = tuple((one, _module(one, one.device, stops, "distance")) for one in ensemble.scene.events)
     damping = any(hasattr(module, "damping") for term, module in acting if not isinstance(term, Drag))
     flow = _flow([module for _, module in acting])
     drags = [(term, module) for term, module in acting if isinstance(term, Drag)]
@@ -118,6 +119,7 @@ def make_model(
     return Model(
         method=method,
         frame=frame,
+        aligned=setting.aligned,
         laws=tuple(acting),
         events=events,
         mass="full" if coupled and mass == "isotropic" else mass,
@@ -133,12 +135,12 @@ def make_model(
     )
 
 
-def _module(term: Term, known: Mapping[str, Any], *roles: str) -> Any:
+def _module(term: Term, device: Any, known: Mapping[str, Any], *roles: str) -> Any:
     """The device code of a term. Raises SceneError where it lacks what it must have."""
-    module = known.get(term.device) if isinstance(term.device, str) else term.device
+    module = known.get(device) if isinstance(device, str) else device
     faults = Faults()
     if module is None:
-        faults.add(f"{term.key}.device", term.device, "is not known", "give a module, or the name of a built-in one")
+        faults.add(f"{term.key}.device", device, "is not known", "give a module, or the name of a built-in one")
     elif not callable(getattr(module, "params", None)):
         faults.add(f"{term.key}.device", module, "has no params(width, real)", "see docs/add_a_law.md")
     elif not any(hasattr(module, role) for role in roles):
@@ -181,7 +183,7 @@ def _acting(ensemble: Ensemble, p: Parameters, setting: Setting, laws: Mapping[s
         if any(np.any(value) for value in term.packed({}, setting).values.values()):
             acting.append((term, laws[term.device]))
     for term in ensemble.scene.terms:
-        module = _module(term, laws, *ROLES)
+        module = _module(term, term.device_in(setting.aligned), laws, *ROLES)
         if term.present(ensemble.own(term, p)):
             acting.append((term, module))
     return acting

@@ -59,7 +59,9 @@ class Packets:
         width, Lane = plan.spec.width, plan.advance.Lane
         self.count = -(-members.count // width)
         Inertia, Params, Events = plan.advance.Inertia, plan.advance.Params, plan.advance.Events
-        setting = Setting(members.parameters, self.frame, members.indices, members.seed, plan.grid.h)
+        setting = Setting(
+            members.parameters, self.frame, members.indices, members.seed, plan.grid.h, plan.model.aligned
+        )
         params, table, memory = self._laws(setting)
         self.inertia = wp.array(self._inertia(), dtype=Inertia, device="cpu")
         self.params = wp.array(params, dtype=Params, device="cpu")
@@ -167,6 +169,9 @@ class Packets:
             if one.memory is not None:
                 values["memory"] = sum(part.shape[1] for part in memory)
                 memory.append(one.memory)
+            if one.work:
+                values["work"] = sum(part.shape[1] for part in memory)
+                memory.append(np.zeros((1, one.work)))
             for key, value in values.items():
                 self._fill(node["own"][key], value)
             node = node["rest"]

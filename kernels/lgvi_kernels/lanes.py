@@ -78,6 +78,13 @@ def _native_any_positive(width, real):
     return f"{_head(width, real, 'A')} return __builtin_reduce_or(A > (S)0) != 0;"
 
 
+def _native_element(width, real, statement):
+    """C++ that reads or writes a lane r at its place in a two-dimensional array."""
+    kind = f"wp::vec_t<{width}, wp::{real.__name__}>"
+    place = f"{kind}* place = ({kind}*)rows.data + ((wp::int64)(entry * rows.shape[1] + row) + offset);"
+    return f"{kind} r; {place} {statement}"
+
+
 def _vec3_maker(width, real):
     """The constructor of a Lane3, bound to its type: an overload's body would look the type up too late."""
     Lane, Lane3 = lane(width, real), lane3(width, real)
@@ -133,6 +140,16 @@ for _real in REALS:
         @wp.func_native(_native_any_positive(_width, _real))
         def any_positive(a: _L) -> bool:
             """Whether some lane is positive."""
+            ...
+
+        @wp.func_native(_native_element(_width, _real, "memcpy(&r, place, sizeof(r)); return r;"))
+        def element(rows: wp.array2d(dtype=_L), entry: int, row: int, offset: int) -> _L:
+            """rows[entry, row + offset] of an array without gaps: one address serves all (constant) offsets."""
+            ...
+
+        @wp.func_native(_native_element(_width, _real, "memcpy(place, &value, sizeof(r));"))
+        def set_element(rows: wp.array2d(dtype=_L), entry: int, row: int, offset: int, value: _L):
+            """rows[entry, row + offset] = value."""
             ...
 
         @wp.func

@@ -5,7 +5,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lane_math import clamp
-from lgvi_kernels.lanes import add, cross, dot, mul, ones, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes import add, cross, dot, element, mul, ones, set_element, sub, vec3  # noqa: F401
 
 
 @wp.func
@@ -29,20 +29,36 @@ def velocity_at(view: Any, r: Any):
 @wp.func
 def row1(view: Any, row: int):
     """One number of the law's table."""
-    return view.table[view.entry, row] * view.h.dtype(1.0)
+    return element(view.table, view.entry, row, 0)
 
 
 @wp.func
 def row3(view: Any, row: int):
     """Three rows of the law's table as a vector."""
-    return vec3(view.table[view.entry, row], view.table[view.entry, row + 1], view.table[view.entry, row + 2])
+    t = view.table
+    i = view.entry
+    return vec3(element(t, i, row, 0), element(t, i, row, 1), element(t, i, row, 2))
+
+
+@wp.func
+def remembered(view: Any, row: int):
+    """One number that the law remembers."""
+    return element(view.memory, view.packet, row, 0)
+
+
+@wp.func
+def remember(view: Any, row: int, value: Any):
+    """Keep a number for later, in this step or a following one."""
+    set_element(view.memory, view.packet, row, 0, value)
 
 
 @wp.func
 def ramp(view: Any, row: int, x: Any):
     """How far x is from one knot to the next, 0 to 1, from the two rows that hold the knot and 1 / the distance."""
     one = ones(x)
-    return clamp((x - view.table[view.entry, row]) * view.table[view.entry, row + 1], one - one, one)
+    t = view.table
+    i = view.entry
+    return clamp((x - element(t, i, row, 0)) * element(t, i, row, 1), one - one, one)
 
 
 @wp.func
@@ -51,7 +67,7 @@ def table1(view: Any, first: int, count: int, x: Any):
     value = row1(view, first)
     for i in range(count):
         at = first + 1 + 3 * i
-        value = value + ramp(view, at, x) * row1(view, at + 2)
+        value = value + ramp(view, at, x) * element(view.table, view.entry, at, 2)
     return value
 
 
@@ -61,7 +77,12 @@ def table3(view: Any, first: int, count: int, x: Any):
     value = row3(view, first)
     for i in range(count):
         at = first + 3 + 5 * i
-        value = value + ramp(view, at, x) * row3(view, at + 2)
+        change = vec3(
+            element(view.table, view.entry, at, 2),
+            element(view.table, view.entry, at, 3),
+            element(view.table, view.entry, at, 4),
+        )
+        value = value + ramp(view, at, x) * change
     return value
 
 

@@ -21,7 +21,8 @@ class Setting:
     """What a term may know when its numbers are made ready: all parameters of the scene, the frame, the run.
 
     parameters: "vehicle.mass" and so on; frame: axes and origin of the forces; members: indices (n,) of the members;
-    seed: of the ensemble; h: the step [s].
+    seed: of the ensemble; h: the step [s]. aligned: whether the frame of every member of the run is the user's but for the
+    order and sense of its axes.
     """
 
     parameters: Numbers
@@ -29,18 +30,21 @@ class Setting:
     members: np.ndarray
     seed: int
     h: float
+    aligned: bool = False
 
 
 class Packed(NamedTuple):
     """A term's numbers as its device code reads them.
 
     values: field of its Params -> (n,) numbers, (n, 3) vectors, whole numbers or (n,) whole numbers, in the kernel's axes;
-    rows: (n, rows), its part of the table; memory: (n, rows), what it remembers at the start. n is 1 where all is shared.
+    rows: (n, rows), its part of the table; memory: (n, rows), what it remembers at the start; work: how many rows it wants
+    for numbers of the moment. n is 1 where all is shared.
     """
 
     values: dict[str, Any]
     rows: np.ndarray | None = None
     memory: np.ndarray | None = None
+    work: int = 0
 
 
 def quantity(
@@ -118,6 +122,10 @@ class Term:
     def memory(self) -> bool:
         """Whether its device code remembers something from step to step."""
         return False
+
+    def device_in(self, aligned: bool) -> Any:
+        """Its device code, where the kernel's axes are the user's (see Setting) and where they are not."""
+        return self.device
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
         """Its numbers in the kernel's axes."""

@@ -76,9 +76,9 @@ class ControlFins(Fins):
         rows = side_by_side([fins.reshape(len(fins), -1), *tables])
         values = {"count": count, "knots": times.shape[1] - 1, "limited": int(self.memory), "memory": 0}
         if not self.memory:
-            return Packed(values, rows)
+            return Packed(values, rows, work=2 * count)
         start = np.clip(_at_start(times, schedule), -own["limit"], own["limit"])
-        return Packed(values, rows, start)
+        return Packed(values, rows, start, 2 * count)
 
 
 def _at_start(times: np.ndarray, schedule: np.ndarray) -> np.ndarray:

@@ -74,7 +74,11 @@ class Drag(Term):
     def packed(self, own: Numbers, setting: Setting) -> Packed:
         """As the matrix that it is the diagonal of."""
         matrices = {kind: own[kind][:, :, None] * np.eye(6) for kind in ("linear", "quadratic")}
-        return packed_matrix(matrices["linear"], matrices["quadratic"], setting.frame)
+        return packed_matrix(matrices["linear"], matrices["quadratic"], setting)
+
+    def device_in(self, aligned: bool) -> str:
+        """As of the matrix."""
+        return "drag_matrix" if aligned else "drag_matrix_turned"
 
 
 def _turned(Q: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
@@ -86,11 +90,10 @@ def _turned(Q: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
 
 def has_exact_flow(frame: Frame) -> bool:
     """Whether the user's axes are principal axes of M and J, in any order, about the same origin."""
-    M, Q = frame.M, np.abs(frame.Q)
+    M = frame.M
     off = np.abs(M[:, ~np.eye(3, dtype=bool)]).max(axis=1)
     diagonal = off <= DIAGONAL * np.abs(np.einsum("nii->ni", M)).max(axis=1)
-    aligned = np.all((Q == 0.0) | (Q == 1.0), axis=(1, 2))
-    return bool(np.all(diagonal) and np.all(aligned) and not np.any(frame.forces) and not frame.coupled)
+    return bool(np.all(diagonal) and frame.aligned and not frame.coupled)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -129,7 +132,11 @@ class DragMatrix(Term):
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
         """In the axes and about the origin of the forces."""
-        return packed_matrix(own["linear"], own["quadratic"], setting.frame)
+        return packed_matrix(own["linear"], own["quadratic"], setting)
+
+    def device_in(self, aligned: bool) -> str:
+        """Where the axes are not the kernel's, velocities along them are to be found first."""
+        return "drag_matrix" if aligned else "drag_matrix_turned"
 
 
 def _creates_energy(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -153,17 +160,22 @@ def _creates_energy(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, 
     return bad, worst
 
 
-def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, frame: Frame) -> Packed:
-    """Rows: the linear matrix; then, for each velocity that has a quadratic column, its twist (6) and its wrench (6)."""
+def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, setting: Setting) -> Packed:
+    """Rows: the linear matrix, then the quadratic one.
+
+    Or, where the axes are not the kernel's, for each velocity that has a quadratic column its twist (6) and its wrench (6).
+    """
     # The user's velocities from those at the origin of the forces in the kernel's axes.
-    X = motion_from(frame.forces, frame.Q)
+    X = motion_from(setting.frame.forces, setting.frame.Q)
     n = max(len(linear), len(quadratic), len(X))
     X = np.broadcast_to(X, (n, 6, 6))
     XT = np.swapaxes(X, 1, 2)
-    constant = XT @ linear @ X
+    values = {"constant": int(np.any(linear))}
+    rows = [(XT @ linear @ X).reshape(n, 36)]
+    if setting.aligned:
+        rows.append((XT @ quadratic @ X).reshape(n, 36))
+        return Packed(values | {"quadratic": int(np.any(quadratic))}, np.concatenate(rows, axis=1))
     columns = [j for j in range(6) if np.any(quadratic[:, :, j])]
-    rows = [constant.reshape(n, 36)]
     for j in columns:
         rows += [X[:, j, :], np.einsum("nij,nj->ni", XT, np.broadcast_to(quadratic[:, :, j], (n, 6)))]
-    has_linear = int(np.any(linear))
-    return Packed({"constant": has_linear, "count": len(columns)}, np.concatenate(rows, axis=1))
+    return Packed(values | {"count": len(columns)}, np.concatenate(rows, axis=1))

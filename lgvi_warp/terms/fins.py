@@ -69,7 +69,8 @@ class Fins(Term):
     def packed(self, own: Numbers, setting: Setting) -> Packed:
         """Rows as the device code has them."""
         rows = fin_rows(own, setting)
-        return Packed({"count": rows.shape[1]}, rows.reshape(len(rows), -1))
+        count = rows.shape[1]
+        return Packed({"count": count}, rows.reshape(len(rows), -1), work=2 * count)
 
 
 def _degenerate(chord: np.ndarray, normal: np.ndarray) -> Any:
@@ -79,14 +80,25 @@ def _degenerate(chord: np.ndarray, normal: np.ndarray) -> Any:
 
 
 def fin_rows(own: Numbers, setting: Setting) -> np.ndarray:
-    """(n, fins, 15): the twists along chord and normal, then rho A/2 times lift slope and the drag coefficients."""
+    """(n, fins, 51): the twists along chord and normal, rho A/2 times lift slope and the drag coefficients, S and W.
+
+    S = c c^T + n n^T and W = n c^T - c n^T of these twists c and n, block by block (kernels: terms/fins.py).
+    """
     chord = own["chord"] / np.linalg.norm(own["chord"], axis=-1, keepdims=True)
     normal = own["normal"] - np.sum(own["normal"] * chord, axis=-1, keepdims=True) * chord
     normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
     half = 0.5 * setting.parameters["environment.water_density"][:, None] * own["area"]
     sizes = [half * own[name] for name in ("lift_slope", "drag", "drag_normal")]
-    twists = [twist(setting.frame, own["position"], direction) for direction in (chord, normal)]
-    return side_by_side([*twists, *(size[..., None] for size in sizes)])
+    c, n = (twist(setting.frame, own["position"], direction) for direction in (chord, normal))
+    cc, nn, nc = (a[..., :, None] * b[..., None, :] for a, b in ((c, c), (n, n), (n, c)))
+    S, W = cc + nn, nc - np.swapaxes(nc, -1, -2)
+    off = ([1, 2, 0], [2, 0, 1])
+    blocks: list[np.ndarray] = []
+    for part in (slice(0, 3), slice(3, 6)):
+        s, w = S[..., part, part], W[..., part, part]
+        blocks.append(np.concatenate([np.diagonal(s, axis1=-2, axis2=-1), s[..., *off], w[..., *off]], axis=-1))
+    between = [one[..., :3, 3:].reshape(*one.shape[:-2], 9) for one in (S, W)]
+    return side_by_side([c, n, *(size[..., None] for size in sizes), blocks[0], *between, blocks[1]])
 
 
 def twist(frame: Frame, point: np.ndarray, direction: np.ndarray) -> np.ndarray:

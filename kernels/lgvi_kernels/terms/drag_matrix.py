@@ -5,18 +5,15 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes import absolute, add, dot, mul  # noqa: F401
+from lgvi_kernels.lanes import absolute, add, mul, vec3  # noqa: F401
 from lgvi_kernels.state import struct
-from lgvi_kernels.view import add_outer, row3
+from lgvi_kernels.view import row3
 
 
 @functools.cache
 def params(width, real):
-    """Params: first row of its table; constant, whether there is a linear matrix; count of columns of the quadratic one.
-
-    Rows: the linear matrix (36), then for each column the twist that measures its velocity (6) and its wrench (6).
-    """
-    return struct("DragMatrix", first=wp.int32, constant=wp.int32, count=wp.int32)
+    """Params: first row of its table; constant, quadratic: whether there is such a matrix. Rows: both (36 each)."""
+    return struct("DragMatrix", first=wp.int32, constant=wp.int32, quadratic=wp.int32)
 
 
 @wp.func
@@ -29,17 +26,27 @@ def add_three(m: Any, view: Any, row: int):
 
 
 @wp.func
+def add_columns(m: Any, view: Any, row: int, size: Any):
+    """The same with each column multiplied by a number of its own."""
+    m.row0 = m.row0 + size * row3(view, row)
+    m.row1 = m.row1 + size * row3(view, row + 6)
+    m.row2 = m.row2 + size * row3(view, row + 12)
+    return m
+
+
+@wp.func
 def damping(D: Any, view: Any, p: Any):
-    """D = linear + sum over columns of |nu_j| times the column."""
+    """D = linear + quadratic diag |nu|."""
     if p.constant > 0:
         D.force_velocity = add_three(D.force_velocity, view, p.first)
         D.force_rate = add_three(D.force_rate, view, p.first + 3)
         D.torque_velocity = add_three(D.torque_velocity, view, p.first + 18)
         D.torque_rate = add_three(D.torque_rate, view, p.first + 21)
-    for j in range(p.count):
-        at = p.first + 36 + 12 * j
-        velocity = row3(view, at)
-        rate = row3(view, at + 3)
-        size = absolute(dot(velocity, view.nu) + dot(rate, view.Om))
-        D = add_outer(D, size * row3(view, at + 6), size * row3(view, at + 9), velocity, rate)
+    if p.quadratic > 0:
+        speeds = vec3(absolute(view.nu.x), absolute(view.nu.y), absolute(view.nu.z))
+        rates = vec3(absolute(view.Om.x), absolute(view.Om.y), absolute(view.Om.z))
+        D.force_velocity = add_columns(D.force_velocity, view, p.first + 36, speeds)
+        D.force_rate = add_columns(D.force_rate, view, p.first + 39, rates)
+        D.torque_velocity = add_columns(D.torque_velocity, view, p.first + 54, speeds)
+        D.torque_rate = add_columns(D.torque_rate, view, p.first + 57, rates)
     return D

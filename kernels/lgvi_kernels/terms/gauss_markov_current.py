@@ -8,6 +8,7 @@ import warp as wp
 from lgvi_kernels.lane_math import normals3
 from lgvi_kernels.lanes import add, div, int_lane, lane, lane3, mul, ones, sub, vec3  # noqa: F401
 from lgvi_kernels.state import struct
+from lgvi_kernels.view import remember, remembered
 
 FLOW = "uniform"
 NOISE = True
@@ -28,17 +29,15 @@ def params(width, real):
 @wp.func
 def recall(view: Any, row: int):
     """Three rows of what it remembers."""
-    i = view.packet
-    return vec3(view.memory[i, row], view.memory[i, row + 1], view.memory[i, row + 2])
+    return vec3(remembered(view, row), remembered(view, row + 1), remembered(view, row + 2))
 
 
 @wp.func
 def keep(view: Any, row: int, v: Any):
     """Write three rows of what it remembers."""
-    i = view.packet
-    view.memory[i, row] = v.x
-    view.memory[i, row + 1] = v.y
-    view.memory[i, row + 2] = v.z
+    remember(view, row, v.x)
+    remember(view, row + 1, v.y)
+    remember(view, row + 2, v.z)
 
 
 @wp.func

@@ -8,7 +8,7 @@ import warp as wp
 from lgvi_kernels.lane_math import clamp, exponential, greatest
 from lgvi_kernels.lanes import absolute, add, div, mul, neg, ones, positive, sub, vec3  # noqa: F401
 from lgvi_kernels.state import struct
-from lgvi_kernels.view import row1, row3, table1
+from lgvi_kernels.view import remember, remembered, row1, row3, table1
 
 # Rows of one thruster: force and torque per newton (6), coefficient forward and backward, dead band, limit, 1 / lag.
 ROWS = 11
@@ -41,10 +41,10 @@ def evolve(state: Any, view: Any, p: Any):
         if view.second > 0:
             t = view.t + quarter
         for i in range(p.count):
-            n = view.memory[view.packet, p.memory + i] * view.h.dtype(1.0)
+            n = remembered(view, p.memory + i)
             u = commanded(view, p, i, t * ones(n))
             rate = row1(view, p.first + wp.static(ROWS) * i + 10)
-            view.memory[view.packet, p.memory + i] = u + exponential(-(quarter + quarter) * rate) * (n - u)
+            remember(view, p.memory + i, u + exponential(-(quarter + quarter) * rate) * (n - u))
     return state
 
 
@@ -56,7 +56,7 @@ def law(w: Any, view: Any, p: Any):
         at = p.first + wp.static(ROWS) * i
         n = zero
         if p.lagged > 0:
-            n = view.memory[view.packet, p.memory + i] * view.h.dtype(1.0)
+            n = remembered(view, p.memory + i)
         else:
             n = commanded(view, p, i, view.t * ones(zero))
         band = row1(view, at + 8)

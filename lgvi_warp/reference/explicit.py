@@ -1,0 +1,189 @@
+"""Explicit Runge-Kutta methods on y = (b, the rows of R, p, pi), of one vehicle, with all its laws.
+
+What a law remembers is advanced by half a step before and after, as in K: such laws are integrated to order 2.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from lgvi_warp.reference.rotation import Array, cross
+from lgvi_warp.reference.submaps import Body, State, acceleration_wrench, damping, look, remembered, water
+
+Row = tuple[float, ...]
+
+
+class Tableau(Protocol):
+    """What lgvi_warp.tableaux holds: a, b, c; rows of error estimates, which go as h to the power `estimate`."""
+
+    @property
+    def a(self) -> tuple[Row, ...]:
+        """Row i has i numbers."""
+
+    @property
+    def b(self) -> Row:
+        """(stages,)."""
+
+    @property
+    def c(self) -> Row:
+        """(stages,)."""
+
+    @property
+    def errors(self) -> tuple[Row, ...]:
+        """(stages,), or one longer, with f(y) at the end."""
+
+    @property
+    def estimate(self) -> int:
+        """Power of h."""
+
+
+# step(x, body, h) -> the state h [s] later.
+Step = Callable[[State, Body, float], State]
+
+# Hairer, Norsett & Wanner (HNW), Solving Ordinary Differential Equations I, II.4, and Hairer & Wanner II, IV.2 (PI control),
+# as in their codes DOPRI5 and DOP853: safety factor, exponent of the error of the step before, smallest and largest factor
+# from one step to the next.
+SAFETY = 0.9
+BETA = 0.04
+SHRINK, GROW = 0.333, 6.0
+
+
+def pack(x: State) -> Array:
+    """y (18,): b [m], R row by row, p [N s], pi [N m s]."""
+    return np.concatenate([x.b, x.R.ravel(), x.p, x.pi])
+
+
+def unpack(y: Array, x: State, t: float) -> State:
+    """The state with y (18,) at t [s], the rest as in x."""
+    return replace(x, b=y[:3], R=y[3:12].reshape(3, 3), p=y[12:15], pi=y[15:], t=t)
+
+
+def wrench(x: State, body: Body, h: float, nu: Array, Om: Array) -> tuple[Array, Array, Array]:
+    """Force (3,) [N], torque (3,) [N m] of all laws, body axes, and the water's velocity (3,) [m/s], inertial."""
+    views = look(x, body, h)
+    flow = water(views, body)
+    force, torque = body.wrench(x.b, x.R, views)
+    pushed, turned = acceleration_wrench(x.R, body, flow)
+    drag = damping(x, body, h, nu, Om, flow) @ np.concatenate([nu, Om])
+    return force + pushed - drag[:3], torque + turned - drag[3:], flow.velocity
+
+
+def rates(x: State, body: Body, h: float) -> Array:
+    """dy/dt (18,), eq. (1) and (3) of Nordkvist & Sanyal 2010 with all laws: b' = R nu + u, R' = R hat(Om),
+    p' = p x Om + f, pi' = pi x Om + p x nu + m; h [s] is the step, which some laws look at."""
+    nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, x.pi])), 2)
+    force, torque, u = wrench(x, body, h, nu, Om)
+    rows = [cross(row, Om) for row in x.R]
+    return np.concatenate([x.R @ nu + u, *rows, cross(x.p, Om) + force, cross(x.pi, Om) + cross(x.p, nu) + torque])
+
+
+def remembered_half(x: State, body: Body, h: float, second: bool) -> State:
+    """What laws remember, half a step of h [s] later; x.t is the step's start, or its end in the second half."""
+    if not any(memory.size for memory in x.memory):
+        return x
+    middle = replace(x, t=x.t + (-0.5 if second else 0.5) * h)
+    return replace(remembered(middle, body, h, second), t=x.t)
+
+
+def stages(x: State, body: Body, h: float, tableau: Tableau) -> Array:
+    """k_i = f(t + c_i h, y + h sum_j a_ij k_j), (stages, 18)."""
+    y, K = pack(x), np.zeros((len(tableau.b), 18))
+    for i, (row, c) in enumerate(zip(tableau.a, tableau.c, strict=True)):
+        K[i] = rates(unpack(y + h * np.array(row) @ K[:i], x, x.t + c * h), body, h)
+    return K
+
+
+def stepper(tableau: Tableau) -> Step:
+    """step(x, body, h): y + h sum_i b_i k_i."""
+
+    def step(x: State, body: Body, h: float) -> State:
+        x = remembered_half(x, body, h, second=False)
+        y = pack(x) + h * np.array(tableau.b) @ stages(x, body, h, tableau)
+        return remembered_half(unpack(y, x, x.t + h), body, h, second=True)
+
+    return step
+
+
+def advance(step: Step, x: State, body: Body, h: float, steps: int) -> State:
+    """The state after so many steps of h [s]."""
+    for _ in range(steps):
+        x = step(replace(x, t=x.step * h), body, h)
+        x = replace(x, step=x.step + 1, t=(x.step + 1) * h)
+    return x
+
+
+def error_norm(tableau: Tableau, K: Array, h: float, scale: Array) -> float:
+    """The error of a step over the tolerance, HNW (4.11); with two estimates, HNW II.10: e5^2 / sqrt(e5^2 + e3^2 / 100)."""
+    norms = [float(np.mean((h * np.array(e) @ K / scale) ** 2)) for e in tableau.errors]
+    if len(norms) == 1:
+        return math.sqrt(norms[0])
+    fifth, third = norms
+    return 0.0 if fifth == 0.0 else fifth / math.sqrt(fifth + 0.01 * third)
+
+
+def next_factor(tableau: Tableau, error: float, before: float) -> float:
+    """PI control, h <- h factor; error and before: those of this step and of the last accepted."""
+    exponent = 1.0 / tableau.estimate - 0.75 * BETA
+    factor = SAFETY * max(error, 1e-10) ** -exponent * max(before, 1e-4) ** BETA
+    return min(GROW, max(SHRINK, factor))
+
+
+def attempt(x: State, body: Body, h: float, tableau: Tableau, rtol: float, atol: float | Array) -> tuple[State, float]:
+    """The state h [s] later and its error over the tolerance atol + rtol max(|y_k|, |y_k+1|)."""
+    x = remembered_half(x, body, h, second=False)
+    K, y = stages(x, body, h, tableau), pack(x)
+    y_k1 = y + h * np.array(tableau.b) @ K
+    new = unpack(y_k1, x, x.t + h)
+    if len(tableau.errors[0]) > len(K):
+        K = np.vstack([K, rates(new, body, h)])
+    error = error_norm(tableau, K, h, atol + rtol * np.maximum(np.abs(y), np.abs(y_k1)))
+    return replace(remembered_half(new, body, h, second=True), step=x.step + 1), error
+
+
+def first_step(x: State, body: Body, tableau: Tableau, rtol: float, atol: float | Array) -> float:
+    """HNW II.4, a starting step: an explicit Euler step of h0 = 0.01 |y| / |f| estimates the second derivative."""
+    y, f = pack(x), rates(x, body, 1.0)
+    scale = atol + rtol * np.abs(y)
+    d0, d1 = (math.sqrt(np.mean((v / scale) ** 2)) for v in (y, f))
+    h0 = 0.01 * d0 / d1 if d0 > 1e-5 and d1 > 1e-5 else 1e-6
+    d2 = math.sqrt(np.mean(((rates(unpack(y + h0 * f, x, x.t + h0), body, 1.0) - f) / scale) ** 2)) / h0
+    h1 = (0.01 / max(d1, d2)) ** (1.0 / tableau.estimate) if max(d1, d2) > 1e-15 else max(1e-6, 1e-3 * h0)
+    return min(100.0 * h0, h1)
+
+
+def adaptive(
+    x: State,
+    body: Body,
+    times: Sequence[float],
+    rtol: float,
+    atol: float | Array,
+    tableau: Tableau,
+    h: float | None = None,
+) -> list[State]:
+    """The states at the times [s], rising; steps are shortened to end on them. atol: for all of y, or (18,).
+
+    Every state's `step` counts the accepted steps. Raises ValueError where the step becomes too small.
+    """
+    h = first_step(x, body, tableau, rtol, atol) if h is None else h
+    states, before = [], 1e-4
+    for t in times:
+        while x.t < t:
+            # Not a tiny last step: what is left is divided in two.
+            left = t - x.t
+            taken = left if left <= 1.0001 * h else min(h, 0.5 * left)
+            new, error = attempt(x, body, taken, tableau, rtol, atol)
+            if not math.isfinite(error):
+                error = 1e10
+            factor = next_factor(tableau, error, before)
+            if error <= 1.0:
+                x, before = (replace(new, t=t) if taken == left else new), error
+                h = max(h, taken * factor) if taken < h else taken * factor
+            else:
+                h = taken * min(1.0, factor)
+            if not h > 1e-14 * max(1.0, abs(x.t)):
+                raise ValueError(f"t = {x.t:.6g}: the step {h:.3g} s is too small; loosen rtol or atol")
+        states.append(x)
+    return states

@@ -1,0 +1,57 @@
+"""Lie group methods on SO(3) x R^9, (R; b, p, pi), of one vehicle with all its laws."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from lgvi_warp.reference.classical import CG3_A, CG3_B
+from lgvi_warp.reference.explicit import rates, remembered_half
+from lgvi_warp.reference.rotation import Array, cross, exp
+from lgvi_warp.reference.submaps import Body, State
+
+
+def algebra_rates(x: State, body: Body, h: float) -> Array:
+    """(Om; b', p', pi') (12,), an element of so(3) x R^9: R' = R hat(Om)."""
+    Om = np.linalg.solve(body.I6, np.concatenate([x.p, x.pi]))[3:]
+    y = rates(x, body, h)
+    return np.concatenate([Om, y[:3], y[12:]])
+
+
+def bracket(u: Array, v: Array) -> Array:
+    """[u, v] of so(3) x R^9: the cross product of the first three, and zeros."""
+    return np.concatenate([cross(u[:3], v[:3]), np.zeros(9)])
+
+
+def act(x: State, u: Array, t: float) -> State:
+    """R exp(hat(u[:3])) and (b, p, pi) + u[3:], at t [s]."""
+    return replace(x, R=x.R @ exp(u[:3]), b=x.b + u[3:6], p=x.p + u[6:9], pi=x.pi + u[9:], t=t)
+
+
+def rkmk4(x: State, body: Body, h: float) -> State:
+    """Munthe-Kaas & Owren (1999): order 4 with two commutators (Hairer, Lubich & Wanner, IV.8, in body axes, so that
+    their signs are opposite)."""
+    x = remembered_half(x, body, h, second=False)
+
+    def k(u: Array, c: float) -> Array:
+        return h * algebra_rates(act(x, u, x.t + c * h), body, h)
+
+    k1 = k(np.zeros(12), 0.0)
+    k2 = k(0.5 * k1, 0.5)
+    k3 = k(0.5 * k2 + bracket(k1, k2) / 8.0, 0.5)
+    k4 = k(k3, 1.0)
+    u = (k1 + 2.0 * k2 + 2.0 * k3 + k4 + 0.5 * bracket(k1, k4)) / 6.0
+    return remembered_half(act(x, u, x.t + h), body, h, second=True)
+
+
+def cg3(x: State, body: Body, h: float) -> State:
+    """Crouch & Grossman (1993), order 3, with any laws: classical.cg3 is the paper's, on SE(3) x R^6."""
+    x = remembered_half(x, body, h, second=False)
+    stages: list[Array] = []
+    for row in (*CG3_A, CG3_B):
+        y = x
+        for weight, k in zip(row, stages, strict=True):
+            y = act(y, weight * k, y.t)
+        y = replace(y, t=x.t + sum(row) * h)
+        if row is not CG3_B:
+            stages.append(h * algebra_rates(y, body, h))
+    return remembered_half(y, body, h, second=True)

@@ -17,7 +17,8 @@ TEXT = """# What each term costs
 
 Nanoseconds per vehicle and step on one core: psi_s with the term alone, and what that is more than with weight,
 buoyancy and restoring moment alone ("none"). One run, all scenes in turn, medians; {members} vehicles in lanes
-(float64: {width64}, float32: {width32} a packet), h = {step} s, checks on. The numbers of the terms are those of
+(float64: {width64}, float32: {width32} a packet, methods of turns in two
+registers where the processor has enough), h = {step} s, checks on. The numbers of the terms are those of
 `benchmarks/scenes.py`: of waves 8 components, of cross-flow 10 stations, of thrusters and fins 4, of control fins 2,
 of tables 4 knots.
 

@@ -40,6 +40,7 @@ from lgvi_warp.terms import (
 from lgvi_warp.vehicle import Vehicle
 
 if TYPE_CHECKING:
+    from lgvi_warp.coefficients import from_fossen, from_sdf, from_yaml, vehicles
     from lgvi_warp.law_check import check_law
     from lgvi_warp.plan import Plan
     from lgvi_warp.sinks.plots import plot
@@ -55,6 +56,10 @@ _LAZY = {
     "plot": "lgvi_warp.sinks.plots",
     "log_rerun": "lgvi_warp.sinks.rerun",
     "check_law": "lgvi_warp.law_check",
+    "from_fossen": "lgvi_warp.coefficients",
+    "from_sdf": "lgvi_warp.coefficients",
+    "from_yaml": "lgvi_warp.coefficients",
+    "vehicles": "lgvi_warp.coefficients",
 }
 
 __all__ = [
@@ -101,11 +106,15 @@ __all__ = [
     "WrenchNoise",
     "WrenchSchedule",
     "check_law",
+    "from_fossen",
+    "from_sdf",
+    "from_yaml",
     "log_rerun",
     "plot",
     "quantity",
     "register",
     "solve",
+    "vehicles",
 ]
 
 

@@ -227,6 +227,13 @@ class Scene:
         return scenefile.load(path, overrides)
 
     @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Scene:
+        """A scene from tables in the form of a scene file, such as the importers return. Raises SceneError."""
+        from lgvi_warp import scenefile
+
+        return scenefile.from_dict(content)
+
+    @classmethod
     def named(cls, name: str, **sections: Any) -> Scene:
         """A scene of a vehicle that comes with the package (`lw.vehicles()` lists them), with its own terms and water.
 

@@ -21,13 +21,15 @@ from lgvi_warp.vehicle import Vehicle
 
 # Operations (an addition, a multiplication or both fused) of one step for diagonal M and J, with weight and restoring
 # moment and the quartic's start value alone; each Newton step of each solve adds 8. Divisions are not counted.
-OPERATIONS = {"phi": 133, "phi_adjoint": 133, "psi": 242, "psi_s": 239, "psi_1": 151}
-SOLVES = {"phi": 1, "phi_adjoint": 1, "psi": 2, "psi_s": 2, "psi_1": 1}
+OPERATIONS = {"phi": 133, "phi_adjoint": 133, "psi": 242, "psi_s": 239, "psi_1": 151, "psi_x": 171, "psi_x8": 213}
+SOLVES = {"phi": 1, "phi_adjoint": 1, "psi": 2, "psi_s": 2, "psi_1": 1, "psi_x": 0, "psi_x8": 0}
 NEWTON = 8
 
 
-def operations(method: str, iterations: int | None = None) -> int:
-    """Operations of one step of a method that is no composition; by default the quartic makes one Newton step."""
+def operations(method: str, iterations: int | None = None) -> int | None:
+    """Operations of one step, None where they were not counted; by default the quartic makes one Newton step."""
+    if method not in OPERATIONS:
+        return None
     return OPERATIONS[method] + NEWTON * SOLVES[method] * (1 if iterations is None else iterations)
 
 
@@ -89,5 +91,5 @@ def record(method: Method, dtype: str, width: int, seconds: float, peak: float) 
         "ns_per_vehicle_step": round(1e9 * seconds, 2),
         "operations": count,
         "peak_gfma": round(peak / 1e9, 1),
-        "part_of_peak": round(float(np.divide(count / seconds, peak)), 3),
+        "part_of_peak": None if count is None else round(float(np.divide(count / seconds, peak)), 3),
     }

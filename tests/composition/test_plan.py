@@ -143,7 +143,8 @@ def test_progress_reaches_one(scene):
 @pytest.mark.parametrize(("named", "text"), [
     ({"dtype": "float16"}, "dtype"), ({"width": 3}, "width"), ({"checks": "some"}, "checks"), ({"method": "psy_s"}, "psi_s"),
     ({"h": -0.1}, "h = -0.1"), ({"t1": 0.0}, "t1 = 0.0"), ({"threads": 0}, "threads"), ({"method": "kl6(phi)"}, "symmetric"),
-    ({"h": float("nan")}, "h = nan"), ({"save": lw.SaveAt(every=20.0)}, "save.every"), ({"save": lw.SaveAt(at=[2.0])}, "beyond"),
+    ({"h": float("nan")}, "h = nan"), ({"save": lw.SaveAt(every=20.0)}, "save.every"),
+    ({"save": lw.SaveAt(at=[2.0])}, "beyond"),
 ])  # fmt: skip
 def test_settings_are_refused(scene, named, text):
     with pytest.raises(lw.SceneError, match=text):

@@ -351,3 +351,11 @@ def test_the_three_forms_agree(yaml):
 def test_the_dict_makes_a_vehicle():
     """Needs the 6x6 form of lgvi_warp.Vehicle."""
     lw.Vehicle(**co.from_fossen(DIAGONAL | PAIRS, **BODY)["vehicle"])
+
+
+def test_a_scene_from_what_an_importer_returns():
+    given = {"X_udot": -1.0, "Y_vdot": -2.0, "Z_wdot": -2.0, "X_u": -3.0}
+    tables = lw.from_fossen(given, mass=10.0, inertia=[0.1, 0.5, 0.5])
+    scene = lw.Scene.from_dict(tables)
+    assert [term.type for term in scene.terms] == ["drag"]
+    np.testing.assert_array_equal(scene.terms[0].linear, [3.0, 0.0, 0.0, 0.0, 0.0, 0.0])

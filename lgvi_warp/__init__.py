@@ -40,7 +40,9 @@ from lgvi_warp.terms import (
 from lgvi_warp.vehicle import Vehicle
 
 if TYPE_CHECKING:
-    from lgvi_warp.coefficients import from_fossen, from_sdf, from_yaml, vehicles
+    from lgvi_warp.coefficients import from_fossen, vehicles
+    from lgvi_warp.coefficients_sdf import from_sdf
+    from lgvi_warp.coefficients_yaml import from_yaml
     from lgvi_warp.law_check import check_law
     from lgvi_warp.plan import Plan
     from lgvi_warp.sinks.plots import plot
@@ -57,8 +59,8 @@ _LAZY = {
     "log_rerun": "lgvi_warp.sinks.rerun",
     "check_law": "lgvi_warp.law_check",
     "from_fossen": "lgvi_warp.coefficients",
-    "from_sdf": "lgvi_warp.coefficients",
-    "from_yaml": "lgvi_warp.coefficients",
+    "from_sdf": "lgvi_warp.coefficients_sdf",
+    "from_yaml": "lgvi_warp.coefficients_yaml",
     "vehicles": "lgvi_warp.coefficients",
 }
 

@@ -26,7 +26,7 @@ NOT_THERE = (
     "exponential",
     "normals",
     "passage",
-    "turn_x",
+    "R_i",
     "back_up",
     "decay3",
     "to_body",

@@ -12,7 +12,7 @@ import warp as wp
 import lgvi_warp as lw
 from lgvi_kernels.lanes import add, lane, mul  # noqa: F401
 from lgvi_kernels.state import struct
-from lgvi_warp import coefficients, scenefile
+from lgvi_warp import scenefile
 from lgvi_warp.solving import make_plan
 
 NAN = float("nan")
@@ -227,12 +227,12 @@ FOSSEN = [
 
 @pytest.mark.parametrize(("given", "words"), [(row[0], row[1:]) for row in FOSSEN])
 def test_fossens_coefficients(given, words):
-    (fault,) = refused(coefficients.from_fossen, given, **BODY)
+    (fault,) = refused(lw.from_fossen, given, **BODY)
     assert all(word in fault for word in words), fault
 
 
 def test_fossens_drag_that_creates_energy():
-    made = coefficients.from_fossen({"X_u": -1.0, "X_v": -100.0, "Y_v": -1.0}, **BODY)
+    made = lw.from_fossen({"X_u": -1.0, "X_v": -100.0, "Y_v": -1.0}, **BODY)
     (fault,) = refused(scenefile.from_dict, made)
     assert "drag_matrix.linear" in fault and "creates energy" in fault and "minus Fossen's" in fault
 
@@ -257,7 +257,7 @@ SDF = [
 
 @pytest.mark.parametrize(("text", "more", "words"), [(row[0], row[1], row[2:]) for row in SDF])
 def test_sdf(text, more, words):
-    fault = next(one for one in refused(coefficients.from_sdf, text, **more) if words[0] in one)
+    fault = next(one for one in refused(lw.from_sdf, text, **more) if words[0] in one)
     assert all(word in fault for word in words), fault
 
 
@@ -277,7 +277,7 @@ YAML = [
 @pytest.mark.parametrize(("text", "words"), [(row[0], row[1:]) for row in YAML])
 def test_yaml(text, words):
     pytest.importorskip("yaml")
-    (fault,) = refused(coefficients.from_yaml, text)
+    (fault,) = refused(lw.from_yaml, text)
     assert all(word in fault for word in words), fault
 
 

@@ -7,6 +7,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import coefficients as co
+from lgvi_warp import coefficients_sdf
 
 DIAGONAL = {"X_udot": -0.93, "Y_vdot": -35.5, "Z_wdot": -35.5, "K_pdot": -0.0704, "M_qdot": -4.88, "N_rdot": -4.88}
 PAIRS = {"Y_rdot": 1.93, "N_vdot": 1.93, "Z_qdot": -1.93, "M_wdot": -1.93}
@@ -172,7 +173,7 @@ def sdf(pose="0 0 0 0 0 0", added="", coefficients="", attributes=""):
 def test_sdf_axes_are_turned_by_half_a_turn_about_x():
     """Port becomes starboard and up becomes down: the energy of one motion is the same in both axes."""
     added = "<fluid_added_mass><xx>1</xx><yy>9</yy><zz>8</zz><xz>0.5</xz><yr>-1.5</yr><zq>2</zq><pp>1</pp><qq>3</qq><rr>4</rr>"
-    vehicle = co.from_sdf(sdf("0.1 0.2 0.3 0 0 0", added + "</fluid_added_mass>"))["vehicle"]
+    vehicle = lw.from_sdf(sdf("0.1 0.2 0.3 0 0 0", added + "</fluid_added_mass>"))["vehicle"]
     assert vehicle["center_of_gravity"] == [0.1, -0.2, -0.3]
     A = np.diag([1.0, 9.0, 8.0, 1.0, 3.0, 4.0])
     A[0, 2] = A[2, 0] = 0.5
@@ -195,14 +196,14 @@ def test_sdf_axes_are_turned_by_half_a_turn_about_x():
 )
 def test_sdf_pose_turns_the_inertia(pose, attributes):
     """A quarter of a turn about z: the axis x of the inertia's frame lies along y of the link."""
-    M = np.array(co.from_sdf(sdf(pose, attributes=attributes))["vehicle"]["rigid_body_mass_matrix"])
+    M = np.array(lw.from_sdf(sdf(pose, attributes=attributes))["vehicle"]["rigid_body_mass_matrix"])
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     flu = turn @ INERTIA @ turn.T
     np.testing.assert_allclose(M[3:, 3:], HALF_TURN[3:, 3:] @ flu @ HALF_TURN[3:, 3:], atol=1e-14)
 
 
 def test_rpy_is_yaw_after_pitch_after_roll():
-    R = co.rotation_from_rpy(np.array([0.3, -0.4, 0.5]))
+    R = coefficients_sdf.rotation_from_rpy(np.array([0.3, -0.4, 0.5]))
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-15)
     np.testing.assert_allclose(R[2], [-np.sin(-0.4), np.cos(-0.4) * np.sin(0.3), np.cos(-0.4) * np.cos(0.3)])
     np.testing.assert_allclose(R[:, 0], [np.cos(0.5) * np.cos(-0.4), np.sin(0.5) * np.cos(-0.4), -np.sin(-0.4)])
@@ -212,7 +213,7 @@ def test_rpy_is_yaw_after_pitch_after_roll():
 @pytest.mark.parametrize("quadratic", ["xUabsU", "xUU"])
 def test_the_plugin_in_either_sign(sign, quadratic):
     text = f"<xDotU>{sign * 5}</xDotU><yDotV>{sign * 6}</yDotV><xU>{sign * 2}</xU><{quadratic}>{sign * 7}</{quadratic}>"
-    made = co.from_sdf(sdf(coefficients=text))
+    made = lw.from_sdf(sdf(coefficients=text))
     np.testing.assert_array_equal(np.diag(made["vehicle"]["added_mass_matrix"]), [5.0, 6.0, 0.0, 0.0, 0.0, 0.0])
     (term,) = made["terms"]
     assert (term["type"], term["linear"][0], term["quadratic"][0]) == ("drag", 2.0, 7.0)
@@ -221,7 +222,7 @@ def test_the_plugin_in_either_sign(sign, quadratic):
 def test_the_plugins_cross_terms_change_sign_with_the_axes():
     """Y_r r with y to port, r about up, is Y_r r with y to starboard, r about down; Z_q keeps its sign, X_w changes it."""
     text = "<yV>-3</yV><yR>1.5</yR><zQ>2.5</zQ><xW>0.5</xW><yRabsR>0.25</yRabsR>"
-    (term,) = co.from_sdf(sdf(coefficients=text))["terms"]
+    (term,) = lw.from_sdf(sdf(coefficients=text))["terms"]
     linear = np.array(term["linear"])
     assert (linear[1, 1], linear[1, 5], linear[2, 4], linear[0, 2]) == (3.0, -1.5, -2.5, 0.5)
     # With nothing on the diagonal to tell, the signs are Fossen's.
@@ -229,27 +230,27 @@ def test_the_plugins_cross_terms_change_sign_with_the_axes():
 
 
 def test_sdf_buoyancy():
-    assert co.from_sdf(sdf(), volume=0.02, water_density=1000.0)["vehicle"]["buoyancy"] == pytest.approx(196.133)
+    assert lw.from_sdf(sdf(), volume=0.02, water_density=1000.0)["vehicle"]["buoyancy"] == pytest.approx(196.133)
     text = sdf(coefficients="<xU>-1</xU><water_density>1025</water_density>")
-    assert co.from_sdf(text, volume=0.02)["vehicle"]["buoyancy"] == pytest.approx(0.02 * 1025.0 * 9.80665)
-    made = co.from_sdf(sdf(), buoyancy=200.0, center_of_buoyancy=(0.0, 0.1, 0.2))["vehicle"]
+    assert lw.from_sdf(text, volume=0.02)["vehicle"]["buoyancy"] == pytest.approx(0.02 * 1025.0 * 9.80665)
+    made = lw.from_sdf(sdf(), buoyancy=200.0, center_of_buoyancy=(0.0, 0.1, 0.2))["vehicle"]
     assert made["buoyancy"] == 200.0 and made["center_of_buoyancy"] == [0.0, -0.1, -0.2]
 
 
 def test_sdf_faults():
-    assert "both signs" in refused(co.from_sdf, sdf(coefficients="<xU>-1</xU><yV>1</yV>"), count=1)
-    assert "<xUabsV>" in refused(co.from_sdf, sdf(coefficients="<xUabsV>1</xUabsV>"), count=1)
-    assert "not XML" in refused(co.from_sdf, "<sdf><link></sdf>")
-    assert "base" in refused(co.from_sdf, sdf(), link="bse")
-    assert "give the path" in refused(co.from_sdf, "nowhere.sdf")
-    message = refused(co.from_sdf, sdf("0 0", "<fluid_added_mass><xx>-1</xx></fluid_added_mass>"), count=2)
+    assert "both signs" in refused(lw.from_sdf, sdf(coefficients="<xU>-1</xU><yV>1</yV>"), count=1)
+    assert "<xUabsV>" in refused(lw.from_sdf, sdf(coefficients="<xUabsV>1</xUabsV>"), count=1)
+    assert "not XML" in refused(lw.from_sdf, "<sdf><link></sdf>")
+    assert "base" in refused(lw.from_sdf, sdf(), link="bse")
+    assert "give the path" in refused(lw.from_sdf, "nowhere.sdf")
+    message = refused(lw.from_sdf, sdf("0 0", "<fluid_added_mass><xx>-1</xx></fluid_added_mass>"), count=2)
     assert "<pose>" in message and "<fluid_added_mass>" in message
 
 
 def test_sdf_from_a_file_and_by_the_name_of_the_link(tmp_path):
     path = tmp_path / "model.sdf"
     path.write_text(sdf(), encoding="utf-8")
-    assert co.from_sdf(path) == co.from_sdf(str(path)) == co.from_sdf(sdf(), link="base")
+    assert lw.from_sdf(path) == lw.from_sdf(str(path)) == lw.from_sdf(sdf(), link="base")
 
 
 # YAML
@@ -274,23 +275,23 @@ def yaml():
 
 
 def test_yaml_positions_are_flu_and_matrices_frd(yaml):
-    made = co.from_yaml(UUV)
+    made = lw.from_yaml(UUV)
     vehicle, (term,) = made["vehicle"], made["terms"]
     assert vehicle["center_of_gravity"] == [0.1, -0.2, -0.3] and vehicle["center_of_buoyancy"] == [0.0, 0.0, -0.4]
     assert np.array(vehicle["added_mass_matrix"])[1, 5] == -1.5 and np.array(vehicle["added_mass_matrix"])[2, 4] == 2.0
     assert vehicle["buoyancy"] == pytest.approx(0.02 * 1000.0 * 9.80665)
     assert term == {"type": "drag", "linear": [1.0, 2, 3, 4, 5, 6], "quadratic": [7.0, 8, 9, 10, 11, 12]}
     assert (
-        vehicle["rigid_body_mass_matrix"] == co.from_sdf(sdf("0.1 0.2 0.3 0 0 0"))["vehicle"]["rigid_body_mass_matrix"]
+        vehicle["rigid_body_mass_matrix"] == lw.from_sdf(sdf("0.1 0.2 0.3 0 0 0"))["vehicle"]["rigid_body_mass_matrix"]
     )
 
 
 def test_yaml_axes_can_be_named(yaml):
-    vehicle = co.from_yaml(UUV, position_axes="frd", matrix_axes="flu")["vehicle"]
+    vehicle = lw.from_yaml(UUV, position_axes="frd", matrix_axes="flu")["vehicle"]
     assert vehicle["center_of_gravity"] == [0.1, 0.2, 0.3]
     # Y_r, Z_q: both axes change sign, the product does not.
     assert np.array(vehicle["added_mass_matrix"])[1, 5] == -1.5
-    assert "position_axes" in refused(co.from_yaml, UUV, position_axes="ned", count=1)
+    assert "position_axes" in refused(lw.from_yaml, UUV, position_axes="ned", count=1)
 
 
 def test_yaml_with_fossens_names(yaml):
@@ -298,23 +299,23 @@ def test_yaml_with_fossens_names(yaml):
     flat = head + "".join(f"{key}: {value}\n" for key, value in (DIAGONAL | PAIRS).items())
     nested = head + "coefficients:\n" + "".join(f"  {key}: {value}\n" for key, value in (DIAGONAL | PAIRS).items())
     expected = co.from_fossen(DIAGONAL | PAIRS, mass=30.48, inertia=(0.177, 3.45, 3.45))
-    assert co.from_yaml(flat) == co.from_yaml(nested) == expected
+    assert lw.from_yaml(flat) == lw.from_yaml(nested) == expected
 
 
 def test_yaml_faults(yaml):
-    message = refused(co.from_yaml, "volume: 0.02\nmas: 3\nlinear_damping: [1, 2]\nMa: [1, -1, 1, 1, 1, 1]\n")
+    message = refused(lw.from_yaml, "volume: 0.02\nmas: 3\nlinear_damping: [1, 2]\nMa: [1, -1, 1, 1, 1, 1]\n")
     for key in ("mass", "inertia", "mas = 3", "density", "linear", "both signs"):
         assert key in message
-    assert "not a map" in refused(co.from_yaml, "- 1\n- 2\n")
-    assert "give the path" in refused(co.from_yaml, "nowhere.yaml")
-    assert co.from_yaml(UUV + "thrusters: 4\n", ignore=["thrusters"]) == co.from_yaml(UUV)
-    assert co.from_yaml(UUV, mass=21.0)["vehicle"]["weight"] == 21.0 * 9.80665
+    assert "not a map" in refused(lw.from_yaml, "- 1\n- 2\n")
+    assert "give the path" in refused(lw.from_yaml, "nowhere.yaml")
+    assert lw.from_yaml(UUV + "thrusters: 4\n", ignore=["thrusters"]) == lw.from_yaml(UUV)
+    assert lw.from_yaml(UUV, mass=21.0)["vehicle"]["weight"] == 21.0 * 9.80665
 
 
 def test_without_pyyaml_the_message_says_how_to_install_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "yaml", None)
     with pytest.raises(ImportError, match="pip install"):
-        co.from_yaml(UUV)
+        lw.from_yaml(UUV)
 
 
 # Round trip
@@ -325,7 +326,7 @@ def test_the_three_forms_agree(yaml):
     added = "".join(f"<{n}>{v}</{n}>" for n, v in (("xx", 0.93), ("yy", 35.5), ("zz", 35.5), ("pp", 0.0704)))
     added += "<qq>4.88</qq><rr>4.88</rr><yr>-1.93</yr><zq>1.93</zq>"
     text = sdf("0 0 -0.0196 0 0 0", f"<fluid_added_mass>{added}</fluid_added_mass>", "<xUabsU>-1.62</xUabsU>")
-    from_sdf = co.from_sdf(text)
+    from_sdf = lw.from_sdf(text)
     given = {"mass": 20.0, "inertia": HALF_TURN[3:, 3:] @ INERTIA @ HALF_TURN[3:, 3:], "inertia_about": "gravity"}
     center = {"center_of_gravity": (0.0, 0.0, 0.0196)}
     from_fossen = co.from_fossen(DIAGONAL | PAIRS | {"X_uu": -1.62}, **given, **center)
@@ -342,7 +343,7 @@ def test_the_three_forms_agree(yaml):
             "quadratic_damping": [-1.62, 0.0, 0.0, 0.0, 0.0, 0.0],
         }
     )
-    from_yaml = co.from_yaml(text)
+    from_yaml = lw.from_yaml(text)
     assert from_yaml["terms"] == from_fossen["terms"]
     for key, value in from_fossen["vehicle"].items():
         np.testing.assert_allclose(from_yaml["vehicle"][key], value, atol=1e-15, err_msg=key)

@@ -3,7 +3,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: run test test-long lint bench clean
+.PHONY: run test test-long lint bench bench-peers clean
 
 run: $(VENV)/.run
 	$(BIN)/lgvi-warp run examples/paper.toml --out runs/paper
@@ -22,8 +22,18 @@ lint: $(VENV)/.dev
 bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/run.py
 
+# Other systems on the same problem; their packages go into an environment of their own.
+bench-peers: .venv-peers/.done
+	.venv-peers/bin/python benchmarks/peers/run.py --out runs/peers
+	.venv-peers/bin/python benchmarks/peers/plot.py runs/peers
+
+.venv-peers/.done: benchmarks/peers/requirements.txt pyproject.toml
+	$(PYTHON) -m venv .venv-peers
+	.venv-peers/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[viz]' --requirement $<
+	touch $@
+
 clean:
-	rm -rf $(VENV) runs build dist .mypy_cache .ruff_cache .pytest_cache
+	rm -rf $(VENV) .venv-peers runs build dist .mypy_cache .ruff_cache .pytest_cache
 
 # Each stamp stands for an installed set of extras; a change of pyproject.toml installs anew.
 $(VENV)/bin/python:

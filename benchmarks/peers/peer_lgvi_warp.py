@@ -1,0 +1,75 @@
+"""lgvi_warp itself: members in packets of lanes, the plan's own kernel, as lw.solve runs it with its default checks."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+
+import numpy as np
+import warp as wp
+
+from benchmarks.peers.problem import End, Problem, Run, Runs
+from lgvi_warp.method import Method
+from lgvi_warp.packets import Packets
+from lgvi_warp.solving import make_plan, unpacked
+
+# What is measured: a method, its precision, and its steps a second.
+METHODS: tuple[tuple[str | Method, str, tuple[float, ...]], ...] = (
+    ("psi_s", "float64", (2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)),
+    ("psi_x", "float64", (2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)),
+    ("psi_1", "float64", (2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)),
+    ("psi", "float64", (2, 4, 8, 16, 32, 64, 128, 256)),
+    ("su4(psi_s)", "float64", (1, 2, 4, 8, 16, 32, 64, 128)),
+    ("su4(psi_x)", "float64", (1, 2, 4, 8, 16, 32, 64, 128)),
+    ("kl6(psi_s)", "float64", (1, 2, 4, 8, 16, 32, 64)),
+    ("kl6(psi_1)", "float64", (1, 2, 4, 8, 16, 32, 64)),
+    ("kl6(psi_x)", "float64", (1, 2, 4, 8, 16, 32, 64)),
+    ("kl8(psi_s)", "float64", (1, 2, 4, 8, 16, 32)),
+    ("kl8(psi_1)", "float64", (1, 2, 4, 8, 16, 32)),
+    ("kl8(psi_x)", "float64", (1, 2, 4, 8, 16, 32)),
+    ("psi_s", "float32", (2, 4, 8, 16, 32, 64)),
+    ("psi_x", "float32", (2, 4, 8, 16, 32, 64)),
+    ("kl6(psi_x)", "float32", (1, 2, 4, 8)),
+)
+
+
+class Fleet:
+    """The members of a plan, in as many parts as threads, and their ends."""
+
+    def __init__(self, problem: Problem, method: str | Method, dtype: str, rate: float, threads: int):
+        self.plan = make_plan(problem.ensemble, method, h=1.0 / rate, t1=problem.t1, dtype=dtype)
+        self.plan.compile()
+        edges = np.linspace(0, problem.members, threads + 1).astype(int)
+        self.parts = [Packets(self.plan, problem.ensemble.select(a, b)) for a, b in pairwise(edges)]
+        self.starts = [wp.clone(part.state) for part in self.parts]
+        self.samples: list[np.ndarray] = [np.zeros(0)] * threads
+
+    def advance(self) -> None:
+        """All steps, from the start."""
+        if len(self.parts) == 1:
+            return self._part(0)
+        with ThreadPoolExecutor(len(self.parts)) as pool:
+            list(pool.map(self._part, range(len(self.parts))))
+
+    def _part(self, i: int) -> None:
+        wp.copy(self.parts[i].state, self.starts[i])
+        self.parts[i].status.zero_()
+        self.samples[i] = self.parts[i].advance(0, self.plan.grid.steps)
+
+    def end(self) -> End:
+        """Of the last call, a member that failed as not a number."""
+        ends = []
+        for part, raw in zip(self.parts, self.samples, strict=True):
+            raw = raw[-1:, : part.members.count].astype(np.float64)
+            raw[0, part.outcome().status != 0] = np.nan
+            ends.append(unpacked(self.plan.spec.fields, raw, part.frame))
+        return tuple(np.concatenate([one[name][-1] for one in ends]) for name in ("position", "attitude"))
+
+
+def runs(problem: Problem, threads: int) -> Runs:
+    """By steps a second."""
+    for method, dtype, rates in METHODS:
+        for rate in rates:
+            fleet = Fleet(problem, method, dtype, rate, threads)
+            name = fleet.plan.method.name
+            yield Run(name, f"h={1.0 / rate:g}", problem.members, fleet.advance, fleet.end, dtype)

@@ -25,7 +25,6 @@ bench: $(VENV)/.dev
 # Other systems on the same problem; their packages go into an environment of their own.
 bench-peers: .venv-peers/.done
 	.venv-peers/bin/python benchmarks/peers/run.py --out runs/peers
-	.venv-peers/bin/python benchmarks/peers/plot.py runs/peers
 
 .venv-peers/.done: benchmarks/peers/requirements.txt pyproject.toml
 	$(PYTHON) -m venv .venv-peers

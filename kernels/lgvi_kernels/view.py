@@ -5,7 +5,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lane_math import clamp
-from lgvi_kernels.lanes import add, cross, dot, element, mul, ones, set_element, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes import add, cross, dot, element, mul, neg, ones, set_element, sub, vec3  # noqa: F401
 
 
 @wp.func
@@ -84,6 +84,22 @@ def table3(view: Any, first: int, count: int, x: Any):
         )
         value = value + ramp(view, at, x) * change
     return value
+
+
+@wp.func
+def command(view: Any, first: int, count: int, limit: Any, t: Any):
+    """A command from its table (see table1) at the time t, kept within a limit."""
+    return clamp(table1(view, first, count, t * ones(limit)), -limit, limit)
+
+
+@wp.func
+def middle_of_half(view: Any):
+    """The time in the middle of this half of a kick, for laws that remember."""
+    quarter = view.h.dtype(0.25) * view.h
+    t = view.t - quarter
+    if view.second > 0:
+        t = view.t + quarter
+    return t
 
 
 @wp.func

@@ -10,7 +10,7 @@ from lgvi_kernels.lanes import add, mul, neg, ones, sub  # noqa: F401
 from lgvi_kernels.state import struct
 from lgvi_kernels.terms import fins
 from lgvi_kernels.terms.fins import add_fins, note_lift_and_drag, speed_along
-from lgvi_kernels.view import remember, remembered, row1, table1
+from lgvi_kernels.view import command, middle_of_half, remember, remembered, row1
 
 # Rows of one fin: those of fins.ROWS, limit, and limit of the rate.
 LIMIT = fins.ROWS
@@ -33,22 +33,19 @@ def params(width, real):
 def commanded(view: Any, p: Any, i: int, t: Any):
     """The command of fin i at time t, within its limit."""
     first = p.first + wp.static(ROWS) * p.count + i * (1 + 3 * p.knots)
-    limit = row1(view, p.first + wp.static(ROWS) * i + wp.static(LIMIT))
-    return clamp(table1(view, first, p.knots, t), -limit, limit)
+    return command(view, first, p.knots, row1(view, p.first + wp.static(ROWS) * i + wp.static(LIMIT)), t)
 
 
 @wp.func
 def evolve(state: Any, view: Any, p: Any):
     """|deflection'| <= rate: towards the command over half a kick, the command that of the middle of that half."""
     if p.limited > 0:
-        quarter = view.h.dtype(0.25) * view.h
-        t = view.t - quarter
-        if view.second > 0:
-            t = view.t + quarter
+        t = middle_of_half(view)
+        half = view.h.dtype(0.5) * view.h
         for i in range(p.count):
             angle = remembered(view, p.memory + i)
-            change = commanded(view, p, i, t * ones(angle)) - angle
-            most = (quarter + quarter) * row1(view, p.first + wp.static(ROWS) * i + wp.static(RATE))
+            change = commanded(view, p, i, t) - angle
+            most = half * row1(view, p.first + wp.static(ROWS) * i + wp.static(RATE))
             remember(view, p.memory + i, angle + clamp(change, -most, most))
     return state
 
@@ -66,7 +63,7 @@ def damping(D: Any, view: Any, p: Any):
         if p.limited > 0:
             angle = remembered(view, p.memory + i)
         else:
-            angle = commanded(view, p, i, view.t * ones(angle))
+            angle = commanded(view, p, i, view.t)
         c = cosine(angle)
         s = sine(angle)
         along = speed_along(view, at)

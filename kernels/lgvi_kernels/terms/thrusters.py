@@ -5,10 +5,10 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lane_math import clamp, exponential, greatest
+from lgvi_kernels.lane_math import exponential, greatest
 from lgvi_kernels.lanes import absolute, add, div, mul, neg, ones, positive, sub, vec3  # noqa: F401
 from lgvi_kernels.state import struct
-from lgvi_kernels.view import remember, remembered, row1, row3, table1
+from lgvi_kernels.view import command, middle_of_half, remember, remembered, row1, row3
 
 # Rows of one thruster: force and torque per newton (6), coefficient forward and backward, dead band, limit, 1 / lag.
 ROWS = 11
@@ -28,23 +28,20 @@ def params(width, real):
 def commanded(view: Any, p: Any, i: int, t: Any):
     """The command of thruster i at time t, within its limit."""
     first = p.first + wp.static(ROWS) * p.count + i * (1 + 3 * p.knots)
-    limit = row1(view, p.first + wp.static(ROWS) * i + 9)
-    return clamp(table1(view, first, p.knots, t), -limit, limit)
+    return command(view, first, p.knots, row1(view, p.first + wp.static(ROWS) * i + 9), t)
 
 
 @wp.func
 def evolve(state: Any, view: Any, p: Any):
     """n' = (command - n) / time constant, exactly over half a kick, the command held at the middle of that half."""
     if p.lagged > 0:
-        quarter = view.h.dtype(0.25) * view.h
-        t = view.t - quarter
-        if view.second > 0:
-            t = view.t + quarter
+        t = middle_of_half(view)
+        half = view.h.dtype(0.5) * view.h
         for i in range(p.count):
             n = remembered(view, p.memory + i)
-            u = commanded(view, p, i, t * ones(n))
+            u = commanded(view, p, i, t)
             rate = row1(view, p.first + wp.static(ROWS) * i + 10)
-            remember(view, p.memory + i, u + exponential(-(quarter + quarter) * rate) * (n - u))
+            remember(view, p.memory + i, u + exponential(-half * rate) * (n - u))
     return state
 
 
@@ -58,7 +55,7 @@ def law(w: Any, view: Any, p: Any):
         if p.lagged > 0:
             n = remembered(view, p.memory + i)
         else:
-            n = commanded(view, p, i, view.t * ones(zero))
+            n = commanded(view, p, i, view.t)
         band = row1(view, at + 8)
         ahead = greatest(n - band, zero)
         astern = greatest(-n - band, zero)

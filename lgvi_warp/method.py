@@ -83,7 +83,9 @@ class Method:
     name: "phi", "phi_adjoint", "psi" (the paper's), "psi_s" (default), "psi_1", or a composition of a symmetric one:
     "tj4(psi_s)", "su4(psi_s)", "kl6(psi_1)", "kl8(psi_s)", ...
     solver: "quartic" (default), "cayley" or "newton" (the paper's, on the exponential map).
-    iterations: Newton steps of every solve, a whole number >= 0; None iterates each vehicle to the tolerance.
+    iterations: Newton steps of every solve, a whole number >= 0; None iterates each vehicle to the tolerance; "auto" finds
+    out, before the run, how many serve every member's start at twice the step, and makes so many (a solve that needed
+    more later on gives its member the status NOT_CONVERGED).
     alpha, beta: weight of the old configuration in the averages of equations (15) and (16), 0 to 1, for nonconservative
     forces and torques in phi, phi_adjoint and psi (their conservative forces, and the other methods, have no such choice).
     tolerance: relative residual of equation (24) above which a solve is not converged (default 1e-14 in float64 and
@@ -94,7 +96,7 @@ class Method:
 
     name: str = "psi_s"
     solver: str = "quartic"
-    iterations: int | None = None
+    iterations: int | str | None = None
     tolerance: float | None = None
     alpha: float = 0.5
     beta: float = 0.5
@@ -109,8 +111,9 @@ class Method:
                 faults.add("method", self.name, "is a composition of a method that is not symmetric", "compose psi_s")
         faults.choice("solver", self.solver, SOLVERS)
         n = self.iterations
-        if n is not None and (isinstance(n, bool) or not isinstance(n, int) or not 0 <= n <= 100):
-            faults.add("iterations", n, "is not a whole number from 0 to 100", "give one, or None for the tolerance")
+        if n not in (None, "auto") and (isinstance(n, bool) or not isinstance(n, int) or not 0 <= n <= 100):
+            remedy = 'give one, "auto", or None for the tolerance'
+            faults.add("iterations", n, "is not a whole number from 0 to 100", remedy)
         for name in ("alpha", "beta"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1.0:

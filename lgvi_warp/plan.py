@@ -104,7 +104,7 @@ class Plan:
             laws=tuple(module for _, module in model.laws),
             mass=model.mass,
             solver=self.method.solver,
-            iterations=self.method.iterations or 0,
+            iterations=int(self.method.iterations or 0),
             adaptive=self.method.iterations is None,
             checked=self.checks != "none",
             fields=tuple(name for name in SAMPLE_FIELDS if name in self.fields),

@@ -107,7 +107,31 @@ def make_plan(
         text = f"run.save_every = {every} s is longer than the run, {t1} s: only the start and the end are kept"
         grid = replace(grid, messages=(*grid.messages, text))
     chosen = method if isinstance(method, Method) else Method(method or settings.method)
-    return Plan(ensemble, chosen, grid, save.fields, dtype or settings.dtype, width, checks)
+    dtype = dtype or settings.dtype
+    if chosen.iterations == "auto":
+        chosen = replace(chosen, iterations=enough_iterations(ensemble, chosen, grid.h, dtype))
+        n = chosen.iterations
+        number = f"{n} a solve, enough for" if n is not None else f"to the tolerance: {MOST_FIXED} are too few for"
+        text = f"Newton steps {number} every member's start at twice the step"
+        grid = replace(grid, messages=(*grid.messages, text))
+    return Plan(ensemble, chosen, grid, save.fields, dtype, width, checks)
+
+
+# Beyond so many Newton steps a fixed number gains nothing over iterating to the tolerance.
+MOST_FIXED = 4
+
+
+def enough_iterations(ensemble: Ensemble, method: Method, h: float, dtype: str) -> int | None:
+    """The least Newton steps that leave every member's residual below the tolerance at twice the step; None above 4.
+
+    The residual of a fixed number grows with h |Omega|: twice the step leaves room for members that spin up.
+    """
+    for n in range(MOST_FIXED + 1):
+        fixed = replace(method, iterations=n)
+        trial = run_plan(make_plan(ensemble, fixed, 2.0 * h, 2.0 * h, SaveAt(), dtype), machine.thread_count())
+        if not np.any(trial.status == Status.NOT_CONVERGED):
+            return n
+    return None
 
 
 class _Progress:

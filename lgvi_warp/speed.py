@@ -83,7 +83,7 @@ def measure(members: int = 4096, steps: int = 1000) -> Iterator[str]:
 
 def record(method: Method, dtype: str, width: int, seconds: float, peak: float) -> dict[str, Any]:
     """One measurement of a kernel beside the core's peak of fused multiply-adds per second."""
-    count = operations(method.name, method.iterations)
+    count = operations(method.name, None if method.iterations is None else int(method.iterations))
     return {
         "method": method.name,
         "dtype": dtype,

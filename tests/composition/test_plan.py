@@ -187,3 +187,22 @@ def test_kernels_compile_for_cuda(tmp_path):
         plan = plan_of(scene, width=1, dtype=dtype)
         wp.compile_aot_module(plan.advance.kernel.module, arch=90, module_dir=str(tmp_path / dtype))
         assert any(path.suffix == ".cubin" for path in (tmp_path / dtype).iterdir())
+
+
+@pytest.mark.parametrize(("solver", "h", "n"), [("quartic", 1e-4, 0), ("quartic", 0.01, 1), ("cayley", 0.1, 2)])
+def test_as_many_newton_steps_as_the_start_needs(scene, solver, h, n):
+    fleet = lw.Ensemble(scene, 20, 1, {"start.angular_velocity": lw.Normal(relative=0.1)})
+    chosen = lw.solve(fleet, lw.Method("psi_s", solver, "auto"), h=h, t1=10 * h, save=lw.SaveAt())
+    assert chosen.provenance["method"]["iterations"] == n and str(n) in chosen.messages[0]
+    assert chosen.status.counts() == {"ok": 20}
+    # Each of 20 solves leaves a residual below 1e-12 of a turn of h |Omega| / 2 < 0.02 rad.
+    exact = lw.solve(fleet, lw.Method("psi_s", solver), h=h, t1=10 * h, save=lw.SaveAt())
+    np.testing.assert_allclose(chosen.attitude, exact.attitude, rtol=0, atol=20 * 1e-12)
+
+
+def test_a_member_that_spins_up_is_told():
+    # At rest no Newton step is needed; 2 rad/s later, at h = 0.1 s, one would be.
+    resting = lw.Scene(lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 0.0), lw.Environment(gravity=0.0),
+                       [lw.Wrench(torque=(1.5, 3.0, 4.0))])  # fmt: skip
+    result = lw.solve(resting, lw.Method("psi_s", iterations="auto"), h=0.1, t1=5.0)
+    assert result.status.counts() == {"not_converged": 1} and 0.0 < result.failure_time[0] < 5.0

@@ -85,7 +85,8 @@ def main():
     warp_setup.start()
     chosen = sys.argv[1:] or list(SCENES)
     described, versions = machine.describe(), machine.versions()
-    head = f"One core of {described['cpu']}, {described['simd']}; Warp {versions['warp-lang']}. Written by `python benchmarks/fronts.py`."
+    where = f"One core of {described['cpu']}, {described['simd']}; Warp {versions['warp-lang']}."
+    head = f"{where} Written by `python benchmarks/fronts.py`."
     text = "\n\n".join([head, *(section(name, SCENES[name]) for name in chosen)])
     page = TARGET.read_text()
     before, rest = page.split(BEGIN)

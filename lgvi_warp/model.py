@@ -15,7 +15,7 @@ from lgvi_warp import inertia, terms, vehicle
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, closest
 from lgvi_warp.inertia import Frame
-from lgvi_warp.method import FORCED, Method, Program, merged, middle_axis, simplified, with_hops
+from lgvi_warp.method import FORCED, Method, Program, divided, merged, middle_axis, simplified, with_hops
 from lgvi_warp.terms.base import Setting, Term
 from lgvi_warp.terms.drag import Drag, has_exact_flow
 
@@ -108,6 +108,8 @@ def make_model(
         program = tuple((letter, coefficient) for letter, coefficient in program if letter != "K")
     if method.turns and coupled:
         program = with_hops(program)
+    if method.halved and (drag or flow != "none"):
+        program = divided(program)  # then K is symmetric but no flow: one of its own for each half
     lead, maps = merged(program)
     # A kick that cannot be undone must not be divided between two steps, nor what events look at.
     undone = all(getattr(module, "POTENTIAL", False) for _, module in acting)

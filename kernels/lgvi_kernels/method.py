@@ -18,6 +18,7 @@ from lgvi_kernels.submaps import (
     Ap,
     anisotropic_velocity,
     fold,
+    fold_pair,
     isotropic_velocity,
     look,
     make_Ab,
@@ -152,6 +153,6 @@ def make_method(spec):
             maps.append((turns.make_turn(axes[0], pitched[axes[0]], following), coefficient))
         else:
             maps.append((letters[letter], coefficient))
-    step = fold(tuple(maps))
+    step = fold_pair(tuple(maps)) if spec.paired else fold(tuple(maps))
     lead = letters[spec.lead[0]] if spec.lead else step
     return Step(step, lead, velocities, prepare, water_velocity)

@@ -100,7 +100,7 @@ def make_model(
         acting = [(term, module), *((t, m) for t, m in acting if t is not term)]
     dense = (damping or bool(drags) or flow == "varying") and not exact
     memory = any(term.memory for term, _ in acting)
-    _check(ensemble, method, frame, p, dense=dense, flow=flow, memory=memory, modules=[module for _, module in acting])
+    _check(ensemble, method, frame, p, dense=dense, flow=flow, memory=memory, acting=acting)
     mass = shape_of_mass(frame.M)
     coupled = frame.coupled
     program = FORCED[method.base] if forced else simplified(method.program, mass == "isotropic" and not coupled)
@@ -113,10 +113,15 @@ def make_model(
     lead, maps = merged(program)
     # A kick that cannot be undone must not be divided between two steps, nor what events look at.
     undone = all(getattr(module, "POTENTIAL", False) for _, module in acting)
-    if events or (lead is not None and lead[0] == "K" and not undone):
+    if method.two_part:
+        # B joins that of the next step exactly, A as far as its order goes.
+        lead, maps = method.program[0], method.program[1:]
+        if events:
+            lead, maps = None, method.program
+    elif events or (lead is not None and lead[0] == "K" and not undone):
         lead, maps = None, program
     asked = {"turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
-             "dense": dense, "water": flow in ("uniform", "varying"),
+             "modified": method.two_part, "dense": dense, "water": flow in ("uniform", "varying"),
              "origin": (bool(events) or flow != "none") and bool(np.any(frame.origin) or np.any(frame.forces))}  # fmt: skip
     return Model(
         method=method,
@@ -205,7 +210,7 @@ def _check(
     dense: bool,
     flow: str,
     memory: bool,
-    modules: list[Any],
+    acting: list[tuple[Term, Any]],
 ) -> None:
     """Refuse what a method cannot do, with the reason."""
     faults = Faults()
@@ -216,11 +221,15 @@ def _check(
             remedy = "use psi_x, psi_x8 or psi_w, which take any 6x6 inertia"
             faults.add("method", method.name, f"cannot couple velocities and rates ({k})", remedy)
     composed = len(method.stages) > 1
-    noisy = any(getattr(module, "NOISE", False) for module in modules)
-    if composed and (dense or flow in ("uniform", "varying") or memory or noisy):
+    noisy = any(getattr(module, "NOISE", False) for _, module in acting)
+    if composed and not method.two_part and (dense or flow in ("uniform", "varying") or memory or noisy):
         what = "a damping matrix" if dense else "water that varies" if flow != "none" else "a term that remembers"
         faults.add("method", method.name, f"keeps its order only for maps that undo themselves, which {what} does not",
                    f"use {method.base}")  # fmt: skip
+    for term, module in acting:
+        if method.two_part and not getattr(module, "SEPARABLE", False):
+            faults.add("method", method.name, f"wants potentials of position plus such of attitude, which {term.key} is not",
+                       "use ss6_13(psi_x), or bm6(psi_x)")  # fmt: skip
     kicks = sum(letter in ("K", "Phi", "Phi*") for letter, _ in method.program)
     if noisy and not composed and kicks != 1:
         faults.add("method", method.name, "would draw noise more than once a step", "use psi_s, psi_x or psi_w")

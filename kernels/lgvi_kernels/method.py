@@ -28,6 +28,7 @@ from lgvi_kernels.submaps import (
     rotate,
 )
 from lgvi_kernels.terms import drag, drag_directions
+from lgvi_kernels.two_part import make_A, make_B
 from lgvi_kernels.view import to_body
 from lgvi_kernels.water import make_shear
 
@@ -123,7 +124,7 @@ def make_method(spec):
     V = None
     if damping is not None and spec.averages is None:
         V = make_V(damping, velocities_of_forces, Damping, factor_struct(width, real), coupled)
-    solve = make_solve(real, spec.solver, spec.iterations, spec.adaptive, spec.checked)
+    solve, solve_within = make_solve(real, spec.solver, spec.iterations, spec.adaptive, spec.checked)
     used = {letter for letter, _ in spec.maps} | ({spec.lead[0]} if spec.lead else set())
     letters = {
         "Ab": make_Ab(velocity, spec.timed),
@@ -135,6 +136,10 @@ def make_method(spec):
         letters["K"] = make_K(View, Wrench, Flow, law, evolve, flow, varies, shifted, E if spec.drag else None, V)
     if "W" in used:
         letters["W"] = make_W(rotation_struct(width, real), rotate, spec.iterations, spec.adaptive, spec.checked)
+    if "modified" in spec.parts:
+        drift = letters["Ab"] if spec.mass == "isotropic" else letters["T"]
+        letters["A"] = make_A(rotation_struct(width, real), solve_within, View, Wrench, law)
+        letters["B"] = make_B(drift, View, Wrench, law)
     U12, U13, U23, *pitched = spec.coupling
     for letter in used:
         if letter[0] == "h":

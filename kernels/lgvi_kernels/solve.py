@@ -49,7 +49,8 @@ NOT_CONVERGED = 2
 
 @functools.cache
 def make_solve(real, solver, iterations, adaptive, checked):
-    """The function (F, alarm, a, J, tolerance) -> (F, alarm) that solves equation (24) in every lane.
+    """The functions (F, alarm, a, J, tolerance) -> (F, alarm) that solves equation (24) in every lane, and the same with
+    the square of the measure of the step's size that is to stay below 1, given after J.
 
     `iterations` Newton steps are made in all lanes. `adaptive` goes on, in the lanes that need it, until the residual is
     below the tolerance: a lane's bits depend on that lane alone. `checked` raises the alarm of a lane whose equation has
@@ -79,7 +80,7 @@ def make_solve(real, solver, iterations, adaptive, checked):
         return alarm
 
     @wp.func
-    def solve(F: Any, alarm: Any, a: Any, J: Any, tolerance: Any):
+    def solve_within(F: Any, alarm: Any, a: Any, J: Any, far: Any, tolerance: Any):
         u = start(a, J)
         for _ in range(wp.static(iterations)):
             u = newton(u, value(u, a, J), a, J)
@@ -88,7 +89,7 @@ def make_solve(real, solver, iterations, adaptive, checked):
             e = excess(v, a, J, tolerance)
             suspect = e
             if wp.static(checked):
-                suspect = positive(e, e, beyond(r.reach(a, J), tolerance))
+                suspect = positive(e, e, beyond(far, tolerance))
             if any_positive(suspect):
                 if wp.static(adaptive):
                     k = int(0)
@@ -98,7 +99,11 @@ def make_solve(real, solver, iterations, adaptive, checked):
                         e = excess(v, a, J, tolerance)
                         k += 1
                 if wp.static(checked):
-                    alarm = raise_alarm(alarm, r.reach(a, J), e, residual2(v, a, J), tolerance)
+                    alarm = raise_alarm(alarm, far, e, residual2(v, a, J), tolerance)
         return rotation(F, u, a, J), alarm
 
-    return solve
+    @wp.func
+    def solve(F: Any, alarm: Any, a: Any, J: Any, tolerance: Any):
+        return solve_within(F, alarm, a, J, r.reach(a, J), tolerance)
+
+    return solve, solve_within

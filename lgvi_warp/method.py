@@ -148,8 +148,8 @@ COMPOSITIONS: dict[str, tuple[int, tuple[float, ...]]] = {
     ),
 }
 
-# name -> (order, first half of a palindrome a_1 .. a_2s). A base Psi_h = chi*_{h/2} after chi_{h/2} gives way to its halves:
-# chi over a_1 h, its adjoint chi* over a_2 h, chi over a_3 h, ... Blanes & Moan (2002), tables 2: S_6 of order 4, S_10 of order 6.
+# name -> (order, first half of a palindrome a_1, a_2, ...). A base Psi_h = chi*_{h/2} after chi_{h/2} gives way to its
+# halves: chi over a_1 h, its adjoint chi* over a_2 h, chi over a_3 h, ... Blanes & Moan (2002), table 2: S_6 and S_10.
 HALVES: dict[str, tuple[int, tuple[float, ...]]] = {
     "bm4": (
         4,

@@ -1,11 +1,10 @@
-"""The parts A and B of a splitting for potentials U_b(b) + U_R(R): each is the flow of its own energy, A to order 8 or exactly.
+"""The parts A and B of a splitting for potentials U_b(b) + U_R(R): both are flows, A to order 8.
 
 A: pi.J^-1 pi / 2 + U_b(b), the free rotation and p <- p + h f. B: p.M^-1 p / 2 + U_R(R), T and pi <- pi + h m.
 The free rotation is equation (24) with a modified inertia J~, J~^-1 = (1 + s) J^-1 + d I, s and d polynomials in
 N = |h pi|^2 / 2 and H = h pi.J^-1 h pi / 2, which it conserves (Hairer & Vilmart 2006, J. Phys. A 39, 13225).
 """
 
-import math
 from typing import Any
 
 import warp as wp
@@ -15,7 +14,7 @@ from lgvi_kernels.rotation import transpose_apply
 from lgvi_kernels.submaps import look
 
 # A spin by theta about a principal axis has J~^-1 h pi = sin(theta): past a quarter turn (24) yields another angle.
-REACH = (2.0 / math.pi) ** 2
+REACH = (2.0 / wp.PI) ** 2
 
 
 @wp.func

@@ -111,6 +111,7 @@ def make_advance(spec):
     flow = superpose(spec.laws, "flow")
     has_lead, drifts, watched = spec.lead is not None, flow is not None, bool(spec.events)
     watch, passage = make_watch(spec.events, View, "origin" in spec.parts) if watched else (step, step)
+    lead_coefficient = spec.lead[1] if has_lead else 0.0
     # A drift that leads has passed half of its time when a step begins; with stages, of the first one's.
     lead_time = spec.lead_time if has_lead and spec.lead[0] in ("Ab", "T", "B") else 0.0
     water_velocity = method.water_velocity
@@ -223,8 +224,10 @@ def make_advance(spec):
             c.drag = prepare(DragFlow(), c.params.own, real(h))
         stages = lead_h.shape[0] - 1
         first_h = real(1.0) * stage_h[0]
-        lead_first = real(1.0) * lead_h[0]
         opening = real(1.0) * lead_h[stages]
+        if wp.static(not composed):
+            # From the one number that the compiler then keeps for the stage and its leads.
+            opening = real(wp.static(lead_coefficient)) * first_h
         x = read(state, i)
         one = ones(x.b.x)
         zero = one - one
@@ -263,7 +266,7 @@ def make_advance(spec):
                 else:
                     x = step(x, c, first_h)
                     if wp.static(has_lead):
-                        x = lead(x, c, lead_first)
+                        x = lead(x, c, opening + opening)
                 if wp.static(watched):
                     x = watch(x, c, real(h))
             repeat = int(0)

@@ -63,7 +63,7 @@ PARTS: dict[str, Program] = {"A": (("A", 1.0), ("B", 1.0)), "B": (("B", 1.0), ("
 # One sub-map of the letter may be divided in two, or two joined: each is the flow of something.
 FLOWS = ("T", "K", "Ab", "Ap")
 
-SOLVERS = ("quartic", "cayley", "newton")
+SOLVERS = ("quartic", "cayley", "newton", "moser_veselov")
 
 
 def _palindrome(*outer: float) -> tuple[float, ...]:
@@ -171,7 +171,7 @@ class Method:
     name: "phi", "phi_adjoint", "psi" (the paper's), "psi_s" (default), "psi_1", or a composition of a symmetric one:
     "tj4(psi_s)", "su4(psi_s)", "kl6(psi_1)", "kl8(psi_s)", ...; "bm4(psi_x)", "bm6(psi_x)" of its two halves;
     "rkn4_6", "rkn6_11", "rkn6_14" of two parts, for weight and restoring moment.
-    solver: "quartic" (default), "cayley" or "newton" (the paper's, on the exponential map).
+    solver: "quartic" (default), "cayley", "newton" (the paper's, on the exponential map) or "moser_veselov" (explicit).
     iterations: Newton steps of every solve, a whole number >= 0; None iterates each vehicle to the tolerance.
     alpha, beta: weight of the old configuration in the averages of equations (15) and (16), 0 to 1, for nonconservative
     forces and torques in phi, phi_adjoint and psi (their conservative forces, and the other methods, have no such choice).

@@ -5,6 +5,7 @@ from typing import Any
 
 import warp as wp
 
+from lgvi_kernels import moser_veselov as mv
 from lgvi_kernels import rotation as r
 from lgvi_kernels.lanes import any_positive, mul, ones, positive, sub  # noqa: F401
 
@@ -37,6 +38,15 @@ SOLVERS = {
         r.vector_excess,
         r.vector_residual2,
         r.newton_rotation,
+    ),
+    "moser_veselov": (
+        mv.mv_explicit,
+        mv.mv_explicit,
+        mv.mv_value,
+        mv.mv_newton,
+        mv.mv_excess,
+        mv.mv_residual2,
+        mv.mv_rotation,
     ),
 }
 

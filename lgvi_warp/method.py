@@ -60,6 +60,9 @@ TWO_PART: dict[str, tuple[int, str, tuple[float, ...]]] = {
 }  # fmt: skip
 PARTS: dict[str, Program] = {"A": (("A", 1.0), ("B", 1.0)), "B": (("B", 1.0), ("A", 1.0))}
 
+# Gauss collocation, which solves for all of the state at once: name -> stages; the order is twice as many.
+GAUSS = {"gauss4": 2, "gauss6": 3, "gauss8": 4, "gauss10": 5, "gauss12": 6}
+
 # One sub-map of the letter may be divided in two, or two joined: each is the flow of something.
 FLOWS = ("T", "K", "Ab", "Ap")
 
@@ -170,7 +173,8 @@ class Method:
 
     name: "phi", "phi_adjoint", "psi" (the paper's), "psi_s" (default), "psi_1", or a composition of a symmetric one:
     "tj4(psi_s)", "su4(psi_s)", "kl6(psi_1)", "kl8(psi_s)", ...; "bm4(psi_x)", "bm6(psi_x)" of its two halves;
-    "rkn4_6", "rkn6_11", "rkn6_14" of two parts, for weight and restoring moment.
+    "rkn4_6", "rkn6_11", "rkn6_14" of two parts, for weight and restoring moment; "gauss4" to "gauss12", Gauss collocation
+    with a fixed-point iteration to the tolerance, or of so many iterations, for forces of position and time.
     solver: "quartic" (default), "cayley", "newton" (the paper's, on the exponential map) or "moser_veselov" (explicit).
     iterations: Newton steps of every solve, a whole number >= 0; None iterates each vehicle to the tolerance.
     alpha, beta: weight of the old configuration in the averages of equations (15) and (16), 0 to 1, for nonconservative
@@ -191,13 +195,13 @@ class Method:
     def __post_init__(self) -> None:
         faults = Faults()
         base, composition = self._split()
-        faults.choice("method", base, PROGRAMS | TWO_PART)
+        faults.choice("method", base, PROGRAMS | TWO_PART | GAUSS)
         if composition is not None:
             faults.choice("method composition", composition, COMPOSITIONS | HALVES)
             if ORDERS.get(base) == 1:
                 faults.add("method", self.name, "is a composition of a method that is not symmetric", "compose psi_s")
-            elif base in TWO_PART:
-                faults.add("method", self.name, "is a composition of a composition", f"use {base}, or compose psi_s")
+            elif base in TWO_PART or base in GAUSS:
+                faults.add("method", self.name, "composes what is not of order 2", f"use {base}, or compose psi_s")
             elif composition in HALVES and base in PROGRAMS and not divisible(PROGRAMS[base]):
                 middle = PROGRAMS[base][len(PROGRAMS[base]) // 2][0]
                 faults.add("method", self.name, f"would divide {middle}, the middle of {base}, which is no flow",
@@ -226,12 +230,19 @@ class Method:
     @property
     def program(self) -> Program:
         """The sub-maps of one stage, the first applied first."""
+        if self.gauss:
+            return (("G", 1.0),)
         return PARTS[TWO_PART[self.base][1]] if self.two_part else PROGRAMS[self.base]
 
     @property
     def two_part(self) -> bool:
         """Whether it splits into the parts A and B."""
         return self.base in TWO_PART
+
+    @property
+    def gauss(self) -> int:
+        """Stages of Gauss collocation; 0 for other methods."""
+        return GAUSS.get(self.base, 0)
 
     @property
     def halved(self) -> bool:
@@ -286,6 +297,8 @@ class Method:
         base, composition = self._split()
         if self.two_part:
             return TWO_PART[base][0]
+        if self.gauss:
+            return 2 * self.gauss
         return ORDERS[base] if composition is None else (COMPOSITIONS | HALVES)[composition][0]
 
     def force_tolerance(self, dtype: str) -> float:

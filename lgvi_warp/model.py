@@ -135,7 +135,7 @@ def make_model(
         parts=tuple(name for name, wanted in asked.items() if wanted),
         coupling=tuple(bool(np.any(U[:, i, j])) for i, j in ((0, 1), (0, 2), (1, 2), (0, 0), (1, 1), (2, 2))),
         timed=any(one.timed for one, _ in (*acting, *events)),
-        memory=memory,
+        memory=memory or method.gauss > 0,
         program=maps,
         lead=lead,
         averages=(method.alpha, method.beta) if forced else None,
@@ -230,6 +230,11 @@ def _check(
         if method.two_part and not getattr(module, "SEPARABLE", False):
             faults.add("method", method.name, f"wants potentials of position plus such of attitude, which {term.key} is not",
                        "use ss6_13(psi_x), or bm6(psi_x)")  # fmt: skip
+        if method.gauss and ("law" not in (roles := [role for role in ROLES if hasattr(module, role)]) or len(roles) > 1
+                             or isinstance(term, Drag) or getattr(module, "NOISE", False)):  # fmt: skip
+            faults.add(
+                "method", method.name, f"takes forces of position and time only, which {term.key} is not", "use psi_s"
+            )
     kicks = sum(letter in ("K", "Phi", "Phi*") for letter, _ in method.program)
     if noisy and not composed and kicks != 1:
         faults.add("method", method.name, "would draw noise more than once a step", "use psi_s, psi_x or psi_w")

@@ -9,6 +9,7 @@ import numpy as np
 import warp as wp
 
 from lgvi_kernels.advance import SAMPLE_FIELDS, STATE_FIELDS
+from lgvi_kernels.collocation import SLOPE_FIELDS
 from lgvi_kernels.lanes import int_lane
 from lgvi_kernels.terms import LAWS
 from lgvi_warp import inertia, model, modified_inertia, notation, vehicle
@@ -180,6 +181,8 @@ class Packets:
             for key, value in values.items():
                 self._fill(node["own"][key], value)
             node = node["rest"]
+        if self.plan.method.gauss:
+            memory.append(np.zeros((1, 2 * self.plan.method.gauss * SLOPE_FIELDS)))
         table = self._lanes(_side_by_side(rows))
         start = np.broadcast_to(_side_by_side(memory), (self.members.count, sum(m.shape[1] for m in memory)))
         # The second half is the copy that a repeated chunk starts from.

@@ -20,6 +20,7 @@ from lgvi_kernels.terms import LAWS
 from lgvi_warp import warp_setup
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
+from lgvi_warp.gauss import gauss
 from lgvi_warp.machine import default_width
 from lgvi_warp.method import Method
 from lgvi_warp.model import Model, make_model
@@ -118,6 +119,7 @@ class Plan:
             averages=model.averages,
             composed=len(self.method.stages) > 1,
             paired=self.method.halved or (self.method.two_part and not model.lead),
+            gauss=gauss(self.method.gauss) if self.method.gauss else (),
             lead_time=self.lengths[1][-1],
         )
 

@@ -46,7 +46,8 @@ class Spec(NamedTuple):
     the three pitches some member has; flow: "none", "steady" (uniform, the same for ever), "uniform", "varying";
     timed: whether a law looks at the time; averages: alpha and beta of (15), (16), or None for conservative maps;
     composed: more than one stage a step, or one, whose constants then are made once for all steps; paired: a stage is two
-    halves, each with a length of its own; lead_time: the part of a step that the lead drifts for.
+    halves, each with a length of its own; gauss: numbers of a collocation method, or none; lead_time: the part of a step that
+    the lead drifts for.
     """
 
     width: int
@@ -70,6 +71,7 @@ class Spec(NamedTuple):
     averages: tuple | None = None
     composed: bool = False
     paired: bool = False
+    gauss: tuple = ()
     lead_time: float = 0.0
 
 

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import warp as wp
 
 from lgvi_kernels import turns
+from lgvi_kernels.collocation import make_G
 from lgvi_kernels.compose import superpose
 from lgvi_kernels.coupled import make_W
 from lgvi_kernels.dissipation import make_V
@@ -140,6 +141,9 @@ def make_method(spec):
         drift = letters["Ab"] if spec.mass == "isotropic" else letters["T"]
         letters["A"] = make_A(rotation_struct(width, real), solve_within, View, Wrench, law)
         letters["B"] = make_B(drift, View, Wrench, law)
+    if spec.gauss:
+        functions = (View, Wrench, law, velocities)
+        letters["G"] = make_G(spec.gauss, *functions, spec.iterations, spec.adaptive, spec.checked, spec.timed)
     U12, U13, U23, *pitched = spec.coupling
     for letter in used:
         if letter[0] == "h":

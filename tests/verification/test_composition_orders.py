@@ -111,7 +111,7 @@ def test_laws_that_do_not_fit(method, term, words, scene):
 
 
 @pytest.mark.parametrize(("name", "words"), [("bm4(psi_1)", "divide D"), ("bm6(phi)", "not symmetric"),
-                                             ("kl6(rkn4_6)", "composition of a composition"),
+                                             ("kl6(rkn4_6)", "not of order 2"),
                                              ("bm5(psi_x)", "did you mean 'bm")])  # fmt: skip
 def test_names_that_do_not_fit(name, words):
     with pytest.raises(lw.SceneError, match=words):

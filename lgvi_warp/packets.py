@@ -181,8 +181,9 @@ class Packets:
             for key, value in values.items():
                 self._fill(node["own"][key], value)
             node = node["rest"]
-        if self.plan.method.gauss:
-            memory.append(np.zeros((1, 2 * self.plan.method.gauss * SLOPE_FIELDS)))
+        if self.plan.spec.gauss:
+            # The slopes of the last step, and room for their extrapolation.
+            memory.append(np.zeros((1, 2 * len(self.plan.spec.gauss[1]) * SLOPE_FIELDS)))
         table = self._lanes(_side_by_side(rows))
         start = np.broadcast_to(_side_by_side(memory), (self.members.count, sum(m.shape[1] for m in memory)))
         # The second half is the copy that a repeated chunk starts from.

@@ -188,7 +188,7 @@ class Bank(Packets):
         # What Packets asks of a Plan and of Members to pack laws.
         plan: Any = SimpleNamespace(
             model=SimpleNamespace(laws=((bench.term, bench.module),)),
-            spec=SimpleNamespace(width=bench.width, drag=()),
+            spec=SimpleNamespace(width=bench.width, drag=(), gauss=()),
             dtypes=(None, bench.Params, None),
             dtype="float64",
         )

@@ -38,10 +38,35 @@ FORCED: dict[str, Program] = {
 }
 ORDERS = {"phi": 1, "phi_adjoint": 1, "psi": 2, "psi_s": 2, "psi_1": 2, "psi_x": 2, "psi_x8": 2, "psi_w": 2}
 
+# Two-part splittings: A = free rotation (modified Moser-Veselov, order 8) and the kick of U_b(b), B = T and the kick of
+# U_R(R). Blanes & Moan (2002), J. Comput. Appl. Math. 142, 313, table 3: SRKN_6^b, SRKN_11^b, SRKN_14^a, whose printed
+# coefficients are given here: name -> (order, first part, half of the palindrome without its last number of each part).
+TWO_PART: dict[str, tuple[int, str, tuple[float, ...]]] = {
+    "rkn4_6": (
+        4, "B",
+        (0.0829844064174052, 0.245298957184271, 0.396309801498368, 0.604872665711080, -0.0390563049223486),
+    ),
+    "rkn6_11": (
+        6, "B",
+        (0.0414649985182624, 0.123229775946271, 0.198128671918067, 0.290553797799558, -0.0400061921041533,
+         -0.127049212625417, 0.0752539843015807, -0.246331761062075, -0.0115113874206879, 0.357208872795928),
+    ),
+    "rkn6_14": (
+        6, "A",
+        (0.03785931984061157, 0.09171915262446165, 0.102635633102435, 0.183983170005006, -0.02586788826655869,
+         -0.05653436583288827, 0.314241403071447, 0.004914688774712854, -0.130144459517415, 0.143761127168358,
+         0.106417700369543, 0.328567693746804, -0.008794243128510581),
+    ),
+}  # fmt: skip
+PARTS: dict[str, Program] = {"A": (("A", 1.0), ("B", 1.0)), "B": (("B", 1.0), ("A", 1.0))}
+
+# Gauss collocation, which solves for all of the state at once: name -> stages; the order is twice as many.
+GAUSS = {"gauss4": 2, "gauss6": 3, "gauss8": 4, "gauss10": 5, "gauss12": 6}
+
 # One sub-map of the letter may be divided in two, or two joined: each is the flow of something.
 FLOWS = ("T", "K", "Ab", "Ap")
 
-SOLVERS = ("quartic", "cayley", "newton")
+SOLVERS = ("quartic", "cayley", "newton", "moser_veselov")
 
 
 def _palindrome(*outer: float) -> tuple[float, ...]:
@@ -52,7 +77,9 @@ _G3 = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))
 _G5 = 1.0 / (4.0 - 4.0 ** (1.0 / 3.0))
 
 # name -> (order, stage coefficients), for a symmetric base of order 2. Hairer, Lubich & Wanner, Geometric Numerical
-# Integration, 2nd ed., II.4 (triple jump, Suzuki) and V.3.2 (Kahan & Li 1997).
+# Integration, 2nd ed., II.4 (triple jump, Suzuki) and V.3.2 (Kahan & Li 1997). yo6: Yoshida (1990), Phys. Lett. A 150,
+# 262, solution A. su8_15: Suzuki & Umeno (1993), the coefficients of McLachlan (1995), SIAM J. Sci. Comput. 16, 151.
+# ss*: Sofroniou & Spaletta (2005), Optim. Methods Softw. 20, 597.
 COMPOSITIONS: dict[str, tuple[int, tuple[float, ...]]] = {
     "tj4": (4, _palindrome(_G3)),
     "su4": (4, _palindrome(_G5, _G5)),
@@ -73,7 +100,71 @@ COMPOSITIONS: dict[str, tuple[int, tuple[float, ...]]] = {
             0.29501172360931029887,
         ),
     ),
+    "yo6": (6, _palindrome(0.78451361047755726381949763, 0.23557321335935813368479318, -1.17767998417887100694641568)),
+    "ss6_11": (
+        6,
+        _palindrome(
+            0.21375583945878254555518066964857,
+            0.18329381407425713911385974425217,
+            0.17692819473098943794898811709929,
+            -0.44329082681170215849622829626258,
+            0.11728560432865935385403585669136,
+        ),
+    ),
+    "ss6_13": (
+        6,
+        _palindrome(
+            0.13861930854051695245808013042625,
+            0.13346562851074760407046858832209,
+            0.13070531011449225190542755785015,
+            0.12961893756907034772505366537091,
+            -0.35000324893920896516170830911323,
+            0.11805530653002387170273438954049,
+        ),
+    ),
+    "su8_15": (
+        8,
+        _palindrome(
+            0.74167036435061295344822780,
+            -0.40910082580003159399730010,
+            0.19075471029623837995387626,
+            -0.57386247111608226665638773,
+            0.29906418130365592384446354,
+            0.33462491824529818378495798,
+            0.31529309239676659663205666,
+        ),
+    ),
+    "ss8_21": (
+        8,
+        _palindrome(
+            0.10647728984550031823931967854896,
+            0.10837408645835726397433410591546,
+            0.35337821052654342419534541324080,
+            -0.23341414023165082198780281128319,
+            -0.24445266791528841269462171413216,
+            0.11317848435755633314700952515599,
+            0.11892905625000350062692972283951,
+            0.12603912321825988140305670268365,
+            0.12581718736176041804392391641587,
+            0.11699135019217642180722881433533,
+        ),
+    ),
 }
+
+# name -> (order, first half of a palindrome a_1, a_2, ...). A base Psi_h = chi*_{h/2} after chi_{h/2} gives way to its
+# halves: chi over a_1 h, its adjoint chi* over a_2 h, chi over a_3 h, ... Blanes & Moan (2002), table 2: S_6 and S_10.
+HALVES: dict[str, tuple[int, tuple[float, ...]]] = {
+    "bm4": (
+        4,
+        (0.0792036964311957, 0.1303114101821663, 0.2228614958676077, -0.3667132690474257, 0.3246481886897062,
+         0.1096884778767498),
+    ),
+    "bm6": (
+        6,
+        (0.0502627644003922, 0.0985536835006498, 0.3149606169276942, -0.4473464826954782, 0.4924263724898759,
+         -0.4251187677976909, 0.2370639139781219, 0.1956024886000531, 0.3463581898507269, -0.3627627792543449),
+    ),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -81,8 +172,10 @@ class Method:
     """A method by name, and how equation (24) is solved inside it.
 
     name: "phi", "phi_adjoint", "psi" (the paper's), "psi_s" (default), "psi_1", or a composition of a symmetric one:
-    "tj4(psi_s)", "su4(psi_s)", "kl6(psi_1)", "kl8(psi_s)", ...
-    solver: "quartic" (default), "cayley" or "newton" (the paper's, on the exponential map).
+    "tj4(psi_s)", "su4(psi_s)", "kl6(psi_1)", "kl8(psi_s)", ...; "bm4(psi_x)", "bm6(psi_x)" of its two halves;
+    "rkn4_6", "rkn6_11", "rkn6_14" of two parts, for weight and restoring moment; "gauss4" to "gauss12", Gauss collocation
+    with a fixed-point iteration to the tolerance, or of so many iterations, for forces of position and time.
+    solver: "quartic" (default), "cayley", "newton" (the paper's, on the exponential map) or "moser_veselov" (explicit).
     iterations: Newton steps of every solve, a whole number >= 0; None iterates each vehicle to the tolerance; "auto" finds
     out, before the run, how many serve every member's start at twice the step, and makes so many (a solve that needed
     more later on gives its member the status NOT_CONVERGED).
@@ -104,11 +197,17 @@ class Method:
     def __post_init__(self) -> None:
         faults = Faults()
         base, composition = self._split()
-        faults.choice("method", base, PROGRAMS)
+        faults.choice("method", base, PROGRAMS | TWO_PART | GAUSS)
         if composition is not None:
-            faults.choice("method composition", composition, COMPOSITIONS)
+            faults.choice("method composition", composition, COMPOSITIONS | HALVES)
             if ORDERS.get(base) == 1:
                 faults.add("method", self.name, "is a composition of a method that is not symmetric", "compose psi_s")
+            elif base in TWO_PART or base in GAUSS:
+                faults.add("method", self.name, "composes what is not of order 2", f"use {base}, or compose psi_s")
+            elif composition in HALVES and base in PROGRAMS and not divisible(PROGRAMS[base]):
+                middle = PROGRAMS[base][len(PROGRAMS[base]) // 2][0]
+                faults.add("method", self.name, f"would divide {middle}, the middle of {base}, which is no flow",
+                           f"use {composition}(psi_s)")  # fmt: skip
         faults.choice("solver", self.solver, SOLVERS)
         n = self.iterations
         if n not in (None, "auto") and (isinstance(n, bool) or not isinstance(n, int) or not 0 <= n <= 100):
@@ -134,7 +233,24 @@ class Method:
     @property
     def program(self) -> Program:
         """The sub-maps of one stage, the first applied first."""
-        return PROGRAMS[self.base]
+        if self.gauss:
+            return (("G", 1.0),)
+        return PARTS[TWO_PART[self.base][1]] if self.two_part else PROGRAMS[self.base]
+
+    @property
+    def two_part(self) -> bool:
+        """Whether it splits into the parts A and B."""
+        return self.base in TWO_PART
+
+    @property
+    def gauss(self) -> int:
+        """Stages of Gauss collocation; 0 for other methods."""
+        return GAUSS.get(self.base, 0)
+
+    @property
+    def halved(self) -> bool:
+        """Whether each stage is two halves of different length."""
+        return self._split()[1] in HALVES
 
     @property
     def turns(self) -> bool:
@@ -143,15 +259,50 @@ class Method:
 
     @property
     def stages(self) -> tuple[float, ...]:
-        """The stage coefficients g_i: one step is the program with g_1 h, then with g_2 h, ..."""
+        """The stage coefficients g_i: one step is the program with g_1 h, then with g_2 h, ...
+
+        Of two halves, or of two parts, these are the numbers of both in turn.
+        """
         composition = self._split()[1]
-        return (1.0,) if composition is None else COMPOSITIONS[composition][1]
+        if self.two_part:
+            return palindrome_of_parts(TWO_PART[self.base][2])
+        if composition is None:
+            return (1.0,)
+        if composition in HALVES:
+            half = HALVES[composition][1]
+            return (*half, *reversed(half))
+        return COMPOSITIONS[composition][1]
+
+    def lengths(self, lead: float | None) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """What the stages are given, and the lead after each of them and, at the end, before the first; in steps.
+
+        lead: the coefficient of the lead, or None without one. Halves and parts have two lengths a stage; where one of
+        two parts leads, the stages have the other's. Psi_h is its halves over h/2: a half over a is told as 2 a.
+        """
+        c, g = lead or 0.0, self.stages
+        if self.two_part:
+            # From `first` in turn, and back to it: its last number has no other after it.
+            first, second = g[0::2], g[1::2]
+            if lead is None:
+                return (*g, 0.0), (0.0,) * (len(first) + 1)
+            return second, (*first[1:-1], first[-1] + first[0], first[0])
+        if self.halved:
+            doubled = tuple(2.0 * a for a in g)
+            first, second = doubled[0::2], doubled[1::2]
+        else:
+            doubled, first, second = g, g, g
+        following = (*first[1:], first[0])
+        return doubled, (*(c * (b + a) for b, a in zip(second, following, strict=True)), c * first[0])
 
     @property
     def order(self) -> int:
         """Order of convergence."""
         base, composition = self._split()
-        return ORDERS[base] if composition is None else COMPOSITIONS[composition][0]
+        if self.two_part:
+            return TWO_PART[base][0]
+        if self.gauss:
+            return 2 * self.gauss
+        return ORDERS[base] if composition is None else (COMPOSITIONS | HALVES)[composition][0]
 
     def force_tolerance(self, dtype: str) -> float:
         """Relative change of the momenta below which the iteration for the forces of Phi* has settled."""
@@ -172,6 +323,28 @@ def merged(program: Program) -> tuple[tuple[str, float] | None, Program]:
     if len(program) > 1 and first == last and first[0] in FLOWS:
         return first, program[1:-1]
     return None, program
+
+
+def palindrome_of_parts(printed: tuple[float, ...]) -> tuple[float, ...]:
+    """All numbers of two parts in turn, from the printed ones: those of each part sum to one, which gives the last two."""
+    c, n = list(printed), len(printed)
+    c.append(0.5 - sum(c[n % 2 :: 2]))
+    c.append(1.0 - 2.0 * sum(c[(n + 1) % 2 :: 2]))
+    return (*c, *reversed(c[:-1]))
+
+
+def divisible(program: Program) -> bool:
+    """Whether a symmetric program is a map and its adjoint: its middle, if it has one, is a flow."""
+    return len(program) % 2 == 0 or program[len(program) // 2][0] in FLOWS
+
+
+def divided(program: Program) -> Program:
+    """With two halves of the middle in its place, where it is symmetric but no flow."""
+    n = len(program) // 2
+    if len(program) % 2 == 0:
+        return program
+    letter, c = program[n]
+    return (*program[:n], (letter, 0.5 * c), (letter, 0.5 * c), *program[n + 1 :])
 
 
 def with_hops(program: Program) -> Program:

@@ -15,7 +15,7 @@ from lgvi_warp import inertia, terms, vehicle
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, closest
 from lgvi_warp.inertia import Frame
-from lgvi_warp.method import FORCED, Method, Program, merged, middle_axis, simplified, with_hops
+from lgvi_warp.method import FORCED, Method, Program, divided, merged, middle_axis, simplified, with_hops
 from lgvi_warp.terms.base import Setting, Term
 from lgvi_warp.terms.drag import Drag, has_exact_flow
 
@@ -100,7 +100,7 @@ def make_model(
         acting = [(term, module), *((t, m) for t, m in acting if t is not term)]
     dense = (damping or bool(drags) or flow == "varying") and not exact
     memory = any(term.memory for term, _ in acting)
-    _check(ensemble, method, frame, p, dense=dense, flow=flow, memory=memory, modules=[module for _, module in acting])
+    _check(ensemble, method, frame, p, dense=dense, flow=flow, memory=memory, acting=acting)
     mass = shape_of_mass(frame.M)
     coupled = frame.coupled
     program = FORCED[method.base] if forced else simplified(method.program, mass == "isotropic" and not coupled)
@@ -108,13 +108,20 @@ def make_model(
         program = tuple((letter, coefficient) for letter, coefficient in program if letter != "K")
     if method.turns and coupled:
         program = with_hops(program)
+    if method.halved and (drag or flow != "none"):
+        program = divided(program)  # then K is symmetric but no flow: one of its own for each half
     lead, maps = merged(program)
     # A kick that cannot be undone must not be divided between two steps, nor what events look at.
     undone = all(getattr(module, "POTENTIAL", False) for _, module in acting)
-    if events or (lead is not None and lead[0] == "K" and not undone):
+    if method.two_part:
+        # B joins that of the next step exactly, A as far as its order goes.
+        lead, maps = method.program[0], method.program[1:]
+        if events:
+            lead, maps = None, method.program
+    elif events or (lead is not None and lead[0] == "K" and not undone):
         lead, maps = None, program
     asked = {"turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
-             "dense": dense, "water": flow in ("uniform", "varying"),
+             "modified": method.two_part, "dense": dense, "water": flow in ("uniform", "varying"),
              "origin": (bool(events) or flow != "none") and bool(np.any(frame.origin) or np.any(frame.forces))}  # fmt: skip
     return Model(
         method=method,
@@ -128,7 +135,7 @@ def make_model(
         parts=tuple(name for name, wanted in asked.items() if wanted),
         coupling=tuple(bool(np.any(U[:, i, j])) for i, j in ((0, 1), (0, 2), (1, 2), (0, 0), (1, 1), (2, 2))),
         timed=any(one.timed for one, _ in (*acting, *events)),
-        memory=memory,
+        memory=memory or method.gauss > 0,
         program=maps,
         lead=lead,
         averages=(method.alpha, method.beta) if forced else None,
@@ -203,7 +210,7 @@ def _check(
     dense: bool,
     flow: str,
     memory: bool,
-    modules: list[Any],
+    acting: list[tuple[Term, Any]],
 ) -> None:
     """Refuse what a method cannot do, with the reason."""
     faults = Faults()
@@ -214,11 +221,20 @@ def _check(
             remedy = "use psi_x, psi_x8 or psi_w, which take any 6x6 inertia"
             faults.add("method", method.name, f"cannot couple velocities and rates ({k})", remedy)
     composed = len(method.stages) > 1
-    noisy = any(getattr(module, "NOISE", False) for module in modules)
-    if composed and (dense or flow in ("uniform", "varying") or memory or noisy):
+    noisy = any(getattr(module, "NOISE", False) for _, module in acting)
+    if composed and not method.two_part and (dense or flow in ("uniform", "varying") or memory or noisy):
         what = "a damping matrix" if dense else "water that varies" if flow != "none" else "a term that remembers"
         faults.add("method", method.name, f"keeps its order only for maps that undo themselves, which {what} does not",
                    f"use {method.base}")  # fmt: skip
+    for term, module in acting:
+        if method.two_part and not getattr(module, "SEPARABLE", False):
+            faults.add("method", method.name, f"wants potentials of position plus such of attitude, which {term.key} is not",
+                       "use ss6_13(psi_x), or bm6(psi_x)")  # fmt: skip
+        if method.gauss and ("law" not in (roles := [role for role in ROLES if hasattr(module, role)]) or len(roles) > 1
+                             or isinstance(term, Drag) or getattr(module, "NOISE", False)):  # fmt: skip
+            faults.add(
+                "method", method.name, f"takes forces of position and time only, which {term.key} is not", "use psi_s"
+            )
     kicks = sum(letter in ("K", "Phi", "Phi*") for letter, _ in method.program)
     if noisy and not composed and kicks != 1:
         faults.add("method", method.name, "would draw noise more than once a step", "use psi_s, psi_x or psi_w")

@@ -9,9 +9,10 @@ import numpy as np
 import warp as wp
 
 from lgvi_kernels.advance import SAMPLE_FIELDS, STATE_FIELDS
+from lgvi_kernels.collocation import SLOPE_FIELDS
 from lgvi_kernels.lanes import int_lane
 from lgvi_kernels.terms import LAWS
-from lgvi_warp import inertia, model, notation, vehicle
+from lgvi_warp import inertia, model, modified_inertia, notation, vehicle
 from lgvi_warp.ensemble import Ensemble, Members
 from lgvi_warp.events import Event
 from lgvi_warp.plan import Plan, build_lock
@@ -104,6 +105,8 @@ class Packets:
         if "dense" in parts:
             Md, C, Jd = (block / scale[:, None, None] for block in inertia.blocks(frame.inertia_at(frame.E_forces)))
             fields |= {"M": _symmetric(Md), "C": C, "J_forces": _symmetric(Jd)}
+        if "modified" in parts:
+            fields |= modified_inertia.fields(J / scale[:, None])
         if "water" in parts:
             fields |= self._water()
         if "origin" in parts:
@@ -130,7 +133,10 @@ class Packets:
 
     def _fill(self, target: np.ndarray, value: Any) -> None:
         names = target.dtype.names or ()
-        if isinstance(value, tuple):
+        if isinstance(value, dict):
+            for name, part in value.items():
+                self._fill(target[name], part)
+        elif isinstance(value, tuple):
             for name, part in zip(("diagonal", "off_diagonal"), value, strict=True):
                 _set_vector(target[name], self._lanes(part))
         elif names == ("x", "y", "z"):
@@ -175,6 +181,9 @@ class Packets:
             for key, value in values.items():
                 self._fill(node["own"][key], value)
             node = node["rest"]
+        if self.plan.spec.gauss:
+            # The slopes of the last step, and room for their extrapolation.
+            memory.append(np.zeros((1, 2 * len(self.plan.spec.gauss[1]) * SLOPE_FIELDS)))
         table = self._lanes(_side_by_side(rows))
         start = np.broadcast_to(_side_by_side(memory), (self.members.count, sum(m.shape[1] for m in memory)))
         # The second half is the copy that a repeated chunk starts from.
@@ -256,7 +265,12 @@ class Packets:
 
 def _leaves(fields: dict[str, Any]) -> list[np.ndarray]:
     """The arrays of a term's numbers."""
-    flat = [part for value in fields.values() for part in (value if isinstance(value, tuple) else (value,))]
+    flat: list[np.ndarray] = []
+    for value in fields.values():
+        if isinstance(value, dict):
+            flat += _leaves(value)
+        else:
+            flat += value if isinstance(value, tuple) else (value,)
     return [part for part in flat if np.ndim(part) > 0]
 
 

@@ -20,6 +20,7 @@ from lgvi_kernels.terms import LAWS
 from lgvi_warp import warp_setup
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
+from lgvi_warp.gauss import gauss
 from lgvi_warp.machine import default_width
 from lgvi_warp.method import Method
 from lgvi_warp.model import Model, make_model
@@ -117,7 +118,9 @@ class Plan:
             memory=model.memory,
             averages=model.averages,
             composed=len(self.method.stages) > 1,
-            lead_time=model.lead[1] * self.method.stages[0] if model.lead else 0.0,
+            paired=self.method.halved or (self.method.two_part and not model.lead),
+            gauss=gauss(self.method.gauss) if self.method.gauss else (),
+            lead_time=self.lengths[1][-1],
         )
 
     @contextlib.contextmanager
@@ -151,13 +154,19 @@ class Plan:
         return tuple(np.dtype(one.numpy_dtype()) for one in types)
 
     @functools.cached_property
+    def lengths(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Of the stages and of the leads, in steps."""
+        lead = self.model.lead
+        return self.method.lengths(lead[1] if lead else None)
+
+    @functools.cached_property
     def times(self) -> tuple[Any, Any, Any]:
         """Kernel arguments that all blocks share: stage_h, lead_h and sample_step."""
-        g = np.array(self.method.stages)
+        stages, leads = (np.array(one) * self.grid.h for one in self.lengths)
         due = np.append(self.grid.sample_steps, 2**31 - 1).astype(np.int32)
         return (
-            wp.array(g * self.grid.h, dtype=self.spec.real, device="cpu"),
-            wp.array((g + np.roll(g, -1)) * self.grid.h, dtype=self.spec.real, device="cpu"),
+            wp.array(stages, dtype=self.spec.real, device="cpu"),
+            wp.array(leads, dtype=self.spec.real, device="cpu"),
             wp.array(due, dtype=wp.int32, device="cpu"),
         )
 

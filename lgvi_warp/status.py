@@ -35,9 +35,10 @@ class Status(IntEnum):
 _TEXT = {
     Status.OK: "ran to the end",
     Status.STEP_TOO_LARGE: "the step is too large: |J^-1 a| reached 1, where equation (24) may have no solution; "
-    "shorten the step below 1 / |angular velocity| (psi and psi_s: below 2 / |angular velocity|)",
-    Status.NOT_CONVERGED: "the solve of the implicit rotation (equation (24); of psi_w its coupled form) kept a "
-    "residual above the tolerance; give a shorter step, more iterations or a larger tolerance",
+    "shorten the step below 1 / |angular velocity| (psi and psi_s: below 2 / |angular velocity|; "
+    "rkn*: a quarter turn in a part)",
+    Status.NOT_CONVERGED: "the solve of the implicit rotation (equation (24); psi_w: its coupled form; gauss*: the stages) "
+    "kept a residual above the tolerance; give a shorter step, more iterations or a larger tolerance",
     Status.FORCES_NOT_CONVERGED: "the iteration for nonconservative forces in Phi* did not settle: they are stiff; "
     "shorten the step, or use psi_s or psi_x, which treat drag implicitly",
     Status.SURFACE: "stopped by an event: rose to the surface",

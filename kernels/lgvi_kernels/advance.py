@@ -45,8 +45,9 @@ class Spec(NamedTuple):
     "diagonal", "full"); parts: what the inertia holds besides (see inertia_struct); coupling: which of U12, U13, U23 and of
     the three pitches some member has; flow: "none", "steady" (uniform, the same for ever), "uniform", "varying";
     timed: whether a law looks at the time; averages: alpha and beta of (15), (16), or None for conservative maps;
-    composed: more than one stage a step, or one, whose constants then are made once for all steps;
-    lead_time: the part of a step that the lead drifts for.
+    composed: more than one stage a step, or one, whose constants then are made once for all steps; paired: a stage is two
+    halves, each with a length of its own; gauss: numbers of a collocation method, or none; lead_time: the part of a step that
+    the lead drifts for.
     """
 
     width: int
@@ -69,6 +70,8 @@ class Spec(NamedTuple):
     memory: bool = False
     averages: tuple | None = None
     composed: bool = False
+    paired: bool = False
+    gauss: tuple = ()
     lead_time: float = 0.0
 
 
@@ -112,9 +115,9 @@ def make_advance(spec):
     watch, passage = make_watch(spec.events, View, "origin" in spec.parts) if watched else (step, step)
     lead_coefficient = spec.lead[1] if has_lead else 0.0
     # A drift that leads has passed half of its time when a step begins; with stages, of the first one's.
-    lead_time = spec.lead_time if has_lead and spec.lead[0] in ("Ab", "T") else 0.0
+    lead_time = spec.lead_time if has_lead and spec.lead[0] in ("Ab", "T", "B") else 0.0
     water_velocity = method.water_velocity
-    renormalised, composed = real == wp.float32, spec.composed
+    renormalised, composed, paired = real == wp.float32, spec.composed, spec.paired
     fields, per_sample = spec.fields, sum(SAMPLE_FIELDS[name] for name in spec.fields)
 
     @wp.func
@@ -146,10 +149,10 @@ def make_advance(spec):
         return x
 
     @wp.func
-    def opened(x: State, c: Constants, part: real):
-        """The lead of the first step; with -1 for `part`, the state at the end of a step without that of the next."""
+    def opened(x: State, c: Constants, length: real):
+        """The lead of the first step; with `length` negative, the state at a step's end without that of the next."""
         if wp.static(has_lead):
-            x = lead(x, c, real(wp.static(lead_coefficient)) * part)
+            x = lead(x, c, length)
         return x
 
     @wp.func
@@ -189,7 +192,7 @@ def make_advance(spec):
         table: wp.array2d(dtype=Lane),
         tolerance: real,
         force_tolerance: real,
-        # method: h g_i of each stage, and the merged lead's h (g_i + g_i+1) after it
+        # method: length of each stage [s], in pairs where it has two halves; of the lead after each, and before the first
         h: wp.float64,
         stage_h: wp.array(dtype=real),
         lead_h: wp.array(dtype=real),
@@ -221,9 +224,12 @@ def make_advance(spec):
             c.events = events[i % events.shape[0]]
         if wp.static(dragged):
             c.drag = prepare(DragFlow(), c.params.own, real(h))
-        stages = stage_h.shape[0]
+        stages = lead_h.shape[0] - 1
         first_h = real(1.0) * stage_h[0]
-        lead_first = real(wp.static(lead_coefficient)) * lead_h[0]
+        opening = real(1.0) * lead_h[stages]
+        if wp.static(not composed):
+            # From the one number that the compiler then keeps for the stage and its leads.
+            opening = real(wp.static(lead_coefficient)) * first_h
         x = read(state, i)
         one = ones(x.b.x)
         zero = one - one
@@ -237,7 +243,7 @@ def make_advance(spec):
         if any_frozen:
             x = choose(frozen, at_rest(x), x)
         if k0 == 0:
-            x = opened(x, c, first_h)
+            x = opened(x, c, opening)
         k = k0
         s = s0
         singles = int(0)
@@ -253,13 +259,16 @@ def make_advance(spec):
                 x = at_step(x, k + j, h)
                 if wp.static(composed):
                     for g in range(stages):
-                        x = step(x, c, stage_h[g])
+                        if wp.static(paired):
+                            x = step(x, c, stage_h[2 * g], stage_h[2 * g + 1])
+                        else:
+                            x = step(x, c, stage_h[g])
                         if wp.static(has_lead):
-                            x = lead(x, c, real(wp.static(lead_coefficient)) * lead_h[g])
+                            x = lead(x, c, lead_h[g])
                 else:
                     x = step(x, c, first_h)
                     if wp.static(has_lead):
-                        x = lead(x, c, lead_first)
+                        x = lead(x, c, opening + opening)
                 if wp.static(watched):
                     x = watch(x, c, real(h))
             repeat = int(0)
@@ -299,7 +308,7 @@ def make_advance(spec):
                     y = x
                     if any_frozen:
                         y = choose(frozen, kept, x)
-                    y = opened(at_step(y, k, h), c, -first_h)
+                    y = opened(at_step(y, k, h), c, -opening)
                     sample(out, i, (s - s0) * wp.static(per_sample), y, c, real(h))
                     s += 1
         if any_frozen:

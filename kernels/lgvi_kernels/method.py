@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import warp as wp
 
 from lgvi_kernels import turns
+from lgvi_kernels.collocation import make_G
 from lgvi_kernels.compose import superpose
 from lgvi_kernels.coupled import make_W
 from lgvi_kernels.dissipation import make_V
@@ -18,6 +19,7 @@ from lgvi_kernels.submaps import (
     Ap,
     anisotropic_velocity,
     fold,
+    fold_pair,
     isotropic_velocity,
     look,
     make_Ab,
@@ -27,6 +29,7 @@ from lgvi_kernels.submaps import (
     rotate,
 )
 from lgvi_kernels.terms import drag, drag_directions
+from lgvi_kernels.two_part import make_A, make_B
 from lgvi_kernels.view import to_body
 from lgvi_kernels.water import make_shear
 
@@ -122,7 +125,7 @@ def make_method(spec):
     V = None
     if damping is not None and spec.averages is None:
         V = make_V(damping, velocities_of_forces, Damping, factor_struct(width, real), coupled)
-    solve = make_solve(real, spec.solver, spec.iterations, spec.adaptive, spec.checked)
+    solve, solve_within = make_solve(real, spec.solver, spec.iterations, spec.adaptive, spec.checked)
     used = {letter for letter, _ in spec.maps} | ({spec.lead[0]} if spec.lead else set())
     letters = {
         "Ab": make_Ab(velocity, spec.timed),
@@ -134,6 +137,13 @@ def make_method(spec):
         letters["K"] = make_K(View, Wrench, Flow, law, evolve, flow, varies, shifted, E if spec.drag else None, V)
     if "W" in used:
         letters["W"] = make_W(rotation_struct(width, real), rotate, spec.iterations, spec.adaptive, spec.checked)
+    if "modified" in spec.parts:
+        drift = letters["Ab"] if spec.mass == "isotropic" else letters["T"]
+        letters["A"] = make_A(rotation_struct(width, real), solve_within, View, Wrench, law)
+        letters["B"] = make_B(drift, View, Wrench, law)
+    if spec.gauss:
+        functions = (View, Wrench, law, velocities)
+        letters["G"] = make_G(spec.gauss, *functions, spec.iterations, spec.adaptive, spec.checked, spec.timed)
     U12, U13, U23, *pitched = spec.coupling
     for letter in used:
         if letter[0] == "h":
@@ -152,6 +162,6 @@ def make_method(spec):
             maps.append((turns.make_turn(axes[0], pitched[axes[0]], following), coefficient))
         else:
             maps.append((letters[letter], coefficient))
-    step = fold(tuple(maps))
+    step = fold_pair(tuple(maps)) if spec.paired else fold(tuple(maps))
     lead = letters[spec.lead[0]] if spec.lead else step
     return Step(step, lead, velocities, prepare, water_velocity)

@@ -5,6 +5,7 @@ from typing import Any
 
 import warp as wp
 
+from lgvi_kernels import moser_veselov as mv
 from lgvi_kernels import rotation as r
 from lgvi_kernels.lanes import any_positive, mul, ones, positive, sub  # noqa: F401
 
@@ -38,6 +39,15 @@ SOLVERS = {
         r.vector_residual2,
         r.newton_rotation,
     ),
+    "moser_veselov": (
+        mv.mv_explicit,
+        mv.mv_explicit,
+        mv.mv_value,
+        mv.mv_newton,
+        mv.mv_excess,
+        mv.mv_residual2,
+        mv.mv_rotation,
+    ),
 }
 
 # At |J^-1 a| -> 1 the root is nearly double and a Newton step only halves the error: 40 steps exhaust float64.
@@ -49,7 +59,8 @@ NOT_CONVERGED = 2
 
 @functools.cache
 def make_solve(real, solver, iterations, adaptive, checked):
-    """The function (F, alarm, a, J, tolerance) -> (F, alarm) that solves equation (24) in every lane.
+    """The functions (F, alarm, a, J, tolerance) -> (F, alarm) that solves equation (24) in every lane, and the same with
+    the square of the measure of the step's size that is to stay below 1, given after J.
 
     `iterations` Newton steps are made in all lanes. `adaptive` goes on, in the lanes that need it, until the residual is
     below the tolerance: a lane's bits depend on that lane alone. `checked` raises the alarm of a lane whose equation has
@@ -79,7 +90,7 @@ def make_solve(real, solver, iterations, adaptive, checked):
         return alarm
 
     @wp.func
-    def solve(F: Any, alarm: Any, a: Any, J: Any, tolerance: Any):
+    def solve_within(F: Any, alarm: Any, a: Any, J: Any, far: Any, tolerance: Any):
         u = start(a, J)
         for _ in range(wp.static(iterations)):
             u = newton(u, value(u, a, J), a, J)
@@ -88,7 +99,7 @@ def make_solve(real, solver, iterations, adaptive, checked):
             e = excess(v, a, J, tolerance)
             suspect = e
             if wp.static(checked):
-                suspect = positive(e, e, beyond(r.reach(a, J), tolerance))
+                suspect = positive(e, e, beyond(far, tolerance))
             if any_positive(suspect):
                 if wp.static(adaptive):
                     k = int(0)
@@ -98,7 +109,11 @@ def make_solve(real, solver, iterations, adaptive, checked):
                         e = excess(v, a, J, tolerance)
                         k += 1
                 if wp.static(checked):
-                    alarm = raise_alarm(alarm, r.reach(a, J), e, residual2(v, a, J), tolerance)
+                    alarm = raise_alarm(alarm, far, e, residual2(v, a, J), tolerance)
         return rotation(F, u, a, J), alarm
 
-    return solve
+    @wp.func
+    def solve(F: Any, alarm: Any, a: Any, J: Any, tolerance: Any):
+        return solve_within(F, alarm, a, J, r.reach(a, J), tolerance)
+
+    return solve, solve_within

@@ -61,6 +61,12 @@ def damping_struct(width, real):
 
 
 @functools.cache
+def series_struct(width, real):
+    """Coefficients of N, H; N^2, N H, H^2; N^3, N^2 H, N H^2, H^3."""
+    return struct("Series", **{f"c{i}": lane(width, real) for i in range(1, 10)})
+
+
+@functools.cache
 def flow_struct(width, real):
     """The water's velocity u [m/s], du/dt [m/s2] and du/db [1/s] by north, east and depth, all in inertial axes."""
     Lane3 = lane3(width, real)
@@ -97,6 +103,7 @@ def inertia_struct(width, real, mass, parts=()):
     "coupled": E = M^-1 C at the origin of the state and at that of the forces, 3x3;
     "dense": the inertia at the origin of the forces as M and J (and C where coupled), for velocity-dependent laws;
     "origin": the user's origin from that of the state, and from that of the forces, where events and water are taken;
+    "modified": 1 / J, and the coefficients of the series s (shrink) and d (shift) of the modified inertia;
     "water": displaced mass less mass, and displaced mass times its lever less mass times its own, by max J.
     """
     Lane, Lane3 = lane(width, real), lane3(width, real)
@@ -114,6 +121,9 @@ def inertia_struct(width, real, mass, parts=()):
         fields |= {"E": Matrix3, "E_forces": Matrix3}
     if "dense" in parts:
         fields |= {"M": Symmetric3, "C": Matrix3, "J_forces": Symmetric3}
+    if "modified" in parts:
+        Series = series_struct(width, real)
+        fields |= {"inverse_J": Lane3, "shrink": Series, "shift": Series}
     if "water" in parts:
         fields |= {"excess": Lane, "excess_lever": Lane3}
     if "origin" in parts:

@@ -124,7 +124,7 @@ def make_turn(axis, pitched, following):
         one = ones(x.b.x)
         g = h * component(c.inertia.half_over_J)
         y = g * component(x.pi)
-        t = tangent(y, h.dtype(1.0 / 3.0))
+        t = tangent(y, h.dtype(wp.static(1.0 / 3.0)))
         if wp.static(pitched):
             # t and -w are the tangents of half the angles by pi_i and by p_i. With n = t - w, m = 1 + t w,
             # q = 1 + t^2, r = 1 + w^2: m^2 + n^2 = q r, and one division serves n / m, 2 n m / (q r) and the slide's 1 / r.

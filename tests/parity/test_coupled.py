@@ -90,3 +90,9 @@ def test_a_few_steps(method, name):
     assert result.status.counts() == {"ok": 1}
     # Five steps of a few hundred operations.
     assert difference(last(result), twin(laws, method, 0.02, 5)) < 5e-13
+
+
+def test_turns_at_a_large_step():
+    # Turns by 0.1 rad and more, where every digit of the series of the tangent counts.
+    result = lw.solve(one(scene_of(()), **STATE), "psi_x", h=0.2, t1=1.0)
+    assert difference(last(result), twin((), "psi_x", 0.2, 5)) < 5e-14

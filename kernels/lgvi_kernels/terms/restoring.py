@@ -8,6 +8,7 @@ import warp as wp
 from lgvi_kernels.lanes import cross, lane3, sub  # noqa: F401
 
 POTENTIAL = True
+SEPARABLE = True
 
 
 @functools.cache

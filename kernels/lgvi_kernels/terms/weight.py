@@ -8,6 +8,7 @@ import warp as wp
 from lgvi_kernels.lanes import add, lane, mul  # noqa: F401
 
 POTENTIAL = True
+SEPARABLE = True
 
 
 @functools.cache

@@ -98,6 +98,7 @@ def make_model(
         drag = term.parts(ensemble.own(term, p))
         module = laws["drag" if has_exact_flow(frame) else "drag_directions"]
         acting = [(term, module), *((t, m) for t, m in acting if t is not term)]
+        _check_backward_drag(ensemble, method, frame, term, h)
     dense = (damping or bool(drags) or flow == "varying") and not exact
     memory = any(term.memory for term, _ in acting)
     _check(ensemble, method, frame, p, dense=dense, flow=flow, memory=memory, acting=acting)
@@ -140,6 +141,28 @@ def make_model(
         lead=lead,
         averages=(method.alpha, method.beta) if forced else None,
     )
+
+
+# A stage that goes backward speeds a damped vehicle up, and at a drag number of 1 without end.
+MOST_BACKWARD_DRAG = 0.5
+
+
+def _check_backward_drag(ensemble: Ensemble, method: Method, frame: Frame, term: Drag, h: float) -> None:
+    """Refuse drag that is too strong for the stages of a composition that go backward, by the members' starts."""
+    back = -h * min(0.0, *method.stages)
+    if back == 0.0:
+        return
+    members = ensemble.select(0, ensemble.members)
+    own = ensemble.own(term, members.parameters)
+    speeds = np.abs(np.concatenate([members.velocity, members.angular_velocity], axis=1))
+    inertias = np.concatenate([np.einsum("nii->ni", frame.M), frame.J], axis=1)
+    number = float((back * (own["linear"] + own["quadratic"] * speeds) / inertias.min(axis=0)).max())
+    if number > MOST_BACKWARD_DRAG:
+        faults = Faults()
+        what = f"goes backward by {back:.3g} s, where {term.key} has a drag number up to {number:.3g}"
+        remedy = f"use {method.base}, or a step {number / MOST_BACKWARD_DRAG:.2g} times shorter"
+        faults.add("method", method.name, what, remedy)
+        faults.raise_if_any()
 
 
 def _module(term: Term, device: Any, known: Mapping[str, Any], *roles: str) -> Any:

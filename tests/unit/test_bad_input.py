@@ -365,6 +365,13 @@ SETTINGS = [
     (MATRIX, {"method": "tj4(psi_x)"}, "method = 'tj4(psi_x)'", "keeps its order only for maps that undo", "use psi_x"),
     (TIDE, {"method": "su4(psi_s)"}, "method = 'su4(psi_s)'", "water that varies does not", "use psi_s"),
     (NOISE, {"method": "psi"}, "method = 'psi'", "noise more than once a step", "use psi_s"),
+    (
+        {"type": "drag", "linear": [0.0, 0.0, 3e5, 0.0, 0.0, 0.0]},
+        {"method": "kl6(psi_s)"},
+        "goes backward by",
+        "drag number up to",
+        "use psi_s, or a step",
+    ),
     (MATRIX, {"method": "psi_q"}, "method = 'psi_q'", "not known", "did you mean 'psi_"),
     (MATRIX, {"method": "kl6(phi)"}, "method = 'kl6(phi)'", "not symmetric", "compose psi_s"),
     (MATRIX, {"dtype": "float16"}, "dtype = 'float16'", "did you mean 'float64'?"),

@@ -6,7 +6,7 @@ Decided once for a run, from the numbers of all members; the members' own number
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -43,9 +43,19 @@ def frame_of(method: Method, parameters: Parameters) -> tuple[Frame, np.ndarray]
         return inertia.turns_frame(I6, middle_axis(method.program))
     if method.base == "psi_w":
         frame = inertia.symmetric_frame(I6)
+    elif method.tableau:
+        frame = _explicit_frame(I6)
     else:
         frame, _ = inertia.uncoupled_frame(I6)
     return frame, np.zeros_like(frame.M)
+
+
+def _explicit_frame(I6: np.ndarray) -> Frame:
+    """Where E is symmetric, so that a vehicle without coupling has none in the kernel."""
+    frame = inertia.symmetric_frame(I6)
+    left = inertia.uncoupled_frame(I6)[1]
+    E = np.where(left[:, None, None] > UNCOUPLED, frame.E, 0.0)
+    return replace(frame, E=E, E_forces=E)
 
 
 @dataclass(frozen=True)
@@ -80,6 +90,7 @@ def make_model(
     """Decide. laws, stops: name -> module of device code. Raises SceneError where a method cannot do what a scene asks."""
     p = ensemble.parameters(0, ensemble.members)
     frame, U = frame_of(method, p)
+    explicit = method.tableau is not None
     setting = Setting(p, frame, ensemble.indices, ensemble.seed, h, frame.aligned)
     acting = _acting(ensemble, p, setting, laws)
     events = tuple((one, _module(one, one.device, stops, "distance")) for one in ensemble.scene.events)
@@ -90,7 +101,7 @@ def make_model(
         not getattr(module, "POTENTIAL", False) and module is not laws["current"] for _, module in acting
     )
     forced = method.base in FORCED and nonconservative
-    exact = len(drags) == 1 and not damping and flow != "varying" and not forced
+    exact = len(drags) == 1 and not damping and not explicit and flow != "varying" and not forced
     drag: tuple[str, ...] = ()
     if exact:
         term = drags[0][0]
@@ -108,12 +119,12 @@ def make_model(
         program = tuple((letter, coefficient) for letter, coefficient in program if letter != "K")
     if method.turns and coupled:
         program = with_hops(program)
-    lead, maps = merged(program)
+    lead, maps = merged(program) if program else (None, ())
     # A kick that cannot be undone must not be divided between two steps, nor what events look at.
     undone = all(getattr(module, "POTENTIAL", False) for _, module in acting)
     if events or (lead is not None and lead[0] == "K" and not undone):
         lead, maps = None, program
-    asked = {"turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
+    asked = {"rates": explicit, "turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
              "dense": dense, "water": flow in ("uniform", "varying"),
              "origin": (bool(events) or flow != "none") and bool(np.any(frame.origin) or np.any(frame.forces))}  # fmt: skip
     return Model(
@@ -207,7 +218,7 @@ def _check(
 ) -> None:
     """Refuse what a method cannot do, with the reason."""
     faults = Faults()
-    if not method.turns and method.base != "psi_w":
+    if not method.turns and method.base != "psi_w" and not method.tableau:
         left = inertia.uncoupled_frame(vehicle.inertia6(p))[1]
         if left.max() > UNCOUPLED:
             k = f"coupling norm up to {left.max():.3g} at the best origin"
@@ -219,8 +230,11 @@ def _check(
         what = "a damping matrix" if dense else "water that varies" if flow != "none" else "a term that remembers"
         faults.add("method", method.name, f"keeps its order only for maps that undo themselves, which {what} does not",
                    f"use {method.base}")  # fmt: skip
+    if method.tableau and (memory or noisy):
+        why = "noise, which has no rate" if noisy else "a term that remembers, which is kept once a step"
+        faults.add("method", method.name, f"cannot advance {why}", "use psi_s, psi_x or psi_w")
     kicks = sum(letter in ("K", "Phi", "Phi*") for letter, _ in method.program)
-    if noisy and not composed and kicks != 1:
+    if noisy and not composed and not method.tableau and kicks != 1:
         faults.add("method", method.name, "would draw noise more than once a step", "use psi_s, psi_x or psi_w")
     if flow in ("uniform", "varying") and np.any(p["environment.gravity"] == 0.0) and np.any(p["vehicle.buoyancy"]):
         faults.add("environment.gravity", 0.0, "leaves the displaced mass unknown, which water that accelerates pushes",

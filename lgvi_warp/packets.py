@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from lgvi_kernels.advance import SAMPLE_FIELDS, STATE_FIELDS
+from lgvi_kernels.advance import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS
 from lgvi_kernels.lanes import int_lane
 from lgvi_kernels.terms import LAWS
 from lgvi_warp import inertia, model, notation, vehicle
@@ -92,6 +92,8 @@ class Packets:
             fields["anisotropy"] = np.einsum("nii->ni", deviation)
         elif self.plan.spec.mass == "full":
             fields["anisotropy"] = _symmetric(deviation)
+        if "rates" in parts:
+            fields["inverse_J"] = scale[:, None] / J
         if "turns" in parts:
             fields["half_over_J"] = 0.5 * scale[:, None] / J
         if "x" in parts:
@@ -205,10 +207,10 @@ class Packets:
             [notation.rotate_into(frame.Q, nu), notation.rotate_into(frame.Q, m.angular_velocity)], 1
         )
         momenta = np.einsum("nij,nj->ni", np.broadcast_to(frame.inertia_at(frame.E), (n, 6, 6)), twist)
-        rows = np.empty((n, STATE_FIELDS))
+        rows = np.zeros((n, STATE_FIELDS + (PACE_FIELDS if self.plan.method.adaptive else 0)))
         rows[:, :9] = R.reshape(-1, 9)
         rows[:, 9:12] = m.position + notation.rotate_out(m.attitude, np.broadcast_to(frame.origin, (n, 3)))
-        rows[:, 12:] = momenta / self.scale[:, None]
+        rows[:, 12:18] = momenta / self.scale[:, None]
         return self._lanes_each(rows)
 
     def _water_at_start(self) -> np.ndarray:
@@ -231,7 +233,7 @@ class Packets:
         real, dtype = plan.spec.real, plan.dtype
         stage_h, lead_h, sample_step = plan.times
         inputs = [self.inertia, self.params, self.events, self.table]
-        inputs += [real(plan.method.residual_tolerance(dtype)), real(plan.method.force_tolerance(dtype))]
+        inputs += [real(tolerance) for tolerance in plan.method.tolerances(dtype)]
         inputs += [wp.float64(plan.grid.h), stage_h, lead_h, k0, k1, s0, sample_step]
         inputs += [self.state, self.memory, self.status, self.failed_step, self.failed_size, out]
         with build_lock:

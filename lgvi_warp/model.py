@@ -124,7 +124,8 @@ def make_model(
     undone = all(getattr(module, "POTENTIAL", False) for _, module in acting)
     if events or (lead is not None and lead[0] == "K" and not undone):
         lead, maps = None, program
-    asked = {"rates": explicit, "turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
+    asked = {"rates": explicit,
+             "turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
              "dense": dense, "water": flow in ("uniform", "varying"),
              "origin": (bool(events) or flow != "none") and bool(np.any(frame.origin) or np.any(frame.forces))}  # fmt: skip
     return Model(

@@ -59,10 +59,8 @@ def rates_struct(width, real, group):
 
 @functools.cache
 def slopes_struct(Rates, count):
-    """k_1 to k_count, nested: the last one, and the rest."""
-    if count == 1:
-        return struct("Slopes", own=Rates)
-    return struct("Slopes", own=Rates, rest=slopes_struct(Rates, count - 1))
+    """k_1 to k_count, as k0, k1, ..."""
+    return struct("Slopes", **{f"k{i}": Rates for i in range(count)})
 
 
 def make_rates(Rates, everything, velocities, group, isotropic, coupled, drifts):
@@ -142,40 +140,96 @@ def make_act(turned):
     return act
 
 
-@functools.cache
+# The two functions that follow are written out for so many stages: a loop or a recursion over them would copy all the
+# slopes for each, which the compiler removes again, in ten times as long.
+MOST_STAGES = 13
+
+
 def make_moves(move, weights):
     """One function (y, slopes, h): the moves by h w_1 k_1, then h w_2 k_2, ... of all weights that are not zero."""
-    weight, more = weights[-1], len(weights) > 1
-    before = make_moves(move, weights[:-1]) if more else move
+    w = weights + (0.0,) * (MOST_STAGES - len(weights))
 
     @wp.func
     def moves(y: Any, k: Any, h: Any):
-        if wp.static(more):
-            y = before(y, k.rest, h)
-        if wp.static(weight != 0.0):
-            y = move(y, k.own, h.dtype(wp.static(weight)) * h)
+        if wp.static(w[0] != 0.0):
+            y = move(y, k.k0, h.dtype(wp.static(w[0])) * h)
+        if wp.static(w[1] != 0.0):
+            y = move(y, k.k1, h.dtype(wp.static(w[1])) * h)
+        if wp.static(w[2] != 0.0):
+            y = move(y, k.k2, h.dtype(wp.static(w[2])) * h)
+        if wp.static(w[3] != 0.0):
+            y = move(y, k.k3, h.dtype(wp.static(w[3])) * h)
+        if wp.static(w[4] != 0.0):
+            y = move(y, k.k4, h.dtype(wp.static(w[4])) * h)
+        if wp.static(w[5] != 0.0):
+            y = move(y, k.k5, h.dtype(wp.static(w[5])) * h)
+        if wp.static(w[6] != 0.0):
+            y = move(y, k.k6, h.dtype(wp.static(w[6])) * h)
+        if wp.static(w[7] != 0.0):
+            y = move(y, k.k7, h.dtype(wp.static(w[7])) * h)
+        if wp.static(w[8] != 0.0):
+            y = move(y, k.k8, h.dtype(wp.static(w[8])) * h)
+        if wp.static(w[9] != 0.0):
+            y = move(y, k.k9, h.dtype(wp.static(w[9])) * h)
+        if wp.static(w[10] != 0.0):
+            y = move(y, k.k10, h.dtype(wp.static(w[10])) * h)
+        if wp.static(w[11] != 0.0):
+            y = move(y, k.k11, h.dtype(wp.static(w[11])) * h)
+        if wp.static(w[12] != 0.0):
+            y = move(y, k.k12, h.dtype(wp.static(w[12])) * h)
         return y
 
     return moves
 
 
-@functools.cache
+def make_stage(moves, node, timed):
+    """The state of one stage."""
+
+    @wp.func
+    def at_node(x: Any, k: Any, h: Any):
+        y = moves(x, k, h)
+        if wp.static(timed):
+            y.time = x.time + wp.float64(wp.static(node)) * wp.float64(h)
+        return y
+
+    return at_node
+
+
 def make_stages(Rates, rates, move, a, c, timed):
-    """One function (x, constants, h) -> the slopes of all rows of `a`, the last row's outermost."""
-    Slopes, node, more = slopes_struct(Rates, len(a)), c[-1], len(a) > 1
-    before = make_stages(Rates, rates, move, a[:-1], c[:-1], timed) if more else rates
-    moves = make_moves(move, a[-1]) if more else move
+    """One function (x, constants, h) -> the slopes of all rows of `a`."""
+    count = len(a)
+    Slopes = slopes_struct(Rates, count)
+    ys = [make_stage(make_moves(move, row), node, timed) for row, node in zip(a, c)]
+    _, at_1, at_2, at_3, at_4, at_5, at_6, at_7, at_8, at_9, at_10, at_11, at_12 = ys + [None] * (MOST_STAGES - count)
 
     @wp.func
     def stages(x: Any, constants: Any, h: Any):
         k = Slopes()
-        y = x
-        if wp.static(more):
-            k.rest = before(x, constants, h)
-            y = moves(x, k.rest, h)
-        if wp.static(timed):
-            y.time = x.time + wp.float64(wp.static(node)) * wp.float64(h)
-        k.own = rates(y, constants, h)
+        k.k0 = rates(x, constants, h)
+        if wp.static(count > 1):
+            k.k1 = rates(at_1(x, k, h), constants, h)
+        if wp.static(count > 2):
+            k.k2 = rates(at_2(x, k, h), constants, h)
+        if wp.static(count > 3):
+            k.k3 = rates(at_3(x, k, h), constants, h)
+        if wp.static(count > 4):
+            k.k4 = rates(at_4(x, k, h), constants, h)
+        if wp.static(count > 5):
+            k.k5 = rates(at_5(x, k, h), constants, h)
+        if wp.static(count > 6):
+            k.k6 = rates(at_6(x, k, h), constants, h)
+        if wp.static(count > 7):
+            k.k7 = rates(at_7(x, k, h), constants, h)
+        if wp.static(count > 8):
+            k.k8 = rates(at_8(x, k, h), constants, h)
+        if wp.static(count > 9):
+            k.k9 = rates(at_9(x, k, h), constants, h)
+        if wp.static(count > 10):
+            k.k10 = rates(at_10(x, k, h), constants, h)
+        if wp.static(count > 11):
+            k.k11 = rates(at_11(x, k, h), constants, h)
+        if wp.static(count > 12):
+            k.k12 = rates(at_12(x, k, h), constants, h)
         return k
 
     return stages
@@ -234,47 +288,48 @@ def make_munthe_kaas(rates, act, turned, timed):
 
 
 @wp.func
-def bound(y: Any, new: Any, rtol: Any, atol: Any):
-    """atol + rtol max(|y|, |new|) of a 3-vector's components."""
-    o = atol * ones(y.x)
-    return vec3(
-        o + rtol * greatest(absolute(y.x), absolute(new.x)),
-        o + rtol * greatest(absolute(y.y), absolute(new.y)),
-        o + rtol * greatest(absolute(y.z), absolute(new.z)),
-    )
+def one_over(y: Any, new: Any, rtol: Any, atol: Any):
+    """1 / (atol + rtol max(|y|, |new|)) of each number."""
+    one = ones(y)
+    return one / (atol * one + rtol * greatest(absolute(y), absolute(new)))
 
 
 @wp.func
-def square_over(e: Any, limit: Any):
-    """Sum of the squares of a 3-vector's components, each over its limit."""
-    q = e / limit
+def one_over3(y: Any, new: Any, rtol: Any, atol: Any):
+    """The same of a 3-vector's components."""
+    return vec3(one_over(y.x, new.x, rtol, atol), one_over(y.y, new.y, rtol, atol), one_over(y.z, new.z, rtol, atol))
+
+
+@wp.func
+def square(a: Any, b: Any):
+    """Sum of the squares of a_i b_i."""
+    q = a * b
     return dot(q, q)
 
 
-def make_errors(Zero, weights, move):
+def make_errors(Rates, weights, move):
     """(y, new, slopes, h, rtol, atol) -> mean square of the estimates over the tolerance, HNW (4.11), one each row."""
     moves = [make_moves(move, row) for row in weights]
     first, last, double = moves[0], moves[-1], len(moves) > 1
 
     @wp.func
-    def mean_square(e: Any, limit: Any):
-        s = square_over(e.b, limit.b) + square_over(e.R0, limit.R0) + square_over(e.R1, limit.R1)
-        s = s + square_over(e.R2, limit.R2) + square_over(e.p, limit.p) + square_over(e.pi, limit.pi)
-        return s.dtype(1.0 / 18.0) * s
+    def mean_square(e: Any, w: Any):
+        s = square(e.b, w.b) + square(e.R0, w.R0) + square(e.R1, w.R1) + square(e.R2, w.R2) + square(e.p, w.p)
+        return s.dtype(1.0 / 18.0) * (s + square(e.pi, w.pi))
 
     @wp.func
     def errors(y: Any, new: Any, k: Any, h: Any, rtol: Any, atol: Any):
         """The error over the tolerance; of two estimates as in HNW II.10, e5^2 / sqrt(e5^2 + e3^2 / 100)."""
-        limit = Zero()
-        limit.b = bound(y.b, new.b, rtol, atol)
-        limit.R0 = bound(y.R0, new.R0, rtol, atol)
-        limit.R1 = bound(y.R1, new.R1, rtol, atol)
-        limit.R2 = bound(y.R2, new.R2, rtol, atol)
-        limit.p = bound(y.p, new.p, rtol, atol)
-        limit.pi = bound(y.pi, new.pi, rtol, atol)
-        fifth = mean_square(first(Zero(), k, h), limit)
+        w = Rates()
+        w.b = one_over3(y.b, new.b, rtol, atol)
+        w.R0 = one_over3(y.R0, new.R0, rtol, atol)
+        w.R1 = one_over3(y.R1, new.R1, rtol, atol)
+        w.R2 = one_over3(y.R2, new.R2, rtol, atol)
+        w.p = one_over3(y.p, new.p, rtol, atol)
+        w.pi = one_over3(y.pi, new.pi, rtol, atol)
+        fifth = mean_square(first(Rates(), k, h), w)
         if wp.static(double):
-            third = mean_square(last(Zero(), k, h), limit)
+            third = mean_square(last(Rates(), k, h), w)
             tiny = h.dtype(wp.static(TINY[wp.float32])) * ones(fifth)
             return fifth / root(fifth + h.dtype(0.01) * third + tiny)
         else:
@@ -300,15 +355,15 @@ def make_adaptive(stages, finish, errors, estimate, width, real, timed):
         return worst
 
     @wp.func
-    def given_up(alarm: Any, error: Any, taken: Any, all: Any):
-        """The lanes that cannot meet the tolerance get their status, and no longer count; or all that are left."""
+    def given_up(alarm: Any, error: Any, most: Any, taken: Any):
+        """The lanes whose error exceeds `most` get their status, and no longer count: the others go on without them."""
         code = alarm.code
         size = alarm.size
         for j in range(wp.static(width)):
             if not code[j] > real(0.0):
                 if not error[j] < real(1e10):
                     code[j] = real(wp.static(float(NON_FINITE)))
-                elif all or error[j] > real(1.0):
+                elif error[j] > most:
                     code[j] = real(wp.static(float(STEP_TOO_SMALL)))
                     size[j] = taken * taken
         alarm.code = code
@@ -359,12 +414,13 @@ def make_adaptive(stages, finish, errors, estimate, width, real, timed):
                     x.time = start + wp.float64(done)
             else:
                 stride = taken * wp.min(real(1.0), factor)
-                if tried >= wp.static(MOST_TRIED):
-                    x.alarm = given_up(x.alarm, error, taken, True)
-                    done = h
-                elif not stride > real(wp.static(SMALLEST[real])) * h:
-                    x.alarm = given_up(x.alarm, error, taken, False)
+                if not stride > real(wp.static(SMALLEST[real])) * h:
+                    x.alarm = given_up(x.alarm, error, real(1.0), taken)
                     stride = left
+            if tried >= wp.static(MOST_TRIED):
+                x.alarm = given_up(x.alarm, error, real(0.5) * worst, taken)
+                stride = h
+                tried = 0
         x.pace.stride = stride
         x.pace.before = before
         return x

@@ -9,7 +9,7 @@ import lgvi_warp as lw
 from lgvi_warp.reference import explicit, munthe_kaas
 from lgvi_warp.reference.submaps import look, start, water
 from lgvi_warp.tableaux import DOP853, DOPRI5, RK4
-from tests.laws import CASES
+from tests.laws import CASES, Case
 from tests.parity import test_coupled, test_terms
 from tests.parity.test_terms import STATE
 from tests.tools import difference, last, one
@@ -62,24 +62,37 @@ def test_float32(method):
     assert difference(*both(scene, body, method, 0.02, 25, dtype="float32")) < 1e-5
 
 
-# One law after the other in rk4; in rk8 what depends on time, place and velocity, since it takes longer to compile.
-@pytest.mark.parametrize(
-    ("method", "name"),
-    [
-        pytest.param(m, name, marks=() if (m, name) in QUICK or m == "rk4" else pytest.mark.slow)
-        for QUICK in [{(m, n) for m in ("rk8", "cg3", "rkmk4") for n in ("drag matrix", "current profile", "waves")}]
-        for m in STEPS
-        for name in SMOOTH
-    ],
-)
-def test_one_step_with_a_law(method, name):
+def together(*names):
+    """A case with the laws of several."""
+    cases = [CASES[name] for name in names]
+    return Case(sum((case.terms for case in cases), ()), sum((case.laws for case in cases), ()))
+
+
+# What depends on velocity, place and time, at once.
+SEVERAL = together("drag", "current profile", "waves", "tether", "wrench schedule")
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_one_step_with_a_law(name):
+    case = CASES[name]
+    assert difference(*both(test_terms.scene_of(case), test_terms.body_of(case), "rk4", 0.02, 1)) < 1e-13
+
+
+@pytest.mark.parametrize("method", ["rk5", "rk8", "cg3", "rkmk4"])
+def test_one_step_with_several_laws(method):
+    assert difference(*both(test_terms.scene_of(SEVERAL), test_terms.body_of(SEVERAL), method, 0.02, 1)) < 1e-13
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["rk5", "rk8", "cg3", "rkmk4"])
+@pytest.mark.parametrize("name", SMOOTH)
+def test_one_step_with_each_law(method, name):
     case = CASES[name]
     assert difference(*both(test_terms.scene_of(case), test_terms.body_of(case), method, 0.02, 1)) < 1e-13
 
 
 # cg3 and rkmk4 turn about the kernel's origin, where the twin turns about the user's: the same to their order only.
-@pytest.mark.parametrize("name", [None, "drag matrix", "current profile"])
-@pytest.mark.parametrize("method", ["rk4", "rk8"])
+@pytest.mark.parametrize(("method", "name"), [("rk4", None), ("rk4", "drag matrix"), ("rk8", "current profile")])
 def test_coupled_inertia(method, name):
     terms, laws = (CASES[name].terms, CASES[name].laws) if name else ((), ())
     scene, body = test_coupled.scene_of(terms), test_coupled.body_of(laws)

@@ -111,7 +111,7 @@ def test_one_that_fails_leaves_the_others(scene):
 
 
 def test_an_event_is_seen_at_the_end_of_h(scene):
-    stopped = lw.Scene(scene.vehicle, scene.environment, start=scene.start, events=[lw.events.Time(at=1.3)])
+    stopped = lw.Scene(scene.vehicle, scene.environment, start=scene.start, events=[lw.StopTime(at=1.3)])
     method = lw.Method("rk8", rtol=1e-8, atol=1e-8)
     result = lw.solve(stopped, method, h=0.5, t1=3.0)
     assert result.status[0] == Status.TIME

@@ -22,11 +22,12 @@ from lgvi_warp.terms.drag import Drag
 
 @dataclass
 class Outcome:
-    """What a block's members came to: arrays over its members, and their samples by field, (k, count, ...)."""
+    """What a block's members came to: arrays over its members. chosen: steps made and tried (count, 2), where they choose."""
 
     status: np.ndarray
     failed_step: np.ndarray
     failed_size: np.ndarray
+    chosen: np.ndarray
 
 
 def pack(values: np.ndarray, width: int) -> np.ndarray:
@@ -245,6 +246,7 @@ class Packets:
     def outcome(self) -> Outcome:
         """Status, steps made before the failure and the value that crossed its limit, of each member."""
         m = self.members.count
+        pace = self.state.numpy()[:, STATE_FIELDS + 2 : STATE_FIELDS + PACE_FIELDS]
         status = self.status.numpy().reshape(-1)[:m].astype(np.uint8)
         for number, (event, _) in reversed(list(enumerate(self.plan.model.events))):
             assert isinstance(event, Event)
@@ -253,6 +255,7 @@ class Packets:
             status,
             self.failed_step.numpy().reshape(-1)[:m].astype(np.int64),
             np.sqrt(self.failed_size.numpy().reshape(-1)[:m].astype(np.float64)),
+            pace.transpose(0, 2, 1).reshape(self.count * self.plan.spec.width, pace.shape[1])[:m].astype(np.int64),
         )
 
 

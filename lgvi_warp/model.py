@@ -101,7 +101,11 @@ def make_model(
         not getattr(module, "POTENTIAL", False) and module is not laws["current"] for _, module in acting
     )
     forced = method.base in FORCED and nonconservative
-    exact = len(drags) == 1 and not damping and not explicit and flow != "varying" and not forced
+    if explicit:
+        # Along the kernel's axes drag is six numbers and no matrix.
+        exact = len(drags) == 1 and has_exact_flow(frame)
+    else:
+        exact = len(drags) == 1 and not damping and flow != "varying" and not forced
     drag: tuple[str, ...] = ()
     if exact:
         term = drags[0][0]
@@ -109,7 +113,7 @@ def make_model(
         drag = term.parts(ensemble.own(term, p))
         module = laws["drag" if has_exact_flow(frame) else "drag_directions"]
         acting = [(term, module), *((t, m) for t, m in acting if t is not term)]
-    dense = (damping or bool(drags) or flow == "varying") and not exact
+    dense = damping or (bool(drags) and not exact) or flow == "varying"
     memory = any(term.memory for term, _ in acting)
     _check(ensemble, method, frame, p, dense=dense, flow=flow, memory=memory, modules=[module for _, module in acting])
     mass = shape_of_mass(frame.M)

@@ -42,7 +42,7 @@ class Spec(NamedTuple):
 
     maps: the sub-maps after the leading one, as (letter, coefficient); lead: the sub-map that opens a step and merges with
     the end of the step before, or None; laws: modules of laws, drag by its exact flow first if it is there;
-    events: modules of events; drag: the parts of drag by its exact flow, or none; mass: shape of M ("isotropic",
+    events: modules of events; drag: the parts of drag along the axes (by its exact flow, or as rates), or none; mass: shape of M ("isotropic",
     "diagonal", "full"); parts: what the inertia holds besides (see inertia_struct); coupling: which of U12, U13, U23 and of
     the three pitches some member has; flow: "none", "steady" (uniform, the same for ever), "uniform", "varying";
     timed: whether a law looks at the time; averages: alpha and beta of (15), (16), or None for conservative maps;
@@ -93,7 +93,7 @@ def make_advance(spec):
     Inertia = inertia_struct(width, real, spec.mass, spec.parts)
     Params, Events = params_of(spec.laws, width, real), params_of(spec.events, width, real)
     DragFlow = drag.flow_struct(width, real)
-    dragged, remembers, timed = bool(spec.drag), spec.memory, spec.timed
+    dragged, remembers, timed = bool(spec.drag) and spec.explicit is None, spec.memory, spec.timed
     Constants = struct(
         "Constants",
         inertia=Inertia,

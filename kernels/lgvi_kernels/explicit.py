@@ -15,6 +15,7 @@ from lgvi_kernels.lanes import absolute, add, cross, div, dot, lane3, mul, ones,
 from lgvi_kernels.rotation import rodrigues, rotation_struct, transpose_apply
 from lgvi_kernels.state import struct
 from lgvi_kernels.submaps import rotate
+from lgvi_kernels.terms.drag import make_resistance
 
 NON_FINITE = 3
 STEP_TOO_SMALL = 5
@@ -63,8 +64,11 @@ def slopes_struct(Rates, count):
     return struct("Slopes", **{f"k{i}": Rates for i in range(count)})
 
 
-def make_rates(Rates, everything, velocities, group, isotropic, coupled, drifts):
-    """The right-hand side, eq. (1) and (3) of Nordkvist & Sanyal 2010 with all laws of a scene."""
+def make_rates(Rates, everything, velocities, group, isotropic, coupled, drifts, drag):
+    """The right-hand side, eq. (1) and (3) of Nordkvist & Sanyal 2010 with all laws of a scene.
+
+    drag: the function that adds drag along the axes, where it is not among `everything`, or None.
+    """
 
     @wp.func
     def rates(x: Any, c: Any, h: Any):
@@ -89,6 +93,8 @@ def make_rates(Rates, everything, velocities, group, isotropic, coupled, drifts)
             # Of the mean of M^-1 it is zero.
             turned = turned + cross(x.p, c.inertia.anisotropy * x.p)
         k.pi = turned
+        if wp.static(drag is not None):
+            k = drag(k, x, c.params.own)
         return k
 
     return rates
@@ -436,7 +442,8 @@ def make_explicit(spec, everything, velocities):
     turned = make_turned(rotation_struct(width, real), real)
     move = make_act(turned) if group else along
     shape = (spec.mass == "isotropic", "coupled" in spec.parts, spec.flow != "none")
-    rates = make_rates(Rates, everything, velocities, group, *shape)
+    drag = make_resistance(spec.drag) if spec.drag else None
+    rates = make_rates(Rates, everything, velocities, group, *shape, drag)
     if method.kind == "munthe_kaas":
         return make_munthe_kaas(rates, move, turned, timed)
     a, c = method.a, method.c

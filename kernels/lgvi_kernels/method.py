@@ -116,7 +116,7 @@ def make_method(spec):
     shear = make_shear(matrix3_struct(width, real), coupled, shifted) if spec.flow == "varying" else None
     damping = make_damping(laws, shear)
     prepare, exact = None, None
-    if spec.drag:
+    if spec.drag and spec.explicit is None:
         by_axes = laws[0] is drag
         prepare, exact = drag.make_E(spec.drag) if by_axes else drag_directions.make_E(spec.drag, velocities_of_forces)
 

@@ -41,13 +41,13 @@ class Spec(NamedTuple):
     """Everything that decides what code a kernel holds.
 
     maps: the sub-maps after the leading one, as (letter, coefficient); lead: the sub-map that opens a step and merges with
-    the end of the step before, or None; laws: modules of laws, drag by its exact flow first if it is there;
-    events: modules of events; drag: the parts of drag along the axes (by its exact flow, or as rates), or none; mass: shape of M ("isotropic",
-    "diagonal", "full"); parts: what the inertia holds besides (see inertia_struct); coupling: which of U12, U13, U23 and of
-    the three pitches some member has; flow: "none", "steady" (uniform, the same for ever), "uniform", "varying";
-    timed: whether a law looks at the time; averages: alpha and beta of (15), (16), or None for conservative maps;
-    composed: more than one stage a step, or one, whose constants then are made once for all steps;
-    lead_time: the part of a step that the lead drifts for; explicit: an explicit method, which has no maps.
+    the end of the step before, or None; laws: modules of laws, drag by its exact flow first if it is there; events: modules
+    of events; drag: the parts of drag along the axes (by its exact flow, or as rates), or none; mass: shape of M
+    ("isotropic", "diagonal", "full"); parts: what the inertia holds besides (see inertia_struct); coupling: which of U12,
+    U13, U23 and of the three pitches some member has; flow: "none", "steady" (uniform, the same for ever), "uniform",
+    "varying"; timed: whether a law looks at the time; averages: alpha and beta of (15), (16), or None for conservative
+    maps; composed: more than one stage a step, or one, whose constants then are made once for all steps; lead_time: the
+    part of a step that the lead drifts for; explicit: an explicit method, which has no maps.
     """
 
     width: int

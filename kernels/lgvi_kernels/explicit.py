@@ -346,7 +346,7 @@ def make_errors(Rates, weights, move):
 
 def make_adaptive(stages, finish, errors, estimate, width, real, timed):
     """From one step of the grid to the next, by steps that the packet's worst lane decides."""
-    exponent = 1.0 / estimate - 0.75 * BETA
+    power = 0.75 * BETA - 1.0 / estimate
 
     @wp.func
     def worst_of(error: Any, code: Any):
@@ -396,7 +396,7 @@ def make_adaptive(stages, finish, errors, estimate, width, real, timed):
             new = finish(x, k, taken)
             error = errors(x, new, k, taken, c.tolerance, c.force_tolerance)
             worst = worst_of(error, x.alarm.code)
-            factor = real(wp.static(SAFETY)) * wp.pow(wp.max(worst, real(1e-10)), real(wp.static(-exponent)))
+            factor = real(wp.static(SAFETY)) * wp.pow(wp.max(worst, real(1e-10)), real(wp.static(power)))
             factor = factor * wp.pow(wp.max(before, real(1e-4)), real(wp.static(BETA)))
             factor = wp.clamp(factor, real(wp.static(SHRINK)), real(wp.static(GROW)))
             tried += 1

@@ -65,7 +65,7 @@ def test_a_tolerance_is_met(method, tolerance, run, example):
 
 
 def test_a_tolerance_in_float32(run, example):
-    end = run(lw.Method("rk8", rtol=1e-6, atol=1e-6), 5.0, dtype="float32")
+    end = run(lw.Method("rk5", rtol=1e-6, atol=1e-6), 5.0, dtype="float32")
     assert difference(end, expected(example["truth"]["5"])) < 3e-5
 
 
@@ -114,14 +114,13 @@ def test_one_that_fails_leaves_the_others(scene):
 
 def test_an_event_is_seen_at_the_end_of_h(scene):
     stopped = lw.Scene(scene.vehicle, scene.environment, start=scene.start, events=[lw.StopTime(at=1.3)])
-    method = lw.Method("rk8", rtol=1e-8, atol=1e-8)
+    method = lw.Method("rk5", rtol=1e-8, atol=1e-8)
     result = lw.solve(stopped, method, h=0.5, t1=3.0)
     assert result.status[0] == Status.TIME
     assert result.failure_time[0] == pytest.approx(1.3)
 
 
-@pytest.mark.parametrize("dtype", ["float64", "float32"])
-@pytest.mark.parametrize("width", [1, 2])
+@pytest.mark.parametrize(("width", "dtype"), [(1, "float64"), (2, "float32")])
 def test_narrow_packets(width, dtype, run, example):
     end = run("rk4", 0.02, dtype=dtype, width=width)
     assert difference(end, expected(example["truth"]["5"])) < (1e-6 if dtype == "float64" else 2e-5)
@@ -137,9 +136,8 @@ def test_water_is_taken_at_the_users_origin():
     )  # fmt: skip
     scene = lw.Scene(vehicle, lw.Environment(gravity=9.8), terms=list(CASES["current profile"].terms))
     start = {"b": (0.4, -0.3, 8.0), "nu": (1.2, 0.3, -0.2), "Om": (0.3, -0.4, 0.5)}
-    truth = last(lw.solve(one(scene, **start), "rk8", h=0.05, t1=1.0))
-    for method in ("psi", "psi_s"):
-        assert difference(last(lw.solve(one(scene, **start), method, h=0.001, t1=1.0)), truth) < 1e-5
+    truth = last(lw.solve(one(scene, **start), "rk4", h=0.01, t1=1.0))
+    assert difference(last(lw.solve(one(scene, **start), "psi", h=0.001, t1=1.0)), truth) < 1e-5
 
 
 @pytest.mark.parametrize("name", ["wrench noise", "Gauss-Markov current", "thrusters", "control fins with rates"])

@@ -147,7 +147,7 @@ def make_act(turned):
 
 
 # The two functions that follow are written out for so many stages: a loop or a recursion over them would copy all the
-# slopes for each, which the compiler removes again, in ten times as long.
+# slopes for each, which the compiler removes again, in three times as long.
 MOST_STAGES = 13
 
 

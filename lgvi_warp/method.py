@@ -10,6 +10,7 @@ import re
 from dataclasses import dataclass
 
 from lgvi_warp.errors import Faults
+from lgvi_warp.tableaux import CG3, DOP853, DOPRI5, RK4, Tableau
 
 Program = tuple[tuple[str, float], ...]
 
@@ -36,7 +37,12 @@ FORCED: dict[str, Program] = {
     "phi_adjoint": (("Phi*", 1.0),),
     "psi": (("Phi", 0.5), ("Phi*", 0.5)),
 }
-ORDERS = {"phi": 1, "phi_adjoint": 1, "psi": 2, "psi_s": 2, "psi_1": 2, "psi_x": 2, "psi_x8": 2, "psi_w": 2}
+# Explicit methods, which know no sub-maps. KINDS: those that keep R on the group (see lgvi_kernels.explicit).
+EXPLICIT: dict[str, Tableau] = {"rk4": RK4, "rk5": DOPRI5, "rk8": DOP853, "cg3": CG3, "rkmk4": RK4}
+KINDS = {"cg3": "group", "rkmk4": "munthe_kaas"}
+ORDERS = {"phi": 1, "phi_adjoint": 1, "psi": 2, "psi_s": 2, "psi_1": 2, "psi_x": 2, "psi_x8": 2, "psi_w": 2} | {
+    name: tableau.order for name, tableau in EXPLICIT.items()
+}
 
 # Two-part splittings: A = free rotation (modified Moser-Veselov, order 8) and the kick of U_b(b), B = T and the kick of
 # U_R(R). Blanes & Moan (2002), J. Comput. Appl. Math. 142, 313, table 3: SRKN_6^b, SRKN_11^b, SRKN_14^a, whose printed
@@ -181,6 +187,11 @@ class Method:
     more later on gives its member the status NOT_CONVERGED).
     alpha, beta: weight of the old configuration in the averages of equations (15) and (16), 0 to 1, for nonconservative
     forces and torques in phi, phi_adjoint and psi (their conservative forces, and the other methods, have no such choice).
+    The name may also be of an explicit method: "rk4", "rk5" (Dormand & Prince), "rk8" (DOP853's), with R as nine numbers, or
+    on the rotation group "cg3" (Crouch & Grossman) and "rkmk4" (Munthe-Kaas).
+    rtol, atol: with both, rk5 and rk8 choose their steps: the error estimated for each step stays below
+    atol + rtol |y| (in the mean square over y = (b, R, p, pi), momenta divided by the largest J). The worst vehicle of a
+    packet decides for it. h then is the longest step: where samples, events and statuses may be.
     tolerance: relative residual of equation (24) above which a solve is not converged (default 1e-14 in float64 and
     1e-6 in float32 when iterating to it; 1e-12 and 1e-5 for a fixed number of iterations).
 
@@ -193,14 +204,16 @@ class Method:
     tolerance: float | None = None
     alpha: float = 0.5
     beta: float = 0.5
+    rtol: float | None = None
+    atol: float | None = None
 
     def __post_init__(self) -> None:
         faults = Faults()
         base, composition = self._split()
-        faults.choice("method", base, PROGRAMS | TWO_PART | GAUSS)
+        faults.choice("method", base, PROGRAMS | EXPLICIT | TWO_PART | GAUSS)
         if composition is not None:
             faults.choice("method composition", composition, COMPOSITIONS | HALVES)
-            if ORDERS.get(base) == 1:
+            if ORDERS.get(base) == 1 or base in EXPLICIT:
                 faults.add("method", self.name, "is a composition of a method that is not symmetric", "compose psi_s")
             elif base in TWO_PART or base in GAUSS:
                 faults.add("method", self.name, "composes what is not of order 2", f"use {base}, or compose psi_s")
@@ -219,7 +232,20 @@ class Method:
                 faults.add(name, value, "is not a number from 0 to 1", "give the weight of the old configuration")
         if self.tolerance is not None and not 0.0 < self.tolerance < 1.0:
             faults.add("tolerance", self.tolerance, "is not between 0 and 1", "give a relative residual such as 1e-12")
+        self._check_steps(faults)
         faults.raise_if_any()
+
+    def _check_steps(self, faults: Faults) -> None:
+        """Both tolerances or none, and only for a method that estimates its error."""
+        given = {name: value for name in ("rtol", "atol") if (value := getattr(self, name)) is not None}
+        for name, value in given.items():
+            if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < 1.0:
+                faults.add(name, value, "is not between 0 and 1", "give a tolerance such as 1e-9")
+        if len(given) == 1:
+            faults.add(*given.popitem(), "has no counterpart", "give both rtol and atol, or none for a fixed step")
+        elif given and self.name in ORDERS and not (self.tableau and self.tableau.errors):
+            able = " or ".join(name for name, tableau in EXPLICIT.items() if tableau.errors)
+            faults.add("rtol, atol", self.name, "estimates no error", f"use {able}, or leave them out")
 
     def _split(self) -> tuple[str, str | None]:
         match = re.fullmatch(r"(\w+)\((\w+)\)", str(self.name))
@@ -235,7 +261,7 @@ class Method:
         """The sub-maps of one stage, the first applied first."""
         if self.gauss:
             return (("G", 1.0),)
-        return PARTS[TWO_PART[self.base][1]] if self.two_part else PROGRAMS[self.base]
+        return PARTS[TWO_PART[self.base][1]] if self.two_part else PROGRAMS.get(self.base, ())
 
     @property
     def two_part(self) -> bool:
@@ -251,6 +277,16 @@ class Method:
     def halved(self) -> bool:
         """Whether each stage is two halves of different length."""
         return self._split()[1] in HALVES
+
+    @property
+    def tableau(self) -> Tableau | None:
+        """The numbers of an explicit method."""
+        return EXPLICIT.get(self.name)
+
+    @property
+    def adaptive(self) -> bool:
+        """Whether each packet chooses its steps."""
+        return self.rtol is not None
 
     @property
     def turns(self) -> bool:
@@ -307,6 +343,12 @@ class Method:
     def force_tolerance(self, dtype: str) -> float:
         """Relative change of the momenta below which the iteration for the forces of Phi* has settled."""
         return 1e-14 if dtype == "float64" else 1e-6
+
+    def tolerances(self, dtype: str) -> tuple[float, float]:
+        """The two tolerances that a kernel gets: of (24) and of the forces of Phi*, or rtol and atol of the steps."""
+        if self.rtol is not None and self.atol is not None:
+            return self.rtol, self.atol
+        return self.residual_tolerance(dtype), self.force_tolerance(dtype)
 
     def residual_tolerance(self, dtype: str) -> float:
         """The tolerance in force for this dtype."""

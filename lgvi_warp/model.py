@@ -6,7 +6,7 @@ Decided once for a run, from the numbers of all members; the members' own number
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -43,9 +43,19 @@ def frame_of(method: Method, parameters: Parameters) -> tuple[Frame, np.ndarray]
         return inertia.turns_frame(I6, middle_axis(method.program))
     if method.base == "psi_w":
         frame = inertia.symmetric_frame(I6)
+    elif method.tableau:
+        frame = _explicit_frame(I6)
     else:
         frame, _ = inertia.uncoupled_frame(I6)
     return frame, np.zeros_like(frame.M)
+
+
+def _explicit_frame(I6: np.ndarray) -> Frame:
+    """Where E is symmetric, so that a vehicle without coupling has none in the kernel."""
+    frame = inertia.symmetric_frame(I6)
+    left = inertia.uncoupled_frame(I6)[1]
+    E = np.where(left[:, None, None] > UNCOUPLED, frame.E, 0.0)
+    return replace(frame, E=E, E_forces=E)
 
 
 @dataclass(frozen=True)
@@ -80,6 +90,7 @@ def make_model(
     """Decide. laws, stops: name -> module of device code. Raises SceneError where a method cannot do what a scene asks."""
     p = ensemble.parameters(0, ensemble.members)
     frame, U = frame_of(method, p)
+    explicit = method.tableau is not None
     setting = Setting(p, frame, ensemble.indices, ensemble.seed, h, frame.aligned)
     acting = _acting(ensemble, p, setting, laws)
     events = tuple((one, _module(one, one.device, stops, "distance")) for one in ensemble.scene.events)
@@ -90,7 +101,11 @@ def make_model(
         not getattr(module, "POTENTIAL", False) and module is not laws["current"] for _, module in acting
     )
     forced = method.base in FORCED and nonconservative
-    exact = len(drags) == 1 and not damping and flow != "varying" and not forced
+    if explicit:
+        # Along the kernel's axes drag is six numbers and no matrix.
+        exact = len(drags) == 1 and has_exact_flow(frame)
+    else:
+        exact = len(drags) == 1 and not damping and flow != "varying" and not forced
     drag: tuple[str, ...] = ()
     if exact:
         term = drags[0][0]
@@ -99,7 +114,7 @@ def make_model(
         module = laws["drag" if has_exact_flow(frame) else "drag_directions"]
         acting = [(term, module), *((t, m) for t, m in acting if t is not term)]
         _check_backward_drag(ensemble, method, frame, term, h)
-    dense = (damping or bool(drags) or flow == "varying") and not exact
+    dense = damping or (bool(drags) and not exact) or flow == "varying"
     memory = any(term.memory for term, _ in acting)
     _check(ensemble, method, frame, p, dense=dense, flow=flow, memory=memory, acting=acting)
     mass = shape_of_mass(frame.M)
@@ -111,7 +126,7 @@ def make_model(
         program = with_hops(program)
     if method.halved and (drag or flow != "none"):
         program = divided(program)  # then K is symmetric but no flow: one of its own for each half
-    lead, maps = merged(program)
+    lead, maps = merged(program) if program else (None, ())
     # A kick that cannot be undone must not be divided between two steps, nor what events look at.
     undone = all(getattr(module, "POTENTIAL", False) for _, module in acting)
     if method.two_part:
@@ -121,7 +136,8 @@ def make_model(
             lead, maps = None, method.program
     elif events or (lead is not None and lead[0] == "K" and not undone):
         lead, maps = None, program
-    asked = {"turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
+    asked = {"rates": explicit,
+             "turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
              "modified": method.two_part, "dense": dense, "water": flow in ("uniform", "varying"),
              "origin": (bool(events) or flow != "none") and bool(np.any(frame.origin) or np.any(frame.forces))}  # fmt: skip
     return Model(
@@ -237,7 +253,7 @@ def _check(
 ) -> None:
     """Refuse what a method cannot do, with the reason."""
     faults = Faults()
-    if not method.turns and method.base != "psi_w":
+    if not method.turns and method.base != "psi_w" and not method.tableau:
         left = inertia.uncoupled_frame(vehicle.inertia6(p))[1]
         if left.max() > UNCOUPLED:
             k = f"coupling norm up to {left.max():.3g} at the best origin"
@@ -258,8 +274,11 @@ def _check(
             faults.add(
                 "method", method.name, f"takes forces of position and time only, which {term.key} is not", "use psi_s"
             )
+    if method.tableau and (memory or noisy):
+        why = "noise, which has no rate" if noisy else "a term that remembers, which is kept once a step"
+        faults.add("method", method.name, f"cannot advance {why}", "use psi_s, psi_x or psi_w")
     kicks = sum(letter in ("K", "Phi", "Phi*") for letter, _ in method.program)
-    if noisy and not composed and kicks != 1:
+    if noisy and not composed and not method.tableau and kicks != 1:
         faults.add("method", method.name, "would draw noise more than once a step", "use psi_s, psi_x or psi_w")
     if flow in ("uniform", "varying") and np.any(p["environment.gravity"] == 0.0) and np.any(p["vehicle.buoyancy"]):
         faults.add("environment.gravity", 0.0, "leaves the displaced mass unknown, which water that accelerates pushes",

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from lgvi_kernels.advance import SAMPLE_FIELDS, STATE_FIELDS
+from lgvi_kernels.advance import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS
 from lgvi_kernels.collocation import SLOPE_FIELDS
 from lgvi_kernels.lanes import int_lane
 from lgvi_kernels.terms import LAWS
@@ -23,11 +23,12 @@ from lgvi_warp.terms.drag import Drag
 
 @dataclass
 class Outcome:
-    """What a block's members came to: arrays over its members, and their samples by field, (k, count, ...)."""
+    """What a block's members came to: arrays over its members. chosen: steps made and tried (count, 2), where they choose."""
 
     status: np.ndarray
     failed_step: np.ndarray
     failed_size: np.ndarray
+    chosen: np.ndarray
 
 
 def pack(values: np.ndarray, width: int) -> np.ndarray:
@@ -93,6 +94,8 @@ class Packets:
             fields["anisotropy"] = np.einsum("nii->ni", deviation)
         elif self.plan.spec.mass == "full":
             fields["anisotropy"] = _symmetric(deviation)
+        if "rates" in parts:
+            fields["inverse_J"] = scale[:, None] / J
         if "turns" in parts:
             fields["half_over_J"] = 0.5 * scale[:, None] / J
         if "x" in parts:
@@ -214,10 +217,10 @@ class Packets:
             [notation.rotate_into(frame.Q, nu), notation.rotate_into(frame.Q, m.angular_velocity)], 1
         )
         momenta = np.einsum("nij,nj->ni", np.broadcast_to(frame.inertia_at(frame.E), (n, 6, 6)), twist)
-        rows = np.empty((n, STATE_FIELDS))
+        rows = np.zeros((n, STATE_FIELDS + (PACE_FIELDS if self.plan.method.adaptive else 0)))
         rows[:, :9] = R.reshape(-1, 9)
         rows[:, 9:12] = m.position + notation.rotate_out(m.attitude, np.broadcast_to(frame.origin, (n, 3)))
-        rows[:, 12:] = momenta / self.scale[:, None]
+        rows[:, 12:18] = momenta / self.scale[:, None]
         return self._lanes_each(rows)
 
     def _water_at_start(self) -> np.ndarray:
@@ -240,7 +243,7 @@ class Packets:
         real, dtype = plan.spec.real, plan.dtype
         stage_h, lead_h, sample_step = plan.times
         inputs = [self.inertia, self.params, self.events, self.table]
-        inputs += [real(plan.method.residual_tolerance(dtype)), real(plan.method.force_tolerance(dtype))]
+        inputs += [real(tolerance) for tolerance in plan.method.tolerances(dtype)]
         inputs += [wp.float64(plan.grid.h), stage_h, lead_h, k0, k1, s0, sample_step]
         inputs += [self.state, self.memory, self.status, self.failed_step, self.failed_size, out]
         with build_lock:
@@ -252,6 +255,7 @@ class Packets:
     def outcome(self) -> Outcome:
         """Status, steps made before the failure and the value that crossed its limit, of each member."""
         m = self.members.count
+        pace = self.state.numpy()[:, STATE_FIELDS + 2 : STATE_FIELDS + PACE_FIELDS]
         status = self.status.numpy().reshape(-1)[:m].astype(np.uint8)
         for number, (event, _) in reversed(list(enumerate(self.plan.model.events))):
             assert isinstance(event, Event)
@@ -260,6 +264,7 @@ class Packets:
             status,
             self.failed_step.numpy().reshape(-1)[:m].astype(np.int64),
             np.sqrt(self.failed_size.numpy().reshape(-1)[:m].astype(np.float64)),
+            pace.transpose(0, 2, 1).reshape(self.count * self.plan.spec.width, pace.shape[1])[:m].astype(np.int64),
         )
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import warp as wp
 
 from lgvi_kernels.advance import CHUNK, SAMPLE_FIELDS, Advance, Spec, make_advance
+from lgvi_kernels.explicit import Explicit
 from lgvi_kernels.lanes import WIDTHS
 from lgvi_kernels.stops import STOPS
 from lgvi_kernels.terms import LAWS
@@ -22,7 +23,7 @@ from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.gauss import gauss
 from lgvi_warp.machine import default_width
-from lgvi_warp.method import Method
+from lgvi_warp.method import KINDS, Method
 from lgvi_warp.model import Model, make_model
 from lgvi_warp.saveat import TimeGrid
 
@@ -121,7 +122,17 @@ class Plan:
             paired=self.method.halved or (self.method.two_part and not model.lead),
             gauss=gauss(self.method.gauss) if self.method.gauss else (),
             lead_time=self.lengths[1][-1],
+            explicit=self._explicit(),
         )
+
+    def _explicit(self) -> Explicit | None:
+        tableau = self.method.tableau
+        if tableau is None:
+            return None
+        # A step that is given asks for no estimate: nothing of it then is in the kernel's source.
+        estimate = (tableau.errors, tableau.estimate) if self.method.adaptive else ((), 0)
+        return Explicit(KINDS.get(self.method.name, "vector"), tableau.a, tableau.b, tableau.c, *estimate,
+                        self.method.adaptive)  # fmt: skip
 
     @contextlib.contextmanager
     def _laws_compile(self) -> Iterator[None]:

@@ -154,6 +154,7 @@ def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None 
     n, k = plan.ensemble.members, len(plan.grid.times)
     samples = {name: np.empty((k, n, *SHAPES[name]), plan.dtype) for name in plan.spec.fields}
     status, failed_step, failed_size = np.zeros(n, np.uint8), np.zeros(n, np.int64), np.zeros(n)
+    chosen = np.zeros((n, 2 if plan.method.adaptive else 0), np.int64)
     counter = _Progress(n * plan.grid.steps, progress)
 
     stop = threading.Event()
@@ -172,6 +173,7 @@ def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None 
             counter.add(block.count * (k1 - k0))
         outcome = packets.outcome()
         status[at], failed_step[at], failed_size[at] = outcome.status, outcome.failed_step, outcome.failed_size
+        chosen[at] = outcome.chosen
 
     def work(block: Block) -> None:
         # A member that is not finite, or not within float32, gets its status from the kernel; NumPy need not remark.
@@ -192,7 +194,8 @@ def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None 
         failure_value=np.where(failed, np.where(stopped, 0.0, failed_size), np.nan),
         parameters=plan.ensemble.parameters(0, n),
         messages=plan.grid.messages + plan.ensemble.scene.vehicle.warnings,
-        provenance=provenance(plan),
+        provenance=provenance(plan)
+        | dict(zip(("steps_made", "steps_tried"), chosen.mean(axis=0).tolist(), strict=False)),
         terms=tuple(plan.ensemble.scene.terms),
         compile_seconds=compile_seconds,
         run_seconds=run_seconds,
@@ -239,7 +242,8 @@ def provenance(plan: Plan) -> dict[str, Any]:
             "iterations": plan.method.iterations,
             "tolerance": plan.method.residual_tolerance(plan.dtype),
         }
-        | ({"alpha": plan.method.alpha, "beta": plan.method.beta} if plan.spec.averages else {}),
+        | ({"alpha": plan.method.alpha, "beta": plan.method.beta} if plan.spec.averages else {})
+        | ({"rtol": plan.method.rtol, "atol": plan.method.atol} if plan.method.adaptive else {}),
         "step": plan.grid.h,
         "steps": plan.grid.steps,
         "dtype": plan.dtype,

@@ -15,6 +15,7 @@ class Status(IntEnum):
     NOT_CONVERGED = 2
     NON_FINITE = 3
     FORCES_NOT_CONVERGED = 4
+    STEP_TOO_SMALL = 5
     SURFACE = 16
     FLOOR = 17
     BOX = 18
@@ -41,6 +42,8 @@ _TEXT = {
     "kept a residual above the tolerance; give a shorter step, more iterations or a larger tolerance",
     Status.FORCES_NOT_CONVERGED: "the iteration for nonconservative forces in Phi* did not settle: they are stiff; "
     "shorten the step, or use psi_s or psi_x, which treat drag implicitly",
+    Status.STEP_TOO_SMALL: "the steps that the tolerance asks for became too small, or too many (100,000 within one h); "
+    "loosen rtol or atol (float32 reaches about 1e-6), or look for forces that jump or are stiff",
     Status.SURFACE: "stopped by an event: rose to the surface",
     Status.FLOOR: "stopped by an event: sank to the sea floor",
     Status.BOX: "stopped by an event: left the box",

@@ -48,6 +48,15 @@ DOPRI5 = Tableau(
     estimate=5,
 )
 
+# Crouch & Grossman (1993), order 3, on a Lie group: the moves by the stages follow one another, the last with `b`.
+# Hairer, Lubich & Wanner, Geometric Numerical Integration, IV.8.
+CG3 = Tableau(
+    order=3,
+    a=((), (-1 / 24,), (161 / 24, -6.0)),
+    b=(1.0, -2 / 3, 2 / 3),
+    c=(0.0, -1 / 24, 161 / 24 - 6.0),
+)
+
 # Hairer, Norsett & Wanner, II.5 and II.10: DOP853, 8(5,3), twelve stages, after Dormand & Prince. errors: of order 5 and 3.
 DOP853 = Tableau(
     order=8,

@@ -29,8 +29,9 @@ from lgvi_kernels.terms import drag
 # Steps between two looks at the alarms. A chunk with an alarm is repeated one step at a time by the same code.
 CHUNK = 128
 
-# Numbers of a packet's state in `state[packet, field]`: R row by row, b, p, pi.
+# Numbers of a packet's state in `state[packet, field]`: R row by row, b, p, pi; and of its pace (see pace_struct).
 STATE_FIELDS = 18
+PACE_FIELDS = 4
 
 # Sampled quantity -> numbers per sample, in the order they are written.
 SAMPLE_FIELDS = {"position": 3, "attitude": 9, "velocity": 3, "angular_velocity": 3}
@@ -40,14 +41,14 @@ class Spec(NamedTuple):
     """Everything that decides what code a kernel holds.
 
     maps: the sub-maps after the leading one, as (letter, coefficient); lead: the sub-map that opens a step and merges with
-    the end of the step before, or None; laws: modules of laws, drag by its exact flow first if it is there;
-    events: modules of events; drag: the parts of drag by its exact flow, or none; mass: shape of M ("isotropic",
-    "diagonal", "full"); parts: what the inertia holds besides (see inertia_struct); coupling: which of U12, U13, U23 and of
-    the three pitches some member has; flow: "none", "steady" (uniform, the same for ever), "uniform", "varying";
-    timed: whether a law looks at the time; averages: alpha and beta of (15), (16), or None for conservative maps;
-    composed: more than one stage a step, or one, whose constants then are made once for all steps; paired: a stage is two
-    halves, each with a length of its own; gauss: numbers of a collocation method, or none; lead_time: the part of a step that
-    the lead drifts for.
+    the end of the step before, or None; laws: modules of laws, drag by its exact flow first if it is there; events: modules
+    of events; drag: the parts of drag along the axes (by its exact flow, or as rates), or none; mass: shape of M
+    ("isotropic", "diagonal", "full"); parts: what the inertia holds besides (see inertia_struct); coupling: which of U12,
+    U13, U23 and of the three pitches some member has; flow: "none", "steady" (uniform, the same for ever), "uniform",
+    "varying"; timed: whether a law looks at the time; averages: alpha and beta of (15), (16), or None for conservative
+    maps; composed: more than one stage a step, or one, whose constants then are made once for all steps; paired: a stage is
+    two halves, each with a length of its own; gauss: numbers of a collocation method, or none; lead_time: the part of a step
+    that the lead drifts for; explicit: an explicit method, which has no maps.
     """
 
     width: int
@@ -73,6 +74,7 @@ class Spec(NamedTuple):
     paired: bool = False
     gauss: tuple = ()
     lead_time: float = 0.0
+    explicit: Any = None
 
 
 class Advance(NamedTuple):
@@ -94,7 +96,7 @@ def make_advance(spec):
     Inertia = inertia_struct(width, real, spec.mass, spec.parts)
     Params, Events = params_of(spec.laws, width, real), params_of(spec.events, width, real)
     DragFlow = drag.flow_struct(width, real)
-    dragged, remembers, timed = bool(spec.drag), spec.memory, spec.timed
+    dragged, remembers, timed = bool(spec.drag) and spec.explicit is None, spec.memory, spec.timed
     Constants = struct(
         "Constants",
         inertia=Inertia,
@@ -118,6 +120,8 @@ def make_advance(spec):
     lead_time = spec.lead_time if has_lead and spec.lead[0] in ("Ab", "T", "B") else 0.0
     water_velocity = method.water_velocity
     renormalised, composed, paired = real == wp.float32, spec.composed, spec.paired
+    # A packet that chooses its steps goes on with them in the next launch, and waits for no frozen lane.
+    paced = spec.explicit is not None and spec.explicit.adaptive
     fields, per_sample = spec.fields, sum(SAMPLE_FIELDS[name] for name in spec.fields)
 
     @wp.func
@@ -129,6 +133,11 @@ def make_advance(spec):
         x.b = vec3(state[i, 9], state[i, 10], state[i, 11])
         x.p = vec3(state[i, 12], state[i, 13], state[i, 14])
         x.pi = vec3(state[i, 15], state[i, 16], state[i, 17])
+        if wp.static(paced):
+            x.pace.stride = state[i, 18][0]
+            x.pace.before = state[i, 19][0]
+            x.pace.made = state[i, 20][0]
+            x.pace.tried = state[i, 21][0]
         return x
 
     @wp.func
@@ -139,6 +148,12 @@ def make_advance(spec):
         put(state, i, 9, x.b)
         put(state, i, 12, x.p)
         put(state, i, 15, x.pi)
+        if wp.static(paced):
+            one = ones(x.b.x)
+            state[i, 18] = x.pace.stride * one
+            state[i, 19] = x.pace.before * one
+            state[i, 20] = x.pace.made * one
+            state[i, 21] = x.pace.tried * one
 
     @wp.func
     def at_step(x: State, k: int, h: wp.float64):
@@ -255,6 +270,8 @@ def make_advance(spec):
             if wp.static(remembers and checked):
                 back_up(memory, i, 0, 1)
             x.alarm = Alarm()
+            if wp.static(paced):
+                x.alarm.code = frozen
             for j in range(n):
                 x = at_step(x, k + j, h)
                 if wp.static(composed):

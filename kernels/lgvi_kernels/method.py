@@ -9,9 +9,11 @@ from lgvi_kernels.collocation import make_G
 from lgvi_kernels.compose import superpose
 from lgvi_kernels.coupled import make_W
 from lgvi_kernels.dissipation import make_V
+from lgvi_kernels.explicit import make_explicit
+from lgvi_kernels.forces import make_forces
 from lgvi_kernels.lanes import add, div, mul, sub  # noqa: F401
 from lgvi_kernels.matrix3 import apply, factor_struct, transpose_times
-from lgvi_kernels.paper import make_forces, make_phi
+from lgvi_kernels.paper import make_phi
 from lgvi_kernels.rotation import rotation_struct
 from lgvi_kernels.solve import make_solve
 from lgvi_kernels.state import damping_struct, flow_struct, matrix3_struct, view_struct, wrench_struct
@@ -44,27 +46,42 @@ class Step(NamedTuple):
     water_velocity: Any
 
 
-def make_velocities(velocity, coupled):
-    """(inertia, p, pi) -> (nu, Om) at the origin of the state, and the same at that of the forces."""
+@wp.func
+def divided(inertia: Any, pi: Any):
+    """J^-1 pi."""
+    return pi / inertia.J
+
+
+@wp.func
+def multiplied(inertia: Any, pi: Any):
+    """The same without a division, for methods that ask many times a step."""
+    return inertia.inverse_J * pi
+
+
+def make_velocities(velocity, turning, coupled):
+    """(inertia, p, pi) -> (nu, Om) at the origin of the state, and the same at that of the forces.
+
+    velocity: M^-1 p; turning: J^-1 of a vector.
+    """
     if not coupled:
 
         @wp.func
         def velocities(inertia: Any, p: Any, pi: Any):
             """nu = M^-1 p, Om = J^-1 pi."""
-            return velocity(inertia, p), pi / inertia.J
+            return velocity(inertia, p), turning(inertia, pi)
 
         return velocities, velocities
 
     @wp.func
     def velocities_of_state(inertia: Any, p: Any, pi: Any):
         """Om = Js^-1 (pi - E^T p), nu = M^-1 p - E Om."""
-        Om = (pi - transpose_times(inertia.E, p)) / inertia.J
+        Om = turning(inertia, pi - transpose_times(inertia.E, p))
         return velocity(inertia, p) - apply(inertia.E, Om), Om
 
     @wp.func
     def velocities_of_forces(inertia: Any, p: Any, pi: Any):
         """The same where the forces act."""
-        Om = (pi - transpose_times(inertia.E_forces, p)) / inertia.J
+        Om = turning(inertia, pi - transpose_times(inertia.E_forces, p))
         return velocity(inertia, p) - apply(inertia.E_forces, Om), Om
 
     return velocities_of_state, velocities_of_forces
@@ -94,14 +111,15 @@ def make_method(spec):
     View, Wrench, Flow, Damping = structs
     coupled, shifted = "coupled" in spec.parts, "origin" in spec.parts
     velocity = isotropic_velocity if spec.mass == "isotropic" else anisotropic_velocity
-    velocities, velocities_of_forces = make_velocities(velocity, coupled)
+    turning = multiplied if spec.explicit else divided
+    velocities, velocities_of_forces = make_velocities(velocity, turning, coupled)
     laws = spec.laws
     law, flow, evolve = (superpose(laws, role) for role in ("law", "flow", "evolve"))
     varies = spec.flow in ("uniform", "varying")
     shear = make_shear(matrix3_struct(width, real), coupled, shifted) if spec.flow == "varying" else None
     damping = make_damping(laws, shear)
     prepare, exact = None, None
-    if spec.drag:
+    if spec.drag and spec.explicit is None:
         by_axes = laws[0] is drag
         prepare, exact = drag.make_E(spec.drag) if by_axes else drag_directions.make_E(spec.drag, velocities_of_forces)
 
@@ -122,6 +140,10 @@ def make_method(spec):
             view.b = x.b + rotate(x, c.inertia.user_origin)
         return to_body(view, flow(Flow(), view, c.params).velocity)
 
+    if spec.explicit is not None:
+        acting = (View, Wrench, Flow, Damping, law, damping, flow, varies, shifted)
+        step = make_explicit(spec, make_forces(*acting)[0], velocities)
+        return Step(step, step, velocities, prepare, water_velocity)
     V = None
     if damping is not None and spec.averages is None:
         V = make_V(damping, velocities_of_forces, Damping, factor_struct(width, real), coupled)
@@ -150,7 +172,7 @@ def make_method(spec):
             letters[letter] = turns.make_hop(int(letter[1]) - 1, int(letter[2]) - 1, U12, U13, U23)
     if spec.averages is not None:
         force, potential = superpose(laws, "force"), superpose(laws, "potential")
-        forces, current = make_forces(View, Wrench, Flow, Damping, force, damping, flow, varies)
+        _, forces, current = make_forces(View, Wrench, Flow, Damping, force, damping, flow, varies, shifted)
         maps = (letters["Ab"], None if spec.mass == "isotropic" else Ap, letters["D"])
         functions = (View, Wrench, potential, forces, current, evolve, velocities)
         letters["Phi"], letters["Phi*"] = make_phi(maps, functions, *spec.averages)

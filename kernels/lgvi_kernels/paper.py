@@ -8,7 +8,6 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.dissipation import damped_force, damped_torque
 from lgvi_kernels.lanes import (  # noqa: F401
     add,
     any_positive,
@@ -19,47 +18,11 @@ from lgvi_kernels.lanes import (  # noqa: F401
     sub,
 )
 from lgvi_kernels.submaps import kicked, look
-from lgvi_kernels.water import acceleration_wrench
 
 FORCES_NOT_CONVERGED = 4
 
 # A contraction by less than a half each time shrinks round-off no further after so many.
 MOST_ITERATIONS = 60
-
-
-def make_forces(View, Wrench, Flow, Damping, force, damping, flow, flow_varies):
-    """phi and tau: the nonconservative laws of a scene at a configuration, for given velocities."""
-
-    @wp.func
-    def water_at(view: Any, c: Any):
-        water = Flow()
-        if wp.static(flow is not None):
-            water = flow(water, view, c.params)
-        return water
-
-    @wp.func
-    def forces(x: Any, c: Any, h: Any, nu: Any, Om: Any):
-        """phi(b, nu, R, Om), tau(b, nu, R, Om)."""
-        view = look(View(), x, c, h)
-        view.nu = nu
-        view.Om = Om
-        w = Wrench()
-        if wp.static(force is not None):
-            w = force(w, view, c.params)
-        if wp.static(flow_varies):
-            w = acceleration_wrench(w, view, c.inertia, water_at(view, c))
-        if wp.static(damping is not None):
-            D = damping(Damping(), view, water_at(view, c), c)
-            w.force = w.force - damped_force(D, nu, Om)
-            w.torque = w.torque - damped_torque(D, nu, Om)
-        return w
-
-    @wp.func
-    def current(x: Any, c: Any, h: Any):
-        """The water's velocity where the vehicle is, inertial axes."""
-        return water_at(look(View(), x, c, h), c).velocity
-
-    return forces, current
 
 
 def make_equation_15(alpha, beta):

@@ -29,14 +29,22 @@ def alarm_struct(width, real):
 
 
 @functools.cache
+def pace_struct(real):
+    """The next step [s], the error of the last accepted one over the tolerance (both 0 at the start), steps made and tried."""
+    return struct("Pace", stride=real, before=real, made=real, tried=real)
+
+
+@functools.cache
 def state_struct(width, real):
     """b [m, inertial], the rows of R (body to inertial), p and pi (momenta / max J) in the kernel's body axes.
 
     time [s] and step are those of the sub-map in turn; they are kept only where a law looks at them.
+    pace: of a packet that chooses its steps (see pace_struct).
     """
     Lane3, Alarm = lane3(width, real), alarm_struct(width, real)
     rows = {"R0": Lane3, "R1": Lane3, "R2": Lane3}
-    return struct("State", b=Lane3, **rows, p=Lane3, pi=Lane3, alarm=Alarm, time=wp.float64, step=wp.int32)
+    times = {"time": wp.float64, "step": wp.int32, "pace": pace_struct(real)}
+    return struct("State", b=Lane3, **rows, p=Lane3, pi=Lane3, alarm=Alarm, **times)
 
 
 @functools.cache
@@ -98,6 +106,7 @@ def inertia_struct(width, real, mass, parts=()):
 
     parts, each only where a scene or method needs it:
     "turns": 1 / (2 J), for the turns about the axes;
+    "rates": 1 / J, for methods that ask for rates many times a step;
     "x": coupling of the turns, the pitches k and the hops U12, U13, U23 (coupled_inertia);
     "w": S, the symmetric coupling of the coupled Moser-Veselov step;
     "coupled": E = M^-1 C at the origin of the state and at that of the forces, 3x3;
@@ -111,6 +120,8 @@ def inertia_struct(width, real, mass, parts=()):
     fields = {"J": Lane3, "inverse_scale": Lane, "mean": Lane}
     if mass != "isotropic":
         fields["anisotropy"] = {"diagonal": Lane3, "full": Symmetric3}[mass]
+    if "rates" in parts:
+        fields["inverse_J"] = Lane3
     if "turns" in parts:
         fields["half_over_J"] = Lane3
     if "x" in parts:

@@ -122,6 +122,19 @@ def kicked(x: Any, c: Any, h: Any, w: Any):
     return x
 
 
+def make_at_user_origin(shifted):
+    """Where water is taken. shifted: the origin of the forces is not the user's."""
+
+    @wp.func
+    def at_user_origin(view: Any, x: Any, c: Any):
+        """Water is taken where the user has his origin, whatever the method's is."""
+        if wp.static(shifted):
+            view.b = x.b + rotate(x, c.inertia.user_origin_forces)
+        return view
+
+    return at_user_origin
+
+
 def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):
     """The kick by these laws, each of them None where a scene has none.
 
@@ -130,13 +143,7 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):
     the forces is not the user's; E: exact flow of drag, or V: velocity-dependent laws, between two half kicks. Order 2.
     """
     drifts, damped, forced = flow is not None, E is not None or V is not None, law is not None or flow_varies
-
-    @wp.func
-    def at_user_origin(view: Any, x: Any, c: Any):
-        """Water is taken where the user has his origin, whatever the method's is."""
-        if wp.static(shifted):
-            view.b = x.b + rotate(x, c.inertia.user_origin_forces)
-        return view
+    at_user_origin = make_at_user_origin(shifted)
 
     @wp.func
     def K(x: Any, c: Any, h: Any):

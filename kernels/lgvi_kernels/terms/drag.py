@@ -35,6 +35,32 @@ def decay3(x: Any):
     return vec3(decay(x.x), decay(x.y), decay(x.z))
 
 
+@wp.func
+def size3(v: Any):
+    """|v| on three axes."""
+    return vec3(absolute(v.x), absolute(v.y), absolute(v.z))
+
+
+def make_resistance(parts):
+    """The same drag for methods that ask for rates, with the parts of PARTS that some member has."""
+    linear_force, linear_torque, quadratic_force, quadratic_torque = (part in parts for part in PARTS)
+
+    @wp.func
+    def resisted(k: Any, x: Any, p: Any):
+        """p' = -(l/I + q/I |p|) p added to the rates, pi' likewise."""
+        if wp.static(linear_force):
+            k.p = k.p - p.linear_force * x.p
+        if wp.static(quadratic_force):
+            k.p = k.p - p.quadratic_force * size3(x.p) * x.p
+        if wp.static(linear_torque):
+            k.pi = k.pi - p.linear_torque * x.pi
+        if wp.static(quadratic_torque):
+            k.pi = k.pi - p.quadratic_torque * size3(x.pi) * x.pi
+        return k
+
+    return resisted
+
+
 def make_E(parts):
     """(prepare, E) with the parts of PARTS that some member has."""
     linear_force, linear_torque, quadratic_force, quadratic_torque = (part in parts for part in PARTS)

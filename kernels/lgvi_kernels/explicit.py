@@ -1,0 +1,457 @@
+"""Explicit Runge-Kutta methods on (b, R, p, pi), and on the rotation group: fixed steps, or steps chosen for a tolerance.
+
+k_i = f(t + c_i h, y_i), where y_i comes from y by h a_i1 k_1, h a_i2 k_2, ... and the new state by h b_1 k_1, h b_2 k_2, ...
+A move adds: the rows of R are nine numbers like the others, and leave the group at the order of the method. Or it turns:
+R <- R exp(h a Om), one after the other (Crouch & Grossman 1993). Zero coefficients make no code; the stages are unrolled.
+"""
+
+import functools
+from typing import Any, NamedTuple
+
+import warp as wp
+
+from lgvi_kernels.lane_math import greatest, root, sine
+from lgvi_kernels.lanes import absolute, add, cross, div, dot, lane3, mul, ones, positive, sub, vec3  # noqa: F401
+from lgvi_kernels.rotation import rodrigues, rotation_struct, transpose_apply
+from lgvi_kernels.state import struct
+from lgvi_kernels.submaps import rotate
+from lgvi_kernels.terms.drag import make_resistance
+
+NON_FINITE = 3
+STEP_TOO_SMALL = 5
+
+# Step control of Hairer, Norsett & Wanner (HNW), Solving Ordinary Differential Equations I, II.4, and Hairer & Wanner II,
+# IV.2, as in their code DOP853: safety factor, exponent of the error before, smallest and largest factor of a step.
+SAFETY = 0.9
+BETA = 0.04
+SHRINK, GROW = 0.333, 6.0
+
+# Steps tried from one step of the grid to the next, and the smallest as a part of that: beyond, the member has failed.
+MOST_TRIED = 100_000
+SMALLEST = {wp.float64: 1e-12, wp.float32: 1e-6}
+# Added under a root that is divided by: the least that keeps 0/0 away.
+TINY = {wp.float64: 1e-300, wp.float32: 1e-36}
+
+
+class Explicit(NamedTuple):
+    """What decides the code of an explicit method: a tableau, whose row i of `a` has i numbers, and how it is used.
+
+    kind: "vector" (R as nine numbers), "group" (R turns by exponentials) or "munthe_kaas" (order 4 with its commutators).
+    errors: rows of error estimates, (stages,) or one longer with f of the new state at its end, which go as h to the power
+    `estimate`. adaptive: each packet chooses its steps.
+    """
+
+    kind: str
+    a: tuple
+    b: tuple
+    c: tuple
+    errors: tuple = ()
+    estimate: int = 0
+    adaptive: bool = False
+
+
+@functools.cache
+def rates_struct(width, real, group):
+    """b', p', pi', and the rows of R' = R hat(Om); on the group, Om instead of them."""
+    Lane3 = lane3(width, real)
+    turning = {"Om": Lane3} if group else {"R0": Lane3, "R1": Lane3, "R2": Lane3}
+    return struct("Rates", b=Lane3, **turning, p=Lane3, pi=Lane3)
+
+
+@functools.cache
+def slopes_struct(Rates, count):
+    """k_1 to k_count, as k0, k1, ..."""
+    return struct("Slopes", **{f"k{i}": Rates for i in range(count)})
+
+
+def make_rates(Rates, everything, velocities, group, isotropic, coupled, drifts, drag):
+    """The right-hand side, eq. (1) and (3) of Nordkvist & Sanyal 2010 with all laws of a scene.
+
+    drag: the function that adds drag along the axes, where it is not among `everything`, or None.
+    """
+
+    @wp.func
+    def rates(x: Any, c: Any, h: Any):
+        """b' = R nu + u, R' = R hat(Om), p' = p x Om + f, pi' = pi x Om + p x nu + m."""
+        k = Rates()
+        nu, Om = velocities(c.inertia, x.p, x.pi)
+        w, u = everything(x, c, h, nu, Om)
+        k.b = rotate(x, nu)
+        if wp.static(drifts):
+            k.b = k.b + u
+        if wp.static(group):
+            k.Om = Om
+        else:
+            k.R0 = cross(x.R0, Om)
+            k.R1 = cross(x.R1, Om)
+            k.R2 = cross(x.R2, Om)
+        k.p = cross(x.p, Om) + c.inertia.inverse_scale * w.force
+        turned = cross(x.pi, Om) + c.inertia.inverse_scale * w.torque
+        if wp.static(coupled):
+            turned = turned + cross(x.p, nu)
+        elif wp.static(not isotropic):
+            # Of the mean of M^-1 it is zero.
+            turned = turned + cross(x.p, c.inertia.anisotropy * x.p)
+        k.pi = turned
+        if wp.static(drag is not None):
+            k = drag(k, x, c.params.own)
+        return k
+
+    return rates
+
+
+@wp.func
+def along(x: Any, k: Any, s: Any):
+    """x + s k."""
+    x.b = x.b + s * k.b
+    x.R0 = x.R0 + s * k.R0
+    x.R1 = x.R1 + s * k.R1
+    x.R2 = x.R2 + s * k.R2
+    x.p = x.p + s * k.p
+    x.pi = x.pi + s * k.pi
+    return x
+
+
+def make_turned(Rotation, real):
+    """R exp(hat(v)) of a rotation vector v."""
+
+    @wp.func
+    def turned(x: Any, v: Any):
+        """Rodrigues' formula: exp = I + sin n / n hat(v) + 1/2 (sin(n/2) / (n/2))^2 hat(v)^2, n = |v|."""
+        square = dot(v, v)
+        half = real(0.5)
+        # n of v = 0 is not 0 but so small that the quotients of sines are 1.
+        n = root(square + real(wp.static(TINY[real])) * ones(square))
+        sinc_half = sine(half * n) / (half * n)
+        F = rodrigues(Rotation(), v, sine(n) / n, half * sinc_half * sinc_half)
+        x.R0 = transpose_apply(F, x.R0)
+        x.R1 = transpose_apply(F, x.R1)
+        x.R2 = transpose_apply(F, x.R2)
+        return x
+
+    return turned
+
+
+def make_act(turned):
+    """How the group moves a state."""
+
+    @wp.func
+    def act(x: Any, k: Any, s: Any):
+        """R exp(s hat(Om)), and (b, p, pi) + s k."""
+        x.b = x.b + s * k.b
+        x.p = x.p + s * k.p
+        x.pi = x.pi + s * k.pi
+        return turned(x, s * k.Om)
+
+    return act
+
+
+# The two functions that follow are written out for so many stages: a loop or a recursion over them would copy all the
+# slopes for each, which the compiler removes again, in three times as long.
+MOST_STAGES = 13
+
+
+def make_moves(move, weights):
+    """One function (y, slopes, h): the moves by h w_1 k_1, then h w_2 k_2, ... of all weights that are not zero."""
+    w = weights + (0.0,) * (MOST_STAGES - len(weights))
+
+    @wp.func
+    def moves(y: Any, k: Any, h: Any):
+        if wp.static(w[0] != 0.0):
+            y = move(y, k.k0, h.dtype(wp.static(w[0])) * h)
+        if wp.static(w[1] != 0.0):
+            y = move(y, k.k1, h.dtype(wp.static(w[1])) * h)
+        if wp.static(w[2] != 0.0):
+            y = move(y, k.k2, h.dtype(wp.static(w[2])) * h)
+        if wp.static(w[3] != 0.0):
+            y = move(y, k.k3, h.dtype(wp.static(w[3])) * h)
+        if wp.static(w[4] != 0.0):
+            y = move(y, k.k4, h.dtype(wp.static(w[4])) * h)
+        if wp.static(w[5] != 0.0):
+            y = move(y, k.k5, h.dtype(wp.static(w[5])) * h)
+        if wp.static(w[6] != 0.0):
+            y = move(y, k.k6, h.dtype(wp.static(w[6])) * h)
+        if wp.static(w[7] != 0.0):
+            y = move(y, k.k7, h.dtype(wp.static(w[7])) * h)
+        if wp.static(w[8] != 0.0):
+            y = move(y, k.k8, h.dtype(wp.static(w[8])) * h)
+        if wp.static(w[9] != 0.0):
+            y = move(y, k.k9, h.dtype(wp.static(w[9])) * h)
+        if wp.static(w[10] != 0.0):
+            y = move(y, k.k10, h.dtype(wp.static(w[10])) * h)
+        if wp.static(w[11] != 0.0):
+            y = move(y, k.k11, h.dtype(wp.static(w[11])) * h)
+        if wp.static(w[12] != 0.0):
+            y = move(y, k.k12, h.dtype(wp.static(w[12])) * h)
+        return y
+
+    return moves
+
+
+def make_stage(moves, node, timed):
+    """The state of one stage."""
+
+    @wp.func
+    def at_node(x: Any, k: Any, h: Any):
+        y = moves(x, k, h)
+        if wp.static(timed):
+            y.time = x.time + wp.float64(wp.static(node)) * wp.float64(h)
+        return y
+
+    return at_node
+
+
+def make_stages(Rates, rates, move, a, c, timed):
+    """One function (x, constants, h) -> the slopes of all rows of `a`."""
+    count = len(a)
+    Slopes = slopes_struct(Rates, count)
+    ys = [make_stage(make_moves(move, row), node, timed) for row, node in zip(a, c)]
+    _, at_1, at_2, at_3, at_4, at_5, at_6, at_7, at_8, at_9, at_10, at_11, at_12 = ys + [None] * (MOST_STAGES - count)
+
+    @wp.func
+    def stages(x: Any, constants: Any, h: Any):
+        k = Slopes()
+        k.k0 = rates(x, constants, h)
+        if wp.static(count > 1):
+            k.k1 = rates(at_1(x, k, h), constants, h)
+        if wp.static(count > 2):
+            k.k2 = rates(at_2(x, k, h), constants, h)
+        if wp.static(count > 3):
+            k.k3 = rates(at_3(x, k, h), constants, h)
+        if wp.static(count > 4):
+            k.k4 = rates(at_4(x, k, h), constants, h)
+        if wp.static(count > 5):
+            k.k5 = rates(at_5(x, k, h), constants, h)
+        if wp.static(count > 6):
+            k.k6 = rates(at_6(x, k, h), constants, h)
+        if wp.static(count > 7):
+            k.k7 = rates(at_7(x, k, h), constants, h)
+        if wp.static(count > 8):
+            k.k8 = rates(at_8(x, k, h), constants, h)
+        if wp.static(count > 9):
+            k.k9 = rates(at_9(x, k, h), constants, h)
+        if wp.static(count > 10):
+            k.k10 = rates(at_10(x, k, h), constants, h)
+        if wp.static(count > 11):
+            k.k11 = rates(at_11(x, k, h), constants, h)
+        if wp.static(count > 12):
+            k.k12 = rates(at_12(x, k, h), constants, h)
+        return k
+
+    return stages
+
+
+def make_fixed(stages, finish, timed):
+    """One step of the length that is asked for."""
+
+    @wp.func
+    def step(x: Any, c: Any, h: Any):
+        """y + h sum_i b_i k_i."""
+        x = finish(x, stages(x, c, h), h)
+        if wp.static(timed):
+            x.time = x.time + wp.float64(h)
+        return x
+
+    return step
+
+
+def make_munthe_kaas(rates, act, turned, timed):
+    """Munthe-Kaas & Owren (1999): order 4 with two commutators."""
+
+    @wp.func
+    def later(y: Any, x: Any, h: Any):
+        if wp.static(timed):
+            y.time = x.time + wp.float64(h)
+        return y
+
+    @wp.func
+    def moved(x: Any, k: Any, s: Any, bracket: Any):
+        """(b, p, pi) + s k, R exp(s hat(Om) + hat(bracket))."""
+        x.b = x.b + s * k.b
+        x.p = x.p + s * k.p
+        x.pi = x.pi + s * k.pi
+        return turned(x, s * k.Om + bracket)
+
+    @wp.func
+    def step(x: Any, c: Any, h: Any):
+        """Hairer, Lubich & Wanner, IV.8, in body axes, so that the signs of the commutators are opposite."""
+        half = h.dtype(0.5) * h
+        k1 = rates(x, c, h)
+        k2 = rates(later(act(x, k1, half), x, half), c, h)
+        k3 = rates(later(moved(x, k2, half, (h.dtype(0.125) * h * h) * cross(k1.Om, k2.Om)), x, half), c, h)
+        k4 = rates(later(act(x, k3, h), x, h), c, h)
+        two = h.dtype(2.0)
+        k = k1
+        k.b = k1.b + two * (k2.b + k3.b) + k4.b
+        k.p = k1.p + two * (k2.p + k3.p) + k4.p
+        k.pi = k1.pi + two * (k2.pi + k3.pi) + k4.pi
+        k.Om = k1.Om + two * (k2.Om + k3.Om) + k4.Om
+        sixth = h / h.dtype(6.0)
+        y = moved(x, k, sixth, (half * sixth) * cross(k1.Om, k4.Om))
+        return later(y, x, h)
+
+    return step
+
+
+@wp.func
+def one_over(y: Any, new: Any, rtol: Any, atol: Any):
+    """1 / (atol + rtol max(|y|, |new|)) of each number."""
+    one = ones(y)
+    return one / (atol * one + rtol * greatest(absolute(y), absolute(new)))
+
+
+@wp.func
+def one_over3(y: Any, new: Any, rtol: Any, atol: Any):
+    """The same of a 3-vector's components."""
+    return vec3(one_over(y.x, new.x, rtol, atol), one_over(y.y, new.y, rtol, atol), one_over(y.z, new.z, rtol, atol))
+
+
+@wp.func
+def square(a: Any, b: Any):
+    """Sum of the squares of a_i b_i."""
+    q = a * b
+    return dot(q, q)
+
+
+def make_errors(Rates, weights, move):
+    """(y, new, slopes, h, rtol, atol) -> mean square of the estimates over the tolerance, HNW (4.11), one each row."""
+    moves = [make_moves(move, row) for row in weights]
+    first, last, double = moves[0], moves[-1], len(moves) > 1
+
+    @wp.func
+    def mean_square(e: Any, w: Any):
+        s = square(e.b, w.b) + square(e.R0, w.R0) + square(e.R1, w.R1) + square(e.R2, w.R2) + square(e.p, w.p)
+        return s.dtype(1.0 / 18.0) * (s + square(e.pi, w.pi))
+
+    @wp.func
+    def errors(y: Any, new: Any, k: Any, h: Any, rtol: Any, atol: Any):
+        """The error over the tolerance; of two estimates as in HNW II.10, e5^2 / sqrt(e5^2 + e3^2 / 100)."""
+        w = Rates()
+        w.b = one_over3(y.b, new.b, rtol, atol)
+        w.R0 = one_over3(y.R0, new.R0, rtol, atol)
+        w.R1 = one_over3(y.R1, new.R1, rtol, atol)
+        w.R2 = one_over3(y.R2, new.R2, rtol, atol)
+        w.p = one_over3(y.p, new.p, rtol, atol)
+        w.pi = one_over3(y.pi, new.pi, rtol, atol)
+        fifth = mean_square(first(Rates(), k, h), w)
+        if wp.static(double):
+            third = mean_square(last(Rates(), k, h), w)
+            tiny = h.dtype(wp.static(TINY[wp.float32])) * ones(fifth)
+            return fifth / root(fifth + h.dtype(0.01) * third + tiny)
+        else:
+            return root(fifth)
+
+    return errors
+
+
+def make_adaptive(stages, finish, errors, estimate, width, real, timed):
+    """From one step of the grid to the next, by steps that the packet's worst lane decides."""
+    power = 0.75 * BETA - 1.0 / estimate
+
+    @wp.func
+    def worst_of(error: Any, code: Any):
+        """The largest error of the lanes that are well; what is not a number counts as huge."""
+        worst = real(0.0)
+        for j in range(wp.static(width)):
+            if not code[j] > real(0.0):
+                e = error[j]
+                if not e < real(1e10):
+                    e = real(1e10)
+                worst = wp.max(worst, e)
+        return worst
+
+    @wp.func
+    def given_up(alarm: Any, error: Any, most: Any, taken: Any):
+        """The lanes whose error exceeds `most` get their status, and no longer count: the others go on without them."""
+        code = alarm.code
+        size = alarm.size
+        for j in range(wp.static(width)):
+            if not code[j] > real(0.0):
+                if not error[j] < real(1e10):
+                    code[j] = real(wp.static(float(NON_FINITE)))
+                elif error[j] > most:
+                    code[j] = real(wp.static(float(STEP_TOO_SMALL)))
+                    size[j] = taken * taken
+        alarm.code = code
+        alarm.size = size
+        return alarm
+
+    @wp.func
+    def step(x: Any, c: Any, h: Any):
+        """HNW II.4 with PI control: steps are shortened to end at h, and not to leave a tiny one for the end."""
+        start = x.time
+        done = real(0.0)
+        stride = x.pace.stride
+        before = x.pace.before
+        if not stride > real(0.0):
+            stride = h
+            before = real(1e-4)
+        tried = int(0)
+        while done < h:
+            left = h - done
+            taken = left
+            if left > real(1.0001) * stride:
+                taken = wp.min(stride, real(0.5) * left)
+            k = stages(x, c, taken)
+            new = finish(x, k, taken)
+            error = errors(x, new, k, taken, c.tolerance, c.force_tolerance)
+            worst = worst_of(error, x.alarm.code)
+            factor = real(wp.static(SAFETY)) * wp.pow(wp.max(worst, real(1e-10)), real(wp.static(power)))
+            factor = factor * wp.pow(wp.max(before, real(1e-4)), real(wp.static(BETA)))
+            factor = wp.clamp(factor, real(wp.static(SHRINK)), real(wp.static(GROW)))
+            tried += 1
+            x.pace.tried = x.pace.tried + real(1.0)
+            if worst <= real(1.0):
+                new.pace = x.pace
+                new.alarm = x.alarm
+                x = new
+                x.pace.made = x.pace.made + real(1.0)
+                before = worst
+                if taken == left:
+                    done = h
+                else:
+                    done = done + taken
+                # A step that was shortened to end at h says little about the next.
+                if taken < stride:
+                    stride = wp.max(stride, taken * factor)
+                else:
+                    stride = taken * factor
+                if wp.static(timed):
+                    x.time = start + wp.float64(done)
+            else:
+                stride = taken * wp.min(real(1.0), factor)
+                if not stride > real(wp.static(SMALLEST[real])) * h:
+                    x.alarm = given_up(x.alarm, error, real(1.0), taken)
+                    stride = left
+            if tried >= wp.static(MOST_TRIED):
+                x.alarm = given_up(x.alarm, error, real(0.5) * worst, taken)
+                stride = h
+                tried = 0
+        x.pace.stride = stride
+        x.pace.before = before
+        return x
+
+    return step
+
+
+def make_explicit(spec, everything, velocities):
+    """The step of an explicit method for this Spec, with all the laws in `everything`."""
+    method, width, real, timed = spec.explicit, spec.width, spec.real, spec.timed
+    group = method.kind != "vector"
+    Rates = rates_struct(width, real, group)
+    turned = make_turned(rotation_struct(width, real), real)
+    move = make_act(turned) if group else along
+    shape = (spec.mass == "isotropic", "coupled" in spec.parts, spec.flow != "none")
+    drag = make_resistance(spec.drag) if spec.drag else None
+    rates = make_rates(Rates, everything, velocities, group, *shape, drag)
+    if method.kind == "munthe_kaas":
+        return make_munthe_kaas(rates, move, turned, timed)
+    a, c = method.a, method.c
+    if method.adaptive and len(method.errors[0]) > len(a):
+        a, c = (*a, method.b), (*c, 1.0)
+    stages = make_stages(Rates, rates, move, a, c, timed)
+    finish = make_moves(move, method.b + (0.0,) * (len(a) - len(method.b)))
+    if not method.adaptive:
+        return make_fixed(stages, finish, timed)
+    errors = make_errors(Rates, method.errors, along)
+    return make_adaptive(stages, finish, errors, method.estimate, width, real, timed)

@@ -20,12 +20,11 @@ from lgvi_kernels.terms import LAWS
 from lgvi_warp import warp_setup
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
-from lgvi_warp.machine import default_width
+from lgvi_warp.machine import DTYPES, default_width
 from lgvi_warp.method import Method
 from lgvi_warp.model import Model, make_model
 from lgvi_warp.saveat import TimeGrid
 
-DTYPES = ("float64", "float32")
 CHECKS = ("none", "safe")
 
 # One launch advances at most this many vehicle-steps and samples: so progress moves, an interrupt is heard, and the
@@ -98,7 +97,7 @@ class Plan:
         model = self.model
         return Spec(
             width=self.width,
-            real=wp.float64 if self.dtype == "float64" else wp.float32,
+            real=wp.float64 if DTYPES[self.dtype] == "float64" else wp.float32,
             maps=model.program,
             lead=model.lead,
             laws=tuple(module for _, module in model.laws),
@@ -118,6 +117,7 @@ class Plan:
             averages=model.averages,
             composed=len(self.method.stages) > 1,
             lead_time=model.lead[1] * self.method.stages[0] if model.lead else 0.0,
+            compensated=self.dtype == "float32_compensated",
         )
 
     @contextlib.contextmanager
@@ -169,7 +169,7 @@ class Plan:
     def segments(self, count: int) -> Iterator[tuple[int, int]]:
         """(k0, k1): launches from step k0 to step k1, for a block of `count` members."""
         due = self.grid.sample_steps
-        per_sample = sum(SAMPLE_FIELDS[name] for name in self.spec.fields) * count * np.dtype(self.dtype).itemsize
+        per_sample = sum(self.spec.sample_fields.values()) * count * np.dtype(DTYPES[self.dtype]).itemsize
         most_samples = max(1, SEGMENT_SAMPLE_BYTES // max(per_sample, 1))
         most_steps = max(CHUNK, SEGMENT_VEHICLE_STEPS // count // CHUNK * CHUNK)
         k = 0

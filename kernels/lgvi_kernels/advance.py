@@ -23,13 +23,14 @@ from lgvi_kernels.lanes import (
 )
 from lgvi_kernels.method import make_method
 from lgvi_kernels.packet import at_rest, choose, failures, put, renormalise
+from lgvi_kernels.place import settled
 from lgvi_kernels.state import alarm_struct, inertia_struct, state_struct, struct, view_struct
 from lgvi_kernels.terms import drag
 
 # Steps between two looks at the alarms. A chunk with an alarm is repeated one step at a time by the same code.
 CHUNK = 128
 
-# Numbers of a packet's state in `state[packet, field]`: R row by row, b, p, pi.
+# Numbers of a packet's state in `state[packet, field]`: R row by row, b, p, pi; with compensated sums 3 more, low.
 STATE_FIELDS = 18
 
 # Sampled quantity -> numbers per sample, in the order they are written.
@@ -46,7 +47,7 @@ class Spec(NamedTuple):
     the three pitches some member has; flow: "none", "steady" (uniform, the same for ever), "uniform", "varying";
     timed: whether a law looks at the time; averages: alpha and beta of (15), (16), or None for conservative maps;
     composed: more than one stage a step, or one, whose constants then are made once for all steps;
-    lead_time: the part of a step that the lead drifts for.
+    lead_time: the part of a step that the lead drifts for; compensated: b is kept as b + low, for float32 (see place).
     """
 
     width: int
@@ -70,6 +71,20 @@ class Spec(NamedTuple):
     averages: tuple | None = None
     composed: bool = False
     lead_time: float = 0.0
+    compensated: bool = False
+
+    @property
+    def state_fields(self) -> int:
+        """Numbers of a packet's state."""
+        return STATE_FIELDS + 3 * self.compensated
+
+    @property
+    def sample_fields(self) -> dict[str, int]:
+        """Field -> numbers per sample, in the order they are written; a compensated position is b and then low."""
+        numbers = {name: SAMPLE_FIELDS[name] for name in self.fields}
+        if self.compensated and "position" in numbers:
+            numbers["position"] = 6
+        return numbers
 
 
 class Advance(NamedTuple):
@@ -87,7 +102,11 @@ def make_advance(spec):
     """Build (without compiling) the kernel for this Spec."""
     width, real, checked = spec.width, spec.real, spec.checked
     Lane, Ints = lane(width, real), int_lane(width)
-    State, Alarm, View = (make(width, real) for make in (state_struct, alarm_struct, view_struct))
+    State, Alarm, View = (
+        state_struct(width, real, spec.compensated),
+        alarm_struct(width, real),
+        view_struct(width, real),
+    )
     Inertia = inertia_struct(width, real, spec.mass, spec.parts)
     Params, Events = params_of(spec.laws, width, real), params_of(spec.events, width, real)
     DragFlow = drag.flow_struct(width, real)
@@ -114,8 +133,8 @@ def make_advance(spec):
     # A drift that leads has passed half of its time when a step begins; with stages, of the first one's.
     lead_time = spec.lead_time if has_lead and spec.lead[0] in ("Ab", "T") else 0.0
     water_velocity = method.water_velocity
-    renormalised, composed = real == wp.float32, spec.composed
-    fields, per_sample = spec.fields, sum(SAMPLE_FIELDS[name] for name in spec.fields)
+    renormalised, composed, compensated = real == wp.float32, spec.composed, spec.compensated
+    fields, per_sample = spec.fields, sum(spec.sample_fields.values())
 
     @wp.func
     def read(state: wp.array2d(dtype=Lane), i: int):
@@ -126,6 +145,8 @@ def make_advance(spec):
         x.b = vec3(state[i, 9], state[i, 10], state[i, 11])
         x.p = vec3(state[i, 12], state[i, 13], state[i, 14])
         x.pi = vec3(state[i, 15], state[i, 16], state[i, 17])
+        if wp.static(compensated):
+            x.low = vec3(state[i, 18], state[i, 19], state[i, 20])
         return x
 
     @wp.func
@@ -136,6 +157,8 @@ def make_advance(spec):
         put(state, i, 9, x.b)
         put(state, i, 12, x.p)
         put(state, i, 15, x.pi)
+        if wp.static(compensated):
+            put(state, i, 18, x.low)
 
     @wp.func
     def at_step(x: State, k: int, h: wp.float64):
@@ -159,6 +182,9 @@ def make_advance(spec):
         if wp.static("position" in fields):
             put(out, i, o, x.b)
             o += 3
+            if wp.static(compensated):
+                put(out, i, o, x.low)
+                o += 3
         if wp.static("attitude" in fields):
             put(out, i, o, x.R0)
             put(out, i, o + 3, x.R1)
@@ -260,6 +286,8 @@ def make_advance(spec):
                     x = step(x, c, first_h)
                     if wp.static(has_lead):
                         x = lead(x, c, lead_first)
+                if wp.static(compensated):
+                    x = settled(x)
                 if wp.static(watched):
                     x = watch(x, c, real(h))
             repeat = int(0)

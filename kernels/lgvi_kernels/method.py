@@ -116,7 +116,7 @@ def make_method(spec):
         """R^T u where the vehicle is."""
         view = look(View(), x, c, h)
         if wp.static(shifted):
-            view.b = x.b + rotate(x, c.inertia.user_origin)
+            view.b = view.b + rotate(x, c.inertia.user_origin)
         return to_body(view, flow(Flow(), view, c.params).velocity)
 
     V = None

@@ -18,6 +18,7 @@ from lgvi_kernels.lanes import (  # noqa: F401
     positive,
     sub,
 )
+from lgvi_kernels.place import moved
 from lgvi_kernels.submaps import kicked, look
 from lgvi_kernels.water import acceleration_wrench
 
@@ -123,7 +124,7 @@ def make_phi(maps, laws, alpha, beta):
         old = forces(x, c, h, nu, Om)
         u = current(x, c, h)
         x = Ab(x, c, h)
-        x.b = x.b + h * u
+        x = moved(x, h * u)
         x = D(x, c, h)
         w = equation_15(old, forces(x, c, h, nu, Om), h)
         x = kicked(x, c, h, sum_of(w, conservative(x, c, h)))
@@ -136,7 +137,7 @@ def make_phi(maps, laws, alpha, beta):
         x = kicked(x, c, h, w)
         x = D(x, c, h)
         x = Ab(x, c, h)
-        x.b = x.b + h * u
+        x = moved(x, h * u)
         return x
 
     @wp.func

@@ -9,6 +9,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lanes import add, cross, dot, mul, vec3  # noqa: F401
+from lgvi_kernels.place import moved, moved_from, place
 from lgvi_kernels.rotation import transpose_apply
 from lgvi_kernels.water import acceleration_wrench
 
@@ -50,8 +51,7 @@ def make_Ab(velocity, timed):
     @wp.func
     def Ab(x: Any, c: Any, h: Any):
         """Eq. (12) and (23), Nordkvist & Sanyal 2010: b <- b + h R nu."""
-        x.b = x.b + rotate(x, h * velocity(c.inertia, x.p))
-        return passed(x, h)
+        return passed(moved(x, rotate(x, h * velocity(c.inertia, x.p))), h)
 
     return Ab
 
@@ -71,7 +71,7 @@ def make_T(timed):
     def T(x: Any, c: Any, h: Any):
         """Ab and Ap together: the exact flow of the kinetic energy p.M^-1 p / 2."""
         d = h * (c.inertia.anisotropy * x.p)
-        x.b = x.b + rotate(x, (h * c.inertia.mean) * x.p + d)
+        x = moved(x, rotate(x, (h * c.inertia.mean) * x.p + d))
         x.pi = x.pi + cross(x.p, d)
         return passed(x, h)
 
@@ -102,7 +102,7 @@ def look(view: Any, x: Any, c: Any, h: Any):
     view.north = x.R0
     view.east = x.R1
     view.down = x.R2
-    view.b = x.b
+    view.b = place(x)
     view.t = h.dtype(x.time)
     view.h = h
     view.step = x.step
@@ -135,7 +135,7 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):
     def at_user_origin(view: Any, x: Any, c: Any):
         """Water is taken where the user has his origin, whatever the method's is."""
         if wp.static(shifted):
-            view.b = x.b + rotate(x, c.inertia.user_origin_forces)
+            view.b = place(x) + rotate(x, c.inertia.user_origin_forces)
         return view
 
     @wp.func
@@ -146,10 +146,10 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):
         if wp.static(evolve is not None):
             view = evolve(view, view, c.params)
         if wp.static(drifts):
-            start = x.b
+            start = x
             water = flow(Flow(), at_user_origin(view, x, c), c.params)
-            x.b = start + half * water.velocity
-            view.b = x.b
+            x = moved_from(x, start, half * water.velocity)
+            view.b = place(x)
             if wp.static(flow_varies):
                 water = flow(Flow(), at_user_origin(view, x, c), c.params)
         if wp.static(forced):
@@ -173,7 +173,7 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):
             if wp.static(forced):
                 x = kicked(x, c, half, w)
         if wp.static(drifts):
-            x.b = start + h * water.velocity
+            x = moved_from(x, start, h * water.velocity)
         if wp.static(evolve is not None):
             view.second = 1
             view = evolve(view, view, c.params)

@@ -9,6 +9,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lanes import add, div, mul, neg, ones, sub, vec3  # noqa: F401
+from lgvi_kernels.place import moved
 
 
 @wp.func
@@ -92,7 +93,7 @@ def make_shift(axis):
     @wp.func
     def shift(x: Any, length: Any):
         """b <- b + length R e_i, pi <- pi - (length e_i) x p."""
-        x.b = x.b + length * vec3(component(x.R0), component(x.R1), component(x.R2))
+        x = moved(x, length * vec3(component(x.R0), component(x.R1), component(x.R2)))
         x.pi = slide(x.pi, x.p, length)
         return x
 

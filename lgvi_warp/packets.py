@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from lgvi_kernels.advance import STATE_FIELDS
 from lgvi_kernels.lanes import int_lane
 from lgvi_kernels.terms import LAWS
 from lgvi_warp import inertia, model, notation, vehicle
@@ -208,10 +209,10 @@ class Packets:
         rows = np.empty((n, self.plan.spec.state_fields))
         rows[:, :9] = R.reshape(-1, 9)
         rows[:, 9:12] = m.position + notation.rotate_out(m.attitude, np.broadcast_to(frame.origin, (n, 3)))
-        rows[:, 12:18] = momenta / self.scale[:, None]
+        rows[:, 12:STATE_FIELDS] = momenta / self.scale[:, None]
         if self.plan.spec.compensated:
-            low = rows[:, 9:12] - rows[:, 9:12].astype(np.float32)
-            rows[:, 18:] = np.where(np.isfinite(low), low, 0.0)
+            low = rows[:, :STATE_FIELDS] - rows[:, :STATE_FIELDS].astype(np.float32)
+            rows[:, STATE_FIELDS:] = np.where(np.isfinite(low), low, 0.0)
         return self._lanes_each(rows)
 
     def _water_at_start(self) -> np.ndarray:

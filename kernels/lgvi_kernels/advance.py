@@ -23,14 +23,14 @@ from lgvi_kernels.lanes import (
 )
 from lgvi_kernels.method import make_method
 from lgvi_kernels.packet import at_rest, choose, failures, put, renormalise
-from lgvi_kernels.place import settled
 from lgvi_kernels.state import alarm_struct, inertia_struct, state_struct, struct, view_struct
+from lgvi_kernels.sums import settled
 from lgvi_kernels.terms import drag
 
 # Steps between two looks at the alarms. A chunk with an alarm is repeated one step at a time by the same code.
 CHUNK = 128
 
-# Numbers of a packet's state in `state[packet, field]`: R row by row, b, p, pi; with compensated sums 3 more, low.
+# Numbers of a packet's state in `state[packet, field]`: R row by row, b, p, pi; with compensated sums as many low parts more.
 STATE_FIELDS = 18
 
 # Sampled quantity -> numbers per sample, in the order they are written.
@@ -47,7 +47,7 @@ class Spec(NamedTuple):
     the three pitches some member has; flow: "none", "steady" (uniform, the same for ever), "uniform", "varying";
     timed: whether a law looks at the time; averages: alpha and beta of (15), (16), or None for conservative maps;
     composed: more than one stage a step, or one, whose constants then are made once for all steps;
-    lead_time: the part of a step that the lead drifts for; compensated: b is kept as b + low, for float32 (see place).
+    lead_time: the part of a step that the lead drifts for; compensated: sums of two float32 (see sums).
     """
 
     width: int
@@ -76,11 +76,11 @@ class Spec(NamedTuple):
     @property
     def state_fields(self) -> int:
         """Numbers of a packet's state."""
-        return STATE_FIELDS + 3 * self.compensated
+        return STATE_FIELDS * (1 + self.compensated)
 
     @property
     def sample_fields(self) -> dict[str, int]:
-        """Field -> numbers per sample, in the order they are written; a compensated position is b and then low."""
+        """Field -> numbers per sample, in the order they are written; a compensated position is b and then its low part."""
         numbers = {name: SAMPLE_FIELDS[name] for name in self.fields}
         if self.compensated and "position" in numbers:
             numbers["position"] = 6
@@ -146,7 +146,12 @@ def make_advance(spec):
         x.p = vec3(state[i, 12], state[i, 13], state[i, 14])
         x.pi = vec3(state[i, 15], state[i, 16], state[i, 17])
         if wp.static(compensated):
-            x.low = vec3(state[i, 18], state[i, 19], state[i, 20])
+            x.R0_low = vec3(state[i, 18], state[i, 19], state[i, 20])
+            x.R1_low = vec3(state[i, 21], state[i, 22], state[i, 23])
+            x.R2_low = vec3(state[i, 24], state[i, 25], state[i, 26])
+            x.b_low = vec3(state[i, 27], state[i, 28], state[i, 29])
+            x.p_low = vec3(state[i, 30], state[i, 31], state[i, 32])
+            x.pi_low = vec3(state[i, 33], state[i, 34], state[i, 35])
         return x
 
     @wp.func
@@ -158,7 +163,12 @@ def make_advance(spec):
         put(state, i, 12, x.p)
         put(state, i, 15, x.pi)
         if wp.static(compensated):
-            put(state, i, 18, x.low)
+            put(state, i, 18, x.R0_low)
+            put(state, i, 21, x.R1_low)
+            put(state, i, 24, x.R2_low)
+            put(state, i, 27, x.b_low)
+            put(state, i, 30, x.p_low)
+            put(state, i, 33, x.pi_low)
 
     @wp.func
     def at_step(x: State, k: int, h: wp.float64):
@@ -183,7 +193,7 @@ def make_advance(spec):
             put(out, i, o, x.b)
             o += 3
             if wp.static(compensated):
-                put(out, i, o, x.low)
+                put(out, i, o, x.b_low)
                 o += 3
         if wp.static("attitude" in fields):
             put(out, i, o, x.R0)

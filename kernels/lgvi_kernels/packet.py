@@ -5,7 +5,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lanes import add, dot, mul, ones, positive, sub, vec3  # noqa: F401
-from lgvi_kernels.place import at_origin, choose_place
+from lgvi_kernels.sums import choose_low, without_low
 
 NON_FINITE = 3
 
@@ -33,22 +33,23 @@ def choose(test: Any, yes: Any, no: Any):
     no.R0 = positive(test, yes.R0, no.R0)
     no.R1 = positive(test, yes.R1, no.R1)
     no.R2 = positive(test, yes.R2, no.R2)
+    no.b = positive(test, yes.b, no.b)
     no.p = positive(test, yes.p, no.p)
     no.pi = positive(test, yes.pi, no.pi)
-    return choose_place(test, yes, no)
+    return choose_low(test, yes, no)
 
 
 @wp.func
 def at_rest(x: Any):
     """The same vehicles at rest at the origin: where frozen lanes wait, so that they raise no more alarms."""
     zero = ones(x.b.x) - ones(x.b.x)
-    x = at_origin(x)
+    x.b = vec3(zero, zero, zero)
     x.p = x.b
     x.pi = x.b
     x.R0 = vec3(ones(zero), zero, zero)
     x.R1 = vec3(zero, ones(zero), zero)
     x.R2 = vec3(zero, zero, ones(zero))
-    return x
+    return without_low(x)
 
 
 @wp.func

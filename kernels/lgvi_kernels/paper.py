@@ -18,8 +18,8 @@ from lgvi_kernels.lanes import (  # noqa: F401
     positive,
     sub,
 )
-from lgvi_kernels.place import moved
 from lgvi_kernels.submaps import kicked, look
+from lgvi_kernels.sums import moved
 from lgvi_kernels.water import acceleration_wrench
 
 FORCES_NOT_CONVERGED = 4

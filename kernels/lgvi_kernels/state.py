@@ -33,12 +33,14 @@ def state_struct(width, real, compensated=False):
     """b [m, inertial], the rows of R (body to inertial), p and pi (momenta / max J) in the kernel's body axes.
 
     time [s] and step are those of the sub-map in turn; they are kept only where a law looks at them.
-    compensated: low is the part of the position that b has no digits for (see place).
+    compensated: each vector has a low part, what it has no digits for (see sums).
     """
     Lane3, Alarm = lane3(width, real), alarm_struct(width, real)
     rows = {"R0": Lane3, "R1": Lane3, "R2": Lane3}
     fields = {"b": Lane3, **rows, "p": Lane3, "pi": Lane3, "alarm": Alarm, "time": wp.float64, "step": wp.int32}
-    return struct("CompensatedState", **fields, low=Lane3) if compensated else struct("State", **fields)
+    if compensated:
+        return struct("CompensatedState", **fields, **{f"{name}_low": Lane3 for name in ("b", *rows, "p", "pi")})
+    return struct("State", **fields)
 
 
 @functools.cache

@@ -9,8 +9,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lanes import add, cross, dot, mul, vec3  # noqa: F401
-from lgvi_kernels.place import moved, moved_from, place
-from lgvi_kernels.rotation import transpose_apply
+from lgvi_kernels.sums import moved, moved_from, place, pushed, turned, twisted
 from lgvi_kernels.water import acceleration_wrench
 
 
@@ -59,8 +58,7 @@ def make_Ab(velocity, timed):
 @wp.func
 def Ap(x: Any, c: Any, h: Any):
     """The Munk moment of eq. (14) and (19): pi <- pi + h p x nu. Absent for M = m I, where it is zero."""
-    x.pi = x.pi + h * cross(x.p, c.inertia.anisotropy * x.p)
-    return x
+    return twisted(x, h * cross(x.p, c.inertia.anisotropy * x.p))
 
 
 def make_T(timed):
@@ -72,8 +70,7 @@ def make_T(timed):
         """Ab and Ap together: the exact flow of the kinetic energy p.M^-1 p / 2."""
         d = h * (c.inertia.anisotropy * x.p)
         x = moved(x, rotate(x, (h * c.inertia.mean) * x.p + d))
-        x.pi = x.pi + cross(x.p, d)
-        return passed(x, h)
+        return passed(twisted(x, cross(x.p, d)), h)
 
     return T
 
@@ -86,12 +83,7 @@ def make_D(Rotation, solve):
         """Eq. (10), (11): F = S(h pi), R <- R F; of (13), (14): p <- F^T p, pi <- F^T pi. Adjoint: (19)-(22)."""
         F, alarm = solve(Rotation(), x.alarm, h * x.pi, c.inertia.J, c.tolerance)
         x.alarm = alarm
-        x.p = transpose_apply(F, x.p)
-        x.pi = transpose_apply(F, x.pi)
-        x.R0 = transpose_apply(F, x.R0)
-        x.R1 = transpose_apply(F, x.R1)
-        x.R2 = transpose_apply(F, x.R2)
-        return x
+        return turned(x, F)
 
     return D
 
@@ -117,9 +109,7 @@ def look(view: Any, x: Any, c: Any, h: Any):
 def kicked(x: Any, c: Any, h: Any, w: Any):
     """p <- p + h f, pi <- pi + h m."""
     k = h * c.inertia.inverse_scale
-    x.p = x.p + k * w.force
-    x.pi = x.pi + k * w.torque
-    return x
+    return twisted(pushed(x, k * w.force), k * w.torque)
 
 
 def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):

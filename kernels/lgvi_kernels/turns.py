@@ -9,7 +9,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lanes import add, div, mul, neg, ones, sub, vec3  # noqa: F401
-from lgvi_kernels.place import moved
+from lgvi_kernels.sums import moved
 
 
 @wp.func

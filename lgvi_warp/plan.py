@@ -86,8 +86,10 @@ class Plan:
         faults.raise_if_any()
         object.__setattr__(self, "model", make_model(self.ensemble, self.method, self.grid.h, LAWS, STOPS))
         if self.width is None:
-            # The turns of psi_x follow one another; the implicit step V of damping laws fills the registers by itself.
-            chained = self.method.turns and "dense" not in self.model.parts
+            # The turns of psi_x follow one another; the implicit step V of damping laws fills the registers by itself, and so
+            # do compensated sums.
+            full = "dense" in self.model.parts or self.dtype == "float32_compensated"
+            chained = self.method.turns and not full
             object.__setattr__(self, "width", default_width(self.dtype, chained=chained))
         object.__setattr__(self, "spec", self._spec())
         with self._laws_compile():

@@ -149,7 +149,8 @@ def make_method(spec):
         if letter[0] == "R":
             axes = [int(other[1]) - 1 for other, _ in (*spec.maps[i:], *spec.maps[:i]) if other[0] == "R"]
             following = next((axis for axis in axes if axis != axes[0]), axes[0])
-            maps.append((turns.make_turn(axes[0], pitched[axes[0]], following), coefficient))
+            turn = turns.make_turn(axes[0], pitched[axes[0]], following, spec.compensated)
+            maps.append((turn, coefficient))
         else:
             maps.append((letters[letter], coefficient))
     step = fold(tuple(maps))

@@ -28,6 +28,34 @@ def carried_turn(v: Any, low: Any, F: Any):
     return carried(v, low, v.x * F.row0 + v.y * F.row1 + v.z * F.row2)
 
 
+@wp.func
+def with_turned(
+    x: Any,
+    p: Any,
+    p_low: Any,
+    pi: Any,
+    pi_low: Any,
+    R0: Any,
+    R0_low: Any,
+    R1: Any,
+    R1_low: Any,
+    R2: Any,
+    R2_low: Any,
+):
+    """The state with these p, pi and R."""
+    x.p = p
+    x.p_low = p_low
+    x.pi = pi
+    x.pi_low = pi_low
+    x.R0 = R0
+    x.R0_low = R0_low
+    x.R1 = R1
+    x.R1_low = R1_low
+    x.R2 = R2
+    x.R2_low = R2_low
+    return x
+
+
 for _width in WIDTHS:
     for _real in REALS:
         _State, _L, _L3 = state_struct(_width, _real), lane(_width, _real), lane3(_width, _real)
@@ -126,17 +154,7 @@ for _width in WIDTHS:
         R0, R0_low = carried_turn(x.R0, x.R0_low, F)
         R1, R1_low = carried_turn(x.R1, x.R1_low, F)
         R2, R2_low = carried_turn(x.R2, x.R2_low, F)
-        x.p = p
-        x.pi = pi
-        x.R0 = R0
-        x.R1 = R1
-        x.R2 = R2
-        x.p_low = p_low
-        x.pi_low = pi_low
-        x.R0_low = R0_low
-        x.R1_low = R1_low
-        x.R2_low = R2_low
-        return x
+        return with_turned(x, p, p_low, pi, pi_low, R0, R0_low, R1, R1_low, R2, R2_low)
 
     @wp.func
     def choose_low(test: _L, yes: _State, no: _State):

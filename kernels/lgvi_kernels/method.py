@@ -100,7 +100,11 @@ def make_method(spec):
     prepare, exact = None, None
     if spec.drag:
         by_axes = laws[0] is drag
-        prepare, exact = drag.make_E(spec.drag) if by_axes else drag_directions.make_E(spec.drag, velocities_of_forces)
+        prepare, exact = (
+            drag.make_E(spec.drag, spec.compensated)
+            if by_axes
+            else drag_directions.make_E(spec.drag, velocities_of_forces)
+        )
 
     @wp.func
     def E(x: Any, c: Any, h: Any):
@@ -137,7 +141,7 @@ def make_method(spec):
     U12, U13, U23, *pitched = spec.coupling
     for letter in used:
         if letter[0] == "h":
-            letters[letter] = turns.make_hop(int(letter[1]) - 1, int(letter[2]) - 1, U12, U13, U23)
+            letters[letter] = turns.make_hop(int(letter[1]) - 1, int(letter[2]) - 1, U12, U13, U23, spec.compensated)
     if spec.averages is not None:
         force, potential = superpose(laws, "force"), superpose(laws, "potential")
         forces, current = make_forces(View, Wrench, Flow, Damping, force, damping, flow, varies)

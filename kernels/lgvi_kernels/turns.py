@@ -9,7 +9,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lanes import add, div, mul, neg, ones, sub, vec3  # noqa: F401
-from lgvi_kernels.sums import carried, moved, with_turned
+from lgvi_kernels.sums import carried, moved, twisted, with_turned
 
 
 @wp.func
@@ -137,7 +137,7 @@ def slide_z(pi: Any, p: Any, length: Any):
 AXES = ((component_x, slide_x), (component_y, slide_y), (component_z, slide_z))
 
 
-def make_shift(axis):
+def make_shift(axis, compensated):
     """The origin moves by a length along an axis of the body."""
     component, slide = AXES[axis]
 
@@ -145,13 +145,13 @@ def make_shift(axis):
     def shift(x: Any, length: Any):
         """b <- b + length R e_i, pi <- pi - (length e_i) x p."""
         x = moved(x, length * vec3(component(x.R0), component(x.R1), component(x.R2)))
-        x.pi = slide(x.pi, x.p, length)
+        if wp.static(compensated):
+            x = twisted(x, slide(x.pi - x.pi, x.p, length))
+        else:
+            x.pi = slide(x.pi, x.p, length)
         return x
 
     return shift
-
-
-SHIFTS = (make_shift(0), make_shift(1), make_shift(2))
 
 
 @wp.func
@@ -160,7 +160,7 @@ def tangent(y: Any, third: Any):
     return y + (y * y) * (third * y)
 
 
-def make_turn(axis, pitched, following, compensated=False):
+def make_turn(axis, pitched, following, compensated):
     """R_i: turn about one axis, for `pitched` with a slide along it (a screw); following: the axis of the next turn.
 
     A step is one chain of turns, each waiting for the momentum about its axis from the one before: what decides its time
@@ -168,7 +168,7 @@ def make_turn(axis, pitched, following, compensated=False):
     """
     component, _ = AXES[axis]
     turn = make_turn_of_state(axis, following, compensated)
-    shift = SHIFTS[axis]
+    shift = make_shift(axis, compensated)
 
     @wp.func
     def R_i(x: Any, c: Any, h: Any):
@@ -201,11 +201,11 @@ def make_turn(axis, pitched, following, compensated=False):
     return R_i
 
 
-def make_hop(here, there, U12, U13, U23):
+def make_hop(here, there, U12, U13, U23, compensated):
     """The origin moves from that of axis `here` to that of axis `there` (0, 1, 2), by the elements of U that are not 0."""
     sign = 1.0 if there > here else -1.0
     first = (here, there) in ((0, 1), (1, 0))
-    along_x, along_y, along_z = SHIFTS
+    along_x, along_y, along_z = (make_shift(axis, compensated) for axis in range(3))
 
     @wp.func
     def hop(x: Any, c: Any, h: Any):

@@ -13,6 +13,7 @@ import warp as wp
 from lgvi_kernels.lanes import absolute, add, cross, div, lane3, mul, ones, sub, vec3  # noqa: F401
 from lgvi_kernels.matrix3 import apply, transpose_times
 from lgvi_kernels.state import matrix3_struct, struct
+from lgvi_kernels.sums import pushed, twisted
 from lgvi_kernels.terms.drag import PARTS
 from lgvi_kernels.terms.drag import make_E as make_exact
 from lgvi_kernels.turns import component_x, component_y, component_z
@@ -137,8 +138,7 @@ def make_E(parts, velocities):
             du = du + d
         impulse = p.mass_force * vec3(du, dv, dw)
         moment = p.mass_torque * vec3(dp, dq, dr)
-        x.p = x.p + transpose_times(p.turn, impulse)
-        x.pi = x.pi + transpose_times(p.turn, moment - cross(p.origin, impulse))
-        return x
+        x = pushed(x, transpose_times(p.turn, impulse))
+        return twisted(x, transpose_times(p.turn, moment - cross(p.origin, impulse)))
 
     return prepare, E

@@ -22,9 +22,9 @@ from lgvi_kernels.lanes import (
     vec3,
 )
 from lgvi_kernels.method import make_method
-from lgvi_kernels.packet import at_rest, choose, failures, put, renormalise
+from lgvi_kernels.packet import failures, put, renormalise
 from lgvi_kernels.state import alarm_struct, inertia_struct, state_struct, struct, view_struct
-from lgvi_kernels.sums import settled
+from lgvi_kernels.sums import at_rest, choose, settled
 from lgvi_kernels.terms import drag
 
 # Steps between two looks at the alarms. A chunk with an alarm is repeated one step at a time by the same code.

@@ -5,7 +5,6 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lanes import add, dot, mul, ones, positive, sub, vec3  # noqa: F401
-from lgvi_kernels.sums import choose_low, without_low
 
 NON_FINITE = 3
 
@@ -28,19 +27,19 @@ def renormalise(x: Any, h: Any):
 
 
 @wp.func
-def choose(test: Any, yes: Any, no: Any):
-    """`yes` in the lanes where test > 0: all of the state but the alarm."""
+def choose_vectors(test: Any, yes: Any, no: Any):
+    """`yes` in the lanes where test > 0: all of the state but the alarm and low parts."""
     no.R0 = positive(test, yes.R0, no.R0)
     no.R1 = positive(test, yes.R1, no.R1)
     no.R2 = positive(test, yes.R2, no.R2)
     no.b = positive(test, yes.b, no.b)
     no.p = positive(test, yes.p, no.p)
     no.pi = positive(test, yes.pi, no.pi)
-    return choose_low(test, yes, no)
+    return no
 
 
 @wp.func
-def at_rest(x: Any):
+def vectors_at_rest(x: Any):
     """The same vehicles at rest at the origin: where frozen lanes wait, so that they raise no more alarms."""
     zero = ones(x.b.x) - ones(x.b.x)
     x.b = vec3(zero, zero, zero)
@@ -49,7 +48,7 @@ def at_rest(x: Any):
     x.R0 = vec3(ones(zero), zero, zero)
     x.R1 = vec3(zero, ones(zero), zero)
     x.R2 = vec3(zero, zero, ones(zero))
-    return without_low(x)
+    return x
 
 
 @wp.func

@@ -10,6 +10,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lanes import REALS, WIDTHS, add, lane, lane3, mul, ones, positive, sub, vec3  # noqa: F401
+from lgvi_kernels.packet import choose_vectors, vectors_at_rest
 from lgvi_kernels.rotation import transpose_apply
 from lgvi_kernels.state import state_struct
 
@@ -100,14 +101,14 @@ for _width in WIDTHS:
             return x
 
         @wp.func
-        def choose_low(test: _L, yes: _State, no: _State):
-            """The low parts of `yes` in the lanes where test > 0: here there are none."""
-            return no
+        def choose(test: _L, yes: _State, no: _State):
+            """`yes` in the lanes where test > 0: all of the state but the alarm."""
+            return choose_vectors(test, yes, no)
 
         @wp.func
-        def without_low(x: _State):
-            """The low parts set to 0."""
-            return x
+        def at_rest(x: _State):
+            """The same vehicles at rest at the origin."""
+            return vectors_at_rest(x)
 
     _State, _L, _L3 = state_struct(_width, wp.float32, True), lane(_width, wp.float32), lane3(_width, wp.float32)
 
@@ -157,7 +158,8 @@ for _width in WIDTHS:
         return with_turned(x, p, p_low, pi, pi_low, R0, R0_low, R1, R1_low, R2, R2_low)
 
     @wp.func
-    def choose_low(test: _L, yes: _State, no: _State):
+    def choose(test: _L, yes: _State, no: _State):
+        no = choose_vectors(test, yes, no)
         no.R0_low = positive(test, yes.R0_low, no.R0_low)
         no.R1_low = positive(test, yes.R1_low, no.R1_low)
         no.R2_low = positive(test, yes.R2_low, no.R2_low)
@@ -167,9 +169,9 @@ for _width in WIDTHS:
         return no
 
     @wp.func
-    def without_low(x: _State):
-        zero = ones(x.b.x) - ones(x.b.x)
-        none = vec3(zero, zero, zero)
+    def at_rest(x: _State):
+        x = vectors_at_rest(x)
+        none = x.b
         x.R0_low = none
         x.R1_low = none
         x.R2_low = none

@@ -73,7 +73,7 @@ def make_E(parts, compensated):
         """v (1 - loss) / (1 + gain |v|) - v per axis, without a difference of large numbers."""
         one = vec3(ones(v.x), ones(v.x), ones(v.x))
         g = gain * vec3(absolute(v.x), absolute(v.y), absolute(v.z))
-        return ((g + loss) / (one + g)) * (v - v - v)
+        return v.x.dtype(-1.0) * (((g + loss) / (one + g)) * v)
 
     @wp.func
     def E_of_sums(x: Any, e: Any, c: Any):

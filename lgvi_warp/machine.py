@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-# What a run's dtype may be -> the type of the kernel's numbers. Compensated: the position in two numbers, b + low.
+# What a run's dtype may be -> the type of the kernel's numbers. Compensated: a state of sums of two numbers.
 DTYPES = {"float64": "float64", "float32": "float32", "float32_compensated": "float32"}
 
 REGISTER_BYTES = {"avx512": 64, "avx2": 32, "other": 16}

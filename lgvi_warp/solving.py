@@ -48,8 +48,8 @@ def solve(
 
     fleet: an Ensemble, or a Scene for its own ensemble (one vehicle if it has none).
     method: a name or a Method. h, t1: step and end [s]. dtype: "float64", "float32", or "float32_compensated", which
-    keeps the position in two numbers (far from the origin, many short steps). What is left out is taken from the scene's
-    [run] section (method "psi_s" and float64 where it says nothing).
+    keeps each number of the state as a sum of two (many short steps, far from the origin). What is left out is taken from
+    the scene's [run] section (method "psi_s" and float64 where it says nothing).
     save: what to keep (default: every [run] save_every of the scene, else the start and the end).
     threads: default all cores. width: vehicles per packet, default from the CPU.
     checks: "safe" gives each member a status and freezes it when it fails; "none" leaves that code out.

@@ -53,7 +53,7 @@ def parser() -> argparse.ArgumentParser:
     run.add_argument("--duration", metavar="S", help="end of the run [s]")
     run.add_argument("--members", metavar="N", help="number of vehicles")
     run.add_argument("--seed", metavar="N", help="seed of what varies")
-    run.add_argument("--dtype", help="float64 or float32")
+    run.add_argument("--dtype", help="float64, float32, or float32_compensated: sums of two float32")
     run.add_argument("--threads", metavar="N", type=int, help="threads (default: all cores)")
     run.add_argument("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
     run.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="replace a key of the scene file")

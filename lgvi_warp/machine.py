@@ -11,6 +11,9 @@ from typing import Any
 
 import numpy as np
 
+# What a run's dtype may be -> the type of the kernel's numbers. Compensated: a state of sums of two numbers.
+DTYPES = {"float64": "float64", "float32": "float32", "float32_compensated": "float32"}
+
 REGISTER_BYTES = {"avx512": 64, "avx2": 32, "other": 16}
 
 
@@ -30,7 +33,7 @@ def default_width(dtype: str, *, chained: bool = False) -> int:
     (AVX-512), so that one vehicle's operation is made while another's waits.
     """
     registers = 2 if chained and simd() == "avx512" else 1
-    return registers * REGISTER_BYTES[simd()] // np.dtype(dtype).itemsize
+    return registers * REGISTER_BYTES[simd()] // np.dtype(DTYPES[dtype]).itemsize
 
 
 def thread_count() -> int:

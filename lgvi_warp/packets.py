@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from lgvi_kernels.advance import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS
+from lgvi_kernels.advance import PACE_FIELDS, STATE_FIELDS
 from lgvi_kernels.collocation import SLOPE_FIELDS
 from lgvi_kernels.lanes import int_lane
 from lgvi_kernels.terms import LAWS
 from lgvi_warp import inertia, model, modified_inertia, notation, vehicle
 from lgvi_warp.ensemble import Ensemble, Members
 from lgvi_warp.events import Event
+from lgvi_warp.machine import DTYPES
 from lgvi_warp.plan import Plan, build_lock
 from lgvi_warp.status import Status
 from lgvi_warp.terms.base import Packed, Setting
@@ -76,10 +77,10 @@ class Packets:
         self.failed_size = wp.zeros(self.count, dtype=Lane, device="cpu")
 
     def _lanes(self, values: np.ndarray) -> np.ndarray:
-        """Rows (1 or m, d) as (1 or packets, d, width) of the plan's dtype."""
+        """Rows (1 or m, d) as (1 or packets, d, width) of the kernel's numbers."""
         width = self.plan.spec.width
         packed = np.repeat(values[:, :, None], width, axis=2) if len(values) == 1 else pack(values, width)
-        return packed.astype(self.plan.dtype)
+        return packed.astype(DTYPES[self.plan.dtype])
 
     def _inertia(self) -> np.ndarray:
         frame, parts = self.frame, self.plan.spec.parts
@@ -194,7 +195,7 @@ class Packets:
 
     def _lanes_each(self, values: np.ndarray) -> np.ndarray:
         """Rows (m, d) as (packets, d, width), one entry a packet even for one member."""
-        return pack(values, self.plan.spec.width).astype(self.plan.dtype)
+        return pack(values, self.plan.spec.width).astype(DTYPES[self.plan.dtype])
 
     def _events(self, setting: Setting) -> np.ndarray:
         packed = [one.packed(Ensemble.own(one, setting.parameters), setting) for one, _ in self.plan.model.events]
@@ -217,10 +218,13 @@ class Packets:
             [notation.rotate_into(frame.Q, nu), notation.rotate_into(frame.Q, m.angular_velocity)], 1
         )
         momenta = np.einsum("nij,nj->ni", np.broadcast_to(frame.inertia_at(frame.E), (n, 6, 6)), twist)
-        rows = np.zeros((n, STATE_FIELDS + (PACE_FIELDS if self.plan.method.adaptive else 0)))
+        rows = np.zeros((n, self.plan.spec.state_fields))
         rows[:, :9] = R.reshape(-1, 9)
         rows[:, 9:12] = m.position + notation.rotate_out(m.attitude, np.broadcast_to(frame.origin, (n, 3)))
-        rows[:, 12:18] = momenta / self.scale[:, None]
+        rows[:, 12:STATE_FIELDS] = momenta / self.scale[:, None]
+        if self.plan.spec.compensated:
+            low = rows[:, :STATE_FIELDS] - rows[:, :STATE_FIELDS].astype(np.float32)
+            rows[:, STATE_FIELDS:] = np.where(np.isfinite(low), low, 0.0)
         return self._lanes_each(rows)
 
     def _water_at_start(self) -> np.ndarray:
@@ -237,7 +241,7 @@ class Packets:
         """Make the steps k0 to k1. Returns the samples due then, (s1 - s0, packets * width, numbers of a sample)."""
         plan = self.plan
         s0, s1 = plan.due(k0, k1)
-        numbers = sum(SAMPLE_FIELDS[name] for name in plan.spec.fields)
+        numbers = sum(plan.spec.sample_fields.values())
         width = plan.spec.width
         out = wp.empty((self.count, max(1, (s1 - s0) * numbers)), dtype=plan.advance.Lane, device="cpu")
         real, dtype = plan.spec.real, plan.dtype

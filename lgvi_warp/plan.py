@@ -22,12 +22,11 @@ from lgvi_warp import warp_setup
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.gauss import gauss
-from lgvi_warp.machine import default_width
+from lgvi_warp.machine import DTYPES, default_width
 from lgvi_warp.method import KINDS, Method
 from lgvi_warp.model import Model, make_model
 from lgvi_warp.saveat import TimeGrid
 
-DTYPES = ("float64", "float32")
 CHECKS = ("none", "safe")
 
 # One launch advances at most this many vehicle-steps and samples: so progress moves, an interrupt is heard, and the
@@ -86,11 +85,16 @@ class Plan:
             faults.choice("width", self.width, WIDTHS)
         if self.checks == "none" and self.ensemble.scene.events:
             faults.add("checks", self.checks, "leaves events unseen", 'use checks="safe", or drop the events')
+        if self.dtype == "float32_compensated" and (self.method.tableau or self.method.gauss or self.method.two_part):
+            what = f"sums up what a method of sub-maps changes, which {self.method.name} is not"
+            faults.add("dtype", self.dtype, what, "use float64, or psi_s, psi_x and their compositions")
         faults.raise_if_any()
         object.__setattr__(self, "model", make_model(self.ensemble, self.method, self.grid.h, LAWS, STOPS))
         if self.width is None:
-            # The turns of psi_x follow one another; the implicit step V of damping laws fills the registers by itself.
-            chained = self.method.turns and "dense" not in self.model.parts
+            # The turns of psi_x follow one another; the implicit step V of damping laws fills the registers by itself, and so
+            # do compensated sums.
+            full = "dense" in self.model.parts or self.dtype == "float32_compensated"
+            chained = self.method.turns and not full
             object.__setattr__(self, "width", default_width(self.dtype, chained=chained))
         object.__setattr__(self, "spec", self._spec())
         with self._laws_compile():
@@ -100,7 +104,7 @@ class Plan:
         model = self.model
         return Spec(
             width=self.width,
-            real=wp.float64 if self.dtype == "float64" else wp.float32,
+            real=wp.float64 if DTYPES[self.dtype] == "float64" else wp.float32,
             maps=model.program,
             lead=model.lead,
             laws=tuple(module for _, module in model.laws),
@@ -123,6 +127,7 @@ class Plan:
             gauss=gauss(self.method.gauss) if self.method.gauss else (),
             lead_time=self.lengths[1][-1],
             explicit=self._explicit(),
+            compensated=self.dtype == "float32_compensated",
         )
 
     def _explicit(self) -> Explicit | None:
@@ -189,7 +194,7 @@ class Plan:
     def segments(self, count: int) -> Iterator[tuple[int, int]]:
         """(k0, k1): launches from step k0 to step k1, for a block of `count` members."""
         due = self.grid.sample_steps
-        per_sample = sum(SAMPLE_FIELDS[name] for name in self.spec.fields) * count * np.dtype(self.dtype).itemsize
+        per_sample = sum(self.spec.sample_fields.values()) * count * np.dtype(DTYPES[self.dtype]).itemsize
         most_samples = max(1, SEGMENT_SAMPLE_BYTES // max(per_sample, 1))
         most_steps = max(CHUNK, SEGMENT_VEHICLE_STEPS // count // CHUNK * CHUNK)
         k = 0

@@ -40,6 +40,8 @@ MEANINGS = {
 class Result:
     """Samples of n members at k times; the initial state is sample 0. Arrays are float64 or float32, as asked.
 
+    With float32_compensated all are float32 but the position, float64, which nothing of its two numbers is lost in.
+
     time: (k,) [s]. samples: the fields that were kept, by name (also attributes: position (k, n, 3) [m, inertial],
     attitude (k, n, 3, 3) body to inertial, velocity (k, n, 3) [m/s, body], angular_velocity (k, n, 3) [rad/s, body]).
     status: (n,), see Status; failure_time: (n,) [s], the time of the last good state, for an event its own

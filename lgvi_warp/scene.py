@@ -11,6 +11,7 @@ import numpy as np
 
 from lgvi_warp import events, notation, terms
 from lgvi_warp.errors import Faults
+from lgvi_warp.machine import DTYPES
 from lgvi_warp.vehicle import Vehicle
 
 ATTITUDES = ("attitude", "rotation_vector", "quaternion_wxyz", "euler_deg")
@@ -141,7 +142,7 @@ class RunSettings:
         for name in ("step", "duration", "save_every"):
             if getattr(self, name) is not None:
                 faults.positive(name, getattr(self, name))
-        faults.choice("dtype", self.dtype, ("float64", "float32"))
+        faults.choice("dtype", self.dtype, DTYPES)
         if not isinstance(self.method, str):
             faults.add("method", self.method, "is not a text", 'give the name of a method, such as "psi_s"')
         faults.raise_if_any()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -47,7 +47,8 @@ def solve(
     """Advance every member of the fleet from t = 0 to t1 and keep the samples asked for.
 
     fleet: an Ensemble, or a Scene for its own ensemble (one vehicle if it has none).
-    method: a name or a Method. h, t1: step and end [s]. dtype: "float64" or "float32". What is left out is taken from
+    method: a name or a Method. h, t1: step and end [s]. dtype: "float64", "float32", or "float32_compensated", which
+    keeps each number of the state as a sum of two (many short steps, far from the origin). What is left out is taken from
     the scene's [run] section (method "psi_s" and float64 where it says nothing).
     save: what to keep (default: every [run] save_every of the scene, else the start and the end).
     threads: default all cores. width: vehicles per packet, default from the CPU.
@@ -152,7 +153,10 @@ def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None 
     """Run every block of the plan and gather the result."""
     compile_seconds = plan.compile()
     n, k = plan.ensemble.members, len(plan.grid.times)
-    samples = {name: np.empty((k, n, *SHAPES[name]), plan.dtype) for name in plan.spec.fields}
+    real = machine.DTYPES[plan.dtype]
+    samples = {name: np.empty((k, n, *SHAPES[name]), real) for name in plan.spec.fields}
+    if plan.spec.compensated and "position" in samples:
+        samples["position"] = np.empty((k, n, 3))
     status, failed_step, failed_size = np.zeros(n, np.uint8), np.zeros(n, np.int64), np.zeros(n)
     chosen = np.zeros((n, 2 if plan.method.adaptive else 0), np.int64)
     counter = _Progress(n * plan.grid.steps, progress)
@@ -169,7 +173,7 @@ def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None 
             if stop.is_set():
                 return
             raw = packets.advance(k0, k1)[:, : block.count]
-            _store(samples, slice(*plan.due(k0, k1)), at, unpacked(plan.spec.fields, raw, packets.frame))
+            _store(samples, slice(*plan.due(k0, k1)), at, unpacked(plan.spec.sample_fields, raw, packets.frame))
             counter.add(block.count * (k1 - k0))
         outcome = packets.outcome()
         status[at], failed_step[at], failed_size[at] = outcome.status, outcome.failed_step, outcome.failed_size
@@ -208,14 +212,19 @@ def _store(samples: dict[str, np.ndarray], when: slice, at: slice, parts: dict[s
         samples[name][when, at] = values
 
 
-def unpacked(fields: tuple[str, ...], raw: np.ndarray, frame: Frame) -> dict[str, np.ndarray]:
-    """Raw samples (samples, members, numbers) as fields, from the kernel's origin and axes to the user's."""
+def unpacked(fields: Mapping[str, int], raw: np.ndarray, frame: Frame) -> dict[str, np.ndarray]:
+    """Raw samples (samples, members, numbers) as fields, from the kernel's origin and axes to the user's.
+
+    fields: numbers of each field; twice as many as it has for a sum of two numbers, which is made in float64.
+    """
     parts: dict[str, np.ndarray] = {}
     column = 0
-    for name in fields:
+    for name, size in fields.items():
         shape = SHAPES[name]
-        size = int(np.prod(shape))
-        parts[name] = raw[..., column : column + size].reshape(*raw.shape[:2], *shape)
+        values = raw[..., column : column + size]
+        if size == 2 * int(np.prod(shape)):
+            values = np.add(*np.split(values, 2, axis=-1), dtype=np.float64)
+        parts[name] = values.reshape(*raw.shape[:2], *shape)
         column += size
     if not np.array_equal(frame.Q, np.broadcast_to(np.eye(3), frame.Q.shape)):
         turns = {"attitude": lambda R: R @ np.swapaxes(frame.Q, -1, -2)}

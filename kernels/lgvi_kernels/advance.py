@@ -22,14 +22,16 @@ from lgvi_kernels.lanes import (
     vec3,
 )
 from lgvi_kernels.method import make_method
-from lgvi_kernels.packet import at_rest, choose, failures, put, renormalise
+from lgvi_kernels.packet import failures, put, renormalise
 from lgvi_kernels.state import alarm_struct, inertia_struct, state_struct, struct, view_struct
+from lgvi_kernels.sums import at_rest, choose, settled
 from lgvi_kernels.terms import drag
 
 # Steps between two looks at the alarms. A chunk with an alarm is repeated one step at a time by the same code.
 CHUNK = 128
 
-# Numbers of a packet's state in `state[packet, field]`: R row by row, b, p, pi; and of its pace (see pace_struct).
+# Numbers of a packet's state in `state[packet, field]`: R row by row, b, p, pi; with compensated sums as many low parts
+# more, or those of its pace (see pace_struct).
 STATE_FIELDS = 18
 PACE_FIELDS = 4
 
@@ -48,7 +50,7 @@ class Spec(NamedTuple):
     "varying"; timed: whether a law looks at the time; averages: alpha and beta of (15), (16), or None for conservative
     maps; composed: more than one stage a step, or one, whose constants then are made once for all steps; paired: a stage is
     two halves, each with a length of its own; gauss: numbers of a collocation method, or none; lead_time: the part of a step
-    that the lead drifts for; explicit: an explicit method, which has no maps.
+    that the lead drifts for; explicit: an explicit method, which has no maps; compensated: sums of two float32 (see sums).
     """
 
     width: int
@@ -75,6 +77,21 @@ class Spec(NamedTuple):
     gauss: tuple = ()
     lead_time: float = 0.0
     explicit: Any = None
+    compensated: bool = False
+
+    @property
+    def state_fields(self) -> int:
+        """Numbers of a packet's state."""
+        paced = self.explicit is not None and self.explicit.adaptive
+        return STATE_FIELDS * (1 + self.compensated) + PACE_FIELDS * paced
+
+    @property
+    def sample_fields(self) -> dict[str, int]:
+        """Field -> numbers per sample, in the order they are written; a compensated position is b and then its low part."""
+        numbers = {name: SAMPLE_FIELDS[name] for name in self.fields}
+        if self.compensated and "position" in numbers:
+            numbers["position"] = 6
+        return numbers
 
 
 class Advance(NamedTuple):
@@ -92,7 +109,11 @@ def make_advance(spec):
     """Build (without compiling) the kernel for this Spec."""
     width, real, checked = spec.width, spec.real, spec.checked
     Lane, Ints = lane(width, real), int_lane(width)
-    State, Alarm, View = (make(width, real) for make in (state_struct, alarm_struct, view_struct))
+    State, Alarm, View = (
+        state_struct(width, real, spec.compensated),
+        alarm_struct(width, real),
+        view_struct(width, real),
+    )
     Inertia = inertia_struct(width, real, spec.mass, spec.parts)
     Params, Events = params_of(spec.laws, width, real), params_of(spec.events, width, real)
     DragFlow = drag.flow_struct(width, real)
@@ -121,8 +142,8 @@ def make_advance(spec):
     water_velocity = method.water_velocity
     renormalised, composed, paired = real == wp.float32, spec.composed, spec.paired
     # A packet that chooses its steps goes on with them in the next launch, and waits for no frozen lane.
-    paced = spec.explicit is not None and spec.explicit.adaptive
-    fields, per_sample = spec.fields, sum(SAMPLE_FIELDS[name] for name in spec.fields)
+    paced, compensated = spec.explicit is not None and spec.explicit.adaptive, spec.compensated
+    fields, per_sample = spec.fields, sum(spec.sample_fields.values())
 
     @wp.func
     def read(state: wp.array2d(dtype=Lane), i: int):
@@ -138,6 +159,13 @@ def make_advance(spec):
             x.pace.before = state[i, 19][0]
             x.pace.made = state[i, 20][0]
             x.pace.tried = state[i, 21][0]
+        if wp.static(compensated):
+            x.R0_low = vec3(state[i, 18], state[i, 19], state[i, 20])
+            x.R1_low = vec3(state[i, 21], state[i, 22], state[i, 23])
+            x.R2_low = vec3(state[i, 24], state[i, 25], state[i, 26])
+            x.b_low = vec3(state[i, 27], state[i, 28], state[i, 29])
+            x.p_low = vec3(state[i, 30], state[i, 31], state[i, 32])
+            x.pi_low = vec3(state[i, 33], state[i, 34], state[i, 35])
         return x
 
     @wp.func
@@ -154,6 +182,13 @@ def make_advance(spec):
             state[i, 19] = x.pace.before * one
             state[i, 20] = x.pace.made * one
             state[i, 21] = x.pace.tried * one
+        if wp.static(compensated):
+            put(state, i, 18, x.R0_low)
+            put(state, i, 21, x.R1_low)
+            put(state, i, 24, x.R2_low)
+            put(state, i, 27, x.b_low)
+            put(state, i, 30, x.p_low)
+            put(state, i, 33, x.pi_low)
 
     @wp.func
     def at_step(x: State, k: int, h: wp.float64):
@@ -177,6 +212,9 @@ def make_advance(spec):
         if wp.static("position" in fields):
             put(out, i, o, x.b)
             o += 3
+            if wp.static(compensated):
+                put(out, i, o, x.b_low)
+                o += 3
         if wp.static("attitude" in fields):
             put(out, i, o, x.R0)
             put(out, i, o + 3, x.R1)
@@ -286,6 +324,8 @@ def make_advance(spec):
                     x = step(x, c, first_h)
                     if wp.static(has_lead):
                         x = lead(x, c, opening + opening)
+                if wp.static(compensated):
+                    x = settled(x)
                 if wp.static(watched):
                     x = watch(x, c, real(h))
             repeat = int(0)

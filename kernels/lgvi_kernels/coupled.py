@@ -10,8 +10,9 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lanes import add, any_positive, cross, div, dot, mul, neg, ones, positive, sub, vec3  # noqa: F401
-from lgvi_kernels.rotation import rodrigues, solve3, transpose_apply
+from lgvi_kernels.rotation import rodrigues, solve3
 from lgvi_kernels.solve import NOT_CONVERGED
+from lgvi_kernels.sums import moved, turned, twisted
 
 # Newton's method gains digits twofold; what has not settled after so many will not.
 MOST_ITERATIONS = 12
@@ -120,13 +121,8 @@ def make_W(Rotation, rotate, iterations, adaptive, checked):
         m1 = trace_less(S, F.row1)
         m2 = trace_less(S, F.row2)
         Y = vec3(m1.z - m2.y, m2.x - m0.z, m0.y - m1.x)
-        x.b = x.b + rotate(x, Y)
-        x.pi = x.pi + cross(x.p, Y)
-        x.p = transpose_apply(F, x.p)
-        x.pi = transpose_apply(F, x.pi)
-        x.R0 = transpose_apply(F, x.R0)
-        x.R1 = transpose_apply(F, x.R1)
-        x.R2 = transpose_apply(F, x.R2)
-        return x
+        x = moved(x, rotate(x, Y))
+        x = twisted(x, cross(x.p, Y))
+        return turned(x, F)
 
     return W

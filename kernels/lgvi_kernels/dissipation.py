@@ -9,8 +9,9 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes import add, mul, sub  # noqa: F401
+from lgvi_kernels.lanes import add, mul, neg, sub  # noqa: F401
 from lgvi_kernels.matrix3 import apply, combine, factorise, solve6, symmetric, transposed
+from lgvi_kernels.sums import pushed, twisted
 
 GAMMA = 1.0 - 0.5**0.5
 
@@ -58,11 +59,10 @@ def make_V(damping, velocities, Damping, Factor, coupled):
         gamma = h.dtype(wp.static(GAMMA)) * scaled
         factor = implicit(D, c.inertia, gamma)
         nu_1, Om_1 = solve6(factor, x.p, x.pi)
-        x.p = x.p - (scaled - gamma) * damped_force(D, nu_1, Om_1)
-        x.pi = x.pi - (scaled - gamma) * damped_torque(D, nu_1, Om_1)
+        x = pushed(x, (gamma - scaled) * damped_force(D, nu_1, Om_1))
+        x = twisted(x, (gamma - scaled) * damped_torque(D, nu_1, Om_1))
         nu_2, Om_2 = solve6(factor, x.p, x.pi)
-        x.p = x.p - gamma * damped_force(D, nu_2, Om_2)
-        x.pi = x.pi - gamma * damped_torque(D, nu_2, Om_2)
-        return x
+        x = pushed(x, -gamma * damped_force(D, nu_2, Om_2))
+        return twisted(x, -gamma * damped_torque(D, nu_2, Om_2))
 
     return V

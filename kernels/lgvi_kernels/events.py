@@ -21,7 +21,7 @@ def make_watch(events, View, shifted):
         """The view from the user's origin."""
         view = look(View(), x, c, h)
         if wp.static(shifted):
-            view.b = x.b + rotate(x, c.inertia.user_origin)
+            view.b = view.b + rotate(x, c.inertia.user_origin)
         return view
 
     @wp.func

@@ -121,7 +121,11 @@ def make_method(spec):
     prepare, exact = None, None
     if spec.drag and spec.explicit is None:
         by_axes = laws[0] is drag
-        prepare, exact = drag.make_E(spec.drag) if by_axes else drag_directions.make_E(spec.drag, velocities_of_forces)
+        prepare, exact = (
+            drag.make_E(spec.drag, spec.compensated)
+            if by_axes
+            else drag_directions.make_E(spec.drag, velocities_of_forces)
+        )
 
     @wp.func
     def E(x: Any, c: Any, h: Any):
@@ -137,7 +141,7 @@ def make_method(spec):
         """R^T u where the vehicle is."""
         view = look(View(), x, c, h)
         if wp.static(shifted):
-            view.b = x.b + rotate(x, c.inertia.user_origin)
+            view.b = view.b + rotate(x, c.inertia.user_origin)
         return to_body(view, flow(Flow(), view, c.params).velocity)
 
     if spec.explicit is not None:
@@ -169,7 +173,7 @@ def make_method(spec):
     U12, U13, U23, *pitched = spec.coupling
     for letter in used:
         if letter[0] == "h":
-            letters[letter] = turns.make_hop(int(letter[1]) - 1, int(letter[2]) - 1, U12, U13, U23)
+            letters[letter] = turns.make_hop(int(letter[1]) - 1, int(letter[2]) - 1, U12, U13, U23, spec.compensated)
     if spec.averages is not None:
         force, potential = superpose(laws, "force"), superpose(laws, "potential")
         _, forces, current = make_forces(View, Wrench, Flow, Damping, force, damping, flow, varies, shifted)
@@ -181,7 +185,8 @@ def make_method(spec):
         if letter[0] == "R":
             axes = [int(other[1]) - 1 for other, _ in (*spec.maps[i:], *spec.maps[:i]) if other[0] == "R"]
             following = next((axis for axis in axes if axis != axes[0]), axes[0])
-            maps.append((turns.make_turn(axes[0], pitched[axes[0]], following), coefficient))
+            turn = turns.make_turn(axes[0], pitched[axes[0]], following, spec.compensated)
+            maps.append((turn, coefficient))
         else:
             maps.append((letters[letter], coefficient))
     step = fold_pair(tuple(maps)) if spec.paired else fold(tuple(maps))

@@ -27,8 +27,8 @@ def renormalise(x: Any, h: Any):
 
 
 @wp.func
-def choose(test: Any, yes: Any, no: Any):
-    """`yes` in the lanes where test > 0: all of the state but the alarm."""
+def choose_vectors(test: Any, yes: Any, no: Any):
+    """`yes` in the lanes where test > 0: all of the state but the alarm and low parts."""
     no.R0 = positive(test, yes.R0, no.R0)
     no.R1 = positive(test, yes.R1, no.R1)
     no.R2 = positive(test, yes.R2, no.R2)
@@ -39,7 +39,7 @@ def choose(test: Any, yes: Any, no: Any):
 
 
 @wp.func
-def at_rest(x: Any):
+def vectors_at_rest(x: Any):
     """The same vehicles at rest at the origin: where frozen lanes wait, so that they raise no more alarms."""
     zero = ones(x.b.x) - ones(x.b.x)
     x.b = vec3(zero, zero, zero)

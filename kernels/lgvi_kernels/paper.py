@@ -18,6 +18,7 @@ from lgvi_kernels.lanes import (  # noqa: F401
     sub,
 )
 from lgvi_kernels.submaps import kicked, look
+from lgvi_kernels.sums import moved
 
 FORCES_NOT_CONVERGED = 4
 
@@ -86,7 +87,7 @@ def make_phi(maps, laws, alpha, beta):
         old = forces(x, c, h, nu, Om)
         u = current(x, c, h)
         x = Ab(x, c, h)
-        x.b = x.b + h * u
+        x = moved(x, h * u)
         x = D(x, c, h)
         w = equation_15(old, forces(x, c, h, nu, Om), h)
         x = kicked(x, c, h, sum_of(w, conservative(x, c, h)))
@@ -99,7 +100,7 @@ def make_phi(maps, laws, alpha, beta):
         x = kicked(x, c, h, w)
         x = D(x, c, h)
         x = Ab(x, c, h)
-        x.b = x.b + h * u
+        x = moved(x, h * u)
         return x
 
     @wp.func

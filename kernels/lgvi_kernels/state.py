@@ -35,16 +35,19 @@ def pace_struct(real):
 
 
 @functools.cache
-def state_struct(width, real):
+def state_struct(width, real, compensated=False):
     """b [m, inertial], the rows of R (body to inertial), p and pi (momenta / max J) in the kernel's body axes.
 
     time [s] and step are those of the sub-map in turn; they are kept only where a law looks at them.
     pace: of a packet that chooses its steps (see pace_struct).
+    compensated: each vector has a low part, what it has no digits for (see sums).
     """
     Lane3, Alarm = lane3(width, real), alarm_struct(width, real)
     rows = {"R0": Lane3, "R1": Lane3, "R2": Lane3}
-    times = {"time": wp.float64, "step": wp.int32, "pace": pace_struct(real)}
-    return struct("State", b=Lane3, **rows, p=Lane3, pi=Lane3, alarm=Alarm, **times)
+    fields = {"b": Lane3, **rows, "p": Lane3, "pi": Lane3, "alarm": Alarm, "time": wp.float64, "step": wp.int32}
+    if compensated:
+        return struct("CompensatedState", **fields, **{f"{name}_low": Lane3 for name in ("b", *rows, "p", "pi")})
+    return struct("State", **fields, pace=pace_struct(real))
 
 
 @functools.cache

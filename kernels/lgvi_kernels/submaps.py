@@ -9,7 +9,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lanes import add, cross, dot, mul, vec3  # noqa: F401
-from lgvi_kernels.rotation import transpose_apply
+from lgvi_kernels.sums import moved, moved_from, place, pushed, turned, twisted
 from lgvi_kernels.water import acceleration_wrench
 
 
@@ -50,8 +50,7 @@ def make_Ab(velocity, timed):
     @wp.func
     def Ab(x: Any, c: Any, h: Any):
         """Eq. (12) and (23), Nordkvist & Sanyal 2010: b <- b + h R nu."""
-        x.b = x.b + rotate(x, h * velocity(c.inertia, x.p))
-        return passed(x, h)
+        return passed(moved(x, rotate(x, h * velocity(c.inertia, x.p))), h)
 
     return Ab
 
@@ -59,8 +58,7 @@ def make_Ab(velocity, timed):
 @wp.func
 def Ap(x: Any, c: Any, h: Any):
     """The Munk moment of eq. (14) and (19): pi <- pi + h p x nu. Absent for M = m I, where it is zero."""
-    x.pi = x.pi + h * cross(x.p, c.inertia.anisotropy * x.p)
-    return x
+    return twisted(x, h * cross(x.p, c.inertia.anisotropy * x.p))
 
 
 def make_T(timed):
@@ -71,9 +69,8 @@ def make_T(timed):
     def T(x: Any, c: Any, h: Any):
         """Ab and Ap together: the exact flow of the kinetic energy p.M^-1 p / 2."""
         d = h * (c.inertia.anisotropy * x.p)
-        x.b = x.b + rotate(x, (h * c.inertia.mean) * x.p + d)
-        x.pi = x.pi + cross(x.p, d)
-        return passed(x, h)
+        x = moved(x, rotate(x, (h * c.inertia.mean) * x.p + d))
+        return passed(twisted(x, cross(x.p, d)), h)
 
     return T
 
@@ -86,12 +83,7 @@ def make_D(Rotation, solve):
         """Eq. (10), (11): F = S(h pi), R <- R F; of (13), (14): p <- F^T p, pi <- F^T pi. Adjoint: (19)-(22)."""
         F, alarm = solve(Rotation(), x.alarm, h * x.pi, c.inertia.J, c.tolerance)
         x.alarm = alarm
-        x.p = transpose_apply(F, x.p)
-        x.pi = transpose_apply(F, x.pi)
-        x.R0 = transpose_apply(F, x.R0)
-        x.R1 = transpose_apply(F, x.R1)
-        x.R2 = transpose_apply(F, x.R2)
-        return x
+        return turned(x, F)
 
     return D
 
@@ -102,7 +94,7 @@ def look(view: Any, x: Any, c: Any, h: Any):
     view.north = x.R0
     view.east = x.R1
     view.down = x.R2
-    view.b = x.b
+    view.b = place(x)
     view.t = h.dtype(x.time)
     view.h = h
     view.step = x.step
@@ -117,9 +109,7 @@ def look(view: Any, x: Any, c: Any, h: Any):
 def kicked(x: Any, c: Any, h: Any, w: Any):
     """p <- p + h f, pi <- pi + h m."""
     k = h * c.inertia.inverse_scale
-    x.p = x.p + k * w.force
-    x.pi = x.pi + k * w.torque
-    return x
+    return twisted(pushed(x, k * w.force), k * w.torque)
 
 
 def make_at_user_origin(shifted):
@@ -129,7 +119,7 @@ def make_at_user_origin(shifted):
     def at_user_origin(view: Any, x: Any, c: Any):
         """Water is taken where the user has his origin, whatever the method's is."""
         if wp.static(shifted):
-            view.b = x.b + rotate(x, c.inertia.user_origin_forces)
+            view.b = place(x) + rotate(x, c.inertia.user_origin_forces)
         return view
 
     return at_user_origin
@@ -153,10 +143,10 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):
         if wp.static(evolve is not None):
             view = evolve(view, view, c.params)
         if wp.static(drifts):
-            start = x.b
+            start = x
             water = flow(Flow(), at_user_origin(view, x, c), c.params)
-            x.b = start + half * water.velocity
-            view.b = x.b
+            x = moved_from(x, start, half * water.velocity)
+            view.b = place(x)
             if wp.static(flow_varies):
                 water = flow(Flow(), at_user_origin(view, x, c), c.params)
         if wp.static(forced):
@@ -180,7 +170,7 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):
             if wp.static(forced):
                 x = kicked(x, c, half, w)
         if wp.static(drifts):
-            x.b = start + h * water.velocity
+            x = moved_from(x, start, h * water.velocity)
         if wp.static(evolve is not None):
             view.second = 1
             view = evolve(view, view, c.params)

@@ -9,6 +9,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lanes import add, div, mul, neg, ones, sub, vec3  # noqa: F401
+from lgvi_kernels.sums import carried, moved, twisted, with_turned
 
 
 @wp.func
@@ -44,6 +45,57 @@ def make_turn_of_vector(axis, early):
             return vec3(x, y, v.z)
 
     return turn
+
+
+@wp.func
+def carried_pair(a: Any, a_low: Any, b: Any, b_low: Any, t: Any, s: Any):
+    """The same turn with compensation, as (a, a_low, b, b_low): what the shears change, each added once."""
+    v, v_low = carried(b, b_low, -(s * (a + t * b)))
+    u, u_low = carried(a, a_low, t * (b + v))
+    return u, u_low, v, v_low
+
+
+def make_carried_turn(axis):
+    """(v, v_low) -> F^T v with compensation, for a turn about an axis."""
+
+    @wp.func
+    def turn(v: Any, low: Any, t: Any, s: Any):
+        if wp.static(axis == 0):
+            y, y_low, z, z_low = carried_pair(v.y, low.y, v.z, low.z, t, s)
+            return vec3(v.x, y, z), vec3(low.x, y_low, z_low)
+        elif wp.static(axis == 1):
+            z, z_low, x, x_low = carried_pair(v.z, low.z, v.x, low.x, t, s)
+            return vec3(x, v.y, z), vec3(x_low, low.y, z_low)
+        else:
+            x, x_low, y, y_low = carried_pair(v.x, low.x, v.y, low.y, t, s)
+            return vec3(x, y, v.z), vec3(x_low, y_low, low.z)
+
+    return turn
+
+
+def make_turn_of_state(axis, early, compensated):
+    """p <- F^T p, pi <- F^T pi, R <- R F for a turn about an axis with this tangent of half the angle and sine."""
+    turn, carried_turn = make_turn_of_vector(axis, early), make_carried_turn(axis)
+
+    @wp.func
+    def plain(x: Any, t: Any, s: Any):
+        x.p = turn(x.p, t, s)
+        x.pi = turn(x.pi, t, s)
+        x.R0 = turn(x.R0, t, s)
+        x.R1 = turn(x.R1, t, s)
+        x.R2 = turn(x.R2, t, s)
+        return x
+
+    @wp.func
+    def with_low(x: Any, t: Any, s: Any):
+        pi, pi_low = carried_turn(x.pi, x.pi_low, t, s)
+        p, p_low = carried_turn(x.p, x.p_low, t, s)
+        R0, R0_low = carried_turn(x.R0, x.R0_low, t, s)
+        R1, R1_low = carried_turn(x.R1, x.R1_low, t, s)
+        R2, R2_low = carried_turn(x.R2, x.R2_low, t, s)
+        return with_turned(x, p, p_low, pi, pi_low, R0, R0_low, R1, R1_low, R2, R2_low)
+
+    return with_low if compensated else plain
 
 
 @wp.func
@@ -85,21 +137,21 @@ def slide_z(pi: Any, p: Any, length: Any):
 AXES = ((component_x, slide_x), (component_y, slide_y), (component_z, slide_z))
 
 
-def make_shift(axis):
+def make_shift(axis, compensated):
     """The origin moves by a length along an axis of the body."""
     component, slide = AXES[axis]
 
     @wp.func
     def shift(x: Any, length: Any):
         """b <- b + length R e_i, pi <- pi - (length e_i) x p."""
-        x.b = x.b + length * vec3(component(x.R0), component(x.R1), component(x.R2))
-        x.pi = slide(x.pi, x.p, length)
+        x = moved(x, length * vec3(component(x.R0), component(x.R1), component(x.R2)))
+        if wp.static(compensated):
+            x = twisted(x, slide(x.pi - x.pi, x.p, length))
+        else:
+            x.pi = slide(x.pi, x.p, length)
         return x
 
     return shift
-
-
-SHIFTS = (make_shift(0), make_shift(1), make_shift(2))
 
 
 @wp.func
@@ -108,15 +160,15 @@ def tangent(y: Any, third: Any):
     return y + (y * y) * (third * y)
 
 
-def make_turn(axis, pitched, following):
+def make_turn(axis, pitched, following, compensated):
     """R_i: turn about one axis, for `pitched` with a slide along it (a screw); following: the axis of the next turn.
 
     A step is one chain of turns, each waiting for the momentum about its axis from the one before: what decides its time
     is how soon that component is there, so all that need not wait is written apart from what must.
     """
     component, _ = AXES[axis]
-    turn = make_turn_of_vector(axis, following)
-    shift = SHIFTS[axis]
+    turn = make_turn_of_state(axis, following, compensated)
+    shift = make_shift(axis, compensated)
 
     @wp.func
     def R_i(x: Any, c: Any, h: Any):
@@ -141,11 +193,7 @@ def make_turn(axis, pitched, following):
             length = k2 * (w - (y * (q * m)) * inverse)
         else:
             s = (t + t) / (one + t * t)
-        x.p = turn(x.p, t, s)
-        x.pi = turn(x.pi, t, s)
-        x.R0 = turn(x.R0, t, s)
-        x.R1 = turn(x.R1, t, s)
-        x.R2 = turn(x.R2, t, s)
+        x = turn(x, t, s)
         if wp.static(pitched):
             x = shift(x, length)
         return x
@@ -153,11 +201,11 @@ def make_turn(axis, pitched, following):
     return R_i
 
 
-def make_hop(here, there, U12, U13, U23):
+def make_hop(here, there, U12, U13, U23, compensated):
     """The origin moves from that of axis `here` to that of axis `there` (0, 1, 2), by the elements of U that are not 0."""
     sign = 1.0 if there > here else -1.0
     first = (here, there) in ((0, 1), (1, 0))
-    along_x, along_y, along_z = SHIFTS
+    along_x, along_y, along_z = (make_shift(axis, compensated) for axis in range(3))
 
     @wp.func
     def hop(x: Any, c: Any, h: Any):

@@ -34,9 +34,9 @@ NOT_THERE = (
 BARE = lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 20.0 * 9.8)
 
 
-def source(scene, folder, method="psi_s"):
+def source(scene, folder, method="psi_s", dtype="float64"):
     """The C++ that Warp generates for a scene."""
-    plan = make_plan(one(scene, **STATE), method, h=0.01, t1=0.1)
+    plan = make_plan(one(scene, **STATE), method, h=0.01, t1=0.1, dtype=dtype)
     wp.compile_aot_module(plan.advance.kernel.module, device="cpu", module_dir=str(folder))
     (path,) = folder.glob("*.cpp")
     return path.read_text()
@@ -52,6 +52,16 @@ def test_a_bare_scene_has_no_law_at_all(tmp_path):
     assert laws_in(text) == set()
     for mark in NOT_THERE:
         assert not re.search(rf"^static (?!.*adj_).*{mark}\w*\(", text, re.MULTILINE), mark
+
+
+@pytest.mark.parametrize("method", ["psi_s", "psi_x"])
+def test_compensation_is_there_only_if_asked_for(method, tmp_path):
+    scene = lw.Scene(VEHICLE, lw.Environment(gravity=9.8), terms=list(CASES["drag"].terms))
+    for dtype, there in (("float64", False), ("float32", False), ("float32_compensated", True)):
+        (tmp_path / dtype).mkdir()
+        text = source(scene, tmp_path / dtype, method, dtype)
+        for mark in ("_low", "carried", "settled", "CompensatedState"):
+            assert (mark in text) == there, (mark, dtype)
 
 
 @pytest.mark.parametrize("name", MARKS)

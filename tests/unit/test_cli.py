@@ -75,7 +75,7 @@ def test_options_reach_the_run(tmp_path, capsys):
         "--step",
         "0.02",
         "--dtype",
-        "float32",
+        "float32_compensated",
         "--threads",
         "1",
         "--width",
@@ -85,7 +85,7 @@ def test_options_reach_the_run(tmp_path, capsys):
     ]
     assert cli.main(["run", PAPER, "--out", str(tmp_path), *SMALL, *options, "--set", "vehicle.mass=124"]) == 0
     p = lw.Result.load(tmp_path / "result.npz").provenance
-    assert (p["method"]["name"], p["step"], p["dtype"], p["width"]) == ("psi", 0.02, "float32", 4)
+    assert (p["method"]["name"], p["step"], p["dtype"], p["width"]) == ("psi", 0.02, "float32_compensated", 4)
     assert p["ensemble"]["seed"] == 9 and p["scene"]["vehicle"]["mass"] == 124
 
 

@@ -71,7 +71,7 @@ def test_overrides():
     changes = {
         "vehicle.mass": "120.5",
         "run.method": "psi",
-        "run.dtype": '"float32"',
+        "run.dtype": '"float32_compensated"',
         "run.duration": 2,
         "start.position": "[0, 0, 5]",
         "ensemble.members": "7",
@@ -79,7 +79,8 @@ def test_overrides():
         'ensemble.vary."vehicle.buoyancy"': "{ normal = { std = 0.1 } }",
     }
     scene = lw.Scene.load(PAPER, changes)
-    assert (scene.vehicle.mass, scene.run.method, scene.run.dtype, scene.run.duration) == (120.5, "psi", "float32", 2)
+    assert (scene.vehicle.mass, scene.run.method, scene.run.duration) == (120.5, "psi", 2)
+    assert scene.run.dtype == "float32_compensated"
     np.testing.assert_array_equal(scene.start.position, [0.0, 0.0, 5.0])
     settings = scene.ensemble_settings
     assert settings.members == 7

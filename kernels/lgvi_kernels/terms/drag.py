@@ -12,6 +12,7 @@ import warp as wp
 from lgvi_kernels.lane_math import decay
 from lgvi_kernels.lanes import absolute, add, div, lane3, mul, ones, sub, vec3  # noqa: F401
 from lgvi_kernels.state import struct
+from lgvi_kernels.sums import pushed, twisted
 
 PARTS = ("linear_force", "linear_torque", "quadratic_force", "quadratic_torque")
 
@@ -24,7 +25,7 @@ def params(width, real):
 
 @functools.cache
 def flow_struct(width, real):
-    """Per axis, for one length of step: e^-x and (h q/I) (1 - e^-x)/x, of force and torque."""
+    """Per axis, for one length of step: e^-x (1 - e^-x for compensated sums) and (h q/I) (1 - e^-x)/x, of force and torque."""
     Lane3 = lane3(width, real)
     return struct("DragFlow", decay_force=Lane3, decay_torque=Lane3, gain_force=Lane3, gain_torque=Lane3, h=real)
 
@@ -61,8 +62,8 @@ def make_resistance(parts):
     return resisted
 
 
-def make_E(parts):
-    """(prepare, E) with the parts of PARTS that some member has."""
+def make_E(parts, compensated):
+    """(prepare, E) with the parts of PARTS that some member has. compensated: momenta change by what E takes off them."""
     linear_force, linear_torque, quadratic_force, quadratic_torque = (part in parts for part in PARTS)
 
     @wp.func
@@ -72,7 +73,9 @@ def make_E(parts):
         if wp.static(linear_force):
             x = h * p.linear_force
             s = decay3(x)
-            e.decay_force = vec3(ones(x.x), ones(x.x), ones(x.x)) - x * s
+            e.decay_force = x * s
+            if wp.static(not compensated):
+                e.decay_force = vec3(ones(x.x), ones(x.x), ones(x.x)) - e.decay_force
             if wp.static(quadratic_force):
                 e.gain_force = h * (p.quadratic_force * s)
         else:
@@ -81,13 +84,31 @@ def make_E(parts):
         if wp.static(linear_torque):
             y = h * p.linear_torque
             t = decay3(y)
-            e.decay_torque = vec3(ones(y.x), ones(y.x), ones(y.x)) - y * t
+            e.decay_torque = y * t
+            if wp.static(not compensated):
+                e.decay_torque = vec3(ones(y.x), ones(y.x), ones(y.x)) - e.decay_torque
             if wp.static(quadratic_torque):
                 e.gain_torque = h * (p.quadratic_torque * t)
         else:
             if wp.static(quadratic_torque):
                 e.gain_torque = h * p.quadratic_torque
         return e
+
+    @wp.func
+    def taken(v: Any, gain: Any, loss: Any):
+        """v (1 - loss) / (1 + gain |v|) - v per axis, without a difference of large numbers."""
+        one = vec3(ones(v.x), ones(v.x), ones(v.x))
+        g = gain * vec3(absolute(v.x), absolute(v.y), absolute(v.z))
+        return v.x.dtype(-1.0) * (((g + loss) / (one + g)) * v)
+
+    @wp.func
+    def E_of_sums(x: Any, e: Any, c: Any):
+        """The same as E; absent parts are zeros."""
+        if wp.static(linear_force or quadratic_force):
+            x = pushed(x, taken(x.p, e.gain_force, e.decay_force))
+        if wp.static(linear_torque or quadratic_torque):
+            x = twisted(x, taken(x.pi, e.gain_torque, e.decay_torque))
+        return x
 
     @wp.func
     def slowed(v: Any, gain: Any):
@@ -116,4 +137,4 @@ def make_E(parts):
         x.pi = pi
         return x
 
-    return prepare, E
+    return prepare, E_of_sums if compensated else E

@@ -13,6 +13,7 @@ import warp as wp
 from lgvi_kernels.lanes import absolute, add, cross, div, lane3, mul, ones, sub, vec3  # noqa: F401
 from lgvi_kernels.matrix3 import apply, transpose_times
 from lgvi_kernels.state import matrix3_struct, struct
+from lgvi_kernels.sums import pushed, twisted
 from lgvi_kernels.terms.drag import PARTS
 from lgvi_kernels.terms.drag import make_E as make_exact
 from lgvi_kernels.turns import component_x, component_y, component_z
@@ -54,7 +55,7 @@ COMPONENTS = (component_x, component_y, component_z)
 
 def make_E(parts, velocities):
     """(prepare, E) as for drag; `velocities` are those at the origin of the forces."""
-    prepare_exact, _ = make_exact(parts)
+    prepare_exact, _ = make_exact(parts, compensated=False)
     force = [make_axis(c, PARTS[0] in parts, PARTS[2] in parts) for c in COMPONENTS]
     torque = [make_axis(c, PARTS[1] in parts, PARTS[3] in parts) for c in COMPONENTS]
     fx, fy, fz = force
@@ -137,8 +138,7 @@ def make_E(parts, velocities):
             du = du + d
         impulse = p.mass_force * vec3(du, dv, dw)
         moment = p.mass_torque * vec3(dp, dq, dr)
-        x.p = x.p + transpose_times(p.turn, impulse)
-        x.pi = x.pi + transpose_times(p.turn, moment - cross(p.origin, impulse))
-        return x
+        x = pushed(x, transpose_times(p.turn, impulse))
+        return twisted(x, transpose_times(p.turn, moment - cross(p.origin, impulse)))
 
     return prepare, E

@@ -259,7 +259,8 @@ class Packets:
     def outcome(self) -> Outcome:
         """Status, steps made before the failure and the value that crossed its limit, of each member."""
         m = self.members.count
-        pace = self.state.numpy()[:, STATE_FIELDS + 2 : STATE_FIELDS + PACE_FIELDS]
+        kept = PACE_FIELDS if self.plan.method.adaptive else 0
+        pace = self.state.numpy()[:, STATE_FIELDS + 2 : STATE_FIELDS + kept]
         status = self.status.numpy().reshape(-1)[:m].astype(np.uint8)
         for number, (event, _) in reversed(list(enumerate(self.plan.model.events))):
             assert isinstance(event, Event)

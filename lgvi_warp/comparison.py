@@ -153,9 +153,7 @@ def failed(result: Result) -> bool:
 def distances(result: Result, reference: Result) -> dict[str, np.ndarray]:
     """Quantity -> (k, n), how far apart they are; NaN from where an event stopped a member in either."""
     pairs = {name: (getattr(result, name).astype(np.float64), getattr(reference, name)) for name in FIELDS}
-    found = {
-        name: np.linalg.norm(a - b, axis=-1) for name, (a, b) in pairs.items() if name in ("position", "velocity")
-    }
+    found = {name: np.linalg.norm(a - b, axis=-1) for name, (a, b) in pairs.items() if name in ("position", "velocity")}
     found["angular_velocity"] = np.linalg.norm(np.subtract(*pairs["angular_velocity"]), axis=-1)
     chord = np.linalg.norm(np.subtract(*pairs["attitude"]), axis=(-2, -1))
     found["attitude"] = 2.0 * np.arcsin(np.minimum(chord / math.sqrt(8.0), 1.0))
@@ -238,7 +236,9 @@ def make_reference(
     """
     names = list(methods or sample.accepted(PRECISE)[0][:2])
     if not names:
-        raise SceneError([f"method: the scene takes none of {', '.join(PRECISE)}; name one that it takes: methods=[...]"])
+        raise SceneError(
+            [f"method: the scene takes none of {', '.join(PRECISE)}; name one that it takes: methods=[...]"]
+        )
     if not methods and len(names) == 2 and Method(names[1]).order < Method(names[0]).order - 2:
         names = names[:1]
     first, second = names[0], names[-1]
@@ -364,3 +364,15 @@ def biases(result: Result, reference: Result) -> dict[str, float]:
         ):
             found[f"{name}_{what}"] = float(np.sqrt(np.mean((change[real] / (spread[real] * size)) ** 2)))
     return found
+
+
+def first(result: Result, members: int) -> Result:
+    """The first members of a result."""
+    return replace(
+        result,
+        samples={name: values[:, :members] for name, values in result.samples.items()},
+        status=result.status[:members],
+        failure_time=result.failure_time[:members],
+        failure_value=result.failure_value[:members],
+        parameters={k: v[:members] for k, v in result.parameters.items()},
+    )

@@ -172,14 +172,13 @@ def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:
 def check_error(scene: Any, result: Any, suggested: Any, quiet: bool) -> list[str]:
     """Say what error the run has, by some members at half its step; a fault where it is above what was asked."""
     from lgvi_warp.ensemble import Ensemble
-    from lgvi_warp.suggestion import CONFIRMED, verified
+    from lgvi_warp.suggestion import verified
 
-    found = verified(Ensemble.from_scene(scene), result, suggested.setting, suggested.of)
-    members = min(CONFIRMED, result.members)
+    found, members = verified(Ensemble.from_scene(scene), result, suggested)
     text = (
         f"error of {suggested.of} {found:.1e} {suggested.unit}, asked {suggested.error:g} ({members} members again at "
     )
-    text += "half the step)"
+    text += "half the step, those with the largest errors among them)"
     if not found <= suggested.error:
         return [f"{text}: missed; ask for a smaller one"]
     if not quiet:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp import comparison, machine
+from lgvi_warp import comparison, machine, tradeoff
 from lgvi_warp.comparison import QUANTITIES, Reference, Sample, Setting
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
@@ -25,6 +25,10 @@ from lgvi_warp.tradeoff import PRECISIONS, Trial, check_of, chosen_methods, cost
 
 # A setting is taken where its error on the sample is below the asked one by this factor.
 SAFETY = 1.15
+# Times that errors are compared at, where the scene does not say: few, so that steps may be long.
+TIMES = 5
+# Tried first to last: whose lines are seldom the cheapest is left out.
+CANDIDATES = tuple(name for name in tradeoff.CANDIDATES if name not in ("phi", "psi", "psi_w"))
 # Members that the choice is checked on.
 CHECKED = 1024
 # Members that a finished run is checked on.
@@ -43,7 +47,7 @@ class Suggestion:
     the members checked, all in `unit`; margin = error / expected. us_per_vehicle_second: cost on one core. run_seconds:
     predicted for all members on `threads` cores, without compiling; memory_bytes: predicted for the result and the run.
     members: of the sample that was checked; reference: what against, reference_error: how good that is.
-    rivals: (setting, cost, error) of the next best.
+    rivals: (setting, cost, error) of the next best. worst: members with the largest errors, for the check after the run.
     """
 
     settings: dict[str, Any]
@@ -61,6 +65,7 @@ class Suggestion:
     reference: str
     reference_error: float
     rivals: tuple[tuple[Setting, float, float], ...] = ()
+    worst: tuple[int, ...] = ()
 
     @property
     def margin(self) -> float:
@@ -106,9 +111,9 @@ def suggest(
     faults = Faults()
     faults.positive("error", error, QUANTITIES[of])
     faults.raise_if_any()
-    names = chosen_methods(methods)
+    names = chosen_methods(methods, CANDIDATES)
     begun, report = time.perf_counter(), progress or void
-    sample = Sample(fleet, t1, members)
+    sample = Sample(fleet, t1, members, TIMES)
     taken, refused = sample.accepted(names)
     if not taken:
         raise SceneError([f"method {name}: {why}" for name, why in refused.items()])
@@ -148,7 +153,15 @@ def suggest(
         reference=reference.text,
         reference_error=reference.error(of),
         rivals=tuple((final[i].setting, prices[i], final[i].error(of)) for i in order[1:]),
+        worst=worst_of(best, reference, of),
     )
+
+
+def worst_of(one: Trial, reference: Reference, of: str, members: int = CONFIRMED // 2) -> tuple[int, ...]:
+    """The members with the largest errors, the largest first."""
+    apart = comparison.distances(one.result, reference.result)[of]
+    largest = np.max(np.where(np.isnan(apart), 0.0, apart), axis=0)
+    return tuple(int(i) for i in np.argsort(-largest)[:members])
 
 
 def checked_reference(sample: Sample, of: str, error: float, seconds: float, taken: Sequence[str]) -> Reference:
@@ -159,7 +172,10 @@ def checked_reference(sample: Sample, of: str, error: float, seconds: float, tak
         unit = QUANTITIES[of]
         what = f"error = {error:g} {unit} of {of} up to {sample.t1:g} s cannot be checked: {reference.text} differ by "
         what += f"{reference.error(of):.1e} {unit}; {growth_text(growth_of(sample, taken, reference))}"
-        raise SceneError([f"{what}; ask for t1 (--duration) up to {until:g} s, or for a larger error"])
+        remedy = (
+            f"ask for t1 (--duration) up to {until:g} s, " if until > 0.0 else "ask for a shorter t1 (--duration), "
+        )
+        raise SceneError([f"{what}; {remedy}for a larger error, or give more seconds"])
     return reference
 
 
@@ -177,7 +193,10 @@ def search(
     A step is halved until it does, and then lengthened by the slope of the errors; a method ends where it costs 1.5 times
     what another does.
     """
-    ladders = [(name, dtype) for name in methods for dtype in PRECISIONS]
+    size_of = np.abs(getattr(reference.result, of)).max()
+    # What float32 cannot hold is not asked of it.
+    dtypes = [name for name in PRECISIONS if target > 4.0 * comparison.ROUND_OFF[name] * size_of]
+    ladders = [(name, dtype) for name in methods for dtype in dtypes or ["float64"]]
     found: list[tuple[float, Trial]] = []
     for i, (method, dtype) in enumerate(ladders):
         report(i / len(ladders))
@@ -254,20 +273,21 @@ def memory_of(fleet: Ensemble, setting: Setting, t1: float) -> int:
     return fleet.members * (len(grid.times) * a_sample + BYTES_OF_A_MEMBER)
 
 
-def verified(fleet: Ensemble, result: Result, setting: Setting, of: str, members: int = CONFIRMED) -> float:
-    """The error of a finished run of `of`, largest over its first members and samples, from half its step.
+def verified(fleet: Ensemble, result: Result, found: Suggestion) -> tuple[float, int]:
+    """The error of a finished run, largest over some members and all samples, from half its step; and how many members.
 
-    A method of order p at half the step is 2^p times better, so the difference is the error but for one part in 2^p.
+    They are those that had the largest errors in the search, and the first ones. A method of order p at half the step is
+    2^p times better, so the difference is the error but for one part in 2^p.
     """
-    check_of(of)
-    n = min(members, fleet.members)
-    part = fleet.subset(range(n))
+    setting = found.setting
+    chosen = list(dict.fromkeys((*found.worst, *range(fleet.members))))[:CONFIRMED]
+    part = fleet.subset(chosen)
     plan = make_plan(part, setting.resolved(), setting.h, float(result.time[-1]), dtype=setting.dtype)
     h = result.provenance["step"]
     steps = np.rint(result.time / h).astype(np.int64)
-    half = Plan(part, plan.method, TimeGrid(h / 2.0, 2 * steps, result.time), plan.fields, setting.dtype)
-    finer = run_plan(half, 1)
-    coarse = comparison.first(result, n)
+    # In double precision, so that round-off of the run's own is seen as well.
+    half = Plan(part, plan.method, TimeGrid(h / 2.0, 2 * steps, result.time), plan.fields, "float64")
     with np.errstate(all="ignore"):
-        apart = comparison.errors(comparison.distances(coarse, finer), len(result.time) - 1)[of]["path_max"]
-    return apart / (1.0 - 2.0**-plan.method.order)
+        apart = comparison.distances(comparison.part(result, chosen), run_plan(half, 1))
+        size = comparison.errors(apart, len(result.time) - 1)[found.of]["path_max"]
+    return size / (1.0 - 2.0**-plan.method.order), len(chosen)

@@ -215,15 +215,16 @@ def check_of(of: str) -> None:
 def known(name: str) -> bool:
     """Whether there is such a method."""
     try:
-        return bool(Method(name))
+        Method(name)
     except SceneError:
         return False
+    return True
 
 
-def chosen_methods(methods: Sequence[str] | None) -> tuple[str, ...]:
+def chosen_methods(methods: Sequence[str] | None, default: Sequence[str] = CANDIDATES) -> tuple[str, ...]:
     """The methods to try. Raises SceneError for a name that is not known."""
     if methods is None:
-        return tuple(name for name in CANDIDATES if known(name))
+        return tuple(name for name in default if known(name))
     faults = Faults()
     for name in methods:
         if not known(name):

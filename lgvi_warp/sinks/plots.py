@@ -78,6 +78,7 @@ def _paths(axes: Any, position: np.ndarray) -> None:
     axes.invert_yaxis()
 
 
+COLORS = [*(f"C{i}" for i in range(10)), "navy", "darkgreen", "indigo", "black", "goldenrod", "deeppink", "teal"]
 MARKERS = "os^vDPX*<>dphH"
 
 
@@ -104,7 +105,12 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None 
     for (name, dtype), members in groups.items():
         i = names.index(name)
         single = dtype != "float64"
-        style = {"color": f"C{i % 10}", "marker": MARKERS[i % len(MARKERS)], "markersize": 4.5, "linewidth": 1.0}
+        style = {
+            "color": COLORS[i % len(COLORS)],
+            "marker": MARKERS[i % len(MARKERS)],
+            "markersize": 4.5,
+            "linewidth": 1.0,
+        }
         style |= {"linestyle": "--", "markerfacecolor": "white"} if single else {}
         line = sorted((one for one in members if one in shown), key=lambda one: one.setting.h)
         costs = [one.us_per_vehicle_second for one in line]

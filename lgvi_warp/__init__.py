@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from lgvi_warp.sinks.rerun import log_rerun
     from lgvi_warp.solving import solve
     from lgvi_warp.suggestion import suggest
-    from lgvi_warp.tradeoff import tradeoff
+    from lgvi_warp.tradeoffs import tradeoff
 
 __version__ = "0.1.0"
 
@@ -57,7 +57,7 @@ __version__ = "0.1.0"
 _LAZY = {
     "solve": "lgvi_warp.solving",
     "suggest": "lgvi_warp.suggestion",
-    "tradeoff": "lgvi_warp.tradeoff",
+    "tradeoff": "lgvi_warp.tradeoffs",
     "Plan": "lgvi_warp.plan",
     "plot": "lgvi_warp.sinks.plots",
     "plot_tradeoff": "lgvi_warp.sinks.plots",

@@ -195,8 +195,8 @@ def tradeoff(chosen: argparse.Namespace) -> int:
     out.mkdir(parents=True, exist_ok=True)
     methods = None if chosen.methods is None else [name.strip() for name in chosen.methods.split(",")]
     from lgvi_warp.sinks.plots import plot_tradeoff
-    from lgvi_warp.tradeoff import report_text
-    from lgvi_warp.tradeoff import tradeoff as measure
+    from lgvi_warp.tradeoffs import report_text
+    from lgvi_warp.tradeoffs import tradeoff as measure
 
     progress = None if chosen.quiet else Progress(sys.stderr)
     found = measure(scene, of=chosen.of, methods=methods, seconds=chosen.seconds, progress=progress)

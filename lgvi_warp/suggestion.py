@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp import comparison, machine, tradeoff
+from lgvi_warp import comparison, machine, tradeoffs
 from lgvi_warp.comparison import QUANTITIES, Reference, Sample, Setting
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
@@ -21,14 +21,14 @@ from lgvi_warp.saveat import TimeGrid
 from lgvi_warp.scene import Scene
 from lgvi_warp.solving import make_plan, run_plan
 from lgvi_warp.speed import void
-from lgvi_warp.tradeoff import PRECISIONS, Trial, check_of, chosen_methods, costs, growth_of, growth_text, tried
+from lgvi_warp.tradeoffs import PRECISIONS, Trial, check_of, chosen_methods, costs, growth_of, growth_text, tried
 
 # A setting is taken where its error on the sample is below the asked one by this factor.
 SAFETY = 1.15
 # Times that errors are compared at, where the scene does not say: few, so that steps may be long.
 TIMES = 5
 # Tried first to last: whose lines are seldom the cheapest is left out.
-CANDIDATES = tuple(name for name in tradeoff.CANDIDATES if name not in ("phi", "psi", "psi_w"))
+CANDIDATES = tuple(name for name in tradeoffs.CANDIDATES if name not in ("phi", "psi", "psi_w"))
 # Members that the choice is checked on.
 CHECKED = 1024
 # Members that a finished run is checked on.

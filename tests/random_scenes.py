@@ -3,7 +3,7 @@
 import numpy as np
 
 import lgvi_warp as lw
-from lgvi_warp import comparison, suggestion, tradeoff
+from lgvi_warp import comparison, suggestion, tradeoffs
 
 
 def random_scene(seed):
@@ -49,19 +49,19 @@ def judged(fleet, found, asked, rounds=5):
     """
     sample = comparison.Sample(fleet, asked["t1"], fleet.members, suggestion.TIMES)
     reference = comparison.make_reference(sample, asked["of"], asked["error"] / 100.0)
-    own = tradeoff.tried(sample, found.setting, reference)
+    own = tradeoffs.tried(sample, found.setting, reference)
     good = [own]
     for method in METHODS:
-        for dtype in tradeoff.PRECISIONS:
+        for dtype in tradeoffs.PRECISIONS:
             m, last = sample.coarsest(3.0), None
             while sample.h(m) > 0.5 * found.setting.h * len(lw.Method(method).stages) / len(own.plan.method.stages):
-                one = tradeoff.tried(sample, sample.setting(method, m, dtype), reference)
+                one = tradeoffs.tried(sample, sample.setting(method, m, dtype), reference)
                 if one.error(asked["of"]) <= asked["error"]:
                     last = one
                     break
                 m = max(m + 1, round(1.2 * m))
             if last:
                 good.append(last)
-    prices = tradeoff.costs([one.plan for one in good], rounds)
+    prices = tradeoffs.costs([one.plan for one in good], rounds)
     best = min(range(len(good)), key=prices.__getitem__)
     return own.error(asked["of"]) / asked["error"], prices[0] / prices[best], good[best].setting

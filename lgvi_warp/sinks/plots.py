@@ -10,7 +10,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from lgvi_warp.result import Result
-    from lgvi_warp.tradeoff import Tradeoff
+    from lgvi_warp.tradeoffs import Tradeoff
 
 # Quantile pairs of the fan, outermost first, and how dark each band is.
 BANDS = ((0.0, 1.0, 0.15), (0.05, 0.95, 0.25), (0.25, 0.75, 0.4))

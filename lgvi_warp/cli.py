@@ -65,7 +65,11 @@ def parser() -> argparse.ArgumentParser:
     trade.add_argument("--methods", metavar="A,B", help="names, such as psi_s,kl8(psi_x) (default: all that fit)")
     trade.add_argument("--of", default="position", help=f"what errors are of (default: position); {OF}")
     trade.add_argument(
-        "--seconds", metavar="S", type=float, default=45.0, help="about how long to measure (default 45)"
+        "--seconds",
+        metavar="S",
+        type=float,
+        default=45.0,
+        help="about how long to measure, compiling aside (default 45)",
     )
     info = verbs.add_parser("info", help="machine, versions, SIMD width, threads and the core's peak")
     info.set_defaults(scene=None)

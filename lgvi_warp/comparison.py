@@ -208,7 +208,7 @@ def extrapolated(sample: Sample, method: str, m: int) -> Result:
         a, b, c = (one.samples[name] for one in runs)
         ab, bc = b + (b - a) / 3.0, c + (c - b) / 3.0
         samples[name] = bc + (bc - ab) / 7.0
-    return replace(runs[-1], samples=samples)
+    return replace(runs[-1], samples=samples, compile_seconds=sum(one.compile_seconds for one in runs))
 
 
 def agreement(a: Result, b: Result) -> dict[str, np.ndarray]:
@@ -232,7 +232,8 @@ def make_reference(
 ) -> Reference:
     """Refine two high-order runs together until they agree to the goal, agree no better, or the time is spent.
 
-    methods: two names in place of the scene's best ones. Raises SceneError where no two runs agree at all.
+    seconds: about how long, compiling aside. methods: two names in place of the scene's best ones. Raises SceneError
+    where there are none; how well the runs agree is for the caller to judge.
     """
     names = list(methods or sample.accepted(PRECISE)[0][:2])
     if not names:
@@ -257,7 +258,8 @@ def make_reference(
             best = Reference(runs[1], text, own, time.perf_counter() - begun)
         else:
             worse += best.error(of) < LOST
-        # Without compiling, which is behind; the coarser runs of an extrapolation take 3/4 of the finest one's time.
+        begun += sum(one.compile_seconds for one in runs)
+        # The coarser runs of an extrapolation take 3/4 of the finest one's time.
         last, spent = 1.75 * sum(one.run_seconds for one in runs), time.perf_counter() - begun
         if report:
             report(min(1.0, spent / seconds))
@@ -305,8 +307,8 @@ def growth(sample: Sample, setting: Setting) -> Growth:
         runs.append(sample.run(setting, one))
     apart = distances(*runs)
     both = np.hypot(apart["position"], apart["attitude"]) / NUDGE
-    with np.errstate(all="ignore"):
-        curve = np.sqrt(np.nanmean(both**2, axis=1))
+    alive = np.isfinite(both)
+    curve = np.sqrt(np.sum(np.where(alive, both, 0.0) ** 2, axis=1) / np.maximum(alive.sum(axis=1), 1))
     good = np.isfinite(curve) & (curve > 0.0) & (curve < 0.1 / NUDGE)
     return fitted(sample.times[good], curve[good], sample.t1)
 

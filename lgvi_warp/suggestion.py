@@ -77,7 +77,8 @@ class Suggestion:
         lines = [
             f"chosen      {s.name}, {s.dtype}, step {s.h:.6g} s: {self.of} to {self.expected:.1e} {self.unit} up to "
             f"{self.t1:g} s, {self.margin:.2g} times better than asked ({self.members} members checked)",
-            f"predicted   {self.run_seconds:.2g} s on {self.threads} threads, {self.memory_bytes / 1e6:.0f} MB",
+            f"predicted   {self.run_seconds:.2g} s on {self.threads} thread{'s' * (self.threads > 1)}, "
+            f"{self.memory_bytes / 1e6:.2g} MB",
             f"reference   {self.reference}: they agree to {self.reference_error:.1e} {self.unit}",
         ]
         for rival, cost, error in self.rivals:
@@ -102,7 +103,8 @@ def suggest(
 
     of: "position" [m], "attitude" [rad], "velocity" [m/s], "angular_velocity" [rad/s] or "energy" [J]. t1: [s], by default
     run.duration of the scene. methods: names (default: all that the scene takes). members: of the sample that it searches
-    on; what it finds is checked on up to 1024. threads: for the predicted time. seconds: about how long to search.
+    on; what it finds is checked on up to 1024. threads: for the predicted time. seconds: about how long to search,
+    compiling aside.
 
     Raises SceneError naming every fault; where noise acts; and where the reference cannot be known ten times better than
     the error, since errors grow too fast: it says up to which time they can.
@@ -112,7 +114,7 @@ def suggest(
     faults.positive("error", error, QUANTITIES[of])
     faults.raise_if_any()
     names = chosen_methods(methods, CANDIDATES)
-    begun, report = time.perf_counter(), progress or void
+    report = progress or void
     sample = Sample(fleet, t1, members, TIMES)
     taken, refused = sample.accepted(names)
     if not taken:
@@ -122,7 +124,15 @@ def suggest(
         raise SceneError([f"{what}; use lgvi-warp tradeoff, which compares statistics"])
     reference = checked_reference(sample, of, error, 0.4 * seconds, taken)
     report(0.3)
-    found = search(sample, taken, reference, of, error / SAFETY, begun + 0.8 * seconds, lambda x: report(0.3 + 0.5 * x))
+    found = search(
+        sample,
+        taken,
+        reference,
+        of,
+        error / SAFETY,
+        time.perf_counter() + 0.6 * seconds,
+        lambda x: report(0.3 + 0.5 * x),
+    )
     if not found:
         what = f"error = {error:g} {QUANTITIES[of]} of {of}: no step of {', '.join(taken)} kept it"
         raise SceneError([f"{what}; ask for a larger error, a shorter t1, or give more seconds"])
@@ -134,8 +144,8 @@ def suggest(
     prices = costs([one.plan for one in final], rounds=7)
     order = sorted(range(len(final)), key=prices.__getitem__)
     best, price = final[order[0]], prices[order[0]]
-    used = threads or machine.thread_count()
     whole = sample.whole
+    used = min(threads or machine.thread_count(), len(blocks(whole.members)))
     report(1.0)
     return Suggestion(
         settings=best.setting.options(),
@@ -145,7 +155,7 @@ def suggest(
         unit=QUANTITIES[of],
         expected=best.error(of),
         us_per_vehicle_second=price,
-        run_seconds=seconds_of(whole, best.setting, sample.t1) / min(used, len(blocks(whole.members))),
+        run_seconds=seconds_of(whole, best.setting, sample.t1) / used,
         threads=used,
         memory_bytes=memory_of(whole, best.setting, sample.t1),
         members=more.members,
@@ -203,10 +213,13 @@ def search(
         if time.perf_counter() > deadline and found:
             break
         m, before, worse = sample.coarsest(2.0), math.inf, 0
-        per_step = costs([sample.plan(sample.setting(method, m, dtype))], 3)[0] * sample.h(m)
+        plan = sample.plan(sample.setting(method, m, dtype))
+        deadline += plan.compile()
+        per_step = costs([plan], 3)[0] * sample.h(m)
         cheapest = min((cost for cost, _ in found), default=math.inf)
         while per_step / sample.h(m) < 2.0 * cheapest:
             one = tried(sample, sample.setting(method, m, dtype), reference)
+            deadline += one.result.compile_seconds
             size = one.error(of)
             if size <= target:
                 best = lengthened(sample, one, m, before, reference, of, target)

@@ -280,7 +280,7 @@ def tradeoff(
             )
             messages.append(f"{text} itself; beyond, statistics alone mean something")
     trials, left = sweep(
-        sample, taken, reference, finest, until, begun + 0.85 * seconds, lambda x: report(0.2 + 0.6 * x)
+        sample, taken, reference, finest, until, time.perf_counter() + 0.6 * seconds, lambda x: report(0.2 + 0.6 * x)
     )
     if left:
         messages.append(f"no time for {', '.join(left)}: give more seconds")
@@ -344,6 +344,7 @@ def sweep(
                 break
             one = tried(sample, sample.setting(method, m, dtype, solver), reference, until)
             trials.append(one)
+            deadline += one.result.compile_seconds
             m *= 2
             if reference is None:
                 continue

@@ -69,7 +69,7 @@ def parser() -> argparse.ArgumentParser:
         metavar="S",
         type=float,
         default=45.0,
-        help="about how long to measure, compiling aside (default 45)",
+        help="about how long to measure (default 45)",
     )
     info = verbs.add_parser("info", help="machine, versions, SIMD width, threads and the core's peak")
     info.set_defaults(scene=None)

@@ -279,11 +279,12 @@ def tradeoff(
                 f"errors of single members are up to {sample.times[until]:g} s, where the reference still agrees with"
             )
             messages.append(f"{text} itself; beyond, statistics alone mean something")
+    deadline = time.perf_counter() + 0.6 * seconds
     trials, left = sweep(
-        sample, taken, reference, finest, until, time.perf_counter() + 0.6 * seconds, lambda x: report(0.2 + 0.6 * x)
+        sample, taken, reference, until, deadline, begun + seconds, lambda part: report(0.2 + 0.6 * part)
     )
     if left:
-        messages.append(f"no time for {', '.join(left)}: give more seconds")
+        messages.append(f"no time for {', '.join(left)}: run again, the kernels are compiled now, or give more seconds")
     measured = measurements(sample, trials, reference, finest, until)
     report(1.0)
     return Tradeoff(
@@ -323,19 +324,26 @@ def sweep(
     sample: Sample,
     methods: Sequence[str],
     reference: Reference | None,
-    finest: Result,
     until: int,
     deadline: float,
+    latest: float,
     report: Callable[[float], None],
 ) -> tuple[list[Trial], list[str]]:
-    """Steps of every method, each half the one before, until its error is round-off's. Returns what was left out too."""
+    """Steps of every method, each half the one before, until its error is round-off's. Returns what was left out too.
+
+    deadline: for running; latest: for beginning with one more method, compiling included.
+    """
     plain: tuple[str, int | None] = ("quartic", None)
     ladders = [(name, dtype, plain) for name in methods for dtype in PRECISIONS]
     ladders += [(SOLVED_BY, "float64", one) for one in SOLVERS if SOLVED_BY in methods]
     trials: list[Trial] = []
     left: list[str] = []
+    longest = (deadline - time.perf_counter()) / 40.0
     for i, (method, dtype, solver) in enumerate(ladders):
         report(i / len(ladders))
+        if time.perf_counter() > latest:
+            left.append(f"{sample.setting(method, 1, dtype, solver).name} {dtype}")
+            continue
         m, best, worse = sample.coarsest(1.0), math.inf, 0
         for k in range(20 if reference else 5):
             if time.perf_counter() > deadline:
@@ -352,7 +360,7 @@ def sweep(
             worse = worse + 1 if error > 0.8 * best and best < 0.1 else 0
             best = min(best, error)
             noise = TRUST * max(reference.error(of, until) for of in DECIDING)
-            if worse >= 2 or error < noise or hopeless(one, trials):
+            if worse >= 2 or error < noise or one.result.run_seconds > longest or hopeless(one, trials):
                 break
     if reference is not None:
         between(sample, trials, reference, until, deadline)

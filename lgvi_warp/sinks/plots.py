@@ -121,14 +121,22 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None 
     front = found.front(of)
     left.plot([one.error(of) for one in front], [one.us_per_vehicle_second for one in front], color="black", linewidth=5,
               alpha=0.2, solid_capstyle="round", label="cheapest for each error", zorder=0)  # fmt: skip
-    left.set(xscale="log", yscale="log", xlabel=f"largest error of {of} [{QUANTITIES[of]}], up to {found.until:g} s",
+    left.set(xlabel=f"largest error of {of} [{QUANTITIES[of]}], up to {found.until:g} s",
              ylabel="microseconds of one core per vehicle and simulated second", title="Cost of accuracy")  # fmt: skip
+    right.set(xlabel="step [s]", ylabel=f"bias / standard error of {found.members} members",
+              title=f"Bias of the mean of {of} up to {found.t1:g} s")  # fmt: skip
+    for axes, drawn, why in (
+        (left, bool(shown), "no error of members: noise acts, or the reference is not good enough"),
+        (right, any(one.biases for one in found.measurements), "no statistics: there is one member"),
+    ):
+        if drawn:
+            axes.set(xscale="log", yscale="log")
+        else:
+            axes.text(0.5, 0.5, why, ha="center", transform=axes.transAxes)
     if shown:
         left.invert_xaxis()
     right.axhline(1.4, color="black", linewidth=0.8, linestyle=":")
     right.text(0.01, 1.6, "chance", fontsize="small", transform=right.get_yaxis_transform())
-    right.set(xscale="log", yscale="log", xlabel="step [s]", ylabel=f"bias / standard error of {found.members} members",
-              title=f"Bias of the mean of {of} up to {found.t1:g} s")  # fmt: skip
     for axes in (left, right):
         axes.grid(True, alpha=0.3)
     figure.legend(*left.get_legend_handles_labels(), loc="center left", bbox_to_anchor=(0.838, 0.5), fontsize="small")

@@ -290,6 +290,8 @@ class Growth:
 
 
 NUDGE = 1e-8
+# Powers of time above this are an exponential seen at few times.
+STEEPEST = 3.0
 
 
 def growth(sample: Sample, setting: Setting) -> Growth:
@@ -321,7 +323,7 @@ def fitted(times: np.ndarray, curve: np.ndarray, t1: float) -> Growth:
     t, logs = times[later], np.log(curve[later])
     (rate, at0), misfit = np.polyfit(t, logs, 1, full=True)[:2]
     (power, _), misfit_power = np.polyfit(np.log(t), logs, 1, full=True)[:2]
-    algebraic = rate <= 0.0 or misfit_power.sum() <= misfit.sum()
+    algebraic = rate <= 0.0 or (power < STEEPEST and misfit_power.sum() <= misfit.sum())
     predictable = {}
     for dtype, size in ROUND_OFF.items():
         beyond = np.flatnonzero(curve * size > LOST)

@@ -293,7 +293,7 @@ def tradeoff(
         members=sample.members,
         t1=sample.t1,
         until=float(sample.times[until]),
-        reference=reference.text if reference else "none: statistics against the finest run",
+        reference=reference.text if reference else "the finest run's statistics, since noise acts",
         reference_error={name: reference.error(name, until) for name in QUANTITIES} if reference else {},
         growth=lost,
         refused=refused,
@@ -303,10 +303,11 @@ def tradeoff(
 
 
 def growth_of(sample: Sample, taken: Sequence[str], reference: Reference) -> Growth:
-    """Growth of errors, by the method of highest order at the reference's step."""
+    """Growth of errors, by the method of highest order at about the reference's step."""
     method = max(taken, key=lambda name: Method(name).order)
-    h = reference.result.provenance["step"]
-    return comparison.growth(sample, sample.setting(method, round(float(sample.spacing) / h)))
+    often = Sample(sample.whole, sample.t1, sample.members)
+    m = max(1, round(float(often.spacing) / reference.result.provenance["step"]))
+    return comparison.growth(often, often.setting(method, m))
 
 
 def trusted_until(reference: Reference, of: str) -> int:

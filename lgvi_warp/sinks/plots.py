@@ -140,8 +140,7 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None 
     for axes in (left, right):
         axes.grid(True, alpha=0.3)
     figure.legend(*left.get_legend_handles_labels(), loc="center left", bbox_to_anchor=(0.838, 0.5), fontsize="small")
-    reference = f"reference {found.reference}" if front else found.reference
-    figure.suptitle(f"{found.members} members, 0 to {found.t1:g} s; {reference}; better is to the right and down",
+    figure.suptitle(f"{found.members} members, 0 to {found.t1:g} s; reference {found.reference}; better is to the right and down",
                     fontsize="medium")  # fmt: skip
     target = Path(path)
     figure.savefig(target, dpi=100)

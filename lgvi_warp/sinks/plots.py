@@ -140,8 +140,10 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None 
     for axes in (left, right):
         axes.grid(True, alpha=0.3)
     figure.legend(*left.get_legend_handles_labels(), loc="center left", bbox_to_anchor=(0.838, 0.5), fontsize="small")
-    figure.suptitle(f"{found.members} members, 0 to {found.t1:g} s; reference {found.reference}; better is to the right and down",
-                    fontsize="medium")  # fmt: skip
+    title = (
+        f"{found.members} members, 0 to {found.t1:g} s; reference {found.reference}; better is to the right and down"
+    )
+    figure.suptitle(title, fontsize="medium")
     target = Path(path)
     figure.savefig(target, dpi=100)
     return target

@@ -45,17 +45,22 @@ if TYPE_CHECKING:
     from lgvi_warp.coefficients_yaml import from_yaml
     from lgvi_warp.law_check import check_law
     from lgvi_warp.plan import Plan
-    from lgvi_warp.sinks.plots import plot
+    from lgvi_warp.sinks.plots import plot, plot_tradeoff
     from lgvi_warp.sinks.rerun import log_rerun
     from lgvi_warp.solving import solve
+    from lgvi_warp.suggestion import suggest
+    from lgvi_warp.tradeoffs import tradeoff
 
 __version__ = "0.1.0"
 
 # Loaded when first used: Warp takes a second to import, and a scene can be read and checked without it.
 _LAZY = {
     "solve": "lgvi_warp.solving",
+    "suggest": "lgvi_warp.suggestion",
+    "tradeoff": "lgvi_warp.tradeoffs",
     "Plan": "lgvi_warp.plan",
     "plot": "lgvi_warp.sinks.plots",
+    "plot_tradeoff": "lgvi_warp.sinks.plots",
     "log_rerun": "lgvi_warp.sinks.rerun",
     "check_law": "lgvi_warp.law_check",
     "from_fossen": "lgvi_warp.coefficients",
@@ -113,9 +118,12 @@ __all__ = [
     "from_yaml",
     "log_rerun",
     "plot",
+    "plot_tradeoff",
     "quantity",
     "register",
     "solve",
+    "suggest",
+    "tradeoff",
     "vehicles",
 ]
 

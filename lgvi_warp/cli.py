@@ -24,9 +24,13 @@ OPTIONS = {
     "seed": "ensemble.seed",
 }
 
+OF = "position, attitude, velocity, angular_velocity or energy"
+
 EPILOG = """examples:
   lgvi-warp run examples/paper.toml --out runs/paper
   lgvi-warp run examples/paper.toml --members 20000 --dtype float32 --set vehicle.mass=120
+  lgvi-warp run examples/paper.toml --error 1e-3
+  lgvi-warp tradeoff examples/paper.toml --out runs/tradeoff
   lgvi-warp info
 """
 
@@ -41,23 +45,32 @@ def parser() -> argparse.ArgumentParser:
     )
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
     run = verbs.add_parser("run", help="run a scene's ensemble: result.npz, fleet.png, fleet.rrd and a summary")
-    run.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
+    _add_scene(run, "runs/NAME of the scene")
     run.add_argument(
-        "--out",
-        metavar="DIR",
-        type=Path,
-        help="folder for the files, replaced if they exist (default: runs/NAME of the scene)",
+        "--error",
+        metavar="E",
+        type=float,
+        help="choose the cheapest method, step and precision that keep this error, and check it after the run",
     )
+    run.add_argument("--of", help=f"what --error is of (default: position [m]); {OF}")
     run.add_argument("--method", help="psi_s, psi_1, psi, phi, phi_adjoint, or a composition such as kl6(psi_s)")
     run.add_argument("--step", metavar="S", help="time step [s]")
-    run.add_argument("--duration", metavar="S", help="end of the run [s]")
-    run.add_argument("--members", metavar="N", help="number of vehicles")
-    run.add_argument("--seed", metavar="N", help="seed of what varies")
     run.add_argument("--dtype", help="float64, float32, or float32_compensated: sums of two float32")
     run.add_argument("--threads", metavar="N", type=int, help="threads (default: all cores)")
     run.add_argument("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
-    run.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="replace a key of the scene file")
-    run.add_argument("--quiet", action="store_true", help="no progress and no summary")
+    trade = verbs.add_parser(
+        "tradeoff", help="speed against accuracy of every method, step and precision: tradeoff.json, .csv and .png"
+    )
+    _add_scene(trade, "runs/NAME_tradeoff")
+    trade.add_argument("--methods", metavar="A,B", help="names, such as psi_s,kl8(psi_x) (default: all that fit)")
+    trade.add_argument("--of", default="position", help=f"what errors are of (default: position); {OF}")
+    trade.add_argument(
+        "--seconds",
+        metavar="S",
+        type=float,
+        default=45.0,
+        help="about how long to measure (default 45)",
+    )
     info = verbs.add_parser("info", help="machine, versions, SIMD width, threads and the core's peak")
     info.set_defaults(scene=None)
     bench = verbs.add_parser("bench", help="speed of the kernel on this machine, beside the core's peak")
@@ -66,11 +79,24 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
+def _add_scene(verb: argparse.ArgumentParser, folder: str) -> None:
+    """The arguments of a verb that runs a scene."""
+    verb.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
+    verb.add_argument(
+        "--out", metavar="DIR", type=Path, help=f"folder for the files, replaced if they exist (default: {folder})"
+    )
+    verb.add_argument("--duration", metavar="S", help="end of the run [s]")
+    verb.add_argument("--members", metavar="N", help="number of vehicles")
+    verb.add_argument("--seed", metavar="N", help="seed of what varies")
+    verb.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="replace a key of the scene file")
+    verb.add_argument("--quiet", action="store_true", help="no progress and no summary")
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the command. Returns the exit code: 0, 1 for a run that failed, 2 for a scene or argument that is refused."""
     chosen = parser().parse_args(arguments)
     try:
-        return {"run": run, "info": info, "bench": bench}[chosen.verb](chosen)
+        return {"run": run, "tradeoff": tradeoff, "info": info, "bench": bench}[chosen.verb](chosen)
     except SceneError as error:
         print(f"lgvi-warp: {error}", file=sys.stderr)
         return 2
@@ -86,7 +112,7 @@ def overrides(chosen: argparse.Namespace) -> dict[str, Any]:
     """What the command line replaces of the scene file. Raises SceneError for a --set without a value."""
     changes: dict[str, Any] = {}
     for name, key in OPTIONS.items():
-        value = getattr(chosen, name)
+        value = getattr(chosen, name, None)
         if value is not None:
             changes[key] = value
     for text in chosen.set:
@@ -108,17 +134,89 @@ def run(chosen: argparse.Namespace) -> int:
     warm = _import_in_background()
     from lgvi_warp.solving import solve
 
+    suggested = suggestion(scene, chosen)
     progress = None if chosen.quiet else Progress(sys.stderr)
-    result = solve(scene, threads=chosen.threads, width=chosen.width, progress=progress)
+    settings = suggested.settings if suggested else {}
+    result = solve(scene, threads=chosen.threads, width=chosen.width, progress=progress, **settings)
     if progress:
         progress.close()
     warm.join()
     files, faults = write(result, out)
     if not chosen.quiet:
         print(summary(result, files, time.perf_counter() - begun))
+    if suggested:
+        faults += check_error(scene, result, suggested, chosen.quiet)
     for fault in faults:
         print(f"lgvi-warp: {fault}", file=sys.stderr)
     return 1 if faults or (result.status != 0).all() else 0
+
+
+def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:
+    """What --error asks for, said; None without it. Raises SceneError."""
+    if chosen.error is None:
+        if chosen.of is not None:
+            raise SceneError([f"--of {chosen.of}: says what --error is of, which is missing; add --error 1e-3"])
+        return None
+    for name in ("step", "dtype"):
+        if getattr(chosen, name) is not None:
+            text = f"--{name} {getattr(chosen, name)}: is what --error chooses"
+            raise SceneError([f"{text}; leave out --{name} or --error"])
+    from lgvi_warp.suggestion import suggest
+
+    progress = None if chosen.quiet else Progress(sys.stderr)
+    methods = [chosen.method] if chosen.method else None
+    of = chosen.of or "position"
+    found = suggest(scene, chosen.error, of, methods=methods, threads=chosen.threads, progress=progress)
+    if progress:
+        progress.close()
+        print(found, flush=True)
+    return found
+
+
+def check_error(scene: Any, result: Any, suggested: Any, quiet: bool) -> list[str]:
+    """Say what error the run has, by some members at half its step; a fault where it is above what was asked."""
+    from lgvi_warp.ensemble import Ensemble
+    from lgvi_warp.suggestion import verified
+
+    found, members = verified(Ensemble.from_scene(scene), result, suggested)
+    text = (
+        f"error of {suggested.of} {found:.1e} {suggested.unit}, asked {suggested.error:g} ({members} members again at "
+    )
+    text += "half the step, those with the largest errors among them)"
+    if not found <= suggested.error:
+        return [f"{text}: missed; ask for a smaller one"]
+    if not quiet:
+        print(f"checked     {text}")
+    return []
+
+
+def tradeoff(chosen: argparse.Namespace) -> int:
+    """lgvi-warp tradeoff."""
+    from lgvi_warp.scene import Scene
+
+    scene = Scene.load(chosen.scene, overrides(chosen))
+    out: Path = chosen.out or Path("runs") / f"{Path(chosen.scene).stem}_tradeoff"
+    out.mkdir(parents=True, exist_ok=True)
+    methods = None if chosen.methods is None else [name.strip() for name in chosen.methods.split(",")]
+    from lgvi_warp.sinks.plots import plot_tradeoff
+    from lgvi_warp.tradeoffs import report_text
+    from lgvi_warp.tradeoffs import tradeoff as measure
+
+    progress = None if chosen.quiet else Progress(sys.stderr)
+    found = measure(scene, of=chosen.of, methods=methods, seconds=chosen.seconds, progress=progress)
+    if progress:
+        progress.close()
+    files, faults = found.save(out), []
+    try:
+        files.append(plot_tradeoff(found, out / "tradeoff.png"))
+    except (ImportError, ValueError) as error:
+        faults.append(f"{out / 'tradeoff.png'} was not written: {error}")
+    if not chosen.quiet:
+        print(report_text(found))
+        print("\n".join(["", *(f"file        {path}" for path in files)]))
+    for fault in faults:
+        print(f"lgvi-warp: {fault}", file=sys.stderr)
+    return 1 if faults else 0
 
 
 def _import_in_background() -> threading.Thread:

@@ -27,6 +27,13 @@ METHODS: tuple[tuple[str | Method, str, tuple[float, ...]], ...] = (
     ("kl8(psi_s)", "float64", (1, 2, 4, 8, 16, 32)),
     ("kl8(psi_1)", "float64", (1, 2, 4, 8, 16, 32)),
     ("kl8(psi_x)", "float64", (1, 2, 4, 8, 16, 32)),
+    ("rk4", "float64", (1, 2, 4, 8, 16, 32, 64)),
+    ("rk5", "float64", (1, 2, 4, 8, 16, 32, 64, 128)),
+    ("rk8", "float64", (0.5, 1, 2, 4, 8, 16, 32)),
+    ("bm6(psi_x)", "float64", (1, 2, 4, 8, 16)),
+    ("rkn6_14", "float64", (2, 4, 8, 16)),
+    ("rk5", "float32", (1, 2, 4, 8, 16)),
+    ("rk8", "float32", (0.5, 1, 2, 4)),
     ("psi_s", "float32", (2, 4, 8, 16, 32, 64)),
     ("psi_x", "float32", (2, 4, 8, 16, 32, 64)),
     ("kl6(psi_x)", "float32", (1, 2, 4, 8)),
@@ -62,7 +69,7 @@ class Fleet:
         for part, raw in zip(self.parts, self.samples, strict=True):
             raw = raw[-1:, : part.members.count].astype(np.float64)
             raw[0, part.outcome().status != 0] = np.nan
-            ends.append(unpacked(self.plan.spec.fields, raw, part.frame))
+            ends.append(unpacked(self.plan.spec.sample_fields, raw, part.frame))
         return tuple(np.concatenate([one[name][-1] for one in ends]) for name in ("position", "attitude"))
 
 

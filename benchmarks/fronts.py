@@ -27,17 +27,14 @@ def paper():
 
 def remus():
     """REMUS 100 with drag, lift and fins, thrust and a rudder held at 4 degrees, in a current, 60 s."""
-    scene = lw.Scene.named(
-        "remus_100",
-        vehicle={"buoyancy": 299.0},
-        terms=[
-            {"type": "wrench", "force": [3.86, 0.0, 0.0]},
-            {"type": "control_fins", "command": [np.deg2rad(4.0), 0.0]},
-            {"type": "current", "velocity": [0.3, 0.1, 0.0]},
-        ],
-        start={"velocity": [1.5, 0.0, 0.0], "angular_velocity": [0.01, 0.0, 0.02]},
-    )
-    return lw.Ensemble(scene, 256, 1, SPREAD), 60.0
+    n, rng = 256, np.random.default_rng(1)
+    current = {"type": "current", "velocity": [0.3, 0.1, 0.0]}
+    scene = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0}, terms=[current])
+    spread = 0.02 * rng.normal(size=(n, 3))
+    states = (np.zeros((n, 3)), np.tile(np.eye(3), (n, 1, 1)), np.add(spread, (1.5, 0.0, 0.0)), spread)
+    return lw.Ensemble.from_states(
+        scene, *states, {"control_fins.command": np.full((n, 2), [np.radians(4.0), 0.0])}
+    ), 60.0
 
 
 def light():

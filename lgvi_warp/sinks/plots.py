@@ -139,7 +139,7 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None 
     right.text(0.01, 1.6, "chance", fontsize="small", transform=right.get_yaxis_transform())
     for axes in (left, right):
         axes.grid(True, alpha=0.3)
-    figure.legend(*left.get_legend_handles_labels(), loc="center left", bbox_to_anchor=(0.838, 0.5), fontsize="small")
+    figure.legend(*left.get_legend_handles_labels(), loc="center left", bbox_to_anchor=(0.838, 0.5), fontsize="x-small", ncols=2)
     title = (
         f"{found.members} members, 0 to {found.t1:g} s; reference {found.reference}; better is to the right and down"
     )

@@ -94,7 +94,7 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None 
     of = of or found.of
     if not found.measurements:
         raise ValueError("no setting was measured: there is nothing to draw")
-    figure = figure_of(figsize=(17.0, 7.5))
+    figure = figure_of(figsize=(20.5, 7.5))
     left, right = figure.subplots(1, 2)
     figure.subplots_adjust(left=0.055, right=0.83, bottom=0.09, top=0.88, wspace=0.2)
     shown = found.shown(of)
@@ -139,7 +139,9 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None 
     right.text(0.01, 1.6, "chance", fontsize="small", transform=right.get_yaxis_transform())
     for axes in (left, right):
         axes.grid(True, alpha=0.3)
-    figure.legend(*left.get_legend_handles_labels(), loc="center left", bbox_to_anchor=(0.838, 0.5), fontsize="x-small", ncols=2)
+    figure.legend(
+        *left.get_legend_handles_labels(), loc="center left", bbox_to_anchor=(0.838, 0.5), fontsize="x-small", ncols=2
+    )
     title = (
         f"{found.members} members, 0 to {found.t1:g} s; reference {found.reference}; better is to the right and down"
     )

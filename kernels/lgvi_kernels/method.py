@@ -156,8 +156,8 @@ def make_method(spec):
     letters = {
         "Ab": make_Ab(velocity, spec.timed),
         "Ap": Ap,
-        "T": make_T(spec.timed),
-        "D": make_D(rotation_struct(width, real), solve),
+        "T": make_T(spec.timed, spec.compensated),
+        "D": make_D(rotation_struct(width, real), solve, spec.compensated),
     }
     if "K" in used:
         letters["K"] = make_K(View, Wrench, Flow, law, evolve, flow, varies, shifted, E if spec.drag else None, V)

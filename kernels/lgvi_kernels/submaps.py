@@ -92,7 +92,7 @@ def make_D(Rotation, solve, compensated):
         if wp.static(compensated):
             x = turned(x, F)
         else:
-            # Written out: by a function of the state the compiler finds a schedule that is a fifth slower.
+            # Written out: by a function of the state the compiler finds a slower schedule.
             x.p = transpose_apply(F, x.p)
             x.pi = transpose_apply(F, x.pi)
             x.R0 = transpose_apply(F, x.R0)

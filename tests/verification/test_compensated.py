@@ -8,6 +8,9 @@ from lgvi_warp import plan, terms
 from lgvi_warp.inertia import moved
 from tests.tools import difference, last, one, random_states, scene_of
 
+# Each method of another program is a kernel of its own to compile.
+SLOW = pytest.mark.slow
+
 METHODS = ("psi", "psi_s", "psi_1", "psi_x", "psi_x8", "psi_w", "kl6(psi_s)")
 FIELDS = ("position", "attitude", "velocity", "angular_velocity")
 COMPENSATED = "float32_compensated"
@@ -42,7 +45,7 @@ def rounded(scene):
     return lw.Scene(changed, scene.environment, terms=scene.terms)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", ["psi_s", *(pytest.param(name, marks=SLOW) for name in METHODS if name != "psi_s")])
 def test_far_from_the_origin(method):
     # M = m I: a straight line of 100 m in 1e5 steps of 1 mm, 1e7 m from the origin, where float32 has a metre's digits.
     # Each step's change is rounded where b's low part, below half a metre, has its digits: 1e5 * 0.5 * 2^-24 if all
@@ -60,7 +63,9 @@ def test_far_from_the_origin(method):
     assert np.abs(plain.position[-1] - expected).max() > 50.0
 
 
-@pytest.mark.parametrize("method", ["psi", "psi_s", "psi_1", "psi_x", "psi_w"])
+@pytest.mark.parametrize(
+    "method", ["psi_s", "psi_x", *(pytest.param(name, marks=SLOW) for name in ("psi", "psi_1", "psi_w"))]
+)
 def test_many_short_steps(method):
     # 1e5 steps of 1 ms. What a step rounds is some 1e-3 of the state, 2^-24 of that: all together as much as rounding the
     # data once if every step errs to the same side, 100 times 2^-24 of the state. Some ten numbers are so rounded.
@@ -88,7 +93,7 @@ LAWS = {
 
 
 @pytest.mark.parametrize("name", LAWS)
-@pytest.mark.parametrize("method", ["psi_s", "psi_x"])
+@pytest.mark.parametrize("method", ["psi_s", pytest.param("psi_x", marks=SLOW)])
 def test_laws(name, method):
     # As above, with some ten numbers of the laws rounded as well.
     scene = lw.Scene(GENERAL.vehicle, GENERAL.environment, terms=LAWS[name])
@@ -97,7 +102,7 @@ def test_laws(name, method):
     assert plain > 10 * compensated
 
 
-@pytest.mark.parametrize("method", ["psi_x", "psi_x8", "psi_w"])
+@pytest.mark.parametrize("method", ["psi_x", *(pytest.param(name, marks=SLOW) for name in ("psi_x8", "psi_w"))])
 def test_coupled_inertia(method):
     # The origin is 0.3 m from the centre of mass: psi_x hops between the origins of the axes at every step.
     rigid = np.diag([20.0, 20.0, 20.0, 1.5, 4.0, 4.5])
@@ -133,7 +138,7 @@ def test_events_stop_where_they_do():
         assert getattr(result, name)[:, ~stopped].tobytes() == getattr(alone, name)[:, ~stopped].tobytes()
 
 
-@pytest.mark.parametrize("method", ["psi_s", "psi_x"])
+@pytest.mark.parametrize("method", ["psi_s", pytest.param("psi_x", marks=SLOW)])
 def test_a_failure_beside_changes_nothing(method):
     # Chunks with a failing lane are repeated one step at a time: the low parts too start where the chunk did.
     b, R, nu, Om = random_states(3, 40, 0.5, 0.5)
@@ -146,7 +151,7 @@ def test_a_failure_beside_changes_nothing(method):
         assert getattr(one_of_them, name)[:, well].tobytes() == getattr(all_well, name)[:, well].tobytes()
 
 
-@pytest.mark.parametrize("method", ["psi_s", "psi_x", "psi_1"])
+@pytest.mark.parametrize("method", ["psi_s", *(pytest.param(name, marks=SLOW) for name in ("psi_x", "psi_1"))])
 def test_launches_and_samples_do_not_change_the_path(method, monkeypatch):
     # The low parts are part of a packet's state: many short launches end where one does, to the bit.
     fleet = one(GENERAL, *random_states(3, 9, 0.5, 0.5))

@@ -214,5 +214,5 @@ def test_simple_vehicles_load(name):
 
 
 def test_the_full_vehicle_loads():
-    """Needs the 6x6 form of lgvi_warp.Vehicle."""
-    lw.Vehicle(**content("remus_100")["vehicle"])
+    given = content("remus_100")["vehicle"]
+    np.testing.assert_array_equal(lw.Vehicle(**given).added_mass_matrix, given["added_mass_matrix"])

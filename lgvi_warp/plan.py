@@ -39,27 +39,6 @@ build_lock = threading.Lock()
 
 
 @dataclass(frozen=True)
-class Block:
-    """A run of members, first to stop: the unit of work."""
-
-    first: int
-    stop: int
-
-    @property
-    def count(self) -> int:
-        """Members in it."""
-        return self.stop - self.first
-
-
-def blocks(members: int) -> list[Block]:
-    """Runs of 256 to 4096 members, a power of two. Depends on the number of members only, so bits and files do too."""
-    size = 256
-    while size < 4096 and size * 64 <= members:
-        size *= 2
-    return [Block(i, min(i + size, members)) for i in range(0, members, size)]
-
-
-@dataclass(frozen=True)
 class Plan:
     """Everything decided before a run: which kernel, which width, which steps.
 

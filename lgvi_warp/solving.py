@@ -2,33 +2,27 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from lgvi_warp import machine, notation
+from lgvi_warp import machine
+from lgvi_warp.blocks import Block, Keeper, blocks, in_order, run_block
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError, shown
 from lgvi_warp.executors import threads as thread_executor
-from lgvi_warp.inertia import Frame
+from lgvi_warp.keepers import Outcomes, Samples
 from lgvi_warp.method import Method
-from lgvi_warp.packets import Packets
-from lgvi_warp.plan import Block, Plan, blocks
+from lgvi_warp.plan import Plan
 from lgvi_warp.result import Result
 from lgvi_warp.saveat import SaveAt, time_grid
 from lgvi_warp.scene import Scene
 from lgvi_warp.status import Status, StatusArray
-
-SHAPES: dict[str, tuple[int, ...]] = {
-    "position": (3,),
-    "attitude": (3, 3),
-    "velocity": (3,),
-    "angular_velocity": (3,),
-}
 
 
 def solve(
@@ -152,92 +146,40 @@ class _Progress:
 def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None = None) -> Result:
     """Run every block of the plan and gather the result."""
     compile_seconds = plan.compile()
-    n, k = plan.ensemble.members, len(plan.grid.times)
-    real = machine.DTYPES[plan.dtype]
-    samples = {name: np.empty((k, n, *SHAPES[name]), real) for name in plan.spec.fields}
-    if plan.spec.compensated and "position" in samples:
-        samples["position"] = np.empty((k, n, 3))
-    status, failed_step, failed_size = np.zeros(n, np.uint8), np.zeros(n, np.int64), np.zeros(n)
-    chosen = np.zeros((n, 2 if plan.method.adaptive else 0), np.int64)
+    n = plan.ensemble.members
+    outcomes, samples = Outcomes(plan), Samples(plan)
+    keepers: tuple[Keeper, ...] = (outcomes, samples)
     counter = _Progress(n * plan.grid.steps, progress)
-
     stop = threading.Event()
 
-    def advance(block: Block) -> None:
-        members = plan.ensemble.select(block.first, block.stop)
-        packets = Packets(plan, members)
-        at = slice(block.first, block.stop)
-        for name, values in samples.items():
-            values[0, at] = getattr(members, name)
-        for k0, k1 in plan.segments(block.count):
-            if stop.is_set():
-                return
-            raw = packets.advance(k0, k1)[:, : block.count]
-            _store(samples, slice(*plan.due(k0, k1)), at, unpacked(plan.spec.sample_fields, raw, packets.frame))
-            counter.add(block.count * (k1 - k0))
-        outcome = packets.outcome()
-        status[at], failed_step[at], failed_size[at] = outcome.status, outcome.failed_step, outcome.failed_size
-        chosen[at] = outcome.chosen
-
-    def work(block: Block) -> None:
-        # A member that is not finite, or not within float32, gets its status from the kernel; NumPy need not remark.
-        with np.errstate(invalid="ignore", over="ignore"):
-            advance(block)
+    def work(block: Block) -> tuple[Any, ...] | None:
+        return run_block(plan, block, keepers, stop.is_set, counter.add)
 
     start = time.perf_counter()
-    thread_executor.run(blocks(n), work, threads, stop)
+    runs = blocks(n)
+    with contextlib.closing(thread_executor.run(runs, work, threads, stop)) as done:
+        for block, parts in in_order(runs, done):
+            for keeper, part in zip(keepers, parts, strict=True):
+                keeper.merge(block, part)
     run_seconds = time.perf_counter() - start
+    status = outcomes.status
     failed, stopped = status != 0, status >= Status.SURFACE
     # An event's size is the part of its step that was made before it.
-    steps_made = failed_step + np.where(stopped, failed_size, 0.0)
+    steps_made = outcomes.failed_step + np.where(stopped, outcomes.failed_size, 0.0)
     return Result(
         time=plan.grid.times,
-        samples=samples,
+        samples=samples.fields,
         status=status.view(StatusArray),
         failure_time=np.where(failed, steps_made * plan.grid.h, np.nan),
-        failure_value=np.where(failed, np.where(stopped, 0.0, failed_size), np.nan),
+        failure_value=np.where(failed, np.where(stopped, 0.0, outcomes.failed_size), np.nan),
         parameters=plan.ensemble.parameters(0, n),
         messages=plan.grid.messages + plan.ensemble.scene.vehicle.warnings,
         provenance=provenance(plan)
-        | dict(zip(("steps_made", "steps_tried"), chosen.mean(axis=0).tolist(), strict=False)),
+        | dict(zip(("steps_made", "steps_tried"), outcomes.chosen.mean(axis=0).tolist(), strict=False)),
         terms=tuple(plan.ensemble.scene.terms),
         compile_seconds=compile_seconds,
         run_seconds=run_seconds,
     )
-
-
-def _store(samples: dict[str, np.ndarray], when: slice, at: slice, parts: dict[str, np.ndarray]) -> None:
-    """Put the samples of a block into their places."""
-    for name, values in parts.items():
-        samples[name][when, at] = values
-
-
-def unpacked(fields: Mapping[str, int], raw: np.ndarray, frame: Frame) -> dict[str, np.ndarray]:
-    """Raw samples (samples, members, numbers) as fields, from the kernel's origin and axes to the user's.
-
-    fields: numbers of each field; twice as many as it has for a sum of two numbers, which is made in float64.
-    """
-    parts: dict[str, np.ndarray] = {}
-    column = 0
-    for name, size in fields.items():
-        shape = SHAPES[name]
-        values = raw[..., column : column + size]
-        if size == 2 * int(np.prod(shape)):
-            values = np.add(*np.split(values, 2, axis=-1), dtype=np.float64)
-        parts[name] = values.reshape(*raw.shape[:2], *shape)
-        column += size
-    if not np.array_equal(frame.Q, np.broadcast_to(np.eye(3), frame.Q.shape)):
-        turns = {"attitude": lambda R: R @ np.swapaxes(frame.Q, -1, -2)}
-        for name in parts.keys() - {"position"}:
-            turn = turns.get(name, lambda v: notation.rotate_out(frame.Q, v))
-            parts[name] = turn(parts[name])
-    if np.any(frame.origin):
-        o = np.broadcast_to(frame.origin, (raw.shape[1], 3))
-        if "position" in parts:
-            parts["position"] = parts["position"] - np.einsum("knij,nj->kni", parts["attitude"], o)
-        if "velocity" in parts:
-            parts["velocity"] = parts["velocity"] - np.cross(parts["angular_velocity"], o)
-    return parts
 
 
 def provenance(plan: Plan) -> dict[str, Any]:

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp import comparison, machine, tradeoffs
+from lgvi_warp.blocks import blocks
 from lgvi_warp.comparison import QUANTITIES, Reference, Sample, Setting
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.method import Method
-from lgvi_warp.plan import Plan, blocks
+from lgvi_warp.plan import Plan
 from lgvi_warp.result import Result
 from lgvi_warp.saveat import TimeGrid
 from lgvi_warp.scene import Scene

@@ -1,0 +1,139 @@
+"""The unit of work: a run of members through all steps, and what is kept of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from lgvi_warp import notation
+from lgvi_warp.inertia import Frame
+
+if TYPE_CHECKING:
+    from lgvi_warp.ensemble import Members
+    from lgvi_warp.packets import Outcome
+    from lgvi_warp.plan import Plan
+
+SHAPES: dict[str, tuple[int, ...]] = {
+    "position": (3,),
+    "attitude": (3, 3),
+    "velocity": (3,),
+    "angular_velocity": (3,),
+}
+
+
+@dataclass(frozen=True)
+class Block:
+    """A run of members, first to stop: the unit of work."""
+
+    first: int
+    stop: int
+
+    @property
+    def count(self) -> int:
+        """Members in it."""
+        return self.stop - self.first
+
+
+def blocks(members: int) -> list[Block]:
+    """Runs of 256 to 4096 members, a power of two. Depends on the number of members only, so bits and files do too."""
+    size = 256
+    while size < 4096 and size * 64 <= members:
+        size *= 2
+    return [Block(i, min(i + size, members)) for i in range(0, members, size)]
+
+
+class BlockKeeper(Protocol):
+    """What is kept of one block, where that block runs."""
+
+    def take(self, when: slice, samples: dict[str, np.ndarray]) -> None:
+        """Samples `when` (of all times) by field, (times, members of the block, ...): each time once, in order."""
+
+    def close(self, outcome: Outcome) -> Any:
+        """What the run is to have of this block: small, and picklable."""
+
+
+class Keeper(Protocol):
+    """What a run keeps of its members: all samples, statistics, files."""
+
+    def open(self, plan: Plan, block: Block, members: Members) -> BlockKeeper:
+        """Before a block's first step, in the thread or process that runs it."""
+
+    def merge(self, block: Block, part: Any) -> None:
+        """What a block's keeper closed with; in the order of the blocks, in the thread that asked for the run."""
+
+
+def run_block(
+    plan: Plan,
+    block: Block,
+    keepers: Sequence[Keeper],
+    halted: Callable[[], bool] = lambda: False,
+    advanced: Callable[[int], None] = lambda vehicle_steps: None,
+) -> tuple[Any, ...] | None:
+    """Advance a block through all steps. Returns what each keeper closed with; None if it was halted before the end.
+
+    advanced: called with the vehicle-steps made since the last call.
+    """
+    from lgvi_warp.packets import Packets
+
+    # A member that is not finite, or not within float32, gets its status from the kernel; NumPy need not remark.
+    with np.errstate(invalid="ignore", over="ignore"):
+        members = plan.ensemble.select(block.first, block.stop)
+        packets = Packets(plan, members)
+        kept = [keeper.open(plan, block, members) for keeper in keepers]
+        start = {name: getattr(members, name)[None] for name in plan.spec.fields}
+        for one in kept:
+            one.take(slice(0, 1), start)
+        for k0, k1 in plan.segments(block.count):
+            if halted():
+                return None
+            raw = packets.advance(k0, k1)[:, : block.count]
+            samples = unpacked(plan.spec.sample_fields, raw, packets.frame)
+            when = slice(*plan.due(k0, k1))
+            if when.start < when.stop:
+                for one in kept:
+                    one.take(when, samples)
+            advanced(block.count * (k1 - k0))
+        outcome = packets.outcome()
+        return tuple(one.close(outcome) for one in kept)
+
+
+def in_order(runs: Sequence[Block], done: Iterable[tuple[Block, Any]]) -> Iterator[tuple[Block, Any]]:
+    """Blocks that finish in any order, in theirs."""
+    waiting: dict[int, Any] = {}
+    place = 0
+    for block, value in done:
+        waiting[block.first] = value
+        while place < len(runs) and runs[place].first in waiting:
+            yield runs[place], waiting.pop(runs[place].first)
+            place += 1
+
+
+def unpacked(fields: Mapping[str, int], raw: np.ndarray, frame: Frame) -> dict[str, np.ndarray]:
+    """Raw samples (samples, members, numbers) as fields, from the kernel's origin and axes to the user's.
+
+    fields: numbers of each field; twice as many as it has for a sum of two numbers, which is made in float64.
+    """
+    parts: dict[str, np.ndarray] = {}
+    column = 0
+    for name, size in fields.items():
+        shape = SHAPES[name]
+        values = raw[..., column : column + size]
+        if size == 2 * int(np.prod(shape)):
+            values = np.add(*np.split(values, 2, axis=-1), dtype=np.float64)
+        parts[name] = values.reshape(*raw.shape[:2], *shape)
+        column += size
+    if not np.array_equal(frame.Q, np.broadcast_to(np.eye(3), frame.Q.shape)):
+        turns = {"attitude": lambda R: R @ np.swapaxes(frame.Q, -1, -2)}
+        for name in parts.keys() - {"position"}:
+            turn = turns.get(name, lambda v: notation.rotate_out(frame.Q, v))
+            parts[name] = turn(parts[name])
+    if np.any(frame.origin):
+        o = np.broadcast_to(frame.origin, (raw.shape[1], 3))
+        if "position" in parts:
+            parts["position"] = parts["position"] - np.einsum("knij,nj->kni", parts["attitude"], o)
+        if "velocity" in parts:
+            parts["velocity"] = parts["velocity"] - np.cross(parts["angular_velocity"], o)
+    return parts

@@ -4,13 +4,13 @@ from typing import TYPE_CHECKING, Any
 
 from lgvi_warp.distributions import LogNormal, Normal, TruncatedNormal, Uniform
 from lgvi_warp.ensemble import Ensemble
-from lgvi_warp.errors import SceneError
+from lgvi_warp.errors import MembersFailed, SceneError
 from lgvi_warp.events import Box, Event, Floor, StopTime, Surface
 from lgvi_warp.method import Method
 from lgvi_warp.result import Result
 from lgvi_warp.saveat import SaveAt
 from lgvi_warp.scene import Environment, Scene, Start
-from lgvi_warp.status import Status
+from lgvi_warp.status import Status, Warnings
 from lgvi_warp.terms import (
     BodyLift,
     ControlFins,
@@ -86,6 +86,7 @@ __all__ = [
     "Floor",
     "GaussMarkovCurrent",
     "LogNormal",
+    "MembersFailed",
     "Method",
     "Normal",
     "Packed",
@@ -107,6 +108,7 @@ __all__ = [
     "TruncatedNormal",
     "Uniform",
     "Vehicle",
+    "Warnings",
     "Waves",
     "Weight",
     "Wrench",

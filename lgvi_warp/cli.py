@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
 
-from lgvi_warp.errors import SceneError
+from lgvi_warp.errors import MembersFailed, SceneError
 
 # Command-line option -> key of the scene file that it replaces.
 OPTIONS = {
@@ -20,6 +20,13 @@ OPTIONS = {
     "step": "run.step",
     "duration": "run.duration",
     "dtype": "run.dtype",
+    "solver": "run.solver",
+    "iterations": "run.iterations",
+    "tolerance": "run.tolerance",
+    "rtol": "run.rtol",
+    "atol": "run.atol",
+    "checks": "run.checks",
+    "on_failure": "run.on_failure",
     "members": "ensemble.members",
     "seed": "ensemble.seed",
 }
@@ -56,6 +63,19 @@ def parser() -> argparse.ArgumentParser:
     run.add_argument("--method", help="psi_s, psi_1, psi, phi, phi_adjoint, or a composition such as kl6(psi_s)")
     run.add_argument("--step", metavar="S", help="time step [s]")
     run.add_argument("--dtype", help="float64, float32, or float32_compensated: sums of two float32")
+    run.add_argument("--solver", help="of equation (24): quartic, cayley, newton or moser_veselov")
+    run.add_argument(
+        "--iterations", metavar="N", help='of every solve: a number, or "auto" (default: to the tolerance)'
+    )
+    run.add_argument("--tolerance", metavar="T", help="relative residual above which a solve is not converged")
+    run.add_argument("--rtol", metavar="R", help="with --atol, rk5 and rk8 choose their steps for this relative error")
+    run.add_argument("--atol", metavar="A", help="and for this absolute one")
+    run.add_argument(
+        "--checks", help="none, safe (statuses, default) or all (warnings of what arises on the way as well)"
+    )
+    run.add_argument(
+        "--on-failure", help="freeze a member that fails (default), raise: exit code 1, or substep: divide its step"
+    )
     run.add_argument("--threads", metavar="N", type=int, help="threads (default: all cores)")
     run.add_argument("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
     trade = verbs.add_parser(
@@ -137,11 +157,16 @@ def run(chosen: argparse.Namespace) -> int:
     suggested = suggestion(scene, chosen)
     progress = None if chosen.quiet else Progress(sys.stderr)
     settings = suggested.settings if suggested else {}
-    result = solve(scene, threads=chosen.threads, width=chosen.width, progress=progress, **settings)
+    failures = []
+    try:
+        result = solve(scene, threads=chosen.threads, width=chosen.width, progress=progress, **settings)
+    except MembersFailed as error:
+        result, failures = error.result, [str(error)]
     if progress:
         progress.close()
     warm.join()
     files, faults = write(result, out)
+    faults += failures
     if not chosen.quiet:
         print(summary(result, files, time.perf_counter() - begun))
     if suggested:
@@ -285,8 +310,34 @@ def summary(result: Any, files: list[Path], seconds: float) -> str:
             lines.append(
                 f"  {code.name.lower()}: {code.text} (first: member {first} at {result.failure_time[first]:g} s)"
             )
+    lines += _warning_lines(result)
+    if result.substeps.any():
+        divided = result.substeps > 0
+        lines.append(
+            f"substeps    {int(result.substeps.sum()):,} steps of {int(divided.sum()):,} members were divided: those paths "
+            "are not symplectic"
+        )
     lines += [f"file        {path} ({path.stat().st_size / 1e6:.1f} MB)" for path in files]
     return "\n".join(lines)
+
+
+def _warning_lines(result: Any) -> list[str]:
+    """Members by warning, and of each warning what it says and who had it first as the most serious one."""
+    from lgvi_warp.status import Warnings
+
+    counts = result.warnings.counts()
+    if not counts:
+        return []
+    lines = ["warnings    " + ", ".join(f"{name} {number:,}" for name, number in counts.items())]
+    worst = result.warnings.worst()
+    for one in Warnings:
+        members = (worst == one).nonzero()[0]
+        if len(members):
+            first = int(members[result.warning_time[members].argmin()])
+            value = f"{one.value_name} = {result.warning_value[first]:.4g}"
+            when = f"first: member {first} at {result.warning_time[first]:g} s, {value}"
+            lines.append(f"  {str(one.name).lower()}: {one.text} ({when})")
+    return lines
 
 
 class Progress:

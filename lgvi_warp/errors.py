@@ -19,6 +19,14 @@ class SceneError(ValueError):
         super().__init__(head + "\n  ".join(self.faults))
 
 
+class MembersFailed(RuntimeError):
+    """Members failed in a run with on_failure="raise". `result` holds all that the run came to: nothing is lost."""
+
+    def __init__(self, text: str, result: Any):
+        super().__init__(text)
+        self.result = result
+
+
 def closest(word: str, known: Iterable[str]) -> str:
     """ "did you mean ..." or the list of what is known."""
     names = [str(name) for name in known]

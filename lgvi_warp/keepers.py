@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,12 +15,14 @@ from lgvi_warp.plan import Plan
 
 
 class Outcomes:
-    """What became of every member: status (n,), failed_step (n,), failed_size (n,), and chosen (n, 2), see Outcome."""
+    """What became of every member: the fields of Outcome, of all n."""
 
     def __init__(self, plan: Plan):
         n = plan.ensemble.members
         self.status, self.failed_step, self.failed_size = np.zeros(n, np.uint8), np.zeros(n, np.int64), np.zeros(n)
         self.chosen = np.zeros((n, 2 if plan.method.adaptive else 0), np.int64)
+        self.warnings, self.warning_step = np.zeros(n, np.uint16), np.zeros(n, np.int64)
+        self.warning_value, self.substeps = np.zeros(n), np.zeros(n, np.int64)
 
     def open(self, plan: Plan, block: Block, members: Members) -> _BlockOutcome:
         """Nothing to prepare."""
@@ -28,8 +31,8 @@ class Outcomes:
     def merge(self, block: Block, part: Outcome) -> None:
         """Put a block's outcome into its place."""
         at = slice(block.first, block.stop)
-        self.status[at], self.failed_step[at], self.failed_size[at] = part.status, part.failed_step, part.failed_size
-        self.chosen[at] = part.chosen
+        for field in dataclasses.fields(part):
+            getattr(self, field.name)[at] = getattr(part, field.name)
 
 
 class _BlockOutcome:

@@ -65,6 +65,7 @@ class Model:
     frame: of all members; aligned: as Setting's. laws: (term, module of its device code); drag by its exact flow first
     where it is used, and `drag` its parts. flow: "none", "steady", "uniform" or "varying". coupling: which of U12, U13, U23
     and of the pitches are there. program: sub-maps of one stage. averages: alpha and beta of (15), (16), or None.
+    conservative: no force creates energy, and the potential of all is known to the kernel.
     """
 
     method: Method
@@ -82,12 +83,21 @@ class Model:
     program: Program
     lead: tuple[str, float] | None
     averages: tuple[float, float] | None
+    conservative: bool
 
 
 def make_model(
-    ensemble: Ensemble, method: Method, h: float, laws: Mapping[str, Any], stops: Mapping[str, Any]
+    ensemble: Ensemble,
+    method: Method,
+    h: float,
+    laws: Mapping[str, Any],
+    stops: Mapping[str, Any],
+    checked: bool = True,
 ) -> Model:
-    """Decide. laws, stops: name -> module of device code. Raises SceneError where a method cannot do what a scene asks."""
+    """Decide. laws, stops: name -> module of device code. Raises SceneError where a method cannot do what a scene asks.
+
+    checked: whether energy is watched where the scene conserves it or loses it.
+    """
     p = ensemble.parameters(0, ensemble.members)
     frame, U = frame_of(method, p)
     explicit = method.tableau is not None
@@ -136,10 +146,13 @@ def make_model(
             lead, maps = None, method.program
     elif events or (lead is not None and lead[0] == "K" and not undone):
         lead, maps = None, program
+    conservative = checked and _conservative(ensemble, p, acting, laws)
+    # Events, water and the potential are where the user or the forces have their origin.
+    elsewhere = bool(events) or flow != "none" or (conservative and np.any(frame.origin != frame.forces))
     asked = {"rates": explicit,
              "turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
              "modified": method.two_part, "dense": dense, "water": flow in ("uniform", "varying"),
-             "origin": (bool(events) or flow != "none") and bool(np.any(frame.origin) or np.any(frame.forces))}  # fmt: skip
+             "origin": bool(elsewhere and (np.any(frame.origin) or np.any(frame.forces)))}  # fmt: skip
     return Model(
         method=method,
         frame=frame,
@@ -156,7 +169,23 @@ def make_model(
         program=maps,
         lead=lead,
         averages=(method.alpha, method.beta) if forced else None,
+        conservative=conservative,
     )
+
+
+def _conservative(ensemble: Ensemble, p: Parameters, acting: list[tuple[Term, Any]], laws: Mapping[str, Any]) -> bool:
+    """Whether no law creates energy, kinetic energy relative to the water, and each potential's device code tells it."""
+    modules = [module for _, module in acting]
+    for term, module in acting:
+        if module is laws["current"]:
+            # A uniform current carries the vehicle past an anchor, or along the vertical that weight acts on.
+            if laws["tether"] in modules or np.any(ensemble.own(term, p)["velocity"][:, 2]):
+                return False
+        elif hasattr(module, "flow") or (hasattr(module, "damping") and not term.dissipative):
+            return False
+        elif hasattr(module, "law") and not (getattr(module, "POTENTIAL", False) and hasattr(module, "energy")):
+            return False
+    return True
 
 
 # A stage that goes backward speeds a damped vehicle up, and at a drag number of 1 without end.

@@ -11,8 +11,9 @@ import warp as wp
 from lgvi_kernels.advance import PACE_FIELDS, STATE_FIELDS
 from lgvi_kernels.collocation import SLOPE_FIELDS
 from lgvi_kernels.lanes import int_lane
+from lgvi_kernels.monitor import ENERGY_FIELDS
 from lgvi_kernels.terms import LAWS
-from lgvi_warp import inertia, model, modified_inertia, notation, vehicle
+from lgvi_warp import inertia, limits, model, modified_inertia, notation, vehicle
 from lgvi_warp.ensemble import Ensemble, Members
 from lgvi_warp.events import Event
 from lgvi_warp.machine import DTYPES
@@ -24,12 +25,20 @@ from lgvi_warp.terms.drag import Drag
 
 @dataclass
 class Outcome:
-    """What a block's members came to: arrays over its members. chosen: steps made and tried (count, 2), where they choose."""
+    """What a block's members came to: arrays over its members. chosen: steps made and tried (count, 2), where they choose.
+
+    warnings: bits of Warnings; warning_step, warning_value: steps made and value at the first crossing of the most serious
+    one. substeps: steps that were divided.
+    """
 
     status: np.ndarray
     failed_step: np.ndarray
     failed_size: np.ndarray
     chosen: np.ndarray
+    warnings: np.ndarray
+    warning_step: np.ndarray
+    warning_value: np.ndarray
+    substeps: np.ndarray
 
 
 def pack(values: np.ndarray, width: int) -> np.ndarray:
@@ -71,10 +80,42 @@ class Packets:
         self.events = wp.array(self._events(setting), dtype=Events, device="cpu")
         self.table = _rows(table, Lane)
         self.memory = _rows(memory, Lane)
-        self.state = _rows(self._state(), Lane)
+        state = self._state()
+        self.state = _rows(self._lanes_each(state), Lane)
+        self.warned = np.zeros(members.count, np.uint16), np.zeros(0)
+        if plan.checks != "none":
+            momentum = state[:, 12:15] * self.scale[:, None]
+            self.warned = limits.at_start(plan, members, self.frame, momentum)
         self.status = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
         self.failed_step = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
         self.failed_size = wp.zeros(self.count, dtype=Lane, device="cpu")
+        self.monitor = self._monitor()
+
+    def _monitor(self) -> Any:
+        """What the kernel compares with now and then, and where it notes what it saw."""
+        plan, monitor = self.plan, self.plan.advance.Monitor()
+        Lane, Ints = plan.advance.Lane, int_lane(plan.spec.width)
+        if plan.spec.looks:
+            monitor.limits = wp.array(self._limits(), dtype=plan.advance.Limits, device="cpu")
+            for name, kind in (("warned", Ints), ("warned_step", Ints), ("warned_size", Lane)):
+                setattr(monitor, name, wp.zeros(self.count, dtype=kind, device="cpu"))
+        if plan.spec.energy:
+            monitor.energy = wp.zeros((self.count, ENERGY_FIELDS), dtype=Lane, device="cpu")
+        if plan.spec.backward:
+            monitor.backward = -plan.grid.h * min(0.0, *plan.method.stages)
+        if plan.spec.substep:
+            monitor.substeps = wp.zeros(self.count, dtype=Ints, device="cpu")
+        return monitor
+
+    def _limits(self) -> np.ndarray:
+        """Limits of the rows that are looked at, squared, and what they are in this block's numbers."""
+        rows, h = self.plan.spec.looks, self.plan.grid.h
+        fields: dict[str, Any] = {f"{row}_limit": limit**2 for row, limit in limits.row_limits(self.plan).items()}
+        if "munk_coarse" in rows:
+            fields["munk"] = (h * self.scale) ** 2 * limits.munk_factor(self.frame)
+        if "step" in (self.plan.dtypes[3].names or ()):
+            fields["step"] = h
+        return self._filled(self.plan.dtypes[3], fields)
 
     def _lanes(self, values: np.ndarray) -> np.ndarray:
         """Rows (1 or m, d) as (1 or packets, d, width) of the kernel's numbers."""
@@ -225,7 +266,7 @@ class Packets:
         if self.plan.spec.compensated:
             low = rows[:, :STATE_FIELDS] - rows[:, :STATE_FIELDS].astype(np.float32)
             rows[:, STATE_FIELDS:] = np.where(np.isfinite(low), low, 0.0)
-        return self._lanes_each(rows)
+        return rows
 
     def _water_at_start(self) -> np.ndarray:
         """R^T u (m, 3) [m/s], user's axes, where each member starts."""
@@ -249,7 +290,7 @@ class Packets:
         inputs = [self.inertia, self.params, self.events, self.table]
         inputs += [real(tolerance) for tolerance in plan.method.tolerances(dtype)]
         inputs += [wp.float64(plan.grid.h), stage_h, lead_h, k0, k1, s0, sample_step]
-        inputs += [self.state, self.memory, self.status, self.failed_step, self.failed_size, out]
+        inputs += [self.state, self.memory, self.status, self.failed_step, self.failed_size, self.monitor, out]
         with build_lock:
             command: Any = wp.launch(plan.advance.kernel, dim=self.count, inputs=inputs, device="cpu", record_cmd=True)
         command.launch()
@@ -257,7 +298,7 @@ class Packets:
         return samples.transpose(1, 0, 3, 2).reshape(s1 - s0, self.count * width, numbers)
 
     def outcome(self) -> Outcome:
-        """Status, steps made before the failure and the value that crossed its limit, of each member."""
+        """Status, steps made before the failure and the value that crossed its limit, of each member; warnings likewise."""
         m = self.members.count
         kept = PACE_FIELDS if self.plan.method.adaptive else 0
         pace = self.state.numpy()[:, STATE_FIELDS + 2 : STATE_FIELDS + kept]
@@ -270,7 +311,27 @@ class Packets:
             self.failed_step.numpy().reshape(-1)[:m].astype(np.int64),
             np.sqrt(self.failed_size.numpy().reshape(-1)[:m].astype(np.float64)),
             pace.transpose(0, 2, 1).reshape(self.count * self.plan.spec.width, pace.shape[1])[:m].astype(np.int64),
+            *self._warnings(),
+            self._of_members(self.monitor.substeps, np.int64) if self.plan.spec.substep else np.zeros(m, np.int64),
         )
+
+    def _of_members(self, lanes: Any, kind: Any) -> np.ndarray:
+        """One number of each member from an array of lanes."""
+        return np.asarray(lanes.numpy().reshape(-1)[: self.members.count].astype(kind))
+
+    def _warnings(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(bits, step, value) of the start and of the kernel's looks: of the more serious of the two, the start's of equals."""
+        bits, value = self.warned
+        step = np.zeros(len(bits), np.int64)
+        if not self.plan.spec.looks:
+            return bits, step, value if len(value) else np.full(len(bits), np.nan)
+        monitor = self.monitor
+        seen = self._of_members(monitor.warned, np.uint16)
+        # More serious than all of the others: its highest bit is in none of them.
+        later = (seen & ~bits) > bits
+        step = np.where(later, self._of_members(monitor.warned_step, np.int64), 0)
+        value = np.where(later, np.sqrt(self._of_members(monitor.warned_size, np.float64)), value)
+        return bits | seen, step, value
 
 
 def _leaves(fields: dict[str, Any]) -> list[np.ndarray]:

@@ -18,7 +18,7 @@ from lgvi_kernels.explicit import Explicit
 from lgvi_kernels.lanes import WIDTHS
 from lgvi_kernels.stops import STOPS
 from lgvi_kernels.terms import LAWS
-from lgvi_warp import warp_setup
+from lgvi_warp import limits, warp_setup
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.gauss import gauss
@@ -26,8 +26,10 @@ from lgvi_warp.machine import DTYPES, default_width
 from lgvi_warp.method import KINDS, Method
 from lgvi_warp.model import Model, make_model
 from lgvi_warp.saveat import TimeGrid
+from lgvi_warp.status import CHECKS, ON_FAILURE
 
-CHECKS = ("none", "safe")
+# Sub-maps whose equation may have no solution.
+SOLVING = {"D", "W", "A", "Phi", "Phi*"}
 
 # One launch advances at most this many vehicle-steps and samples: so progress moves, an interrupt is heard, and the
 # buffer that samples pass through stays small, however long the run is.
@@ -42,7 +44,8 @@ build_lock = threading.Lock()
 class Plan:
     """Everything decided before a run: which kernel, which width, which steps.
 
-    Raises SceneError for a dtype, width or checks that do not exist, and where the method cannot do what the scene asks.
+    Raises SceneError for a dtype, width, checks or on_failure that do not exist, and where the method cannot do what the
+    scene asks.
     """
 
     ensemble: Ensemble
@@ -52,6 +55,7 @@ class Plan:
     dtype: str = "float64"
     width: int | None = None
     checks: str = "safe"
+    on_failure: str = "freeze"
     model: Model = field(init=False)
     spec: Spec = field(init=False)
     advance: Advance = field(init=False)
@@ -60,6 +64,7 @@ class Plan:
         faults = Faults()
         faults.choice("dtype", self.dtype, DTYPES)
         faults.choice("checks", self.checks, CHECKS)
+        faults.choice("on_failure", self.on_failure, ON_FAILURE)
         if self.width is not None:
             faults.choice("width", self.width, WIDTHS)
         if self.checks == "none" and self.ensemble.scene.events:
@@ -67,8 +72,14 @@ class Plan:
         if self.dtype == "float32_compensated" and (self.method.tableau or self.method.gauss or self.method.two_part):
             what = f"sums up what a method of sub-maps changes, which {self.method.name} is not"
             faults.add("dtype", self.dtype, what, "use float64, or psi_s, psi_x and their compositions")
+        if self.checks == "none" and self.on_failure in ON_FAILURE[1:]:
+            what = f"leaves failures unseen, which on_failure={self.on_failure!r} waits for"
+            faults.add("checks", self.checks, what, 'use checks="safe", or on_failure="freeze"')
         faults.raise_if_any()
-        object.__setattr__(self, "model", make_model(self.ensemble, self.method, self.grid.h, LAWS, STOPS))
+        checked = self.checks != "none"
+        model = make_model(self.ensemble, self.method, self.grid.h, LAWS, STOPS, checked)
+        object.__setattr__(self, "model", model)
+        self._check_substep()
         if self.width is None:
             # The turns of psi_x follow one another; the implicit step V of damping laws fills the registers by itself, and so
             # do compensated sums.
@@ -79,8 +90,30 @@ class Plan:
         with self._laws_compile():
             object.__setattr__(self, "advance", make_advance(self.spec))
 
+    def _check_substep(self) -> None:
+        """Refuse to divide the steps of a method or of laws that cannot be divided, with the reason."""
+        if self.on_failure != "substep":
+            return
+        faults, name = Faults(), self.method.name
+        letters = {letter for letter, _ in self.model.program} | ({self.model.lead[0]} if self.model.lead else set())
+        if self.method.gauss:
+            why = "starts each step from the stages of the last one, which a divided step would have lost"
+            faults.add("on_failure", "substep", f"{name} {why}", 'shorten the step, or use on_failure="freeze"')
+        elif not letters & SOLVING:
+            why = "solves nothing that could fail"
+            faults.add("on_failure", "substep", f"{name} {why}", 'use on_failure="freeze"; psi_s and psi solve (24)')
+        for term, module in self.model.laws:
+            noisy = getattr(module, "NOISE", False)
+            if term.memory or noisy:
+                why = (
+                    "draws its noise once a step" if noisy else "remembers what a step that is made again would change"
+                )
+                faults.add("on_failure", "substep", f"{term.key} {why}", 'use on_failure="freeze", or a shorter step')
+        faults.raise_if_any()
+
     def _spec(self) -> Spec:
-        model = self.model
+        model, checked = self.model, self.checks != "none"
+        back = min(0.0, *self.method.stages) < 0.0 and bool(model.drag) and self.method.tableau is None
         return Spec(
             width=self.width,
             real=wp.float64 if DTYPES[self.dtype] == "float64" else wp.float32,
@@ -91,7 +124,7 @@ class Plan:
             solver=self.method.solver,
             iterations=int(self.method.iterations or 0),
             adaptive=self.method.iterations is None,
-            checked=self.checks != "none",
+            checked=checked,
             fields=tuple(name for name in SAMPLE_FIELDS if name in self.fields),
             events=tuple(module for _, module in model.events),
             drag=model.drag,
@@ -107,6 +140,10 @@ class Plan:
             lead_time=self.lengths[1][-1],
             explicit=self._explicit(),
             compensated=self.dtype == "float32_compensated",
+            looks=limits.watched(self) if self.checks == "all" else (),
+            energy=model.conservative,
+            backward=checked and back,
+            substep=self.on_failure == "substep",
         )
 
     def _explicit(self) -> Explicit | None:
@@ -143,9 +180,9 @@ class Plan:
         return time.perf_counter() - start
 
     @functools.cached_property
-    def dtypes(self) -> tuple[np.dtype, np.dtype, np.dtype]:
-        """NumPy's types of the kernel's Inertia, Params and Events."""
-        types = (self.advance.Inertia, self.advance.Params, self.advance.Events)
+    def dtypes(self) -> tuple[np.dtype, ...]:
+        """NumPy's types of the kernel's Inertia, Params, Events and Limits."""
+        types = (self.advance.Inertia, self.advance.Params, self.advance.Events, self.advance.Limits)
         return tuple(np.dtype(one.numpy_dtype()) for one in types)
 
     @functools.cached_property

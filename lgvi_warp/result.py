@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp import invariants, notation
-from lgvi_warp.status import StatusArray
+from lgvi_warp.status import StatusArray, WarningArray
 from lgvi_warp.terms import Term, from_list
 
 if TYPE_CHECKING:
@@ -35,6 +35,17 @@ MEANINGS = {
     "energy": "kinetic and potential energy",
 }
 
+# Fields with one number of each member, and their meaning.
+OF_MEMBERS = {
+    "status": "0 ok, see lgvi_warp.Status",
+    "failure_time": "time of the last good state, or of the event [s]",
+    "failure_value": "value that crossed its limit",
+    "warnings": "bits of lgvi_warp.Warnings",
+    "warning_time": "first crossing of the most serious warning [s]",
+    "warning_value": "its value then",
+    "substeps": "steps that were divided",
+}
+
 
 @dataclass(frozen=True, eq=False)
 class Result:
@@ -47,6 +58,9 @@ class Result:
     status: (n,), see Status; failure_time: (n,) [s], the time of the last good state, for an event its own
     time, interpolated within the step; NaN where there was neither. failure_value: (n,), the |J^-1 a| or relative residual
     that crossed its limit, 0 for a non-finite state and for an event.
+    warnings: (n,), bits of Warnings; warning_time (n,) [s] and warning_value (n,): when a member's most serious warning was
+    first seen (0 for one that its start gives), and the value then; NaN without. Motion is looked at once in 128 steps and at
+    the end, with checks="all" only. substeps: (n,), steps that were divided (on_failure="substep").
     messages: what the user should know; provenance: scene, settings, versions, seed, machine.
     """
 
@@ -55,6 +69,10 @@ class Result:
     status: StatusArray
     failure_time: np.ndarray
     failure_value: np.ndarray
+    warnings: WarningArray
+    warning_time: np.ndarray
+    warning_value: np.ndarray
+    substeps: np.ndarray
     parameters: dict[str, np.ndarray]
     messages: tuple[str, ...]
     provenance: dict[str, Any]
@@ -120,7 +138,8 @@ class Result:
             values = getattr(self, name)
             attributes = {"units": UNITS[name], "long_name": MEANINGS[name]}
             data[name] = (("time", "realization", *dims.get(values.ndim - 2, ())), values, attributes)
-        data["status"] = (("realization",), np.asarray(self.status), {"long_name": "0 ok, see lgvi_warp.Status"})
+        for name, meaning in OF_MEMBERS.items():
+            data[name] = (("realization",), np.asarray(getattr(self, name)), {"long_name": meaning})
         coordinates = {"time": ("time", self.time, {"units": "s", "long_name": "time since the start"})}
         attributes = {"Conventions": "CF-1.11", "provenance": json.dumps(self.provenance)}
         return xr.Dataset(data, coordinates, attributes)
@@ -129,8 +148,8 @@ class Result:
         """Write everything to an .npz file, whole or not at all. Returns its path. Raises OSError."""
         target = Path(path)
         part = target.with_name(target.name + ".part")
-        arrays = {"time": self.time, **self.samples, "status": np.asarray(self.status)}
-        arrays |= {"failure_time": self.failure_time, "failure_value": self.failure_value}
+        arrays = {"time": self.time, **self.samples}
+        arrays |= {name: np.asarray(getattr(self, name)) for name in OF_MEMBERS}
         arrays |= {f"parameters/{name}": value for name, value in self.parameters.items()}
         texts = {"messages": json.dumps(self.messages), "provenance": json.dumps(self.provenance)}
         try:
@@ -151,8 +170,8 @@ class Result:
             time=content["time"],
             samples={name: content[name] for name in content if name in UNITS},
             status=content["status"].view(StatusArray),
-            failure_time=content["failure_time"],
-            failure_value=content["failure_value"],
+            warnings=content["warnings"].view(WarningArray),
+            **{name: content[name] for name in OF_MEMBERS if name not in ("status", "warnings")},
             parameters={name.removeprefix(prefix): content[name] for name in content if name.startswith(prefix)},
             messages=tuple(json.loads(str(content["messages"]))),
             provenance=(provenance := json.loads(str(content["provenance"]))),

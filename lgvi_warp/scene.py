@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
 from lgvi_warp import events, notation, terms
-from lgvi_warp.errors import Faults
+from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.machine import DTYPES
+from lgvi_warp.method import Method
+from lgvi_warp.status import CHECKS, ON_FAILURE
 from lgvi_warp.vehicle import Vehicle
 
 ATTITUDES = ("attitude", "rotation_vector", "quaternion_wxyz", "euler_deg")
@@ -129,13 +131,23 @@ def resolve_attitude(values: Mapping[str, np.ndarray]) -> np.ndarray:
 
 @dataclass(frozen=True)
 class RunSettings:
-    """The [run] section of a scene file: method, step [s], duration [s], save_every [s], dtype. Raises SceneError."""
+    """The [run] section of a scene file: method, step [s], duration [s], save_every [s], dtype. Raises SceneError.
+
+    solver, iterations, tolerance, rtol, atol: of the method, as in Method. checks, on_failure: as in solve.
+    """
 
     method: str = "psi_s"
     step: float | None = None
     duration: float | None = None
     save_every: float | None = None
     dtype: str = "float64"
+    solver: str | None = None
+    iterations: int | str | None = None
+    tolerance: float | None = None
+    rtol: float | None = None
+    atol: float | None = None
+    checks: str = "safe"
+    on_failure: str = "freeze"
 
     def __post_init__(self) -> None:
         faults = Faults("run.")
@@ -143,13 +155,29 @@ class RunSettings:
             if getattr(self, name) is not None:
                 faults.positive(name, getattr(self, name))
         faults.choice("dtype", self.dtype, DTYPES)
+        faults.choice("checks", self.checks, CHECKS)
+        faults.choice("on_failure", self.on_failure, ON_FAILURE)
         if not isinstance(self.method, str):
             faults.add("method", self.method, "is not a text", 'give the name of a method, such as "psi_s"')
+        else:
+            with faults.including():
+                try:
+                    self.method_of(self.method)
+                except SceneError as error:
+                    raise SceneError(f"run.{fault}" for fault in error.faults) from None
         faults.raise_if_any()
 
+    def method_of(self, name: str | None = None) -> Method:
+        """The method of this section; of another name, without what this section says of its own. Raises SceneError."""
+        if name is not None and name != self.method:
+            return Method(name)
+        given = {key: getattr(self, key) for key in ("solver", "iterations", "tolerance", "rtol", "atol")}
+        return Method(self.method, **{key: value for key, value in given.items() if value is not None})
+
     def to_dict(self) -> dict[str, Any]:
-        """As in a scene file."""
-        return {key: value for key, value in vars(self).items() if value is not None}
+        """As in a scene file: what is not left to the default, and the method and dtype."""
+        kept = {"method", "dtype"} | {one.name for one in fields(self) if getattr(self, one.name) != one.default}
+        return {key: value for key, value in vars(self).items() if key in kept}
 
 
 @dataclass(frozen=True)

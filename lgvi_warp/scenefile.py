@@ -12,7 +12,6 @@ from typing import Any
 
 from lgvi_warp import distributions
 from lgvi_warp.errors import Faults, SceneError
-from lgvi_warp.method import Method
 from lgvi_warp.scene import EnsembleSettings, Environment, RunSettings, Scene, Start
 from lgvi_warp.vehicle import Vehicle
 
@@ -72,8 +71,6 @@ def from_dict(content: Mapping[str, Any]) -> Scene:
     environment = _build(faults, "environment", Environment, tables["environment"])
     start = _build(faults, "start", Start, tables["start"])
     run = _build(faults, "run", RunSettings, tables["run"])
-    if run is not None:
-        _check_method(faults, run.method)
     laws = _laws(faults, tables["ensemble"].get("vary", {}))
     settings = _build(faults, "ensemble", EnsembleSettings, {**tables["ensemble"], "vary": laws})
     scene = None
@@ -146,15 +143,6 @@ def _build(faults: Faults, name: str, kind: Callable[..., Any], table: Mapping[s
     with faults.including():
         return kind(**known)
     return None
-
-
-def _check_method(faults: Faults, name: str) -> None:
-    """Note what is wrong with [run] method."""
-    with faults.including():
-        try:
-            Method(name)
-        except SceneError as error:
-            raise SceneError(f"run.{fault}" for fault in error.faults) from None
 
 
 _STAND_INS: dict[str, Any] = {"mass": 1.0, "inertia": (1.0, 1.0, 1.0)}

@@ -14,7 +14,7 @@ import numpy as np
 from lgvi_warp import machine
 from lgvi_warp.blocks import Block, Keeper, blocks, in_order, run_block
 from lgvi_warp.ensemble import Ensemble
-from lgvi_warp.errors import Faults, SceneError, shown
+from lgvi_warp.errors import Faults, MembersFailed, SceneError, shown
 from lgvi_warp.executors import threads as thread_executor
 from lgvi_warp.keepers import Outcomes, Samples
 from lgvi_warp.method import Method
@@ -22,7 +22,7 @@ from lgvi_warp.plan import Plan
 from lgvi_warp.result import Result
 from lgvi_warp.saveat import SaveAt, time_grid
 from lgvi_warp.scene import Scene
-from lgvi_warp.status import Status, StatusArray
+from lgvi_warp.status import Status, StatusArray, WarningArray, failure_text
 
 
 def solve(
@@ -35,7 +35,8 @@ def solve(
     *,
     threads: int | None = None,
     width: int | None = None,
-    checks: str = "safe",
+    checks: str | None = None,
+    on_failure: str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Result:
     """Advance every member of the fleet from t = 0 to t1 and keep the samples asked for.
@@ -46,10 +47,14 @@ def solve(
     the scene's [run] section (method "psi_s" and float64 where it says nothing).
     save: what to keep (default: every [run] save_every of the scene, else the start and the end).
     threads: default all cores. width: vehicles per packet, default from the CPU.
-    checks: "safe" gives each member a status and freezes it when it fails; "none" leaves that code out.
+    checks: "safe" (default) gives each member a status and freezes it when it fails, and warns of what its numbers and its
+    start say against the step; "all" also warns of what arises on the way; "none" leaves all that code out.
+    on_failure: "freeze" (default) keeps a member that fails at its last good state; "raise" raises MembersFailed after the
+    run; "substep" makes a step that has no solution again in 2, 4, ... 1024 parts, for that member alone: order and the
+    symmetry of each step are kept, symplecticity is not.
     progress: called with the fraction of the work that is done, from the threads that do it.
 
-    Raises SceneError naming every fault of the arguments. Prints nothing. The same inputs give the same bits for any
+    Raises SceneError naming every fault of the arguments, MembersFailed as asked. Prints nothing. The same inputs give the same bits for any
     number of threads, on one type of machine.
     """
     if not isinstance(fleet, Ensemble | Scene):
@@ -57,12 +62,16 @@ def solve(
             [f"fleet = {shown(fleet)}: is neither an Ensemble nor a Scene; give lw.Scene(...) or lw.Ensemble(...)"]
         )
     ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
-    plan = make_plan(ensemble, method, h, t1, save, dtype, width=width, checks=checks)
+    plan = make_plan(ensemble, method, h, t1, save, dtype, width=width, checks=checks, on_failure=on_failure)
     faults = Faults()
     if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
         faults.add("threads", threads, "is not a whole number above 0", "give 1 or more, or leave it out for all cores")
     faults.raise_if_any()
-    return run_plan(plan, threads or machine.thread_count(), progress)
+    result = run_plan(plan, threads or machine.thread_count(), progress)
+    failures = failure_text(result) if plan.on_failure == "raise" else ""
+    if failures:
+        raise MembersFailed(failures, result)
+    return result
 
 
 def make_plan(
@@ -74,7 +83,8 @@ def make_plan(
     dtype: str | None = None,
     *,
     width: int | None = None,
-    checks: str = "safe",
+    checks: str | None = None,
+    on_failure: str | None = None,
 ) -> Plan:
     """Settle a run's settings, from the arguments and then from the scene's [run]. Raises SceneError."""
     settings = ensemble.scene.run
@@ -101,15 +111,15 @@ def make_plan(
     if dropped:
         text = f"run.save_every = {every} s is longer than the run, {t1} s: only the start and the end are kept"
         grid = replace(grid, messages=(*grid.messages, text))
-    chosen = method if isinstance(method, Method) else Method(method or settings.method)
-    dtype = dtype or settings.dtype
+    chosen = method if isinstance(method, Method) else settings.method_of(method)
+    dtype, checks = dtype or settings.dtype, checks or settings.checks
     if chosen.iterations == "auto":
         chosen = replace(chosen, iterations=enough_iterations(ensemble, chosen, grid.h, dtype))
         n = chosen.iterations
         number = f"{n} a solve, enough for" if n is not None else f"to the tolerance: {MOST_FIXED} are too few for"
         text = f"Newton steps {number} every member's start at twice the step"
         grid = replace(grid, messages=(*grid.messages, text))
-    return Plan(ensemble, chosen, grid, save.fields, dtype, width, checks)
+    return Plan(ensemble, chosen, grid, save.fields, dtype, width, checks, on_failure or settings.on_failure)
 
 
 # Beyond so many Newton steps a fixed number gains nothing over iterating to the tolerance.
@@ -170,6 +180,10 @@ def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None 
         time=plan.grid.times,
         samples=samples.fields,
         status=status.view(StatusArray),
+        warnings=outcomes.warnings.view(WarningArray),
+        warning_time=np.where(outcomes.warnings != 0, outcomes.warning_step * plan.grid.h, np.nan),
+        warning_value=outcomes.warning_value,
+        substeps=outcomes.substeps,
         failure_time=np.where(failed, steps_made * plan.grid.h, np.nan),
         failure_value=np.where(failed, np.where(stopped, 0.0, outcomes.failed_size), np.nan),
         parameters=plan.ensemble.parameters(0, n),
@@ -200,6 +214,7 @@ def provenance(plan: Plan) -> dict[str, Any]:
         "dtype": plan.dtype,
         "width": plan.spec.width,
         "checks": plan.checks,
+        "on_failure": plan.on_failure,
         "terms": [term.type for term, _ in plan.model.laws],
         "versions": machine.versions(),
         "machine": machine.describe(),

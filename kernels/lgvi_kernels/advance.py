@@ -5,8 +5,9 @@ from typing import Any, NamedTuple
 
 import warp as wp
 
+from lgvi_kernels import monitor as monitors
 from lgvi_kernels.compose import params_of, superpose
-from lgvi_kernels.events import make_watch
+from lgvi_kernels.events import FIRST, make_watch
 from lgvi_kernels.flags import CPU_FLAGS
 from lgvi_kernels.lanes import (
     add,  # noqa: F401
@@ -23,12 +24,15 @@ from lgvi_kernels.lanes import (
 )
 from lgvi_kernels.method import make_method
 from lgvi_kernels.packet import failures, put, renormalise
-from lgvi_kernels.state import alarm_struct, inertia_struct, state_struct, struct, view_struct
+from lgvi_kernels.state import alarm_struct, damping_struct, inertia_struct, state_struct, struct, view_struct
 from lgvi_kernels.sums import at_rest, choose, settled
-from lgvi_kernels.terms import drag
+from lgvi_kernels.terms import drag, drag_directions
 
 # Steps between two looks at the alarms. A chunk with an alarm is repeated one step at a time by the same code.
 CHUNK = 128
+
+# A step without a solution is divided into at most so many.
+MOST_PARTS = 1024
 
 # Numbers of a packet's state in `state[packet, field]`: R row by row, b, p, pi; with compensated sums as many low parts
 # more, or those of its pace (see pace_struct).
@@ -51,6 +55,8 @@ class Spec(NamedTuple):
     maps; composed: more than one stage a step, or one, whose constants then are made once for all steps; paired: a stage is
     two halves, each with a length of its own; gauss: numbers of a collocation method, or none; lead_time: the part of a step
     that the lead drifts for; explicit: an explicit method, which has no maps; compensated: sums of two float32 (see sums).
+    looks: rows of warnings (see monitor); energy: whether its growth is a failure; backward: whether drag is looked at for
+    stages that go backward; substep: whether a step that has no solution is divided.
     """
 
     width: int
@@ -78,6 +84,10 @@ class Spec(NamedTuple):
     lead_time: float = 0.0
     explicit: Any = None
     compensated: bool = False
+    looks: tuple = ()
+    energy: bool = False
+    backward: bool = False
+    substep: bool = False
 
     @property
     def state_fields(self) -> int:
@@ -102,6 +112,8 @@ class Advance(NamedTuple):
     Inertia: Any
     Params: Any
     Events: Any
+    Limits: Any
+    Monitor: Any
 
 
 @functools.cache
@@ -144,6 +156,10 @@ def make_advance(spec):
     # A packet that chooses its steps goes on with them in the next launch, and waits for no frozen lane.
     paced, compensated = spec.explicit is not None and spec.explicit.adaptive, spec.compensated
     fields, per_sample = spec.fields, sum(spec.sample_fields.values())
+    looks, energetic, backward, substepped = spec.looks, spec.energy, spec.backward, spec.substep
+    Monitor = monitors.monitor_struct(width, real, looks, energetic, backward, substepped)
+    warned, looking = bool(looks), bool(looks) or energetic
+    look_at, energies, growth, drag_back = _watchers(spec, method)
 
     @wp.func
     def read(state: wp.array2d(dtype=Lane), i: int):
@@ -236,6 +252,115 @@ def make_advance(spec):
         for j in range(rows):
             memory[i, target * rows + j] = memory[i, source * rows + j]
 
+    @wp.func
+    def closed(x: State, c: Constants, k: int, h: wp.float64, opening: real):
+        """The state after k steps without the lead of the next."""
+        return opened(at_step(x, k, h), c, -opening)
+
+    @wp.func
+    def created(y: State, c: Constants, monitor: Monitor):
+        """Energy that came from nowhere since the start, over what there was to exchange."""
+        T, U = energies(y, c)
+        e = monitor.energy
+        return growth(T, U, e[c.packet, 0], e[c.packet, 1], e[c.packet, 2])
+
+    @wp.func
+    def energy_alarm(x: State, y: State, c: Constants, monitor: Monitor, among: Lane):
+        """Raise the alarm of the lanes, among these, whose energy explodes."""
+        g = created(y, c, monitor)
+        one = ones(g)
+        over = positive(among, g - real(wp.static(monitors.MOST_ENERGY)) * one, one - one)
+        x.alarm.size = positive(x.alarm.code, x.alarm.size, positive(over, g * g, x.alarm.size))
+        grew = real(wp.static(float(monitors.ENERGY_GREW))) * one
+        x.alarm.code = positive(x.alarm.code, x.alarm.code, positive(over, grew, one - one))
+        return x
+
+    @wp.func
+    def start_energy(x: State, c: Constants, monitor: Monitor):
+        """Of the start."""
+        T, U = energies(x, c)
+        monitor.energy[c.packet, 0] = T
+        monitor.energy[c.packet, 1] = U
+        monitor.energy[c.packet, 2] = T - T
+
+    @wp.func
+    def note_energy(y: State, c: Constants, monitor: Monitor, frozen: Lane):
+        """Keep the largest fall of the potential."""
+        T, U = energies(y, c)
+        fall = monitor.energy[c.packet, 2]
+        d = monitor.energy[c.packet, 1] - U
+        monitor.energy[c.packet, 2] = positive(frozen, fall, positive(d - fall, d, fall))
+
+    @wp.func
+    def warn(y: State, c: Constants, monitor: Monitor, k: int, frozen: Lane):
+        """Note which rows are crossed after k steps; of the most serious one, when it was first so, and its value."""
+        g = frozen
+        if wp.static(energetic):
+            g = created(y, c, monitor)
+        seen = look_at(y, c, monitor.limits[c.packet % monitor.limits.shape[0]], g)
+        bits = positive(frozen, frozen - frozen, seen.bits)
+        if any_positive(bits):
+            for j in range(wp.static(width)):
+                old = monitor.warned[c.packet][j]
+                new = int(bits[j]) & ~old
+                if new > old:
+                    monitor.warned_step[c.packet][j] = k
+                    monitor.warned_size[c.packet][j] = seen.size[j]
+                monitor.warned[c.packet][j] = old | new
+
+    @wp.func
+    def divided(x: State, c: Constants, k: int, h: wp.float64, parts: int, stage_h: wp.array(dtype=real),
+                lead_h: wp.array(dtype=real), opening: real):  # fmt: skip
+        """One step as so many equal ones, from and to a state that the lead has opened for h."""
+        r = real(1.0) / real(parts)
+        stages = lead_h.shape[0] - 1
+        x = at_step(x, k, h)
+        x = opened(opened(x, c, -opening), c, r * opening)
+        for _ in range(parts):
+            for g in range(stages):
+                if wp.static(paired):
+                    x = step(x, c, r * stage_h[2 * g], r * stage_h[2 * g + 1])
+                else:
+                    x = step(x, c, r * stage_h[g])
+                if wp.static(has_lead):
+                    if wp.static(composed):
+                        x = lead(x, c, r * lead_h[g])
+                    else:
+                        x = lead(x, c, r * (opening + opening))
+            if wp.static(compensated):
+                x = settled(x)
+        return opened(opened(x, c, -(r * opening)), c, opening)
+
+    @wp.func
+    def retried(good: State, x: State, code: Lane, c: Constants, k: int, h: wp.float64, stage_h: wp.array(dtype=real),
+                lead_h: wp.array(dtype=real), opening: real):  # fmt: skip
+        """(state, code) after step k: where it had no solution, by 2, 4, ... equal parts, as soon as those have one."""
+        one = ones(code)
+        zero = one - one
+        left = code + zero
+        pending = zero
+        for j in range(wp.static(width)):
+            if code[j] == real(1.0) or code[j] == real(2.0) or code[j] == real(4.0):
+                pending[j] = real(1.0)
+        parts = int(1)
+        while parts < wp.static(MOST_PARTS) and any_positive(pending):
+            parts = 2 * parts
+            y = choose(pending, good, at_rest(good))
+            y.alarm = Alarm()
+            y = divided(y, c, k, h, parts, stage_h, lead_h, opening)
+            if wp.static(watched):
+                y = watch(y, c, real(h))
+            wrong = failures(y, one - pending)
+            solved = one - one
+            for j in range(wp.static(width)):
+                # An event is no failure, but what becomes of the lane.
+                if pending[j] > real(0.0) and (wrong[j] <= real(0.0) or wrong[j] >= real(wp.static(float(FIRST)))):
+                    solved[j] = real(1.0)
+                    pending[j] = real(0.0)
+                    left[j] = wrong[j]
+            x = choose(solved, y, x)
+        return x, left
+
     @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": CPU_FLAGS})
     def advance(
         # vehicles, laws and events, one entry (shared) or one a packet
@@ -260,6 +385,8 @@ def make_advance(spec):
         status: wp.array(dtype=Ints),
         failed_step: wp.array(dtype=Ints),
         failed_size: wp.array(dtype=Lane),
+        # what is looked at now and then
+        monitor: Monitor,
         # out
         out: wp.array2d(dtype=Lane),
     ):
@@ -296,9 +423,14 @@ def make_advance(spec):
         if any_frozen:
             x = choose(frozen, at_rest(x), x)
         if k0 == 0:
+            if wp.static(energetic):
+                start_energy(x, c, monitor)
             x = opened(x, c, opening)
         k = k0
         s = s0
+        if wp.static(looking):
+            suspects = zero
+            last = sample_step[sample_step.shape[0] - 2]
         singles = int(0)
         while k < k1:
             n = wp.min(wp.static(CHUNK) - k % wp.static(CHUNK), wp.min(k1, sample_step[s]) - k)
@@ -326,14 +458,32 @@ def make_advance(spec):
                         x = lead(x, c, opening + opening)
                 if wp.static(compensated):
                     x = settled(x)
+                if wp.static(backward):
+                    x = drag_back(x, c, monitor.backward)
                 if wp.static(watched):
                     x = watch(x, c, real(h))
             repeat = int(0)
             if wp.static(checked):
+                if wp.static(energetic):
+                    # Of a chunk that is made again, only those lanes are looked at in between that made it necessary.
+                    if (k + n) % wp.static(CHUNK) == 0 or k + n == last:
+                        x = energy_alarm(x, closed(x, c, k + n, h, opening), c, monitor, one - frozen)
+                    elif singles > 0:
+                        x = energy_alarm(x, closed(x, c, k + n, h, opening), c, monitor, suspects)
                 code = failures(x, frozen)
+                if wp.static(substepped):
+                    if n == 1 and any_positive(code):
+                        was = code
+                        x, code = retried(good, x, was, c, k, h, stage_h, lead_h, opening)
+                        for j in range(wp.static(width)):
+                            if code[j] != was[j]:
+                                monitor.substeps[i][j] = monitor.substeps[i][j] + 1
+                                x.alarm.size[j] = real(0.0)
                 if any_positive(code):
                     if n > 1:
                         repeat = n
+                        if wp.static(looking):
+                            suspects = code
                     else:
                         if wp.static(watched):
                             x.alarm.size = positive(
@@ -358,6 +508,13 @@ def make_advance(spec):
                 k += n
                 if singles > 0:
                     singles -= 1
+                if wp.static(looking):
+                    if k % wp.static(CHUNK) == 0 or k == last:
+                        z = closed(x, c, k, h, opening)
+                        if wp.static(warned):
+                            warn(z, c, monitor, k, frozen)
+                        if wp.static(energetic):
+                            note_energy(z, c, monitor, frozen)
                 if wp.static(renormalised):
                     if k % wp.static(CHUNK) == 0:
                         x = renormalise(x, tolerance)
@@ -372,4 +529,25 @@ def make_advance(spec):
             x = choose(frozen, kept, x)
         write(state, i, x)
 
-    return Advance(advance, Lane, Inertia, Params, Events)
+    return Advance(advance, Lane, Inertia, Params, Events, monitors.limits_struct(width, real, looks), Monitor)
+
+
+def _watchers(spec, method):
+    """(look_at, energies, growth, drag_back) of monitor.py for this Spec; the step in place of what it does not ask for."""
+    width, real, laws = spec.width, spec.real, spec.laws
+    View, Damping = view_struct(width, real), damping_struct(width, real)
+    directions = bool(laws) and laws[0] is drag_directions
+    velocities, of_forces = method.velocities, method.velocities_of_forces
+    look_at, energies, growth, drag_back = (method.step,) * 4
+    if spec.looks:
+        rate = None
+        if "drag" in spec.looks and spec.drag:
+            rate = monitors.make_drag_rate(directions, spec.drag, of_forces, 2.0)
+        elif "drag" in spec.looks:
+            rate = monitors.make_matrix_rate(View, Damping, superpose(laws, "damping"), of_forces)
+        look_at = monitors.make_look(spec.looks, width, real, velocities, rate)
+    if spec.energy:
+        energies, growth = monitors.make_energy(laws, real, View, velocities, "origin" in spec.parts)
+    if spec.backward:
+        drag_back = monitors.make_backward(monitors.make_drag_rate(directions, spec.drag, of_forces, 1.0))
+    return look_at, energies, growth, drag_back

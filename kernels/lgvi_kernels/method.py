@@ -37,13 +37,17 @@ from lgvi_kernels.water import make_shear
 
 
 class Step(NamedTuple):
-    """Functions of a method: one stage without its lead, the lead, the velocities of a state, E's set-up, the current."""
+    """Functions of a method: one stage without its lead, the lead, the velocities of a state, E's set-up, the current.
+
+    velocities_of_forces: those at the origin of the forces.
+    """
 
     step: Any
     lead: Any
     velocities: Any
     prepare: Any
     water_velocity: Any
+    velocities_of_forces: Any
 
 
 @wp.func
@@ -147,7 +151,7 @@ def make_method(spec):
     if spec.explicit is not None:
         acting = (View, Wrench, Flow, Damping, law, damping, flow, varies, shifted)
         step = make_explicit(spec, make_forces(*acting)[0], velocities)
-        return Step(step, step, velocities, prepare, water_velocity)
+        return Step(step, step, velocities, prepare, water_velocity, velocities_of_forces)
     V = None
     if damping is not None and spec.averages is None:
         V = make_V(damping, velocities_of_forces, Damping, factor_struct(width, real), coupled)
@@ -191,4 +195,4 @@ def make_method(spec):
             maps.append((letters[letter], coefficient))
     step = fold_pair(tuple(maps)) if spec.paired else fold(tuple(maps))
     lead = letters[spec.lead[0]] if spec.lead else step
-    return Step(step, lead, velocities, prepare, water_velocity)
+    return Step(step, lead, velocities, prepare, water_velocity, velocities_of_forces)

@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes import cross, lane3, sub  # noqa: F401
+from lgvi_kernels.lanes import add, cross, dot, lane3, sub  # noqa: F401
 
 POTENTIAL = True
 SEPARABLE = True
@@ -28,3 +28,9 @@ def law(w: Any, view: Any, p: Any):
     """mU(b, R) = -B r x R^T e3."""
     w.torque = w.torque - cross(p.moment, view.down)
     return w
+
+
+@wp.func
+def energy(u: Any, view: Any, p: Any):
+    """U = B r.R^T e3."""
+    return u + dot(p.moment, view.down)

@@ -26,3 +26,10 @@ def law(w: Any, view: Any, p: Any):
     w.force = w.force + f
     w.torque = w.torque + cross(p.center, f)
     return w
+
+
+@wp.func
+def energy(u: Any, view: Any, p: Any):
+    """U = B gradient (d - d0)^2 / 2."""
+    deep = view.b.z + dot(view.down, p.center) - p.reference_depth
+    return u + view.t.dtype(0.5) * (p.stiffness * deep * deep)

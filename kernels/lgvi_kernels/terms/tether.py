@@ -38,3 +38,11 @@ def law(w: Any, view: Any, p: Any):
     w.force = w.force + f
     w.torque = w.torque + cross(p.attachment, f)
     return w
+
+
+@wp.func
+def energy(u: Any, view: Any, p: Any):
+    """U = k max(|d| - L0, 0)^2 / 2."""
+    d = p.anchor - view.b - to_inertial(view, p.attachment)
+    stretch = greatest(root(dot(d, d)) - p.rest_length, ones(d.x) - ones(d.x))
+    return u + view.t.dtype(0.5) * (p.stiffness * stretch * stretch)

@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes import add, lane, mul  # noqa: F401
+from lgvi_kernels.lanes import add, lane, mul, sub  # noqa: F401
 
 POTENTIAL = True
 SEPARABLE = True
@@ -28,3 +28,9 @@ def law(w: Any, view: Any, p: Any):
     """f(b, R) = net R^T e3."""
     w.force = w.force + p.net * view.down
     return w
+
+
+@wp.func
+def energy(u: Any, view: Any, p: Any):
+    """U = -net b3."""
+    return u - p.net * view.b.z

@@ -252,11 +252,35 @@ def make_advance(spec):
         for j in range(rows):
             memory[i, target * rows + j] = memory[i, source * rows + j]
 
-    @wp.func
-    def closed(x: State, c: Constants, k: int, h: wp.float64, opening: real):
-        """The state after k steps without the lead of the next."""
-        return opened(at_step(x, k, h), c, -opening)
+    @wp.func(inline=False)
+    def stepped(x: State, c: Constants, monitor: Monitor, k: int, n: int, h: wp.float64, stage_h: wp.array(dtype=real),
+                lead_h: wp.array(dtype=real), first_h: real, opening: real):  # fmt: skip
+        """The steps k to k + n: the loop that takes the time, apart from all else, which would spoil its schedule."""
+        stages = lead_h.shape[0] - 1
+        for j in range(n):
+            x = at_step(x, k + j, h)
+            if wp.static(composed):
+                for g in range(stages):
+                    if wp.static(paired):
+                        x = step(x, c, stage_h[2 * g], stage_h[2 * g + 1])
+                    else:
+                        x = step(x, c, stage_h[g])
+                    if wp.static(has_lead):
+                        x = lead(x, c, lead_h[g])
+            else:
+                x = step(x, c, first_h)
+                if wp.static(has_lead):
+                    x = lead(x, c, opening + opening)
+            if wp.static(compensated):
+                x = settled(x)
+            if wp.static(backward):
+                x = drag_back(x, c, monitor.backward)
+            if wp.static(watched):
+                x = watch(x, c, real(h))
+        return x
 
+    # What follows is for rare looks and repairs: no part of it is to be mixed with the loop over the steps, whose schedule
+    # and registers it would spoil (a fifth of the speed).
     @wp.func
     def created(y: State, c: Constants, monitor: Monitor):
         """Energy that came from nowhere since the start, over what there was to exchange."""
@@ -264,18 +288,19 @@ def make_advance(spec):
         e = monitor.energy
         return growth(T, U, e[c.packet, 0], e[c.packet, 1], e[c.packet, 2])
 
-    @wp.func
-    def energy_alarm(x: State, y: State, c: Constants, monitor: Monitor, among: Lane):
-        """Raise the alarm of the lanes, among these, whose energy explodes."""
-        g = created(y, c, monitor)
+    @wp.func(inline=False)
+    def energy_alarm(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real, among: Lane):
+        """The alarm after k steps, with that of the lanes, among these, whose energy explodes."""
+        g = created(opened(at_step(x, k, h), c, -opening), c, monitor)
         one = ones(g)
         over = positive(among, g - real(wp.static(monitors.MOST_ENERGY)) * one, one - one)
-        x.alarm.size = positive(x.alarm.code, x.alarm.size, positive(over, g * g, x.alarm.size))
+        alarm = x.alarm
+        alarm.size = positive(alarm.code, alarm.size, positive(over, g * g, alarm.size))
         grew = real(wp.static(float(monitors.ENERGY_GREW))) * one
-        x.alarm.code = positive(x.alarm.code, x.alarm.code, positive(over, grew, one - one))
-        return x
+        alarm.code = positive(alarm.code, alarm.code, positive(over, grew, one - one))
+        return alarm
 
-    @wp.func
+    @wp.func(inline=False)
     def start_energy(x: State, c: Constants, monitor: Monitor):
         """Of the start."""
         T, U = energies(x, c)
@@ -308,6 +333,15 @@ def make_advance(spec):
                     monitor.warned_size[c.packet][j] = seen.size[j]
                 monitor.warned[c.packet][j] = old | new
 
+    @wp.func(inline=False)
+    def note(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real, frozen: Lane):
+        """Look at the state after k steps, without the lead of the next."""
+        y = opened(at_step(x, k, h), c, -opening)
+        if wp.static(warned):
+            warn(y, c, monitor, k, frozen)
+        if wp.static(energetic):
+            note_energy(y, c, monitor, frozen)
+
     @wp.func
     def divided(x: State, c: Constants, k: int, h: wp.float64, parts: int, stage_h: wp.array(dtype=real),
                 lead_h: wp.array(dtype=real), opening: real):  # fmt: skip
@@ -331,7 +365,7 @@ def make_advance(spec):
                 x = settled(x)
         return opened(opened(x, c, -(r * opening)), c, opening)
 
-    @wp.func
+    @wp.func(inline=False)
     def retried(good: State, x: State, code: Lane, c: Constants, k: int, h: wp.float64, stage_h: wp.array(dtype=real),
                 lead_h: wp.array(dtype=real), opening: real):  # fmt: skip
         """(state, code) after step k: where it had no solution, by 2, 4, ... equal parts, as soon as those have one."""
@@ -442,34 +476,15 @@ def make_advance(spec):
             x.alarm = Alarm()
             if wp.static(paced):
                 x.alarm.code = frozen
-            for j in range(n):
-                x = at_step(x, k + j, h)
-                if wp.static(composed):
-                    for g in range(stages):
-                        if wp.static(paired):
-                            x = step(x, c, stage_h[2 * g], stage_h[2 * g + 1])
-                        else:
-                            x = step(x, c, stage_h[g])
-                        if wp.static(has_lead):
-                            x = lead(x, c, lead_h[g])
-                else:
-                    x = step(x, c, first_h)
-                    if wp.static(has_lead):
-                        x = lead(x, c, opening + opening)
-                if wp.static(compensated):
-                    x = settled(x)
-                if wp.static(backward):
-                    x = drag_back(x, c, monitor.backward)
-                if wp.static(watched):
-                    x = watch(x, c, real(h))
+            x = stepped(x, c, monitor, k, n, h, stage_h, lead_h, first_h, opening)
             repeat = int(0)
             if wp.static(checked):
                 if wp.static(energetic):
                     # Of a chunk that is made again, only those lanes are looked at in between that made it necessary.
                     if (k + n) % wp.static(CHUNK) == 0 or k + n == last:
-                        x = energy_alarm(x, closed(x, c, k + n, h, opening), c, monitor, one - frozen)
+                        x.alarm = energy_alarm(x, c, monitor, k + n, h, opening, one - frozen)
                     elif singles > 0:
-                        x = energy_alarm(x, closed(x, c, k + n, h, opening), c, monitor, suspects)
+                        x.alarm = energy_alarm(x, c, monitor, k + n, h, opening, suspects)
                 code = failures(x, frozen)
                 if wp.static(substepped):
                     if n == 1 and any_positive(code):
@@ -510,11 +525,7 @@ def make_advance(spec):
                     singles -= 1
                 if wp.static(looking):
                     if k % wp.static(CHUNK) == 0 or k == last:
-                        z = closed(x, c, k, h, opening)
-                        if wp.static(warned):
-                            warn(z, c, monitor, k, frozen)
-                        if wp.static(energetic):
-                            note_energy(z, c, monitor, frozen)
+                        note(x, c, monitor, k, h, opening, frozen)
                 if wp.static(renormalised):
                     if k % wp.static(CHUNK) == 0:
                         x = renormalise(x, tolerance)

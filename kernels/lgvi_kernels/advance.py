@@ -158,6 +158,7 @@ def make_advance(spec):
     fields, per_sample = spec.fields, sum(spec.sample_fields.values())
     looks, energetic, backward, substepped = spec.looks, spec.energy, spec.backward, spec.substep
     Monitor = monitors.monitor_struct(width, real, looks, energetic, backward, substepped)
+    apart = spec.explicit is None
     warned, looking = bool(looks), bool(looks) or energetic
     look_at, energies, growth, drag_back = _watchers(spec, method)
 
@@ -252,31 +253,37 @@ def make_advance(spec):
         for j in range(rows):
             memory[i, target * rows + j] = memory[i, source * rows + j]
 
+    @wp.func
+    def one_step(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, stage_h: wp.array(dtype=real),
+                 lead_h: wp.array(dtype=real), first_h: real, opening: real):  # fmt: skip
+        """Step k, and what is looked at in each."""
+        x = at_step(x, k, h)
+        if wp.static(composed):
+            for g in range(lead_h.shape[0] - 1):
+                if wp.static(paired):
+                    x = step(x, c, stage_h[2 * g], stage_h[2 * g + 1])
+                else:
+                    x = step(x, c, stage_h[g])
+                if wp.static(has_lead):
+                    x = lead(x, c, lead_h[g])
+        else:
+            x = step(x, c, first_h)
+            if wp.static(has_lead):
+                x = lead(x, c, opening + opening)
+        if wp.static(compensated):
+            x = settled(x)
+        if wp.static(backward):
+            x = drag_back(x, c, monitor.backward)
+        if wp.static(watched):
+            x = watch(x, c, real(h))
+        return x
+
     @wp.func(inline=False)
     def stepped(x: State, c: Constants, monitor: Monitor, k: int, n: int, h: wp.float64, stage_h: wp.array(dtype=real),
                 lead_h: wp.array(dtype=real), first_h: real, opening: real):  # fmt: skip
         """The steps k to k + n: the loop that takes the time, apart from all else, which would spoil its schedule."""
-        stages = lead_h.shape[0] - 1
         for j in range(n):
-            x = at_step(x, k + j, h)
-            if wp.static(composed):
-                for g in range(stages):
-                    if wp.static(paired):
-                        x = step(x, c, stage_h[2 * g], stage_h[2 * g + 1])
-                    else:
-                        x = step(x, c, stage_h[g])
-                    if wp.static(has_lead):
-                        x = lead(x, c, lead_h[g])
-            else:
-                x = step(x, c, first_h)
-                if wp.static(has_lead):
-                    x = lead(x, c, opening + opening)
-            if wp.static(compensated):
-                x = settled(x)
-            if wp.static(backward):
-                x = drag_back(x, c, monitor.backward)
-            if wp.static(watched):
-                x = watch(x, c, real(h))
+            x = one_step(x, c, monitor, k + j, h, stage_h, lead_h, first_h, opening)
         return x
 
     # What follows is for rare looks and repairs: no part of it is to be mixed with the loop over the steps, whose schedule
@@ -476,7 +483,11 @@ def make_advance(spec):
             x.alarm = Alarm()
             if wp.static(paced):
                 x.alarm.code = frozen
-            x = stepped(x, c, monitor, k, n, h, stage_h, lead_h, first_h, opening)
+            if wp.static(apart):
+                x = stepped(x, c, monitor, k, n, h, stage_h, lead_h, first_h, opening)
+            else:
+                for j in range(n):
+                    x = one_step(x, c, monitor, k + j, h, stage_h, lead_h, first_h, opening)
             repeat = int(0)
             if wp.static(checked):
                 if wp.static(energetic):

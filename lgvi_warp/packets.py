@@ -59,6 +59,8 @@ class Packets:
         self.plan, self.members = plan, members
         self.frame, self.U = model.frame_of(plan.method, members.parameters)
         self.scale = self.frame.J.max(axis=1)
+        if not plan.spec.scaled:
+            self.scale = np.ones_like(self.scale)
         width, Lane = plan.spec.width, plan.advance.Lane
         self.count = -(-members.count // width)
         Inertia, Params, Events = plan.advance.Inertia, plan.advance.Params, plan.advance.Events
@@ -163,7 +165,8 @@ class Packets:
             if i == 0 and self.plan.spec.drag:
                 assert isinstance(term, Drag)
                 by_axes = module is LAWS["drag"]
-                packed.append(term.packed_exact(own, self.frame) if by_axes else term.packed_directions(own, setting))
+                exact = term.packed_exact(own, self.frame, self.scale) if by_axes else term.packed_directions(own, setting)
+                packed.append(exact)
             else:
                 packed.append(term.packed(own, setting))
         dtype = self.plan.dtypes[1]

@@ -80,6 +80,11 @@ class Spec(NamedTuple):
     compensated: bool = False
 
     @property
+    def scaled(self) -> bool:
+        """Whether momenta and inertia are divided by max J: for (24), and where a step is chosen, for its tolerance."""
+        return self.explicit is None or self.explicit.adaptive
+
+    @property
     def state_fields(self) -> int:
         """Numbers of a packet's state."""
         paced = self.explicit is not None and self.explicit.adaptive

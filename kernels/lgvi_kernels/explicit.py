@@ -1,8 +1,9 @@
 """Explicit Runge-Kutta methods on (b, R, p, pi), and on the rotation group: fixed steps, or steps chosen for a tolerance.
 
 k_i = f(t + c_i h, y_i), where y_i comes from y by h a_i1 k_1, h a_i2 k_2, ... and the new state by h b_1 k_1, h b_2 k_2, ...
-A move adds: the rows of R are nine numbers like the others, and leave the group at the order of the method. Or it turns:
-R <- R exp(h a Om), one after the other (Crouch & Grossman 1993). Zero coefficients make no code; the stages are unrolled.
+A move adds: two rows of R are six numbers like the others, which leave the group at the order of the method, and the third
+is their cross product. Or it turns: R <- R exp(h a Om), one after the other (Crouch & Grossman 1993). Zero coefficients make
+no code; the stages are unrolled.
 """
 
 import functools
@@ -36,7 +37,7 @@ TINY = {wp.float64: 1e-300, wp.float32: 1e-36}
 class Explicit(NamedTuple):
     """What decides the code of an explicit method: a tableau, whose row i of `a` has i numbers, and how it is used.
 
-    kind: "vector" (R as nine numbers), "group" (R turns by exponentials) or "munthe_kaas" (order 4 with its commutators).
+    kind: "vector" (R as two of its rows), "group" (R turns by exponentials) or "munthe_kaas" (order 4 with its commutators).
     errors: rows of error estimates, (stages,) or one longer with f of the new state at its end, which go as h to the power
     `estimate`. adaptive: each packet chooses its steps.
     """
@@ -52,9 +53,9 @@ class Explicit(NamedTuple):
 
 @functools.cache
 def rates_struct(width, real, group):
-    """b', p', pi', and the rows of R' = R hat(Om); on the group, Om instead of them."""
+    """b', p', pi', and the first and last row of R' = R hat(Om); on the group, Om instead of them."""
     Lane3 = lane3(width, real)
-    turning = {"Om": Lane3} if group else {"R0": Lane3, "R1": Lane3, "R2": Lane3}
+    turning = {"Om": Lane3} if group else {"R0": Lane3, "R2": Lane3}
     return struct("Rates", b=Lane3, **turning, p=Lane3, pi=Lane3)
 
 
@@ -64,11 +65,19 @@ def slopes_struct(Rates, count):
     return struct("Slopes", **{f"k{i}": Rates for i in range(count)})
 
 
-def make_rates(Rates, everything, velocities, group, isotropic, coupled, drifts, drag):
+def make_rates(Rates, everything, velocities, group, isotropic, coupled, drifts, scaled, drag):
     """The right-hand side, eq. (1) and (3) of Nordkvist & Sanyal 2010 with all laws of a scene.
 
-    drag: the function that adds drag along the axes, where it is not among `everything`, or None.
+    scaled: momenta are divided by max J; drag: the function that adds drag along the axes, where it is not among
+    `everything`, or None.
     """
+
+    @wp.func
+    def momentum(c: Any, w: Any):
+        """A force or torque in the unit of momenta."""
+        if wp.static(scaled):
+            w = c.inertia.inverse_scale * w
+        return w
 
     @wp.func
     def rates(x: Any, c: Any, h: Any):
@@ -83,10 +92,9 @@ def make_rates(Rates, everything, velocities, group, isotropic, coupled, drifts,
             k.Om = Om
         else:
             k.R0 = cross(x.R0, Om)
-            k.R1 = cross(x.R1, Om)
             k.R2 = cross(x.R2, Om)
-        k.p = cross(x.p, Om) + c.inertia.inverse_scale * w.force
-        turned = cross(x.pi, Om) + c.inertia.inverse_scale * w.torque
+        k.p = cross(x.p, Om) + momentum(c, w.force)
+        turned = cross(x.pi, Om) + momentum(c, w.torque)
         if wp.static(coupled):
             turned = turned + cross(x.p, nu)
         elif wp.static(not isotropic):
@@ -102,13 +110,19 @@ def make_rates(Rates, everything, velocities, group, isotropic, coupled, drifts,
 
 @wp.func
 def along(x: Any, k: Any, s: Any):
-    """x + s k."""
+    """x + s k; the middle row of R is left behind (see `completed`)."""
     x.b = x.b + s * k.b
     x.R0 = x.R0 + s * k.R0
-    x.R1 = x.R1 + s * k.R1
     x.R2 = x.R2 + s * k.R2
     x.p = x.p + s * k.p
     x.pi = x.pi + s * k.pi
+    return x
+
+
+@wp.func
+def completed(x: Any):
+    """The middle row of R from the others."""
+    x.R1 = cross(x.R2, x.R0)
     return x
 
 
@@ -151,8 +165,11 @@ def make_act(turned):
 MOST_STAGES = 13
 
 
-def make_moves(move, weights):
-    """One function (y, slopes, h): the moves by h w_1 k_1, then h w_2 k_2, ... of all weights that are not zero."""
+def make_moves(move, weights, complete):
+    """One function (y, slopes, h): the moves by h w_1 k_1, then h w_2 k_2, ... of all weights that are not zero.
+
+    complete: what completes a state that was moved, or None.
+    """
     w = weights + (0.0,) * (MOST_STAGES - len(weights))
 
     @wp.func
@@ -183,6 +200,8 @@ def make_moves(move, weights):
             y = move(y, k.k11, h.dtype(wp.static(w[11])) * h)
         if wp.static(w[12] != 0.0):
             y = move(y, k.k12, h.dtype(wp.static(w[12])) * h)
+        if wp.static(complete is not None):
+            y = complete(y)
         return y
 
     return moves
@@ -201,11 +220,11 @@ def make_stage(moves, node, timed):
     return at_node
 
 
-def make_stages(Rates, rates, move, a, c, timed):
+def make_stages(Rates, rates, move, complete, a, c, timed):
     """One function (x, constants, h) -> the slopes of all rows of `a`."""
     count = len(a)
     Slopes = slopes_struct(Rates, count)
-    ys = [make_stage(make_moves(move, row), node, timed) for row, node in zip(a, c)]
+    ys = [make_stage(make_moves(move, row, complete), node, timed) for row, node in zip(a, c)]
     _, at_1, at_2, at_3, at_4, at_5, at_6, at_7, at_8, at_9, at_10, at_11, at_12 = ys + [None] * (MOST_STAGES - count)
 
     @wp.func
@@ -315,13 +334,13 @@ def square(a: Any, b: Any):
 
 def make_errors(Rates, weights, move):
     """(y, new, slopes, h, rtol, atol) -> mean square of the estimates over the tolerance, HNW (4.11), one each row."""
-    moves = [make_moves(move, row) for row in weights]
+    moves = [make_moves(move, row, None) for row in weights]
     first, last, double = moves[0], moves[-1], len(moves) > 1
 
     @wp.func
     def mean_square(e: Any, w: Any):
-        s = square(e.b, w.b) + square(e.R0, w.R0) + square(e.R1, w.R1) + square(e.R2, w.R2) + square(e.p, w.p)
-        return s.dtype(1.0 / 18.0) * (s + square(e.pi, w.pi))
+        s = square(e.b, w.b) + square(e.R0, w.R0) + square(e.R2, w.R2) + square(e.p, w.p) + square(e.pi, w.pi)
+        return s.dtype(1.0 / 15.0) * s
 
     @wp.func
     def errors(y: Any, new: Any, k: Any, h: Any, rtol: Any, atol: Any):
@@ -329,7 +348,6 @@ def make_errors(Rates, weights, move):
         w = Rates()
         w.b = one_over3(y.b, new.b, rtol, atol)
         w.R0 = one_over3(y.R0, new.R0, rtol, atol)
-        w.R1 = one_over3(y.R1, new.R1, rtol, atol)
         w.R2 = one_over3(y.R2, new.R2, rtol, atol)
         w.p = one_over3(y.p, new.p, rtol, atol)
         w.pi = one_over3(y.pi, new.pi, rtol, atol)
@@ -440,8 +458,8 @@ def make_explicit(spec, everything, velocities):
     group = method.kind != "vector"
     Rates = rates_struct(width, real, group)
     turned = make_turned(rotation_struct(width, real), real)
-    move = make_act(turned) if group else along
-    shape = (spec.mass == "isotropic", "coupled" in spec.parts, spec.flow != "none")
+    move, complete = (make_act(turned), None) if group else (along, completed)
+    shape = (spec.mass == "isotropic", "coupled" in spec.parts, spec.flow != "none", spec.scaled)
     drag = make_resistance(spec.drag) if spec.drag else None
     rates = make_rates(Rates, everything, velocities, group, *shape, drag)
     if method.kind == "munthe_kaas":
@@ -449,8 +467,8 @@ def make_explicit(spec, everything, velocities):
     a, c = method.a, method.c
     if method.adaptive and len(method.errors[0]) > len(a):
         a, c = (*a, method.b), (*c, 1.0)
-    stages = make_stages(Rates, rates, move, a, c, timed)
-    finish = make_moves(move, method.b + (0.0,) * (len(a) - len(method.b)))
+    stages = make_stages(Rates, rates, move, complete, a, c, timed)
+    finish = make_moves(move, method.b + (0.0,) * (len(a) - len(method.b)), complete)
     if not method.adaptive:
         return make_fixed(stages, finish, timed)
     errors = make_errors(Rates, method.errors, along)

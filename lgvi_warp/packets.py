@@ -165,7 +165,9 @@ class Packets:
             if i == 0 and self.plan.spec.drag:
                 assert isinstance(term, Drag)
                 by_axes = module is LAWS["drag"]
-                exact = term.packed_exact(own, self.frame, self.scale) if by_axes else term.packed_directions(own, setting)
+                exact = (
+                    term.packed_exact(own, self.frame, self.scale) if by_axes else term.packed_directions(own, setting)
+                )
                 packed.append(exact)
             else:
                 packed.append(term.packed(own, setting))
@@ -224,6 +226,8 @@ class Packets:
         rows = np.zeros((n, self.plan.spec.state_fields))
         rows[:, :9] = R.reshape(-1, 9)
         rows[:, 9:12] = m.position + notation.rotate_out(m.attitude, np.broadcast_to(frame.origin, (n, 3)))
+        if self.plan.spec.inertial:
+            momenta[:, :3] = notation.rotate_out(R, momenta[:, :3])
         rows[:, 12:STATE_FIELDS] = momenta / self.scale[:, None]
         if self.plan.spec.compensated:
             low = rows[:, :STATE_FIELDS] - rows[:, :STATE_FIELDS].astype(np.float32)

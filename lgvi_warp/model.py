@@ -66,6 +66,7 @@ class Model:
     where it is used, and `drag` its parts. flow: "none", "steady", "uniform" or "varying". coupling: which of U12, U13, U23
     and of the pitches are there. program: sub-maps of one stage. averages: alpha and beta of (15), (16), or None.
     conservative: no force creates energy, and the potential of all is known to the kernel.
+    steady: forces never change in inertial axes.
     """
 
     method: Method
@@ -84,6 +85,7 @@ class Model:
     lead: tuple[str, float] | None
     averages: tuple[float, float] | None
     conservative: bool
+    steady: bool
 
 
 def make_model(
@@ -170,7 +172,13 @@ def make_model(
         lead=lead,
         averages=(method.alpha, method.beta) if forced else None,
         conservative=conservative,
+        steady=not drag and flow in ("none", "steady") and all(_steady(module) for _, module in acting),
     )
+
+
+def _steady(module: Any) -> bool:
+    """Whether what a law pushes with never changes in inertial axes."""
+    return hasattr(module, "steady_force") or not any(hasattr(module, role) for role in ("law", "damping", "evolve"))
 
 
 def _conservative(ensemble: Ensemble, p: Parameters, acting: list[tuple[Term, Any]], laws: Mapping[str, Any]) -> bool:

@@ -34,8 +34,8 @@ CHUNK = 128
 # A step without a solution is divided into at most so many.
 MOST_PARTS = 1024
 
-# Numbers of a packet's state in `state[packet, field]`: R row by row, b, p, pi; with compensated sums as many low parts
-# more, or those of its pace (see pace_struct).
+# Numbers of a packet's state in `state[packet, field]`: R row by row, b, p (or R p, see Spec.inertial), pi; with compensated
+# sums as many low parts more, or those of its pace (see pace_struct).
 STATE_FIELDS = 18
 PACE_FIELDS = 4
 
@@ -88,6 +88,16 @@ class Spec(NamedTuple):
     energy: bool = False
     backward: bool = False
     substep: bool = False
+
+    @property
+    def scaled(self) -> bool:
+        """Whether momenta and inertia are divided by max J: for (24), and where a step is chosen, for its tolerance."""
+        return self.explicit is None or self.explicit.adaptive
+
+    @property
+    def inertial(self) -> bool:
+        """Whether the state holds R p in place of p."""
+        return self.explicit is not None and self.explicit.kind == "inertial"
 
     @property
     def state_fields(self) -> int:
@@ -145,7 +155,7 @@ def make_advance(spec):
     )
     method = make_method(spec)
     step, lead, velocities, prepare = method.step, method.lead, method.velocities, method.prepare
-    flow = superpose(spec.laws, "flow")
+    flow, momentum = superpose(spec.laws, "flow"), method.momentum
     has_lead, drifts, watched = spec.lead is not None, flow is not None, bool(spec.events)
     watch, passage = make_watch(spec.events, View, "origin" in spec.parts) if watched else (step, step)
     lead_coefficient = spec.lead[1] if has_lead else 0.0
@@ -237,6 +247,8 @@ def make_advance(spec):
             put(out, i, o + 3, x.R1)
             put(out, i, o + 6, x.R2)
             o += 9
+        if wp.static(momentum is not None):
+            x.p = momentum(x)
         nu, Om = velocities(c.inertia, x.p, x.pi)
         if wp.static("velocity" in fields):
             if wp.static(drifts):
@@ -289,6 +301,14 @@ def make_advance(spec):
     # What follows is for rare looks and repairs: no part of it is to be mixed with the loop over the steps, whose schedule
     # and registers it would spoil (a fifth of the speed).
     @wp.func
+    def closed(x: State, c: Constants, k: int, h: wp.float64, opening: real):
+        """The state after k steps without the lead of the next, with p in body axes."""
+        y = opened(at_step(x, k, h), c, -opening)
+        if wp.static(momentum is not None):
+            y.p = momentum(y)
+        return y
+
+    @wp.func
     def created(y: State, c: Constants, monitor: Monitor):
         """Energy that came from nowhere since the start, over what there was to exchange."""
         T, U = energies(y, c)
@@ -298,7 +318,7 @@ def make_advance(spec):
     @wp.func(inline=False)
     def energy_alarm(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real, among: Lane):
         """The alarm after k steps, with that of the lanes, among these, whose energy explodes."""
-        g = created(opened(at_step(x, k, h), c, -opening), c, monitor)
+        g = created(closed(x, c, k, h, opening), c, monitor)
         one = ones(g)
         over = positive(among, g - real(wp.static(monitors.MOST_ENERGY)) * one, one - one)
         alarm = x.alarm
@@ -310,7 +330,10 @@ def make_advance(spec):
     @wp.func(inline=False)
     def start_energy(x: State, c: Constants, monitor: Monitor):
         """Of the start."""
-        T, U = energies(x, c)
+        y = x
+        if wp.static(momentum is not None):
+            y.p = momentum(x)
+        T, U = energies(y, c)
         monitor.energy[c.packet, 0] = T
         monitor.energy[c.packet, 1] = U
         monitor.energy[c.packet, 2] = T - T
@@ -343,7 +366,7 @@ def make_advance(spec):
     @wp.func(inline=False)
     def note(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real, frozen: Lane):
         """Look at the state after k steps, without the lead of the next."""
-        y = opened(at_step(x, k, h), c, -opening)
+        y = closed(x, c, k, h, opening)
         if wp.static(warned):
             warn(y, c, monitor, k, frozen)
         if wp.static(energetic):

@@ -34,3 +34,9 @@ def law(w: Any, view: Any, p: Any):
 def energy(u: Any, view: Any, p: Any):
     """U = B r.R^T e3."""
     return u + dot(p.moment, view.down)
+
+
+@wp.func
+def steady_force(w: Any, view: Any, p: Any):
+    """A moment only."""
+    return w

@@ -34,3 +34,10 @@ def law(w: Any, view: Any, p: Any):
 def energy(u: Any, view: Any, p: Any):
     """U = -net b3."""
     return u - p.net * view.b.z
+
+
+@wp.func
+def steady_force(w: Any, view: Any, p: Any):
+    """The same in inertial axes: net e3."""
+    w.force.z = w.force.z + p.net
+    return w

@@ -248,7 +248,10 @@ def _vehicle_checks(p: Mapping[str, np.ndarray], varied: set[str]) -> dict[str, 
         }
     else:
         rigid, added = "vehicle.rigid_body_mass_matrix", "vehicle.added_mass_matrix"
-        checks |= {rigid: ~_positive_definite(p[rigid]), f"{rigid} + {added}": ~_positive_definite(p[rigid] + p[added])}
+        good = _positive_definite(p[rigid])
+        possible = np.where(good[:, None, None], p[rigid], np.eye(6))
+        bad = ~good | vehicles.impossible(possible)
+        checks |= {rigid: bad, f"{rigid} + {added}": ~_positive_definite(p[rigid] + p[added])}
     for key in ("vehicle.center_of_buoyancy", "vehicle.center_of_gravity"):
         if key in p:
             checks[key] = ~np.isfinite(p[key]).all(axis=1)

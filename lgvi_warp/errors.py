@@ -19,7 +19,7 @@ class SceneError(ValueError):
         super().__init__(head + "\n  ".join(self.faults))
 
 
-class MembersFailed(RuntimeError):
+class MembersFailed(RuntimeError):  # noqa: N818
     """Members failed in a run with on_failure="raise". `result` holds all that the run came to: nothing is lost."""
 
     def __init__(self, text: str, result: Any):

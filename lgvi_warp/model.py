@@ -183,15 +183,16 @@ def _steady(module: Any) -> bool:
 
 def _conservative(ensemble: Ensemble, p: Parameters, acting: list[tuple[Term, Any]], laws: Mapping[str, Any]) -> bool:
     """Whether no law creates energy, kinetic energy relative to the water, and each potential's device code tells it."""
-    modules = [module for _, module in acting]
+    tethered = any(module is laws["tether"] for _, module in acting)
     for term, module in acting:
         if module is laws["current"]:
             # A uniform current carries the vehicle past an anchor, or along the vertical that weight acts on.
-            if laws["tether"] in modules or np.any(ensemble.own(term, p)["velocity"][:, 2]):
-                return False
-        elif hasattr(module, "flow") or (hasattr(module, "damping") and not term.dissipative):
-            return False
-        elif hasattr(module, "law") and not (getattr(module, "POTENTIAL", False) and hasattr(module, "energy")):
+            passive = not tethered and not np.any(ensemble.own(term, p)["velocity"][:, 2])
+        else:
+            dissipates = term.dissipative or not hasattr(module, "damping")
+            told = getattr(module, "POTENTIAL", False) and hasattr(module, "energy")
+            passive = not hasattr(module, "flow") and dissipates and (told or not hasattr(module, "law"))
+        if not passive:
             return False
     return True
 

@@ -335,7 +335,7 @@ class Packets:
         return np.asarray(lanes.numpy().reshape(-1)[: self.members.count].astype(kind))
 
     def _warnings(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(bits, step, value) of the start and of the kernel's looks: of the more serious of the two, the start's of equals."""
+        """(bits, step, value) of the start and of the kernel's looks: the more serious of the two, of equals the start's."""
         bits, value = self.warned
         step = np.zeros(len(bits), np.int64)
         if not self.plan.spec.looks:

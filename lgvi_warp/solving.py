@@ -54,8 +54,8 @@ def solve(
     symmetry of each step are kept, symplecticity is not.
     progress: called with the fraction of the work that is done, from the threads that do it.
 
-    Raises SceneError naming every fault of the arguments, MembersFailed as asked. Prints nothing. The same inputs give the same bits for any
-    number of threads, on one type of machine.
+    Raises SceneError naming every fault of the arguments, MembersFailed as asked. Prints nothing. The same inputs give the
+    same bits for any number of threads, on one type of machine.
     """
     if not isinstance(fleet, Ensemble | Scene):
         raise SceneError(

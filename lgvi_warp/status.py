@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-
 # What solve and [run] may ask for (see solve).
 CHECKS = ("none", "safe", "all")
 ON_FAILURE = ("freeze", "raise", "substep")
@@ -52,8 +51,8 @@ _TEXT = {
     "shorten the step, or use psi_s or psi_x, which treat drag implicitly",
     Status.STEP_TOO_SMALL: "the steps that the tolerance asks for became too small, or too many (100,000 within one h); "
     "loosen rtol or atol (float32 reaches about 1e-6), or look for forces that jump or are stiff",
-    Status.ENERGY_GREW: "energy came from nowhere, more than 100 times what there was to exchange, though no force of the scene "
-    "creates any: the method is unstable at this step; shorten it (result.warnings tells what is too fast)",
+    Status.ENERGY_GREW: "energy came from nowhere, more than 100 times what there was to exchange, though no force of the "
+    "scene creates any: the method is unstable at this step; shorten it (result.warnings tells what is too fast)",
     Status.BACKWARD_DRAG: "drag became too strong for the stages of the composition that go backward: their drag number, "
     "(back) (l + q|v|) / I, passed 0.5, and at 1 drag has no past; use the method that is composed, or shorten the step",
     Status.SURFACE: "stopped by an event: rose to the surface",
@@ -117,8 +116,8 @@ _WARNING_TEXT = {
     "(psi_x: 1, beyond which its turns are inaccurate); shorten the step",
     Warnings.DRAG_STIFF: "drag is stiff for a method that treats it explicitly: h (l + 2 q|v|) / I > 1; shorten the step, or "
     "use psi_s or psi_x, which treat drag exactly or implicitly",
-    Warnings.MUNK_UNSTABLE: "the Munk moment's oscillation is too fast for this method and step: h w passed the measured limit "
-    "of stability; shorten the step",
+    Warnings.MUNK_UNSTABLE: "the Munk moment's oscillation is too fast for this method and step: h w passed the measured "
+    "limit of stability; shorten the step",
     Warnings.RESTORING_UNSTABLE: "the restoring moment's oscillation is too fast for this method and step: h sqrt(B|r|/J) "
     "passed the measured limit of stability; shorten the step",
     Warnings.ENERGY: "energy came from nowhere, more than half of what there was to exchange, though no force of the scene "

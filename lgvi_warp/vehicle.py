@@ -124,6 +124,11 @@ class Vehicle:
             center = faults.finite("center_of_gravity", self.center_of_gravity, (3,), "m")
         if rigid is not None:
             center, warnings = self._rigid(faults, rigid, center)
+            if _definite(rigid) and bool(impossible(rigid[None])[0]):
+                moments = ", ".join(f"{one:.6g}" for one in np.linalg.eigvalsh(about_center(rigid[None])[0]))
+                what = f"has principal inertias {moments} kg m2, two of which sum to less than the third: no rigid body has"
+                remedy = "give the rigid body's own inertia here, and added inertia in added_mass_matrix"
+                faults.add("rigid_body_mass_matrix", rigid[3:, 3:], what, remedy)
         if rigid is not None and added is not None and _definite(rigid) and not _definite(rigid + added):
             faults.add("added_mass_matrix", given, "with the rigid body's is not positive definite", SIGN)
         values = {"rigid_body_mass_matrix": rigid, "added_mass_matrix": added, "weight": weight}
@@ -143,18 +148,13 @@ class Vehicle:
         if np.abs(rigid[:3, 3:] + m * inertias.hat(implied)).max() > 1e-6 * size:
             faults.add("rigid_body_mass_matrix", rigid[:3, 3:], "has no -m hat(r_g) in its second block", remedy)
         if center is None:
-            return implied, self._unusual(rigid, implied, m)
+            return implied, ()
         if np.abs(center - implied).max() > 1e-3 * max(np.abs(center).max(), np.sqrt(np.trace(rigid[3:, 3:]) / m)):
             text = (
                 f"center_of_gravity {center.tolist()} m, where the rigid body's matrix has it at {implied.tolist()} m"
             )
             return center, (f"vehicle.{text}: weight acts at the first, inertia at the second",)
-        return center, self._unusual(rigid, implied, m)
-
-    @staticmethod
-    def _unusual(rigid: np.ndarray, center: np.ndarray, m: float) -> tuple[str, ...]:
-        H = inertias.hat(center)
-        return unusual("rigid_body_mass_matrix", rigid[3:, 3:] + m * H @ H)
+        return center, ()
 
     @property
     def mass_matrix(self) -> np.ndarray:
@@ -197,6 +197,19 @@ def unusual(name: str, inertia: Any) -> tuple[str, ...]:
         return ()
     text = f"vehicle.{name}: principal inertias {small:.6g} + {middle:.6g} < {large:.6g} [kg m2]"
     return (text + ": no rigid body has these; that is right only if added inertia makes the difference",)
+
+
+def about_center(rigid: np.ndarray) -> np.ndarray:
+    """Inertia (n, 3, 3) [kg m2] about the centre of gravity, from rigid bodies' matrices (n, 6, 6)."""
+    m = rigid[:, :1, :1]
+    H = inertias.hat(-inertias.vee(rigid[:, :3, 3:]) / m[:, 0])
+    return np.asarray(rigid[:, 3:, 3:] + m * (H @ H))
+
+
+def impossible(rigid: np.ndarray) -> np.ndarray:
+    """Which matrices (n, 6, 6) no rigid body has: two principal inertias sum to less than the third, to 1e-6."""
+    small, middle, large = np.linalg.eigvalsh(about_center(rigid)).T
+    return np.asarray(small + middle < large * (1.0 - 1e-6))
 
 
 def inertia6(p: Numbers) -> np.ndarray:

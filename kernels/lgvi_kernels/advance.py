@@ -585,11 +585,13 @@ def _watchers(spec, method):
     velocities, of_forces = method.velocities, method.velocities_of_forces
     look_at, energies, growth, drag_back = (method.step,) * 4
     if spec.looks:
-        rate = None
+        rates = []
+        damping = superpose(laws, "damping")
         if "drag" in spec.looks and spec.drag:
-            rate = monitors.make_drag_rate(directions, spec.drag, of_forces, 2.0)
-        elif "drag" in spec.looks:
-            rate = monitors.make_matrix_rate(View, Damping, superpose(laws, "damping"), of_forces)
+            rates.append(monitors.make_drag_rate(directions, spec.drag, of_forces, 2.0))
+        if "drag" in spec.looks and damping is not None:
+            rates.append(monitors.make_matrix_rate(View, Damping, damping, of_forces))
+        rate = monitors.make_sum(*rates) if len(rates) == 2 else (*rates, None)[0]
         look_at = monitors.make_look(spec.looks, width, real, velocities, rate)
     if spec.energy:
         energies, growth = monitors.make_energy(laws, real, View, velocities, "origin" in spec.parts)

@@ -9,9 +9,9 @@ from typing import Any
 
 import warp as wp
 
+from lgvi_kernels.compose import superpose
 from lgvi_kernels.lane_math import greatest
 from lgvi_kernels.lanes import absolute, add, cross, div, dot, int_lane, lane, mul, neg, ones, positive, sub, vec3  # noqa: F401
-from lgvi_kernels.compose import superpose
 from lgvi_kernels.matrix3 import apply
 from lgvi_kernels.state import struct
 from lgvi_kernels.submaps import look, rotate
@@ -142,6 +142,16 @@ def make_matrix_rate(View, Damping, damping, velocities):
         return c.inertia.inverse_scale * greatest(largest(force), largest(torque))
 
     return matrix_rate
+
+
+def make_sum(one, other):
+    """Of drag along axes and of matrices beside it."""
+
+    @wp.func
+    def rate(x: Any, c: Any):
+        return one(x, c) + other(x, c)
+
+    return rate
 
 
 def make_backward(drag_rate):

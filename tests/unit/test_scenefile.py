@@ -33,7 +33,7 @@ def test_the_paper_in_numbers():
     np.testing.assert_array_equal(np.diag(v.inertia), [5.46, 5.29, 5.72])
     np.testing.assert_allclose(np.diag(v.mass_matrix), [188.8, 193.8, 198.8], rtol=1e-15)
     np.testing.assert_array_equal(v.center_of_buoyancy, [0.0, 0.0, -0.007])
-    assert vars(scene.run) == {
+    assert scene.run.to_dict() == {
         "method": "psi_s", "step": 0.01, "duration": 150.0, "save_every": 1.0, "dtype": "float64",
     }  # fmt: skip
     settings = scene.ensemble_settings

@@ -31,6 +31,9 @@ from lgvi_kernels.terms import drag, drag_directions
 # Steps between two looks at the alarms. A chunk with an alarm is repeated one step at a time by the same code.
 CHUNK = 128
 
+# Where every step is a sample, steps between two looks at the energy: it is then found out so many late.
+SINGLE_LOOKS = 8
+
 # A step without a solution is divided into at most so many.
 MOST_PARTS = 1024
 
@@ -327,17 +330,6 @@ def make_advance(spec):
         alarm.code = positive(alarm.code, alarm.code, positive(over, grew, one - one))
         return alarm
 
-    @wp.func(inline=False)
-    def start_energy(x: State, c: Constants, monitor: Monitor):
-        """Of the start."""
-        y = x
-        if wp.static(momentum is not None):
-            y.p = momentum(x)
-        T, U = energies(y, c)
-        monitor.energy[c.packet, 0] = T
-        monitor.energy[c.packet, 1] = U
-        monitor.energy[c.packet, 2] = T - T
-
     @wp.func
     def note_energy(y: State, c: Constants, monitor: Monitor, frozen: Lane):
         """Keep the largest fall of the potential."""
@@ -362,6 +354,20 @@ def make_advance(spec):
                     monitor.warned_step[c.packet][j] = k
                     monitor.warned_size[c.packet][j] = seen.size[j]
                 monitor.warned[c.packet][j] = old | new
+
+    @wp.func(inline=False)
+    def begin(x: State, c: Constants, monitor: Monitor, frozen: Lane):
+        """Look at the start, whose energy later ones are compared with."""
+        y = x
+        if wp.static(momentum is not None):
+            y.p = momentum(x)
+        if wp.static(energetic):
+            T, U = energies(y, c)
+            monitor.energy[c.packet, 0] = T
+            monitor.energy[c.packet, 1] = U
+            monitor.energy[c.packet, 2] = T - T
+        if wp.static(warned):
+            warn(y, c, monitor, 0, frozen)
 
     @wp.func(inline=False)
     def note(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real, frozen: Lane):
@@ -487,8 +493,8 @@ def make_advance(spec):
         if any_frozen:
             x = choose(frozen, at_rest(x), x)
         if k0 == 0:
-            if wp.static(energetic):
-                start_energy(x, c, monitor)
+            if wp.static(looking):
+                begin(x, c, monitor, frozen)
             x = opened(x, c, opening)
         k = k0
         s = s0
@@ -514,11 +520,11 @@ def make_advance(spec):
             repeat = int(0)
             if wp.static(checked):
                 if wp.static(energetic):
-                    # Of a chunk that is made again, only those lanes are looked at in between that made it necessary.
-                    if (k + n) % wp.static(CHUNK) == 0 or k + n == last:
-                        x.alarm = energy_alarm(x, c, monitor, k + n, h, opening, one - frozen)
-                    elif singles > 0:
+                    if singles > 0:
+                        # Of a chunk that is made again, only those lanes are looked at that made it necessary.
                         x.alarm = energy_alarm(x, c, monitor, k + n, h, opening, suspects)
+                    elif n > 1 or (k + n) % wp.static(SINGLE_LOOKS) == 0 or k + n == last:
+                        x.alarm = energy_alarm(x, c, monitor, k + n, h, opening, one - frozen)
                 code = failures(x, frozen)
                 if wp.static(substepped):
                     if n == 1 and any_positive(code):

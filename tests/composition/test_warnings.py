@@ -1,0 +1,295 @@
+"""Each row of warnings is crossed where it should be and not 5 % below; levels of checks; what a level leaves out."""
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp import limits, terms
+from lgvi_warp.method import Method
+from lgvi_warp.status import Status, Warnings
+from tests.tools import one, random_states, scene_of
+
+BELOW, ABOVE = 0.95, 1.05
+BOTH = np.array([BELOW, ABOVE])
+MUNK = {"M": (1.0, 4.0, 4.0), "J": (1.0, 2.0, 2.5)}
+
+
+def warned(result, warning):
+    """Which members have it."""
+    return result.warnings.has(warning).tolist()
+
+
+def munk_speed(w, scene):
+    """Speed along the third axis for this frequency of the Munk moment, by the row's formula."""
+    M, J = np.diag(scene.vehicle.mass_matrix), np.diag(scene.vehicle.inertia)
+    p = w / np.sqrt((1.0 / M.min() - 1.0 / M.max()) / J.min())
+    return p / M[2]
+
+
+@pytest.mark.parametrize("checks", ["safe", "all"])
+@pytest.mark.parametrize("method", ["psi_s", "kl8(psi_s)"])
+def test_munk_at_the_start(checks, method):
+    scene, h = scene_of(**MUNK), 0.1
+    limit = 0.5 / max(abs(stage) for stage in Method(method).stages)
+    nu = np.outer(munk_speed(limit / h * BOTH, scene), [0.0, 0.0, 1.0])
+    result = lw.solve(one(scene, nu=nu), method, h=h, t1=h, checks=checks)
+    assert warned(result, Warnings.MUNK_COARSE) == [False, True]
+    assert result.warning_time[1] == 0.0 and np.isnan(result.warning_time[0])
+    np.testing.assert_allclose(result.warning_value, [np.nan, limit * ABOVE], rtol=1e-12)
+
+
+@pytest.mark.parametrize("method", ["phi", "psi", "psi_s", "psi_1", "psi_x"])
+def test_munk_beyond_the_limit_of_the_method(method):
+    scene, h = scene_of(**MUNK), 0.1
+    nu = np.outer(munk_speed(limits.MUNK[method] / h * BOTH, scene), [0.0, 0.0, 1.0])
+    result = lw.solve(one(scene, nu=nu), method, h=h, t1=h)
+    assert warned(result, Warnings.MUNK_UNSTABLE) == [False, True]
+    assert result.warnings.counts() == {"munk_coarse": 2, "munk_unstable": 1}
+
+
+def test_munk_that_arises_on_the_way():
+    # A heavy vehicle sinks from rest along its heavy axis: p = net t, so that the row is crossed at a known time.
+    scene, h = scene_of(**MUNK, net=2.0), 0.02
+    crossing = 0.5 / h / np.sqrt((1.0 / 1.0 - 1.0 / 4.0) / 1.0) / 2.0
+    result = lw.solve(one(scene), "psi_s", h=h, t1=1.4 * crossing, checks="all")
+    assert result.warnings.counts() == {"munk_coarse": 1}
+    assert crossing <= result.warning_time[0] <= crossing + 128 * h
+    safe = lw.solve(one(scene), "psi_s", h=h, t1=1.4 * crossing)
+    assert safe.warnings.counts() == {}
+    for name in ("position", "attitude", "velocity", "angular_velocity"):
+        np.testing.assert_allclose(getattr(result, name), getattr(safe, name), rtol=1e-13, atol=1e-13)
+
+
+@pytest.mark.parametrize(("factor", "warning"), [
+    (0.5, Warnings.RESTORING_COARSE), (limits.RESTORING["psi_s"], Warnings.RESTORING_UNSTABLE),
+])  # fmt: skip
+def test_restoring(factor, warning):
+    h = 0.1
+    for part, crossed in ((BELOW, False), (ABOVE, True)):
+        scene = scene_of((2.0, 2.0, 2.0), (1.0, 2.0, 2.5), moment=(0.0, 0.0, -((part * factor / h) ** 2)))
+        result = lw.solve(one(scene), "psi_s", h=h, t1=h)
+        assert warned(result, warning) == [crossed]
+        if crossed:
+            assert result.warning_value[0] == pytest.approx(part * factor)
+
+
+@pytest.mark.parametrize("method", ["rk4", "psi_x"])
+def test_rotation(method):
+    h = 0.1
+    limit = 2.0 * np.sqrt(2.0) if method == "rk4" else limits.TURNS  # the classical method's on the imaginary axis
+    Om = np.outer(limit / h * BOTH, [0.0, 0.0, 1.0])
+    for checks in ("safe", "all"):
+        result = lw.solve(one(scene_of((2.0, 2.0, 2.0)), Om=Om), method, h=h, t1=h, checks=checks)
+        assert warned(result, Warnings.ROTATION) == [False, True]
+    assert result.warning_value[1] == pytest.approx(ABOVE * limit)
+
+
+def test_explicit_methods_have_their_limits_on_the_imaginary_axis():
+    # Orders 3 and 4 with as many stages have the exponential's series: sqrt(3) and 2 sqrt(2).
+    known = {"cg3": np.sqrt(3.0), "rk4": 2.0 * np.sqrt(2.0), "rkmk4": 2.0 * np.sqrt(2.0)}
+    assert {name: limits.imaginary_limit(name) for name in known} == pytest.approx(known, abs=2e-3)
+
+
+@pytest.mark.parametrize(("method", "law"), [
+    ("rk4", lambda l, q: terms.Drag(linear=[l] * 6, quadratic=[q] * 6)),
+    ("rk4", lambda l, q: terms.DragMatrix(linear=l * np.eye(6), quadratic=q * np.eye(6))),
+    ("psi", lambda l, q: terms.Drag(linear=[l] * 6, quadratic=[q] * 6)),
+])  # fmt: skip
+def test_stiff_drag_of_explicit_methods(method, law):
+    # h (l + 2 q|v|) / I of surge, M = 2, v = 1.5.
+    h, v, M = 0.1, 1.5, 2.0
+    for part, crossed in ((BELOW, False), (ABOVE, True)):
+        q = 1.0
+        l = part * M / h - 2.0 * q * v
+        scene = scene_of((M, M, M), (30.0, 30.0, 30.0))
+        scene = lw.Scene(scene.vehicle, scene.environment, terms=[law(l, q)])
+        result = lw.solve(one(scene, nu=[v, 0.0, 0.0]), method, h=h, t1=h, checks="all")
+        assert warned(result, Warnings.DRAG_STIFF) == [crossed]
+    assert (result.warning_time[0], result.warning_value[0]) == (0.0, pytest.approx(ABOVE))
+    quiet = lw.solve(one(scene, nu=[v, 0.0, 0.0]), "psi_s", h=h, t1=h, checks="all")
+    assert warned(quiet, Warnings.DRAG_STIFF) == [False]
+
+
+@pytest.mark.parametrize("checks", ["safe", "all"])
+def test_precision_far_from_the_origin(checks):
+    h, v = 0.01, 1.0
+    far = limits.PRECISION * h * v / np.finfo(np.float32).eps
+    b = np.outer(far * BOTH, [0.0, 0.0, 1.0])
+    fleet = one(scene_of((2.0, 2.0, 2.0)), b=b, nu=[v, 0.0, 0.0])
+    assert warned(lw.solve(fleet, h=h, t1=h, dtype="float32", checks=checks), Warnings.PRECISION_LOSS) == [False, True]
+    for dtype in ("float64", "float32_compensated"):
+        assert lw.solve(fleet, h=h, t1=h, dtype=dtype, checks=checks).warnings.counts() == {}
+    # At rest nothing is lost.
+    assert (
+        lw.solve(one(scene_of((2.0, 2.0, 2.0)), b=b), h=h, t1=h, dtype="float32", checks=checks).warnings.counts() == {}
+    )
+
+
+def test_precision_on_the_way():
+    h, v = 0.01, 1.0
+    far = limits.PRECISION * h * v / np.finfo(np.float32).eps
+    fleet = one(scene_of((2.0, 2.0, 2.0)), b=[far - 3.0, 0.0, 0.0], nu=[v, 0.0, 0.0])
+    result = lw.solve(fleet, h=h, t1=8.0, dtype="float32", checks="all")
+    assert warned(result, Warnings.PRECISION_LOSS) == [True]
+    # float32 places lie 1 mm apart there: that many come to the first look after 3 s within a few per cent.
+    assert 2.8 <= result.warning_time[0] <= 3.0 + 1.28 + 0.3
+
+
+def test_orthogonality():
+    # R of rk4 leaves the group by h^4 a unit of time: |R^T R - I| = 1e-10 is crossed at the coarser step only.
+    fleet = one(scene_of((2.0, 2.0, 2.0)), Om=[0.0, 0.0, 1.0])
+    coarse, fine = (lw.solve(fleet, "rk4", h=h, t1=128 * h, checks="all") for h in (0.1, 0.001))
+    R = coarse.attitude[-1, 0]
+    assert coarse.warnings.counts() == {"orthogonality": 1} and fine.warnings.counts() == {}
+    np.testing.assert_allclose(coarse.warning_value[0], np.abs(R.T @ R - np.eye(3)).max(), rtol=1e-6)
+
+
+def test_inertia_that_no_rigid_body_has():
+    J = np.array([[1.0, 2.0, 2.9], [1.0, 2.0, 3.1]])
+    scene = scene_of((2.0, 2.0, 2.0), (1.0, 2.0, 2.5))
+    fleet = lw.Ensemble.from_states(scene, *random_states(1, 2, 0.1, 0.1), {"vehicle.inertia": J})
+    result = lw.solve(fleet, h=0.01, t1=0.01)
+    assert warned(result, Warnings.INERTIA) == [False, True] and result.warning_value[1] == pytest.approx(3.1 / 3.0)
+    rigid = np.diag([10.0, 10.0, 10.0, 1.0, 2.0, 3.1])
+    with pytest.raises(lw.SceneError, match="two of which sum to less than the third"):
+        lw.Vehicle(rigid_body_mass_matrix=rigid)
+    added = np.diag([0.0, 0.0, 0.0, 0.0, 0.0, 0.2])
+    assert lw.Vehicle(rigid_body_mass_matrix=rigid - added, added_mass_matrix=added).full
+
+
+# Far too long a step: without a solve that could fail, energy explodes and nothing else tells.
+@pytest.fixture(scope="module")
+def unstable():
+    scene = scene_of(**MUNK)
+    w = np.array([0.5, 3.0]) * limits.MUNK["psi_x"]
+    R = lw.notation.matrix_from_rotation_vector(np.array([0.0, 0.3, 0.0]))
+    nu = munk_speed(w, scene)[:, None] * (R.T @ [0.0, 0.0, 1.0])
+    return one(scene, R=R, nu=nu)
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_energy_that_explodes_is_a_failure(unstable, dtype):
+    result = lw.solve(unstable, "psi_x", h=1.0, t1=3000.0, save=lw.SaveAt(every=4.0), dtype=dtype)
+    assert list(result.status) == [Status.OK, Status.ENERGY_GREW]
+    assert result.failure_value[1] > 100.0
+    # Frozen at the last good state: its energy is below the limit, and samples stay from there on.
+    k = int(np.searchsorted(result.time, result.failure_time[1]))
+    created = (result.energy[:, 1] - result.energy[0, 1]) / result.energy[0, 1]
+    assert 0.5 < created[k:].max() <= 100.0 and np.ptp(created[k:]) < 1e-5
+    alone = lw.solve(unstable.subset([0]), "psi_x", h=1.0, t1=3000.0, save=lw.SaveAt(every=4.0), dtype=dtype)
+    for name in ("position", "attitude", "velocity", "angular_velocity"):
+        assert getattr(alone, name)[:, 0].tobytes() == getattr(result, name)[:, 0].tobytes()
+
+
+def test_energy_is_warned_of_before(unstable):
+    result = lw.solve(unstable, "psi_x", h=1.0, t1=128.0, checks="all")
+    assert warned(result, Warnings.ENERGY) == [False, result.status[1] == Status.OK]
+    assert result.warnings.worst()[0] <= Warnings.MUNK_COARSE * 4
+
+
+def test_energy_of_healthy_scenes_is_quiet():
+    # Falls from rest with and without a spring, a swing, drag: no look may take exchange for creation.
+    vehicle = scene_of((1.0, 2.0, 3.0), (1.0, 2.0, 2.5), net=0.5, moment=(0.0, 0.0, -0.3))
+    R = lw.notation.matrix_from_rotation_vector(np.array([0.5, 0.2, 0.0]))
+    tether = terms.Tether(anchor=[0.0, 0.0, 0.0], stiffness=0.2, rest_length=1.0)
+    for laws in ([], [tether], [terms.Drag(linear=[0.1] * 6)], [terms.Current(velocity=[0.3, 0.0, 0.0])]):
+        scene = lw.Scene(vehicle.vehicle, vehicle.environment, terms=laws)
+        for dtype in ("float64", "float32"):
+            result = lw.solve(one(scene, R=R), "psi_s", h=0.05, t1=50.0, dtype=dtype, checks="all")
+            assert result.status.counts() == {"ok": 1}
+            assert not warned(result, Warnings.ENERGY)[0] and not warned(result, Warnings.ORTHOGONALITY)[0]
+
+
+@pytest.mark.parametrize(("laws", "conservative"), [
+    ([], True), ([terms.Drag(linear=[0.1] * 6)], True), ([terms.Wrench(force=[1.0, 0.0, 0.0])], False),
+    ([terms.Current(velocity=[1.0, 0.0, 0.0])], True), ([terms.Current(velocity=[1.0, 0.0, 0.1])], False),
+    ([terms.Current(velocity=[1.0, 0.0, 0.0]), terms.Tether(anchor=[0.0] * 3, stiffness=1.0)], False),
+    ([terms.BodyLift(matrix=np.eye(6))], False), ([terms.Stratification(gradient=0.01)], True),
+])  # fmt: skip
+def test_energy_is_watched_where_no_force_creates_any(laws, conservative):
+    base = scene_of((2.0, 2.0, 2.0))
+    plan = lw.solving.make_plan(one(lw.Scene(base.vehicle, base.environment, terms=laws)), h=0.01, t1=0.1)
+    assert plan.spec.energy == conservative
+
+
+def test_drag_that_arises_in_backward_stages():
+    # From rest, so that nothing is refused; thrust then drives it to where the stages that go back lose their meaning.
+    base = scene_of((2.0, 2.0, 2.0), (1.0, 2.0, 2.5))
+    law = terms.Drag(quadratic=[2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    scene = lw.Scene(base.vehicle, base.environment, terms=[law, terms.Wrench(force=[40.0, 0.0, 0.0])])
+    back = 0.70624617255763935981
+    h = 0.4
+    result = lw.solve(one(scene), "kl6(psi_s)", h=h, t1=10.0, save=lw.SaveAt(every=h))
+    assert list(result.status) == [Status.BACKWARD_DRAG]
+    speed = np.abs(result.velocity[:, 0, 0]).max()
+    assert back * h * 2.0 * speed / 2.0 <= 0.5 < result.failure_value[0]
+    plain = lw.solve(one(scene), "psi_s", h=h, t1=10.0)
+    assert plain.status.counts() == {"ok": 1}
+
+
+def test_a_neighbour_that_warns_or_fails_changes_no_bit():
+    scene = scene_of(**MUNK, net=0.3)
+    b, R, nu, Om = random_states(4, 8, 0.3, 0.3)
+    quiet = lw.solve(one(scene, b, R, nu, Om), "psi_s", h=0.1, t1=30.0, checks="all")
+    nu[3] *= 300.0
+    Om[5] *= 300.0
+    loud = lw.solve(one(scene, b, R, nu, Om), "psi_s", h=0.1, t1=30.0, checks="all")
+    assert loud.status[5] != 0 and loud.warnings[3] != 0
+    well = [0, 1, 2, 4, 6, 7]
+    for name in ("position", "attitude", "velocity", "angular_velocity"):
+        assert getattr(quiet, name)[:, well].tobytes() == getattr(loud, name)[:, well].tobytes()
+    for name in ("warnings", "warning_time", "warning_value", "status"):
+        np.testing.assert_array_equal(getattr(quiet, name)[well], getattr(loud, name)[well])
+
+
+def test_warnings_do_not_depend_on_what_is_kept():
+    scene = scene_of(**MUNK, net=2.0)
+    runs = [
+        lw.solve(one(scene), "psi_s", h=0.02, t1=20.0, save=lw.SaveAt(every=every), checks="all")
+        for every in (0.1, 20.0)
+    ]
+    assert runs[0].warning_time[0] == runs[1].warning_time[0] and runs[0].warnings[0] == runs[1].warnings[0] != 0
+
+
+def test_checks_none_warns_of_nothing():
+    scene = scene_of(**MUNK)
+    result = lw.solve(one(scene, nu=[0.0, 0.0, 1e3]), h=0.1, t1=0.1, checks="none")
+    assert result.warnings.counts() == {} and np.isnan(result.warning_time).all()
+
+
+def test_every_warning_says_what_to_do():
+    for one_of in Warnings:
+        assert len(one_of.text) > 40 and one_of.value_name
+    both = Warnings.ENERGY | Warnings.INERTIA
+    assert both.text.count(";") >= 2 and both.value_name == Warnings.ENERGY.value_name
+
+
+def test_bits_and_codes_are_those_of_the_kernel():
+    from lgvi_kernels import monitor
+
+    names = {"precision": "PRECISION_LOSS", "drag": "DRAG_STIFF"}
+    for row, bit in monitor.BITS.items():
+        assert Warnings[names.get(row, row.upper())] == 1 << bit
+    assert (monitor.ENERGY_GREW, monitor.BACKWARD_DRAG) == (Status.ENERGY_GREW, Status.BACKWARD_DRAG)
+
+
+def test_every_method_has_its_limits():
+    from lgvi_warp.method import COMPOSITIONS, EXPLICIT, GAUSS, HALVES, PROGRAMS, TWO_PART
+
+    composed = [f"{name}({base})" for name in COMPOSITIONS | HALVES for base in ("psi_s", "psi_x", "psi_1", "psi")]
+    for name in (*PROGRAMS, *EXPLICIT, *TWO_PART, *GAUSS, *composed):
+        try:
+            method = Method(name)
+        except lw.SceneError:
+            continue
+        for table in (limits.MUNK, limits.RESTORING):
+            assert limits.oscillation_limit(method, table) > limits.COARSE / limits.longest_stage(method)
+
+
+def test_a_result_keeps_its_warnings(tmp_path):
+    scene = scene_of(**MUNK)
+    result = lw.solve(one(scene, nu=[[0.0, 0.0, 1e3], [0.0, 0.0, 0.0]]), h=0.1, t1=0.1)
+    again = lw.Result.load(result.save(tmp_path / "result.npz"))
+    assert again.warnings.counts() == result.warnings.counts() != {}
+    for name in ("warnings", "warning_time", "warning_value", "substeps", "status", "failure_time"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(result, name))

@@ -34,9 +34,9 @@ NOT_THERE = (
 BARE = lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 20.0 * 9.8)
 
 
-def source(scene, folder, method="psi_s", dtype="float64"):
+def source(scene, folder, method="psi_s", dtype="float64", **settings):
     """The C++ that Warp generates for a scene."""
-    plan = make_plan(one(scene, **STATE), method, h=0.01, t1=0.1, dtype=dtype)
+    plan = make_plan(one(scene, **STATE), method, h=0.01, t1=0.1, dtype=dtype, **settings)
     wp.compile_aot_module(plan.advance.kernel.module, device="cpu", module_dir=str(folder))
     (path,) = folder.glob("*.cpp")
     return path.read_text()
@@ -62,6 +62,35 @@ def test_compensation_is_there_only_if_asked_for(method, tmp_path):
         text = source(scene, tmp_path / dtype, method, dtype)
         for mark in ("_low", "carried", "settled", "CompensatedState"):
             assert (mark in text) == there, (mark, dtype)
+
+
+# Functions of the kernel that a level of checks, or a fallback, brings with it.
+LEVELS = {
+    "solve_within": ("none", "safe", "all"), "raise_alarm": ("safe", "all"), "failures": ("safe", "all"),
+    "energy_alarm": ("safe", "all"), "growth": ("safe", "all"), "look_at": ("all",), "warn": ("all",), "noted": ("all",),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("checks", ["none", "safe", "all"])
+def test_a_level_of_checks_brings_its_code_and_no_other(checks, tmp_path):
+    text = source(lw.Scene(BARE, lw.Environment(gravity=9.8)), tmp_path, checks=checks)
+    for function, levels in LEVELS.items():
+        there = bool(re.search(rf"^static (?!.*adj_).*{function}_\d+\(", text, re.MULTILINE))
+        assert there == (checks in levels), function
+    for absent in ("retried", "divided", "drag_back", "backward"):
+        assert not re.search(rf"^static (?!.*adj_).*{absent}\w*\(", text, re.MULTILINE), absent
+    assert ("NoMonitor" in text) == (checks == "none") and ("warned_step" in text) == (checks == "all")
+
+
+def test_steps_are_divided_only_if_asked_for(tmp_path):
+    text = source(lw.Scene(BARE, lw.Environment(gravity=9.8)), tmp_path, on_failure="substep")
+    assert re.search(r"^static (?!.*adj_).*retried_\d+\(", text, re.MULTILINE) and "substeps" in text
+
+
+def test_energy_is_not_looked_at_where_forces_create_it(tmp_path):
+    wrench = list(CASES["wrench"].terms)
+    text = source(lw.Scene(BARE, lw.Environment(gravity=9.8), terms=wrench), tmp_path)
+    assert "energy_alarm" not in text and "NoMonitor" in text
 
 
 @pytest.mark.parametrize("name", MARKS)

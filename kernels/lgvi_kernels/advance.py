@@ -379,7 +379,7 @@ def make_advance(spec):
             note_energy(y, c, monitor, frozen)
 
     @wp.func
-    def divided(x: State, c: Constants, k: int, h: wp.float64, parts: int, stage_h: wp.array(dtype=real),
+    def in_parts(x: State, c: Constants, k: int, h: wp.float64, parts: int, stage_h: wp.array(dtype=real),
                 lead_h: wp.array(dtype=real), opening: real):  # fmt: skip
         """One step as so many equal ones, from and to a state that the lead has opened for h."""
         r = real(1.0) / real(parts)
@@ -417,7 +417,7 @@ def make_advance(spec):
             parts = 2 * parts
             y = choose(pending, good, at_rest(good))
             y.alarm = Alarm()
-            y = divided(y, c, k, h, parts, stage_h, lead_h, opening)
+            y = in_parts(y, c, k, h, parts, stage_h, lead_h, opening)
             if wp.static(watched):
                 y = watch(y, c, real(h))
             wrong = failures(y, one - pending)

@@ -77,7 +77,7 @@ def test_a_level_of_checks_brings_its_code_and_no_other(checks, tmp_path):
     for function, levels in LEVELS.items():
         there = bool(re.search(rf"^static (?!.*adj_).*{function}_\d+\(", text, re.MULTILINE))
         assert there == (checks in levels), function
-    for absent in ("retried", "divided", "drag_back", "backward"):
+    for absent in ("retried", "in_parts", "drag_back", "backward"):
         assert not re.search(rf"^static (?!.*adj_).*{absent}\w*\(", text, re.MULTILINE), absent
     assert ("NoMonitor" in text) == (checks == "none") and ("warned_step" in text) == (checks == "all")
 

@@ -91,18 +91,18 @@ def test_explicit_methods_have_their_limits_on_the_imaginary_axis():
 
 
 @pytest.mark.parametrize(("method", "law"), [
-    ("rk4", lambda l, q: terms.Drag(linear=[l] * 6, quadratic=[q] * 6)),
-    ("rk4", lambda l, q: terms.DragMatrix(linear=l * np.eye(6), quadratic=q * np.eye(6))),
-    ("psi", lambda l, q: terms.Drag(linear=[l] * 6, quadratic=[q] * 6)),
+    ("rk4", lambda linear, q: terms.Drag(linear=[linear] * 6, quadratic=[q] * 6)),
+    ("rk4", lambda linear, q: terms.DragMatrix(linear=linear * np.eye(6), quadratic=q * np.eye(6))),
+    ("psi", lambda linear, q: terms.Drag(linear=[linear] * 6, quadratic=[q] * 6)),
 ])  # fmt: skip
 def test_stiff_drag_of_explicit_methods(method, law):
     # h (l + 2 q|v|) / I of surge, M = 2, v = 1.5.
     h, v, M = 0.1, 1.5, 2.0
     for part, crossed in ((BELOW, False), (ABOVE, True)):
         q = 1.0
-        l = part * M / h - 2.0 * q * v
+        linear = part * M / h - 2.0 * q * v
         scene = scene_of((M, M, M), (30.0, 30.0, 30.0))
-        scene = lw.Scene(scene.vehicle, scene.environment, terms=[law(l, q)])
+        scene = lw.Scene(scene.vehicle, scene.environment, terms=[law(linear, q)])
         result = lw.solve(one(scene, nu=[v, 0.0, 0.0]), method, h=h, t1=h, checks="all")
         assert warned(result, Warnings.DRAG_STIFF) == [crossed]
     assert (result.warning_time[0], result.warning_value[0]) == (0.0, pytest.approx(ABOVE))

@@ -148,3 +148,37 @@ def test_bench(capsys):
     records = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [r["dtype"] for r in records] == ["float64", "float32"]
     assert all(r["ns_per_vehicle_step"] > 0 and r["part_of_peak"] > 0 for r in records)
+
+
+def test_warnings_are_counted_and_explained(tmp_path, capsys):
+    # At h = 0.5 the paper's vehicle turns by 0.19 rad a step: its Munk moment is coarse, nothing fails.
+    options = ["--checks", "all", "--step", "0.5", "--set", "start.velocity_inertial=[0.1,0.2,3.0]"]
+    assert cli.main(["run", PAPER, "--out", str(tmp_path), *SMALL, *options]) == 0
+    said = capsys.readouterr().out
+    result = lw.Result.load(tmp_path / "result.npz")
+    assert result.provenance["checks"] == "all" and result.warnings.counts()["munk_coarse"] == 20
+    assert "warnings    munk_coarse 20" in said and "shorten the step" in said
+    assert f"h w = {result.warning_value[0]:.4g}" in said
+
+
+def test_raise_exits_with_1_and_writes_the_files(tmp_path, capsys):
+    options = ["--on-failure", "raise", "--set", "start.angular_velocity=[0,0,500]"]
+    assert cli.main(["run", PAPER, "--out", str(tmp_path), *SMALL, *options]) == 1
+    said = capsys.readouterr()
+    assert "step_too_large, 20 of 20 members (first: member 0 at 0 s" in said.err and "result.npz" in said.out
+    assert lw.Result.load(tmp_path / "result.npz").status.counts() == {"step_too_large": 20}
+
+
+def test_substep_is_told_of(tmp_path, capsys):
+    options = ["--on-failure", "substep", "--set", "start.angular_velocity=[0,0,250]"]
+    assert cli.main(["run", PAPER, "--out", str(tmp_path), *SMALL, *options]) == 0
+    assert "substeps    4,000 steps of 20 members" in capsys.readouterr().out
+
+
+def test_a_step_is_chosen_by_options(tmp_path, capsys):
+    options = ["--method", "rk8", "--rtol", "1e-9", "--atol", "1e-9", "--step", "0.5"]
+    assert cli.main(["run", PAPER, "--out", str(tmp_path), *SMALL, *options]) == 0
+    method = lw.Result.load(tmp_path / "result.npz").provenance["method"]
+    assert (method["name"], method["rtol"], method["atol"]) == ("rk8", 1e-9, 1e-9)
+    assert cli.main(["run", PAPER, "--out", str(tmp_path), *SMALL, "--rtol", "1e-9"]) == 2
+    assert "run.rtol" in capsys.readouterr().err

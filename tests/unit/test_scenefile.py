@@ -198,3 +198,36 @@ def test_all_faults_of_all_sections_come_in_one_message():
     assert len(found) == len(keys), found
     for key in keys:
         assert sum(fault.startswith(key) for fault in found) == 1, key
+
+
+SOLVING = """
+[vehicle]
+mass = 1.0
+inertia = [1.0, 1.0, 1.0]
+[run]
+"""
+
+
+def test_solver_settings_of_a_run():
+    text = SOLVING + 'method = "rk8"\nrtol = 1e-9\natol = 1e-10\nchecks = "all"\non_failure = "raise"'
+    run = scenefile.loads(text).run
+    assert run.method_of() == lw.Method("rk8", rtol=1e-9, atol=1e-10)
+    assert (run.checks, run.on_failure) == ("all", "raise")
+    assert run.to_dict() == {"method": "rk8", "dtype": "float64", "rtol": 1e-9, "atol": 1e-10, "checks": "all",
+                             "on_failure": "raise"}  # fmt: skip
+    text = SOLVING + 'solver = "cayley"\niterations = 2\ntolerance = 1e-9'
+    assert scenefile.loads(text).run.method_of() == lw.Method("psi_s", "cayley", 2, 1e-9)
+    assert scenefile.loads(SOLVING + 'iterations = "auto"').run.method_of().iterations == "auto"
+    # Another method, named later, does not inherit what was said of this one.
+    assert run.method_of("psi_s") == lw.Method("psi_s")
+
+
+@pytest.mark.parametrize(("text", "fault"), [
+    ("rtol = 1e-9\natol = 1e-9", "run.rtol, atol = 'psi_s': estimates no error"), ("atol = 1e-9", "run.atol.*counterpart"),
+    ('solver = "cayly"', "run.solver = 'cayly'.*cayley"), ("iterations = -1", "run.iterations = -1"),
+    ("tolerance = 2.0", "run.tolerance = 2.0"), ('checks = "some"', "run.checks = 'some'.*safe"),
+    ('on_failure = "panic"', "run.on_failure = 'panic'.*substep"), ("rtl = 1e-9", "run.rtl.*rtol"),
+])  # fmt: skip
+def test_solver_settings_are_refused(text, fault):
+    with pytest.raises(lw.SceneError, match=fault):
+        scenefile.loads(SOLVING + text)

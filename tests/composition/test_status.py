@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp.method import PROGRAMS
+from lgvi_warp.reference import advance as twin
 from lgvi_warp.reference import rotation
 from lgvi_warp.status import Status
-from tests.tools import METHODS, one, random_states, scene_of
+from tests.tools import METHODS, body_of, one, random_states, scene_of, to_state
 
 SOLVES_HALF = ("psi", "psi_s")
 
@@ -38,6 +40,23 @@ def test_the_twin_agrees_on_what_is_solvable(scene):
         assert rotation.residual(solver(J @ [0.9, 0.0, 0.0], J), J @ [0.9, 0.0, 0.0], J) < 1e-12
         with pytest.raises(rotation.NoSolution):
             solver(J @ [0.0, 1.05, 0.0], J)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_twin_stops_where_the_kernel_does(scene, method):
+    # On principal axes, where |J^-1 a| < 1 is sharp, the twin's step raises for the members that the kernel freezes.
+    h = 0.1
+    Om = np.outer([0.7, 0.97, 1.03, 1.9, 2.06], [0.0, 0.0, 1.0 / h])
+    status = lw.solve(one(scene, Om=Om), method, h=h, t1=h).status
+    body = body_of(scene)
+    for spin, code in zip(Om, status, strict=True):
+        x = to_state(body, np.zeros(3), np.eye(3), np.zeros(3), spin)
+        if code == Status.OK:
+            twin.step(x, body, PROGRAMS[method], h)
+        else:
+            with pytest.raises(rotation.NoSolution):
+                twin.step(x, body, PROGRAMS[method], h)
+    assert 0 < np.count_nonzero(status) < len(status)
 
 
 def test_failure_on_the_way(scene):

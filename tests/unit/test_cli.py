@@ -151,14 +151,14 @@ def test_bench(capsys):
 
 
 def test_warnings_are_counted_and_explained(tmp_path, capsys):
-    # At h = 0.5 the paper's vehicle turns by 0.19 rad a step: its Munk moment is coarse, nothing fails.
+    # At h = 0.5 and 3 m/s both oscillations of the paper's vehicle are coarse; nothing fails.
     options = ["--checks", "all", "--step", "0.5", "--set", "start.velocity_inertial=[0.1,0.2,3.0]"]
     assert cli.main(["run", PAPER, "--out", str(tmp_path), *SMALL, *options]) == 0
     said = capsys.readouterr().out
     result = lw.Result.load(tmp_path / "result.npz")
     assert result.provenance["checks"] == "all" and result.warnings.counts()["munk_coarse"] == 20
-    assert "warnings    munk_coarse 20" in said and "shorten the step" in said
-    assert f"h w = {result.warning_value[0]:.4g}" in said
+    assert "warnings    munk_coarse 20, restoring_coarse 20" in said and "shorten the step" in said
+    assert f"(first: member 0 at 0 s, h sqrt(B|r|/J) = {result.warning_value[0]:.4g})" in said
 
 
 def test_raise_exits_with_1_and_writes_the_files(tmp_path, capsys):

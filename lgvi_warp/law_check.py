@@ -119,7 +119,8 @@ def check_law(
     step [m, rad, s]: of the finite differences. Compiles one small kernel for each new law. What is checked, each where
     the law has it:
 
-    law: finite; blind to velocities, and to the time unless `timed`; with POTENTIAL, the derivatives of potential().
+    law: finite; blind to velocities, and to the time unless `timed`; with POTENTIAL, the derivatives of potential(),
+    which energy() adds.
     damping: nu.D nu >= 0; where the term says `dissipative = False`, its least value is told and is no fault.
     flow: rate and gradient are the derivatives of velocity, and water() gives the same velocity; FLOW is what it does.
     All: lanes do not mix; numbers that vary by member give what shared ones do; packed() fills what params() names, and
@@ -204,7 +205,8 @@ class Bank(Packets):
     def evaluate(self, views: Views) -> dict[str, np.ndarray]:
         """What the law gives at views as many as the bench has, by role: (k, numbers)."""
         out = self._launch(views, -1)
-        return {role: out[:, COLUMNS[role][0] : sum(COLUMNS[role])] for role in self.bench.roles}
+        roles = (*self.bench.roles, *["energy"] * hasattr(self.bench.module, "energy"))
+        return {role: out[:, COLUMNS[role][0] : sum(COLUMNS[role])] for role in roles}
 
     def _launch(self, views: Views, second: int) -> np.ndarray:
         width, Lane = self.bench.width, self.bench.examine.Lane
@@ -428,6 +430,11 @@ def _potential(bench: Bench, step: float) -> Iterator[Check]:
     yield _judged("law: force = -R^T dU/db", wrench[:, :3] - force, allowed, views, remedy)
     limits = np.stack([one.allowed for one in turns], axis=1)
     yield _judged("law: torque = -dU/dR", wrench[:, 3:] - torque, limits, views, remedy)
+    if hasattr(bench.module, "energy"):
+        known, told = U(views), bench.at(views)["energy"][:, 0]
+        round_off = 100.0 * ROUNDINGS * EPS * max(np.abs(known).max(), np.abs(told).max())
+        difference = (told - told[0]) - (known - known[0])
+        yield _judged("energy: as potential()", difference, round_off, views, "is it u + U, with u as given?")
 
 
 def _damping(bench: Bench, step: float) -> Iterator[Check]:

@@ -14,8 +14,8 @@ from lgvi_kernels.state import damping_struct, flow_struct, view_struct, wrench_
 VIEW_FIELDS = 18
 
 # What comes out -> (first column, numbers); a role that the law does not have leaves zeros.
-COLUMNS = {"law": (0, 6), "damping": (6, 36), "flow": (42, 15), "distance": (57, 1)}
-OUT_FIELDS = 58
+COLUMNS = {"law": (0, 6), "damping": (6, 36), "flow": (42, 15), "distance": (57, 1), "energy": (58, 1)}
+OUT_FIELDS = 59
 
 
 class Examine(NamedTuple):
@@ -32,7 +32,7 @@ def make_examine(module, width, real):
     Lane, View, Params = lane(width, real), view_struct(width, real), params_of((module,), width, real)
     Wrench, Damping, Flow = (make(width, real) for make in (wrench_struct, damping_struct, flow_struct))
     law, damping, flow, evolve = (superpose((module,), role) for role in ("law", "damping", "flow", "evolve"))
-    distance = plays(module, "distance")
+    distance, energy = plays(module, "distance"), superpose((module,), "energy")
 
     @wp.func
     def put_rows(out: wp.array2d(dtype=Lane), i: int, first: int, m: Any):
@@ -97,5 +97,7 @@ def make_examine(module, width, real):
                 put(out, i, 54, f.by_depth)
             if wp.static(distance is not None):
                 out[i, 57] = distance(view, p.own)
+            if wp.static(energy is not None):
+                out[i, 58] = energy(view.b.x - view.b.x, view, p)
 
     return Examine(examine, Lane, Params)

@@ -12,7 +12,7 @@ import warp as wp
 import lgvi_warp as lw
 from lgvi_kernels.lanes import add, cross, div, lane, mul, ones, sub, vec3  # noqa: F401
 from lgvi_kernels.state import struct
-from lgvi_kernels.terms import restoring
+from lgvi_kernels.terms import restoring, tether
 from lgvi_kernels.view import to_body
 from tests.laws import CASES
 
@@ -296,3 +296,23 @@ def test_a_second_check_builds_no_kernel():
     before = make_examine.cache_info().misses
     lw.check_law(lw.Tether(anchor=(0.0, 0.0, 1.0), stiffness=1.0), seed=3, samples=16)
     assert make_examine.cache_info().misses == before
+
+
+@wp.func
+def energy_of_nothing(u: Any, view: Any, p: Any):
+    return u + p.stiffness
+
+
+class Spring:
+    """A tether whose energy is not its potential."""
+
+    params = staticmethod(tether.params)
+    law, energy, POTENTIAL = tether.law, energy_of_nothing, True
+
+
+def test_an_energy_that_is_not_the_potential_is_found():
+    class Wrong(lw.Tether):
+        device: ClassVar[Any] = Spring
+
+    report = lw.check_law(Wrong(**CASES["tether"].terms[0].parameters()))
+    assert names_of_failed(report) == ["energy: as potential()"]

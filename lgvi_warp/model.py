@@ -190,7 +190,8 @@ def _conservative(ensemble: Ensemble, p: Parameters, acting: list[tuple[Term, An
             passive = not tethered and not np.any(ensemble.own(term, p)["velocity"][:, 2])
         else:
             dissipates = term.dissipative or not hasattr(module, "damping")
-            told = getattr(module, "POTENTIAL", False) and hasattr(module, "energy")
+            bounded = hasattr(module, "supply") or hasattr(module, "push")
+            told = getattr(module, "POTENTIAL", False) and hasattr(module, "energy") and bounded
             passive = not hasattr(module, "flow") and dissipates and (told or not hasattr(module, "law"))
         if not passive:
             return False

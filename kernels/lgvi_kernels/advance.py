@@ -173,7 +173,7 @@ def make_advance(spec):
     Monitor = monitors.monitor_struct(width, real, looks, energetic, backward, substepped)
     apart = spec.explicit is None
     warned, looking = bool(looks), bool(looks) or energetic
-    look_at, energies, growth, drag_back = _watchers(spec, method)
+    look_at, energies, supplies, growth, drag_back = _watchers(spec, method)
 
     @wp.func
     def read(state: wp.array2d(dtype=Lane), i: int):
@@ -312,16 +312,15 @@ def make_advance(spec):
         return y
 
     @wp.func
-    def created(y: State, c: Constants, monitor: Monitor):
+    def created(y: State, c: Constants, monitor: Monitor, t: real):
         """Energy that came from nowhere since the start, over what there was to exchange."""
-        T, U = energies(y, c)
         e = monitor.energy
-        return growth(T, U, e[c.packet, 0], e[c.packet, 1], e[c.packet, 2])
+        return growth(y, c, t, e[c.packet, 0], e[c.packet, 1], e[c.packet, 2])
 
     @wp.func(inline=False)
     def energy_alarm(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real, among: Lane):
         """The alarm after k steps, with that of the lanes, among these, whose energy explodes."""
-        g = created(closed(x, c, k, h, opening), c, monitor)
+        g = created(closed(x, c, k, h, opening), c, monitor, real(wp.float64(k) * h))
         one = ones(g)
         over = positive(among, g - real(wp.static(monitors.MOST_ENERGY)) * one, one - one)
         alarm = x.alarm
@@ -331,19 +330,11 @@ def make_advance(spec):
         return alarm
 
     @wp.func
-    def note_energy(y: State, c: Constants, monitor: Monitor, frozen: Lane):
-        """Keep the largest fall of the potential."""
-        T, U = energies(y, c)
-        fall = monitor.energy[c.packet, 2]
-        d = monitor.energy[c.packet, 1] - U
-        monitor.energy[c.packet, 2] = positive(frozen, fall, positive(d - fall, d, fall))
-
-    @wp.func
-    def warn(y: State, c: Constants, monitor: Monitor, k: int, frozen: Lane):
+    def warn(y: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, frozen: Lane):
         """Note which rows are crossed after k steps; of the most serious one, when it was first so, and its value."""
         g = frozen
         if wp.static(energetic):
-            g = created(y, c, monitor)
+            g = created(y, c, monitor, real(wp.float64(k) * h))
         seen = look_at(y, c, monitor.limits[c.packet % monitor.limits.shape[0]], g)
         bits = positive(frozen, frozen - frozen, seen.bits)
         if any_positive(bits):
@@ -356,7 +347,7 @@ def make_advance(spec):
                 monitor.warned[c.packet][j] = old | new
 
     @wp.func(inline=False)
-    def begin(x: State, c: Constants, monitor: Monitor, frozen: Lane):
+    def begin(x: State, c: Constants, monitor: Monitor, h: wp.float64, frozen: Lane):
         """Look at the start, whose energy later ones are compared with."""
         y = x
         if wp.static(momentum is not None):
@@ -365,18 +356,14 @@ def make_advance(spec):
             T, U = energies(y, c)
             monitor.energy[c.packet, 0] = T
             monitor.energy[c.packet, 1] = U
-            monitor.energy[c.packet, 2] = T - T
+            monitor.energy[c.packet, 2] = supplies(y, c, T)
         if wp.static(warned):
-            warn(y, c, monitor, 0, frozen)
+            warn(y, c, monitor, 0, h, frozen)
 
     @wp.func(inline=False)
     def note(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real, frozen: Lane):
         """Look at the state after k steps, without the lead of the next."""
-        y = closed(x, c, k, h, opening)
-        if wp.static(warned):
-            warn(y, c, monitor, k, frozen)
-        if wp.static(energetic):
-            note_energy(y, c, monitor, frozen)
+        warn(closed(x, c, k, h, opening), c, monitor, k, h, frozen)
 
     @wp.func
     def in_parts(x: State, c: Constants, k: int, h: wp.float64, parts: int, stage_h: wp.array(dtype=real),
@@ -494,7 +481,7 @@ def make_advance(spec):
             x = choose(frozen, at_rest(x), x)
         if k0 == 0:
             if wp.static(looking):
-                begin(x, c, monitor, frozen)
+                begin(x, c, monitor, h, frozen)
             x = opened(x, c, opening)
         k = k0
         s = s0
@@ -563,7 +550,7 @@ def make_advance(spec):
                 k += n
                 if singles > 0:
                     singles -= 1
-                if wp.static(looking):
+                if wp.static(warned):
                     if k % wp.static(CHUNK) == 0 or k == last:
                         note(x, c, monitor, k, h, opening, frozen)
                 if wp.static(renormalised):
@@ -584,12 +571,12 @@ def make_advance(spec):
 
 
 def _watchers(spec, method):
-    """(look_at, energies, growth, drag_back) of monitor.py for this Spec; the step in place of what it does not ask for."""
+    """(look_at, energies, supplies, growth, drag_back) of monitor.py; the step in place of what a Spec does not ask for."""
     width, real, laws = spec.width, spec.real, spec.laws
     View, Damping = view_struct(width, real), damping_struct(width, real)
     directions = bool(laws) and laws[0] is drag_directions
     velocities, of_forces = method.velocities, method.velocities_of_forces
-    look_at, energies, growth, drag_back = (method.step,) * 4
+    look_at, energies, supplies, growth, drag_back = (method.step,) * 5
     if spec.looks:
         rates = []
         damping = superpose(laws, "damping")
@@ -600,7 +587,7 @@ def _watchers(spec, method):
         rate = monitors.make_sum(*rates) if len(rates) == 2 else (*rates, None)[0]
         look_at = monitors.make_look(spec.looks, width, real, velocities, rate)
     if spec.energy:
-        energies, growth = monitors.make_energy(laws, real, View, velocities, "origin" in spec.parts)
+        energies, supplies, growth = monitors.make_energy(laws, real, View, velocities, "origin" in spec.parts)
     if spec.backward:
         drag_back = monitors.make_backward(monitors.make_drag_rate(directions, spec.drag, of_forces, 1.0))
-    return look_at, energies, growth, drag_back
+    return look_at, energies, supplies, growth, drag_back

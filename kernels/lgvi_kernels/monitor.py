@@ -35,7 +35,7 @@ MOST_ENERGY = 100.0
 # Drag number of the stages that go backward beyond which the member has failed: at 1 drag alone has no past.
 MOST_BACKWARD_DRAG = 0.5
 
-# T and U at the start, and the largest fall of U that was seen.
+# T and U at the start, and what both could give from there.
 ENERGY_FIELDS = 3
 EPSILON = {wp.float64: 2.0**-52, wp.float32: 2.0**-23}
 # Round-off of energies that cancel, in units of EPSILON: what a float32 attitude loses between two renormalisations.
@@ -171,11 +171,11 @@ def make_backward(drag_rate):
 
 
 def make_energy(laws, real, View, velocities, shifted):
-    """(energies, growth): T and U of a state, both divided by max J, and what was created over what could be exchanged.
+    """(energies, supplies, growth) of states, divided by max J: T and U; what they can give; what was created over that.
 
     shifted: the forces have another origin than the state.
     """
-    potential = superpose(laws, "energy")
+    potential, supply, push = (superpose(laws, role) for role in ("energy", "supply", "push"))
 
     @wp.func
     def energies(x: Any, c: Any):
@@ -191,12 +191,27 @@ def make_energy(laws, real, View, velocities, shifted):
         return T, U
 
     @wp.func
-    def growth(T: Any, U: Any, T0: Any, U0: Any, fall: Any):
-        """(E - E0) / (T0 + the largest fall of U), with the round-off of U under the fraction."""
-        floor = real(wp.static(ROUND_OFF * EPSILON[real])) * (absolute(U) + absolute(U0))
-        return ((T - T0) + (U - U0)) / (T0 + greatest(fall, U0 - U) + floor)
+    def supplies(x: Any, c: Any, T: Any):
+        """The kinetic energy, and what potentials with a least value can give from here."""
+        s = T - T
+        if wp.static(supply is not None):
+            s = c.inertia.inverse_scale * supply(s, look(View(), x, c, real(0.0)), c.params)
+        return T + s
 
-    return energies, growth
+    @wp.func
+    def growth(x: Any, c: Any, t: Any, T0: Any, U0: Any, S0: Any):
+        """(E - E0) / (what there was to exchange), with the round-off of U under the fraction.
+
+        A steady force F gives in the time t no more than (F t)^2 / (2 M), whatever else acts; 3 `mean` is above all 1 / M.
+        """
+        T, U = energies(x, c)
+        S = S0 + real(wp.static(ROUND_OFF * EPSILON[real])) * (absolute(U) + absolute(U0))
+        if wp.static(push is not None):
+            impulse = t * (c.inertia.inverse_scale * push(T - T, look(View(), x, c, real(0.0)), c.params))
+            S = S + real(1.5) * (c.inertia.mean * impulse * impulse)
+        return ((T - T0) + (U - U0)) / S
+
+    return energies, supplies, growth
 
 
 @wp.func

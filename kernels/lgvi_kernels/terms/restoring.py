@@ -5,6 +5,7 @@ from typing import Any
 
 import warp as wp
 
+from lgvi_kernels.lane_math import root
 from lgvi_kernels.lanes import add, cross, dot, lane3, sub  # noqa: F401
 
 POTENTIAL = True
@@ -40,3 +41,9 @@ def energy(u: Any, view: Any, p: Any):
 def steady_force(w: Any, view: Any, p: Any):
     """A moment only."""
     return w
+
+
+@wp.func
+def supply(s: Any, view: Any, p: Any):
+    """U and B |r|: down to where the vehicle hangs."""
+    return energy(s, view, p) + root(dot(p.moment, p.moment))

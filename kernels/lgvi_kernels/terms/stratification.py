@@ -33,3 +33,9 @@ def energy(u: Any, view: Any, p: Any):
     """U = B gradient (d - d0)^2 / 2."""
     deep = view.b.z + dot(view.down, p.center) - p.reference_depth
     return u + view.t.dtype(0.5) * (p.stiffness * deep * deep)
+
+
+@wp.func
+def supply(s: Any, view: Any, p: Any):
+    """All of U: down to the reference depth."""
+    return energy(s, view, p)

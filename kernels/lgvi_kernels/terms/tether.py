@@ -46,3 +46,9 @@ def energy(u: Any, view: Any, p: Any):
     d = p.anchor - view.b - to_inertial(view, p.attachment)
     stretch = greatest(root(dot(d, d)) - p.rest_length, ones(d.x) - ones(d.x))
     return u + view.t.dtype(0.5) * (p.stiffness * stretch * stretch)
+
+
+@wp.func
+def supply(s: Any, view: Any, p: Any):
+    """All of U: down to where it is slack."""
+    return energy(s, view, p)

@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes import add, lane, mul, sub  # noqa: F401
+from lgvi_kernels.lanes import absolute, add, lane, mul, sub  # noqa: F401
 
 POTENTIAL = True
 SEPARABLE = True
@@ -41,3 +41,9 @@ def steady_force(w: Any, view: Any, p: Any):
     """The same in inertial axes: net e3."""
     w.force.z = w.force.z + p.net
     return w
+
+
+@wp.func
+def push(s: Any, view: Any, p: Any):
+    """A steady force: it gives energy for ever."""
+    return s + absolute(p.net)

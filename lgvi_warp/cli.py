@@ -31,6 +31,7 @@ EPILOG = """examples:
   lgvi-warp run examples/paper.toml --members 20000 --dtype float32 --set vehicle.mass=120
   lgvi-warp run examples/paper.toml --error 1e-3
   lgvi-warp tradeoff examples/paper.toml --out runs/tradeoff
+  lgvi-warp sensitivity examples/paper.toml --of "position[2]" --out runs/sensitivity
   lgvi-warp info
 """
 
@@ -71,12 +72,40 @@ def parser() -> argparse.ArgumentParser:
         default=45.0,
         help="about how long to measure (default 45)",
     )
+    _add_sensitivity(verbs)
     info = verbs.add_parser("info", help="machine, versions, SIMD width, threads and the core's peak")
     info.set_defaults(scene=None)
     bench = verbs.add_parser("bench", help="speed of the kernel on this machine, beside the core's peak")
     bench.add_argument("--members", type=int, default=4096, help="vehicles (default 4096)")
     bench.add_argument("--steps", type=int, default=1000, help="steps (default 1000)")
     return top
+
+
+def _add_sensitivity(verbs: Any) -> None:
+    """lgvi-warp sensitivity and its arguments."""
+    verb = verbs.add_parser(
+        "sensitivity",
+        help="what of that which varies matters: Sobol indices or Morris screening; .txt, .csv, .json, .png",
+    )
+    verb.add_argument("scene", metavar="SCENE", help="scene file (TOML) with [ensemble.vary]")
+    verb.add_argument("--of", metavar="Q", action="append", help='quantity of interest: "position[2]" (the default), '
+                      '"norm(velocity)", "max(energy)" ...; may be given several times')  # fmt: skip
+    verb.add_argument("--out", metavar="DIR", type=Path, help="folder for the files (default: runs/NAME_sensitivity)")
+    verb.add_argument("--analysis", choices=("sobol", "morris"), default="sobol", help="default sobol")
+    verb.add_argument("--samples", metavar="N", type=int, help="groups of the design (default: sobol 256, morris 64)")
+    verb.add_argument(
+        "--first-order", action="store_true", help="sobol without pairs of factors: about half the members"
+    )
+    verb.add_argument("--failed", choices=("refuse", "drop"), default="refuse",
+                      help="what to do about groups with a failed member (default refuse)")  # fmt: skip
+    verb.add_argument("--method", help="integration method, as of run")
+    verb.add_argument("--step", metavar="S", help="time step [s]")
+    verb.add_argument("--dtype", help="float64, float32, or float32_compensated")
+    verb.add_argument("--duration", metavar="S", help="end of the run [s]")
+    verb.add_argument("--seed", metavar="N", help="seed of the design")
+    verb.add_argument("--threads", metavar="N", type=int, help="threads (default: all cores)")
+    verb.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="replace a key of the scene file")
+    verb.add_argument("--quiet", action="store_true", help="no progress and no table")
 
 
 def _add_scene(verb: argparse.ArgumentParser, folder: str) -> None:
@@ -96,7 +125,8 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the command. Returns the exit code: 0, 1 for a run that failed, 2 for a scene or argument that is refused."""
     chosen = parser().parse_args(arguments)
     try:
-        return {"run": run, "tradeoff": tradeoff, "info": info, "bench": bench}[chosen.verb](chosen)
+        verbs = {"run": run, "tradeoff": tradeoff, "sensitivity": sensitivity, "info": info, "bench": bench}
+        return verbs[chosen.verb](chosen)
     except SceneError as error:
         print(f"lgvi-warp: {error}", file=sys.stderr)
         return 2
@@ -214,6 +244,42 @@ def tradeoff(chosen: argparse.Namespace) -> int:
     if not chosen.quiet:
         print(report_text(found))
         print("\n".join(["", *(f"file        {path}" for path in files)]))
+    for fault in faults:
+        print(f"lgvi-warp: {fault}", file=sys.stderr)
+    return 1 if faults else 0
+
+
+def sensitivity(chosen: argparse.Namespace) -> int:
+    """lgvi-warp sensitivity."""
+    from lgvi_warp import uq
+    from lgvi_warp.scene import Scene
+    from lgvi_warp.sinks.sensitivity import plot_sensitivity
+
+    scene = Scene.load(chosen.scene, overrides(chosen))
+    out: Path = chosen.out or Path("runs") / f"{Path(chosen.scene).stem}_sensitivity"
+    out.mkdir(parents=True, exist_ok=True)
+    progress = None if chosen.quiet else Progress(sys.stderr)
+    settings: dict[str, Any] = {"failed": chosen.failed, "threads": chosen.threads, "progress": progress}
+    of = chosen.of or ["position[2]"]
+    try:
+        if chosen.analysis == "morris":
+            found: uq.Indices = uq.morris(scene, of, samples=chosen.samples or 64, **settings)
+        else:
+            first = chosen.first_order
+            found = uq.sobol(scene, of, samples=chosen.samples or 256, second_order=not first, **settings)
+    except (uq.FailedMembers, ImportError) as error:
+        print(f"lgvi-warp: {error}", file=sys.stderr)
+        return 1
+    finally:
+        if progress:
+            progress.close()
+    files, faults = found.save(out), []
+    try:
+        files.append(plot_sensitivity(found, out / "sensitivity.png"))
+    except (ImportError, ValueError) as error:
+        faults.append(f"{out / 'sensitivity.png'} was not written: {error}")
+    if not chosen.quiet:
+        print("\n".join([str(found), "", *(f"file        {path}" for path in files)]))
     for fault in faults:
         print(f"lgvi-warp: {fault}", file=sys.stderr)
     return 1 if faults else 0

@@ -125,6 +125,7 @@ class CorrelatedNormal(JointLaw):
         if self.mean is not None:
             faults.finite("mean", self.mean)
         faults.raise_if_any()
+        assert matrix is not None
         object.__setattr__(self, "_root", root(matrix))
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
@@ -172,6 +173,7 @@ class RotationNormal(JointLaw):
         if matrix is not None and matrix.shape != (3, 3):
             faults.add("covariance", self.covariance, "is not 3 x 3", "give 3 x 3 numbers [rad^2], body axes")
         faults.raise_if_any()
+        assert matrix is not None
         object.__setattr__(self, "_root", root(matrix))
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
@@ -237,9 +239,9 @@ class PositiveDefinite(JointLaw):
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
         """One sigma, or one for each row."""
         d = shapes[0][0]
-        if np.size(self.sigma) in (1, d):
+        if np.asarray(self.sigma).size in (1, d):
             return None
-        return f"has {np.size(self.sigma)} sigmas for a {d} x {d} matrix", f"give one number or {d}"
+        return f"has {np.asarray(self.sigma).size} sigmas for a {d} x {d} matrix", f"give one number or {d}"
 
     def unusable(self, base: np.ndarray) -> tuple[str, str] | None:
         """(what is wrong, the remedy) with the scene's matrix; None if the law can start from it."""

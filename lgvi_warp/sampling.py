@@ -241,9 +241,9 @@ def _halton(seed: int, dimensions: int) -> Any:
 class Saltelli(Sampling):
     """The design for Sobol indices, in the order of SALib.sample.sobol: groups of 2 d + 2 members, or d + 2.
 
-    d + 2: without second_order. d: factors, which are the entries that vary by themselves and each joint law. A group is a point A and a point B of one
-    Sobol sequence, and A with each factor of B, and B with each of A. Groups may be added; powers of two of them are balanced.
-    Saltelli et al. (2010), Computer Physics Communications 181.
+    d + 2: without second_order. d: factors, which are the entries that vary by themselves and each joint law. A group is a
+    point A and a point B of one Sobol sequence, A with each factor of B, and B with each of A. Groups may be added; powers
+    of two of them are balanced. Saltelli et al. (2010), Computer Physics Communications 181.
     """
 
     second_order: bool = True

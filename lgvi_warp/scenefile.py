@@ -43,10 +43,14 @@ def loads(
 
 def _files_in(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
     """The same with the file of a table of members in that folder, where its path is relative."""
-    ensemble = content.get("ensemble")
-    sampling = ensemble.get("sampling") if isinstance(ensemble, dict) else None
-    table = sampling.get("table") if isinstance(sampling, dict) else None
-    if not (isinstance(table, dict) and isinstance(table.get("file"), str)):
+    try:
+        ensemble = content["ensemble"]
+        sampling = ensemble["sampling"]
+        table = sampling["table"]
+        known = isinstance(table["file"], str)
+    except (KeyError, TypeError):
+        return content
+    if not known:
         return content
     table = table | {"file": os.fspath(folder / table["file"])}
     return content | {"ensemble": ensemble | {"sampling": sampling | {"table": table}}}

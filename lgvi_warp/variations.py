@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +25,8 @@ ATTITUDE = "start.attitude"
 RIGID = ("vehicle.inertia", "vehicle.rigid_body_mass_matrix")
 
 
-class Target(NamedTuple):
+@dataclass(frozen=True)
+class Target:
     """A number of the scene by name, or the entry of it at `index`."""
 
     name: str
@@ -122,7 +123,7 @@ class Variation:
         entries: Iterable[Sequence[int]] = np.ndindex(*base.shape)
         if target.name in MATRICES and target.index is None:
             d = len(self.wholes[0])
-            entries = [(i, i) for i in range(d)] if base.size == d else list(zip(*np.triu_indices(d), strict=True))
+            entries = [(i, i) for i in range(d)] if base.size == d else np.argwhere(np.triu(np.ones((d, d)))).tolist()
         return [Target(target.name, tuple(int(i) for i in entry)).label for entry in entries]
 
     def values(self, u: np.ndarray) -> list[tuple[Target, np.ndarray]]:
@@ -169,9 +170,10 @@ def put(values: dict[str, np.ndarray], target: Target, drawn: np.ndarray) -> Non
         whole = np.array(np.broadcast_to(whole, (len(drawn), *whole.shape[1:])))
     else:
         whole = whole.copy()
-    whole[:, *target.index] = drawn
+    every: tuple[Any, ...] = (slice(None),)
+    whole[every + target.index] = drawn
     if target.name in MATRICES:
-        whole[:, *target.index[::-1]] = drawn
+        whole[every + target.index[::-1]] = drawn
     values[target.name] = whole
 
 

@@ -58,7 +58,7 @@ class Quantity:
 
 def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[Quantity, ...]:
     """What is asked for, one or several. Raises SceneError naming every fault."""
-    asked = [of] if isinstance(of, str) or callable(of) else list(of)
+    asked = list(of) if isinstance(of, list | tuple) else [of]
     faults = Faults()
     found = [one for one in (_quantity(faults, one) for one in asked) if one]
     if not asked:

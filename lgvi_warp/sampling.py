@@ -468,7 +468,7 @@ class Table(Sampling):
             object.__setattr__(self, "sha256", found)
             lines = content.decode("utf-8-sig").splitlines()
             names = [name.strip() for name in next(csv.reader(lines[:1]))]
-            numbers = np.loadtxt(lines[1:], delimiter=",", ndmin=2)
+            numbers = np.loadtxt(lines[1:], delimiter=",", ndmin=2) if lines[1:] else np.empty((0, len(names)))
         except (OSError, UnicodeDecodeError, StopIteration, ValueError) as error:
             faults.add(
                 "file",

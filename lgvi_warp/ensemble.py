@@ -77,7 +77,11 @@ class Ensemble:
     @classmethod
     def of(cls, scene: Scene, settings: scenes.EnsembleSettings) -> Ensemble:
         """The ensemble that settings describe; only their `indices` of it where they name some."""
-        ensemble = cls(scene, settings.members, settings.seed, settings.vary, settings.sampling)
+        ensemble = cls.__new__(cls)
+        # A scene file's own ensemble was looked at when the file was read.
+        ensemble._setup(scene, settings, {}, checked=vars(scene).get("_checked") is settings)
+        if scene.ensemble_settings is settings:
+            object.__setattr__(scene, "_checked", settings)
         if settings.indices is None:
             return ensemble
         most = int(np.max(settings.indices))
@@ -134,7 +138,9 @@ class Ensemble:
         ensemble._setup(scene, scenes.EnsembleSettings(n), explicit)
         return ensemble
 
-    def _setup(self, scene: Scene, settings: scenes.EnsembleSettings, explicit: dict[str, np.ndarray]) -> None:
+    def _setup(
+        self, scene: Scene, settings: scenes.EnsembleSettings, explicit: dict[str, np.ndarray], checked: bool = False
+    ) -> None:
         self.scene, self.seed = scene, int(settings.seed)
         self.vary: dict[str, Any] = dict(settings.vary)
         self.sampling: Sampling = settings.sampling
@@ -150,7 +156,8 @@ class Ensemble:
         self.space: Space = variations.space(self.seed, self._variations)
         self._whole = self._counted(settings)
         self.members = self._whole
-        self._check_physical()
+        if not checked:
+            self._check_physical()
 
     def _described(self) -> list[Variation]:
         """What varies, by law; notes every name and law that does not fit the scene."""

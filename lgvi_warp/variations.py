@@ -236,6 +236,10 @@ def _misfit(found: Variation) -> tuple[str, str] | None:
     wrong: tuple[str, str] | None = law.fault([base.shape for base in found.bases])
     if wrong is None and isinstance(law, PositiveDefinite):
         wrong = law.unusable(found.wholes[0])
+    if wrong is None and law.kind == "choice" and law.joint and named[0].name in MATRICES and named[0].index is None:
+        values = np.asarray(law.values)
+        if np.any(np.abs(values - np.swapaxes(values, 1, 2)) > 1e-9 * np.abs(values).max()):
+            wrong = "holds a matrix that is not symmetric", "give symmetric matrices"
     return wrong
 
 

@@ -284,7 +284,7 @@ def test_a_scene_file_names_its_sampling(tmp_path):
         "vehicle.mass" = { gamma = { a = 400.0, scale = 0.05 } }
         "vehicle.mass_dummy" = { normal = { std = 1.0 } }
         "start.attitude" = { rotation_normal = { std = [0.1, 0.1, 0.3] } }
-        "start.velocity[0], vehicle.buoyancy" = { correlated_normal = { std = [0.1, 0.2], correlation = [[1, 0.9], [0.9, 1]] } }
+        "start.velocity[0], vehicle.buoyancy" = { correlated_normal = { covariance = [[0.01, 0.01], [0.01, 0.04]] } }
         "environment.gravity" = { choice = { values = [9.78, 9.80665, 9.83] } }
     """
     path = tmp_path / "scene.toml"
@@ -296,7 +296,8 @@ def test_a_scene_file_names_its_sampling(tmp_path):
     # A sequence of 512 points: means good to a few 1/512 of the spread.
     assert abs(m.parameters["vehicle.mass"].mean() - 20.0) < 0.02
     assert set(m.parameters["environment.gravity"]) == {9.78, 9.80665, 9.83}
-    assert np.corrcoef(m.velocity[:, 0], m.parameters["vehicle.buoyancy"])[0, 1] < 1.0
+    # Covariance 0.01 of deviations 0.1 and 0.2: a correlation of 0.5, whose standard error at random is 0.75 / sqrt(512).
+    assert abs(np.corrcoef(m.velocity[:, 0], m.parameters["vehicle.buoyancy"])[0, 1] - 0.5) < 5.0 * 0.75 / np.sqrt(512)
 
 
 # What is refused -----------------------------------------------------------------------------------------------------------
@@ -369,6 +370,25 @@ def test_bad_names_and_laws_come_in_one_message(scene):
     assert len(found) == 9
     for key in vary:
         assert sum(f'"{key}" =' in fault for fault in found) == (0 if key == "start.position" else 1), key
+
+
+def test_every_fault_of_a_section_comes_at_once(scene):
+    content = scene.to_dict() | {"ensemble": {
+        "members": 0, "seed": -1, "sampling": "sobbol", "indices": [],
+        "vary": {"vehicle.mas": {"normal": {"std": 1.0}}, "vehicle.mass": {"gamma": {}}},
+    }}  # fmt: skip
+    found = faults(lw.Scene.from_dict, content)
+    assert len(found) == 6
+    for word in ("members = 0", "seed = -1", "'sobbol'", "indices = []", "vehicle.mas", "gamma.a"):
+        assert any(word in fault for fault in found), word
+
+
+def test_whole_matrices_of_a_grid(scene):
+    J = np.diag([5.0, 5.5, 6.0])
+    skew = J + np.array([[0.0, 0.1, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    fleet = lw.Ensemble(scene, sampling=lw.Grid({"vehicle.inertia": [J, 1.1 * J]}))
+    np.testing.assert_array_equal(fleet.parameters(0, 2)["vehicle.inertia"], [J, 1.1 * J])
+    assert "not symmetric" in faults(lw.Ensemble, scene, sampling=lw.Grid({"vehicle.inertia": [J, skew]}))[0]
 
 
 def test_the_attitude_varies_in_one_way_only(scene):

@@ -94,8 +94,8 @@ def page(seeds: int, members: int) -> str:
     lines = [
         "# What samplings cost, and what they gain", "",
         "The paper's vehicle with mass, second moments of mass, center of buoyancy and angular velocity varied: 10 columns.",
-        f"Mean depth after {T1:g} s; root mean square error over {seeds} seeds [m], from the mean of 8 Sobol sequences of 32,768",
-        f"members. Then the time to make an ensemble of {members:,} members (all are drawn and checked), to draw its last",
+        f"Mean depth after {T1:g} s; root mean square error over {seeds} seeds [m], from the mean of 8 Sobol sequences of",
+        f"32,768 members. Then the time to make an ensemble of {members:,} members (all are drawn and checked), to draw its last",
         f"blocks of {BLOCK}, and the memory that both took beyond that of a small ensemble, in a process of its own, one",
         f"thread; the least of {TRIALS} processes.", "",
         f"Machine: {machine.describe()['cpu']}. Written by `python benchmarks/sampling_table.py`; do not edit.", "",

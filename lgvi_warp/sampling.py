@@ -185,20 +185,16 @@ def sobol_points(seed: int, name: str, dimensions: int, indices: np.ndarray, scr
 @functools.lru_cache(maxsize=32)
 def _sobol_basis(seed: int, name: str, dimensions: int, bits: int, scramble: bool) -> np.ndarray:
     """Point 0, and what each bit of an index changes in it: (bits + 1, dimensions), as whole numbers."""
-    import warnings
-
     from scipy.stats import qmc
 
     rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed_words(seed, name))))
     engine = qmc.Sobol(dimensions, scramble=scramble, bits=SOBOL_BITS, rng=rng)
     points, made = [], 0
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of numbers of points that are no power of two
-        for index in (0, *(1 << bit for bit in range(bits))):
-            if index > made:
-                engine.fast_forward(index - made)
-            points.append(engine.random(1)[0])
-            made = index + 1
+    for index in (0, *(1 << bit for bit in range(bits))):
+        if index > made:
+            engine.fast_forward(index - made)
+        points.append(engine.random(1)[0])
+        made = index + 1
     whole = (np.array(points) * 2.0**SOBOL_BITS).astype(np.uint64)
     whole[1:] ^= whole[0]
     return whole

@@ -209,6 +209,16 @@ def test_noise_that_acts_alike_belongs_to_no_factor(sinking):
     assert alone.total[0, 0] > 1e-6 and alike.total[0, 0] < 1e-20
 
 
+@pytest.mark.parametrize("sampling", ["sobol", "halton", {"latin_hypercube": {"group": 20}}, "saltelli"], ids=str)
+def test_a_member_runs_again_alone_with_its_bits(sinking, sampling):
+    noisy = dataclasses.replace(sinking, terms=[lw.WrenchNoise(force=(1.0, 1.0, 1.0), torque=(0.0, 0.0, 0.0))])
+    fleet = lw.Ensemble(noisy, 40, 3, LAWS, sampling)
+    whole = lw.solve(fleet, **SINK).position
+    np.testing.assert_array_equal(lw.solve(fleet.member(33), **SINK).position, whole[:, 33:34])
+    back = lw.Scene.from_dict(noisy.to_dict() | {"ensemble": fleet.subset([7, 2]).to_dict()})
+    np.testing.assert_array_equal(lw.solve(back, **SINK).position, whole[:, [7, 2]])
+
+
 # Members that fail --------------------------------------------------------------------------------------------------------
 
 # Beyond 2 / h = 200 rad/s the step is too large: 1 of 20 points of the cube.

@@ -41,9 +41,14 @@ def _broadcast(matrices: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, n
     return np.broadcast_to(matrices, (vectors.shape[1], *matrices.shape[1:])), vectors
 
 
+def kinetic_energy(result: Result) -> np.ndarray:
+    """Kinetic energy relative to the water, (nu, Om).I6 (nu, Om) / 2, (k, n) [J]."""
+    return np.asarray(0.5 * np.sum(_relative(result) * _momenta(result), axis=-1))
+
+
 def energy(result: Result) -> np.ndarray:
-    """Kinetic energy relative to the water, (nu, Om).I6 (nu, Om) / 2, and the potential of every term, (k, n) [J]."""
-    total = 0.5 * np.sum(_relative(result) * _momenta(result), axis=-1)
+    """Kinetic energy and the potential of every term, (k, n) [J]."""
+    total = kinetic_energy(result)
     position, attitude = result.position.astype(np.float64), result.attitude.astype(np.float64)
     for term in (*terms.IMPLIED, *result.terms):
         total = total + term.potential(result.own(term), position, attitude, result.parameters)

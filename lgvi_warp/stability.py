@@ -1,0 +1,600 @@
+"""Where a method holds: maps of accurate, bounded, flagged, failed and silently wrong runs over two parameters."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, field
+from enum import IntEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp import comparison, invariants, machine, plan
+from lgvi_warp.comparison import PRECISE, QUANTITIES
+from lgvi_warp.errors import Faults, SceneError
+from lgvi_warp.method import Method
+from lgvi_warp.plan import Plan
+from lgvi_warp.result import Result
+from lgvi_warp.saveat import FIELDS, TimeGrid
+from lgvi_warp.scene import Scene
+from lgvi_warp.solving import provenance, run_plan
+from lgvi_warp.speed import void
+from lgvi_warp.stability_grid import Axis, Grid, Line
+from lgvi_warp.stability_limits import LIMITS
+from lgvi_warp.status import Status
+from lgvi_warp.tradeoffs import _finite, check_of, chosen_methods
+
+METHODS = ("psi", "psi_s", "psi_x", "rk4")
+# Maps by name: their two axes.
+GRIDS = {"omega": ("h", "angular_velocity"), "mass": ("h", "added_mass_ratio"), "drag": ("h", "drag_number")}
+# Times that errors are taken at, and that energies are looked at.
+ERROR_SAMPLES, ENERGY_SAMPLES = 8, 64
+# A reference agrees with another run to the error bound over this.
+TRUST = 10.0
+# Of a reference: it turns by this at most in its first step [rad], and its step is halved so often to agree.
+FINE, HALVINGS = 0.2, 6
+# A matrix this far from a rotation is none any more.
+SKEWED = 0.1
+# The status of members whose column the program refused to run.
+REFUSED = 255
+
+
+class Cell(IntEnum):
+    """What became of the members of a cell, the worst of its directions."""
+
+    ACCURATE = 0
+    BOUNDED = 1
+    FLAGGED = 2
+    FAILED = 3
+    SILENT = 4
+
+    @property
+    def text(self) -> str:
+        """What it means, in a few words."""
+        return TEXTS[self]
+
+
+TEXTS = {
+    Cell.ACCURATE: "error below the bound",
+    Cell.BOUNDED: "error above, energy bounded",
+    Cell.FLAGGED: "stopped or warned in time",
+    Cell.FAILED: "energy unbounded, flagged",
+    Cell.SILENT: "energy unbounded, no flag",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityMap:
+    """Classes of cells over two axes, for each method.
+
+    x, y: lines of nx and ny values. classes: method -> (ny, nx), Cell. errors: largest error [unit of `of`] up to
+    error_time, infinite without one; energies: largest growth of energy over the bound, above 1 where it is unbounded;
+    statuses: the largest Status code (255: the program refused to run it). ratios: method -> limit -> (ny, nx), h over the
+    analytic limit of the fastest direction (see stability_limits.LIMITS), above 1 beyond it. error_bound [unit of `of`];
+    error_time and t1 [s], each rounded up to whole steps. judged: how energies are ("conservative", "dissipative" or
+    "driven"). unverified: cells whose reference was not good enough, which so cannot be accurate. refused: method -> why.
+    """
+
+    x: Line
+    y: Line
+    classes: dict[str, np.ndarray]
+    errors: dict[str, np.ndarray]
+    energies: dict[str, np.ndarray]
+    statuses: dict[str, np.ndarray]
+    ratios: dict[str, dict[str, np.ndarray]]
+    of: str
+    error_bound: float
+    error_time: float
+    t1: float
+    directions: int
+    judged: str
+    reference: str
+    unverified: int
+    provenance: dict[str, Any]
+    refused: dict[str, str] = field(default_factory=dict)
+    messages: tuple[str, ...] = ()
+    seconds: float = 0.0
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Methods of the map."""
+        return tuple(self.classes)
+
+    def limit(self, method: str, worst: Cell = Cell.BOUNDED) -> np.ndarray:
+        """The measured limit per y (ny,): the largest x up to which all cells are at most `worst`; NaN where the first is not.
+
+        The last x where the whole row is: the limit then lies beyond the map.
+        """
+        good = np.logical_and.accumulate(self._of(method) <= worst, axis=1).sum(axis=1)
+        return np.where(good > 0, self.x.values[np.maximum(good - 1, 0)], np.nan)
+
+    def counts(self, method: str) -> dict[str, int]:
+        """Cells by class."""
+        return {cell.name.lower(): int(np.sum(self._of(method) == cell)) for cell in Cell}
+
+    def silent(self, method: str) -> list[tuple[float, float]]:
+        """(x, y) of the cells whose energy is unbounded without any flag: what must never happen."""
+        return [(float(self.x.values[j]), float(self.y.values[i])) for i, j in np.argwhere(self._of(method) == Cell.SILENT)]
+
+    def _of(self, method: str) -> np.ndarray:
+        faults = Faults()
+        faults.choice("method", method, self.classes)
+        faults.raise_if_any()
+        return self.classes[method]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, as JSON holds it; what is not finite is None."""
+        content = {name: value for name, value in vars(self).items() if name not in ("x", "y", *ARRAYS, "ratios")}
+        content |= {"x": self.x.to_dict(), "y": self.y.to_dict(), "messages": list(self.messages)}
+        for name in ARRAYS:
+            content[name] = {method: values.tolist() for method, values in getattr(self, name).items()}
+        content["ratios"] = {method: {limit: values.tolist() for limit, values in found.items()}
+                             for method, found in self.ratios.items()}  # fmt: skip
+        content["limits"] = {method: self.limit(method).tolist() for method in self.methods}
+        content["legend"] = {str(int(cell)): f"{cell.name.lower()}: {cell.text}" for cell in Cell}
+        return dict(_finite(content))
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> StabilityMap:
+        """From what `to_dict` gave."""
+        kept = {name: value for name, value in content.items() if name not in ("limits", "legend")}
+        kept |= {"x": Line.from_dict(content["x"]), "y": Line.from_dict(content["y"])}
+        for name, kind in ARRAYS.items():
+            kept[name] = {method: _array(values, kind) for method, values in content[name].items()}
+        kept["ratios"] = {method: {limit: _array(values, np.float64) for limit, values in found.items()}
+                          for method, found in content["ratios"].items()}  # fmt: skip
+        return cls(**kept | {"messages": tuple(content["messages"])})
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> StabilityMap:
+        """Read the JSON that `save` wrote. Raises OSError or ValueError if it is none."""
+        return cls.from_dict(json.loads(Path(path).read_text()))
+
+    def rows(self) -> list[dict[str, Any]]:
+        """A flat record for each cell and method."""
+        rows = []
+        for method in self.methods:
+            for i, j in np.ndindex(self.classes[method].shape):
+                row = {"method": method, self.x.name: self.x.values[j], self.y.name: self.y.values[i]}
+                row |= {"class": Cell(self.classes[method][i, j]).name.lower(), f"error_{self.of}": self.errors[method][i, j]}
+                row |= {"energy_growth": self.energies[method][i, j], "status": status_name(self.statuses[method][i, j])}
+                rows.append(row | {f"h_over_{name}_limit": values[i, j] for name, values in self.ratios[method].items()})
+        return rows
+
+    def to_csv(self, path: str | os.PathLike[str]) -> Path:
+        """Write the rows to a CSV file. Returns its path."""
+        rows, target = self.rows(), Path(path)
+        names = list(dict.fromkeys(key for row in rows for key in row))
+        with target.open("w", newline="") as file:
+            writer = csv.DictWriter(file, names)
+            writer.writeheader()
+            writer.writerows(rows)
+        return target
+
+    def save(self, folder: str | os.PathLike[str], name: str = "stability") -> list[Path]:
+        """Write NAME.json and NAME.csv into a folder. Returns their paths."""
+        target = Path(folder)
+        target.mkdir(parents=True, exist_ok=True)
+        (target / f"{name}.json").write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False))
+        return [target / f"{name}.json", self.to_csv(target / f"{name}.csv")]
+
+
+# Arrays (ny, nx) by method, and their types.
+ARRAYS: dict[str, Any] = {"classes": np.int64, "errors": np.float64, "energies": np.float64, "statuses": np.int64}
+
+
+def _array(values: Any, kind: Any) -> np.ndarray:
+    """An array; None is infinite."""
+    array = np.array(values, dtype=object)
+    return np.asarray(np.where(np.equal(array, None), np.inf, array).astype(kind))
+
+
+def status_name(code: int) -> str:
+    """In small letters."""
+    return "refused" if code == REFUSED else Status(code).name.lower()
+
+
+@dataclass
+class _Found:
+    """What a method's runs showed, by member."""
+
+    error: np.ndarray
+    growth: np.ndarray
+    status: np.ndarray
+    warned: np.ndarray
+
+
+@dataclass(eq=False)
+class _Column:
+    """One step and the members that take it, with the times that its runs are sampled at, and the reference there."""
+
+    h: float
+    members: np.ndarray
+    error_steps: np.ndarray
+    steps: np.ndarray
+    reference: Result | None = None
+    verified: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
+
+    def grid(self, finer: int = 1, whole: bool = True) -> TimeGrid:
+        """The steps and samples; `finer`: of h over this many."""
+        steps = self.steps if whole else self.error_steps
+        return TimeGrid(self.h / finer, steps * finer, steps * self.h)
+
+
+def _column(h: float, members: np.ndarray, error_time: float, t1: float) -> _Column:
+    short, long = (max(1, math.ceil(t / h * (1.0 - 1e-12))) for t in (error_time, t1))
+    errors = np.unique(np.linspace(0, short, ERROR_SAMPLES + 1).round().astype(np.int64))
+    more = np.linspace(0, max(long, short), ENERGY_SAMPLES + 1).round().astype(np.int64)
+    return _Column(h, members, errors, np.union1d(errors, more))
+
+
+def stability_map(
+    scene: Scene,
+    x: Any = "h",
+    y: Any = "angular_velocity",
+    methods: Sequence[str] | None = None,
+    *,
+    points: int | tuple[int, int] = 24,
+    t1: float | None = None,
+    error: float = 1e-2,
+    of: str = "attitude",
+    error_time: float | None = None,
+    energy_bound: float = 1.0,
+    directions: int = 4,
+    h: float | None = None,
+    dtype: str = "float64",
+    seed: int = 0,
+    threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> StabilityMap:
+    """Run a grid of members by every method and say of each cell whether it is accurate, bounded, flagged, failed or silent.
+
+    x, y: axes: "h", "angular_velocity", "speed", "added_mass_ratio", "drag_number" or a name of scene.parameters(), as a
+    text ("h=0.01:3", "vehicle.mass=50:500:linear"), as (name, low, high) or as a stability_grid.Axis. methods: names
+    (default psi, psi_s, psi_x, rk4). points: cells along x and y, one number or two. directions: starts per cell, the
+    scene's own and such of velocity and spin turned at random; the worst counts. h: the step [s], where it is on no axis.
+
+    A cell is accurate where the error of `of` stays below `error` [its unit] up to error_time [s] (default: one period of
+    the fastest motion at the start), against a reference of fine steps that two runs agree on ten times better; bounded
+    where only energy and rotation stay bounded up to t1 [s] (default: ten periods): a conservative scene's energy changes,
+    a damped one's grows, by less than energy_bound times what the start's momenta can hold as kinetic energy plus what the
+    potentials gave. It is flagged where that holds and a member got a status or a warning; failed where it does not and
+    one was given, also for numbers that are not finite; silent where it does not and none was. What drives a scene (wrenches,
+    thrusters, waves) changes its energy by right: there it is compared with the reference's, up to error_time.
+
+    progress: called with the fraction of the work done. Raises SceneError naming every fault, and where noise acts.
+    """
+    begun, report = time.perf_counter(), progress or void
+    names = chosen_methods(methods, METHODS)
+    faults = Faults()
+    with faults.including():
+        check_of(of)
+    for name, value, unit in (("error", error, QUANTITIES.get(of, "")), ("energy_bound", energy_bound, "1"),
+                              *((name, value, "s") for name, value in (("t1", t1), ("error_time", error_time))
+                                if value is not None)):  # fmt: skip
+        faults.positive(name, value, unit)
+    faults.choice("dtype", dtype, plan.DTYPES)
+    grid = None
+    with faults.including():
+        both = (points, points) if isinstance(points, int) else tuple(points)
+        grid = Grid(scene, x, y, both, directions, seed, h)
+    faults.raise_if_any()
+    assert grid is not None
+    period = 2.0 * math.pi / grid.rate
+    error_time = error_time or min(period, t1 or period)
+    judged = _judged(grid, names)
+    t1 = error_time if judged == "driven" else max(t1 or 10.0 * period, error_time)
+    columns = [_column(step, members, error_time, t1) for step, members in grid.columns()]
+    threads = threads or machine.thread_count()
+    text = _make_references(grid, columns, of, error, threads, lambda part: report(0.4 * part))
+    found, refused, messages = {}, {}, []
+    for i, name in enumerate(names):
+        part = lambda done, i=i: report(0.4 + 0.6 * (i + done) / len(names))  # noqa: E731
+        one, why = _run(grid, columns, name, dtype, of, judged, threads, part)
+        if np.all(one.status == REFUSED):
+            refused[name] = why
+            continue
+        found[name] = one
+        if why:
+            messages.append(f"{name}: refused in {int(_worst(grid, one.status == REFUSED).sum())} cells: {why}")
+    if not found:
+        raise SceneError([f"method {name}: {why}" for name, why in refused.items()])
+    verified = np.zeros(len(grid.h), bool)
+    for column in columns:
+        verified[column.members] = column.verified
+    classes = {name: _worst(grid, _classes(one, verified, error, energy_bound)) for name, one in found.items()}
+    line_x, line_y = grid.lines
+    result = StabilityMap(
+        x=line_x,
+        y=line_y,
+        classes=classes,
+        errors={name: _worst(grid, one.error) for name, one in found.items()},
+        energies={name: _worst(grid, one.growth / energy_bound) for name, one in found.items()},
+        statuses={name: _worst(grid, one.status) for name, one in found.items()},
+        ratios=_ratios(grid, list(found)),
+        of=of,
+        error_bound=float(error),
+        error_time=float(error_time),
+        t1=float(t1),
+        directions=directions,
+        judged=judged,
+        reference=text,
+        unverified=int(_worst(grid, ~verified).sum()),
+        provenance=_provenance(grid, columns[0], names, dtype, seed, energy_bound),
+        refused=refused,
+        messages=tuple(messages),
+        seconds=time.perf_counter() - begun,
+    )
+    report(1.0)
+    return result
+
+
+def _worst(grid: Grid, values: np.ndarray) -> np.ndarray:
+    """(ny, nx) of what members have: the largest over the directions of a cell."""
+    return np.max(values.reshape(grid.shape), axis=2)
+
+
+def _plan(grid: Grid, members: np.ndarray, method: str, times: TimeGrid, dtype: str) -> Plan:
+    checks = "all" if "all" in plan.CHECKS else "safe"
+    return Plan(grid.fleet(members), Method(method), times, FIELDS, dtype, checks=checks)
+
+
+def _judged(grid: Grid, names: Sequence[str]) -> str:
+    """Whether energy is kept, only lost, or given by what acts. Raises SceneError where noise acts."""
+    for name in (*names, *PRECISE):
+        try:
+            # A step so short that no method refuses it for its length.
+            laws = _plan(grid, np.arange(1), name, TimeGrid(1e-9, np.array([0, 1]), np.array([0.0, 1e-9])), "float64").model.laws
+            break
+        except SceneError:
+            continue
+    else:
+        return "driven"
+    if any(getattr(module, "NOISE", False) for _, module in laws):
+        raise SceneError(["terms: noise acts, whose path differs from step to step; leave it out for a stability map"])
+    driven = [term for term, module in laws if not getattr(module, "POTENTIAL", False) and not _damps(term, module)]
+    if driven:
+        return "driven"
+    return "dissipative" if any(_damps(term, module) for term, module in laws) else "conservative"
+
+
+def _damps(term: Any, module: Any) -> bool:
+    """Whether it can only take energy, relative to the water. A horizontal current that is steady gives none to that."""
+    if getattr(module, "FLOW", "none") != "none":
+        return getattr(module, "FLOW", "none") == "steady" and not np.any(np.asarray(getattr(term, "velocity", [0, 0, 1]))[2:])
+    return bool(term.dissipative) and not hasattr(module, "law")
+
+
+def _make_references(
+    grid: Grid, columns: Sequence[_Column], of: str, error: float, threads: int, report: Callable[[float], None]
+) -> str:
+    """Give every column the states at its error times; says by which methods."""
+    first, second = _precise(grid)
+    rates = np.max(list(grid.rates().values()), axis=0)
+    done = 0
+    with ThreadPoolExecutor(threads) as pool:
+        jobs = [pool.submit(_reference, grid, one, (first, second), rates, of, error / TRUST) for one in columns]
+        for job in as_completed(jobs):
+            job.result()
+            done += 1
+            report(done / len(jobs))
+    return f"{second} against {first}, steps that turn by {FINE:g} rad or less, halved until they agree"
+
+
+def _precise(grid: Grid) -> tuple[str, str]:
+    """The two best methods that the scene takes; the best twice where the second is of much lower order."""
+    names: list[str] = []
+    times = TimeGrid(1e-9, np.array([0, 1]), np.array([0.0, 1e-9]))
+    for name in PRECISE:
+        try:
+            Method(name)
+            _plan(grid, np.arange(len(grid.h)), name, times, "float64")
+        except SceneError:
+            continue
+        names.append(name)
+        if len(names) == 2:
+            break
+    if not names:
+        raise SceneError([f"method: the scene takes none of {', '.join(PRECISE)} for a reference"])
+    close = len(names) == 2 and Method(names[1]).order >= Method(names[0]).order - 2
+    return names[0], names[1] if close else names[0]
+
+
+def _reference(
+    grid: Grid, column: _Column, names: tuple[str, str], rates: np.ndarray, of: str, goal: float
+) -> None:
+    """Fill in a column's reference: two methods, halving the steps of the members that they do not yet agree on."""
+    n = len(column.members)
+    column.verified = np.zeros(n, bool)
+    open_ = np.arange(n)
+    finer = max(1, math.ceil(column.h * float(rates[column.members].max()) / FINE))
+    for _ in range(HALVINGS):
+        members = column.members[open_]
+        try:
+            with np.errstate(all="ignore"):
+                a, b = (run_plan(_plan(grid, members, name, column.grid(k, whole=False), "float64"), 1)
+                        for name, k in zip(names, (finer, math.ceil(1.5 * finer)), strict=True))  # fmt: skip
+                apart = comparison.distances(a, b)[of]
+                good = ~_refused(a) & ~_refused(b) & (np.nanmax(np.nan_to_num(apart, posinf=np.inf), axis=0) <= goal)
+                good &= np.isfinite(b.attitude).all(axis=(0, 2, 3))
+        except SceneError:
+            # Too long for a stage that goes backward.
+            finer *= 2
+            continue
+        column.reference = _joined(column.reference, b, open_, n)
+        column.verified[open_] = good
+        open_ = open_[~good]
+        finer *= 2
+        if len(open_) == 0:
+            break
+
+
+def _refused(result: Result) -> np.ndarray:
+    """Which members got a status that is no event's."""
+    status = np.asarray(result.status)
+    return np.asarray((status != Status.OK) & (status < Status.SURFACE))
+
+
+def _joined(whole: Result | None, part: Result, at: np.ndarray, n: int) -> Result:
+    """The part's members in the place of those of the whole."""
+    if whole is None:
+        return part
+    for name, values in part.samples.items():
+        whole.samples[name][:, at] = values
+    whole.status[at], whole.failure_time[at] = part.status, part.failure_time
+    # Energies that were asked for already are of the old samples.
+    vars(whole).pop("energy", None)
+    return whole
+
+
+def _run(
+    grid: Grid, columns: Sequence[_Column], method: str, dtype: str, of: str, judged: str, threads: int,
+    report: Callable[[float], None],
+) -> tuple[_Found, str]:  # fmt: skip
+    """Run a method over all columns; also the reason where the program refused some."""
+    n = len(grid.h)
+    found = _Found(np.full(n, np.inf), np.zeros(n), np.full(n, REFUSED), np.zeros(n, bool))
+    why: list[str] = []
+    rows = grid.shape[2]
+
+    def column_of(column: _Column, at: np.ndarray) -> None:
+        members = column.members[at]
+        try:
+            plan = _plan(grid, members, method, column.grid(), dtype)
+        except SceneError as error:
+            why.append(str(error))
+            if len(at) > rows:
+                # Only some cells of it are refused: halves of whole cells.
+                half = len(at) // rows // 2 * rows
+                column_of(column, at[:half])
+                column_of(column, at[half:])
+            return
+        with np.errstate(all="ignore"):
+            _judge(run_plan(plan, 1), column, at, found, of, judged)
+
+    with ThreadPoolExecutor(threads) as pool:
+        jobs = [pool.submit(column_of, one, np.arange(len(one.members))) for one in columns]
+        for done, job in enumerate(as_completed(jobs), 1):
+            job.result()
+            report(done / len(jobs))
+    return found, why[0] if why else ""
+
+
+def _judge(result: Result, column: _Column, at: np.ndarray, found: _Found, of: str, judged: str) -> None:
+    """Note what the run of some members of a column showed."""
+    members = column.members[at]
+    found.status[members] = np.asarray(result.status)
+    warnings = getattr(result, "warnings", None)
+    if warnings is not None:
+        found.warned[members] = np.asarray(warnings) != 0
+    early = np.searchsorted(column.steps, column.error_steps)
+    if column.reference is not None:
+        reference = comparison.part(column.reference, at)
+        apart = comparison.distances(_at_times(result, early), reference)[of]
+        found.error[members] = np.max(np.where(np.isnan(apart) & ~np.isfinite(result.failure_time), np.inf,
+                                               np.nan_to_num(apart, posinf=np.inf)), axis=0)  # fmt: skip
+        # A member that was frozen before the error time has none.
+        found.error[members] = np.where(_refused(result), np.inf, found.error[members])
+        if judged == "driven":
+            energy, size = reference.energy, np.max(invariants.kinetic_energy(reference), axis=0)
+            change = np.max(np.abs(result.energy[early] - energy), axis=0)
+            found.growth[members] = _with_rotation(change / np.maximum(size, 1e-300), result)
+            return
+    found.growth[members] = _with_rotation(energy_growth(result, judged == "dissipative"), result)
+
+
+def _at_times(result: Result, rows: np.ndarray) -> Result:
+    from dataclasses import replace
+
+    return replace(
+        result, time=result.time[rows], samples={name: values[rows] for name, values in result.samples.items()}
+    )
+
+
+def energy_growth(result: Result, dissipative: bool = False) -> np.ndarray:
+    """Largest change of energy (n,), or where it is dissipative largest growth, over what members could hold.
+
+    That is |p|^2 / (2 M_min) + |pi|^2 / (2 J_min) of the start and, up to each time, the largest change of the potential:
+    a bounded motion stays below about 1, whatever it exchanges.
+    """
+    kinetic, total = invariants.kinetic_energy(result), result.energy
+    potential = total - kinetic
+    momenta = invariants._momenta(result)[0]
+    I6 = np.broadcast_to(invariants.vehicle.inertia6(result.parameters), (result.members, 6, 6))
+    held = sum(0.5 * np.sum(momenta[:, part] ** 2, axis=1) / np.linalg.eigvalsh(I6[:, part, part])[:, 0]
+               for part in (slice(0, 3), slice(3, 6)))  # fmt: skip
+    given = np.maximum.accumulate(np.abs(potential - potential[:1]), axis=0)
+    change = total - total[:1]
+    growth = np.max((change if dissipative else np.abs(change)) / np.maximum(held + given, 1e-300), axis=0)
+    return np.where(np.isfinite(total).all(axis=0), growth, np.inf)
+
+
+def _with_rotation(growth: np.ndarray, result: Result) -> np.ndarray:
+    """Also how far R is from a rotation, over SKEWED; infinite where a number of the state is not finite."""
+    R = result.attitude.astype(np.float64)
+    skewed = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(0, 2, 3)) / SKEWED
+    worst = np.maximum(growth, skewed)
+    return np.where(np.isfinite(worst) & (np.asarray(result.status) != Status.NON_FINITE), worst, np.inf)
+
+
+def _classes(one: _Found, verified: np.ndarray, error: float, energy_bound: float) -> np.ndarray:
+    """The class of every member."""
+    unbounded = ~(one.growth / energy_bound <= 1.0)
+    flagged = one.warned | ((one.status != Status.OK) & ((one.status < Status.SURFACE) | (one.status == REFUSED)))
+    accurate = verified & (one.error <= error)
+    quiet = np.where(accurate, Cell.ACCURATE, Cell.BOUNDED)
+    return np.where(unbounded, np.where(flagged, Cell.FAILED, Cell.SILENT), np.where(flagged, Cell.FLAGGED, quiet))
+
+
+def _ratios(grid: Grid, methods: Sequence[str]) -> dict[str, dict[str, np.ndarray]]:
+    """method -> limit -> h over the analytic limit; limits that a method has not, or that nothing reaches, are left out."""
+    numbers = {name: _worst(grid, grid.h * rate) for name, rate in grid.rates().items()}
+    found: dict[str, dict[str, np.ndarray]] = {}
+    for method in methods:
+        limits = {name: limit(method) for name, limit in LIMITS.items()}
+        found[method] = {name: number / limits[name] for name, number in numbers.items()
+                         if math.isfinite(limits[name]) and np.any(number)}  # fmt: skip
+    return found
+
+
+def _provenance(
+    grid: Grid, column: _Column, methods: Sequence[str], dtype: str, seed: int, energy_bound: float
+) -> dict[str, Any]:
+    """Scene, settings, versions, machine."""
+    content = provenance(_plan(grid, column.members[:1], "rk8", column.grid(), "float64"))
+    content = {name: content[name] for name in ("scene", "versions", "machine", "checks")}
+    axes = {name: vars(axis) for name, axis in (("x", grid.x), ("y", grid.y))}
+    return content | {"methods": list(methods), "dtype": dtype, "seed": seed, "energy_bound": energy_bound, "axes": axes}
+
+
+def report_text(found: StabilityMap) -> str:
+    """The map in lines for people."""
+    unit = QUANTITIES[found.of]
+    lines = [f"note        {message}" for message in found.messages]
+    lines += [
+        f"map         {found.x.label} x {found.y.label}: {len(found.x.values)} x {len(found.y.values)} cells, "
+        f"{found.directions} starts each, {found.seconds:.0f} s",
+        f"accurate    {found.of} to {found.error_bound:g} {unit} up to {found.error_time:.3g} s; bounded: energy up to "
+        f"{found.t1:.3g} s ({found.judged})",
+        f"reference   {found.reference}" + (f"; not in {found.unverified} cells" if found.unverified else ""),
+    ]
+    if found.refused:
+        lines.append(f"refused     {', '.join(f'{name}: {why}' for name, why in found.refused.items())}")
+    heads = "".join(f"{cell.name.lower():>10}" for cell in Cell)
+    lines += ["", f"{'cells':<18}{heads}   limit of {found.x.name} over {found.y.name}, least to most"]
+    for method in found.methods:
+        limit, numbers = found.limit(method), found.counts(method).values()
+        good = limit[np.isfinite(limit)]
+        span = f"{good.min():.3g} to {good.max():.3g}" if len(good) else "none"
+        lines.append(f"{method:<18}" + "".join(f"{number:>10}" for number in numbers) + f"   {span} {found.x.unit}")
+    return "\n".join(lines)
+
+
+__all__ = ["GRIDS", "Axis", "Cell", "StabilityMap", "stability_map"]

@@ -1,4 +1,4 @@
-"""Measure the largest stable step of every method, on motions of one rate each, and write the table of docs/where_it_breaks.md.
+"""Measure the largest stable step of every method, on motions of one rate; write the table of docs/where_it_breaks.md.
 
 python benchmarks/limits_table.py            # JSON lines, then the table, which also goes into the page
 
@@ -161,7 +161,9 @@ def table(records):
             "h \\|Omega\\|", "theory")  # fmt: skip
     rows = []
     for r in records:
-        cells = [pair(r[f"{m}_{a:g}_first"], r[f"{m}_{a:g}_last"]) for m in ("munk", "restoring") for a in (SMALL, LARGE)]
+        cells = [
+            pair(r[f"{m}_{a:g}_first"], r[f"{m}_{a:g}_last"]) for m in ("munk", "restoring") for a in (SMALL, LARGE)
+        ]
         explicit = "drag_first" in r
         rows.append([f"`{r['method']}`", *cells, shown(r["munk_theory"]),
                      shown(r["drag_first"]) if explicit else "", shown(r["drag_theory"]) if explicit else "",

@@ -45,9 +45,10 @@ if TYPE_CHECKING:
     from lgvi_warp.coefficients_yaml import from_yaml
     from lgvi_warp.law_check import check_law
     from lgvi_warp.plan import Plan
-    from lgvi_warp.sinks.plots import plot, plot_tradeoff
+    from lgvi_warp.sinks.plots import plot, plot_stability, plot_tradeoff
     from lgvi_warp.sinks.rerun import log_rerun
     from lgvi_warp.solving import solve
+    from lgvi_warp.stability import StabilityMap, stability_map
     from lgvi_warp.suggestion import suggest
     from lgvi_warp.tradeoffs import tradeoff
 
@@ -60,7 +61,10 @@ _LAZY = {
     "tradeoff": "lgvi_warp.tradeoffs",
     "Plan": "lgvi_warp.plan",
     "plot": "lgvi_warp.sinks.plots",
+    "plot_stability": "lgvi_warp.sinks.plots",
     "plot_tradeoff": "lgvi_warp.sinks.plots",
+    "StabilityMap": "lgvi_warp.stability",
+    "stability_map": "lgvi_warp.stability",
     "log_rerun": "lgvi_warp.sinks.rerun",
     "check_law": "lgvi_warp.law_check",
     "from_fossen": "lgvi_warp.coefficients",
@@ -96,6 +100,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "Setting",
+    "StabilityMap",
     "Start",
     "Status",
     "StopTime",
@@ -118,10 +123,12 @@ __all__ = [
     "from_yaml",
     "log_rerun",
     "plot",
+    "plot_stability",
     "plot_tradeoff",
     "quantity",
     "register",
     "solve",
+    "stability_map",
     "suggest",
     "tradeoff",
     "vehicles",

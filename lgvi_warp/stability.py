@@ -8,7 +8,6 @@ import math
 import os
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
@@ -16,34 +15,21 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp import comparison, invariants, machine, plan
-from lgvi_warp.comparison import PRECISE, QUANTITIES
+from lgvi_warp import machine, plan
+from lgvi_warp.comparison import QUANTITIES
 from lgvi_warp.errors import Faults, SceneError
-from lgvi_warp.method import Method
-from lgvi_warp.plan import Plan
-from lgvi_warp.result import Result
-from lgvi_warp.saveat import FIELDS, TimeGrid
 from lgvi_warp.scene import Scene
-from lgvi_warp.solving import provenance, run_plan
+from lgvi_warp.solving import provenance
 from lgvi_warp.speed import void
 from lgvi_warp.stability_grid import Axis, Grid, Line
 from lgvi_warp.stability_limits import LIMITS
+from lgvi_warp.stability_runs import REFUSED, SHORTEST, Found, column, judged, make_references, plan_of, run_method
 from lgvi_warp.status import Status
 from lgvi_warp.tradeoffs import _finite, check_of, chosen_methods
 
 METHODS = ("psi", "psi_s", "psi_x", "rk4")
 # Maps by name: their two axes.
 GRIDS = {"omega": ("h", "angular_velocity"), "mass": ("h", "added_mass_ratio"), "drag": ("h", "drag_number")}
-# Times that errors are taken at, and that energies are looked at.
-ERROR_SAMPLES, ENERGY_SAMPLES = 8, 64
-# A reference agrees with another run to the error bound over this.
-TRUST = 10.0
-# Of a reference: it turns by this at most in its first step [rad], and its step is halved so often to agree.
-FINE, HALVINGS = 0.2, 6
-# A matrix this far from a rotation is none any more.
-SKEWED = 0.1
-# The status of members whose column the program refused to run.
-REFUSED = 255
 
 
 class Cell(IntEnum):
@@ -63,10 +49,10 @@ class Cell(IntEnum):
 
 TEXTS = {
     Cell.ACCURATE: "error below the bound",
-    Cell.BOUNDED: "error above, energy bounded",
-    Cell.FLAGGED: "stopped or warned in time",
-    Cell.FAILED: "energy unbounded, flagged",
-    Cell.SILENT: "energy unbounded, no flag",
+    Cell.BOUNDED: "error above it, energy bounded",
+    Cell.FLAGGED: "status or warning, energy bounded",
+    Cell.FAILED: "energy or R unbounded, flagged",
+    Cell.SILENT: "energy or R unbounded, no flag",
 }
 
 
@@ -121,7 +107,9 @@ class StabilityMap:
 
     def silent(self, method: str) -> list[tuple[float, float]]:
         """(x, y) of the cells whose energy is unbounded without any flag: what must never happen."""
-        return [(float(self.x.values[j]), float(self.y.values[i])) for i, j in np.argwhere(self._of(method) == Cell.SILENT)]
+        return [
+            (float(self.x.values[j]), float(self.y.values[i])) for i, j in np.argwhere(self._of(method) == Cell.SILENT)
+        ]
 
     def _of(self, method: str) -> np.ndarray:
         faults = Faults()
@@ -163,9 +151,17 @@ class StabilityMap:
         for method in self.methods:
             for i, j in np.ndindex(self.classes[method].shape):
                 row = {"method": method, self.x.name: self.x.values[j], self.y.name: self.y.values[i]}
-                row |= {"class": Cell(self.classes[method][i, j]).name.lower(), f"error_{self.of}": self.errors[method][i, j]}
-                row |= {"energy_growth": self.energies[method][i, j], "status": status_name(self.statuses[method][i, j])}
-                rows.append(row | {f"h_over_{name}_limit": values[i, j] for name, values in self.ratios[method].items()})
+                row |= {
+                    "class": Cell(int(self.classes[method][i, j])).name.lower(),
+                    f"error_{self.of}": self.errors[method][i, j],
+                }
+                row |= {
+                    "energy_growth": self.energies[method][i, j],
+                    "status": status_name(int(self.statuses[method][i, j])),
+                }
+                rows.append(
+                    row | {f"h_over_{name}_limit": values[i, j] for name, values in self.ratios[method].items()}
+                )
         return rows
 
     def to_csv(self, path: str | os.PathLike[str]) -> Path:
@@ -193,46 +189,12 @@ ARRAYS: dict[str, Any] = {"classes": np.int64, "errors": np.float64, "energies":
 def _array(values: Any, kind: Any) -> np.ndarray:
     """An array; None is infinite."""
     array = np.array(values, dtype=object)
-    return np.asarray(np.where(np.equal(array, None), np.inf, array).astype(kind))
+    return np.asarray(np.where(array == np.array(None), np.inf, array).astype(kind))
 
 
 def status_name(code: int) -> str:
     """In small letters."""
     return "refused" if code == REFUSED else Status(code).name.lower()
-
-
-@dataclass
-class _Found:
-    """What a method's runs showed, by member."""
-
-    error: np.ndarray
-    growth: np.ndarray
-    status: np.ndarray
-    warned: np.ndarray
-
-
-@dataclass(eq=False)
-class _Column:
-    """One step and the members that take it, with the times that its runs are sampled at, and the reference there."""
-
-    h: float
-    members: np.ndarray
-    error_steps: np.ndarray
-    steps: np.ndarray
-    reference: Result | None = None
-    verified: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
-
-    def grid(self, finer: int = 1, whole: bool = True) -> TimeGrid:
-        """The steps and samples; `finer`: of h over this many."""
-        steps = self.steps if whole else self.error_steps
-        return TimeGrid(self.h / finer, steps * finer, steps * self.h)
-
-
-def _column(h: float, members: np.ndarray, error_time: float, t1: float) -> _Column:
-    short, long = (max(1, math.ceil(t / h * (1.0 - 1e-12))) for t in (error_time, t1))
-    errors = np.unique(np.linspace(0, short, ERROR_SAMPLES + 1).round().astype(np.int64))
-    more = np.linspace(0, max(long, short), ENERGY_SAMPLES + 1).round().astype(np.int64)
-    return _Column(h, members, errors, np.union1d(errors, more))
 
 
 def stability_map(
@@ -289,15 +251,15 @@ def stability_map(
     assert grid is not None
     period = 2.0 * math.pi / grid.rate
     error_time = error_time or min(period, t1 or period)
-    judged = _judged(grid, names)
-    t1 = error_time if judged == "driven" else max(t1 or 10.0 * period, error_time)
-    columns = [_column(step, members, error_time, t1) for step, members in grid.columns()]
+    kind = judged(grid, names)
+    t1 = error_time if kind == "driven" else max(t1 or 10.0 * period, error_time)
+    columns = [column(step, members, error_time, t1) for step, members in grid.columns()]
     threads = threads or machine.thread_count()
-    text = _make_references(grid, columns, of, error, threads, lambda part: report(0.4 * part))
+    text = make_references(grid, columns, of, error, threads, lambda part: report(0.4 * part))
     found, refused, messages = {}, {}, []
     for i, name in enumerate(names):
-        part = lambda done, i=i: report(0.4 + 0.6 * (i + done) / len(names))  # noqa: E731
-        one, why = _run(grid, columns, name, dtype, of, judged, threads, part)
+        one, why = run_method(grid, columns, name, dtype, of, kind, threads)
+        report(0.4 + 0.6 * (i + 1) / len(names))
         if np.all(one.status == REFUSED):
             refused[name] = why
             continue
@@ -307,8 +269,8 @@ def stability_map(
     if not found:
         raise SceneError([f"method {name}: {why}" for name, why in refused.items()])
     verified = np.zeros(len(grid.h), bool)
-    for column in columns:
-        verified[column.members] = column.verified
+    for part in columns:
+        verified[part.members] = part.verified
     classes = {name: _worst(grid, _classes(one, verified, error, energy_bound)) for name, one in found.items()}
     line_x, line_y = grid.lines
     result = StabilityMap(
@@ -324,10 +286,10 @@ def stability_map(
         error_time=float(error_time),
         t1=float(t1),
         directions=directions,
-        judged=judged,
+        judged=kind,
         reference=text,
         unverified=int(_worst(grid, ~verified).sum()),
-        provenance=_provenance(grid, columns[0], names, dtype, seed, energy_bound),
+        provenance=_provenance(grid, list(found), dtype, seed, energy_bound),
         refused=refused,
         messages=tuple(messages),
         seconds=time.perf_counter() - begun,
@@ -341,210 +303,7 @@ def _worst(grid: Grid, values: np.ndarray) -> np.ndarray:
     return np.max(values.reshape(grid.shape), axis=2)
 
 
-def _plan(grid: Grid, members: np.ndarray, method: str, times: TimeGrid, dtype: str) -> Plan:
-    checks = "all" if "all" in plan.CHECKS else "safe"
-    return Plan(grid.fleet(members), Method(method), times, FIELDS, dtype, checks=checks)
-
-
-def _judged(grid: Grid, names: Sequence[str]) -> str:
-    """Whether energy is kept, only lost, or given by what acts. Raises SceneError where noise acts."""
-    for name in (*names, *PRECISE):
-        try:
-            # A step so short that no method refuses it for its length.
-            laws = _plan(grid, np.arange(1), name, TimeGrid(1e-9, np.array([0, 1]), np.array([0.0, 1e-9])), "float64").model.laws
-            break
-        except SceneError:
-            continue
-    else:
-        return "driven"
-    if any(getattr(module, "NOISE", False) for _, module in laws):
-        raise SceneError(["terms: noise acts, whose path differs from step to step; leave it out for a stability map"])
-    driven = [term for term, module in laws if not getattr(module, "POTENTIAL", False) and not _damps(term, module)]
-    if driven:
-        return "driven"
-    return "dissipative" if any(_damps(term, module) for term, module in laws) else "conservative"
-
-
-def _damps(term: Any, module: Any) -> bool:
-    """Whether it can only take energy, relative to the water. A horizontal current that is steady gives none to that."""
-    if getattr(module, "FLOW", "none") != "none":
-        return getattr(module, "FLOW", "none") == "steady" and not np.any(np.asarray(getattr(term, "velocity", [0, 0, 1]))[2:])
-    return bool(term.dissipative) and not hasattr(module, "law")
-
-
-def _make_references(
-    grid: Grid, columns: Sequence[_Column], of: str, error: float, threads: int, report: Callable[[float], None]
-) -> str:
-    """Give every column the states at its error times; says by which methods."""
-    first, second = _precise(grid)
-    rates = np.max(list(grid.rates().values()), axis=0)
-    done = 0
-    with ThreadPoolExecutor(threads) as pool:
-        jobs = [pool.submit(_reference, grid, one, (first, second), rates, of, error / TRUST) for one in columns]
-        for job in as_completed(jobs):
-            job.result()
-            done += 1
-            report(done / len(jobs))
-    return f"{second} against {first}, steps that turn by {FINE:g} rad or less, halved until they agree"
-
-
-def _precise(grid: Grid) -> tuple[str, str]:
-    """The two best methods that the scene takes; the best twice where the second is of much lower order."""
-    names: list[str] = []
-    times = TimeGrid(1e-9, np.array([0, 1]), np.array([0.0, 1e-9]))
-    for name in PRECISE:
-        try:
-            Method(name)
-            _plan(grid, np.arange(len(grid.h)), name, times, "float64")
-        except SceneError:
-            continue
-        names.append(name)
-        if len(names) == 2:
-            break
-    if not names:
-        raise SceneError([f"method: the scene takes none of {', '.join(PRECISE)} for a reference"])
-    close = len(names) == 2 and Method(names[1]).order >= Method(names[0]).order - 2
-    return names[0], names[1] if close else names[0]
-
-
-def _reference(
-    grid: Grid, column: _Column, names: tuple[str, str], rates: np.ndarray, of: str, goal: float
-) -> None:
-    """Fill in a column's reference: two methods, halving the steps of the members that they do not yet agree on."""
-    n = len(column.members)
-    column.verified = np.zeros(n, bool)
-    open_ = np.arange(n)
-    finer = max(1, math.ceil(column.h * float(rates[column.members].max()) / FINE))
-    for _ in range(HALVINGS):
-        members = column.members[open_]
-        try:
-            with np.errstate(all="ignore"):
-                a, b = (run_plan(_plan(grid, members, name, column.grid(k, whole=False), "float64"), 1)
-                        for name, k in zip(names, (finer, math.ceil(1.5 * finer)), strict=True))  # fmt: skip
-                apart = comparison.distances(a, b)[of]
-                good = ~_refused(a) & ~_refused(b) & (np.nanmax(np.nan_to_num(apart, posinf=np.inf), axis=0) <= goal)
-                good &= np.isfinite(b.attitude).all(axis=(0, 2, 3))
-        except SceneError:
-            # Too long for a stage that goes backward.
-            finer *= 2
-            continue
-        column.reference = _joined(column.reference, b, open_, n)
-        column.verified[open_] = good
-        open_ = open_[~good]
-        finer *= 2
-        if len(open_) == 0:
-            break
-
-
-def _refused(result: Result) -> np.ndarray:
-    """Which members got a status that is no event's."""
-    status = np.asarray(result.status)
-    return np.asarray((status != Status.OK) & (status < Status.SURFACE))
-
-
-def _joined(whole: Result | None, part: Result, at: np.ndarray, n: int) -> Result:
-    """The part's members in the place of those of the whole."""
-    if whole is None:
-        return part
-    for name, values in part.samples.items():
-        whole.samples[name][:, at] = values
-    whole.status[at], whole.failure_time[at] = part.status, part.failure_time
-    # Energies that were asked for already are of the old samples.
-    vars(whole).pop("energy", None)
-    return whole
-
-
-def _run(
-    grid: Grid, columns: Sequence[_Column], method: str, dtype: str, of: str, judged: str, threads: int,
-    report: Callable[[float], None],
-) -> tuple[_Found, str]:  # fmt: skip
-    """Run a method over all columns; also the reason where the program refused some."""
-    n = len(grid.h)
-    found = _Found(np.full(n, np.inf), np.zeros(n), np.full(n, REFUSED), np.zeros(n, bool))
-    why: list[str] = []
-    rows = grid.shape[2]
-
-    def column_of(column: _Column, at: np.ndarray) -> None:
-        members = column.members[at]
-        try:
-            plan = _plan(grid, members, method, column.grid(), dtype)
-        except SceneError as error:
-            why.append(str(error))
-            if len(at) > rows:
-                # Only some cells of it are refused: halves of whole cells.
-                half = len(at) // rows // 2 * rows
-                column_of(column, at[:half])
-                column_of(column, at[half:])
-            return
-        with np.errstate(all="ignore"):
-            _judge(run_plan(plan, 1), column, at, found, of, judged)
-
-    with ThreadPoolExecutor(threads) as pool:
-        jobs = [pool.submit(column_of, one, np.arange(len(one.members))) for one in columns]
-        for done, job in enumerate(as_completed(jobs), 1):
-            job.result()
-            report(done / len(jobs))
-    return found, why[0] if why else ""
-
-
-def _judge(result: Result, column: _Column, at: np.ndarray, found: _Found, of: str, judged: str) -> None:
-    """Note what the run of some members of a column showed."""
-    members = column.members[at]
-    found.status[members] = np.asarray(result.status)
-    warnings = getattr(result, "warnings", None)
-    if warnings is not None:
-        found.warned[members] = np.asarray(warnings) != 0
-    early = np.searchsorted(column.steps, column.error_steps)
-    if column.reference is not None:
-        reference = comparison.part(column.reference, at)
-        apart = comparison.distances(_at_times(result, early), reference)[of]
-        found.error[members] = np.max(np.where(np.isnan(apart) & ~np.isfinite(result.failure_time), np.inf,
-                                               np.nan_to_num(apart, posinf=np.inf)), axis=0)  # fmt: skip
-        # A member that was frozen before the error time has none.
-        found.error[members] = np.where(_refused(result), np.inf, found.error[members])
-        if judged == "driven":
-            energy, size = reference.energy, np.max(invariants.kinetic_energy(reference), axis=0)
-            change = np.max(np.abs(result.energy[early] - energy), axis=0)
-            found.growth[members] = _with_rotation(change / np.maximum(size, 1e-300), result)
-            return
-    found.growth[members] = _with_rotation(energy_growth(result, judged == "dissipative"), result)
-
-
-def _at_times(result: Result, rows: np.ndarray) -> Result:
-    from dataclasses import replace
-
-    return replace(
-        result, time=result.time[rows], samples={name: values[rows] for name, values in result.samples.items()}
-    )
-
-
-def energy_growth(result: Result, dissipative: bool = False) -> np.ndarray:
-    """Largest change of energy (n,), or where it is dissipative largest growth, over what members could hold.
-
-    That is |p|^2 / (2 M_min) + |pi|^2 / (2 J_min) of the start and, up to each time, the largest change of the potential:
-    a bounded motion stays below about 1, whatever it exchanges.
-    """
-    kinetic, total = invariants.kinetic_energy(result), result.energy
-    potential = total - kinetic
-    momenta = invariants._momenta(result)[0]
-    I6 = np.broadcast_to(invariants.vehicle.inertia6(result.parameters), (result.members, 6, 6))
-    held = sum(0.5 * np.sum(momenta[:, part] ** 2, axis=1) / np.linalg.eigvalsh(I6[:, part, part])[:, 0]
-               for part in (slice(0, 3), slice(3, 6)))  # fmt: skip
-    given = np.maximum.accumulate(np.abs(potential - potential[:1]), axis=0)
-    change = total - total[:1]
-    growth = np.max((change if dissipative else np.abs(change)) / np.maximum(held + given, 1e-300), axis=0)
-    return np.where(np.isfinite(total).all(axis=0), growth, np.inf)
-
-
-def _with_rotation(growth: np.ndarray, result: Result) -> np.ndarray:
-    """Also how far R is from a rotation, over SKEWED; infinite where a number of the state is not finite."""
-    R = result.attitude.astype(np.float64)
-    skewed = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(0, 2, 3)) / SKEWED
-    worst = np.maximum(growth, skewed)
-    return np.where(np.isfinite(worst) & (np.asarray(result.status) != Status.NON_FINITE), worst, np.inf)
-
-
-def _classes(one: _Found, verified: np.ndarray, error: float, energy_bound: float) -> np.ndarray:
+def _classes(one: Found, verified: np.ndarray, error: float, energy_bound: float) -> np.ndarray:
     """The class of every member."""
     unbounded = ~(one.growth / energy_bound <= 1.0)
     flagged = one.warned | ((one.status != Status.OK) & ((one.status < Status.SURFACE) | (one.status == REFUSED)))
@@ -564,14 +323,18 @@ def _ratios(grid: Grid, methods: Sequence[str]) -> dict[str, dict[str, np.ndarra
     return found
 
 
-def _provenance(
-    grid: Grid, column: _Column, methods: Sequence[str], dtype: str, seed: int, energy_bound: float
-) -> dict[str, Any]:
+def _provenance(grid: Grid, methods: Sequence[str], dtype: str, seed: int, energy_bound: float) -> dict[str, Any]:
     """Scene, settings, versions, machine."""
-    content = provenance(_plan(grid, column.members[:1], "rk8", column.grid(), "float64"))
+    content = provenance(plan_of(grid, np.arange(1), methods[0], SHORTEST, "float64"))
     content = {name: content[name] for name in ("scene", "versions", "machine", "checks")}
     axes = {name: vars(axis) for name, axis in (("x", grid.x), ("y", grid.y))}
-    return content | {"methods": list(methods), "dtype": dtype, "seed": seed, "energy_bound": energy_bound, "axes": axes}
+    return content | {
+        "methods": list(methods),
+        "dtype": dtype,
+        "seed": seed,
+        "energy_bound": energy_bound,
+        "axes": axes,
+    }
 
 
 def report_text(found: StabilityMap) -> str:

@@ -111,7 +111,9 @@ class Grid:
     random, from the seed. What the scene's ensemble varies is left out. Raises SceneError naming every fault.
     """
 
-    def __init__(self, scene: Scene, x: Any, y: Any, points: Sequence[int], directions: int, seed: int, h: float | None):
+    def __init__(
+        self, scene: Scene, x: Any, y: Any, points: Sequence[int], directions: int, seed: int, h: float | None
+    ):
         faults = Faults()
         axes = []
         for given in (x, y):
@@ -187,7 +189,9 @@ class Grid:
 
     def scaled(self, axis: Axis) -> bool:
         """Whether a parameter is multiplied by the axis' values."""
-        return axis.key not in SPECIAL and (bool(self.base.parameters[axis.key][0].ndim) if axis.scaled is None else axis.scaled)  # fmt: skip
+        if axis.key in SPECIAL:
+            return False
+        return bool(self.base.parameters[axis.key][0].ndim) if axis.scaled is None else axis.scaled
 
     def line(self, axis: Axis, values: np.ndarray) -> Line:
         """The axis as a finished map has it."""
@@ -235,7 +239,9 @@ class Grid:
         self.h = np.full(n, self.step or 0.0)
         cells = np.meshgrid(*self._values, np.zeros(d), indexing="ij")
         # Masses first: drag rates and the like are of the vehicle that is then there.
-        for axis, values in sorted(zip((self.y, self.x), cells[:2], strict=True), key=lambda pair: pair[0].key in SPECIAL):
+        for axis, values in sorted(
+            zip((self.y, self.x), cells[:2], strict=True), key=lambda pair: pair[0].key in SPECIAL
+        ):
             self._apply(axis, values.ravel())
 
     def _apply(self, axis: Axis, values: np.ndarray) -> None:
@@ -281,8 +287,9 @@ class Grid:
 
     def fleet(self, members: np.ndarray) -> Ensemble:
         """Some members as an ensemble. Raises SceneError for unphysical values."""
-        states = (self.state[name][members] for name in STATES)
-        return Ensemble.from_states(self.scene, *states, {name: value[members] for name, value in self.varied.items()})
+        b, R, nu, Om = (self.state[name][members] for name in STATES)
+        varied = {name: value[members] for name, value in self.varied.items()}
+        return Ensemble.from_states(self.scene, b, R, nu, Om, varied)
 
     def rates(self) -> dict[str, np.ndarray]:
         """How fast every member moves at its start, by kind (see stability_limits.rates)."""

@@ -18,7 +18,7 @@ from lgvi_warp.tableaux import Tableau
 
 # A step that makes a small motion grow by less than this passes for stable: tenfold in 4000 steps.
 GROWTH = math.log(10.0) / 4000.0
-# What the iteration for the forces of Phi* can: a contraction that reaches its tolerance in its last round (lgvi_kernels.paper).
+# What the iteration for the forces of Phi* can: a contraction that reaches its tolerance in 60 rounds.
 CONTRACTION = 1e-14 ** (1.0 / 60.0)
 # Numbers h w that are looked at.
 STEP, MOST = 1e-3, 30.0
@@ -184,5 +184,3 @@ def drag_keys(parameters: Mapping[str, np.ndarray]) -> list[str]:
 
 def _diagonal(values: np.ndarray) -> np.ndarray:
     return values if values.ndim == 2 else np.einsum("nii->ni", values)
-
-

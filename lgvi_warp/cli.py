@@ -254,9 +254,9 @@ def stability(chosen: argparse.Namespace) -> int:
             [f"--grid {chosen.grid}: says the axes that --x and --y say; leave out --grid, or both of them"]
         )
     changes = overrides(chosen)
-    # The map's seed: of the random directions. The scene's ensemble plays no part in it.
-    seed = changes.pop("ensemble.seed", "0")
     scene = Scene.load(chosen.scene, changes)
+    # Of the random directions: all that the scene's ensemble has to say here.
+    seed = scene.ensemble_settings.seed if scene.ensemble_settings else 0
     out: Path = chosen.out or Path("runs") / f"{Path(chosen.scene).stem}_stability"
     out.mkdir(parents=True, exist_ok=True)
     from lgvi_warp.sinks.plots import plot_stability
@@ -272,7 +272,7 @@ def stability(chosen: argparse.Namespace) -> int:
     files, faults, texts = [], [], []
     for i, (name, (x, y)) in enumerate(maps.items()):
         found = stability_map(
-            scene, x, y, methods, points=chosen.points, t1=t1, error=chosen.error, of=chosen.of, seed=int(seed),
+            scene, x, y, methods, points=chosen.points, t1=t1, error=chosen.error, of=chosen.of, seed=seed,
             progress=_part_of(progress, i, len(maps)),
         )  # fmt: skip
         files += found.save(out, name)

@@ -51,8 +51,8 @@ TEXTS = {
     Cell.ACCURATE: "error below the bound",
     Cell.BOUNDED: "error above it, energy bounded",
     Cell.FLAGGED: "status or warning, energy bounded",
-    Cell.FAILED: "energy or R unbounded, flagged",
-    Cell.SILENT: "energy or R unbounded, no flag",
+    Cell.FAILED: "unbounded or not finite, flagged",
+    Cell.SILENT: "unbounded without any flag",
 }
 
 
@@ -271,7 +271,7 @@ def stability_map(
     verified = np.zeros(len(grid.h), bool)
     for part in columns:
         verified[part.members] = part.verified
-    classes = {name: _worst(grid, _classes(one, verified, error, energy_bound)) for name, one in found.items()}
+    classes = {name: _worst(grid, cells_of(one, verified, error, energy_bound)) for name, one in found.items()}
     line_x, line_y = grid.lines
     result = StabilityMap(
         x=line_x,
@@ -303,7 +303,7 @@ def _worst(grid: Grid, values: np.ndarray) -> np.ndarray:
     return np.max(values.reshape(grid.shape), axis=2)
 
 
-def _classes(one: Found, verified: np.ndarray, error: float, energy_bound: float) -> np.ndarray:
+def cells_of(one: Found, verified: np.ndarray, error: float, energy_bound: float) -> np.ndarray:
     """The class of every member."""
     unbounded = ~(one.growth / energy_bound <= 1.0)
     flagged = one.warned | ((one.status != Status.OK) & ((one.status < Status.SURFACE) | (one.status == REFUSED)))

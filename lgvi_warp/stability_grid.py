@@ -153,7 +153,11 @@ class Grid:
         low, high = low if axis.low is None else axis.low, high if axis.high is None else axis.high
         for value in (low, high):
             positive = axis.log or axis.key in SPECIAL
-            good = not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)
+            good = (
+                not isinstance(value, bool)
+                and isinstance(value, int | float | np.integer | np.floating)
+                and math.isfinite(value)
+            )
             if not good or (positive and value <= 0.0):
                 faults.add(f"axis {axis.name}", value, "is not a finite number" + " above 0" * positive,
                            f"give a range: {FORM}")  # fmt: skip
@@ -182,7 +186,7 @@ class Grid:
         }
         if axis.key in known:
             return known[axis.key]
-        if self.scaled(axis):
+        if self.scaled(axis) or m.parameters[axis.key][0].ndim:
             return 0.1, 10.0
         value = float(m.parameters[axis.key][0])
         return (0.1 * value, 10.0 * value) if value > 0.0 else (None, None)

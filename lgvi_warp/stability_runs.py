@@ -98,9 +98,14 @@ def judged(grid: Grid, names: Sequence[str]) -> str:
         return "driven"
     if any(flow == "steady" for flow in flows) and not all(_carried(term, module) for term, module in laws):
         return "driven"
-    takes = [term for term, module in laws if term.dissipative and not hasattr(module, "law")]
-    gives = [term for term, module in laws if not getattr(module, "POTENTIAL", False) and term not in takes]
-    return "driven" if gives else "dissipative" if takes else "conservative"
+    rest = [
+        (term, module)
+        for term, module in laws
+        if not getattr(module, "POTENTIAL", False) and not hasattr(module, "flow")
+    ]
+    if any(hasattr(module, "law") or not term.dissipative for term, module in rest):
+        return "driven"
+    return "dissipative" if rest else "conservative"
 
 
 def _carried(term: Any, module: Any) -> bool:

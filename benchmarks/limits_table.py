@@ -46,9 +46,9 @@ def tilted(n, axis, angle):
     return notation.matrix_from_rotation_vector(np.tile(angle * np.eye(3)[axis], (n, 1)))
 
 
-def run(fleet, method, steps=STEPS):
+def run(fleet, method, steps=STEPS, samples=SAMPLES):
     """The result after so many steps of 1 s."""
-    return lw.solve(fleet, method, h=1.0, t1=float(steps), save=lw.SaveAt(every=float(steps // SAMPLES)), threads=1)
+    return lw.solve(fleet, method, h=1.0, t1=float(steps), save=lw.SaveAt(every=float(steps // samples)), threads=1)
 
 
 def stays(result, axis, angle):
@@ -60,13 +60,18 @@ def stays(result, axis, angle):
 
 
 def munk(method, hw, angle):
+    """Whether a Munk oscillation that was released at an angle stays."""
+    return stays(munk_run(method, hw, angle), 1, angle)
+
+
+def munk_run(method, hw, angle, steps=STEPS, samples=SAMPLES):
     """Released at rest with the momentum `angle` off broadside, w = |p| sqrt((1 - 1/100) / J), J = 1."""
     n = len(hw)
     R = tilted(n, 2, angle)
     p = R[:, 1, :] * (hw / np.sqrt(1.0 - 0.01))[:, None]
     scene = lw.Scene(lw.Vehicle(0.5, (1.0, 1.0, 1.0), np.array(MASS) - 0.5), lw.Environment(gravity=0.0))
     fleet = lw.Ensemble.from_states(scene, still(n), R, p / MASS, still(n))
-    return stays(run(fleet, method), 1, angle)
+    return run(fleet, method, steps, samples)
 
 
 def restoring(method, hw, angle):

@@ -21,9 +21,19 @@ from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.scene import Scene
 from lgvi_warp.solving import provenance
 from lgvi_warp.speed import void
-from lgvi_warp.stability_grid import Axis, Grid, Line
+from lgvi_warp.stability_grid import Grid, Line
 from lgvi_warp.stability_limits import LIMITS
-from lgvi_warp.stability_runs import REFUSED, SHORTEST, Found, column, judged, make_references, plan_of, run_method
+from lgvi_warp.stability_runs import (
+    REFUSED,
+    SHORTEST,
+    Found,
+    column,
+    judged,
+    make_references,
+    plan_of,
+    refusals,
+    run_method,
+)
 from lgvi_warp.status import Status
 from lgvi_warp.tradeoffs import _finite, check_of, chosen_methods
 
@@ -62,7 +72,7 @@ class StabilityMap:
 
     x, y: lines of nx and ny values. classes: method -> (ny, nx), Cell. errors: largest error [unit of `of`] up to
     error_time, infinite without one; energies: largest growth of energy over the bound, above 1 where it is unbounded;
-    statuses: the largest Status code (255: the program refused to run it). ratios: method -> limit -> (ny, nx), h over the
+    statuses: the worst Status code (255: the program refused to run it). ratios: method -> limit -> (ny, nx), h over the
     analytic limit of the fastest direction (see stability_limits.LIMITS), above 1 beyond it. error_bound [unit of `of`];
     error_time and t1 [s], each rounded up to whole steps. judged: how energies are ("conservative", "dissipative" or
     "driven"). unverified: cells whose reference was not good enough, which so cannot be accurate. refused: method -> why.
@@ -211,7 +221,7 @@ def stability_map(
     energy_bound: float = 1.0,
     directions: int = 4,
     h: float | None = None,
-    dtype: str = "float64",
+    dtype: str | None = None,
     seed: int = 0,
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
@@ -222,6 +232,7 @@ def stability_map(
     text ("h=0.01:3", "vehicle.mass=50:500:linear"), as (name, low, high) or as a stability_grid.Axis. methods: names
     (default psi, psi_s, psi_x, rk4). points: cells along x and y, one number or two. directions: starts per cell, the
     scene's own and such of velocity and spin turned at random; the worst counts. h: the step [s], where it is on no axis.
+    dtype: default the scene's. What the scene's ensemble varies is left out.
 
     A cell is accurate where the error of `of` stays below `error` [its unit] up to error_time [s] (default: one period of
     the fastest motion at the start), against a reference of fine steps that two runs agree on ten times better; bounded
@@ -234,6 +245,7 @@ def stability_map(
     progress: called with the fraction of the work done. Raises SceneError naming every fault, and where noise acts.
     """
     begun, report = time.perf_counter(), progress or void
+    dtype = dtype or scene.run.dtype
     names = chosen_methods(methods, METHODS)
     faults = Faults()
     with faults.including():
@@ -249,6 +261,10 @@ def stability_map(
         grid = Grid(scene, x, y, both, directions, seed, h)
     faults.raise_if_any()
     assert grid is not None
+    refused = refusals(grid, names, dtype)
+    if len(refused) == len(names):
+        raise SceneError([f"method {name}: {why}" for name, why in refused.items()])
+    names = tuple(name for name in names if name not in refused)
     period = 2.0 * math.pi / grid.rate
     error_time = error_time or min(period, t1 or period)
     kind = judged(grid, names)
@@ -256,18 +272,13 @@ def stability_map(
     columns = [column(step, members, error_time, t1) for step, members in grid.columns()]
     threads = threads or machine.thread_count()
     text = make_references(grid, columns, of, error, threads, lambda part: report(0.4 * part))
-    found, refused, messages = {}, {}, []
+    found, messages = {}, []
     for i, name in enumerate(names):
         one, why = run_method(grid, columns, name, dtype, of, kind, threads)
         report(0.4 + 0.6 * (i + 1) / len(names))
-        if np.all(one.status == REFUSED):
-            refused[name] = why
-            continue
         found[name] = one
         if why:
             messages.append(f"{name}: refused in {int(_worst(grid, one.status == REFUSED).sum())} cells: {why}")
-    if not found:
-        raise SceneError([f"method {name}: {why}" for name, why in refused.items()])
     verified = np.zeros(len(grid.h), bool)
     for part in columns:
         verified[part.members] = part.verified
@@ -279,7 +290,7 @@ def stability_map(
         classes=classes,
         errors={name: _worst(grid, one.error) for name, one in found.items()},
         energies={name: _worst(grid, one.growth / energy_bound) for name, one in found.items()},
-        statuses={name: _worst(grid, one.status) for name, one in found.items()},
+        statuses={name: _worst_status(grid, one.status) for name, one in found.items()},
         ratios=_ratios(grid, list(found)),
         of=of,
         error_bound=float(error),
@@ -301,6 +312,14 @@ def stability_map(
 def _worst(grid: Grid, values: np.ndarray) -> np.ndarray:
     """(ny, nx) of what members have: the largest over the directions of a cell."""
     return np.max(values.reshape(grid.shape), axis=2)
+
+
+def _worst_status(grid: Grid, status: np.ndarray) -> np.ndarray:
+    """(ny, nx): what the program refused before failures, those before events, and the latter before OK."""
+    event = (status >= Status.SURFACE) & (status < REFUSED)
+    rank = np.where(event, status - 500, np.where(status == Status.OK, -1000, status)).reshape(grid.shape)
+    chosen = np.argmax(rank, axis=2)[:, :, None]
+    return np.take_along_axis(status.reshape(grid.shape), chosen, axis=2)[:, :, 0]
 
 
 def cells_of(one: Found, verified: np.ndarray, error: float, energy_bound: float) -> np.ndarray:
@@ -358,6 +377,3 @@ def report_text(found: StabilityMap) -> str:
         span = f"{good.min():.3g} to {good.max():.3g}" if len(good) else "none"
         lines.append(f"{method:<18}" + "".join(f"{number:>10}" for number in numbers) + f"   {span} {found.x.unit}")
     return "\n".join(lines)
-
-
-__all__ = ["GRIDS", "Axis", "Cell", "StabilityMap", "stability_map"]

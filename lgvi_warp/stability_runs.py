@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import threading
 from collections.abc import Callable, Sequence
@@ -81,16 +80,20 @@ def plan_of(grid: Grid, members: np.ndarray, method: str, times: TimeGrid, dtype
         return Plan(grid.fleet(members), Method(method), times, FIELDS, dtype, checks=checks)
 
 
+def refusals(grid: Grid, names: Sequence[str], dtype: str) -> dict[str, str]:
+    """Methods that the scene does not take at any step, and why."""
+    refused = {}
+    for name in names:
+        try:
+            plan_of(grid, np.arange(len(grid.h)), name, SHORTEST, dtype)
+        except SceneError as error:
+            refused[name] = str(error)
+    return refused
+
+
 def judged(grid: Grid, names: Sequence[str]) -> str:
     """Whether energy is kept, only lost, or given by what acts. Raises SceneError where noise acts."""
-    for name in (*names, *PRECISE):
-        try:
-            laws = plan_of(grid, np.arange(1), name, SHORTEST, "float64").model.laws
-            break
-        except SceneError:
-            continue
-    else:
-        return "driven"
+    laws = plan_of(grid, np.arange(1), names[0], SHORTEST, "float64").model.laws
     if any(getattr(module, "NOISE", False) for _, module in laws):
         raise SceneError(["terms: noise acts, whose path differs from step to step; leave it out for a stability map"])
     flows = [getattr(module, "FLOW", "none") for _, module in laws]
@@ -202,8 +205,7 @@ def run_method(
     found = Found(np.full(n, np.inf), np.zeros(n), np.full(n, REFUSED), np.zeros(n, bool))
     why: list[str] = []
     rows = grid.shape[2]
-    with contextlib.suppress(SceneError):
-        plan_of(grid, np.arange(n), method, SHORTEST, dtype).compile()
+    plan_of(grid, np.arange(n), method, SHORTEST, dtype).compile()
 
     def column_of(column: Column, at: np.ndarray) -> None:
         members = column.members[at]

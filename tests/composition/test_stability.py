@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import cli
+from lgvi_warp import cli, invariants, stability
 from lgvi_warp.stability import Cell, StabilityMap, report_text
 from lgvi_warp.stability_grid import Grid
 from lgvi_warp.stability_runs import column, judged, make_references
@@ -116,6 +116,29 @@ def test_what_acts_decides_how_energy_is_judged(scene):
     assert kind(lw.Wrench(force=[1.0, 0.0, 0.0])) == "driven"
     with pytest.raises(lw.SceneError, match="noise acts"):
         kind(lw.WrenchNoise(force=[1.0, 0.0, 0.0]))
+
+
+def test_growth_of_energy_is_over_what_the_start_can_hold(scene):
+    result = lw.solve(
+        dataclasses.replace(scene, ensemble_settings=None), "psi_s", h=0.01, t1=2.0, save=lw.SaveAt(every=0.5)
+    )
+    assert 0.0 < invariants.energy_growth(result)[0] < 1e-4
+
+    def altered(factor):
+        velocity = result.velocity.copy()
+        velocity[-1] *= factor
+        return dataclasses.replace(result, samples=result.samples | {"velocity": velocity})
+
+    faster, slower, lost = (altered(factor) for factor in (2.0, 0.5, np.nan))
+    # Four times the kinetic energy of translation: three times what it was too much, of M from 189 to 199 kg.
+    assert 2.5 < invariants.energy_growth(faster)[0] < 3.5 and invariants.energy_growth(lost)[0] == np.inf
+    assert invariants.energy_growth(slower)[0] > 0.6 > invariants.energy_growth(slower, dissipative=True)[0]
+
+
+def test_the_worst_status_is_of_a_failure_before_an_event(scene):
+    grid = Grid(scene, "h", "angular_velocity", (2, 2), 3, 0, None)
+    status = np.array([0, 16, 3, 0, 0, 16, 255, 16, 1, 0, 0, 0])
+    assert stability._worst_status(grid, status).tolist() == [[3, 16], [255, 0]]
 
 
 def test_the_same_for_any_number_of_threads(scene):

@@ -11,7 +11,7 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.limits_table import EXPLICIT_DRAG, LARGE, METHODS, MOTIONS, SMALL, measured
+from benchmarks.limits_table import EXPLICIT_DRAG, LARGE, MASS, METHODS, MOTIONS, SMALL, measured, munk_run
 from lgvi_warp.stability_limits import LIMITS
 
 # method -> (limit, whether stable windows above the first loss count).
@@ -40,6 +40,30 @@ def test_a_right_angle_in_a_step_loses_large_angles_only(method):
     assert close(measured("munk", method, LARGE, high=4.0)[0], math.sqrt(2.0), 0.02)
     near = math.sqrt(2.0) * np.linspace(0.98, 1.02, 64)
     assert np.all(MOTIONS["munk"](method, near, SMALL)) and not np.all(MOTIONS["munk"](method, near, LARGE))
+
+
+def started(method, hw, steps):
+    """Angle (k,) off broadside and momentum (k,), over the start's, of an oscillation released at .3 rad, step by step."""
+    result = munk_run(method, np.array([hw]), LARGE, steps, samples=steps)
+    R, p = result.attitude[:, 0], result.velocity[:, 0] * np.array(MASS)
+    size = np.linalg.norm(p, axis=1)
+    return np.arctan2(R[:, 0, 1], R[:, 1, 1]), size / size[0]
+
+
+def test_above_two_an_oscillation_jumps_from_side_to_side():
+    angle, _ = started("psi_s", 2.05, 400)
+    assert np.all(angle[1:] * angle[:-1] < 0.0) and np.all(np.abs(angle) < 1.5 * LARGE)
+
+
+@pytest.mark.slow
+def test_explicit_methods_gain_momentum_up_to_the_linear_limit():
+    """rk4 is lost at h w = 2.46, .3 rad: |p| grows in the first steps, and w with it, to sqrt(8) / h; psi_s keeps it."""
+    _, size = started("rk4", 2.46, 8)
+    assert 2.46 * size[4] > 0.98 * math.sqrt(8.0) and size[1] > 1.05
+    _, size = started("rk4", 1.0, 8)
+    assert np.all(np.abs(size - 1.0) < 0.01)
+    _, size = started("psi_s", 2.05, 400)
+    assert np.all(np.abs(size - 1.0) < 1e-12)
 
 
 SOLVED = [m for m in METHODS if not m.startswith("gauss")]

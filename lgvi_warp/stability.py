@@ -240,7 +240,7 @@ def stability_map(
     a damped one's grows, by less than energy_bound times what the start's momenta can hold as kinetic energy plus what the
     potentials gave. It is flagged where that holds and a member got a status or a warning; failed where it does not and
     one was given, also for numbers that are not finite; silent where it does not and none was. What drives a scene (wrenches,
-    thrusters, waves) changes its energy by right: there it is compared with the reference's, up to error_time.
+    thrusters, waves) changes its energy by right: there it is compared with the reference's, up to error_time or 16 steps.
 
     progress: called with the fraction of the work done. Raises SceneError naming every fault, and where noise acts.
     """
@@ -269,7 +269,8 @@ def stability_map(
     error_time = error_time or min(period, t1 or period)
     kind = judged(grid, names)
     t1 = error_time if kind == "driven" else max(t1 or 10.0 * period, error_time)
-    columns = [column(step, members, error_time, t1) for step, members in grid.columns()]
+    least = LEAST_DRIVEN if kind == "driven" else 1
+    columns = [column(step, members, error_time, t1, least) for step, members in grid.columns()]
     threads = threads or machine.thread_count()
     text = make_references(grid, columns, of, error, threads, lambda part: report(0.4 * part))
     found, messages = {}, []

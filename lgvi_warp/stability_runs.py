@@ -28,6 +28,8 @@ ERROR_SAMPLES, ENERGY_SAMPLES = 8, 64
 TRUST = 10.0
 # Of a reference: it turns by this at most in its first step [rad], and its step is halved so often to agree.
 FINE, HALVINGS = 0.2, 6
+# What is judged by the reference's energy makes so many steps: in two even the worst method does not blow up.
+LEAST_DRIVEN = 16
 # A matrix this far from a rotation is none any more.
 SKEWED = 0.1
 # The status of members whose column the program refused to run.
@@ -65,9 +67,9 @@ class Column:
         return TimeGrid(self.h / finer, steps * finer, steps * self.h)
 
 
-def column(h: float, members: np.ndarray, error_time: float, t1: float) -> Column:
-    """The column of these members: both times rounded up to whole steps."""
-    short, long = (max(1, math.ceil(t / h * (1.0 - 1e-12))) for t in (error_time, t1))
+def column(h: float, members: np.ndarray, error_time: float, t1: float, least: int = 1) -> Column:
+    """The column of these members: both times rounded up to whole steps, `least` of them or more."""
+    short, long = (max(least, math.ceil(t / h * (1.0 - 1e-12))) for t in (error_time, t1))
     errors = np.unique(np.linspace(0, short, ERROR_SAMPLES + 1).round().astype(np.int64))
     more = np.linspace(0, max(long, short), ENERGY_SAMPLES + 1).round().astype(np.int64)
     return Column(h, members, errors, np.union1d(errors, more))

@@ -24,6 +24,7 @@ from lgvi_warp.speed import void
 from lgvi_warp.stability_grid import Grid, Line
 from lgvi_warp.stability_limits import LIMITS
 from lgvi_warp.stability_runs import (
+    LEAST_DRIVEN,
     REFUSED,
     SHORTEST,
     Found,

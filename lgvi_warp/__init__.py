@@ -49,10 +49,11 @@ if TYPE_CHECKING:
     from lgvi_warp.coefficients_yaml import from_yaml
     from lgvi_warp.law_check import check_law
     from lgvi_warp.plan import Plan
-    from lgvi_warp.sinks.plots import plot, plot_tradeoff
+    from lgvi_warp.sinks.plots import plot, plot_stability, plot_tradeoff
     from lgvi_warp.sinks.rerun import log_rerun
     from lgvi_warp.sinks.sensitivity import plot_sensitivity
     from lgvi_warp.solving import solve
+    from lgvi_warp.stability import StabilityMap, stability_map
     from lgvi_warp.suggestion import suggest
     from lgvi_warp.tradeoffs import tradeoff
 
@@ -65,8 +66,11 @@ _LAZY = {
     "tradeoff": "lgvi_warp.tradeoffs",
     "Plan": "lgvi_warp.plan",
     "plot": "lgvi_warp.sinks.plots",
+    "plot_stability": "lgvi_warp.sinks.plots",
     "plot_tradeoff": "lgvi_warp.sinks.plots",
     "plot_sensitivity": "lgvi_warp.sinks.sensitivity",
+    "StabilityMap": "lgvi_warp.stability",
+    "stability_map": "lgvi_warp.stability",
     "log_rerun": "lgvi_warp.sinks.rerun",
     "check_law": "lgvi_warp.law_check",
     "from_fossen": "lgvi_warp.coefficients",
@@ -116,6 +120,7 @@ __all__ = [
     "SceneError",
     "Setting",
     "Sobol",
+    "StabilityMap",
     "Start",
     "Status",
     "StopTime",
@@ -141,10 +146,12 @@ __all__ = [
     "log_rerun",
     "plot",
     "plot_sensitivity",
+    "plot_stability",
     "plot_tradeoff",
     "quantity",
     "register",
     "solve",
+    "stability_map",
     "suggest",
     "tradeoff",
     "uq",

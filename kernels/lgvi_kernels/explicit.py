@@ -11,10 +11,11 @@ from typing import Any, NamedTuple
 
 import warp as wp
 
+from lgvi_kernels.compose import superpose
 from lgvi_kernels.lane_math import greatest, root, sine
 from lgvi_kernels.lanes import absolute, add, cross, div, dot, lane3, mul, ones, positive, sub, vec3  # noqa: F401
 from lgvi_kernels.rotation import rodrigues, rotation_struct, transpose_apply
-from lgvi_kernels.state import struct
+from lgvi_kernels.state import struct, view_struct, wrench_struct
 from lgvi_kernels.submaps import rotate
 from lgvi_kernels.terms.drag import make_resistance
 
@@ -37,7 +38,9 @@ TINY = {wp.float64: 1e-300, wp.float32: 1e-36}
 class Explicit(NamedTuple):
     """What decides the code of an explicit method: a tableau, whose row i of `a` has i numbers, and how it is used.
 
-    kind: "vector" (R as two of its rows), "group" (R turns by exponentials) or "munthe_kaas" (order 4 with its commutators).
+    kind: "vector" (R as two of its rows), "inertial" (the same, and forces never change in inertial axes, so that R p is
+    known for all times: it is kept in place of p), "group" (R turns by exponentials) or "munthe_kaas" (order 4 with its
+    commutators).
     errors: rows of error estimates, (stages,) or one longer with f of the new state at its end, which go as h to the power
     `estimate`. adaptive: each packet chooses its steps.
     """
@@ -52,11 +55,12 @@ class Explicit(NamedTuple):
 
 
 @functools.cache
-def rates_struct(width, real, group):
-    """b', p', pi', and the first and last row of R' = R hat(Om); on the group, Om instead of them."""
+def rates_struct(width, real, kind):
+    """b', pi', p' unless it is known, and the first and last row of R' = R hat(Om); on the group, Om instead of them."""
     Lane3 = lane3(width, real)
-    turning = {"Om": Lane3} if group else {"R0": Lane3, "R2": Lane3}
-    return struct("Rates", b=Lane3, **turning, p=Lane3, pi=Lane3)
+    turning = {"R0": Lane3, "R2": Lane3} if kind in ("vector", "inertial") else {"Om": Lane3}
+    pushing = {} if kind == "inertial" else {"p": Lane3}
+    return struct("Rates", b=Lane3, **turning, **pushing, pi=Lane3)
 
 
 @functools.cache
@@ -65,26 +69,44 @@ def slopes_struct(Rates, count):
     return struct("Slopes", **{f"k{i}": Rates for i in range(count)})
 
 
-def make_rates(Rates, everything, velocities, group, isotropic, coupled, drifts, scaled, drag):
+def make_rates(Rates, Wrench, everything, velocities, kind, mass, coupled, drifts, scaled, drag):
     """The right-hand side, eq. (1) and (3) of Nordkvist & Sanyal 2010 with all laws of a scene.
 
     scaled: momenta are divided by max J; drag: the function that adds drag along the axes, where it is not among
     `everything`, or None.
     """
 
+    isotropic, munk = mass == "isotropic", make_munk(mass == "diagonal")
+    group, inertial = kind not in ("vector", "inertial"), kind == "inertial"
+
     @wp.func
-    def momentum(c: Any, w: Any):
-        """A force or torque in the unit of momenta."""
-        if wp.static(scaled):
-            w = c.inertia.inverse_scale * w
+    def turning(w: Any, x: Any, c: Any, nu: Any, Om: Any):
+        """p x Om and pi x Om + p x nu: what the momenta in body axes change by without any force."""
+        w.force = w.force + cross(x.p, Om)
+        w.torque = w.torque + cross(x.pi, Om)
+        if wp.static(coupled):
+            w.torque = w.torque + cross(x.p, nu)
+        elif wp.static(not isotropic):
+            # Of the mean of M^-1 it is zero.
+            w.torque = munk(w.torque, x.p, c.inertia.anisotropy)
         return w
 
     @wp.func
     def rates(x: Any, c: Any, h: Any):
         """b' = R nu + u, R' = R hat(Om), p' = p x Om + f, pi' = pi x Om + p x nu + m."""
         k = Rates()
+        if wp.static(inertial):
+            x.p = in_body(x)
         nu, Om = velocities(c.inertia, x.p, x.pi)
-        w, u = everything(x, c, h, nu, Om)
+        w = Wrench()
+        if wp.static(not scaled):
+            # Laws add to what is there: fewer operations than a sum of their own.
+            w = turning(w, x, c, nu, Om)
+        w, u = everything(w, x, c, h, nu, Om)
+        if wp.static(scaled):
+            w.force = c.inertia.inverse_scale * w.force
+            w.torque = c.inertia.inverse_scale * w.torque
+            w = turning(w, x, c, nu, Om)
         k.b = rotate(x, nu)
         if wp.static(drifts):
             k.b = k.b + u
@@ -93,19 +115,37 @@ def make_rates(Rates, everything, velocities, group, isotropic, coupled, drifts,
         else:
             k.R0 = cross(x.R0, Om)
             k.R2 = cross(x.R2, Om)
-        k.p = cross(x.p, Om) + momentum(c, w.force)
-        turned = cross(x.pi, Om) + momentum(c, w.torque)
-        if wp.static(coupled):
-            turned = turned + cross(x.p, nu)
-        elif wp.static(not isotropic):
-            # Of the mean of M^-1 it is zero.
-            turned = turned + cross(x.p, c.inertia.anisotropy * x.p)
-        k.pi = turned
+        if wp.static(not inertial):
+            k.p = w.force
+        k.pi = w.torque
         if wp.static(drag is not None):
             k = drag(k, x, c.params.own)
         return k
 
     return rates
+
+
+@wp.func
+def in_body(x: Any):
+    """R^T P, with P in place of p."""
+    return x.p.x * x.R0 + x.p.y * x.R1 + x.p.z * x.R2
+
+
+def make_munk(diagonal):
+    """pi' + p x A p, where A is M^-1 less its mean."""
+
+    @wp.func
+    def munk(turned: Any, p: Any, A: Any):
+        if wp.static(diagonal):
+            # The differences stay the same for all steps, and the compiler keeps them.
+            turned.x = turned.x + (A.z - A.y) * (p.y * p.z)
+            turned.y = turned.y + (A.x - A.z) * (p.z * p.x)
+            turned.z = turned.z + (A.y - A.x) * (p.x * p.y)
+        else:
+            turned = turned + cross(p, A * p)
+        return turned
+
+    return munk
 
 
 @wp.func
@@ -115,6 +155,16 @@ def along(x: Any, k: Any, s: Any):
     x.R0 = x.R0 + s * k.R0
     x.R2 = x.R2 + s * k.R2
     x.p = x.p + s * k.p
+    x.pi = x.pi + s * k.pi
+    return x
+
+
+@wp.func
+def along_known(x: Any, k: Any, s: Any):
+    """The same where P is known for all times."""
+    x.b = x.b + s * k.b
+    x.R0 = x.R0 + s * k.R0
+    x.R2 = x.R2 + s * k.R2
     x.pi = x.pi + s * k.pi
     return x
 
@@ -207,12 +257,27 @@ def make_moves(move, weights, complete):
     return moves
 
 
-def make_stage(moves, node, timed):
-    """The state of one stage."""
+def make_push(Wrench, View, laws):
+    """(x, constants, h): P <- P + h F, where F never changes in inertial axes."""
+    force = superpose(laws, "steady_force")
 
     @wp.func
-    def at_node(x: Any, k: Any, h: Any):
+    def pushed(x: Any, c: Any, h: Any):
+        if wp.static(force is not None):
+            x.p = x.p + h * force(Wrench(), View(), c.params).force
+        return x
+
+    return pushed
+
+
+def make_stage(moves, push, node, timed):
+    """The state of one stage. push: what changes P, where it is known, or None."""
+
+    @wp.func
+    def at_node(x: Any, k: Any, c: Any, h: Any):
         y = moves(x, k, h)
+        if wp.static(push is not None):
+            y = push(y, c, h.dtype(wp.static(node)) * h)
         if wp.static(timed):
             y.time = x.time + wp.float64(wp.static(node)) * wp.float64(h)
         return y
@@ -220,11 +285,11 @@ def make_stage(moves, node, timed):
     return at_node
 
 
-def make_stages(Rates, rates, move, complete, a, c, timed):
+def make_stages(Rates, rates, move, complete, push, a, c, timed):
     """One function (x, constants, h) -> the slopes of all rows of `a`."""
     count = len(a)
     Slopes = slopes_struct(Rates, count)
-    ys = [make_stage(make_moves(move, row, complete), node, timed) for row, node in zip(a, c)]
+    ys = [make_stage(make_moves(move, row, complete), push, node, timed) for row, node in zip(a, c)]
     _, at_1, at_2, at_3, at_4, at_5, at_6, at_7, at_8, at_9, at_10, at_11, at_12 = ys + [None] * (MOST_STAGES - count)
 
     @wp.func
@@ -232,41 +297,43 @@ def make_stages(Rates, rates, move, complete, a, c, timed):
         k = Slopes()
         k.k0 = rates(x, constants, h)
         if wp.static(count > 1):
-            k.k1 = rates(at_1(x, k, h), constants, h)
+            k.k1 = rates(at_1(x, k, constants, h), constants, h)
         if wp.static(count > 2):
-            k.k2 = rates(at_2(x, k, h), constants, h)
+            k.k2 = rates(at_2(x, k, constants, h), constants, h)
         if wp.static(count > 3):
-            k.k3 = rates(at_3(x, k, h), constants, h)
+            k.k3 = rates(at_3(x, k, constants, h), constants, h)
         if wp.static(count > 4):
-            k.k4 = rates(at_4(x, k, h), constants, h)
+            k.k4 = rates(at_4(x, k, constants, h), constants, h)
         if wp.static(count > 5):
-            k.k5 = rates(at_5(x, k, h), constants, h)
+            k.k5 = rates(at_5(x, k, constants, h), constants, h)
         if wp.static(count > 6):
-            k.k6 = rates(at_6(x, k, h), constants, h)
+            k.k6 = rates(at_6(x, k, constants, h), constants, h)
         if wp.static(count > 7):
-            k.k7 = rates(at_7(x, k, h), constants, h)
+            k.k7 = rates(at_7(x, k, constants, h), constants, h)
         if wp.static(count > 8):
-            k.k8 = rates(at_8(x, k, h), constants, h)
+            k.k8 = rates(at_8(x, k, constants, h), constants, h)
         if wp.static(count > 9):
-            k.k9 = rates(at_9(x, k, h), constants, h)
+            k.k9 = rates(at_9(x, k, constants, h), constants, h)
         if wp.static(count > 10):
-            k.k10 = rates(at_10(x, k, h), constants, h)
+            k.k10 = rates(at_10(x, k, constants, h), constants, h)
         if wp.static(count > 11):
-            k.k11 = rates(at_11(x, k, h), constants, h)
+            k.k11 = rates(at_11(x, k, constants, h), constants, h)
         if wp.static(count > 12):
-            k.k12 = rates(at_12(x, k, h), constants, h)
+            k.k12 = rates(at_12(x, k, constants, h), constants, h)
         return k
 
     return stages
 
 
-def make_fixed(stages, finish, timed):
-    """One step of the length that is asked for."""
+def make_fixed(stages, finish, push, timed):
+    """One step of the length that is asked for. push: as of make_stage."""
 
     @wp.func
     def step(x: Any, c: Any, h: Any):
         """y + h sum_i b_i k_i."""
         x = finish(x, stages(x, c, h), h)
+        if wp.static(push is not None):
+            x = push(x, c, h)
         if wp.static(timed):
             x.time = x.time + wp.float64(h)
         return x
@@ -455,21 +522,23 @@ def make_adaptive(stages, finish, errors, estimate, width, real, timed):
 def make_explicit(spec, everything, velocities):
     """The step of an explicit method for this Spec, with all the laws in `everything`."""
     method, width, real, timed = spec.explicit, spec.width, spec.real, spec.timed
-    group = method.kind != "vector"
-    Rates = rates_struct(width, real, group)
+    Wrench = wrench_struct(width, real)
+    Rates = rates_struct(width, real, method.kind)
     turned = make_turned(rotation_struct(width, real), real)
-    move, complete = (make_act(turned), None) if group else (along, completed)
-    shape = (spec.mass == "isotropic", "coupled" in spec.parts, spec.flow != "none", spec.scaled)
+    moves = {"vector": (along, completed), "inertial": (along_known, completed)}
+    move, complete = moves.get(method.kind, (make_act(turned), None))
+    push = make_push(Wrench, view_struct(width, real), spec.laws) if method.kind == "inertial" else None
+    shape = (spec.mass, "coupled" in spec.parts, spec.flow != "none", spec.scaled)
     drag = make_resistance(spec.drag) if spec.drag else None
-    rates = make_rates(Rates, everything, velocities, group, *shape, drag)
+    rates = make_rates(Rates, Wrench, everything, velocities, method.kind, *shape, drag)
     if method.kind == "munthe_kaas":
         return make_munthe_kaas(rates, move, turned, timed)
     a, c = method.a, method.c
     if method.adaptive and len(method.errors[0]) > len(a):
         a, c = (*a, method.b), (*c, 1.0)
-    stages = make_stages(Rates, rates, move, complete, a, c, timed)
+    stages = make_stages(Rates, rates, move, complete, push, a, c, timed)
     finish = make_moves(move, method.b + (0.0,) * (len(a) - len(method.b)), complete)
     if not method.adaptive:
-        return make_fixed(stages, finish, timed)
+        return make_fixed(stages, finish, push, timed)
     errors = make_errors(Rates, method.errors, along)
     return make_adaptive(stages, finish, errors, method.estimate, width, real, timed)

@@ -1,6 +1,7 @@
 """Explicit Runge-Kutta methods on y = (b, two rows of R, p, pi), of one vehicle, with all its laws.
 
-The middle row of R is the cross product of the others. What a law remembers is advanced by half a step before and after, as in K: such laws are integrated to order 2.
+The middle row of R is the cross product of the others. What a law remembers is advanced by half a step before and after,
+as in K: such laws are integrated to order 2.
 """
 
 import math
@@ -133,6 +134,32 @@ def advance(step: Step, x: State, body: Body, h: float, steps: int) -> State:
         x = step(replace(x, t=x.step * h), body, h)
         x = replace(x, step=x.step + 1, t=(x.step + 1) * h)
     return x
+
+
+def advance_steady(tableau: Tableau, x: State, body: Body, h: float, steps: int, origin: Array = USER) -> State:
+    """The state after so many steps of h [s] where forces never change in inertial axes: then R p = P + t F is known.
+
+    y = (b, two rows of R, pi), (12,), of which p = R^T (R p) at every stage.
+    """
+    x = at(x, origin)
+    nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, at(x, -origin).pi])), 2)
+    P, F = x.R @ x.p, x.R @ wrench(x, body, h, nu, Om)[0]
+
+    def unpacked(y: Array, t: float) -> State:
+        whole = unpack(np.concatenate([y[:9], P, y[9:]]), x, t)
+        return replace(whole, p=whole.R.T @ (P + t * F))
+
+    def f(y: Array, t: float) -> Array:
+        rate = rates(unpacked(y, t), body, h, origin)
+        return np.concatenate([rate[:9], rate[12:]])
+
+    y = np.concatenate([x.b, x.R[0], x.R[2], x.pi])
+    for k in range(steps):
+        K = np.zeros((len(tableau.b), 12))
+        for i, (row, c) in enumerate(zip(tableau.a, tableau.c, strict=True)):
+            K[i] = f(y + h * np.array(row) @ K[:i], (k + c) * h)
+        y = y + h * np.array(tableau.b) @ K
+    return replace(at(unpacked(y, steps * h), -origin), step=steps)
 
 
 def error_norm(tableau: Tableau, K: Array, h: float, scale: Array) -> float:

@@ -329,6 +329,8 @@ def test_the_command_says_what_is_wrong(tmp_path, capsys):
             ["sensitivity", PAPER, "--out", str(tmp_path), "--of", "energy", "--samples", "4", *options, "--quiet"]
         )
 
+    assert run("--samples", "0") == 2
+    assert "samples = 0" in capsys.readouterr().err
     assert run("--set", "ensemble.vary.vehicle.buoyancy={ normal = { stdd = 1.0 } }") == 2
     assert "did you mean 'std'" in capsys.readouterr().err
     fast = ["--set", "start.angular_velocity=[900.0, 0.0, 0.0]", "--duration", "0.02"]

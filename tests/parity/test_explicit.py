@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.model import frame_of
 from lgvi_warp.reference import explicit, munthe_kaas
 from lgvi_warp.reference.submaps import look, start, water
+from lgvi_warp.solving import make_plan
 from lgvi_warp.tableaux import DOP853, DOPRI5, RK4
 from tests.laws import CASES, Case
 from tests.parity import test_coupled, test_terms
@@ -22,13 +22,18 @@ METHODS = (*TABLEAUX, "cg3", "rkmk4")
 SMOOTH = [name for name in CASES if not any(word in name for word in ("noise", "Gauss", "thrusters", "rates", "all"))]
 
 
-def twin_step(method, scene):
-    """The twin's step, with b and pi where the kernel has them."""
+def advanced(scene, body, method, h, steps, at):
+    """The twin's state after so many steps, with b, p and pi where the kernel has them."""
     fleet = lw.Ensemble.from_scene(scene)
-    origin = frame_of(lw.Method(method), fleet.parameters(0, 1))[0].origin[0]
+    plan = make_plan(fleet, method, h=h, t1=steps * h)
+    origin = plan.model.frame.origin[0]
+    if plan.spec.inertial:
+        return explicit.advance_steady(TABLEAUX[method], begun(body, at), body, h, steps, origin)
     if method in TABLEAUX:
-        return explicit.stepper(TABLEAUX[method], origin)
-    return functools.partial({"cg3": munthe_kaas.cg3, "rkmk4": munthe_kaas.rkmk4}[method], origin=origin)
+        step = explicit.stepper(TABLEAUX[method], origin)
+    else:
+        step = functools.partial({"cg3": munthe_kaas.cg3, "rkmk4": munthe_kaas.rkmk4}[method], origin=origin)
+    return explicit.advance(step, begun(body, at), body, h, steps)
 
 
 def begun(body, at=STATE):
@@ -49,7 +54,7 @@ def both(scene, body, method, h, steps, at=STATE, **named):
     """The state after so many steps by the kernel and by the twin."""
     result = lw.solve(one(scene, **at), method, h=h, t1=steps * h, **named)
     assert result.status.counts() == {"ok": 1}
-    return last(result), ended(explicit.advance(twin_step(method, scene), begun(body, at), body, h, steps), body)
+    return last(result), ended(advanced(scene, body, method, h, steps, at), body)
 
 
 PLAIN = CASES["wrench"]
@@ -122,6 +127,21 @@ def test_coupled_inertia(method, name):
     terms, laws = (CASES[name].terms, CASES[name].laws) if name else ((), ())
     scene, body = test_coupled.scene_of(terms), test_coupled.body_of(laws)
     assert difference(*both(scene, body, method, 0.02, 5, test_coupled.STATE)) < 5e-13
+
+
+@pytest.mark.parametrize(
+    "current", [(), ({"type": "current", "velocity": (0.3, -0.2, 0.1)},)], ids=["still", "current"]
+)
+@pytest.mark.parametrize("method", TABLEAUX)
+def test_forces_that_never_change(method, current):
+    # R p is known for all times; with coupled inertia too. 5 and 50 steps, round-off of 1e-15 each.
+    laws = CASES["current"].laws if current else ()
+    for scene, body, at in (
+        (test_terms.scene_of(Case(current, laws)), test_terms.body_of(Case(current, laws)), STATE),
+        (test_coupled.scene_of(current), test_coupled.body_of(laws), test_coupled.STATE),
+    ):
+        for steps, bound in ((5, 2e-13), (50, 2e-12)):
+            assert difference(*both(scene, body, method, 0.05, steps, at)) < bound
 
 
 @pytest.mark.parametrize("method", ["rk5", "rk8"])

@@ -289,7 +289,8 @@ class Packets:
     def advance(self, k0: int, k1: int) -> np.ndarray:
         """Make the steps k0 to k1. Returns the samples due then, (s1 - s0, packets * width, numbers of a sample)."""
         packed = self.launch(k0, k1)
-        return packed.transpose(1, 0, 3, 2).copy().reshape(packed.shape[1], -1, packed.shape[2])
+        packets, samples, numbers, width = packed.shape
+        return packed.transpose(1, 0, 3, 2).copy().reshape(samples, packets * width, numbers)
 
     def launch(self, k0: int, k1: int) -> np.ndarray:
         """Make the steps k0 to k1. Returns the samples due then as the kernel has them, (packets, s1 - s0, numbers, width),

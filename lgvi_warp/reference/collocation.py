@@ -1,6 +1,7 @@
 """Gauss collocation, order 2s with s stages, on y = (b, the rows of R, p, pi), of one vehicle with all its laws.
 
-Symmetric and symplectic; every quadratic invariant is kept to round-off: R^T R, R p without forces, and so on.
+Symmetric; every quadratic invariant is kept to round-off: R^T R, R p without forces, and so on. Symplectic in canonical
+variables, which (R, p, pi) are not: here to the method's order only.
 Hairer, Lubich & Wanner, Geometric Numerical Integration, II.1.3, IV.2.1, VIII.6 (iteration, compensated sums).
 """
 

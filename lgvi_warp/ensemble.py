@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp import scene as scenes
+from lgvi_warp import vehicle as vehicles
 from lgvi_warp import variations
 from lgvi_warp.errors import Faults, closest, shown
 from lgvi_warp.sampling import Sampling

@@ -155,6 +155,11 @@ def test_inertia_that_no_rigid_body_has():
     rigid = np.diag([10.0, 10.0, 10.0, 1.0, 2.0, 3.1])
     with pytest.raises(lw.SceneError, match="two of which sum to less than the third"):
         lw.Vehicle(rigid_body_mass_matrix=rigid)
+    good = lw.Scene(lw.Vehicle(rigid_body_mass_matrix=np.diag([10.0, 10.0, 10.0, 1.0, 2.0, 2.9])))
+    with pytest.raises(lw.SceneError, match=r"rigid_body_mass_matrix of member 1.*unphysical \(1 of 2"):
+        lw.Ensemble.from_states(
+            good, *random_states(1, 2), {"vehicle.rigid_body_mass_matrix": [good.vehicle.rigid_body_mass_matrix, rigid]}
+        )
     added = np.diag([0.0, 0.0, 0.0, 0.0, 0.0, 0.2])
     assert lw.Vehicle(rigid_body_mass_matrix=rigid - added, added_mass_matrix=added).full
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp import scene as scenes
-from lgvi_warp import vehicle as vehicles
 from lgvi_warp import variations
+from lgvi_warp import vehicle as vehicles
 from lgvi_warp.errors import Faults, closest, shown
 from lgvi_warp.sampling import Sampling
 from lgvi_warp.scene import Scene

@@ -10,6 +10,21 @@ from lgvi_warp.method import Method
 from lgvi_warp.result import Result
 from lgvi_warp.saveat import SaveAt
 from lgvi_warp.scene import Environment, Scene, Start
+from lgvi_warp.statistics import (
+    CircularMean,
+    Covariance,
+    Exceedance,
+    Extremes,
+    FirstPassage,
+    Histogram,
+    Mean,
+    MeanAttitude,
+    PathMaximum,
+    PathMinimum,
+    Quantiles,
+    Quantity,
+)
+from lgvi_warp.statistics.until import Until
 from lgvi_warp.status import Status
 from lgvi_warp.terms import (
     BodyLift,
@@ -45,7 +60,7 @@ if TYPE_CHECKING:
     from lgvi_warp.coefficients_yaml import from_yaml
     from lgvi_warp.law_check import check_law
     from lgvi_warp.plan import Plan
-    from lgvi_warp.sinks.plots import plot, plot_tradeoff
+    from lgvi_warp.sinks.plots import plot, plot_statistics, plot_tradeoff
     from lgvi_warp.sinks.rerun import log_rerun
     from lgvi_warp.solving import solve
     from lgvi_warp.suggestion import suggest
@@ -60,6 +75,7 @@ _LAZY = {
     "tradeoff": "lgvi_warp.tradeoffs",
     "Plan": "lgvi_warp.plan",
     "plot": "lgvi_warp.sinks.plots",
+    "plot_statistics": "lgvi_warp.sinks.plots",
     "plot_tradeoff": "lgvi_warp.sinks.plots",
     "log_rerun": "lgvi_warp.sinks.rerun",
     "check_law": "lgvi_warp.law_check",
@@ -72,7 +88,9 @@ _LAZY = {
 __all__ = [
     "BodyLift",
     "Box",
+    "CircularMean",
     "ControlFins",
+    "Covariance",
     "CrossFlow",
     "Current",
     "CurrentHarmonics",
@@ -82,14 +100,24 @@ __all__ = [
     "Ensemble",
     "Environment",
     "Event",
+    "Exceedance",
+    "Extremes",
     "Fins",
+    "FirstPassage",
     "Floor",
     "GaussMarkovCurrent",
+    "Histogram",
     "LogNormal",
+    "Mean",
+    "MeanAttitude",
     "Method",
     "Normal",
     "Packed",
+    "PathMaximum",
+    "PathMinimum",
     "Plan",
+    "Quantiles",
+    "Quantity",
     "Restoring",
     "Result",
     "SaveAt",
@@ -106,6 +134,7 @@ __all__ = [
     "Thrusters",
     "TruncatedNormal",
     "Uniform",
+    "Until",
     "Vehicle",
     "Waves",
     "Weight",
@@ -118,6 +147,7 @@ __all__ = [
     "from_yaml",
     "log_rerun",
     "plot",
+    "plot_statistics",
     "plot_tradeoff",
     "quantity",
     "register",

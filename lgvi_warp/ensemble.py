@@ -200,6 +200,10 @@ class Ensemble:
         drawn = self.vary[name].quantile(u, base)
         return _matrices(drawn, _diagonal(whole), len(whole)) if name in MATRICES else drawn
 
+    def parameter(self, name: str, first: int, stop: int) -> np.ndarray:
+        """One parameter of the members first to stop, with a leading dimension of 1 where they share it."""
+        return self._value(name, first, stop)
+
     def parameters(self, first: int, stop: int) -> dict[str, np.ndarray]:
         """Parameters of the members first to stop, shared ones with a leading dimension of 1."""
         return {name: self._value(name, first, stop) for name in self._base}

@@ -5,18 +5,22 @@ from __future__ import annotations
 import functools
 import json
 import os
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lgvi_warp import invariants, notation
+from lgvi_warp.statistics.estimate import Estimates
 from lgvi_warp.status import StatusArray
 from lgvi_warp.terms import Term, from_list
 
 if TYPE_CHECKING:
     import xarray
+
+    from lgvi_warp.ensemble import Ensemble
 
 UNITS = {
     "position": "m",
@@ -47,7 +51,8 @@ class Result:
     status: (n,), see Status; failure_time: (n,) [s], the time of the last good state, for an event its own
     time, interpolated within the step; NaN where there was neither. failure_value: (n,), the |J^-1 a| or relative residual
     that crossed its limit, 0 for a non-finite state and for an event.
-    messages: what the user should know; provenance: scene, settings, versions, seed, machine.
+    statistics: what was gathered while the run went, by name. kept: samples of the members kept_members (m,), where not
+    all were kept. messages: what the user should know; provenance: scene, settings, versions, seed, machine.
     """
 
     time: np.ndarray
@@ -55,14 +60,19 @@ class Result:
     status: StatusArray
     failure_time: np.ndarray
     failure_value: np.ndarray
-    parameters: dict[str, np.ndarray]
+    parameters: Mapping[str, np.ndarray]
     messages: tuple[str, ...]
     provenance: dict[str, Any]
     terms: tuple[Term, ...] = ()
+    statistics: Estimates = field(default_factory=Estimates)
+    kept: Result | None = None
+    kept_members: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     compile_seconds: float = field(default=0.0, compare=False)
     run_seconds: float = field(default=0.0, compare=False)
 
     def _kept(self, name: str) -> np.ndarray:
+        if not self.samples:
+            raise AttributeError(f"{name} was not kept: give keep='all', or indices of members, which are result.kept then")
         if name not in self.samples:
             raise AttributeError(f"{name} was not kept: add {name!r} to SaveAt(fields=...)")
         return self.samples[name]
@@ -101,6 +111,13 @@ class Result:
         """A term's numbers, by field, with a leading dimension of 1 or n."""
         return {name: self.parameters[f"{term.key}.{name}"] for name in term.parameters()}
 
+    def part(self, places: np.ndarray) -> Result:
+        """The same of the members in these places, in this order."""
+        own = {name: values[places] if len(values) > 1 else values for name, values in self.parameters.items()}
+        samples = {name: values[:, places] for name, values in self.samples.items()}
+        status, when, value = (getattr(self, name)[places] for name in ("status", "failure_time", "failure_value"))
+        return replace(self, samples=samples, status=status, failure_time=when, failure_value=value, parameters=own)
+
     @property
     def members(self) -> int:
         """n."""
@@ -126,13 +143,24 @@ class Result:
         return xr.Dataset(data, coordinates, attributes)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write everything to an .npz file, whole or not at all. Returns its path. Raises OSError."""
+        """Write everything to an .npz file, whole or not at all. Returns its path. Raises OSError.
+
+        Where no samples were kept, parameters are left out too: they follow from the provenance's ensemble.
+        """
         target = Path(path)
         part = target.with_name(target.name + ".part")
         arrays = {"time": self.time, **self.samples, "status": np.asarray(self.status)}
         arrays |= {"failure_time": self.failure_time, "failure_value": self.failure_value}
-        arrays |= {f"parameters/{name}": value for name, value in self.parameters.items()}
+        if self.samples:
+            arrays |= {f"parameters/{name}": value for name, value in self.parameters.items()}
         texts = {"messages": json.dumps(self.messages), "provenance": json.dumps(self.provenance)}
+        if self.statistics:
+            found, texts["statistics"] = self.statistics.to_arrays()
+            arrays |= {f"statistics/{name}": value for name, value in found.items()}
+        if self.kept is not None:
+            arrays |= {f"kept/{name}": value for name, value in self.kept.samples.items()}
+            arrays |= {"kept/members": self.kept_members}
+            arrays |= {f"kept/parameters/{name}": value for name, value in self.kept.parameters.items()}
         try:
             with part.open("wb") as file:
                 np.savez(file, **arrays, **texts)  # type: ignore[arg-type]
@@ -146,15 +174,48 @@ class Result:
         """Read what `save` wrote. Raises OSError or ValueError if it is not such a file."""
         with np.load(Path(path), allow_pickle=False) as data:
             content = {name: data[name] for name in data.files}
-        prefix = "parameters/"
-        return cls(
+        estimates = Estimates()
+        if "statistics" in content:
+            estimates = Estimates.from_arrays(_below("statistics/", content), str(content["statistics"]))
+        result = cls(
             time=content["time"],
             samples={name: content[name] for name in content if name in UNITS},
             status=content["status"].view(StatusArray),
             failure_time=content["failure_time"],
             failure_value=content["failure_value"],
-            parameters={name.removeprefix(prefix): content[name] for name in content if name.startswith(prefix)},
+            parameters=_below("parameters/", content),
             messages=tuple(json.loads(str(content["messages"]))),
             provenance=(provenance := json.loads(str(content["provenance"]))),
             terms=from_list(provenance["scene"].get("terms", ())),
+            statistics=estimates,
         )
+        kept = _below("kept/", content)
+        if not kept:
+            return result
+        members = kept["members"]
+        few = replace(result.part(members), parameters=_below("parameters/", kept), statistics=Estimates())
+        few = replace(few, samples={name: kept[name] for name in kept if name in UNITS})
+        return replace(result, kept=few, kept_members=members)
+
+
+def _below(prefix: str, content: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """What is named so, without the prefix."""
+    return {name.removeprefix(prefix): value for name, value in content.items() if name.startswith(prefix)}
+
+
+class Drawn(Mapping[str, np.ndarray]):
+    """Parameters of an ensemble's first members, drawn when they are asked for: they take no memory before."""
+
+    def __init__(self, ensemble: Ensemble, members: int):
+        self._ensemble, self._members = ensemble, members
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self._ensemble.scene.parameters():
+            raise KeyError(name)
+        return self._ensemble.parameter(name, 0, self._members)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._ensemble.scene.parameters())
+
+    def __len__(self) -> int:
+        return len(self._ensemble.scene.parameters())

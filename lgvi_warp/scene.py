@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp import events, notation, terms
+from lgvi_warp import statistics as kinds
 from lgvi_warp.errors import Faults
 from lgvi_warp.machine import DTYPES
+from lgvi_warp.statistics import until as stopping
 from lgvi_warp.vehicle import Vehicle
 
 ATTITUDES = ("attitude", "rotation_vector", "quaternion_wxyz", "euler_deg")
@@ -127,18 +129,46 @@ def resolve_attitude(values: Mapping[str, np.ndarray]) -> np.ndarray:
     return notation.matrix_from_rotation_vector(values["rotation_vector"])
 
 
+KEEP = ("all", "none", "failed")
+
+
+def check_keep(faults: Faults, key: str, keep: Any, members: int | None = None) -> None:
+    """Which members' samples to keep: all, none, those that failed, or indices below the number of members."""
+    if isinstance(keep, str):
+        faults.choice(key, keep, KEEP)
+        return
+    indices = np.asarray(keep) if isinstance(keep, list | tuple | np.ndarray | range) else np.array(None)
+    if indices.ndim != 1 or indices.size == 0 or indices.dtype.kind not in "iu" or np.any(indices < 0):
+        faults.add(key, keep, "names no members", f'give {", ".join(map(repr, KEEP))}, or a list of indices from 0')
+    elif members is not None and np.any(indices >= members):
+        faults.add(key, int(indices.max()), f"is beyond the last of {members} members", f"give indices up to {members - 1}")
+
+
 @dataclass(frozen=True)
 class RunSettings:
-    """The [run] section of a scene file: method, step [s], duration [s], save_every [s], dtype. Raises SceneError."""
+    """The [run] section of a scene file: method, step [s], duration [s], save_every [s], dtype. Raises SceneError.
+
+    statistics: tables as in [[run.statistics]] or Statistic objects; keep: "all" samples of members, "none", "failed", or
+    indices of members; until: a table as in [run.until], or an Until.
+    """
 
     method: str = "psi_s"
     step: float | None = None
     duration: float | None = None
     save_every: float | None = None
     dtype: str = "float64"
+    keep: Any = "all"
+    statistics: Sequence[Any] = ()
+    until: Any = None
 
     def __post_init__(self) -> None:
         faults = Faults("run.")
+        check_keep(faults, "keep", self.keep)
+        with faults.including():
+            object.__setattr__(self, "statistics", kinds.from_list(self.statistics, "run.statistics"))
+        if self.until is not None:
+            with faults.including():
+                object.__setattr__(self, "until", stopping.from_dict(self.until))
         for name in ("step", "duration", "save_every"):
             if getattr(self, name) is not None:
                 faults.positive(name, getattr(self, name))
@@ -149,7 +179,15 @@ class RunSettings:
 
     def to_dict(self) -> dict[str, Any]:
         """As in a scene file."""
-        return {key: value for key, value in vars(self).items() if value is not None}
+        content = {key: value for key, value in vars(self).items() if value is not None}
+        for name, default in (("keep", "all"), ("statistics", ()), ("until", None)):
+            if name in content and isinstance(content[name], type(default)) and content[name] == default:
+                del content[name]
+        if "statistics" in content:
+            content["statistics"] = [one.to_dict() for one in self.statistics]
+        if "until" in content:
+            content["until"] = self.until.to_dict()
+        return content
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,7 @@ def test_the_paper_in_numbers():
     np.testing.assert_array_equal(v.center_of_buoyancy, [0.0, 0.0, -0.007])
     assert vars(scene.run) == {
         "method": "psi_s", "step": 0.01, "duration": 150.0, "save_every": 1.0, "dtype": "float64",
+        "keep": "all", "statistics": (), "until": None,
     }  # fmt: skip
     settings = scene.ensemble_settings
     assert (settings.members, settings.seed) == (4096, 1)

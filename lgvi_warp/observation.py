@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp import statistics as kinds
-from lgvi_warp.errors import Faults
 from lgvi_warp.ensemble import Ensemble
+from lgvi_warp.errors import Faults
 from lgvi_warp.saveat import FIELDS
 from lgvi_warp.scene import check_keep
 from lgvi_warp.statistics import Estimate, Statistic
@@ -106,5 +106,3 @@ def notes(estimates: Mapping[str, Estimate], ensemble: Ensemble, members: int) -
         text = f"intervals are those of independent members: wider than need be for sampling {sampling!r}"
         found += (f"{text}; independent repetitions with other seeds show by how much",)
     return found
-
-

@@ -72,7 +72,9 @@ class Result:
 
     def _kept(self, name: str) -> np.ndarray:
         if not self.samples:
-            raise AttributeError(f"{name} was not kept: give keep='all', or indices of members, which are result.kept then")
+            raise AttributeError(
+                f"{name} was not kept: give keep='all', or indices of members, which are result.kept then"
+            )
         if name not in self.samples:
             raise AttributeError(f"{name} was not kept: add {name!r} to SaveAt(fields=...)")
         return self.samples[name]

@@ -139,9 +139,11 @@ def check_keep(faults: Faults, key: str, keep: Any, members: int | None = None) 
         return
     indices = np.asarray(keep) if isinstance(keep, list | tuple | np.ndarray | range) else np.array(None)
     if indices.ndim != 1 or indices.size == 0 or indices.dtype.kind not in "iu" or np.any(indices < 0):
-        faults.add(key, keep, "names no members", f'give {", ".join(map(repr, KEEP))}, or a list of indices from 0')
+        faults.add(key, keep, "names no members", f"give {', '.join(map(repr, KEEP))}, or a list of indices from 0")
     elif members is not None and np.any(indices >= members):
-        faults.add(key, int(indices.max()), f"is beyond the last of {members} members", f"give indices up to {members - 1}")
+        faults.add(
+            key, int(indices.max()), f"is beyond the last of {members} members", f"give indices up to {members - 1}"
+        )
 
 
 @dataclass(frozen=True)

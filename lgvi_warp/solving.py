@@ -239,7 +239,7 @@ def again(
         width = plan.spec.width
         chosen = np.unique(indices // width)[:, None] * width + np.arange(width)
         chosen = chosen[chosen < plan.ensemble.members]
-    result = run_plan(plan.part(chosen, fields), threads)
+    result = run_plan(plan.part([int(i) for i in chosen], fields), threads)
     return indices, result if len(chosen) == len(indices) else result.part(np.searchsorted(chosen, indices))
 
 

@@ -43,7 +43,9 @@ def from_list(given: Any, key: str = "statistics", *, whole: bool = True) -> tup
             with faults.including():
                 names += [part.key for part in one.parts()]
         for name in sorted({name for name in names if names.count(name) > 1}):
-            faults.add(key, name, f"is the name of {names.count(name)} statistics", "give each a name of its own: name=...")
+            faults.add(
+                key, name, f"is the name of {names.count(name)} statistics", "give each a name of its own: name=..."
+            )
     faults.raise_if_any()
     return tuple(found)
 
@@ -53,7 +55,9 @@ def _one(where: str, given: Any) -> Statistic:
     if isinstance(given, Statistic):
         return given
     if not isinstance(given, Mapping):
-        raise SceneError([f'{where} = {shown(given)}: is no statistic; write type = "mean", or give lw.Mean("position")'])
+        raise SceneError(
+            [f'{where} = {shown(given)}: is no statistic; write type = "mean", or give lw.Mean("position")']
+        )
     word = given.get("type", "")
     kind = TYPES.get(word) if isinstance(word, str) else None
     if kind is None:

@@ -10,7 +10,7 @@ import numpy as np
 from lgvi_warp.errors import Faults
 from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.base import Statistic
-from lgvi_warp.statistics.estimate import Estimate
+from lgvi_warp.statistics.estimate import Estimate, along
 from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate, joined_means, sums
 from lgvi_warp.statistics.tree import Part
 from lgvi_warp.statistics.values import Values
@@ -138,8 +138,13 @@ class MeanAttitude(Statistic):
         entries = self._entries(R, covariance / np.maximum(count, 1)[:, None, None])
         reach = np.where(known[:, None, None] & np.isfinite(factor)[:, None], factor[:, None] * entries, 2.0)
         value = empty_as_nan(R, count)
-        arrays = {"value": value, "lower": value - reach, "upper": value + reach, "covariance": empty_as_nan(covariance, count, 2)}
-        dims = dict.fromkeys(arrays, ("time", "row", "column"))
+        arrays = {
+            "value": value,
+            "lower": value - reach,
+            "upper": value + reach,
+            "covariance": empty_as_nan(covariance, count, 2),
+        }
+        dims = along(arrays, "time", "row", "column")
         arrays |= {"rotation_half_width": np.minimum(half, np.pi), "standard_error": error, "dispersion": dispersion}
         dims |= {"rotation_half_width": ("time", "axis"), "standard_error": ("time", "axis")}
         arrays |= {"count": count}

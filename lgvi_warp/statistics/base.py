@@ -84,7 +84,9 @@ class Statistic:
         """What it is of. Raises SceneError where nothing was said."""
         found: Quantity | None = getattr(self, "_quantity", None)
         if found is None:
-            raise SceneError([f"{self.type}.of = None: is missing; say what it is of: lw.{type(self).__name__}('depth')"])
+            raise SceneError(
+                [f"{self.type}.of = None: is missing; say what it is of: lw.{type(self).__name__}('depth')"]
+            )
         return found
 
     @property

@@ -11,7 +11,7 @@ import numpy as np
 from lgvi_warp.errors import Faults
 from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.base import Statistic
-from lgvi_warp.statistics.estimate import Estimate
+from lgvi_warp.statistics.estimate import Estimate, along
 from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate
 from lgvi_warp.statistics.tree import Part
 from lgvi_warp.statistics.values import Values
@@ -49,7 +49,7 @@ class Histogram(Counted):
             if isinstance(bins, bool) or not isinstance(bins, int) or bins < 1:
                 faults.add("bins", bins, "is no whole number above 0", "give 50")
                 return
-            edges = None if limits is None else np.linspace(*limits, bins + 1)
+            edges = None if limits is None else np.linspace(limits[0], limits[1], bins + 1)
         else:
             edges = faults.finite("edges", self.edges)
         if edges is not None and (edges.ndim != 1 or len(edges) < 2 or np.any(np.diff(edges) <= 0.0)):
@@ -82,7 +82,7 @@ class Histogram(Counted):
         value = empty_as_nan(inside / np.maximum(n, 1), count)
         lower, upper = intervals.wilson(inside / np.maximum(n, 1), n, self.confidence)
         arrays = {"value": value, "lower": lower, "upper": upper, "counts": inside}
-        dims = dict.fromkeys(arrays, ("time", "component", "bin"))
+        dims = along(arrays, "time", "component", "bin")
         arrays |= {"below": counts[..., 0], "above": counts[..., -1]}
         dims |= {"below": ("time", "component"), "above": ("time", "component"), "count": ("time",)}
         bins = {"bin": 0.5 * (edges[1:] + edges[:-1])}
@@ -182,11 +182,11 @@ class FirstPassage(Condition, Counted):
 
     value (k,): probability to have passed by each time, Kaplan & Meier's estimate: a member that fails before it passes
     counts until its last good sample. survival is 1 - value. Interval: Wilson's with the number of members that has
-    Greenwood's variance. passed, lost (k,): members that pass at a time, and that failed before it without having passed;
-    censored: members that were good to the end and did not pass; count (k,): members at risk of passing at each time. passage_time (levels,) [s]: the first sample time by which
-    that fraction has passed, infinite if it never does, with passage_time_lower, _upper from the interval of value. A
-    passage lies between the sample before and the one that sees it; one that comes and goes between two is not
-    seen (an event of the scene sees every step).
+    Greenwood's variance. passed, lost (k,): members that pass at a time, and that failed before it without having
+    passed; count (k,): members at risk of passing at each time; censored: those that were good to the end and did not
+    pass. passage_time (levels,) [s]: the first sample time by which that fraction has passed, infinite if it never has,
+    with passage_time_lower, _upper from the interval of value. A passage lies between the sample before and the one that
+    sees it; one that comes and goes between two is not seen (an event of the scene sees every step).
     """
 
     type: ClassVar[str] = "first_passage"
@@ -221,12 +221,12 @@ class FirstPassage(Condition, Counted):
         value = 1.0 - survival
         arrays = {"value": value, "lower": lower, "upper": upper, "survival": survival, "passed": passed, "lost": lost}
         arrays |= {"count": risk}
-        dims: dict[str, tuple[str, ...]] = dict.fromkeys(arrays, ("time",))
+        dims = along(arrays, "time")
         arrays |= {"censored": part["lost"][-1]}
         dims["censored"] = ()
         curves = {"passage_time": value, "passage_time_lower": upper, "passage_time_upper": lower}
         arrays |= {name: self._first(curve, time) for name, curve in curves.items()}
-        dims |= dict.fromkeys(curves, ("level",))
+        dims |= along(curves, "level")
         levels = {"level": np.asarray(self.levels, dtype=np.float64)}
         return estimate(self, "Wilson with Greenwood's variance", dims, arrays, time, levels, "1", labels=())
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,14 @@ import numpy as np
 
 if TYPE_CHECKING:
     import xarray
+
+
+Dims = dict[str, tuple[str, ...]]
+
+
+def along(names: Iterable[str], *dims: str) -> Dims:
+    """These arrays have these dimensions."""
+    return dict.fromkeys(names, dims)
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +37,7 @@ class Estimate:
     unit: str
     confidence: float
     interval: str
-    dims: dict[str, tuple[str, ...]]
+    dims: Dims
     arrays: dict[str, np.ndarray]
     coordinates: dict[str, np.ndarray]
 
@@ -79,7 +87,9 @@ class Estimate:
             name: (self.dims[name], values, {"units": self.unit} if name in ("value", "lower", "upper") else {})
             for name, values in self.arrays.items()
         }
-        known = {name: values for name, values in self.coordinates.items() if any(name in d for d in self.dims.values())}
+        known = {
+            name: values for name, values in self.coordinates.items() if any(name in d for d in self.dims.values())
+        }
         attributes = {"long_name": self.name, "confidence": self.confidence, "interval": self.interval}
         return xr.Dataset(data, known, attributes | {"settings": json.dumps(self.settings)})
 
@@ -117,11 +127,13 @@ class Estimates(Mapping[str, Estimate]):
 
     def to_arrays(self) -> tuple[dict[str, np.ndarray], str]:
         """Named arrays, and a text of all else, for a file."""
-        arrays, words = {}, []
+        arrays, words = dict[str, np.ndarray](), []
         for i, one in enumerate(self.values()):
             arrays |= {f"{i}/{name}": values for name, values in one.arrays.items()}
             arrays |= {f"{i}/coordinates/{name}": values for name, values in one.coordinates.items()}
-            words.append({key: getattr(one, key) for key in ("name", "settings", "unit", "confidence", "interval", "dims")})
+            words.append(
+                {key: getattr(one, key) for key in ("name", "settings", "unit", "confidence", "interval", "dims")}
+            )
         return arrays, json.dumps(words)
 
     @classmethod

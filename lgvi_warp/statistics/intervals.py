@@ -24,7 +24,10 @@ def about(value: np.ndarray, standard_error: np.ndarray, factor: np.ndarray) -> 
 
 
 def wilson(probability: np.ndarray, count: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-    """Of a probability that so many trials estimated (Wilson 1927): where |p - p0| <= z sqrt(p0 (1 - p0) / n). 0 to 1 without trials."""
+    """Of a probability p that n trials estimated: where |p - p0| <= z sqrt(p0 (1 - p0) / n) (Wilson 1927).
+
+    0 to 1 without trials.
+    """
     z2 = normal(confidence) ** 2
     n = np.maximum(count, 1e-300)
     centre = (probability + 0.5 * z2 / n) / (1.0 + z2 / n)

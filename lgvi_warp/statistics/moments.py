@@ -10,7 +10,7 @@ import numpy as np
 
 from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.base import Statistic
-from lgvi_warp.statistics.estimate import Estimate
+from lgvi_warp.statistics.estimate import Dims, Estimate, along
 from lgvi_warp.statistics.tree import Part
 from lgvi_warp.statistics.values import Values
 
@@ -51,7 +51,9 @@ def moved(part: Part, a: np.ndarray) -> Part:
         m20, m02, ai, aj = squares[:, :, None], squares[:, None], a[:, :, None], a[:, None]
         m21, m12 = part["m21"], np.swapaxes(part["m21"], 1, 2)
         found["m21"] = m21 + 2.0 * ai * m11 + aj * m20 + n * ai * aa
-        found["m22"] = part["m22"] + 2.0 * (aj * m21 + ai * m12) + aj**2 * m20 + ai**2 * m02 + 4.0 * aa * m11 + n * aa**2
+        found["m22"] = (
+            part["m22"] + 2.0 * (aj * m21 + ai * m12) + aj**2 * m20 + ai**2 * m02 + 4.0 * aa * m11 + n * aa**2
+        )
     return found
 
 
@@ -68,9 +70,9 @@ def empty_as_nan(values: np.ndarray, count: np.ndarray, least: int = 1) -> np.nd
     return np.asarray(np.where(few, np.nan, values))
 
 
-def component_dims(*names: str) -> dict[str, tuple[str, ...]]:
+def component_dims(*names: str) -> Dims:
     """Dimensions (time, component) of these arrays, and of the count."""
-    return {"count": ("time",)} | dict.fromkeys(names, ("time", "component"))
+    return {"count": ("time",)} | along(names, "time", "component")
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,16 +143,18 @@ class Covariance(Statistic):
         correlation = value / np.where(scale > 0.0, scale, np.inf)
         arrays = {"value": value, "lower": lower, "upper": upper, "standard_error": error, "correlation": correlation}
         arrays |= {"mean": empty_as_nan(part["mean"], count), "count": count}
-        dims = dict.fromkeys(arrays, ("time", "component", "component_2"))
+        dims = along(arrays, "time", "component", "component_2")
         dims |= {"mean": ("time", "component"), "count": ("time",)}
         labels = {"component_2": np.array(self.quantity.labels)}
-        return estimate(self, "delta method: fourth moments", dims, arrays, time, labels, self.quantity.unit + " squared")
+        return estimate(
+            self, "delta method: fourth moments", dims, arrays, time, labels, self.quantity.unit + " squared"
+        )
 
 
 def estimate(
     statistic: Statistic,
     interval: str,
-    dims: dict[str, tuple[str, ...]],
+    dims: Dims,
     arrays: dict[str, np.ndarray],
     time: np.ndarray,
     coordinates: dict[str, np.ndarray] | None = None,

@@ -11,7 +11,7 @@ import numpy as np
 from lgvi_warp.errors import Faults
 from lgvi_warp.statistics import intervals, sketch
 from lgvi_warp.statistics.base import Statistic
-from lgvi_warp.statistics.estimate import Estimate
+from lgvi_warp.statistics.estimate import Estimate, along
 from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate
 from lgvi_warp.statistics.tree import Part
 from lgvi_warp.statistics.values import Values
@@ -40,7 +40,10 @@ class Extremes(Statistic):
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
         """The more extreme; the first member's of equal ones."""
         both: Part = {"count": left["count"] + right["count"]}
-        for name, better in (("minimum", right["minimum"] < left["minimum"]), ("maximum", right["maximum"] > left["maximum"])):
+        for name, better in (
+            ("minimum", right["minimum"] < left["minimum"]),
+            ("maximum", right["maximum"] > left["maximum"]),
+        ):
             for key in (name, f"{name}_member"):
                 both[key] = np.where(better, right[key], left[key])
         return both
@@ -60,8 +63,8 @@ class Extremes(Statistic):
 class Quantiles(Statistic):
     """Quantiles over members: value (k, levels, d). Exact up to `size` members; then from a sketch with a proven bound.
 
-    levels: between 0 and 1. size: numbers that each level of the sketch keeps, a power of two. rank_error (k,): proven bound on
-    the rank's error as a fraction of the members; what is to be expected is several times smaller (docs/statistics.md).
+    levels: between 0 and 1. size: numbers that each level of the sketch keeps, a power of two. rank_error (k,): proven
+    bound on the rank's error as a fraction of the members; what is to be expected is several times smaller.
     Interval: from the ranks of sorted values (binomial, no assumption on the distribution), widened by the sketch's
     standard error; infinite where too few members lie beyond the level.
     """
@@ -104,7 +107,9 @@ class Quantiles(Statistic):
         finite = np.isfinite(values)
 
         def at(rank: np.ndarray) -> np.ndarray:
-            return sketch.at_rank(values, middles, finite, np.broadcast_to(rank[:, :, None], (*rank.shape, values.shape[1])))
+            return sketch.at_rank(
+                values, middles, finite, np.broadcast_to(rank[:, :, None], (*rank.shape, values.shape[1]))
+            )
 
         value = empty_as_nan(at((n - 1) * level), count)
         low, high = intervals.ranks(n, level, self.confidence)
@@ -116,6 +121,6 @@ class Quantiles(Statistic):
         upper = np.where((high > n)[:, :, None], np.inf, at(np.maximum(np.minimum(high, n) - 1.0, 0.0)))
         error = part["error"][0] / np.maximum(count, 1)
         arrays = {"value": value, "lower": empty_as_nan(lower, count), "upper": empty_as_nan(upper, count)}
-        dims = dict.fromkeys(arrays, ("time", "level", "component")) | {"count": ("time",), "rank_error": ("time",)}
+        dims = along(arrays, "time", "level", "component") | {"count": ("time",), "rank_error": ("time",)}
         arrays |= {"rank_error": error, "count": count}
         return estimate(self, "order statistics: binomial ranks", dims, arrays, time, {"level": level[0]})

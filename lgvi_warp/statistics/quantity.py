@@ -79,7 +79,7 @@ def _euler(samples: Fields, members: Members) -> np.ndarray:
 
 def _energy(samples: Fields, members: Members) -> np.ndarray:
     """That of `Result.energy`."""
-    terms: tuple[Term, ...] = samples.terms
+    terms: Sequence[Term] = samples.terms
 
     def own(term: Term) -> dict[str, np.ndarray]:
         return {name: members.parameters[f"{term.key}.{name}"] for name in term.parameters()}
@@ -101,7 +101,9 @@ KNOWN: dict[str, Quantity] = {
         Quantity("velocity", _field("velocity"), "m/s", ("velocity",), _labels("velocity", 3)),
         Quantity("velocity_inertial", _velocity_inertial, "m/s", ("attitude", "velocity"), _labels("velocity_inertial", 3)),
         Quantity("speed", _speed, "m/s", ("velocity",)),
-        Quantity("angular_velocity", _field("angular_velocity"), "rad/s", ("angular_velocity",), _labels("angular_velocity", 3)),
+        Quantity(
+            "angular_velocity", _field("angular_velocity"), "rad/s", ("angular_velocity",), _labels("angular_velocity", 3)
+        ),
         Quantity("attitude", _field("attitude"), "1", ("attitude",), _labels("attitude", 3, 3)),
         Quantity("euler", _euler, "rad", ("attitude",), _labels("euler", 3)),
         Quantity("energy", _energy, "J"),

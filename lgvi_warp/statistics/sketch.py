@@ -88,7 +88,7 @@ def sorted_values(part: Part) -> tuple[np.ndarray, np.ndarray]:
 
 def at_rank(values: np.ndarray, middles: np.ndarray, finite: np.ndarray, rank: np.ndarray) -> np.ndarray:
     """Values at ranks (k, q, d), linear between those kept, never beyond the finite ones."""
-    k, d, m = values.shape
+    k, d = values.shape[:2]
     found = np.full(rank.shape, np.nan)
     last = finite.sum(axis=2) - 1
     for i in range(k):

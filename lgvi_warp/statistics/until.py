@@ -127,7 +127,9 @@ def watch(until: Until, statistics: Sequence[Statistic], times: np.ndarray) -> W
     found = _find(until.statistic, statistics)
     if found is None:
         names = [part.key for one in statistics for part in one.parts()]
-        faults.add("statistic", until.statistic, "is none of the run's statistics", closest(until.statistic, names or KNOWN))
+        faults.add(
+            "statistic", until.statistic, "is none of the run's statistics", closest(until.statistic, names or KNOWN)
+        )
     faults.raise_if_any()
     assert found is not None
     if found[0].type == "extremes":

@@ -29,7 +29,7 @@ def wilson(probability: np.ndarray, count: np.ndarray, confidence: float) -> tup
     0 to 1 without trials.
     """
     z2 = normal(confidence) ** 2
-    n = np.maximum(count, 1e-300)
+    n = np.where(count > 0, count, 1.0)
     centre = (probability + 0.5 * z2 / n) / (1.0 + z2 / n)
     spread = np.maximum(probability * (1.0 - probability), 0.0) / n + 0.25 * z2 / n**2
     half = np.sqrt(z2) * np.sqrt(np.where(count > 0, spread, 0.0)) / (1.0 + z2 / n)

@@ -70,7 +70,7 @@ class Quantiles(Statistic):
     """
 
     type: ClassVar[str] = "quantiles"
-    shared: ClassVar[frozenset[str]] = frozenset({"weights", "error", "variance"})
+    shared: ClassVar[frozenset[str]] = frozenset({"weights", "error", "variance", "shift"})
 
     levels: Any = (0.05, 0.25, 0.5, 0.75, 0.95)
     size: int = 2048

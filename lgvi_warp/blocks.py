@@ -11,6 +11,7 @@ import numpy as np
 
 from lgvi_warp import notation
 from lgvi_warp.inertia import Frame
+from lgvi_warp.machine import DTYPES
 from lgvi_warp.status import Status
 
 if TYPE_CHECKING:
@@ -113,9 +114,8 @@ def run_block(
         members = plan.ensemble.select(block.first, block.stop)
         packets = Packets(plan, members)
         kept = [keeper.open(plan, block, members) for keeper in keepers]
-        start = {name: getattr(members, name)[None] for name in plan.fields}
         for one in kept:
-            one.take(slice(0, 1), Fields(start, plan, slice(0, 1), packets.outcome))
+            one.take(slice(0, 1), Fields(at_start(plan, members), plan, slice(0, 1), packets.outcome))
         for k0, k1 in plan.segments(block.count):
             if halted():
                 return None
@@ -129,6 +129,13 @@ def run_block(
             advanced(block.count * (k1 - k0))
         outcome = packets.outcome()
         return tuple(one.close(outcome) for one in kept)
+
+
+def at_start(plan: Plan, members: Members) -> dict[str, np.ndarray]:
+    """The samples at t = 0, of the type of those that follow."""
+    real = np.dtype(DTYPES[plan.dtype])
+    types = {"position": np.dtype(np.float64)} if plan.spec.compensated else {}
+    return {name: getattr(members, name)[None].astype(types.get(name, real), copy=False) for name in plan.fields}
 
 
 def in_order(runs: Sequence[Block], done: Iterable[tuple[Block, Any]]) -> Iterator[tuple[Block, Any]]:

@@ -87,7 +87,8 @@ def plot_statistics(result: Result, path: str | os.PathLike[str]) -> Path:
     figure = figure_of(figsize=(5.0 * columns, 3.8 * rows), layout="constrained")
     for axes, one in zip(figure.subplots(rows, columns, squeeze=False).flat, drawn, strict=False):
         _PANEL[one.settings["type"]](axes, one)
-        axes.set(title=one.name, xlabel="time [s]", ylabel=f"[{one.unit}]")
+        histogram = one.settings["type"] == "histogram"
+        axes.set(title=one.name, xlabel="time [s]", ylabel="" if histogram else f"[{one.unit}]")
         axes.grid(True, alpha=0.3)
         if "depth" in one.name or "position[2]" in one.name:
             axes.set_ylabel("[m], down" if one.unit == "m" else f"[{one.unit}]")

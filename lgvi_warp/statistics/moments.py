@@ -146,9 +146,9 @@ class Covariance(Statistic):
         dims = along(arrays, "time", "component", "component_2")
         dims |= {"mean": ("time", "component"), "count": ("time",)}
         labels = {"component_2": np.array(self.quantity.labels)}
-        return estimate(
-            self, "delta method: fourth moments", dims, arrays, time, labels, self.quantity.unit + " squared"
-        )
+        unit = self.quantity.unit
+        unit = "products of the components' units" if "," in unit else f"({unit})^2"
+        return estimate(self, "delta method: fourth moments", dims, arrays, time, labels, unit)
 
 
 def estimate(

@@ -13,10 +13,11 @@ def table(estimates: Estimates) -> list[str]:
     """One line for each number: what it is of, its value, its interval, the members that it is of."""
     found = []
     for one in estimates.values():
-        unit = "" if one.unit == "1" else f" {one.unit}"
+        unit = "" if one.unit == "1" or one.unit.startswith("products") else f" {one.unit}"
+        members = one.count[0] if one.settings["type"] == "first_passage" else one.count[-1]
         for label, value, lower, upper in _LINES.get(one.settings["type"], _entries)(one):
             ends = f"{lower:.5g} to {upper:.5g}" if np.isfinite(lower) or np.isfinite(upper) else "no interval"
-            found.append((label, f"{value:.6g}{unit}", ends, f"{int(one.count[-1]):,} members"))
+            found.append((label, f"{value:.6g}{unit}", ends, f"{int(members):,} members"))
     widths = [max((len(row[i]) for row in found), default=0) for i in range(3)]
     return [
         "  ".join([*(text.ljust(width) for text, width in zip(row, widths, strict=False)), row[3]]) for row in found
@@ -65,8 +66,8 @@ def _extremes(one: Estimate) -> Iterator[Line]:
 def _passage(one: Estimate) -> Iterator[Line]:
     yield one.name, one.value[-1], one.lower[-1], one.upper[-1]
     for j, level in enumerate(one.coordinates["level"]):
-        ends = (one[f"passage_time_{name}"][j] for name in ("lower", "upper"))
-        yield f"{one.name}: time [s] of {level:g}", one["passage_time"][j], *ends  # type: ignore[misc]
+        lower, upper = (float(one[f"passage_time_{name}"][j]) for name in ("lower", "upper"))
+        yield f"{one.name}: time [s] of {level:g}", float(one["passage_time"][j]), lower, upper
 
 
 def _attitude(one: Estimate) -> Iterator[Line]:

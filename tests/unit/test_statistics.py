@@ -45,7 +45,7 @@ def of(kind, x, *arguments, good=None, block=256, **named):
 
 @pytest.fixture(scope="module")
 def values():
-    """(4, 1500, 3): correlated, skewed, far from zero; and which count: fewer as time goes, at the last none of the first 300."""
+    """(4, 1500, 3): correlated, skewed, far from zero; and which count: fewer as time goes."""
     rng = np.random.default_rng(2)
     x = rng.gamma(2.0, size=(4, 1500, 3)) @ rng.normal(size=(3, 3)) + np.array([1e3, 0.0, -5.0])
     good = rng.random((4, 1500)) < np.array([1.0, 0.9, 0.5, 0.2])[:, None]
@@ -200,8 +200,8 @@ def test_a_mean_attitude_is_the_nearest_rotation():
     np.testing.assert_allclose(found["rotation_half_width"][0], 1.96 * sigma / np.sqrt(n), rtol=0.06)
 
 
-# Coverage: 1,000 repetitions stand side by side as 1,000 times. Of 1,000 with 95 % each, chance leaves 93.0 to 97.0 % out
-# of 3 in 1,000 trials only: the seeds are fixed, so the tests are either right or wrong for ever.
+# Coverage: 1,000 repetitions stand side by side as 1,000 times. Of 1,000 intervals that hold with 95 % each, 93 to 97 %
+# hold in 99.6 % of all seeds.
 REPETITIONS, MEMBERS = 1000, 1000
 
 
@@ -233,10 +233,11 @@ def test_coverage_of_quantiles(repeated):
 
     found = of(lw.Quantiles, repeated, (0.1, 0.5, 0.9))
     between(coverage(found, ndtri([0.1, 0.5, 0.9])[:, None]))
-    # 1,000 members in a sketch of 128: the interval is widened by its error, and may hold more than 95 %.
+    # 1,000 members in a sketch of 128: the interval is widened by a bound on its variance, so that it holds more often.
     rough = of(lw.Quantiles, repeated, (0.1, 0.5, 0.9), size=128)
+    assert np.all(rough["rank_error"] > 0.0) and np.all(rough.half_width[:, 1].mean() > found.half_width[:, 1].mean())
     held = coverage(rough, ndtri([0.1, 0.5, 0.9])[:, None])
-    assert np.all(rough["rank_error"] > 0.0) and np.all((held >= 0.93) & (held <= 0.995)), held
+    assert np.all((held >= 0.93) & (held <= 0.985)), held
 
 
 def test_coverage_of_probabilities(repeated):
@@ -371,3 +372,13 @@ def test_all_faults_at_once():
     with pytest.raises(lw.SceneError) as caught:
         lw.Quantiles("dept", (0.0, 2.0), size=3, confidence=0.0, stopped="x", name=1)
     assert len(caught.value.faults) == 6
+
+
+@pytest.mark.slow
+def test_coverage_of_runs_that_stop_by_themselves():
+    from benchmarks.coverage_table import stops
+
+    for law, least, _, held, _ in stops(REPETITIONS):
+        # Stopping costs some coverage where looks begin early and the distribution is skewed (docs/statistics.md).
+        assert held >= (0.93 if least >= 1024 and law == "normal" else 0.9), (law, least, held)
+        assert held <= 0.97

@@ -26,7 +26,12 @@ print(json.dumps({{"run_s": seconds, "peak_MiB": resource.getrusage(resource.RUS
 
 
 def statistics():
-    return (lw.Mean("position"), lw.Covariance("position"), lw.Quantiles("position", (0.05, 0.5, 0.95)), lw.Extremes("position"))
+    return (
+        lw.Mean("position"),
+        lw.Covariance("position"),
+        lw.Quantiles("position", (0.05, 0.5, 0.95)),
+        lw.Extremes("position"),
+    )
 
 
 def runs(members, steps):

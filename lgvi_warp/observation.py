@@ -17,6 +17,9 @@ from lgvi_warp.statistics import Estimate, Statistic
 from lgvi_warp.statistics.until import Until, Watch, from_dict, watch
 from lgvi_warp.status import Status
 
+# Samplings whose means are at least as close as those of independent members.
+EVENLY_SPREAD = ("latin_hypercube", "sobol", "halton")
+
 
 @dataclass(frozen=True)
 class Observation:
@@ -98,11 +101,15 @@ def notes(estimates: Mapping[str, Estimate], ensemble: Ensemble, members: int) -
         return found
     counts = [one.count for one in estimates.values() if one.settings["type"] != "first_passage"]
     fewest = min((int(count.min()) for count in counts), default=members)
-    sampling = str(getattr(ensemble, "sampling", "random"))
+    sampling = getattr(ensemble, "sampling", "random")
+    kind = str(getattr(sampling, "kind", sampling))
     if fewest < members:
         text = f"statistics leave members out from their failure on: {fewest} of {members} count where fewest do"
         found += (f"{text} (count of each statistic)",)
-    if sampling != "random":
-        text = f"intervals are those of independent members: wider than need be for sampling {sampling!r}"
-        found += (f"{text}; independent repetitions with other seeds show by how much",)
+    if kind in EVENLY_SPREAD:
+        text = f"intervals are those of independent members, wider than need be for sampling {kind!r}"
+        found += (f"{text}: repetitions with other seeds show by how much",)
+    elif kind != "random":
+        text = f"intervals are those of independent members, which a {kind} does not give"
+        found += (f"{text}: do not rely on them",)
     return found

@@ -194,6 +194,8 @@ def run_plan(
             if watch and gathered and watch.due(block.stop) and watch.reached(gathered.estimates(watch.statistic)):
                 n = block.stop
                 break
+    if progress and n < plan.ensemble.members:
+        progress(1.0)
     run_seconds = time.perf_counter() - start
     status, size = outcomes.status[:n], outcomes.failed_size[:n]
     failed, stopped = status != 0, status >= Status.SURFACE

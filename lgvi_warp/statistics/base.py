@@ -76,6 +76,10 @@ class Statistic:
         self.check(faults)
         faults.raise_if_any()
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Made anew in another process from what was said of it: functions are found by their names there."""
+        return _made, (type(self), {one.name: getattr(self, one.name) for one in fields(self)})
+
     def check(self, faults: Faults) -> None:
         """Note what else is wrong."""
 
@@ -135,6 +139,10 @@ class Statistic:
     def alone(self, i: int) -> Quantity:
         """One component of what it is of."""
         return component(self.quantity, i)
+
+
+def _made(kind: type[Statistic], given: dict[str, Any]) -> Statistic:
+    return kind(**given)
 
 
 def plain(value: Any) -> Any:

@@ -41,6 +41,9 @@ class Histogram(Counted):
 
     def check(self, faults: Faults) -> None:
         """Edges must rise."""
+        if self.edges is not None and self.bins is not None:
+            faults.add("edges", self.edges, "and bins are both given", "keep one of them")
+            return
         if (self.edges is None) == (self.bins is None or self.limits is None):
             faults.add("edges", self.edges, "or bins and limits are wanted, one of them", "give edges=(0, 10, 20)")
             return

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 class Gathered:
     """The statistics of a run, so far: a tree of parts for each."""
 
+    # What a store calls its parts.
+    name = "statistics"
+
     def __init__(self, plan: Plan, statistics: Sequence[Statistic]):
         self._statistics, self.time = tuple(statistics), plan.grid.times
         self._size = blocks(plan.ensemble.members)[0].count
@@ -49,18 +52,20 @@ class Gathered:
         """All of them, by name."""
         return Estimates(self.estimates())
 
-    @staticmethod
-    def to_arrays(part: Sequence[Part]) -> dict[str, np.ndarray]:
-        """A block's part as named arrays, for a file."""
-        return {f"{i}/{name}": array for i, one in enumerate(part) for name, array in one.items()}
+    def __getstate__(self) -> dict[str, Any]:
+        """What another process needs to gather blocks: not what was gathered here."""
+        return {name: value for name, value in vars(self).items() if name != "_trees"}
 
     @staticmethod
-    def from_arrays(arrays: Mapping[str, np.ndarray]) -> list[Part]:
+    def to_arrays(part: Sequence[Part]) -> tuple[dict[str, np.ndarray], Any]:
+        """A block's part as named arrays, for a file, and the number of statistics."""
+        return {f"{i}/{name}": array for i, one in enumerate(part) for name, array in one.items()}, len(part)
+
+    @staticmethod
+    def from_arrays(arrays: Mapping[str, np.ndarray], content: Any) -> list[Part]:
         """What `to_arrays` gave: merged later, it gives the same bits."""
-        part: list[Part] = []
-        for i in range(1 + max((int(name.partition("/")[0]) for name in arrays), default=-1)):
-            part.append({n.removeprefix(f"{i}/"): a for n, a in arrays.items() if n.startswith(f"{i}/")})
-        return part
+        prefixes = [f"{i}/" for i in range(content)]
+        return [{n.removeprefix(one): a for n, a in arrays.items() if n.startswith(one)} for one in prefixes]
 
 
 class _BlockStatistics:

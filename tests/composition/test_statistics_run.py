@@ -1,7 +1,9 @@
 """Statistics of runs: exact solutions, equal bits for any number of threads, members that fail or stop, what is kept."""
 
 import json
+import pickle
 import tomllib
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -93,18 +95,30 @@ def test_parts_pass_through_files(fleet, whole, tmp_path):
     """A store may keep a block's part, and merge it later: to the same bits, in any order."""
     plan = make_plan(fleet, **SETTINGS)
     statistics = tuple(EVERY)
-    gathered, again = Gathered(plan, statistics), Gathered(plan, statistics)
+    # What gathers blocks elsewhere was pickled.
+    gathered, again = pickle.loads(pickle.dumps(Gathered(plan, statistics))), Gathered(plan, statistics)
     from lgvi_warp.blocks import run_block
 
     plan.compile()
     for i in (2, 0, 3, 1):
         block: Block = blocks(1003)[i]
         (part,) = run_block(plan, block, [gathered]) or ()
-        np.savez(tmp_path / f"{i}.npz", **{k.replace("/", "|"): a for k, a in gathered.to_arrays(part).items()})
+        arrays, content = gathered.to_arrays(part)
+        assert json.loads(json.dumps(content)) == content
+        np.savez(tmp_path / f"{i}.npz", **{k.replace("/", "|"): a for k, a in arrays.items()})
     for i in (3, 1, 0, 2):
         with np.load(tmp_path / f"{i}.npz") as data:
-            again.merge(blocks(1003)[i], again.from_arrays({k.replace("|", "/"): data[k] for k in data.files}))
+            again.merge(blocks(1003)[i], again.from_arrays({k.replace("|", "/"): data[k] for k in data.files}, content))
     assert same(again.result(), whole.statistics)
+
+
+@pytest.mark.parametrize(("kind", "words"), [("sobol", "wider than need be"), ("grid", "do not rely"), ("random", "")])
+def test_intervals_of_dependent_members_are_said_to_be(fleet, whole, kind, words):
+    class Sampled:
+        sampling = kind
+
+    (text,) = observation.notes(whole.statistics, Sampled(), 1003) or ("",)
+    assert words in text and bool(text) == (kind != "random")
 
 
 def test_the_result_keeps_its_statistics(fleet, whole, tmp_path):
@@ -420,3 +434,19 @@ def test_no_statistics_cost_nothing(fleet):
     asked = make_plan(fleet, **SETTINGS, fields=settings.fields)
     assert plain.advance is asked.advance
     assert "observed" not in lw.solve(fleet, **SETTINGS).provenance
+
+
+def test_memory_grows_with_neither_members_nor_steps():
+    def peak(n, steps):
+        fleet, save = falling(n), lw.SaveAt(every=0.01 * steps / 10)
+        tracemalloc.start()
+        lw.solve(fleet, h=0.01, t1=0.01 * steps, save=save, statistics=[lw.Mean("depth")], keep="none", threads=1)
+        found = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return found
+
+    # Both in blocks of 512; eleven samples of position are 264 bytes a member, and status and its like below 80.
+    few, many = 16_384, 32_767
+    peak(few, 10)
+    assert peak(many, 10) - peak(few, 10) < 80 * (many - few)
+    assert peak(few, 1000) - peak(few, 10) < 100_000

@@ -1,12 +1,14 @@
 """Statistics of 10^6 members at ten sample times beside the bare kernel, in turn: psi_s, float64, all threads; peak memory.
 
-"none": mean, covariance, quantiles and extremes of position beside runs that keep nothing, with the same sample times
-and without any, medians of rounds in turn. Memory is that of a process of its own.
+Mean, covariance, quantiles and extremes of position, together and one by one, beside runs that keep nothing: with the same
+sample times, and without any. The least time of rounds in turn; core_s is that of all threads together, which other work
+on the machine disturbs less. Memory is that of a process of its own.
 """
 
 import json
 import subprocess
 import sys
+import time
 from pathlib import Path
 from statistics import median
 
@@ -20,7 +22,7 @@ MEMORY = """
 import json, resource, sys
 sys.path[:0] = [{root!r}, {root!r} + "/kernels"]
 from benchmarks.cases.statistics import case
-seconds = case.runs({members}, {steps})["statistics"]()
+seconds, _ = case.runs({members}, {steps})["statistics"]()
 print(json.dumps({{"run_s": seconds, "peak_MiB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024}}))
 """
 
@@ -35,14 +37,20 @@ def statistics():
 
 
 def runs(members, steps):
-    """Name -> a call that makes the run and returns its seconds."""
+    """Name -> a call that makes the run and returns its seconds, and those of all cores together."""
     fleet, t1 = speed.fleet(members), 0.01 * steps
     every = lw.SaveAt(every=t1 / 10)
     threads = machine.thread_count()
 
     def of(save, fields, observed):
         plan = make_plan(fleet, "psi_s", 0.01, t1, save, fields=lambda asked: fields)
-        return lambda: run_plan(plan, threads, None, observed).run_seconds
+
+        def call():
+            start = time.process_time()
+            result = run_plan(plan, threads, None, observed)
+            return result.run_seconds, time.process_time() - start
+
+        return call
 
     nothing = Observation(keep="none")
     one_by_one = {one.type: of(every, ("position",), Observation((one,), "none")) for one in statistics()}
@@ -54,7 +62,7 @@ def runs(members, steps):
 
 
 def run(quick):
-    members, steps, rounds = (20_000, 200, 2) if quick else (1_000_000, 1000, 7)
+    members, steps, rounds = (20_000, 200, 2) if quick else (1_000_000, 1000, 5)
     calls = runs(members, steps)
     found = {name: [] for name in calls}
     for call in calls.values():
@@ -62,16 +70,19 @@ def run(quick):
     for _ in range(rounds):
         for name, call in calls.items():
             found[name].append(call())
-    bare = found["no samples"]
-    for name, seconds in found.items():
+    least = {name: [min(column) for column in zip(*times, strict=True)] for name, times in found.items()}
+    for name, (wall, cores) in least.items():
+        pairs = zip(found[name], found["no samples"], strict=True)
         yield {
             "members": members,
             "steps": steps,
             "run": name,
-            "run_s": round(min(seconds), 3),
-            "to_no_samples": round(min(seconds) / min(bare), 3),
-            "to_samples_dropped": round(min(seconds) / min(found["samples dropped"]), 3),
-            "median_to_no_samples": round(median(s / b for s, b in zip(seconds, bare, strict=True)), 3),
+            "run_s": round(wall, 3),
+            "to_no_samples": round(wall / least["no samples"][0], 3),
+            "to_samples_dropped": round(wall / least["samples dropped"][0], 3),
+            "median_to_no_samples": round(median(one[0] / bare[0] for one, bare in pairs), 3),
+            "core_s": round(cores, 3),
+            "core_s_to_no_samples": round(cores / least["no samples"][1], 3),
         }
     for n in (members // 10, members):
         code = MEMORY.format(root=str(ROOT), members=n, steps=steps)

@@ -100,7 +100,7 @@ LAWS = {
 def stops(repetitions):
     """(law, members before the first look, asked for, coverage, members taken)."""
     for law, (draw, truth, deviation) in LAWS.items():
-        for least, wanted in ((256, 512), (256, 4096), (1024, 4096)):
+        for least, wanted in ((256, 512), (1024, 512), (256, 4096)):
             half = 1.96 * deviation / np.sqrt(wanted)
             yield law, least, wanted, *stopped(repetitions, lw.Until("mean x", half, members=least), draw, truth)
 

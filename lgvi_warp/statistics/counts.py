@@ -108,7 +108,9 @@ class Condition(Statistic):
         for name in ("above", "below"):
             if getattr(self, name) is not None:
                 limit = faults.finite(name, getattr(self, name))
-                if limit is not None and limit.ndim > 1:
+                found = getattr(self, "_quantity", None)
+                fits = (1,) if found is None else (1, found.size)
+                if limit is not None and (limit.ndim > 1 or limit.size not in fits):
                     faults.add(name, getattr(self, name), "is no number", "give one number, or one for each component")
 
     @property

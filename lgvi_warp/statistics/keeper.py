@@ -37,15 +37,18 @@ class Gathered:
 
     def merge(self, block: Block, part: list[Part]) -> None:
         """Take in a block's part: of each statistic, named arrays."""
-        for tree, one in zip(self._trees, part, strict=True):
-            tree.add(block.first // self._size, one)
+        # A member that is about to fail may be too large to be squared: the statistic then says so, and NumPy need not.
+        with np.errstate(invalid="ignore", over="ignore"):
+            for tree, one in zip(self._trees, part, strict=True):
+                tree.add(block.first // self._size, one)
 
     def estimates(self, chosen: Statistic | None = None) -> list[Estimate]:
         """What all say of the blocks so far, or one of them."""
         found: list[Estimate] = []
         for statistic, tree in zip(self._statistics, self._trees, strict=True):
             if chosen is None or statistic is chosen:
-                found += statistic.estimates(tree.parts(), self.time)
+                with np.errstate(invalid="ignore", over="ignore"):
+                    found += statistic.estimates(tree.parts(), self.time)
         return found
 
     def result(self) -> Estimates:

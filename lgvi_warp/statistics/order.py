@@ -88,7 +88,10 @@ class Quantiles(Statistic):
 
     def rows(self, values: Values) -> Part:
         """The block's values, sorted; every other one, and so on, down to `size`."""
-        return {"count": values.count} | sketch.of(values.filled(np.inf), values.size, self.size, values.block)
+        x = values.filled(np.inf)
+        # Sorting is most of the work, and half as much of numbers half as long.
+        x = x.astype(np.float32) if values.single else x
+        return {"count": values.count} | sketch.of(x, values.size, self.size, values.block)
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
         """One sketch of two."""

@@ -23,7 +23,7 @@ class _Path:
     def __init__(self, statistic: _PathExtreme, count: int):
         self._statistic, self._whole = statistic, np.ones((1, count), bool)
         self._best: np.ndarray | None = None
-        self._place = (0, 0, 0)
+        self._place, self._single = (0, 0, 0), False
 
     def take(self, values: Values, when: slice) -> None:
         """Look at these times."""
@@ -31,13 +31,13 @@ class _Path:
         self._best = best if self._best is None else self._statistic.better(self._best, best)
         if values.good is not None:
             self._whole &= values.good.all(axis=0)
-        self._place = (values.first, values.block, values.size)
+        self._place, self._single = (values.first, values.block, values.size), values.single
 
     def close(self) -> Part:
         """What each of the statistics keeps of the paths' bests."""
         assert self._best is not None
         good = None if self._whole.all() else self._whole
-        values = Values(self._best, good, *self._place)
+        values = Values(self._best.astype(np.float32) if self._single else self._best, good, *self._place)
         found: Part = {}
         for i, one in enumerate(self._statistic.then_all):
             gathered = one.open(1, values.x.shape[2])

@@ -28,7 +28,7 @@ class Quantity:
 
     function(samples, members): samples["position"] (k, n, 3) and so on, samples.time (k,) [s], samples.terms; members
     as lw.Ensemble.select gives them. fields: the samples that it needs. labels: names of the components. What is not
-    finite leaves its member out at that time. A name that begins a scene file's `of` is no such function.
+    finite leaves its member out at that time.
     """
 
     name: str
@@ -47,13 +47,14 @@ class Quantity:
         return len(self.labels)
 
     def __call__(self, samples: Fields, members: Members) -> np.ndarray:
-        """Its numbers (k, d, n), float64 and contiguous."""
+        """Its numbers (k, d, n), contiguous: float32 where they are numbers of such a run as they stand, else float64."""
         values = np.asarray(self.function(samples, members))
         k, n = len(samples.time), members.count
         if values.shape not in ((k, n), (k, n, self.size)) or (values.ndim == 2 and self.size != 1):
             wanted = f"({k}, {n})" if self.size == 1 else f"({k}, {n}, {self.size})"
             raise ValueError(f"quantity {self.name}: gave shape {values.shape}; {wanted} is wanted: times, members")
-        return np.ascontiguousarray(np.moveaxis(values.reshape(k, n, self.size), 2, 1), dtype=np.float64)
+        real = np.float32 if values.dtype == np.float32 else np.float64
+        return np.ascontiguousarray(np.moveaxis(values.reshape(k, n, self.size), 2, 1), dtype=real)
 
 
 def _field(name: str) -> Function:

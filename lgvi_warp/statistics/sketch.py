@@ -31,7 +31,7 @@ def coin(level: int, place: int, sides: int) -> int:
 def of(x: np.ndarray, members: int, size: int, block: int) -> Part:
     """A block's sketch: x (k, d, n), filled up to `members` values with +inf, at most `size` of them kept."""
     k, d, n = x.shape
-    values = np.empty((k, d, max(members, n)))
+    values = np.empty((k, d, max(members, n)), x.dtype)
     values[..., :n] = x
     values[..., n:] = np.inf
     values.sort(axis=2)

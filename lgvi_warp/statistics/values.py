@@ -11,11 +11,14 @@ class Values:
     """x (k, d, n): numbers of n members at k times, float64; good (k, n), or None where all count.
 
     A member counts at a time if it had not failed by then and each of its numbers is finite. first: index of the
-    block's first member; block: the block's number, and size: the members of a whole block.
+    block's first member; block: the block's number, and size: the members of a whole block. single: whether the numbers
+    are float32 as they stand, so that what only sorts them may do so.
     """
 
     def __init__(self, x: np.ndarray, good: np.ndarray | None = None, first: int = 0, block: int = 0, size: int = 0):
         self.first, self.block, self.size = first, block, max(size, x.shape[2])
+        self.single = x.dtype == np.float32
+        x = x.astype(np.float64, copy=False)
         if good is None and np.isfinite(x.sum(axis=2)).all():
             self.x, self.good = x, None
             self.count = np.full(len(x), x.shape[2], np.int64)

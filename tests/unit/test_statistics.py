@@ -358,6 +358,7 @@ def test_coins_are_fair_and_fixed():
     (lambda: lw.Mean("depth", confidence=1.5), "between 0 and 1"), (lambda: lw.Mean("depth", stopped="no"), "held"),
     (lambda: lw.Quantiles("depth", (0.0, 0.5)), "between 0 and 1"), (lambda: lw.Quantiles("depth", size=1000), "power of two"),
     (lambda: lw.Histogram("depth"), "edges"), (lambda: lw.Histogram("depth", (1.0, 0.0)), "rise"),
+    (lambda: lw.Exceedance("position", (1.0, 2.0)), "one for each component"),
     (lambda: lw.Exceedance("depth", 1.0, 2.0), "both given"), (lambda: lw.FirstPassage("position", 1.0), "3 components"),
     (lambda: lw.MeanAttitude("depth"), "no attitude"), (lambda: lw.PathMaximum("depth", lw.Mean("speed")), "leave it out"),
     (lambda: lw.Until("mean depth", -1.0), "half_width"), (lambda: lw.Until(3, 1.0), "no name"),

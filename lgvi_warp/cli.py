@@ -251,7 +251,7 @@ def write(result: Any, out: Path) -> tuple[list[Path], list[str]]:
     """
     from concurrent.futures import ThreadPoolExecutor
 
-    from lgvi_warp.sinks.plots import plot, plot_statistics
+    from lgvi_warp.sinks.plots import drawable, plot, plot_statistics
     from lgvi_warp.sinks.rerun import log_rerun
 
     files, faults = [], []
@@ -259,7 +259,7 @@ def write(result: Any, out: Path) -> tuple[list[Path], list[str]]:
     shown = result if result.samples else result.kept
     if shown is not None:
         writers |= {"fleet.png": lambda path: plot(shown, path), "fleet.rrd": lambda path: log_rerun(shown, path)}
-    if result.statistics:
+    if drawable(result):
         writers["statistics.png"] = lambda path: plot_statistics(result, path)
     with ThreadPoolExecutor(len(writers)) as pool:
         jobs = {out / name: pool.submit(writer, out / name) for name, writer in writers.items()}

@@ -79,7 +79,7 @@ def plot_statistics(result: Result, path: str | os.PathLike[str]) -> Path:
     without matplotlib (extra: viz), ValueError when there is nothing to draw.
     """
     figure_of = _figure()
-    drawn = [one for one in result.statistics.values() if len(one.time) > 1 and one.settings["type"] in _PANEL][:PANELS]
+    drawn = drawable(result)[:PANELS]
     if not drawn:
         raise ValueError("no statistic against time was gathered: there is nothing to draw; give statistics=[...]")
     columns = min(3, len(drawn))
@@ -100,6 +100,11 @@ def plot_statistics(result: Result, path: str | os.PathLike[str]) -> Path:
     target = Path(path)
     figure.savefig(target, dpi=100)
     return target
+
+
+def drawable(result: Result) -> list[Estimate]:
+    """The statistics that `plot_statistics` draws."""
+    return [one for one in result.statistics.values() if len(one.time) > 1 and one.settings["type"] in _PANEL]
 
 
 def _levels_panel(axes: Any, one: Estimate) -> None:

@@ -197,22 +197,16 @@ def run_plan(
     if progress and n < plan.ensemble.members:
         progress(1.0)
     run_seconds = time.perf_counter() - start
-    status, size = outcomes.status[:n], outcomes.failed_size[:n]
-    failed, stopped = status != 0, status >= Status.SURFACE
-    # An event's size is the part of its step that was made before it.
-    steps_made = outcomes.failed_step[:n] + np.where(stopped, size, 0.0)
     parameters = Drawn(plan.ensemble, n)
     estimates = gathered.result() if gathered else Estimates()
     messages = plan.grid.messages + plan.ensemble.scene.vehicle.warnings + notes(estimates, plan.ensemble, n)
     if watch:
         messages += (watch.report(n, gathered.estimates(watch.statistic) if gathered else ()),)
-    indices, kept = again(plan, observed, status, fields, threads)
+    indices, kept = again(plan, observed, outcomes.status[:n], fields, threads)
     return Result(
         time=plan.grid.times,
         samples={} if samples is None else {name: values[:, :n] for name, values in samples.fields.items()},
-        status=status.view(StatusArray),
-        failure_time=np.where(failed, steps_made * plan.grid.h, np.nan),
-        failure_value=np.where(failed, np.where(stopped, 0.0, size), np.nan),
+        **failures(outcomes, n, plan.grid.h),
         parameters=dict(parameters) if samples is not None else parameters,
         messages=messages,
         provenance=provenance(plan)
@@ -226,6 +220,19 @@ def run_plan(
         compile_seconds=compile_seconds,
         run_seconds=run_seconds,
     )
+
+
+def failures(outcomes: Outcomes, n: int, h: float) -> dict[str, Any]:
+    """status, failure_time and failure_value of the first n members, as a Result has them."""
+    status, size = outcomes.status[:n], outcomes.failed_size[:n]
+    failed, stopped = status != 0, status >= Status.SURFACE
+    # An event's size is the part of its step that was made before it.
+    steps_made = outcomes.failed_step[:n] + np.where(stopped, size, 0.0)
+    return {
+        "status": status.view(StatusArray),
+        "failure_time": np.where(failed, steps_made * h, np.nan),
+        "failure_value": np.where(failed, np.where(stopped, 0.0, size), np.nan),
+    }
 
 
 def again(

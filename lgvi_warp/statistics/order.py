@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -15,6 +15,10 @@ from lgvi_warp.statistics.estimate import Estimate, along
 from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate
 from lgvi_warp.statistics.tree import Part
 from lgvi_warp.statistics.values import Values
+
+
+# Numbers of sketches: some 50 bytes are needed for each.
+SORTED_AT_ONCE = 2_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +100,18 @@ class Quantiles(Statistic):
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
         """One sketch of two."""
         return {"count": left["count"] + right["count"]} | sketch.join(left, right, self.size, place)
+
+    def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
+        """Some times after others: sorting all at once would take more memory than the sketches do."""
+        numbers = sum(part["values"][0].size for part in parts)
+        rows = max(1, SORTED_AT_ONCE // numbers)
+        found = []
+        for first in range(0, len(time), rows):
+            at = slice(first, first + rows)
+            some = [part | {key: part[key][at] for key in part.keys() - self.shared} for part in parts]
+            found.append(self.read(self.whole(some), time[at]))
+        arrays = {name: np.concatenate([one[name] for one in found]) for name in found[0].arrays}
+        return [replace(found[0], arrays=arrays, coordinates=found[0].coordinates | {"time": time})]
 
     def whole(self, parts: Sequence[Part]) -> Part:
         """All that is kept, side by side."""

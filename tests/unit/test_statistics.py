@@ -89,6 +89,15 @@ def test_quantiles_are_exact_while_few(values):
             np.testing.assert_allclose(found.value[t], np.quantile(own, LEVELS, axis=0), rtol=1e-13)
 
 
+def test_quantiles_of_few_times_at_once_are_the_same(values, monkeypatch):
+    x, good = values
+    whole = of(lw.Quantiles, x, LEVELS, good=good, size=64)
+    monkeypatch.setattr("lgvi_warp.statistics.order.SORTED_AT_ONCE", 1)
+    pieces = of(lw.Quantiles, x, LEVELS, good=good, size=64)
+    assert all(whole[name].tobytes() == pieces[name].tobytes() for name in whole.arrays)
+    np.testing.assert_array_equal(whole.time, pieces.time)
+
+
 def test_extremes_name_their_members(values):
     x, good = values
     found = of(lw.Extremes, x, good=good)

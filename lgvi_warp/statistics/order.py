@@ -16,7 +16,6 @@ from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate
 from lgvi_warp.statistics.tree import Part
 from lgvi_warp.statistics.values import Values
 
-
 # Numbers of sketches: some 50 bytes are needed for each.
 SORTED_AT_ONCE = 2_000_000
 

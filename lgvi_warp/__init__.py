@@ -2,12 +2,15 @@
 
 from typing import TYPE_CHECKING, Any
 
-from lgvi_warp.distributions import LogNormal, Normal, TruncatedNormal, Uniform
+from lgvi_warp.distributions import Choice, LogNormal, Normal, TruncatedNormal, Uniform
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import SceneError
 from lgvi_warp.events import Box, Event, Floor, StopTime, Surface
+from lgvi_warp.joint_laws import CorrelatedNormal, PhysicalInertia, PositiveDefinite, RotationNormal, UniformRotation
+from lgvi_warp.laws import Frozen
 from lgvi_warp.method import Method
 from lgvi_warp.result import Result
+from lgvi_warp.sampling import Grid, Halton, LatinHypercube, Levels, Morris, Random, Saltelli, Sobol, Table
 from lgvi_warp.saveat import SaveAt
 from lgvi_warp.scene import Environment, Scene, Start
 from lgvi_warp.statistics import (
@@ -55,14 +58,17 @@ from lgvi_warp.terms import (
 from lgvi_warp.vehicle import Vehicle
 
 if TYPE_CHECKING:
+    from lgvi_warp import uq
     from lgvi_warp.coefficients import from_fossen, vehicles
     from lgvi_warp.coefficients_sdf import from_sdf
     from lgvi_warp.coefficients_yaml import from_yaml
     from lgvi_warp.law_check import check_law
     from lgvi_warp.plan import Plan
-    from lgvi_warp.sinks.plots import plot, plot_statistics, plot_tradeoff
+    from lgvi_warp.sinks.plots import plot, plot_stability, plot_statistics, plot_tradeoff
     from lgvi_warp.sinks.rerun import log_rerun
+    from lgvi_warp.sinks.sensitivity import plot_sensitivity
     from lgvi_warp.solving import solve
+    from lgvi_warp.stability import StabilityMap, stability_map
     from lgvi_warp.suggestion import suggest
     from lgvi_warp.tradeoffs import tradeoff
 
@@ -76,7 +82,11 @@ _LAZY = {
     "Plan": "lgvi_warp.plan",
     "plot": "lgvi_warp.sinks.plots",
     "plot_statistics": "lgvi_warp.sinks.plots",
+    "plot_stability": "lgvi_warp.sinks.plots",
     "plot_tradeoff": "lgvi_warp.sinks.plots",
+    "plot_sensitivity": "lgvi_warp.sinks.sensitivity",
+    "StabilityMap": "lgvi_warp.stability",
+    "stability_map": "lgvi_warp.stability",
     "log_rerun": "lgvi_warp.sinks.rerun",
     "check_law": "lgvi_warp.law_check",
     "from_fossen": "lgvi_warp.coefficients",
@@ -88,8 +98,10 @@ _LAZY = {
 __all__ = [
     "BodyLift",
     "Box",
+    "Choice",
     "CircularMean",
     "ControlFins",
+    "CorrelatedNormal",
     "Covariance",
     "CrossFlow",
     "Current",
@@ -105,35 +117,50 @@ __all__ = [
     "Fins",
     "FirstPassage",
     "Floor",
+    "Frozen",
     "GaussMarkovCurrent",
+    "Grid",
+    "Halton",
     "Histogram",
+    "LatinHypercube",
+    "Levels",
     "LogNormal",
     "Mean",
     "MeanAttitude",
     "Method",
+    "Morris",
     "Normal",
     "Packed",
     "PathMaximum",
     "PathMinimum",
+    "PhysicalInertia",
     "Plan",
+    "PositiveDefinite",
     "Quantiles",
     "Quantity",
+    "Random",
     "Restoring",
     "Result",
+    "RotationNormal",
+    "Saltelli",
     "SaveAt",
     "Scene",
     "SceneError",
     "Setting",
+    "Sobol",
+    "StabilityMap",
     "Start",
     "Status",
     "StopTime",
     "Stratification",
     "Surface",
+    "Table",
     "Term",
     "Tether",
     "Thrusters",
     "TruncatedNormal",
     "Uniform",
+    "UniformRotation",
     "Until",
     "Vehicle",
     "Waves",
@@ -147,22 +174,26 @@ __all__ = [
     "from_yaml",
     "log_rerun",
     "plot",
+    "plot_sensitivity",
+    "plot_stability",
     "plot_statistics",
     "plot_tradeoff",
     "quantity",
     "register",
     "solve",
+    "stability_map",
     "suggest",
     "tradeoff",
+    "uq",
     "vehicles",
 ]
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _LAZY:
+    if name != "uq" and name not in _LAZY:
         raise AttributeError(f"module 'lgvi_warp' has no attribute {name!r}")
     from importlib import import_module
 
-    value = getattr(import_module(_LAZY[name]), name)
+    value = import_module("lgvi_warp.uq") if name == "uq" else getattr(import_module(_LAZY[name]), name)
     globals()[name] = value
     return value

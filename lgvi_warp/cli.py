@@ -32,6 +32,8 @@ EPILOG = """examples:
   lgvi-warp run examples/paper.toml --members 20000 --dtype float32 --set vehicle.mass=120
   lgvi-warp run examples/paper.toml --error 1e-3
   lgvi-warp tradeoff examples/paper.toml --out runs/tradeoff
+  lgvi-warp sensitivity examples/paper.toml --of "position[2]" --out runs/sensitivity
+  lgvi-warp stability examples/paper.toml --out runs/stability
   lgvi-warp info
 """
 
@@ -75,6 +77,8 @@ def parser() -> argparse.ArgumentParser:
         default=45.0,
         help="about how long to measure (default 45)",
     )
+    _add_sensitivity(verbs)
+    _add_stability(verbs)
     info = verbs.add_parser("info", help="machine, versions, SIMD width, threads and the core's peak")
     info.set_defaults(scene=None)
     bench = verbs.add_parser("bench", help="speed of the kernel on this machine, beside the core's peak")
@@ -83,14 +87,63 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
-def _add_scene(verb: argparse.ArgumentParser, folder: str) -> None:
+def _add_sensitivity(verbs: Any) -> None:
+    """lgvi-warp sensitivity and its arguments."""
+    verb = verbs.add_parser(
+        "sensitivity",
+        help="what of that which varies matters: Sobol indices or Morris screening; .txt, .csv, .json, .png",
+    )
+    verb.add_argument("scene", metavar="SCENE", help="scene file (TOML) with [ensemble.vary]")
+    verb.add_argument("--of", metavar="Q", action="append", help='quantity of interest: "position[2]" (the default), '
+                      '"norm(velocity)", "max(energy)" ...; may be given several times')  # fmt: skip
+    verb.add_argument("--out", metavar="DIR", type=Path, help="folder for the files (default: runs/NAME_sensitivity)")
+    verb.add_argument("--analysis", choices=("sobol", "morris"), default="sobol", help="default sobol")
+    verb.add_argument("--samples", metavar="N", type=int, help="groups of the design (default: sobol 256, morris 64)")
+    verb.add_argument(
+        "--first-order", action="store_true", help="sobol without pairs of factors: about half the members"
+    )
+    verb.add_argument("--failed", choices=("refuse", "drop"), default="refuse",
+                      help="what to do about groups with a failed member (default refuse)")  # fmt: skip
+    verb.add_argument("--method", help="integration method, as of run")
+    verb.add_argument("--step", metavar="S", help="time step [s]")
+    verb.add_argument("--dtype", help="float64, float32, or float32_compensated")
+    verb.add_argument("--duration", metavar="S", help="end of the run [s]")
+    verb.add_argument("--seed", metavar="N", help="seed of the design")
+    verb.add_argument("--threads", metavar="N", type=int, help="threads (default: all cores)")
+    verb.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="replace a key of the scene file")
+    verb.add_argument("--quiet", action="store_true", help="no progress and no table")
+
+
+def _add_stability(verbs: Any) -> None:
+    """The arguments of lgvi-warp stability."""
+    verb = verbs.add_parser(
+        "stability",
+        help="where methods are accurate, bounded, flagged or fail, over two parameters: .json, .csv and .png",
+    )
+    _add_scene(verb, "runs/NAME_stability", ensemble=False)
+    verb.add_argument(
+        "--grid",
+        choices=("omega", "mass", "drag", "all"),
+        help="step against angular velocity (default), added-mass ratio or drag number, or all three",
+    )
+    axis = "NAME or NAME=LOW:HIGH[:linear], such as"
+    verb.add_argument("--x", metavar="AXIS", help=f"instead of --grid: {axis} h=0.01:3")
+    verb.add_argument("--y", metavar="AXIS", help=f"instead of --grid: {axis} angular_velocity, vehicle.mass=50:500")
+    verb.add_argument("--methods", metavar="A,B", help="names, such as psi_s,kl8(psi_x) (default: psi,psi_s,psi_x,rk4)")
+    verb.add_argument("--points", metavar="N", type=int, default=24, help="cells along each axis (default 24)")
+    verb.add_argument("--error", metavar="E", type=float, default=1e-2, help="an accurate cell's bound (default 0.01)")
+    verb.add_argument("--of", default="attitude", help=f"what --error is of (default: attitude); {OF}")
+
+
+def _add_scene(verb: argparse.ArgumentParser, folder: str, ensemble: bool = True) -> None:
     """The arguments of a verb that runs a scene."""
     verb.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
     verb.add_argument(
         "--out", metavar="DIR", type=Path, help=f"folder for the files, replaced if they exist (default: {folder})"
     )
     verb.add_argument("--duration", metavar="S", help="end of the run [s]")
-    verb.add_argument("--members", metavar="N", help="number of vehicles")
+    if ensemble:
+        verb.add_argument("--members", metavar="N", help="number of vehicles")
     verb.add_argument("--seed", metavar="N", help="seed of what varies")
     verb.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="replace a key of the scene file")
     verb.add_argument("--quiet", action="store_true", help="no progress and no summary")
@@ -100,7 +153,8 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the command. Returns the exit code: 0, 1 for a run that failed, 2 for a scene or argument that is refused."""
     chosen = parser().parse_args(arguments)
     try:
-        return {"run": run, "tradeoff": tradeoff, "info": info, "bench": bench}[chosen.verb](chosen)
+        verbs = {"run": run, "tradeoff": tradeoff, "sensitivity": sensitivity, "stability": stability}
+        return (verbs | {"info": info, "bench": bench})[chosen.verb](chosen)
     except SceneError as error:
         print(f"lgvi-warp: {error}", file=sys.stderr)
         return 2
@@ -225,6 +279,94 @@ def tradeoff(chosen: argparse.Namespace) -> int:
     for fault in faults:
         print(f"lgvi-warp: {fault}", file=sys.stderr)
     return 1 if faults else 0
+
+
+def sensitivity(chosen: argparse.Namespace) -> int:
+    """lgvi-warp sensitivity."""
+    from lgvi_warp import uq
+    from lgvi_warp.scene import Scene
+    from lgvi_warp.sinks.sensitivity import plot_sensitivity
+
+    scene = Scene.load(chosen.scene, overrides(chosen))
+    out: Path = chosen.out or Path("runs") / f"{Path(chosen.scene).stem}_sensitivity"
+    out.mkdir(parents=True, exist_ok=True)
+    progress = None if chosen.quiet else Progress(sys.stderr)
+    settings: dict[str, Any] = {"failed": chosen.failed, "threads": chosen.threads, "progress": progress}
+    of, asked = chosen.of or ["position[2]"], {} if chosen.samples is None else {"samples": chosen.samples}
+    try:
+        if chosen.analysis == "morris":
+            found: uq.Indices = uq.morris(scene, of, **asked, **settings)
+        else:
+            first = chosen.first_order
+            asked = {"samples": 256} | asked
+            found = uq.sobol(scene, of, second_order=not first, **asked, **settings)
+    except (uq.FailedMembers, ImportError) as error:
+        print(f"lgvi-warp: {error}", file=sys.stderr)
+        return 1
+    finally:
+        if progress:
+            progress.close()
+    files, faults = found.save(out), []
+    try:
+        files.append(plot_sensitivity(found, out / "sensitivity.png"))
+    except (ImportError, ValueError) as error:
+        faults.append(f"{out / 'sensitivity.png'} was not written: {error}")
+    if not chosen.quiet:
+        print("\n".join([str(found), "", *(f"file        {path}" for path in files)]))
+    for fault in faults:
+        print(f"lgvi-warp: {fault}", file=sys.stderr)
+    return 1 if faults else 0
+
+
+def stability(chosen: argparse.Namespace) -> int:
+    """lgvi-warp stability."""
+    from lgvi_warp.scene import Scene
+
+    if chosen.grid is not None and (chosen.x is not None or chosen.y is not None):
+        raise SceneError(
+            [f"--grid {chosen.grid}: says the axes that --x and --y say; leave out --grid, or both of them"]
+        )
+    changes = overrides(chosen)
+    scene = Scene.load(chosen.scene, changes)
+    # Of the random directions: all that the scene's ensemble has to say here.
+    seed = scene.ensemble_settings.seed if scene.ensemble_settings else 0
+    out: Path = chosen.out or Path("runs") / f"{Path(chosen.scene).stem}_stability"
+    out.mkdir(parents=True, exist_ok=True)
+    from lgvi_warp.sinks.plots import plot_stability
+    from lgvi_warp.stability import GRIDS, report_text, stability_map
+
+    maps = {"stability": (chosen.x or "h", chosen.y or "angular_velocity")}
+    if chosen.grid:
+        names = GRIDS if chosen.grid == "all" else (chosen.grid,)
+        maps = {f"stability_{name}": GRIDS[name] for name in names}
+    methods = None if chosen.methods is None else [name.strip() for name in chosen.methods.split(",")]
+    t1 = scene.run.duration if chosen.duration is not None else None
+    progress = None if chosen.quiet else Progress(sys.stderr)
+    files, faults, texts = [], [], []
+    for i, (name, (x, y)) in enumerate(maps.items()):
+        found = stability_map(
+            scene, x, y, methods, points=chosen.points, t1=t1, error=chosen.error, of=chosen.of, seed=seed,
+            progress=_part_of(progress, i, len(maps)),
+        )  # fmt: skip
+        files += found.save(out, name)
+        texts.append(report_text(found))
+        try:
+            files.append(plot_stability(found, out / f"{name}.png"))
+        except (ImportError, ValueError) as error:
+            faults.append(f"{out / f'{name}.png'} was not written: {error}")
+    if progress:
+        progress.close()
+    if not chosen.quiet:
+        print("\n\n".join(texts))
+        print("\n".join(["", *(f"file        {path}" for path in files)]))
+    for fault in faults:
+        print(f"lgvi-warp: {fault}", file=sys.stderr)
+    return 1 if faults else 0
+
+
+def _part_of(progress: Progress | None, i: int, n: int) -> Callable[[float], None] | None:
+    """Progress of the whole from that of its part i of n."""
+    return progress and (lambda part: progress((i + part) / n))
 
 
 def _import_in_background() -> threading.Thread:

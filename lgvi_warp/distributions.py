@@ -5,16 +5,31 @@ Every distribution maps uniform numbers in (0, 1) to values, so any sampling of 
 
 from __future__ import annotations
 
+import functools
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.errors import Faults, SceneError
+from lgvi_warp.errors import Faults
 
 Spread = float | tuple[float, ...] | list[float] | np.ndarray
+
+# Between two members that are asked for, it costs less to draw so many others than to start again.
+NEAR = 64
+
+
+@functools.lru_cache(maxsize=1024)
+def seed_words(seed: int, name: str) -> tuple[int, ...]:
+    """Entropy that depends on the seed and the name, for numpy.random.SeedSequence."""
+    return (int(seed), *(int(word) for word in np.frombuffer(hashlib.sha256(name.encode()).digest(), dtype="<u4")))
+
+
+@functools.lru_cache(maxsize=1024)
+def _philox_key(seed: int, name: str) -> np.ndarray:
+    return np.random.SeedSequence(seed_words(seed, name)).generate_state(2, np.uint64)
 
 
 def uniforms(seed: int, name: str, first: int, count: int, components: int) -> np.ndarray:
@@ -22,13 +37,23 @@ def uniforms(seed: int, name: str, first: int, count: int, components: int) -> n
 
     They depend on the seed, the member's index and the name only: Philox counters, a fixed number for each member.
     """
-    words = np.frombuffer(hashlib.sha256(name.encode()).digest(), dtype="<u4")
-    key = np.random.SeedSequence([int(seed), *(int(word) for word in words)]).generate_state(2, np.uint64)
     counters = -(-components // 4)
-    generator = np.random.Philox(key=key)
+    generator = np.random.Philox(key=_philox_key(int(seed), name))
     generator.advance(first * counters)
     raw = generator.random_raw(count * counters * 4).reshape(count, counters * 4)[:, :components]
     return ((raw >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53
+
+
+def uniforms_of(seed: int, name: str, members: np.ndarray, components: int) -> np.ndarray:
+    """The same of any members (n,), in any order: (n, components). Neighbours are drawn together."""
+    first, count = int(members[0]), len(members)
+    if count == 1 or np.all(np.diff(members) == 1):
+        return uniforms(seed, name, first, count, components)
+    ascending, place = np.unique(members, return_inverse=True)
+    ends = np.flatnonzero(np.diff(ascending) > NEAR) + 1
+    runs = np.split(ascending, ends)
+    drawn = [uniforms(seed, name, int(run[0]), int(run[-1] - run[0]) + 1, components)[run - run[0]] for run in runs]
+    return np.concatenate(drawn)[place.reshape(-1)]
 
 
 @dataclass(frozen=True)
@@ -50,7 +75,7 @@ class Distribution:
             faults.add(" and ".join(given) or "width", "...", f"{len(given)} given", remedy)
         values = {name: faults.finite(name, value) for name, value in self._given().items()}
         for name, array in values.items():
-            if array is not None and name not in ("mean", "median", "low", "high") and np.any(array < 0.0):
+            if array is not None and name not in ("mean", "median", "low", "high", "values") and np.any(array < 0.0):
                 faults.add(name, array, "is negative", "give a spread from 0")
         low, high = values.get("low"), values.get("high")
         if low is not None and high is not None and not ordered(low, high):
@@ -67,6 +92,23 @@ class Distribution:
     def numbers(self) -> list[Any]:
         """The numbers that were given."""
         return list(self._given().values())
+
+    @property
+    def joint(self) -> bool:
+        """Whether it gives a quantity, or several, as a whole (a `JointLaw`), and not each entry by itself."""
+        return False
+
+    def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
+        """(what is wrong, the remedy) for quantities of these shapes that it is to draw; None if it fits."""
+        (shape,) = shapes
+        try:
+            good = np.broadcast_shapes(shape, *(np.shape(number) for number in self.numbers())) == shape
+        except ValueError:
+            good = False
+        if good:
+            return None
+        wanted = f"one number or {' x '.join(map(str, shape))}, one per component" if shape else "one number"
+        return f"does not fit a quantity of shape {shape}", f"give {wanted}"
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
         """Values at the levels u (n, *shape) of a quantity whose scene value is base (*shape)."""
@@ -193,24 +235,60 @@ class TruncatedNormal(Distribution):
         return low, high, width
 
 
-KINDS: dict[str, type[Distribution]] = {law.kind: law for law in (Normal, Uniform, LogNormal, TruncatedNormal)}
+@dataclass(frozen=True)
+class Choice(Distribution):
+    """One of the values, with chances proportional to the weights (default: equal).
 
+    values (k,): every entry of the quantity gets one of these numbers, each entry by itself; (k, *shape): the quantity gets
+    one of these as a whole.
+    """
 
-def from_dict(key: str, content: Any) -> Distribution:
-    """A distribution from { normal = { std = 1.0 } }. Raises SceneError naming the key and every fault."""
-    faults = Faults()
-    if not isinstance(content, Mapping) or len(content) != 1:
-        faults.add(key, content, "is not a distribution", "write { normal = { std = 1.0 } }")
-        faults.raise_if_any()
-    kind, values = next(iter(content.items()))
-    if kind not in KINDS:
-        faults.keys(key, [kind], KINDS)
-    elif not isinstance(values, Mapping):
-        faults.add(f"{key}.{kind}", values, "is not a table", "write { normal = { std = 1.0 } }")
-    else:
-        faults.keys(f"{key}.{kind}", values, [item.name for item in fields(KINDS[kind])])
-    faults.raise_if_any()
-    try:
-        return KINDS[kind](**values)
-    except SceneError as error:
-        raise SceneError(f"{key}: {fault}" for fault in error.faults) from None
+    values: Any = ()
+    weights: Any = None
+    kind: ClassVar[str] = "choice"
+
+    def _check_more(self, faults: Faults) -> None:
+        try:
+            values = np.array(self.values, dtype=np.float64)
+            weights = np.ones(len(values)) if self.weights is None else np.array(self.weights, dtype=np.float64)
+        except (TypeError, ValueError):
+            return  # said already: not numeric
+        if values.ndim == 0 or not len(values):
+            faults.add("values", self.values, "is no list of values", "give one value or more")
+        elif weights.shape != values.shape[:1] or not weights.sum() > 0.0:
+            faults.add(
+                "weights", self.weights, f"does not weigh {len(values)} values", "give one from 0 for each value"
+            )
+
+    def numbers(self) -> list[Any]:
+        """None of them is a component's."""
+        return []
+
+    @property
+    def joint(self) -> bool:
+        """Whether the values are of the whole quantity."""
+        return np.ndim(self.values) > 1
+
+    def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
+        """A value of the whole quantity must have its shape."""
+        if not self.joint:
+            return super().fault(shapes)
+        shape = np.shape(self.values)[1:]
+        if len(shapes) == 1 and shape == shapes[0]:
+            return None
+        return f"has values of shape {shape}", f"give values of shape {shapes[0]}"
+
+    def size(self, bases: Sequence[np.ndarray]) -> int:
+        """One uniform number chooses a whole value."""
+        return 1
+
+    def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """A value of the whole quantity at the levels u (n, 1)."""
+        return [self.quantile(u[:, 0], bases[0])]
+
+    def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
+        """The value whose part of (0, 1) holds u."""
+        values = np.asarray(self.values, dtype=np.float64)
+        weights = np.ones(len(values)) if self.weights is None else np.asarray(self.weights, dtype=np.float64)
+        ends = np.cumsum(weights)[:-1] / weights.sum()
+        return values[np.searchsorted(ends, u, side="right")]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,13 +11,12 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp import scene as scenes
-from lgvi_warp import vehicle as vehicles
-from lgvi_warp.distributions import Distribution, uniforms
-from lgvi_warp.errors import Faults, closest
+from lgvi_warp import variations
+from lgvi_warp.errors import Faults, closest, shown
+from lgvi_warp.sampling import Sampling
 from lgvi_warp.scene import Scene
+from lgvi_warp.variations import MATRICES, Space, Target, Variation
 
-# Parameters that are symmetric matrices, and stay so when they vary.
-MATRICES = tuple(f"vehicle.{name}" for name in vehicles.SYMMETRIC)
 STATES = ("position", "attitude", "velocity", "angular_velocity")
 
 
@@ -44,30 +45,56 @@ class Members:
 class Ensemble:
     """A scene and what varies in it.
 
-    scene: the Scene. members: how many, >= 1. seed: whole number >= 0. vary: name -> distribution; names are every number
-    that the scene has: "vehicle.mass", "drag.quadratic", "current.velocity" (a term's name or type, and its field), ...
-    (`scene.parameters()` lists them), and what the scene's start gives ("start.position", "start.angular_velocity", ...).
+    scene: the Scene. members: how many, >= 1 (default: as many as the sampling has, else 1). seed: whole number >= 0.
+    vary: name -> distribution, of lgvi_warp or a frozen one of scipy.stats; names are every number that the scene has:
+    "vehicle.mass", "drag.quadratic", "current.velocity" (a term's name or type, and its field), ... (`scene.parameters()`
+    lists them), and what the scene's start gives ("start.position", "start.angular_velocity", ...) and "start.attitude";
+    an entry of one, "start.position[2]"; several that one law draws together, "vehicle.mass, vehicle.buoyancy".
     One law varies every entry; of a symmetric matrix, the entries on and above the diagonal (of a diagonal one, those on
-    it). A draw depends on the seed, the member's index and the name only.
+    it). sampling: "random" (a draw depends on the seed, the member's index and the name only), "sobol", "halton",
+    "saltelli", lw.LatinHypercube(...), lw.Grid(...), lw.Table(...) and others, or a table as in a scene file. A member is
+    the same in whatever block, subset or order it is drawn.
 
     Raises SceneError naming every fault; members that would be unphysical are counted and the first is shown.
     """
 
-    def __init__(self, scene: Scene, members: int = 1, seed: int = 0, vary: Mapping[str, Distribution] | None = None):
+    def __init__(
+        self,
+        scene: Scene,
+        members: int | None = None,
+        seed: int = 0,
+        vary: Mapping[Any, Any] | None = None,
+        sampling: Any = "random",
+    ):
         faults = Faults()
         if not isinstance(scene, Scene):
             faults.add("scene", scene, "is no Scene", "give lw.Scene(...) or lw.Scene.load(path)")
-        if vary is not None and not (isinstance(vary, Mapping) and all(isinstance(name, str) for name in vary)):
+        if vary is not None and not (isinstance(vary, Mapping) and all(_is_name(name) for name in vary)):
             faults.add("vary", vary, "does not map names to distributions", 'give {"vehicle.mass": lw.Normal(...)}')
         faults.raise_if_any()
-        settings = scenes.EnsembleSettings(members, seed, dict(vary or {}))
-        self._setup(scene, settings, {})
+        self._setup(scene, scenes.EnsembleSettings(members, seed, dict(vary or {}), sampling), {})
+
+    @classmethod
+    def of(cls, scene: Scene, settings: scenes.EnsembleSettings) -> Ensemble:
+        """The ensemble that settings describe; only their `indices` of it where they name some."""
+        ensemble = cls.__new__(cls)
+        # A scene file's own ensemble was looked at when the file was read.
+        ensemble._setup(scene, settings, {}, checked=vars(scene).get("_checked") is settings)
+        if scene.ensemble_settings is settings:
+            object.__setattr__(scene, "_checked", settings)
+        if settings.indices is None:
+            return ensemble
+        most = int(np.max(settings.indices))
+        if most >= ensemble.members:
+            faults = Faults("ensemble.")
+            faults.add("indices", most, f"is no member of {ensemble.members}", f"give 0 to {ensemble.members - 1}")
+            faults.raise_if_any()
+        return ensemble.subset(settings.indices)
 
     @classmethod
     def from_scene(cls, scene: Scene) -> Ensemble:
         """The ensemble that the scene file describes; one member if it describes none."""
-        settings = scene.ensemble_settings or scenes.EnsembleSettings()
-        return cls(scene, settings.members, settings.seed, settings.vary)
+        return cls.of(scene, scene.ensemble_settings or scenes.EnsembleSettings())
 
     @classmethod
     def from_states(
@@ -111,109 +138,166 @@ class Ensemble:
         ensemble._setup(scene, scenes.EnsembleSettings(n), explicit)
         return ensemble
 
-    def _setup(self, scene: Scene, settings: scenes.EnsembleSettings, explicit: dict[str, np.ndarray]) -> None:
-        self.scene, self.members, self.seed = scene, int(settings.members), int(settings.seed)
-        self.vary: dict[str, Distribution] = dict(settings.vary)
-        self._settings, self._explicit = settings, explicit
+    def _setup(
+        self, scene: Scene, settings: scenes.EnsembleSettings, explicit: dict[str, np.ndarray], checked: bool = False
+    ) -> None:
+        self.scene, self.seed = scene, int(settings.seed)
+        self.vary: dict[str, Any] = dict(settings.vary)
+        self.sampling: Sampling = settings.sampling
+        self._explicit = explicit
         self._start = {f"start.{key}": value for key, value in scene.start.given().items()}
         if explicit:
             self._start = {key: value for key, value in explicit.items() if key.startswith("start.")}
         self._base = scene.parameters()
-        self.indices = np.arange(self.members)
-        self._check_names()
-        self._check_physical()
+        # Which members of the whole it holds, and by which indices their noise is keyed; None for all, by their own.
+        self._places: np.ndarray | None = None
+        self._indices: np.ndarray | None = None
+        self._variations = self._described()
+        self.space: Space = variations.space(self.seed, self._variations)
+        self._whole = self._counted(settings)
+        self.members = self._whole
+        if not checked:
+            self._check_physical()
 
-    def _check_names(self) -> None:
+    def _described(self) -> list[Variation]:
+        """What varies, by law; notes every name and law that does not fit the scene."""
         faults = Faults("ensemble.vary.")
-        known = [*self._base, *self._start]
-        for name, law in self.vary.items():
-            if name not in known:
-                others = [key for key in known if key.split(".")[0] == name.split(".")[0]]
-                hint = f"the scene gives {', '.join(others)}" if name[6:] in scenes.SHAPES else closest(name, known)
-                faults.add(f'"{name}"', law, "does not name what the scene has", hint)
-            elif not isinstance(law, Distribution):
-                faults.add(f'"{name}"', law, "is not a distribution", "give lw.Normal(std=...) or another")
-            elif name == "start.attitude":
-                faults.add(f'"{name}"', law, "cannot vary by entry", "give rotation_vector or euler_deg and vary it")
-            else:
-                self._check_shape(faults, name, law)
+        columns = self.sampling.columns()
+        self._turn_by_matrix(faults, columns)
+        known = {**self._base, **({} if self._explicit else self._start)}
+        laws = {**self.sampling.laws(), **self.vary}
+        for key in self.sampling.laws().keys() & self.vary.keys():
+            faults.add(
+                f'"{key}"', self.vary[key], f"varies what the {self.sampling.kind} gives values", "drop one of them"
+            )
+        found = [variations.variation(faults, key, law, known) for key, law in sorted(laws.items())]
+        named = [(one.key, one.targets) for one in found if one]
+        self._columns: list[tuple[Target, np.ndarray]] = []
+        tables = Faults("ensemble.sampling.table.")
+        for key, column in columns.items():
+            (target, *more) = variations.targets(key)
+            if more:
+                tables.add(f'"{key}"', "...", "names several numbers", "give each a column of its own")
+            elif variations.known_target(tables, key, "...", target, known):
+                named.append((key, (target,)))
+                shape = (len(column), *target.of(known[target.name]).shape)
+                name = target.name if target.index is None else key
+                self._columns.append((target, _explicit_parameter(tables, name, column, shape)))
+                if target.name == variations.ATTITUDE and column.shape == shape and not scenes.rotations(column).all():
+                    tables.add(
+                        f'"{key}"', "...", "holds a matrix that is no rotation to 1e-9", "give R^T R = I, det R = 1"
+                    )
+        variations.clashes(faults, named)
+        with faults.including():
+            tables.raise_if_any()
         faults.raise_if_any()
+        return [one for one in found if one]
 
-    def _check_shape(self, faults: Faults, name: str, law: Distribution) -> None:
-        shape = self._drawn_base(name).shape
-        try:
-            good = np.broadcast_shapes(shape, *(np.shape(number) for number in law.numbers())) == shape
-        except ValueError:
-            good = False
-        if not good:
-            wanted = f"one number or {' x '.join(map(str, shape))}, one per component" if shape else "one number"
-            faults.add(f'"{name}"', law, f"does not fit a quantity of shape {shape}", f"give {wanted}")
+    def _turn_by_matrix(self, faults: Faults, columns: Mapping[str, Any]) -> None:
+        """Where the attitude itself varies, the scene's attitude is a matrix, however the scene gives it."""
+        keys = [*self.vary, *self.sampling.laws(), *columns]
+        names = {target.name for key in keys for target in variations.targets(key)}
+        if variations.ATTITUDE not in names or self._explicit:
+            return
+        ways = {f"start.{way}" for way in scenes.ATTITUDES} - {variations.ATTITUDE}
+        for way in sorted(ways & names):
+            faults.add(f'"{way}"', "...", f'varies beside "{variations.ATTITUDE}"', "keep one of them")
+        faults.raise_if_any()
+        given = {way: self._start.pop(f"start.{way}") for way in scenes.ATTITUDES if f"start.{way}" in self._start}
+        R = scenes.resolve_attitude({way: np.asarray(value)[None] for way, value in given.items()})
+        self._start[variations.ATTITUDE] = R[0]
+
+    def _counted(self, settings: scenes.EnsembleSettings) -> int:
+        """How many members there are; refuses a number that the sampling cannot have."""
+        faults = Faults("ensemble.")
+        own, group = self.sampling.own_members(self.space), self.sampling.group_size(self.space)
+        members = settings.members or own or group
+        self.sampling.check(faults, self.space, int(members))
+        faults.raise_if_any()
+        return int(members)
+
+    @property
+    def indices(self) -> np.ndarray:
+        """(members,), which members of the whole they are: what their noise is keyed by."""
+        if self._indices is not None:
+            return self._indices
+        return np.arange(self.members) if self._places is None else self._places
+
+    @indices.setter
+    def indices(self, indices: np.ndarray) -> None:
+        self._indices = indices
 
     def _check_physical(self) -> None:
-        varied = {name for name in (*self.vary, *self._explicit) if name in self._base}
-        if not varied:
-            return
+        """Refuse members that are unphysical: all are looked at, so many at a time that memory stays small."""
+        targets = [target for one in self._variations for target in one.targets] + [one for one, _ in self._columns]
+        varied = {name for name in (*(target.name for target in targets), *self._explicit) if name in self._base}
+        found: dict[str, _Unphysical] = {}
+        for first in range(0, self.members if varied else 0, CHECKED_AT_ONCE):
+            self._look_at(first, min(first + CHECKED_AT_ONCE, self.members), varied, found)
         faults = Faults()
+        for key, one in found.items():
+            drawn = any(name in {t.name for v in self._variations for t in v.targets} for name in key.split(" + "))
+            remedy = "use a smaller spread, TruncatedNormal or LogNormal" if drawn else "give finite, physical values"
+            what = f"is unphysical ({one.count} of {one.of if one.shared else self.members} members)"
+            faults.add(f"{key} of member {one.first}", one.value, what, remedy)
+        faults.raise_if_any()
+
+    def _look_at(self, first: int, stop: int, varied: set[str], found: dict[str, _Unphysical]) -> None:
         with np.errstate(over="ignore", invalid="ignore"):
-            p = self.parameters(0, self.members)
+            p = self.parameters(first, stop)
             checks = _vehicle_checks(p, varied)
             for one in (*self.scene.terms, *self.scene.events):
                 own = self.own(one, p)
                 if any(f"{one.key}.{name}" in varied for name in own):
                     checks |= {f"{one.key}.{name}": bad for name, bad in one.unphysical(own).items()}
         for key, bad in checks.items():
-            if np.any(bad):
-                self._note_unphysical(faults, key, np.broadcast_to(bad, max(len(bad), 1)), p)
-        faults.raise_if_any()
-
-    def _note_unphysical(self, faults: Faults, key: str, bad: np.ndarray, p: dict[str, np.ndarray]) -> None:
-        first = int(np.argmax(bad))
-        value = sum(
-            p[name][first % len(p[name])] for name in key.split(" + ") if p[name].ndim == p[key.split(" + ")[-1]].ndim
-        )
-        drawn = any(name in self.vary for name in key.split(" + "))
-        remedy = "use a smaller spread, TruncatedNormal or LogNormal" if drawn else "give finite, physical values"
-        what = f"is unphysical ({int(bad.sum())} of {len(bad)} members)"
-        faults.add(f"{key} of member {first}", value, what, remedy)
+            bad = np.atleast_1d(bad)
+            if not np.any(bad):
+                continue
+            if key not in found:
+                names = key.split(" + ")
+                i = int(np.argmax(bad))
+                value = sum(p[name][i % len(p[name])] for name in names if p[name].ndim == p[names[-1]].ndim)
+                found[key] = _Unphysical(first + i, value, len(bad) == 1 and stop - first > 1, len(bad))
+            found[key].count += 0 if found[key].shared and first else int(bad.sum())
 
     @staticmethod
     def own(term: Any, parameters: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """A term's own numbers, by field, out of all parameters."""
         return {name: parameters[f"{term.key}.{name}"] for name in term.parameters()}
 
-    def _drawn_base(self, name: str) -> np.ndarray:
-        """The scene's value of a quantity that is drawn: of a symmetric matrix, its upper triangle or its diagonal."""
-        base = np.asarray(self._start[name] if name in self._start else self._base[name])
-        if name not in MATRICES:
-            return base
-        return np.diag(base) if _diagonal(base) else base[np.triu_indices(len(base))]
-
-    def _value(self, name: str, first: int, stop: int) -> np.ndarray:
-        """Values of the members first to stop, or of all as one: a leading dimension of stop - first, or of 1."""
-        if name in self._explicit:
-            return self._explicit[name][first:stop]
-        whole = np.asarray(self._start[name] if name in self._start else self._base[name])
-        if name not in self.vary:
-            return whole[None]
-        base = self._drawn_base(name)
-        u = uniforms(self.seed, name, first, stop - first, max(1, base.size)).reshape(stop - first, *base.shape)
-        drawn = self.vary[name].quantile(u, base)
-        return _matrices(drawn, _diagonal(whole), len(whole)) if name in MATRICES else drawn
-
-    def parameter(self, name: str, first: int, stop: int) -> np.ndarray:
-        """One parameter of the members first to stop, with a leading dimension of 1 where they share it."""
-        return self._value(name, first, stop)
+    def _values(self, first: int, stop: int, start: bool = True) -> dict[str, np.ndarray]:
+        """Numbers of the members first to stop by name, shared ones with a leading dimension of 1; with the start or not."""
+        whole = self._base | (self._start if start and not self._explicit else {})
+        values = {name: np.asarray(value)[None] for name, value in whole.items()}
+        if self._explicit:
+            rows = slice(first, stop) if self._places is None else self._places[first:stop]
+            values |= {name: column[rows] for name, column in self._explicit.items() if start or name in self._base}
+        wanted = [one for one in self._variations if start or any(target.name in self._base for target in one.targets)]
+        if not (wanted or self._columns):
+            return values
+        members = np.arange(first, stop) if self._places is None else self._places[first:stop]
+        space = self.space.of([one.key for one in wanted]) if self.sampling.kind == "random" else self.space
+        levels = self.sampling.draw(space, members) if wanted else {}
+        drawn = [(target, column[members]) for target, column in self._columns]
+        for one in wanted:
+            drawn += one.values(levels[one.key])
+        for target, column in drawn:
+            if target.name in values:
+                variations.put(values, target, column)
+        return values
 
     def parameters(self, first: int, stop: int) -> dict[str, np.ndarray]:
         """Parameters of the members first to stop, shared ones with a leading dimension of 1."""
-        return {name: self._value(name, first, stop) for name in self._base}
+        return self._values(first, stop, start=False)
 
     def select(self, first: int, stop: int) -> Members:
         """The numbers of the members first to stop (not included). Raises IndexError where there are none."""
         if not 0 <= first < stop <= self.members:
             raise IndexError(f"members {first} to {stop} of {self.members}")
         m = stop - first
-        start = {key.removeprefix("start."): self._value(key, first, stop) for key in self._start}
+        values = self._values(first, stop)
+        start = {key.removeprefix("start."): values.pop(key) for key in self._start}
         R = np.broadcast_to(scenes.resolve_attitude(start), (m, 3, 3))
         if "velocity_inertial" in start:
             # Written out: the sum's order, and so the bits, must not depend on how many members are asked for.
@@ -222,21 +306,51 @@ class Ensemble:
         else:
             nu = start["velocity"]
         position, nu, Om = (np.broadcast_to(x, (m, 3)) for x in (start["position"], nu, start["angular_velocity"]))
-        return Members(self.parameters(first, stop), position, R, nu, Om, self.indices[first:stop], self.seed)
+        indices = np.arange(first, stop) if self._indices is self._places is None else self.indices[first:stop]
+        return Members(values, position, R, nu, Om, indices, self.seed)
 
-    def subset(self, indices: Sequence[int]) -> Ensemble:
-        """These members, in this order, as an ensemble of its own with the same numbers."""
-        chosen = [self.select(int(i), int(i) + 1) for i in indices]
-        b, R, nu, Om = (np.concatenate([getattr(one, name) for one in chosen]) for name in STATES)
-        varied = [name for name in self._base if name in self.vary or name in self._explicit]
-        parameters = {name: np.concatenate([one.parameters[name] for one in chosen]) for name in varied}
-        ensemble = Ensemble.from_states(self.scene, b, R, nu, Om, parameters)
-        ensemble.indices, ensemble.seed = self.indices[np.asarray(indices, dtype=int)], self.seed
-        return ensemble
+    def subset(self, indices: Sequence[int] | np.ndarray) -> Ensemble:
+        """These members, in this order, as an ensemble of its own with the same numbers. Raises IndexError."""
+        chosen = np.asarray(indices)
+        if chosen.ndim != 1 or not len(chosen) or chosen.dtype.kind not in "iu":
+            raise IndexError(f"members {shown(indices)}: give a list of one or more whole numbers")
+        if chosen.min() < 0 or chosen.max() >= self.members:
+            raise IndexError(f"members {chosen.min()} to {chosen.max()} of {self.members}")
+        chosen = chosen.astype(np.int64)
+        part = copy.copy(self)
+        part._places = chosen if self._places is None else self._places[chosen]
+        part._indices = None if self._indices is None else self._indices[chosen]
+        part.members = len(chosen)
+        return part
+
+    def member(self, index: int) -> Ensemble:
+        """One member alone, with the bits that it has among all. Raises IndexError where there is none."""
+        return self.subset([operator.index(index)])
 
     def to_dict(self) -> dict[str, Any]:
-        """members, seed and vary as in a scene file, and the names that were given as arrays."""
-        return self._settings.to_dict() | ({"explicit": sorted(self._explicit)} if self._explicit else {})
+        """members, seed, vary, sampling and indices as in a scene file, and the names that were given as arrays."""
+        settings = scenes.EnsembleSettings(self._whole, self.seed, self.vary, self.sampling, self._places)
+        return settings.to_dict() | ({"explicit": sorted(self._explicit)} if self._explicit else {})
+
+
+# Members whose numbers are looked at together when an ensemble is made: some tens of megabytes.
+CHECKED_AT_ONCE = 65_536
+
+
+@dataclass
+class _Unphysical:
+    """What was found of one quantity: the first member, its value, and how many. shared: one number of all members."""
+
+    first: int
+    value: Any
+    shared: bool
+    of: int
+    count: int = 0
+
+
+def _is_name(name: Any) -> bool:
+    """A text, or several for one law."""
+    return isinstance(name, str) or (isinstance(name, tuple) and all(isinstance(one, str) for one in name))
 
 
 def _vehicle_checks(p: Mapping[str, np.ndarray], varied: set[str]) -> dict[str, np.ndarray]:
@@ -265,20 +379,6 @@ def _vehicle_checks(p: Mapping[str, np.ndarray], varied: set[str]) -> dict[str, 
     return {key: bad for key, bad in checks.items() if any(name in varied for name in key.split(" + "))}
 
 
-def _diagonal(matrix: np.ndarray) -> bool:
-    return not np.any(matrix - np.diag(np.diag(matrix)))
-
-
-def _matrices(drawn: np.ndarray, diagonal: bool, size: int) -> np.ndarray:
-    """Symmetric matrices (n, size, size) from their drawn diagonals or upper triangles."""
-    if diagonal:
-        return drawn[:, :, None] * np.eye(size)
-    upper = np.zeros((len(drawn), size, size))
-    rows, columns = np.triu_indices(size)
-    upper[:, rows, columns] = upper[:, columns, rows] = drawn
-    return upper
-
-
 def _floats(faults: Faults, key: str, value: Any) -> np.ndarray:
     """A float64 copy, which may hold NaN: the caller's later writes to his array do not reach the ensemble."""
     try:
@@ -288,13 +388,14 @@ def _floats(faults: Faults, key: str, value: Any) -> np.ndarray:
         return np.empty(0)
 
 
-def check_names(vary: Mapping[str, Distribution], parameters: Sequence[str]) -> None:
+def check_names(vary: Mapping[str, Any], parameters: Sequence[str]) -> None:
     """Refuse names that a scene with these parameters has not. Raises SceneError."""
     faults = Faults("ensemble.vary.")
     known = [*parameters, *(f"start.{name}" for name in scenes.SHAPES)]
-    for name, law in vary.items():
-        if name not in known:
-            faults.add(f'"{name}"', law, "does not name what a scene has", closest(name, known))
+    for key, law in vary.items():
+        for target in variations.targets(key):
+            if target.name not in known:
+                faults.add(f'"{key}"', law, "does not name what a scene has", closest(target.name, known))
     faults.raise_if_any()
 
 
@@ -311,7 +412,13 @@ def _explicit_parameter(faults: Faults, key: str, value: Any, shape: tuple[int, 
 
 
 def _positive_definite(matrices: np.ndarray) -> np.ndarray:
-    """Which symmetric matrices (n, d, d) are positive definite; False where a number is not finite."""
-    finite = np.isfinite(matrices).all(axis=(1, 2))
-    safe = np.where(finite[:, None, None], matrices, np.eye(matrices.shape[-1]))
-    return np.asarray(finite & (np.linalg.eigvalsh(safe)[:, 0] > 0.0))
+    """Which symmetric matrices (n, d, d) are positive definite, by the pivots of elimination; False where not finite."""
+    d = matrices.shape[-1]
+    left = matrices.copy()
+    good = np.isfinite(matrices).all(axis=(1, 2))
+    for k in range(d):
+        pivot = left[:, k, k]
+        good &= pivot > 0.0
+        row = left[:, k, k + 1 :] / np.where(good, pivot, 1.0)[:, None]
+        left[:, k + 1 :, k + 1 :] -= left[:, k + 1 :, k, None] * row[:, None, :]
+    return np.asarray(good)

@@ -41,9 +41,14 @@ def _broadcast(matrices: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, n
     return np.broadcast_to(matrices, (vectors.shape[1], *matrices.shape[1:])), vectors
 
 
+def kinetic_energy(result: Result) -> np.ndarray:
+    """Kinetic energy relative to the water, (nu, Om).I6 (nu, Om) / 2, (k, n) [J]."""
+    return np.asarray(0.5 * np.sum(_relative(result) * _momenta(result), axis=-1))
+
+
 def energy(result: Result) -> np.ndarray:
-    """Kinetic energy relative to the water, (nu, Om).I6 (nu, Om) / 2, and the potential of every term, (k, n) [J]."""
-    total = 0.5 * np.sum(_relative(result) * _momenta(result), axis=-1)
+    """Kinetic energy and the potential of every term, (k, n) [J]."""
+    total = kinetic_energy(result)
     position, attitude = result.position.astype(np.float64), result.attitude.astype(np.float64)
     for term in (*terms.IMPLIED, *result.terms):
         total = total + term.potential(result.own(term), position, attitude, result.parameters)
@@ -61,6 +66,24 @@ def angular_momentum(result: Result) -> np.ndarray:
     b, P = (np.moveaxis(x, -1, 0) for x in (result.position.astype(np.float64), linear_momentum(result)))
     orbit = np.stack([b[1] * P[2] - b[2] * P[1], b[2] * P[0] - b[0] * P[2], b[0] * P[1] - b[1] * P[0]], axis=-1)
     return _times(result.attitude.astype(np.float64), spin) + orbit
+
+
+def energy_growth(result: Result, *, dissipative: bool = False) -> np.ndarray:
+    """Largest change of energy (n,), or where it is dissipative largest growth, over what members could hold.
+
+    That is |p|^2 / (2 M_min) + |pi|^2 / (2 J_min) of the start and, up to each time, the largest change of the potential:
+    a bounded motion stays below about 1, whatever it exchanges.
+    """
+    kinetic, total = kinetic_energy(result), result.energy
+    potential = total - kinetic
+    momenta = _momenta(result)[0]
+    I6 = np.broadcast_to(vehicle.inertia6(result.parameters), (result.members, 6, 6))
+    held = sum(0.5 * np.sum(momenta[:, part] ** 2, axis=1) / np.linalg.eigvalsh(I6[:, part, part])[:, 0]
+               for part in (slice(0, 3), slice(3, 6)))  # fmt: skip
+    given = np.maximum.accumulate(np.abs(potential - potential[:1]), axis=0)
+    change = total - total[:1]
+    growth = np.max((change if dissipative else np.abs(change)) / np.maximum(held + given, 1e-300), axis=0)
+    return np.where(np.isfinite(total).all(axis=0), growth, np.inf)
 
 
 def drift(result: Result) -> dict[str, float]:

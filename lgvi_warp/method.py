@@ -187,7 +187,7 @@ class Method:
     more later on gives its member the status NOT_CONVERGED).
     alpha, beta: weight of the old configuration in the averages of equations (15) and (16), 0 to 1, for nonconservative
     forces and torques in phi, phi_adjoint and psi (their conservative forces, and the other methods, have no such choice).
-    The name may also be of an explicit method: "rk4", "rk5" (Dormand & Prince), "rk8" (DOP853's), with R as nine numbers, or
+    The name may also be of an explicit method: "rk4", "rk5" (Dormand & Prince), "rk8" (DOP853's), with R as two rows, or
     on the rotation group "cg3" (Crouch & Grossman) and "rkmk4" (Munthe-Kaas).
     rtol, atol: with both, rk5 and rk8 choose their steps: the error estimated for each step stays below
     atol + rtol |y| (in the mean square over y = (b, R, p, pi), momenta divided by the largest J). The worst vehicle of a

@@ -65,6 +65,7 @@ class Model:
     frame: of all members; aligned: as Setting's. laws: (term, module of its device code); drag by its exact flow first
     where it is used, and `drag` its parts. flow: "none", "steady", "uniform" or "varying". coupling: which of U12, U13, U23
     and of the pitches are there. program: sub-maps of one stage. averages: alpha and beta of (15), (16), or None.
+    steady: forces never change in inertial axes.
     """
 
     method: Method
@@ -82,6 +83,7 @@ class Model:
     program: Program
     lead: tuple[str, float] | None
     averages: tuple[float, float] | None
+    steady: bool
 
 
 def make_model(
@@ -156,7 +158,13 @@ def make_model(
         program=maps,
         lead=lead,
         averages=(method.alpha, method.beta) if forced else None,
+        steady=not drag and flow in ("none", "steady") and all(_steady(module) for _, module in acting),
     )
+
+
+def _steady(module: Any) -> bool:
+    """Whether what a law pushes with never changes in inertial axes."""
+    return hasattr(module, "steady_force") or not any(hasattr(module, role) for role in ("law", "damping", "evolve"))
 
 
 # A stage that goes backward speeds a damped vehicle up, and at a drag number of 1 without end.

@@ -59,6 +59,8 @@ class Packets:
         self.plan, self.members = plan, members
         self.frame, self.U = model.frame_of(plan.method, members.parameters)
         self.scale = self.frame.J.max(axis=1)
+        if not plan.spec.scaled:
+            self.scale = np.ones_like(self.scale)
         width, Lane = plan.spec.width, plan.advance.Lane
         self.count = -(-members.count // width)
         Inertia, Params, Events = plan.advance.Inertia, plan.advance.Params, plan.advance.Events
@@ -75,6 +77,7 @@ class Packets:
         self.status = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
         self.failed_step = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
         self.failed_size = wp.zeros(self.count, dtype=Lane, device="cpu")
+        self.out: wp.array | None = None
 
     def _lanes(self, values: np.ndarray) -> np.ndarray:
         """Rows (1 or m, d) as (1 or packets, d, width) of the kernel's numbers."""
@@ -163,7 +166,10 @@ class Packets:
             if i == 0 and self.plan.spec.drag:
                 assert isinstance(term, Drag)
                 by_axes = module is LAWS["drag"]
-                packed.append(term.packed_exact(own, self.frame) if by_axes else term.packed_directions(own, setting))
+                exact = (
+                    term.packed_exact(own, self.frame, self.scale) if by_axes else term.packed_directions(own, setting)
+                )
+                packed.append(exact)
             else:
                 packed.append(term.packed(own, setting))
         dtype = self.plan.dtypes[1]
@@ -221,6 +227,8 @@ class Packets:
         rows = np.zeros((n, self.plan.spec.state_fields))
         rows[:, :9] = R.reshape(-1, 9)
         rows[:, 9:12] = m.position + notation.rotate_out(m.attitude, np.broadcast_to(frame.origin, (n, 3)))
+        if self.plan.spec.inertial:
+            momenta[:, :3] = notation.rotate_out(R, momenta[:, :3])
         rows[:, 12:STATE_FIELDS] = momenta / self.scale[:, None]
         if self.plan.spec.compensated:
             low = rows[:, :STATE_FIELDS] - rows[:, :STATE_FIELDS].astype(np.float32)
@@ -239,22 +247,30 @@ class Packets:
 
     def advance(self, k0: int, k1: int) -> np.ndarray:
         """Make the steps k0 to k1. Returns the samples due then, (s1 - s0, packets * width, numbers of a sample)."""
+        packed = self.launch(k0, k1)
+        packets, samples, numbers, width = packed.shape
+        return packed.transpose(1, 0, 3, 2).copy().reshape(samples, packets * width, numbers)
+
+    def launch(self, k0: int, k1: int) -> np.ndarray:
+        """Make the steps k0 to k1. Returns the samples due then as the kernel has them, (packets, s1 - s0, numbers, width),
+        in memory that the next launch writes to again."""
         plan = self.plan
         s0, s1 = plan.due(k0, k1)
         numbers = sum(plan.spec.sample_fields.values())
         width = plan.spec.width
-        out = wp.empty((self.count, max(1, (s1 - s0) * numbers)), dtype=plan.advance.Lane, device="cpu")
+        shape = (self.count, max(1, (s1 - s0) * numbers))
+        if self.out is None or self.out.shape != shape:
+            self.out = wp.empty(shape, dtype=plan.advance.Lane, device="cpu")
         real, dtype = plan.spec.real, plan.dtype
         stage_h, lead_h, sample_step = plan.times
         inputs = [self.inertia, self.params, self.events, self.table]
         inputs += [real(tolerance) for tolerance in plan.method.tolerances(dtype)]
         inputs += [wp.float64(plan.grid.h), stage_h, lead_h, k0, k1, s0, sample_step]
-        inputs += [self.state, self.memory, self.status, self.failed_step, self.failed_size, out]
+        inputs += [self.state, self.memory, self.status, self.failed_step, self.failed_size, self.out]
         with build_lock:
             command: Any = wp.launch(plan.advance.kernel, dim=self.count, inputs=inputs, device="cpu", record_cmd=True)
         command.launch()
-        samples = out.numpy()[:, : (s1 - s0) * numbers].reshape(self.count, s1 - s0, numbers, width)
-        return samples.transpose(1, 0, 3, 2).reshape(s1 - s0, self.count * width, numbers)
+        return self.out.numpy()[:, : (s1 - s0) * numbers].reshape(self.count, s1 - s0, numbers, width)
 
     def outcome(self) -> Outcome:
         """Status, steps made before the failure and the value that crossed its limit, of each member."""

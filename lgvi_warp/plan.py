@@ -141,7 +141,10 @@ class Plan:
             return None
         # A step that is given asks for no estimate: nothing of it then is in the kernel's source.
         estimate = (tableau.errors, tableau.estimate) if self.method.adaptive else ((), 0)
-        return Explicit(KINDS.get(self.method.name, "vector"), tableau.a, tableau.b, tableau.c, *estimate,
+        kind = KINDS.get(self.method.name, "vector")
+        if kind == "vector" and self.model.steady and not self.method.adaptive:
+            kind = "inertial"
+        return Explicit(kind, tableau.a, tableau.b, tableau.c, *estimate,
                         self.method.adaptive)  # fmt: skip
 
     @contextlib.contextmanager

@@ -211,13 +211,15 @@ class Drawn(Mapping[str, np.ndarray]):
     def __init__(self, ensemble: Ensemble, members: int):
         self._ensemble, self._members = ensemble, members
 
+    @functools.cached_property
+    def _drawn(self) -> dict[str, np.ndarray]:
+        return self._ensemble.parameters(0, self._members)
+
     def __getitem__(self, name: str) -> np.ndarray:
-        if name not in self._ensemble.scene.parameters():
-            raise KeyError(name)
-        return self._ensemble.parameter(name, 0, self._members)
+        return self._drawn[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._ensemble.scene.parameters())
+        return iter(self._drawn)
 
     def __len__(self) -> int:
-        return len(self._ensemble.scene.parameters())
+        return len(self._drawn)

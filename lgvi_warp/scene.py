@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp import events, notation, terms
+from lgvi_warp import events, laws, notation, terms
 from lgvi_warp import statistics as kinds
-from lgvi_warp.errors import Faults
+from lgvi_warp.errors import Faults, holds_bool
 from lgvi_warp.machine import DTYPES
+from lgvi_warp.sampling import sampling_of
 from lgvi_warp.statistics import until as stopping
 from lgvi_warp.vehicle import Vehicle
 
@@ -194,24 +195,55 @@ class RunSettings:
 
 @dataclass(frozen=True)
 class EnsembleSettings:
-    """The [ensemble] section: members, seed, and what varies (name -> distribution). Raises SceneError."""
+    """The [ensemble] section: members, seed, what varies (name -> distribution), how it is sampled (sampling.py).
 
-    members: int = 1
+    members: None for as many as the sampling has, or one. indices: which of them to run, all by default.
+    Raises SceneError.
+    """
+
+    members: int | None = None
     seed: int = 0
     vary: Mapping[str, Any] = field(default_factory=dict)
+    sampling: Any = "random"
+    indices: Any = None
 
     def __post_init__(self) -> None:
         faults = Faults("ensemble.")
         for name, least in (("members", 1), ("seed", 0)):
             value = getattr(self, name)
+            if name == "members" and value is None:
+                continue
             if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
                 faults.add(name, value, f"is not a whole number from {least}", f"give {least} or more")
+        if self.indices is not None and not _whole_numbers(self.indices):
+            faults.add("indices", self.indices, "is no list of whole numbers from 0", "give members: indices = [17]")
+        if isinstance(self.vary, Mapping):
+            named = {", ".join(key) if isinstance(key, tuple) else key: laws.as_law(v) for key, v in self.vary.items()}
+            object.__setattr__(self, "vary", named)
+        with faults.including():
+            object.__setattr__(self, "sampling", sampling_of(self.sampling))
         faults.raise_if_any()
 
     def to_dict(self) -> dict[str, Any]:
         """As in a scene file."""
-        vary = {name: distribution.to_dict() for name, distribution in self.vary.items()}
-        return {"members": int(self.members), "seed": int(self.seed)} | ({"vary": vary} if vary else {})
+        content: dict[str, Any] = {} if self.members is None else {"members": int(self.members)}
+        content["seed"] = int(self.seed)
+        if self.vary:
+            content["vary"] = {name: distribution.to_dict() for name, distribution in self.vary.items()}
+        if self.sampling.kind != "random":
+            content["sampling"] = self.sampling.to_dict()
+        return content | ({} if self.indices is None else {"indices": np.asarray(self.indices).tolist()})
+
+
+def _whole_numbers(value: Any) -> bool:
+    """Whether it is a list of one or more whole numbers from 0."""
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        return False
+    return (
+        array.ndim == 1 and len(array) > 0 and array.dtype.kind in "iu" and not holds_bool(value) and array.min() >= 0
+    )
 
 
 @dataclass(frozen=True, eq=False)

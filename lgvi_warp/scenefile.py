@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from lgvi_warp import distributions
 from lgvi_warp.errors import Faults, SceneError
+from lgvi_warp.laws import from_dict as law_from_dict
 from lgvi_warp.method import Method
 from lgvi_warp.scene import EnsembleSettings, Environment, RunSettings, Scene, Start
 from lgvi_warp.vehicle import Vehicle
@@ -25,18 +25,35 @@ def load(path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = Non
         text = Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError, TypeError) as error:
         raise SceneError([f"scene file {path}: {error}; give the path of a TOML file"]) from None
-    return loads(text, overrides, os.fspath(path))
+    return loads(text, overrides, os.fspath(path), Path(path).parent)
 
 
-def loads(text: str, overrides: Mapping[str, Any] | None = None, name: str = "scene") -> Scene:
-    """The same from a text."""
+def loads(
+    text: str, overrides: Mapping[str, Any] | None = None, name: str = "scene", folder: Path | None = None
+) -> Scene:
+    """The same from a text. folder: where the files that it names are looked for, by default the current one."""
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise SceneError([f"{name} is not TOML: {error}; mend that line"]) from None
     for key, value in (overrides or {}).items():
         override(content, key, value)
-    return from_dict(content)
+    return from_dict(_files_in(folder, content) if folder else content)
+
+
+def _files_in(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
+    """The same with the file of a table of members in that folder, where its path is relative."""
+    try:
+        ensemble = content["ensemble"]
+        sampling = ensemble["sampling"]
+        table = sampling["table"]
+        known = isinstance(table["file"], str)
+    except (KeyError, TypeError):
+        return content
+    if not known:
+        return content
+    table = table | {"file": os.fspath(folder / table["file"])}
+    return content | {"ensemble": ensemble | {"sampling": sampling | {"table": table}}}
 
 
 def override(content: dict[str, Any], key: str, value: Any) -> None:
@@ -135,7 +152,7 @@ def _check_ensemble(settings: EnsembleSettings, scene: Scene | None, parameters:
     if scene is None:
         check_names(settings.vary, parameters)
     else:
-        Ensemble(scene, settings.members, settings.seed, settings.vary)
+        Ensemble.of(scene, settings)
 
 
 def _build(faults: Faults, name: str, kind: Callable[..., Any], table: Mapping[str, Any]) -> Any:
@@ -168,5 +185,5 @@ def _laws(faults: Faults, vary: Any) -> dict[str, Any]:
         vary = {}
     for key, value in vary.items():
         with faults.including():
-            laws[key] = distributions.from_dict(f'ensemble.vary."{key}"', value)
+            laws[key] = law_from_dict(f'ensemble.vary."{key}"', value)
     return laws

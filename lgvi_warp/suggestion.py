@@ -283,7 +283,7 @@ def seconds_of(fleet: Ensemble, setting: Setting, t1: float, members: int = 256)
 def memory_of(fleet: Ensemble, setting: Setting, t1: float) -> int:
     """Bytes that a run of all members takes, with the scene's samples."""
     grid = make_plan(fleet.subset([0]), setting.resolved(), setting.h, t1, dtype=setting.dtype).grid
-    a_sample = 18 * np.dtype(setting.dtype).itemsize
+    a_sample = 18 * np.dtype(machine.DTYPES[setting.dtype]).itemsize
     return fleet.members * (len(grid.times) * a_sample + BYTES_OF_A_MEMBER)
 
 

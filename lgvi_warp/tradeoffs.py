@@ -33,6 +33,8 @@ CANDIDATES = ("kl8(psi_x)", "psi_x", "psi_s", "su4(psi_x)", "kl6(psi_x)", "rk8",
 SOLVERS: tuple[tuple[str, int | None], ...] = (("quartic", 1), ("cayley", None), ("newton", None))
 SOLVED_BY = "psi_s"
 PRECISIONS = tuple(name for name in DTYPES if name in ("float64", "float32"))
+# Tried last, in sums of two float32.
+COMPENSATED = ("psi_x", "psi_s", "su4(psi_x)", "kl6(psi_x)")
 # What a ladder of steps goes on for, until it is round-off's.
 DECIDING = ("position", "attitude")
 # Errors shown are at least so many times the reference's own.
@@ -337,6 +339,8 @@ def sweep(
     plain: tuple[str, int | None] = ("quartic", None)
     ladders = [(name, dtype, plain) for name in methods for dtype in PRECISIONS]
     ladders += [(SOLVED_BY, "float64", one) for one in SOLVERS if SOLVED_BY in methods]
+    summed, _ = sample.accepted([name for name in COMPENSATED if name in methods], "float32_compensated")
+    ladders += [(name, "float32_compensated", plain) for name in summed]
     trials: list[Trial] = []
     left: list[str] = []
     longest = (deadline - time.perf_counter()) / 40.0
@@ -441,10 +445,10 @@ def report_text(found: Tradeoff) -> str:
         header = ("us/vehicle/s", "method", "precision", "step [s]", f"{found.of} [{unit}]", "rms",
                   "energy drift [J]")  # fmt: skip
         lines += ["", f"Cheapest settings for each error ({found.of}, largest over members and path):",
-                  "{:>12}  {:<18}{:<11}{:>10}{:>15}{:>10}{:>18}".format(*header)]  # fmt: skip
+                  "{:>12}  {:<18}{:<20}{:>10}{:>15}{:>10}{:>18}".format(*header)]  # fmt: skip
     for one in front:
         s = one.setting
-        lines.append(f"{one.us_per_vehicle_second:>12.3g}  {s.name:<18}{s.dtype:<11}{s.h:>10.4g}"
+        lines.append(f"{one.us_per_vehicle_second:>12.3g}  {s.name:<18}{s.dtype:<20}{s.h:>10.4g}"
                      f"{one.error(found.of):>15.1e}{one.error(found.of, 'path_rms'):>10.1e}"
                      f"{one.energy_drift:>18.1e}")  # fmt: skip
     return "\n".join([*lines, *bias_lines(found)])

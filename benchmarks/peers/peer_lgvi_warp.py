@@ -12,6 +12,7 @@ from benchmarks.peers.problem import End, Problem, Run, Runs
 from lgvi_warp.blocks import unpacked
 from lgvi_warp.method import Method
 from lgvi_warp.packets import Packets
+from lgvi_warp.saveat import SaveAt
 from lgvi_warp.solving import make_plan
 
 # What is measured: a method, its precision, and its steps a second.
@@ -33,19 +34,26 @@ METHODS: tuple[tuple[str | Method, str, tuple[float, ...]], ...] = (
     ("rk8", "float64", (0.5, 1, 2, 4, 8, 16, 32)),
     ("bm6(psi_x)", "float64", (1, 2, 4, 8, 16)),
     ("rkn6_14", "float64", (2, 4, 8, 16)),
+    ("rk4", "float32", (1, 2, 4, 8)),
     ("rk5", "float32", (1, 2, 4, 8, 16)),
     ("rk8", "float32", (0.5, 1, 2, 4)),
+    ("su4(psi_x)", "float32", (1, 2, 4)),
+    ("bm4(psi_x)", "float32", (1, 2, 4)),
     ("psi_s", "float32", (2, 4, 8, 16, 32, 64)),
     ("psi_x", "float32", (2, 4, 8, 16, 32, 64)),
     ("kl6(psi_x)", "float32", (1, 2, 4, 8)),
 )
 
 
+# At the end, and what errors are of.
+SAVE = SaveAt(fields=("position", "attitude"))
+
+
 class Fleet:
     """The members of a plan, in as many parts as threads, and their ends."""
 
     def __init__(self, problem: Problem, method: str | Method, dtype: str, rate: float, threads: int):
-        self.plan = make_plan(problem.ensemble, method, h=1.0 / rate, t1=problem.t1, dtype=dtype)
+        self.plan = make_plan(problem.ensemble, method, h=1.0 / rate, t1=problem.t1, save=SAVE, dtype=dtype)
         self.plan.compile()
         edges = np.linspace(0, problem.members, threads + 1).astype(int)
         self.parts = [Packets(self.plan, problem.ensemble.select(a, b)) for a, b in pairwise(edges)]
@@ -62,13 +70,14 @@ class Fleet:
     def _part(self, i: int) -> None:
         wp.copy(self.parts[i].state, self.starts[i])
         self.parts[i].status.zero_()
-        self.samples[i] = self.parts[i].advance(0, self.plan.grid.steps)
+        self.samples[i] = self.parts[i].launch(0, self.plan.grid.steps)
 
     def end(self) -> End:
         """Of the last call, a member that failed as not a number."""
         ends = []
         for part, raw in zip(self.parts, self.samples, strict=True):
-            raw = raw[-1:, : part.members.count].astype(np.float64)
+            raw = raw[:, -1].transpose(0, 2, 1).reshape(1, -1, raw.shape[2])
+            raw = raw[:, : part.members.count].astype(np.float64)
             raw[0, part.outcome().status != 0] = np.nan
             ends.append(unpacked(self.plan.spec.sample_fields, raw, part.frame))
         return tuple(np.concatenate([one[name][-1] for one in ends]) for name in ("position", "attitude"))

@@ -30,8 +30,8 @@ from lgvi_kernels.terms import drag
 # Steps between two looks at the alarms. A chunk with an alarm is repeated one step at a time by the same code.
 CHUNK = 128
 
-# Numbers of a packet's state in `state[packet, field]`: R row by row, b, p, pi; with compensated sums as many low parts
-# more, or those of its pace (see pace_struct).
+# Numbers of a packet's state in `state[packet, field]`: R row by row, b, p (or R p, see Spec.inertial), pi; with compensated
+# sums as many low parts more, or those of its pace (see pace_struct).
 STATE_FIELDS = 18
 PACE_FIELDS = 4
 
@@ -78,6 +78,16 @@ class Spec(NamedTuple):
     lead_time: float = 0.0
     explicit: Any = None
     compensated: bool = False
+
+    @property
+    def scaled(self) -> bool:
+        """Whether momenta and inertia are divided by max J: for (24), and where a step is chosen, for its tolerance."""
+        return self.explicit is None or self.explicit.adaptive
+
+    @property
+    def inertial(self) -> bool:
+        """Whether the state holds R p in place of p."""
+        return self.explicit is not None and self.explicit.kind == "inertial"
 
     @property
     def state_fields(self) -> int:
@@ -133,7 +143,7 @@ def make_advance(spec):
     )
     method = make_method(spec)
     step, lead, velocities, prepare = method.step, method.lead, method.velocities, method.prepare
-    flow = superpose(spec.laws, "flow")
+    flow, momentum = superpose(spec.laws, "flow"), method.momentum
     has_lead, drifts, watched = spec.lead is not None, flow is not None, bool(spec.events)
     watch, passage = make_watch(spec.events, View, "origin" in spec.parts) if watched else (step, step)
     lead_coefficient = spec.lead[1] if has_lead else 0.0
@@ -220,6 +230,8 @@ def make_advance(spec):
             put(out, i, o + 3, x.R1)
             put(out, i, o + 6, x.R2)
             o += 9
+        if wp.static(momentum is not None):
+            x.p = momentum(x)
         nu, Om = velocities(c.inertia, x.p, x.pi)
         if wp.static("velocity" in fields):
             if wp.static(drifts):

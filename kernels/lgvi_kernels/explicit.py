@@ -1,8 +1,9 @@
 """Explicit Runge-Kutta methods on (b, R, p, pi), and on the rotation group: fixed steps, or steps chosen for a tolerance.
 
 k_i = f(t + c_i h, y_i), where y_i comes from y by h a_i1 k_1, h a_i2 k_2, ... and the new state by h b_1 k_1, h b_2 k_2, ...
-A move adds: the rows of R are nine numbers like the others, and leave the group at the order of the method. Or it turns:
-R <- R exp(h a Om), one after the other (Crouch & Grossman 1993). Zero coefficients make no code; the stages are unrolled.
+A move adds: two rows of R are six numbers like the others, which leave the group at the order of the method, and the third
+is their cross product. Or it turns: R <- R exp(h a Om), one after the other (Crouch & Grossman 1993). Zero coefficients make
+no code; the stages are unrolled.
 """
 
 import functools
@@ -10,10 +11,11 @@ from typing import Any, NamedTuple
 
 import warp as wp
 
+from lgvi_kernels.compose import superpose
 from lgvi_kernels.lane_math import greatest, root, sine
 from lgvi_kernels.lanes import absolute, add, cross, div, dot, lane3, mul, ones, positive, sub, vec3  # noqa: F401
 from lgvi_kernels.rotation import rodrigues, rotation_struct, transpose_apply
-from lgvi_kernels.state import struct
+from lgvi_kernels.state import struct, view_struct, wrench_struct
 from lgvi_kernels.submaps import rotate
 from lgvi_kernels.terms.drag import make_resistance
 
@@ -36,7 +38,9 @@ TINY = {wp.float64: 1e-300, wp.float32: 1e-36}
 class Explicit(NamedTuple):
     """What decides the code of an explicit method: a tableau, whose row i of `a` has i numbers, and how it is used.
 
-    kind: "vector" (R as nine numbers), "group" (R turns by exponentials) or "munthe_kaas" (order 4 with its commutators).
+    kind: "vector" (R as two of its rows), "inertial" (the same, and forces never change in inertial axes, so that R p is
+    known for all times: it is kept in place of p), "group" (R turns by exponentials) or "munthe_kaas" (order 4 with its
+    commutators).
     errors: rows of error estimates, (stages,) or one longer with f of the new state at its end, which go as h to the power
     `estimate`. adaptive: each packet chooses its steps.
     """
@@ -51,11 +55,12 @@ class Explicit(NamedTuple):
 
 
 @functools.cache
-def rates_struct(width, real, group):
-    """b', p', pi', and the rows of R' = R hat(Om); on the group, Om instead of them."""
+def rates_struct(width, real, kind):
+    """b', pi', p' unless it is known, and the first and last row of R' = R hat(Om); on the group, Om instead of them."""
     Lane3 = lane3(width, real)
-    turning = {"Om": Lane3} if group else {"R0": Lane3, "R1": Lane3, "R2": Lane3}
-    return struct("Rates", b=Lane3, **turning, p=Lane3, pi=Lane3)
+    turning = {"R0": Lane3, "R2": Lane3} if kind in ("vector", "inertial") else {"Om": Lane3}
+    pushing = {} if kind == "inertial" else {"p": Lane3}
+    return struct("Rates", b=Lane3, **turning, **pushing, pi=Lane3)
 
 
 @functools.cache
@@ -64,18 +69,44 @@ def slopes_struct(Rates, count):
     return struct("Slopes", **{f"k{i}": Rates for i in range(count)})
 
 
-def make_rates(Rates, everything, velocities, group, isotropic, coupled, drifts, drag):
+def make_rates(Rates, Wrench, everything, velocities, kind, mass, coupled, drifts, scaled, drag):
     """The right-hand side, eq. (1) and (3) of Nordkvist & Sanyal 2010 with all laws of a scene.
 
-    drag: the function that adds drag along the axes, where it is not among `everything`, or None.
+    scaled: momenta are divided by max J; drag: the function that adds drag along the axes, where it is not among
+    `everything`, or None.
     """
+
+    isotropic, munk = mass == "isotropic", make_munk(mass == "diagonal")
+    group, inertial = kind not in ("vector", "inertial"), kind == "inertial"
+
+    @wp.func
+    def turning(w: Any, x: Any, c: Any, nu: Any, Om: Any):
+        """p x Om and pi x Om + p x nu: what the momenta in body axes change by without any force."""
+        w.force = w.force + cross(x.p, Om)
+        w.torque = w.torque + cross(x.pi, Om)
+        if wp.static(coupled):
+            w.torque = w.torque + cross(x.p, nu)
+        elif wp.static(not isotropic):
+            # Of the mean of M^-1 it is zero.
+            w.torque = munk(w.torque, x.p, c.inertia.anisotropy)
+        return w
 
     @wp.func
     def rates(x: Any, c: Any, h: Any):
         """b' = R nu + u, R' = R hat(Om), p' = p x Om + f, pi' = pi x Om + p x nu + m."""
         k = Rates()
+        if wp.static(inertial):
+            x.p = in_body(x)
         nu, Om = velocities(c.inertia, x.p, x.pi)
-        w, u = everything(x, c, h, nu, Om)
+        w = Wrench()
+        if wp.static(not scaled):
+            # Laws add to what is there: fewer operations than a sum of their own.
+            w = turning(w, x, c, nu, Om)
+        w, u = everything(w, x, c, h, nu, Om)
+        if wp.static(scaled):
+            w.force = c.inertia.inverse_scale * w.force
+            w.torque = c.inertia.inverse_scale * w.torque
+            w = turning(w, x, c, nu, Om)
         k.b = rotate(x, nu)
         if wp.static(drifts):
             k.b = k.b + u
@@ -83,16 +114,10 @@ def make_rates(Rates, everything, velocities, group, isotropic, coupled, drifts,
             k.Om = Om
         else:
             k.R0 = cross(x.R0, Om)
-            k.R1 = cross(x.R1, Om)
             k.R2 = cross(x.R2, Om)
-        k.p = cross(x.p, Om) + c.inertia.inverse_scale * w.force
-        turned = cross(x.pi, Om) + c.inertia.inverse_scale * w.torque
-        if wp.static(coupled):
-            turned = turned + cross(x.p, nu)
-        elif wp.static(not isotropic):
-            # Of the mean of M^-1 it is zero.
-            turned = turned + cross(x.p, c.inertia.anisotropy * x.p)
-        k.pi = turned
+        if wp.static(not inertial):
+            k.p = w.force
+        k.pi = w.torque
         if wp.static(drag is not None):
             k = drag(k, x, c.params.own)
         return k
@@ -101,14 +126,53 @@ def make_rates(Rates, everything, velocities, group, isotropic, coupled, drifts,
 
 
 @wp.func
+def in_body(x: Any):
+    """R^T P, with P in place of p."""
+    return x.p.x * x.R0 + x.p.y * x.R1 + x.p.z * x.R2
+
+
+def make_munk(diagonal):
+    """pi' + p x A p, where A is M^-1 less its mean."""
+
+    @wp.func
+    def munk(turned: Any, p: Any, A: Any):
+        if wp.static(diagonal):
+            # The differences stay the same for all steps, and the compiler keeps them.
+            turned.x = turned.x + (A.z - A.y) * (p.y * p.z)
+            turned.y = turned.y + (A.x - A.z) * (p.z * p.x)
+            turned.z = turned.z + (A.y - A.x) * (p.x * p.y)
+        else:
+            turned = turned + cross(p, A * p)
+        return turned
+
+    return munk
+
+
+@wp.func
 def along(x: Any, k: Any, s: Any):
-    """x + s k."""
+    """x + s k; the middle row of R is left behind (see `completed`)."""
     x.b = x.b + s * k.b
     x.R0 = x.R0 + s * k.R0
-    x.R1 = x.R1 + s * k.R1
     x.R2 = x.R2 + s * k.R2
     x.p = x.p + s * k.p
     x.pi = x.pi + s * k.pi
+    return x
+
+
+@wp.func
+def along_known(x: Any, k: Any, s: Any):
+    """The same where P is known for all times."""
+    x.b = x.b + s * k.b
+    x.R0 = x.R0 + s * k.R0
+    x.R2 = x.R2 + s * k.R2
+    x.pi = x.pi + s * k.pi
+    return x
+
+
+@wp.func
+def completed(x: Any):
+    """The middle row of R from the others."""
+    x.R1 = cross(x.R2, x.R0)
     return x
 
 
@@ -151,8 +215,11 @@ def make_act(turned):
 MOST_STAGES = 13
 
 
-def make_moves(move, weights):
-    """One function (y, slopes, h): the moves by h w_1 k_1, then h w_2 k_2, ... of all weights that are not zero."""
+def make_moves(move, weights, complete):
+    """One function (y, slopes, h): the moves by h w_1 k_1, then h w_2 k_2, ... of all weights that are not zero.
+
+    complete: what completes a state that was moved, or None.
+    """
     w = weights + (0.0,) * (MOST_STAGES - len(weights))
 
     @wp.func
@@ -183,17 +250,34 @@ def make_moves(move, weights):
             y = move(y, k.k11, h.dtype(wp.static(w[11])) * h)
         if wp.static(w[12] != 0.0):
             y = move(y, k.k12, h.dtype(wp.static(w[12])) * h)
+        if wp.static(complete is not None):
+            y = complete(y)
         return y
 
     return moves
 
 
-def make_stage(moves, node, timed):
-    """The state of one stage."""
+def make_push(Wrench, View, laws):
+    """(x, constants, h): P <- P + h F, where F never changes in inertial axes."""
+    force = superpose(laws, "steady_force")
 
     @wp.func
-    def at_node(x: Any, k: Any, h: Any):
+    def pushed(x: Any, c: Any, h: Any):
+        if wp.static(force is not None):
+            x.p = x.p + h * force(Wrench(), View(), c.params).force
+        return x
+
+    return pushed
+
+
+def make_stage(moves, push, node, timed):
+    """The state of one stage. push: what changes P, where it is known, or None."""
+
+    @wp.func
+    def at_node(x: Any, k: Any, c: Any, h: Any):
         y = moves(x, k, h)
+        if wp.static(push is not None):
+            y = push(y, c, h.dtype(wp.static(node)) * h)
         if wp.static(timed):
             y.time = x.time + wp.float64(wp.static(node)) * wp.float64(h)
         return y
@@ -201,11 +285,11 @@ def make_stage(moves, node, timed):
     return at_node
 
 
-def make_stages(Rates, rates, move, a, c, timed):
+def make_stages(Rates, rates, move, complete, push, a, c, timed):
     """One function (x, constants, h) -> the slopes of all rows of `a`."""
     count = len(a)
     Slopes = slopes_struct(Rates, count)
-    ys = [make_stage(make_moves(move, row), node, timed) for row, node in zip(a, c)]
+    ys = [make_stage(make_moves(move, row, complete), push, node, timed) for row, node in zip(a, c)]
     _, at_1, at_2, at_3, at_4, at_5, at_6, at_7, at_8, at_9, at_10, at_11, at_12 = ys + [None] * (MOST_STAGES - count)
 
     @wp.func
@@ -213,41 +297,43 @@ def make_stages(Rates, rates, move, a, c, timed):
         k = Slopes()
         k.k0 = rates(x, constants, h)
         if wp.static(count > 1):
-            k.k1 = rates(at_1(x, k, h), constants, h)
+            k.k1 = rates(at_1(x, k, constants, h), constants, h)
         if wp.static(count > 2):
-            k.k2 = rates(at_2(x, k, h), constants, h)
+            k.k2 = rates(at_2(x, k, constants, h), constants, h)
         if wp.static(count > 3):
-            k.k3 = rates(at_3(x, k, h), constants, h)
+            k.k3 = rates(at_3(x, k, constants, h), constants, h)
         if wp.static(count > 4):
-            k.k4 = rates(at_4(x, k, h), constants, h)
+            k.k4 = rates(at_4(x, k, constants, h), constants, h)
         if wp.static(count > 5):
-            k.k5 = rates(at_5(x, k, h), constants, h)
+            k.k5 = rates(at_5(x, k, constants, h), constants, h)
         if wp.static(count > 6):
-            k.k6 = rates(at_6(x, k, h), constants, h)
+            k.k6 = rates(at_6(x, k, constants, h), constants, h)
         if wp.static(count > 7):
-            k.k7 = rates(at_7(x, k, h), constants, h)
+            k.k7 = rates(at_7(x, k, constants, h), constants, h)
         if wp.static(count > 8):
-            k.k8 = rates(at_8(x, k, h), constants, h)
+            k.k8 = rates(at_8(x, k, constants, h), constants, h)
         if wp.static(count > 9):
-            k.k9 = rates(at_9(x, k, h), constants, h)
+            k.k9 = rates(at_9(x, k, constants, h), constants, h)
         if wp.static(count > 10):
-            k.k10 = rates(at_10(x, k, h), constants, h)
+            k.k10 = rates(at_10(x, k, constants, h), constants, h)
         if wp.static(count > 11):
-            k.k11 = rates(at_11(x, k, h), constants, h)
+            k.k11 = rates(at_11(x, k, constants, h), constants, h)
         if wp.static(count > 12):
-            k.k12 = rates(at_12(x, k, h), constants, h)
+            k.k12 = rates(at_12(x, k, constants, h), constants, h)
         return k
 
     return stages
 
 
-def make_fixed(stages, finish, timed):
-    """One step of the length that is asked for."""
+def make_fixed(stages, finish, push, timed):
+    """One step of the length that is asked for. push: as of make_stage."""
 
     @wp.func
     def step(x: Any, c: Any, h: Any):
         """y + h sum_i b_i k_i."""
         x = finish(x, stages(x, c, h), h)
+        if wp.static(push is not None):
+            x = push(x, c, h)
         if wp.static(timed):
             x.time = x.time + wp.float64(h)
         return x
@@ -315,13 +401,13 @@ def square(a: Any, b: Any):
 
 def make_errors(Rates, weights, move):
     """(y, new, slopes, h, rtol, atol) -> mean square of the estimates over the tolerance, HNW (4.11), one each row."""
-    moves = [make_moves(move, row) for row in weights]
+    moves = [make_moves(move, row, None) for row in weights]
     first, last, double = moves[0], moves[-1], len(moves) > 1
 
     @wp.func
     def mean_square(e: Any, w: Any):
-        s = square(e.b, w.b) + square(e.R0, w.R0) + square(e.R1, w.R1) + square(e.R2, w.R2) + square(e.p, w.p)
-        return s.dtype(1.0 / 18.0) * (s + square(e.pi, w.pi))
+        s = square(e.b, w.b) + square(e.R0, w.R0) + square(e.R2, w.R2) + square(e.p, w.p) + square(e.pi, w.pi)
+        return s.dtype(1.0 / 15.0) * s
 
     @wp.func
     def errors(y: Any, new: Any, k: Any, h: Any, rtol: Any, atol: Any):
@@ -329,7 +415,6 @@ def make_errors(Rates, weights, move):
         w = Rates()
         w.b = one_over3(y.b, new.b, rtol, atol)
         w.R0 = one_over3(y.R0, new.R0, rtol, atol)
-        w.R1 = one_over3(y.R1, new.R1, rtol, atol)
         w.R2 = one_over3(y.R2, new.R2, rtol, atol)
         w.p = one_over3(y.p, new.p, rtol, atol)
         w.pi = one_over3(y.pi, new.pi, rtol, atol)
@@ -437,21 +522,23 @@ def make_adaptive(stages, finish, errors, estimate, width, real, timed):
 def make_explicit(spec, everything, velocities):
     """The step of an explicit method for this Spec, with all the laws in `everything`."""
     method, width, real, timed = spec.explicit, spec.width, spec.real, spec.timed
-    group = method.kind != "vector"
-    Rates = rates_struct(width, real, group)
+    Wrench = wrench_struct(width, real)
+    Rates = rates_struct(width, real, method.kind)
     turned = make_turned(rotation_struct(width, real), real)
-    move = make_act(turned) if group else along
-    shape = (spec.mass == "isotropic", "coupled" in spec.parts, spec.flow != "none")
+    moves = {"vector": (along, completed), "inertial": (along_known, completed)}
+    move, complete = moves.get(method.kind, (make_act(turned), None))
+    push = make_push(Wrench, view_struct(width, real), spec.laws) if method.kind == "inertial" else None
+    shape = (spec.mass, "coupled" in spec.parts, spec.flow != "none", spec.scaled)
     drag = make_resistance(spec.drag) if spec.drag else None
-    rates = make_rates(Rates, everything, velocities, group, *shape, drag)
+    rates = make_rates(Rates, Wrench, everything, velocities, method.kind, *shape, drag)
     if method.kind == "munthe_kaas":
         return make_munthe_kaas(rates, move, turned, timed)
     a, c = method.a, method.c
     if method.adaptive and len(method.errors[0]) > len(a):
         a, c = (*a, method.b), (*c, 1.0)
-    stages = make_stages(Rates, rates, move, a, c, timed)
-    finish = make_moves(move, method.b + (0.0,) * (len(a) - len(method.b)))
+    stages = make_stages(Rates, rates, move, complete, push, a, c, timed)
+    finish = make_moves(move, method.b + (0.0,) * (len(a) - len(method.b)), complete)
     if not method.adaptive:
-        return make_fixed(stages, finish, timed)
+        return make_fixed(stages, finish, push, timed)
     errors = make_errors(Rates, method.errors, along)
     return make_adaptive(stages, finish, errors, method.estimate, width, real, timed)

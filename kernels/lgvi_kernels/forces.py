@@ -22,13 +22,12 @@ def make_forces(View, Wrench, Flow, Damping, force, damping, flow, flow_varies, 
         return water
 
     @wp.func
-    def everything(x: Any, c: Any, h: Any, nu: Any, Om: Any):
-        """Force and torque, body axes, and the water's velocity, inertial axes. The water's laws are asked once."""
+    def everything(w: Any, x: Any, c: Any, h: Any, nu: Any, Om: Any):
+        """Force and torque, body axes, added to w, and the water's velocity, inertial axes, whose laws are asked once."""
         view = look(View(), x, c, h)
         water = water_at(view, x, c)
         view.nu = nu
         view.Om = Om
-        w = Wrench()
         if wp.static(force is not None):
             w = force(w, view, c.params)
         if wp.static(flow_varies):
@@ -42,7 +41,7 @@ def make_forces(View, Wrench, Flow, Damping, force, damping, flow, flow_varies, 
     @wp.func
     def forces(x: Any, c: Any, h: Any, nu: Any, Om: Any):
         """phi(b, nu, R, Om), tau(b, nu, R, Om)."""
-        w, u = everything(x, c, h, nu, Om)
+        w, u = everything(Wrench(), x, c, h, nu, Om)
         return w
 
     @wp.func

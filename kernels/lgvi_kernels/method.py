@@ -9,9 +9,9 @@ from lgvi_kernels.collocation import make_G
 from lgvi_kernels.compose import superpose
 from lgvi_kernels.coupled import make_W
 from lgvi_kernels.dissipation import make_V
-from lgvi_kernels.explicit import make_explicit
+from lgvi_kernels.explicit import in_body, make_explicit
 from lgvi_kernels.forces import make_forces
-from lgvi_kernels.lanes import add, div, mul, sub  # noqa: F401
+from lgvi_kernels.lanes import add, div, mul, sub, vec3  # noqa: F401
 from lgvi_kernels.matrix3 import apply, factor_struct, transpose_times
 from lgvi_kernels.paper import make_phi
 from lgvi_kernels.rotation import rotation_struct
@@ -37,13 +37,25 @@ from lgvi_kernels.water import make_shear
 
 
 class Step(NamedTuple):
-    """Functions of a method: one stage without its lead, the lead, the velocities of a state, E's set-up, the current."""
+    """Functions of a method: one stage without its lead, the lead, the velocities of a state, E's set-up, the current.
+
+    momentum: p of a state that holds R p in its place, or None.
+    """
 
     step: Any
     lead: Any
     velocities: Any
     prepare: Any
     water_velocity: Any
+    momentum: Any = None
+
+
+@wp.func
+def direct_velocity(inertia: Any, p: Any):
+    """The same for diagonal M by one product, for methods that ask many times: the compiler keeps the sums."""
+    A = inertia.anisotropy
+    mean = inertia.mean
+    return vec3((mean + A.x) * p.x, (mean + A.y) * p.y, (mean + A.z) * p.z)
 
 
 @wp.func
@@ -111,6 +123,8 @@ def make_method(spec):
     View, Wrench, Flow, Damping = structs
     coupled, shifted = "coupled" in spec.parts, "origin" in spec.parts
     velocity = isotropic_velocity if spec.mass == "isotropic" else anisotropic_velocity
+    if spec.explicit and spec.mass == "diagonal":
+        velocity = direct_velocity
     turning = multiplied if spec.explicit else divided
     velocities, velocities_of_forces = make_velocities(velocity, turning, coupled)
     laws = spec.laws
@@ -122,7 +136,7 @@ def make_method(spec):
     if spec.drag and spec.explicit is None:
         by_axes = laws[0] is drag
         prepare, exact = (
-            drag.make_E(spec.drag, spec.compensated)
+            drag.make_E(spec.drag, spec.real == wp.float32)
             if by_axes
             else drag_directions.make_E(spec.drag, velocities_of_forces)
         )
@@ -147,7 +161,7 @@ def make_method(spec):
     if spec.explicit is not None:
         acting = (View, Wrench, Flow, Damping, law, damping, flow, varies, shifted)
         step = make_explicit(spec, make_forces(*acting)[0], velocities)
-        return Step(step, step, velocities, prepare, water_velocity)
+        return Step(step, step, velocities, prepare, water_velocity, in_body if spec.inertial else None)
     V = None
     if damping is not None and spec.averages is None:
         V = make_V(damping, velocities_of_forces, Damping, factor_struct(width, real), coupled)

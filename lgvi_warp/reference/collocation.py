@@ -1,6 +1,7 @@
 """Gauss collocation, order 2s with s stages, on y = (b, the rows of R, p, pi), of one vehicle with all its laws.
 
-Symmetric and symplectic; every quadratic invariant is kept to round-off: R^T R, R p without forces, and so on.
+Symmetric; every quadratic invariant is kept to round-off: R^T R, R p without forces, and so on. Symplectic in canonical
+variables, which (R, p, pi) are not: here to the method's order only.
 Hairer, Lubich & Wanner, Geometric Numerical Integration, II.1.3, IV.2.1, VIII.6 (iteration, compensated sums).
 """
 
@@ -9,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial import legendre
 
-from lgvi_warp.reference.explicit import pack, rates, remembered_half, unpack
+from lgvi_warp.reference.explicit import derivatives, remembered_half
 from lgvi_warp.reference.rotation import Array
 from lgvi_warp.reference.submaps import Body, State
 
@@ -45,6 +46,22 @@ def gauss(s: int) -> Gauss:
     a = integrals @ P[:, :s].T * b
     ahead = polynomials(x + 2.0, s - 1) @ ((2 * np.arange(s)[:, None] + 1) * P[:, :s].T) * b
     return Gauss(a, b, c, ahead)
+
+
+def pack(x: State) -> Array:
+    """y (18,): b [m], R row by row, p [N s], pi [N m s]: with all of R, whose R^T R is a quadratic invariant."""
+    return np.concatenate([x.b, x.R.ravel(), x.p, x.pi])
+
+
+def unpack(y: Array, x: State, t: float) -> State:
+    """The state with y (18,) at t [s], the rest as in x."""
+    return replace(x, b=y[:3], R=y[3:12].reshape(3, 3), p=y[12:15], pi=y[15:], t=t)
+
+
+def rates(x: State, body: Body, h: float) -> Array:
+    """dy/dt (18,)."""
+    b, R, p, pi = derivatives(x, body, h)
+    return np.concatenate([b, R.ravel(), p, pi])
 
 
 def solve_stages(x: State, body: Body, h: float, method: Gauss, K: Array) -> tuple[Array, int]:

@@ -1,6 +1,7 @@
-"""Explicit Runge-Kutta methods on y = (b, the rows of R, p, pi), of one vehicle, with all its laws.
+"""Explicit Runge-Kutta methods on y = (b, two rows of R, p, pi), of one vehicle, with all its laws.
 
-What a law remembers is advanced by half a step before and after, as in K: such laws are integrated to order 2.
+The middle row of R is the cross product of the others. What a law remembers is advanced by half a step before and after,
+as in K: such laws are integrated to order 2.
 """
 
 import math
@@ -51,14 +52,18 @@ BETA = 0.04
 SHRINK, GROW = 0.333, 6.0
 
 
+USER: Array = np.zeros(3)
+
+
 def pack(x: State) -> Array:
-    """y (18,): b [m], R row by row, p [N s], pi [N m s]."""
-    return np.concatenate([x.b, x.R.ravel(), x.p, x.pi])
+    """y (15,): b [m], the first and the last row of R, p [N s], pi [N m s]."""
+    return np.concatenate([x.b, x.R[0], x.R[2], x.p, x.pi])
 
 
 def unpack(y: Array, x: State, t: float) -> State:
-    """The state with y (18,) at t [s], the rest as in x."""
-    return replace(x, b=y[:3], R=y[3:12].reshape(3, 3), p=y[12:15], pi=y[15:], t=t)
+    """The state with y (15,) at t [s], the rest as in x."""
+    first, last = y[3:6], y[6:9]
+    return replace(x, b=y[:3], R=np.array([first, cross(last, first), last]), p=y[9:12], pi=y[12:], t=t)
 
 
 def wrench(x: State, body: Body, h: float, nu: Array, Om: Array) -> tuple[Array, Array, Array]:
@@ -71,13 +76,29 @@ def wrench(x: State, body: Body, h: float, nu: Array, Om: Array) -> tuple[Array,
     return force + pushed - drag[:3], torque + turned - drag[3:], flow.velocity
 
 
-def rates(x: State, body: Body, h: float) -> Array:
-    """dy/dt (18,), eq. (1) and (3) of Nordkvist & Sanyal 2010 with all laws: b' = R nu + u, R' = R hat(Om),
-    p' = p x Om + f, pi' = pi x Om + p x nu + m; h [s] is the step, which some laws look at."""
+def at(x: State, origin: Array) -> State:
+    """The same motion with b [m] and pi [N m s] taken at a point (3,) [m] of the body, from where they were, body axes."""
+    return replace(x, b=x.b + x.R @ origin, pi=x.pi - cross(origin, x.p))
+
+
+def derivatives(x: State, body: Body, h: float, origin: Array = USER) -> tuple[Array, Array, Array, Array]:
+    """b' (3,), R' (3, 3), p' (3,), pi' (3,), eq. (1) and (3) of Nordkvist & Sanyal 2010 with all laws: b' = R nu + u,
+    R' = R hat(Om), p' = p x Om + f, pi' = pi x Om + p x nu + m; h [s] is the step, which some laws look at.
+
+    origin (3,) [m]: where x has its b and pi, from the user's origin.
+    """
+    x = at(x, -origin)
     nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, x.pi])), 2)
     force, torque, u = wrench(x, body, h, nu, Om)
-    rows = [cross(row, Om) for row in x.R]
-    return np.concatenate([x.R @ nu + u, *rows, cross(x.p, Om) + force, cross(x.pi, Om) + cross(x.p, nu) + torque])
+    turning = np.array([cross(row, Om) for row in x.R])
+    p, pi = cross(x.p, Om) + force, cross(x.pi, Om) + cross(x.p, nu) + torque
+    return x.R @ nu + u + turning @ origin, turning, p, pi - cross(origin, p)
+
+
+def rates(x: State, body: Body, h: float, origin: Array = USER) -> Array:
+    """dy/dt (15,)."""
+    b, R, p, pi = derivatives(x, body, h, origin)
+    return np.concatenate([b, R[0], R[2], p, pi])
 
 
 def remembered_half(x: State, body: Body, h: float, second: bool) -> State:
@@ -88,21 +109,21 @@ def remembered_half(x: State, body: Body, h: float, second: bool) -> State:
     return replace(remembered(middle, body, h, second), t=x.t)
 
 
-def stages(x: State, body: Body, h: float, tableau: Tableau) -> Array:
-    """k_i = f(t + c_i h, y + h sum_j a_ij k_j), (stages, 18)."""
-    y, K = pack(x), np.zeros((len(tableau.b), 18))
+def stages(x: State, body: Body, h: float, tableau: Tableau, origin: Array = USER) -> Array:
+    """k_i = f(t + c_i h, y + h sum_j a_ij k_j), (stages, 15)."""
+    y, K = pack(x), np.zeros((len(tableau.b), 15))
     for i, (row, c) in enumerate(zip(tableau.a, tableau.c, strict=True)):
-        K[i] = rates(unpack(y + h * np.array(row) @ K[:i], x, x.t + c * h), body, h)
+        K[i] = rates(unpack(y + h * np.array(row) @ K[:i], x, x.t + c * h), body, h, origin)
     return K
 
 
-def stepper(tableau: Tableau) -> Step:
-    """step(x, body, h): y + h sum_i b_i k_i."""
+def stepper(tableau: Tableau, origin: Array = USER) -> Step:
+    """step(x, body, h): y + h sum_i b_i k_i, with y taken at a point (3,) [m] of the body; x is at the user's origin."""
 
     def step(x: State, body: Body, h: float) -> State:
-        x = remembered_half(x, body, h, second=False)
-        y = pack(x) + h * np.array(tableau.b) @ stages(x, body, h, tableau)
-        return remembered_half(unpack(y, x, x.t + h), body, h, second=True)
+        x = at(remembered_half(x, body, h, second=False), origin)
+        y = pack(x) + h * np.array(tableau.b) @ stages(x, body, h, tableau, origin)
+        return remembered_half(at(unpack(y, x, x.t + h), -origin), body, h, second=True)
 
     return step
 
@@ -113,6 +134,32 @@ def advance(step: Step, x: State, body: Body, h: float, steps: int) -> State:
         x = step(replace(x, t=x.step * h), body, h)
         x = replace(x, step=x.step + 1, t=(x.step + 1) * h)
     return x
+
+
+def advance_steady(tableau: Tableau, x: State, body: Body, h: float, steps: int, origin: Array = USER) -> State:
+    """The state after so many steps of h [s] where forces never change in inertial axes: then R p = P + t F is known.
+
+    y = (b, two rows of R, pi), (12,), of which p = R^T (R p) at every stage.
+    """
+    x = at(x, origin)
+    nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, at(x, -origin).pi])), 2)
+    P, F = x.R @ x.p, x.R @ wrench(x, body, h, nu, Om)[0]
+
+    def unpacked(y: Array, t: float) -> State:
+        whole = unpack(np.concatenate([y[:9], P, y[9:]]), x, t)
+        return replace(whole, p=whole.R.T @ (P + t * F))
+
+    def f(y: Array, t: float) -> Array:
+        rate = rates(unpacked(y, t), body, h, origin)
+        return np.concatenate([rate[:9], rate[12:]])
+
+    y = np.concatenate([x.b, x.R[0], x.R[2], x.pi])
+    for k in range(steps):
+        K = np.zeros((len(tableau.b), 12))
+        for i, (row, c) in enumerate(zip(tableau.a, tableau.c, strict=True)):
+            K[i] = f(y + h * np.array(row) @ K[:i], (k + c) * h)
+        y = y + h * np.array(tableau.b) @ K
+    return replace(at(unpacked(y, steps * h), -origin), step=steps)
 
 
 def error_norm(tableau: Tableau, K: Array, h: float, scale: Array) -> float:
@@ -163,7 +210,7 @@ def adaptive(
     tableau: Tableau,
     h: float | None = None,
 ) -> list[State]:
-    """The states at the times [s], rising; steps are shortened to end on them. atol: for all of y, or (18,).
+    """The states at the times [s], rising; steps are shortened to end on them. atol: for all of y, or (15,).
 
     Every state's `step` counts the accepted steps. Raises ValueError where the step becomes too small.
     """

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 
 from lgvi_warp.reference.classical import CG3_A, CG3_B
-from lgvi_warp.reference.explicit import rates, remembered_half
+from lgvi_warp.reference.explicit import USER, at, derivatives, remembered_half
 from lgvi_warp.reference.rotation import Array, cross, exp
 from lgvi_warp.reference.submaps import Body, State
 
 
-def algebra_rates(x: State, body: Body, h: float) -> Array:
-    """(Om; b', p', pi') (12,), an element of so(3) x R^9: R' = R hat(Om)."""
-    Om = np.linalg.solve(body.I6, np.concatenate([x.p, x.pi]))[3:]
-    y = rates(x, body, h)
-    return np.concatenate([Om, y[:3], y[12:]])
+def algebra_rates(x: State, body: Body, h: float, origin: Array = USER) -> Array:
+    """(Om; b', p', pi') (12,), an element of so(3) x R^9: R' = R hat(Om); x has its b and pi at origin."""
+    Om = np.linalg.solve(body.I6, np.concatenate([x.p, at(x, -origin).pi]))[3:]
+    b, _, p, pi = derivatives(x, body, h, origin)
+    return np.concatenate([Om, b, p, pi])
 
 
 def bracket(u: Array, v: Array) -> Array:
@@ -27,25 +27,25 @@ def act(x: State, u: Array, t: float) -> State:
     return replace(x, R=x.R @ exp(u[:3]), b=x.b + u[3:6], p=x.p + u[6:9], pi=x.pi + u[9:], t=t)
 
 
-def rkmk4(x: State, body: Body, h: float) -> State:
+def rkmk4(x: State, body: Body, h: float, origin: Array = USER) -> State:
     """Munthe-Kaas & Owren (1999): order 4 with two commutators (Hairer, Lubich & Wanner, IV.8, in body axes, so that
-    their signs are opposite)."""
-    x = remembered_half(x, body, h, second=False)
+    their signs are opposite). origin (3,) [m]: the point of the body that R turns about."""
+    x = at(remembered_half(x, body, h, second=False), origin)
 
     def k(u: Array, c: float) -> Array:
-        return h * algebra_rates(act(x, u, x.t + c * h), body, h)
+        return h * algebra_rates(act(x, u, x.t + c * h), body, h, origin)
 
     k1 = k(np.zeros(12), 0.0)
     k2 = k(0.5 * k1, 0.5)
     k3 = k(0.5 * k2 + bracket(k1, k2) / 8.0, 0.5)
     k4 = k(k3, 1.0)
     u = (k1 + 2.0 * k2 + 2.0 * k3 + k4 + 0.5 * bracket(k1, k4)) / 6.0
-    return remembered_half(act(x, u, x.t + h), body, h, second=True)
+    return remembered_half(at(act(x, u, x.t + h), -origin), body, h, second=True)
 
 
-def cg3(x: State, body: Body, h: float) -> State:
-    """Crouch & Grossman (1993), order 3, with any laws: classical.cg3 is the paper's, on SE(3) x R^6."""
-    x = remembered_half(x, body, h, second=False)
+def cg3(x: State, body: Body, h: float, origin: Array = USER) -> State:
+    """Crouch & Grossman (1993), order 3, with any laws: classical.cg3 is the paper's, on SE(3) x R^6. origin: as above."""
+    x = at(remembered_half(x, body, h, second=False), origin)
     stages: list[Array] = []
     for row in (*CG3_A, CG3_B):
         y = x
@@ -53,5 +53,5 @@ def cg3(x: State, body: Body, h: float) -> State:
             y = act(y, weight * k, y.t)
         y = replace(y, t=x.t + sum(row) * h)
         if row is not CG3_B:
-            stages.append(h * algebra_rates(y, body, h))
-    return remembered_half(y, body, h, second=True)
+            stages.append(h * algebra_rates(y, body, h, origin))
+    return remembered_half(at(y, -origin), body, h, second=True)

@@ -10,6 +10,8 @@ import numpy as np
 
 if TYPE_CHECKING:
     from lgvi_warp.result import Result
+    from lgvi_warp.stability import StabilityMap
+    from lgvi_warp.stability_grid import Line
     from lgvi_warp.statistics import Estimate
     from lgvi_warp.tradeoffs import Tradeoff
 
@@ -241,3 +243,106 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None 
     target = Path(path)
     figure.savefig(target, dpi=100)
     return target
+
+
+# Colours of stability_map's classes, apart for every kind of colour vision and in grey; what must not be is hatched too.
+CELLS = ("#0072B2", "#9BD1F0", "#F0E442", "#8C8C8C", "#D55E00")
+# Line styles of the analytic limits.
+STYLES = {"rotation": "-", "munk": "--", "restoring": "-.", "drag": ":"}
+
+
+def plot_stability(found: StabilityMap, path: str | os.PathLike[str]) -> Path:
+    """Draw a stability map, a panel for each method, with the analytic limits that lie in it. Returns the path.
+
+    Raises ImportError without matplotlib.
+    """
+    figure_of = _figure()
+    n = len(found.methods)
+    columns = n if n <= 4 else -(-n // 2)
+    rows = -(-n // columns)
+    figure = figure_of(figsize=(max(4.3 * columns + 0.6, 9.0), 4.3 * rows + 1.9))
+    panels = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).ravel()
+    height = 4.3 * rows + 1.9
+    figure.subplots_adjust(left=0.9 / (4.3 * columns + 0.6), right=0.985, bottom=1.35 / height, top=1.0 - 0.75 / height,
+                           wspace=0.07, hspace=0.2)  # fmt: skip
+    drawn: set[str] = set()
+    for axes, method in zip(panels, found.methods, strict=False):
+        _cells(axes, found, method)
+        drawn |= _limits(axes, found, method)
+        limit = found.limit(method)
+        title = f"{method}: every row to {limit.min():.2g} {found.x.unit}" if np.isfinite(limit).all() else method
+        axes.set_title(title, fontsize="medium")
+        axes.set_xlabel(f"{found.x.label} [{found.x.unit}]")
+    for axes in panels[::columns]:
+        axes.set_ylabel(f"{found.y.label} [{found.y.unit}]")
+    for axes in panels[n:]:
+        axes.set_visible(False)
+    _legend(figure, drawn)
+    scene = f"accurate: {found.of} to {found.error_bound:g} {_unit_of(found)} up to {found.error_time:.3g} s"
+    figure.suptitle(
+        f"{scene}; bounded: energy up to {found.t1:.3g} s; worst of {found.directions} starts", fontsize="medium"
+    )
+    target = Path(path)
+    figure.savefig(target, dpi=110)
+    return target
+
+
+def _unit_of(found: StabilityMap) -> str:
+    from lgvi_warp.comparison import QUANTITIES
+
+    return QUANTITIES[found.of]
+
+
+def _edges(line: Line) -> np.ndarray:
+    """Between the values of an axis, and beyond its ends (k + 1,)."""
+    values = np.log(line.values) if line.log else line.values
+    half = 0.5 * np.diff(values) if len(values) > 1 else np.array([0.5])
+    edges = np.concatenate([[values[0] - half[0]], values[:-1] + half[: len(values) - 1], [values[-1] + half[-1]]])
+    return np.exp(edges) if line.log else edges
+
+
+def _cells(axes: Any, found: StabilityMap, method: str) -> None:
+    """The classes as colours."""
+    from matplotlib.colors import ListedColormap
+
+    classes = found.classes[method]
+    x, y = _edges(found.x), _edges(found.y)
+    axes.pcolormesh(x, y, classes, cmap=ListedColormap(CELLS), vmin=-0.5, vmax=len(CELLS) - 0.5, shading="flat")
+    silent = np.ma.masked_where(classes != len(CELLS) - 1, classes)
+    if not silent.mask.all():
+        axes.pcolor(x, y, silent, cmap=ListedColormap(CELLS[-1:]), hatch="xxx", edgecolor="black", linewidth=0.0)
+    axes.set_xscale("log" if found.x.log else "linear")
+    axes.set_yscale("log" if found.y.log else "linear")
+
+
+def _limits(axes: Any, found: StabilityMap, method: str) -> set[str]:
+    """Where h reaches each analytic limit: black on white, to be seen on every colour. Returns those that lie in the map."""
+    drawn: set[str] = set()
+    if min(len(found.x.values), len(found.y.values)) < 2:
+        return drawn
+    for name, ratios in found.ratios[method].items():
+        level = np.log(np.maximum(ratios, 1e-12))
+        if level.min() < 0.0 < level.max():
+            drawn.add(name)
+            for color, width in (("white", 4.0), ("black", 1.7)):
+                axes.contour(found.x.values, found.y.values, level, [0.0], colors=color, linewidths=width,
+                             linestyles="-" if color == "white" else STYLES[name])  # fmt: skip
+    return drawn
+
+
+def _legend(figure: Any, drawn: set[str]) -> None:
+    """Classes and limits, below the panels."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    from lgvi_warp.stability import Cell
+    from lgvi_warp.stability_limits import TEXTS
+
+    handles: list[Any] = [
+        Patch(facecolor=color, edgecolor="black", linewidth=0.4, label=f"{cell.name.lower()}: {cell.text}",
+              hatch="xxx" if cell == Cell.SILENT else None)
+        for cell, color in zip(Cell, CELLS, strict=True)
+    ]  # fmt: skip
+    handles += [Line2D([], [], color="black", linewidth=1.7, linestyle=style, label=TEXTS[name])
+                for name, style in STYLES.items() if name in drawn]  # fmt: skip
+    figure.legend(handles=handles, loc="lower center", ncols=3, fontsize="small", frameon=False)

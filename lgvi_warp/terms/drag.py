@@ -44,15 +44,14 @@ class Drag(Term):
             if np.any(own[kind][:, part])
         )
 
-    def packed_exact(self, own: Numbers, frame: Frame) -> Packed:
-        """For the exact flow: l / I [1/s], and q / I per momentum that is kept divided by max J."""
-        scale = frame.J.max(axis=1)[:, None]
+    def packed_exact(self, own: Numbers, frame: Frame, scale: np.ndarray) -> Packed:
+        """For the exact flow: l / I [1/s], and q / I per momentum, which is kept divided by scale (1 or n,)."""
         inertia = {"force": np.einsum("nii->ni", frame.M), "torque": frame.J}
         values = {}
         for where, half in (("force", slice(0, 3)), ("torque", slice(3, 6))):
             linear, quadratic = (_turned(frame.Q, own[kind][:, half]) for kind in ("linear", "quadratic"))
             values[f"linear_{where}"] = linear / inertia[where]
-            values[f"quadratic_{where}"] = quadratic * scale / inertia[where] ** 2
+            values[f"quadratic_{where}"] = quadratic * scale[:, None] / inertia[where] ** 2
         return Packed(values)
 
     def packed_directions(self, own: Numbers, setting: Setting) -> Packed:

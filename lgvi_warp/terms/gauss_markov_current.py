@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.special import ndtri
 
-from lgvi_warp.distributions import uniforms
+from lgvi_warp.distributions import uniforms_of
 from lgvi_warp.errors import Faults
 from lgvi_warp.terms.base import Numbers, Packed, Setting, Term, quantity
 from lgvi_warp.terms.current_harmonics import above_zero, not_above_zero
@@ -69,9 +69,5 @@ class GaussMarkovCurrent(Term):
         if self.start == "zero":
             return np.zeros((1, 3))
         name, members = f"{self.key}.start", setting.members
-        low, count = int(members.min()), int(np.ptp(members)) + 1
-        if count == len(members):
-            u = uniforms(setting.seed, name, low, count, 3)[members - low]
-        else:
-            u = np.concatenate([uniforms(setting.seed, name, int(i), 1, 3) for i in members])
+        u = uniforms_of(setting.seed, name, members, 3)
         return np.asarray(own["standard_deviation"] * ndtri(u))

@@ -142,13 +142,21 @@ def test_parts_pass_through_files(fleet, whole, tmp_path):
     assert same(again.result(), whole.statistics)
 
 
-@pytest.mark.parametrize(("kind", "words"), [("sobol", "wider than need be"), ("grid", "do not rely"), ("random", "")])
-def test_intervals_of_dependent_members_are_said_to_be(fleet, whole, kind, words):
-    class Sampled:
-        sampling = kind
-
-    (text,) = observation.notes(whole.statistics, Sampled(), 1003) or ("",)
-    assert words in text and bool(text) == (kind != "random")
+@pytest.mark.parametrize(
+    ("sampling", "words"),
+    [
+        ("sobol", "wider than need be"),
+        ("halton", "wider"),
+        (lw.Grid({"start.position[0]": 4, "vehicle.mass": 4}), "do not rely"),
+        ("random", ""),
+    ],
+)
+def test_intervals_of_dependent_members_are_said_to_be(scene, whole, sampling, words):
+    sampled = lw.Ensemble(
+        scene, 16, 1, {"start.position[0]": lw.Normal(std=1.0), "vehicle.mass": lw.Normal(std=1.0)}, sampling
+    )
+    (text,) = observation.notes(whole.statistics, sampled, 1003) or ("",)
+    assert words in text and bool(text) == (sampling != "random")
 
 
 def test_the_result_keeps_its_statistics(fleet, whole, tmp_path):

@@ -121,7 +121,7 @@ def test_embedded_methods():
 
 @pytest.mark.parametrize("s", range(1, 7))
 def test_gauss_coefficients(s):
-    # B(2s), C(s), symmetry, and b_i a_ij + b_j a_ji = b_i b_j: symplectic.
+    # B(2s), C(s), symmetry, and b_i a_ij + b_j a_ji = b_i b_j: quadratic invariants are kept.
     g = collocation.gauss(s)
     np.testing.assert_allclose([g.b @ g.c**k for k in range(2 * s)], 1.0 / np.arange(1, 2 * s + 1), rtol=1e-14)
     for k in range(1, s + 1):

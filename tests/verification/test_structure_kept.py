@@ -134,11 +134,25 @@ def _form(p, pi):
     return S
 
 
-@pytest.mark.parametrize("method", [*SYMPLECTIC, "su4(psi_s)"])
+slow = pytest.mark.slow
+COMPOSED = ("psi_w", "bm6(psi_x)", "kl8(psi_x)", "rkn4_6", "rkn6_14")
+
+
+@pytest.mark.parametrize(
+    "method", [*SYMPLECTIC, "su4(psi_s)", "psi_x", "bm4(psi_x)", *(pytest.param(name, marks=slow) for name in COMPOSED)]
+)
 def test_symplectic(method):
     # Differences of order 4: eps^4 = 2e-15 times a fifth derivative, and round-off 1e-16 / eps = 1e-12.
     assert symplectic_defect(method, 0.1, (1.0, 2.0, 3.0)) < 1e-9
     assert symplectic_defect(method, 0.05, (1.0, 1.2, 6.0)) < 1e-9
+
+
+@pytest.mark.parametrize(("method", "order"), [("rk4", 4), ("gauss4", 4), pytest.param("cg3", 3, marks=slow)])
+def test_others_are_symplectic_to_their_order_only(method, order):
+    # Gauss collocation too: (R, p, pi) are not canonical variables. Its quadratic invariants are another matter.
+    defects = [symplectic_defect(method, h, (1.0, 2.0, 3.0)) for h in (0.2, 0.1)]
+    assert defects[1] > 1e-7
+    assert 0.7 * 2.0 ** (order + 1) < defects[0] / defects[1] < 1.5 * 2.0 ** (order + 1)
 
 
 @pytest.mark.parametrize("method", ["phi", "phi_adjoint", "psi"])

@@ -3,6 +3,7 @@
 law(w, view, p): a force and torque from position, attitude and time, POTENTIAL if they follow from a potential,
 SEPARABLE if that is a sum of one of position, at most quadratic, and one of attitude;
 damping(D, view, p): a matrix D, from velocities as well, of the force and torque -D (nu; Om);
+steady_force(w, view, p): where the force of `law` never changes in inertial axes, what it is there;
 flow(f, view, p): how the water moves; evolve(view, view, p): what the law remembers, advanced by half a kick.
 """
 

@@ -25,7 +25,7 @@ def params(width, real):
 
 @functools.cache
 def flow_struct(width, real):
-    """Per axis, for one length of step: e^-x (1 - e^-x for compensated sums) and (h q/I) (1 - e^-x)/x, of force and torque."""
+    """Per axis, for one length of step: e^-x (1 - e^-x by changes) and (h q/I) (1 - e^-x)/x, of force and torque."""
     Lane3 = lane3(width, real)
     return struct("DragFlow", decay_force=Lane3, decay_torque=Lane3, gain_force=Lane3, gain_torque=Lane3, h=real)
 
@@ -62,8 +62,29 @@ def make_resistance(parts):
     return resisted
 
 
-def make_E(parts, compensated):
-    """(prepare, E) with the parts of PARTS that some member has. compensated: momenta change by what E takes off them."""
+def make_taken(linear, quadratic):
+    """(v, gain, loss) -> v (1 - loss) / (1 + gain |v|) - v per axis, without a difference of large numbers."""
+
+    @wp.func
+    def taken(v: Any, gain: Any, loss: Any):
+        less = v.x.dtype(-1.0)
+        if wp.static(quadratic):
+            one = vec3(ones(v.x), ones(v.x), ones(v.x))
+            g = gain * size3(v)
+            if wp.static(linear):
+                return less * (((g + loss) / (one + g)) * v)
+            return less * ((g / (one + g)) * v)
+        return less * (loss * v)
+
+    return taken
+
+
+def make_E(parts, by_changes):
+    """(prepare, E) with the parts of PARTS that some member has.
+
+    by_changes: momenta change by what E takes off them. In float32 e^-x has few digits of a small x, and compensated sums
+    have no other way.
+    """
     linear_force, linear_torque, quadratic_force, quadratic_torque = (part in parts for part in PARTS)
 
     @wp.func
@@ -74,7 +95,7 @@ def make_E(parts, compensated):
             x = h * p.linear_force
             s = decay3(x)
             e.decay_force = x * s
-            if wp.static(not compensated):
+            if wp.static(not by_changes):
                 e.decay_force = vec3(ones(x.x), ones(x.x), ones(x.x)) - e.decay_force
             if wp.static(quadratic_force):
                 e.gain_force = h * (p.quadratic_force * s)
@@ -85,7 +106,7 @@ def make_E(parts, compensated):
             y = h * p.linear_torque
             t = decay3(y)
             e.decay_torque = y * t
-            if wp.static(not compensated):
+            if wp.static(not by_changes):
                 e.decay_torque = vec3(ones(y.x), ones(y.x), ones(y.x)) - e.decay_torque
             if wp.static(quadratic_torque):
                 e.gain_torque = h * (p.quadratic_torque * t)
@@ -94,20 +115,17 @@ def make_E(parts, compensated):
                 e.gain_torque = h * p.quadratic_torque
         return e
 
-    @wp.func
-    def taken(v: Any, gain: Any, loss: Any):
-        """v (1 - loss) / (1 + gain |v|) - v per axis, without a difference of large numbers."""
-        one = vec3(ones(v.x), ones(v.x), ones(v.x))
-        g = gain * vec3(absolute(v.x), absolute(v.y), absolute(v.z))
-        return v.x.dtype(-1.0) * (((g + loss) / (one + g)) * v)
+    force, torque = linear_force or quadratic_force, linear_torque or quadratic_torque
+    taken_from_p = make_taken(linear_force, quadratic_force)
+    taken_from_pi = make_taken(linear_torque, quadratic_torque)
 
     @wp.func
-    def E_of_sums(x: Any, e: Any, c: Any):
-        """The same as E; absent parts are zeros."""
-        if wp.static(linear_force or quadratic_force):
-            x = pushed(x, taken(x.p, e.gain_force, e.decay_force))
-        if wp.static(linear_torque or quadratic_torque):
-            x = twisted(x, taken(x.pi, e.gain_torque, e.decay_torque))
+    def E_by_changes(x: Any, e: Any, c: Any):
+        """The same as E, by what it takes off: a momentum loses no digit of a small change."""
+        if wp.static(force):
+            x = pushed(x, taken_from_p(x.p, e.gain_force, e.decay_force))
+        if wp.static(torque):
+            x = twisted(x, taken_from_pi(x.pi, e.gain_torque, e.decay_torque))
         return x
 
     @wp.func
@@ -137,4 +155,4 @@ def make_E(parts, compensated):
         x.pi = pi
         return x
 
-    return prepare, E_of_sums if compensated else E
+    return prepare, E_by_changes if by_changes else E

@@ -28,3 +28,9 @@ def law(w: Any, view: Any, p: Any):
     """mU(b, R) = -B r x R^T e3."""
     w.torque = w.torque - cross(p.moment, view.down)
     return w
+
+
+@wp.func
+def steady_force(w: Any, view: Any, p: Any):
+    """A moment only."""
+    return w

@@ -28,3 +28,10 @@ def law(w: Any, view: Any, p: Any):
     """f(b, R) = net R^T e3."""
     w.force = w.force + p.net * view.down
     return w
+
+
+@wp.func
+def steady_force(w: Any, view: Any, p: Any):
+    """The same in inertial axes: net e3."""
+    w.force.z = w.force.z + p.net
+    return w

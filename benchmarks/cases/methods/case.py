@@ -1,0 +1,62 @@
+"""Every method in every precision and at every width, on one core: ns per vehicle and step, and how far off its operations.
+
+A method makes the same operations at every width. A core makes them at a rate that it shows with fused multiply-adds
+alone, at that width (machine.fma_peak). `off` is time times that rate, over its least at any width: 1 where a width is
+used as well as the best one is, and 10 where vectorisation fell off a cliff.
+"""
+
+from lgvi_kernels.lanes import WIDTHS
+from lgvi_warp import machine, speed
+from lgvi_warp.errors import SceneError
+from lgvi_warp.method import Method
+from lgvi_warp.solving import make_plan
+
+METHODS = (
+    "phi", "phi_adjoint", "psi", "psi_s", "psi_1", "psi_x", "psi_x8", "psi_w", "tj4(psi_s)", "su4(psi_s)", "su4(psi_x)",
+    "bm4(psi_x)", "kl6(psi_s)", "bm6(psi_x)", "kl8(psi_s)", "kl8(psi_x)", "ss8_21(psi_x)", "rkn4_6", "rkn6_11", "rkn6_14",
+    "gauss4", "gauss6", "gauss8", "gauss10", "gauss12", "cg3", "rkmk4", "rk4", "rk5", "rk8", "rk5 chosen", "rk8 chosen",
+)  # fmt: skip
+QUICK = ("psi_s", "psi_x", "rk8")
+DTYPES = ("float64", "float32", "float32_compensated")
+
+
+def method_of(name):
+    """A method; "chosen": it chooses its steps."""
+    base, _, chosen = name.partition(" ")
+    return Method(base, rtol=1e-5, atol=1e-5) if chosen else Method(base)
+
+
+def run(quick):
+    members, steps = (512, 50) if quick else (2048, 100)
+    names = QUICK if quick else METHODS
+    for dtype in DTYPES:
+        real = "float64" if dtype == "float64" else "float32"
+        widths = WIDTHS if real == "float32" else WIDTHS[:-1]
+        rates = {width: machine.fma_peak(real, width) for width in widths}
+        for name in names:
+            yield from one_method(name, dtype, rates, members, steps)
+
+
+def one_method(name, dtype, rates, members, steps):
+    """One record for each width."""
+    fleet = speed.fleet(members)
+    try:
+        plans = {w: make_plan(fleet, method_of(name), h=0.05, t1=0.05 * steps, dtype=dtype, width=w) for w in rates}
+        default = make_plan(fleet, method_of(name), h=0.05, t1=0.05 * steps, dtype=dtype).spec.width
+    except SceneError as error:
+        yield {"method": name, "dtype": dtype, "refused": error.faults[0]}
+        return
+    compiled = {width: plan.compile() for width, plan in plans.items()}
+    seconds = speed.interleaved([speed.stepper(plan) for plan in plans.values()])
+    ns = {width: 1e9 * one / (members * steps) for width, one in zip(plans, seconds, strict=True)}
+    operations = {width: ns[width] * rates[width] * 1e-9 for width in ns}
+    for width in ns:
+        yield {
+            "method": name,
+            "dtype": dtype,
+            "width": width,
+            "default": width == default,
+            "ns_per_vehicle_step": round(ns[width], 2),
+            "off": round(operations[width] / min(operations.values()), 2),
+            "load_seconds": round(compiled[width], 2),
+        }

@@ -1,0 +1,149 @@
+"""Every law by its name in a scene file, and those of scipy.stats as they are there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.distributions import Choice, Distribution, LogNormal, Normal, TruncatedNormal, Uniform
+from lgvi_warp.errors import Faults, SceneError
+from lgvi_warp.joint_laws import CorrelatedNormal, PhysicalInertia, PositiveDefinite, RotationNormal, UniformRotation
+
+# Name in a scene file -> name in scipy.stats, whose parameters, loc and scale it takes.
+SCIPY = {
+    "beta": "beta",
+    "exponential": "expon",
+    "gamma": "gamma",
+    "gumbel": "gumbel_r",
+    "student_t": "t",
+    "triangular": "triang",
+    "weibull": "weibull_min",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Frozen(Distribution):
+    """A frozen distribution of scipy.stats: lw.Frozen(scipy.stats.gamma(2.0, scale=3.0)), or in `vary` that itself.
+
+    Its values are absolute: the scene's own value plays no part. Its parameters may be one number or one per component.
+    Raises SceneError for what has no quantiles.
+    """
+
+    distribution: Any = None
+    kind: ClassVar[str] = "scipy"
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        if not is_frozen(self.distribution):
+            faults.add("distribution", self.distribution, "is no frozen distribution of scipy.stats",
+                       "give one with its numbers, such as scipy.stats.gamma(2.0, scale=3.0)")  # fmt: skip
+        elif not np.all(np.isfinite(self.distribution.ppf(0.5))):
+            faults.add(
+                self.name, self._numbers(), "are numbers that scipy.stats refuses", "see its page for their limits"
+            )
+        faults.raise_if_any()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Frozen) and self.to_dict() == other.to_dict()
+
+    def __hash__(self) -> int:
+        return hash(self.name)
+
+    @property
+    def name(self) -> str:
+        """In scipy.stats."""
+        return str(getattr(self.distribution.dist, "name", None) or type(self.distribution.dist).__name__)
+
+    def _numbers(self) -> dict[str, Any]:
+        """By their names in scipy.stats."""
+        shapes = (self.distribution.dist.shapes or "").replace(" ", "").split(",")
+        known = [*(name for name in shapes if name), "loc", "scale"]
+        given = dict(zip(known, self.distribution.args, strict=False)) | self.distribution.kwds
+        return {name: np.asarray(value).tolist() for name, value in given.items()}
+
+    def numbers(self) -> list[Any]:
+        """Its parameters."""
+        return list(self._numbers().values())
+
+    def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
+        """scipy's ppf."""
+        return np.asarray(self.distribution.ppf(u), dtype=np.float64)
+
+    def to_dict(self) -> dict[str, Any]:
+        """{ gamma = { a = 2.0, scale = 3.0 } }, or { scipy = { name = "...", ... } } of one without a name of its own."""
+        own = {name: kind for kind, name in SCIPY.items()}
+        if self.name in own:
+            return {own[self.name]: self._numbers()}
+        return {"scipy": {"name": self.name} | self._numbers()}
+
+    @classmethod
+    def from_table(cls, key: str, kind: str, values: Mapping[str, Any]) -> Frozen:
+        """From what `to_dict` gives. Raises SceneError naming the key and every fault."""
+        from scipy import stats
+
+        faults = Faults()
+        name = SCIPY.get(kind, values.get("name"))
+        law = getattr(stats, name, None) if isinstance(name, str) else None
+        if not isinstance(law, stats.rv_continuous | stats.rv_discrete):
+            faults.add(
+                f"{key}.{kind}.name", name, "is no distribution of scipy.stats", 'give its name, such as "gamma"'
+            )
+            faults.raise_if_any()
+        assert law is not None
+        shapes = [one for one in (law.shapes or "").replace(" ", "").split(",") if one]
+        known = [*shapes, "loc"] + ["scale"] * isinstance(law, stats.rv_continuous)
+        given = {one: value for one, value in values.items() if kind in SCIPY or one != "name"}
+        faults.keys(f"{key}.{kind}", given, known)
+        for one in shapes:
+            if one not in given:
+                faults.add(f"{key}.{kind}.{one}", None, "is missing", f"scipy.stats.{name} takes {', '.join(known)}")
+        for one, value in given.items():
+            faults.finite(f"{key}.{kind}.{one}", value)
+        faults.raise_if_any()
+        try:
+            return cls(law(**{one: np.asarray(value)[()] for one, value in given.items()}))
+        except SceneError as error:
+            raise SceneError(f"{key}.{kind}: {fault}" for fault in error.faults) from None
+
+
+KINDS: dict[str, type[Distribution]] = {
+    law.kind: law
+    for law in (Normal, Uniform, LogNormal, TruncatedNormal, Choice, CorrelatedNormal, RotationNormal, UniformRotation,
+                PositiveDefinite, PhysicalInertia)
+}  # fmt: skip
+
+
+def is_frozen(value: Any) -> bool:
+    """Whether it is a frozen distribution of scipy.stats; without importing that."""
+    return all(hasattr(value, name) for name in ("dist", "args", "kwds", "ppf"))
+
+
+def as_law(value: Any) -> Any:
+    """A frozen distribution of scipy.stats as a law; everything else as it is."""
+    return Frozen(value) if is_frozen(value) else value
+
+
+def from_dict(key: str, content: Any) -> Distribution:
+    """A distribution from { normal = { std = 1.0 } }. Raises SceneError naming the key and every fault."""
+    faults = Faults()
+    if not isinstance(content, Mapping) or len(content) != 1:
+        faults.add(key, content, "is not a distribution", "write { normal = { std = 1.0 } }")
+        faults.raise_if_any()
+    kind, values = next(iter(content.items()))
+    foreign = kind in SCIPY or kind == Frozen.kind
+    if not foreign and kind not in KINDS:
+        faults.keys(key, [kind], [*KINDS, *SCIPY, Frozen.kind])
+    elif not isinstance(values, Mapping):
+        faults.add(f"{key}.{kind}", values, "is not a table", "write { normal = { std = 1.0 } }")
+    elif not foreign:
+        faults.keys(f"{key}.{kind}", values, [item.name for item in fields(KINDS[kind])])
+    faults.raise_if_any()
+    if foreign:
+        return Frozen.from_table(key, kind, values)
+    try:
+        return KINDS[kind](**values)
+    except SceneError as error:
+        raise SceneError(f"{key}: {fault}" for fault in error.faults) from None

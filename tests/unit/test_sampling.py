@@ -1,0 +1,438 @@
+"""Samplings: marginals, discrepancy, that any block, subset or longer ensemble has the same members, and what is refused.
+
+Kolmogorov-Smirnov: P(sqrt(n) D > x) < 2 exp(-2 x^2); at 2.5 that is 7e-6, and seeds are fixed.
+"""
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.stats import qmc
+
+import lgvi_warp as lw
+from lgvi_warp import sampling
+from lgvi_warp.variations import Space, targets
+from tests.unit.test_ensemble import assert_same, faults
+
+KOLMOGOROV = 2.5
+VARY = {
+    "vehicle.mass": lw.Normal(relative=0.01),
+    "vehicle.inertia": lw.PhysicalInertia(sigma=0.1, off_diagonal=0.05),
+    "vehicle.buoyancy": stats.gamma(100.0, scale=10.0),
+    "start.attitude": lw.RotationNormal(std=0.2),
+    "start.position[2]": lw.Uniform(low=5.0, high=15.0),
+    "start.velocity_inertial[0], start.angular_velocity": lw.CorrelatedNormal(
+        covariance=0.01 * (np.eye(4) + 0.5 * (np.ones((4, 4)) - np.eye(4)))
+    ),
+}
+SPACE = Space(3, ("a", "b"), (2, 1), (("a[0]", (0,)), ("a[1]", (1,)), ("b", (2,))))
+SEQUENCES = ("random", "sobol", "halton", {"latin_hypercube": {"group": 40}})
+# 6 factors vary, three of them joint laws: groups of 14 or 8 members, and paths of 7.
+DESIGNS = ({"saltelli": {"second_order": True}}, {"saltelli": {"second_order": False}}, "morris")
+
+
+def members_of(content):
+    """A number of members that the sampling may have, 560 to 600."""
+    kind = content if isinstance(content, str) else next(iter(content))
+    return {"latin_hypercube": 600, "saltelli": 560, "morris": 560}.get(kind, 600)
+
+
+def cube(content, members, space=SPACE):
+    drawn = sampling.sampling_of(content).draw(space, np.asarray(members))
+    return np.concatenate([drawn[key] for key in space.keys], axis=1)
+
+
+# The same members ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("content", [*SEQUENCES, *DESIGNS], ids=str)
+def test_blocks_subsets_and_longer_ensembles_have_the_same_members(scene, content):
+    n = members_of(content)
+    fleet = lw.Ensemble(scene, n, 3, VARY, content)
+    whole = fleet.select(0, n)
+    for first, stop in ((0, 1), (1, 8), (7, 8), (255, 513), (n - 1, n)):
+        assert_same(fleet.select(first, stop), whole, slice(first, stop))
+    order = np.random.default_rng(0).permutation(n)[:60]
+    some = fleet.subset(order)
+    assert_same(some.select(0, 60), whole, order)
+    assert_same(some.subset([7, 3]).select(0, 2), whole, order[[7, 3]])
+    assert_same(fleet.member(17).select(0, 1), whole, [17])
+    np.testing.assert_array_equal(some.select(3, 5).indices, order[3:5])
+    longer = lw.Ensemble(scene, 5 * n, 3, VARY, content)
+    assert_same(longer.select(0, n), whole, slice(0, n))
+
+
+@pytest.mark.parametrize("content", SEQUENCES, ids=str)
+def test_far_members(content):
+    far = 10**8 + 3
+    np.testing.assert_array_equal(cube(content, np.arange(far, far + 50))[[7, 30]], cube(content, [far + 7, far + 30]))
+
+
+@pytest.mark.parametrize("content", SEQUENCES, ids=str)
+def test_another_seed_gives_other_members(content):
+    other = Space(4, *[getattr(SPACE, name) for name in ("keys", "sizes", "factors")])
+    assert not np.any(cube(content, np.arange(80)) == cube(content, np.arange(80), other))
+
+
+def test_sequences_are_these_numbers():
+    """The members of a seed are a promise: drawn once, with scipy 1.17."""
+    np.testing.assert_array_equal(cube("sobol", [0, 5]), SOBOL)
+    np.testing.assert_allclose(cube("halton", [0, 5]), HALTON, rtol=1e-15)
+    np.testing.assert_array_equal(cube({"latin_hypercube": {"group": 8}}, [0, 9]), LATIN)
+
+
+SOBOL = [
+    [0.029180726618506014, 0.21242503903340548, 0.31510313984472305],
+    [0.8223508863011375, 0.9412634876789525, 0.41237329703290015],
+]
+HALTON = [
+    [0.6569170426508356, 0.42754819126216037, 0.5106789685181907],
+    [0.031917042650835614, 0.9831037468177162, 0.5506789685181908],
+]
+LATIN = [
+    [0.24267010446711515, 0.7606552021171017, 0.9640351063422453],
+    [0.394352329870452, 0.1927249966504648, 0.8978476365967205],
+]
+
+
+@pytest.mark.parametrize("content", ["random", {"latin_hypercube": {"group": 40}}], ids=str)
+def test_varying_more_does_not_change_the_rest(scene, content):
+    less = {"vehicle.mass": VARY["vehicle.mass"]}
+    a, b = (lw.Ensemble(scene, 80, 3, vary, content).select(0, 80) for vary in (less, VARY))
+    np.testing.assert_array_equal(a.parameters["vehicle.mass"], b.parameters["vehicle.mass"])
+
+
+# The unit cube ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("content", [*SEQUENCES, "saltelli"], ids=str)
+def test_levels_are_uniform_within_the_open_cube(content):
+    n = 8000
+    u = cube(content, np.arange(n))
+    assert u.min() > 0.0 and u.max() < 1.0
+    grid = (np.arange(n) + 0.5) / n
+    # Saltelli's members repeat the points A and B: n / 4 of them are their own, in each column.
+    own = n / 4 if content == "saltelli" else n
+    for column in u.T:
+        assert np.sqrt(own) * np.abs(np.sort(column) - grid).max() < KOLMOGOROV
+
+
+@pytest.mark.parametrize("content", ["sobol", "halton", {"latin_hypercube": {"group": 1024}}], ids=str)
+def test_discrepancy_is_below_that_of_random_points(content):
+    # Centred discrepancy, squared, of 1024 points in 3 dimensions: of 5 random sets none comes near.
+    random = min(qmc.discrepancy(np.random.default_rng(i).random((1024, 3))) for i in range(5))
+    found = qmc.discrepancy(cube(content, np.arange(1024)))
+    # A Latin hypercube fills the sides only: its gain is in the one-dimensional part.
+    assert found < (0.7 if isinstance(content, dict) else 0.02) * random
+
+
+def test_sobol_points_are_balanced_and_those_of_scipy():
+    u = sampling.sobol_points(1, "x", 4, np.arange(256))
+    for column in u.T:
+        np.testing.assert_array_equal(np.sort(np.floor(column * 256)), np.arange(256))
+    engine = qmc.Sobol(4, scramble=False, bits=32)
+    got = sampling.sobol_points(1, "x", 4, np.arange(300), scramble=False)
+    with pytest.warns(UserWarning):
+        expected = engine.random(300)
+    np.testing.assert_array_equal(got, expected + 2.0**-33)
+
+
+def test_every_group_is_a_latin_hypercube():
+    u = cube({"latin_hypercube": {"group": 40}}, np.arange(120))
+    for group in range(3):
+        for column in u[40 * group : 40 * group + 40].T:
+            np.testing.assert_array_equal(np.sort(np.floor(column * 40)), np.arange(40))
+    assert not np.any(u[:40] == u[40:80])
+
+
+@pytest.mark.parametrize("second_order", [True, False])
+def test_saltellis_design_is_that_of_salib(second_order):
+    from SALib.sample import sobol
+
+    d, N = 3, 16
+    problem = {"num_vars": d, "names": ["x", "y", "z"], "bounds": [[0.0, 1.0]] * d}
+    expected = sobol.sample(problem, N, calc_second_order=second_order, scramble=False)
+    design = sampling.Saltelli(second_order)
+    AB = sampling.sobol_points(0, "x", 2 * d, np.arange(N), scramble=False)
+    rows = design.rows(SPACE)
+    got = np.concatenate([np.where(rows, one[d:], one[:d]) for one in AB])
+    np.testing.assert_allclose(got, expected, rtol=0, atol=2.0**-32)
+    assert design.group_size(SPACE) == len(rows) == len(expected) // N
+    # The design itself is these rows of its own scrambled points.
+    own = sampling.sobol_points(3, "saltelli", 2 * d, np.arange(N))
+    np.testing.assert_array_equal(cube(design, np.arange(len(expected))),
+                                  np.concatenate([np.where(rows, one[d:], one[:d]) for one in own]))  # fmt: skip
+
+
+def test_a_joint_law_moves_as_one_factor():
+    space = Space(1, ("a", "b"), (3, 1), (("a", (0, 1, 2)), ("b", (3,))))
+    u = cube("saltelli", np.arange(6), space)
+    A, B = u[0], u[-1]
+    np.testing.assert_array_equal(u[1], [*B[:3], A[3]])
+    np.testing.assert_array_equal(u[2], [*A[:3], B[3]])
+    path = cube("morris", np.arange(3), space)
+    moved = np.diff(path, axis=0) != 0.0
+    assert sorted(moved.sum(axis=1)) == [1, 3] and (moved.sum(axis=0) == 1).all()
+
+
+def test_a_path_moves_one_factor_at_a_time_by_half_the_levels():
+    u = cube("morris", np.arange(40))
+    np.testing.assert_allclose(u * 4.0 - 0.5, np.round(u * 4.0 - 0.5), atol=1e-12)
+    for path in u.reshape(10, 4, 3):
+        moved = np.abs(np.diff(path, axis=0))
+        np.testing.assert_allclose(np.sort(moved, axis=None), [0.0] * 6 + [0.5] * 3, atol=1e-12)
+        assert ((moved > 0.1).sum(axis=0) == 1).all()
+
+
+# Grids and tables --------------------------------------------------------------------------------------------------------
+
+
+def test_a_grid_is_every_combination(scene):
+    grid = lw.Grid({"vehicle.mass": [120.0, 121.0, 125.0], "start.position[2]": [5.0, 6.0], "vehicle.buoyancy": 4,
+                    "start.angular_velocity": [[0.0, 0.0, 0.1], [0.0, 0.2, 0.0]]})  # fmt: skip
+    vary = {"vehicle.buoyancy": lw.Uniform(low=1000.0, high=1400.0), "environment.gravity": lw.Normal(std=0.001)}
+    fleet = lw.Ensemble(scene, None, 1, vary, grid)
+    assert fleet.members == 2 * 2 * 4 * 3
+    m = fleet.select(0, 48)
+    got = [(om[1], b[2], float(B), float(mass)) for om, b, B, mass in
+           zip(m.angular_velocity, m.position, m.parameters["vehicle.buoyancy"], m.parameters["vehicle.mass"])]  # fmt: skip
+    # In the order of the names, the last one fastest; a number of levels gives the middles of the law's parts.
+    expected = list(itertools.product([0.0, 0.2], [5.0, 6.0], [1050.0, 1150.0, 1250.0, 1350.0], [120.0, 121.0, 125.0]))
+    np.testing.assert_allclose(got, expected, rtol=1e-14)
+    assert len(np.unique(m.parameters["environment.gravity"])) == 48
+    assert_same(fleet.select(13, 20), m, slice(13, 20))
+    assert_same(fleet.subset([40, 2]).select(0, 2), m, [40, 2])
+
+
+def test_a_table_of_arrays(scene):
+    rng = np.random.default_rng(0)
+    J = rng.uniform(5.0, 5.5, (6, 3))
+    R = stats.special_ortho_group(3, seed=1).rvs(6)
+    values = {"vehicle.mass": rng.uniform(100, 150, 6), "start.position[1]": np.arange(6.0), "vehicle.inertia": J,
+              "start.attitude": R, "vehicle.added_mass[0,1]": np.arange(6.0)}  # fmt: skip
+    fleet = lw.Ensemble(scene, sampling=lw.Table(values), vary={"environment.gravity": lw.Normal(std=0.001)})
+    m = fleet.select(0, 6)
+    np.testing.assert_array_equal(m.parameters["vehicle.mass"], values["vehicle.mass"])
+    np.testing.assert_array_equal(m.position, [[0.0, i, 10.0] for i in range(6)])
+    np.testing.assert_array_equal(m.parameters["vehicle.inertia"], J[:, :, None] * np.eye(3))
+    np.testing.assert_array_equal(m.attitude, R)
+    added = m.parameters["vehicle.added_mass"]
+    np.testing.assert_array_equal(added[:, 0, 1], np.arange(6.0))
+    np.testing.assert_array_equal(added, np.swapaxes(added, 1, 2))
+    assert_same(fleet.subset([4, 1]).select(0, 2), m, [4, 1])
+    assert len(m.parameters["environment.gravity"]) == 6
+
+
+def test_a_table_of_a_file(scene, tmp_path):
+    path = tmp_path / "members.csv"
+    path.write_text('vehicle.mass, start.position[2],"vehicle.inertia[0,0]"\n120.5,7,5.4\n121,8.25,5.5\n')
+    (tmp_path / "scene.toml").write_text(
+        '[vehicle]\nmass = 123.8\ninertia = [5.46, 5.29, 5.72]\n[ensemble]\nsampling = { table = { file = "members.csv" } }\n'
+    )
+    fleet = lw.Ensemble.from_scene(lw.Scene.load(tmp_path / "scene.toml"))
+    m = fleet.select(0, 2)
+    np.testing.assert_array_equal(m.parameters["vehicle.mass"], [120.5, 121.0])
+    np.testing.assert_array_equal(m.position[:, 2], [7.0, 8.25])
+    np.testing.assert_array_equal(m.parameters["vehicle.inertia"][:, 0, 0], [5.4, 5.5])
+    content = fleet.scene.to_dict() | {"ensemble": fleet.to_dict()}
+    assert_same(lw.Ensemble.from_scene(lw.Scene.from_dict(content)).select(0, 2), m, [0, 1])
+    path.write_text(path.read_text().replace("120.5", "120.6"))
+    assert "has changed" in faults(lw.Scene.from_dict, content)[0]
+
+
+def test_a_design_of_ones_own(scene):
+    u = np.random.default_rng(1).random((20, 2))
+    vary = {"vehicle.mass": lw.Uniform(low=100.0, high=110.0), "environment.gravity": lw.Uniform(low=9.0, high=10.0)}
+    fleet = lw.Ensemble(scene, None, 0, vary, lw.Levels(u))
+    assert fleet.space.keys == ("environment.gravity", "vehicle.mass")
+    np.testing.assert_allclose(fleet.parameters(0, 20)["environment.gravity"], 9.0 + u[:, 0], rtol=1e-15)
+    np.testing.assert_allclose(fleet.parameters(3, 9)["vehicle.mass"], 100.0 + 10.0 * u[3:9, 1], rtol=1e-15)
+
+
+# There and back ----------------------------------------------------------------------------------------------------------
+
+GRID = {"grid": {"vehicle.mass": [120.0, 121.0], "vehicle.buoyancy": 3}}
+TABLE = {"table": {"values": {"start.velocity_inertial[1]": [0.1, 0.2, 0.3]}}}
+
+
+@pytest.mark.parametrize("content", [*SEQUENCES, *DESIGNS, GRID, TABLE], ids=str)
+def test_an_ensemble_comes_back_from_its_provenance(scene, content):
+    import json
+
+    varied = {key: law for key, law in VARY.items() if content is not GRID or key != "vehicle.mass"}
+    n = None if content in (GRID, TABLE) else members_of(content)
+    fleet = lw.Ensemble(scene, n, 3, varied, content)
+    for one in (fleet, fleet.subset([2, 0])):
+        written = json.loads(json.dumps(scene.to_dict() | {"ensemble": one.to_dict()}))
+        back = lw.Ensemble.from_scene(lw.Scene.from_dict(written))
+        assert back.members == one.members and back.to_dict() == one.to_dict()
+        assert_same(back.select(0, one.members), one.select(0, one.members), slice(None))
+
+
+def test_a_scene_file_names_its_sampling(tmp_path):
+    text = """
+        [vehicle]
+        mass = 20.0
+        inertia = [1.5, 4.0, 4.5]
+        buoyancy = 196.0
+        [ensemble]
+        members = 512
+        seed = 4
+        sampling = "sobol"
+        [ensemble.vary]
+        "vehicle.mass" = { gamma = { a = 400.0, scale = 0.05 } }
+        "vehicle.mass_dummy" = { normal = { std = 1.0 } }
+        "start.attitude" = { rotation_normal = { std = [0.1, 0.1, 0.3] } }
+        "start.velocity[0], vehicle.buoyancy" = { correlated_normal = { covariance = [[0.01, 0.01], [0.01, 0.04]] } }
+        "environment.gravity" = { choice = { values = [9.78, 9.80665, 9.83] } }
+    """
+    path = tmp_path / "scene.toml"
+    path.write_text(text)
+    (fault,) = faults(lw.Scene.load, path)
+    assert "vehicle.mass_dummy" in fault
+    path.write_text(text.replace('        "vehicle.mass_dummy" = { normal = { std = 1.0 } }\n', ""))
+    m = lw.Ensemble.from_scene(lw.Scene.load(path)).select(0, 512)
+    # A sequence of 512 points: means good to a few 1/512 of the spread.
+    assert abs(m.parameters["vehicle.mass"].mean() - 20.0) < 0.02
+    assert set(m.parameters["environment.gravity"]) == {9.78, 9.80665, 9.83}
+    # Covariance 0.01 of deviations 0.1 and 0.2: a correlation of 0.5, whose standard error at random is 0.75 / sqrt(512).
+    assert abs(np.corrcoef(m.velocity[:, 0], m.parameters["vehicle.buoyancy"])[0, 1] - 0.5) < 5.0 * 0.75 / np.sqrt(512)
+
+
+# What is refused -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("content", "members", "texts"),
+    [
+        ("sobbol", 8, ["did you mean 'sobol'?"]),
+        (3, 8, ["is not a sampling"]),
+        ({"sobol": {}, "halton": {}}, 8, ["is not a sampling"]),
+        ({"sobol": 3}, 8, ["is not a table"]),
+        ({"sobol": {"scramble": True}}, 8, ["unknown key"]),
+        ("latin_hypercube", 8, ["group = 0", "256"]),
+        ({"latin_hypercube": {"group": 2.5}}, 8, ["group = 2.5"]),
+        ({"latin_hypercube": {"group": 30}}, 80, ["no whole number of groups of 30", "60 or 90"]),
+        ("saltelli", 13, ["groups of 14", "give 14"]),
+        ({"saltelli": {"second_order": 1}}, 14, ["second_order = 1"]),
+        ("morris", 20, ["groups of 7", "14 or 21"]),
+        ({"morris": {"levels": 5}}, 7, ["levels = 5"]),
+        ({"grid": {}}, None, ["names nothing"]),
+        ({"grid": {"vehicle.mass": []}}, None, ["no list of values"]),
+        ({"grid": {"vehicle.mass": 0}}, None, ["whole number from 1"]),
+        ({"grid": {"environment.gravity": 3}}, None, ["has no law"]),
+        ({"grid": {"environment.gravity": [9.8, 9.9]}}, 3, ["is not the 2 of the grid"]),
+        ({"grid": {"vehicle.mass": [1.0, 2.0]}}, None, ["drop one of them"]),
+        ({"table": {}}, None, ["one of file and values"]),
+        ({"table": {"file": "/nowhere.csv"}}, None, ["cannot be read"]),
+        ({"table": {"values": {"environment.gravity": [9.8], "environment.water_density": [1.0, 2.0]}}}, None,
+         ["lengths"]),
+        ({"table": {"values": {"environment.gravity": [9.8], "environment.gravty": [1.0]}}}, None, ["did you mean"]),
+        ({"table": {"values": {"vehicle.mass": [9.8]}}}, None, ["varied by", "keep one"]),
+        ({"table": {"values": {"vehicle.center_of_buoyancy": [9.8]}}}, None, ["shape (1,)", "(1, 3)"]),
+        ({"table": {"values": {"environment.gravity": [9.8, 9.9]}}}, 5, ["is not the 2 of the table"]),
+        ({"levels": {"points": [[0.5, 1.0]]}}, None, ["leaves the open unit cube"]),
+        ({"levels": {"points": [[0.5, 0.1]]}}, None, ["has 2 columns"]),
+    ],
+    ids=str,
+)  # fmt: skip
+def test_bad_samplings(scene, content, members, texts):
+    (fault,) = faults(lw.Ensemble, scene, members, 3, VARY, content)
+    assert all(text in fault for text in texts), fault
+
+
+def test_bad_files(scene, tmp_path):
+    path = tmp_path / "members.csv"
+    for text, expected in (
+        ("", "cannot be read"), ("vehicle.mass\n", "lengths"), ("vehicle.mass\nheavy\n", "cannot be read"),
+        ("vehicle.mass\n1,2\n", "1 names for 2 columns"), ("vehicle.mass,vehicle.mass\n1,2\n", "twice"),
+        ("vehicle.mass\n120\nnan\n", "line 3"),
+    ):  # fmt: skip
+        path.write_text(text)
+        assert any(expected in fault for fault in faults(lw.Table, str(path))), text
+
+
+def test_bad_names_and_laws_come_in_one_message(scene):
+    vary = {
+        "vehicle.mass, vehicle.buoyancy": lw.Normal(std=1.0),
+        "vehicle.inertia[0,5]": lw.Normal(std=1.0),
+        "vehicle.mass[0]": lw.Normal(std=1.0),
+        "start.position": lw.Normal(std=1.0),
+        "start.position[1]": lw.Normal(std=1.0),
+        "vehicle.added_mass": lw.RotationNormal(std=0.1),
+        "vehicle.center_of_buoyancy": lw.PositiveDefinite(sigma=0.1),
+        "environment.gravity, environment.water_density": lw.CorrelatedNormal(covariance=np.eye(3)),
+        "vehicle.inertia": lw.PositiveDefinite(sigma=(0.1, 0.2)),
+        "vehicle.nothing": stats.gamma(2.0),
+    }
+    found = faults(lw.Ensemble, scene, 4, 0, vary)
+    assert len(found) == 9
+    for key in vary:
+        assert sum(f'"{key}" =' in fault for fault in found) == (0 if key == "start.position" else 1), key
+
+
+def test_every_fault_of_a_section_comes_at_once(scene):
+    content = scene.to_dict() | {"ensemble": {
+        "members": 0, "seed": -1, "sampling": "sobbol", "indices": [],
+        "vary": {"vehicle.mas": {"normal": {"std": 1.0}}, "vehicle.mass": {"gamma": {}}},
+    }}  # fmt: skip
+    found = faults(lw.Scene.from_dict, content)
+    assert len(found) == 6
+    for word in ("members = 0", "seed = -1", "'sobbol'", "indices = []", "vehicle.mas", "gamma.a"):
+        assert any(word in fault for fault in found), word
+
+
+def test_whole_matrices_of_a_grid(scene):
+    J = np.diag([5.0, 5.5, 6.0])
+    skew = J + np.array([[0.0, 0.1, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    fleet = lw.Ensemble(scene, sampling=lw.Grid({"vehicle.inertia": [J, 1.1 * J]}))
+    np.testing.assert_array_equal(fleet.parameters(0, 2)["vehicle.inertia"], [J, 1.1 * J])
+    assert "not symmetric" in faults(lw.Ensemble, scene, sampling=lw.Grid({"vehicle.inertia": [J, skew]}))[0]
+
+
+def test_the_attitude_varies_in_one_way_only(scene):
+    vary = {"start.attitude": lw.UniformRotation(), "start.rotation_vector": lw.Normal(std=0.1)}
+    assert "keep one of them" in faults(lw.Ensemble, scene, 4, 0, vary)[0]
+    assert "RotationNormal" in faults(lw.Ensemble, scene, 4, 0, {"start.attitude[0,0]": lw.Normal(std=0.1)})[0]
+
+
+def test_indices_that_are_not_there(scene):
+    content = scene.to_dict() | {"ensemble": {"members": 4, "indices": [1, 4]}}
+    assert "no member of 4" in faults(lw.Scene.from_dict, content)[0]
+    content["ensemble"]["indices"] = [0.5]
+    assert "whole numbers" in faults(lw.Scene.from_dict, content)[0]
+    fleet = lw.Ensemble(scene, 10)
+    for bad in ([], [10], [-1], [0.5], [[1]]):
+        with pytest.raises(IndexError):
+            fleet.subset(bad)
+
+
+def test_names_and_entries():
+    (a,), (b, c, d) = targets("vehicle.mass"), targets("x.y[1, 2],start.position[0] , z")
+    assert (a.name, a.index) == ("vehicle.mass", None)
+    assert [one.label for one in (b, c, d)] == ["x.y[1,2]", "start.position[0]", "z"]
+
+
+def test_an_entry_varies_alone(scene):
+    vary = {"start.position[2]": lw.Normal(std=1.0), "vehicle.inertia[0,1]": lw.Normal(std=0.01)}
+    m = lw.Ensemble(scene, 30, 0, vary).select(0, 30)
+    np.testing.assert_array_equal(m.position[:, :2], 0.0)
+    J = m.parameters["vehicle.inertia"]
+    assert len(np.unique(m.position[:, 2])) == len(np.unique(J[:, 0, 1])) == 30
+    np.testing.assert_array_equal(J, np.swapaxes(J, 1, 2))
+    np.testing.assert_array_equal(J[:, 2], np.tile([0.0, 0.0, 5.72], (30, 1)))
+
+
+def test_many_members_take_little_memory(scene):
+    """All members are looked at when the ensemble is made; nothing of them stays."""
+    import tracemalloc
+
+    tracemalloc.start()
+    fleet = lw.Ensemble(scene, 300_000, 0, {"vehicle.mass": lw.Normal(relative=0.001)}, "sobol")
+    fleet.select(299_000, 300_000)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    # 65,536 members at a time: a 3x3 matrix, its copy and a few numbers of each are below 30 doubles; of all members they
+    # would be 72 MB.
+    assert peak < 65_536 * 8 * 60

@@ -175,6 +175,7 @@ def test_kept_members_are_those_of_the_whole(fleet, whole):
     assert all(kept.samples[f].tobytes() == whole.samples[f][:, [0, 513, 1002]].tobytes() for f in FIELDS)
 
 
+@pytest.mark.slow  # for its kernels: rk8 that chooses its steps
 def test_kept_members_of_a_method_that_chooses_its_steps(fleet):
     method = lw.Method("rk8", rtol=1e-6, atol=1e-6)
     every = lw.solve(fleet.subset(range(40)), method, **SETTINGS)
@@ -381,8 +382,19 @@ def test_only_the_fields_that_statistics_need_are_written(fleet):
     assert list(shown.samples) == ["position"]
 
 
-def test_positions_alone_where_the_origin_is_moved():
+def test_what_a_moved_origin_needs_is_written_too():
     # psi_x puts the origin where mass and inertia fall apart: positions come back with the help of attitudes.
+    fleet = lw.Ensemble(lw.Scene.named("remus_100"))
+    plan = make_plan(fleet, "psi_x", 0.01, 0.1, lw.SaveAt(fields=("position",)))
+    assert plan.fields == ("position",) and plan.spec.fields == ("position", "attitude")
+    plan = make_plan(fleet, "psi_x", 0.01, 0.1, lw.SaveAt(fields=("velocity", "position")))
+    assert plan.fields == ("position", "velocity") and plan.spec.fields == FIELDS
+    plan = make_plan(one(scene_of(net=1.0)), "psi_s", 0.01, 0.1, lw.SaveAt(fields=("position",)))
+    assert plan.fields == plan.spec.fields == ("position",)
+
+
+@pytest.mark.slow  # for its kernels
+def test_positions_alone_where_the_origin_is_moved():
     scene = lw.Scene.named("remus_100")
     settings = {"method": "psi_x", "h": 0.01, "t1": 0.1}
     whole = lw.solve(scene, **settings)

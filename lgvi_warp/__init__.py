@@ -13,6 +13,21 @@ from lgvi_warp.result import Result
 from lgvi_warp.sampling import Grid, Halton, LatinHypercube, Levels, Morris, Random, Saltelli, Sobol, Table
 from lgvi_warp.saveat import SaveAt
 from lgvi_warp.scene import Environment, Scene, Start
+from lgvi_warp.statistics import (
+    CircularMean,
+    Covariance,
+    Exceedance,
+    Extremes,
+    FirstPassage,
+    Histogram,
+    Mean,
+    MeanAttitude,
+    PathMaximum,
+    PathMinimum,
+    Quantiles,
+    Quantity,
+)
+from lgvi_warp.statistics.until import Until
 from lgvi_warp.status import Status, Warnings
 from lgvi_warp.terms import (
     BodyLift,
@@ -49,7 +64,7 @@ if TYPE_CHECKING:
     from lgvi_warp.coefficients_yaml import from_yaml
     from lgvi_warp.law_check import check_law
     from lgvi_warp.plan import Plan
-    from lgvi_warp.sinks.plots import plot, plot_stability, plot_tradeoff
+    from lgvi_warp.sinks.plots import plot, plot_stability, plot_statistics, plot_tradeoff
     from lgvi_warp.sinks.rerun import log_rerun
     from lgvi_warp.sinks.sensitivity import plot_sensitivity
     from lgvi_warp.solving import solve
@@ -66,6 +81,7 @@ _LAZY = {
     "tradeoff": "lgvi_warp.tradeoffs",
     "Plan": "lgvi_warp.plan",
     "plot": "lgvi_warp.sinks.plots",
+    "plot_statistics": "lgvi_warp.sinks.plots",
     "plot_stability": "lgvi_warp.sinks.plots",
     "plot_tradeoff": "lgvi_warp.sinks.plots",
     "plot_sensitivity": "lgvi_warp.sinks.sensitivity",
@@ -83,8 +99,10 @@ __all__ = [
     "BodyLift",
     "Box",
     "Choice",
+    "CircularMean",
     "ControlFins",
     "CorrelatedNormal",
+    "Covariance",
     "CrossFlow",
     "Current",
     "CurrentHarmonics",
@@ -94,23 +112,33 @@ __all__ = [
     "Ensemble",
     "Environment",
     "Event",
+    "Exceedance",
+    "Extremes",
     "Fins",
+    "FirstPassage",
     "Floor",
     "Frozen",
     "GaussMarkovCurrent",
     "Grid",
     "Halton",
+    "Histogram",
     "LatinHypercube",
     "Levels",
     "LogNormal",
+    "Mean",
+    "MeanAttitude",
     "MembersFailed",
     "Method",
     "Morris",
     "Normal",
     "Packed",
+    "PathMaximum",
+    "PathMinimum",
     "PhysicalInertia",
     "Plan",
     "PositiveDefinite",
+    "Quantiles",
+    "Quantity",
     "Random",
     "Restoring",
     "Result",
@@ -134,6 +162,7 @@ __all__ = [
     "TruncatedNormal",
     "Uniform",
     "UniformRotation",
+    "Until",
     "Vehicle",
     "Warnings",
     "Waves",
@@ -149,6 +178,7 @@ __all__ = [
     "plot",
     "plot_sensitivity",
     "plot_stability",
+    "plot_statistics",
     "plot_tradeoff",
     "quantity",
     "register",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
@@ -10,6 +11,8 @@ import numpy as np
 
 from lgvi_warp import notation
 from lgvi_warp.inertia import Frame
+from lgvi_warp.machine import DTYPES
+from lgvi_warp.status import Status
 
 if TYPE_CHECKING:
     from lgvi_warp.ensemble import Members
@@ -45,10 +48,38 @@ def blocks(members: int) -> list[Block]:
     return [Block(i, min(i + size, members)) for i in range(0, members, size)]
 
 
+class Fields(dict[str, np.ndarray]):
+    """Samples of a block by field, (k times, n members, ...), and what else is known of its members at these times.
+
+    time (k,) [s]; terms: those of the scene.
+    """
+
+    def __init__(self, fields: Mapping[str, np.ndarray], plan: Plan, when: slice, outcome: Callable[[], Outcome]):
+        super().__init__(fields)
+        self.time, self.terms = plan.grid.times[when], plan.ensemble.scene.terms
+        self._steps, self._outcome = plan.grid.sample_steps[when], outcome
+
+    @functools.cached_property
+    def _ends(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Status of each member and the step after which it is no more its own; None if all still are."""
+        outcome = self._outcome()
+        return (outcome.status, outcome.failed_step) if np.any(outcome.status) else None
+
+    def good(self, held: bool = True) -> np.ndarray | None:
+        """(k, n), which members had not failed by each time; None: none had. held: one that an event stopped has not."""
+        if self._ends is None:
+            return None
+        status, step = self._ends
+        ended = (status != 0) & (status < Status.SURFACE) if held else status != 0
+        if not ended.any():
+            return None
+        return np.asarray(~ended | (self._steps[:, None] <= step))
+
+
 class BlockKeeper(Protocol):
     """What is kept of one block, where that block runs."""
 
-    def take(self, when: slice, samples: dict[str, np.ndarray]) -> None:
+    def take(self, when: slice, samples: Fields) -> None:
         """Samples `when` (of all times) by field, (times, members of the block, ...): each time once, in order."""
 
     def close(self, outcome: Outcome) -> Any:
@@ -83,21 +114,28 @@ def run_block(
         members = plan.ensemble.select(block.first, block.stop)
         packets = Packets(plan, members)
         kept = [keeper.open(plan, block, members) for keeper in keepers]
-        start = {name: getattr(members, name)[None] for name in plan.spec.fields}
         for one in kept:
-            one.take(slice(0, 1), start)
+            one.take(slice(0, 1), Fields(at_start(plan, members), plan, slice(0, 1), packets.outcome))
         for k0, k1 in plan.segments(block.count):
             if halted():
                 return None
             raw = packets.advance(k0, k1)[:, : block.count]
-            samples = unpacked(plan.spec.sample_fields, raw, packets.frame)
             when = slice(*plan.due(k0, k1))
-            if when.start < when.stop:
+            if when.start < when.stop and kept:
+                found = unpacked(plan.spec.sample_fields, raw, packets.frame)
+                samples = Fields({name: found[name] for name in plan.fields}, plan, when, packets.outcome)
                 for one in kept:
                     one.take(when, samples)
             advanced(block.count * (k1 - k0))
         outcome = packets.outcome()
         return tuple(one.close(outcome) for one in kept)
+
+
+def at_start(plan: Plan, members: Members) -> dict[str, np.ndarray]:
+    """The samples at t = 0, of the type of those that follow."""
+    real = np.dtype(DTYPES[plan.dtype])
+    types = {"position": np.dtype(np.float64)} if plan.spec.compensated else {}
+    return {name: getattr(members, name)[None].astype(types.get(name, real), copy=False) for name in plan.fields}
 
 
 def in_order(runs: Sequence[Block], done: Iterable[tuple[Block, Any]]) -> Iterator[tuple[Block, Any]]:

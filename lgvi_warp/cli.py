@@ -27,6 +27,7 @@ OPTIONS = {
     "atol": "run.atol",
     "checks": "run.checks",
     "on_failure": "run.on_failure",
+    "keep": "run.keep",
     "members": "ensemble.members",
     "seed": "ensemble.seed",
 }
@@ -77,6 +78,9 @@ def parser() -> argparse.ArgumentParser:
     )
     run.add_argument(
         "--on-failure", help="freeze a member that fails (default), raise: exit code 1, or substep: divide its step"
+    )
+    run.add_argument(
+        "--keep", help="samples of members to keep: all, none or failed (statistics are those of the scene)"
     )
     run.add_argument("--threads", metavar="N", type=int, help="threads (default: all cores)")
     run.add_argument("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
@@ -236,6 +240,10 @@ def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:
         if chosen.of is not None:
             raise SceneError([f"--of {chosen.of}: says what --error is of, which is missing; add --error 1e-3"])
         return None
+    if not (isinstance(scene.run.keep, str) and scene.run.keep == "all") or scene.run.until is not None:
+        raise SceneError(
+            [f'--error {chosen.error:g}: is checked on samples of all members; give run.keep="all", no run.until']
+        )
     for name in ("step", "dtype"):
         if getattr(chosen, name) is not None:
             text = f"--{name} {getattr(chosen, name)}: is what --error chooses"
@@ -404,18 +412,22 @@ def _import_in_background() -> threading.Thread:
 
 
 def write(result: Any, out: Path) -> tuple[list[Path], list[str]]:
-    """Write result.npz, fleet.png and fleet.rrd side by side. Returns the files, and a text for each that failed."""
+    """Write result.npz, fleet.png, fleet.rrd and statistics.png side by side: what there is of them.
+
+    Returns the files, and a text for each that failed.
+    """
     from concurrent.futures import ThreadPoolExecutor
 
-    from lgvi_warp.sinks.plots import plot
+    from lgvi_warp.sinks.plots import drawable, plot, plot_statistics
     from lgvi_warp.sinks.rerun import log_rerun
 
     files, faults = [], []
-    writers: dict[str, Callable[[Path], Path]] = {
-        "result.npz": result.save,
-        "fleet.png": lambda path: plot(result, path),
-        "fleet.rrd": lambda path: log_rerun(result, path),
-    }
+    writers: dict[str, Callable[[Path], Path]] = {"result.npz": result.save}
+    shown = result if result.samples else result.kept
+    if shown is not None:
+        writers |= {"fleet.png": lambda path: plot(shown, path), "fleet.rrd": lambda path: log_rerun(shown, path)}
+    if drawable(result):
+        writers["statistics.png"] = lambda path: plot_statistics(result, path)
     with ThreadPoolExecutor(len(writers)) as pool:
         jobs = {out / name: pool.submit(writer, out / name) for name, writer in writers.items()}
     for path, job in jobs.items():
@@ -429,12 +441,12 @@ def write(result: Any, out: Path) -> tuple[list[Path], list[str]]:
 def summary(result: Any, files: list[Path], seconds: float) -> str:
     """The run in a few lines."""
     from lgvi_warp import invariants
+    from lgvi_warp.statistics.table import table
     from lgvi_warp.status import Status
 
     settings = result.provenance
     steps = settings["steps"]
     rate = result.members * steps / result.run_seconds
-    drift = invariants.drift(result)
     lines = [
         *(f"note        {message}" for message in result.messages),
         f"members     {result.members:,}, {settings['method']['name']}, {settings['dtype']}, "
@@ -442,9 +454,15 @@ def summary(result: Any, files: list[Path], seconds: float) -> str:
         f"speed       {rate:.3g} vehicle-steps per second ({result.run_seconds:.2f} s; kernel loaded in "
         f"{result.compile_seconds:.2f} s; {seconds:.2f} s in all)",
         "status      " + ", ".join(f"{name} {number:,}" for name, number in result.status.counts().items()),
-        f"drift       energy {drift['energy']:.2g} J, horizontal momentum {drift['horizontal_momentum']:.2g} N s, "
-        f"vertical angular momentum {drift['vertical_angular_momentum']:.2g} N m s (largest of all members)",
     ]
+    if result.samples:
+        drift = invariants.drift(result)
+        lines.append(
+            f"drift       energy {drift['energy']:.2g} J, horizontal momentum {drift['horizontal_momentum']:.2g} N s, "
+            f"vertical angular momentum {drift['vertical_angular_momentum']:.2g} N m s (largest of all members)"
+        )
+    elif result.kept is not None:
+        lines.append(f"kept        {result.kept.members:,} members' samples, run again")
     for code in Status:
         failed = (result.status == code).nonzero()[0]
         if code and len(failed):
@@ -459,6 +477,9 @@ def summary(result: Any, files: list[Path], seconds: float) -> str:
             f"substeps    {int(result.substeps.sum()):,} steps of {int(divided.sum()):,} members were divided: those paths "
             "are not symplectic"
         )
+    if result.statistics:
+        lines.append(f"statistics  at {result.time[-1]:g} s, with intervals")
+        lines += [f"  {line}" for line in table(result.statistics)]
     lines += [f"file        {path} ({path.stat().st_size / 1e6:.1f} MB)" for path in files]
     return "\n".join(lines)
 

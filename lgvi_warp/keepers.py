@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from lgvi_warp import machine
-from lgvi_warp.blocks import SHAPES, Block
+from lgvi_warp.blocks import SHAPES, Block, Fields
 from lgvi_warp.ensemble import Members
 from lgvi_warp.packets import Outcome
 from lgvi_warp.plan import Plan
@@ -36,7 +37,7 @@ class Outcomes:
 
 
 class _BlockOutcome:
-    def take(self, when: slice, samples: dict[str, np.ndarray]) -> None:
+    def take(self, when: slice, samples: Fields) -> None:
         """Samples say nothing about the outcome."""
 
     def close(self, outcome: Outcome) -> Outcome:
@@ -47,10 +48,11 @@ class _BlockOutcome:
 class Samples:
     """Every sample of every member: fields (k, n, ...), which blocks in threads of one process write into."""
 
-    def __init__(self, plan: Plan):
+    def __init__(self, plan: Plan, fields: Sequence[str] | None = None):
         n, k = plan.ensemble.members, len(plan.grid.times)
         real = machine.DTYPES[plan.dtype]
-        self.fields = {name: np.empty((k, n, *SHAPES[name]), real) for name in plan.spec.fields}
+        names = plan.fields if fields is None else fields
+        self.fields = {name: np.empty((k, n, *SHAPES[name]), real) for name in names}
         if plan.spec.compensated and "position" in self.fields:
             self.fields["position"] = np.empty((k, n, 3))
 
@@ -66,10 +68,10 @@ class Samples:
 class _BlockSamples:
     places: dict[str, np.ndarray]
 
-    def take(self, when: slice, samples: dict[str, np.ndarray]) -> None:
+    def take(self, when: slice, samples: Fields) -> None:
         """Put samples into their places."""
-        for name, values in samples.items():
-            self.places[name][when] = values
+        for name, place in self.places.items():
+            place[when] = samples[name]
 
     def close(self, outcome: Outcome) -> None:
         """Nothing is left to do."""

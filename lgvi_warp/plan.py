@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import functools
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -86,6 +87,10 @@ class Plan:
             full = "dense" in self.model.parts or self.dtype == "float32_compensated"
             chained = self.method.turns and not full
             object.__setattr__(self, "width", default_width(self.dtype, chained=chained))
+        object.__setattr__(self, "fields", tuple(name for name in SAMPLE_FIELDS if name in self.fields))
+        self._choose_kernel()
+
+    def _choose_kernel(self) -> None:
         object.__setattr__(self, "spec", self._spec())
         with self._laws_compile():
             object.__setattr__(self, "advance", make_advance(self.spec))
@@ -111,6 +116,27 @@ class Plan:
                 faults.add("on_failure", "substep", f"{term.key} {why}", 'use on_failure="freeze", or a shorter step')
         faults.raise_if_any()
 
+    def part(self, indices: Sequence[int], fields: Sequence[str]) -> Plan:
+        """The plan for these members alone, whose samples have these fields; all that was chosen for the whole stays.
+
+        So its members' bits are those of the whole, for methods whose packets do not choose their steps.
+        """
+        part = copy.copy(self)
+        for name in ("dtypes", "times"):
+            part.__dict__.pop(name, None)
+        object.__setattr__(part, "ensemble", self.ensemble.subset(indices))
+        object.__setattr__(part, "fields", tuple(name for name in SAMPLE_FIELDS if name in fields))
+        part._choose_kernel()
+        return part
+
+    def _sampled(self) -> tuple[str, ...]:
+        """The fields that samples hold: those asked for, and what they are made of where the origin is moved."""
+        needed = set(self.fields)
+        if np.any(self.model.frame.origin):
+            needed |= {"attitude"} if "position" in needed else set()
+            needed |= {"angular_velocity"} if "velocity" in needed else set()
+        return tuple(name for name in SAMPLE_FIELDS if name in needed)
+
     def _spec(self) -> Spec:
         model, checked = self.model, self.checks != "none"
         back = min(0.0, *self.method.stages) < 0.0 and bool(model.drag) and self.method.tableau is None
@@ -125,7 +151,7 @@ class Plan:
             iterations=int(self.method.iterations or 0),
             adaptive=self.method.iterations is None,
             checked=checked,
-            fields=tuple(name for name in SAMPLE_FIELDS if name in self.fields),
+            fields=self._sampled(),
             events=tuple(module for _, module in model.events),
             drag=model.drag,
             parts=model.parts,

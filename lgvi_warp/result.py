@@ -5,18 +5,22 @@ from __future__ import annotations
 import functools
 import json
 import os
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lgvi_warp import invariants, notation
+from lgvi_warp.statistics.estimate import Estimates
 from lgvi_warp.status import StatusArray, WarningArray
 from lgvi_warp.terms import Term, from_list
 
 if TYPE_CHECKING:
     import xarray
+
+    from lgvi_warp.ensemble import Ensemble
 
 UNITS = {
     "position": "m",
@@ -61,7 +65,8 @@ class Result:
     warnings: (n,), bits of Warnings; warning_time (n,) [s] and warning_value (n,): when a member's most serious warning was
     first seen (0 for one that its start gives), and the value then; NaN without. Motion is looked at once in 128 steps and at
     the end, with checks="all" only. substeps: (n,), steps that were divided (on_failure="substep").
-    messages: what the user should know; provenance: scene, settings, versions, seed, machine.
+    statistics: what was gathered while the run went, by name. kept: samples of the members kept_members (m,), where not
+    all were kept. messages: what the user should know; provenance: scene, settings, versions, seed, machine.
     """
 
     time: np.ndarray
@@ -73,14 +78,21 @@ class Result:
     warning_time: np.ndarray
     warning_value: np.ndarray
     substeps: np.ndarray
-    parameters: dict[str, np.ndarray]
+    parameters: Mapping[str, np.ndarray]
     messages: tuple[str, ...]
     provenance: dict[str, Any]
     terms: tuple[Term, ...] = ()
+    statistics: Estimates = field(default_factory=Estimates)
+    kept: Result | None = None
+    kept_members: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     compile_seconds: float = field(default=0.0, compare=False)
     run_seconds: float = field(default=0.0, compare=False)
 
     def _kept(self, name: str) -> np.ndarray:
+        if not self.samples:
+            raise AttributeError(
+                f"{name} was not kept: give keep='all', or indices of members, which are result.kept then"
+            )
         if name not in self.samples:
             raise AttributeError(f"{name} was not kept: add {name!r} to SaveAt(fields=...)")
         return self.samples[name]
@@ -119,6 +131,13 @@ class Result:
         """A term's numbers, by field, with a leading dimension of 1 or n."""
         return {name: self.parameters[f"{term.key}.{name}"] for name in term.parameters()}
 
+    def part(self, places: np.ndarray) -> Result:
+        """The same of the members in these places, in this order."""
+        own = {name: values[places] if len(values) > 1 else values for name, values in self.parameters.items()}
+        samples = {name: values[:, places] for name, values in self.samples.items()}
+        of_members = {name: getattr(self, name)[places] for name in OF_MEMBERS}
+        return replace(self, samples=samples, parameters=own, **of_members)
+
     @property
     def members(self) -> int:
         """n."""
@@ -145,13 +164,24 @@ class Result:
         return xr.Dataset(data, coordinates, attributes)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write everything to an .npz file, whole or not at all. Returns its path. Raises OSError."""
+        """Write everything to an .npz file, whole or not at all. Returns its path. Raises OSError.
+
+        Where no samples were kept, parameters are left out too: they follow from the provenance's ensemble.
+        """
         target = Path(path)
         part = target.with_name(target.name + ".part")
         arrays = {"time": self.time, **self.samples}
         arrays |= {name: np.asarray(getattr(self, name)) for name in OF_MEMBERS}
-        arrays |= {f"parameters/{name}": value for name, value in self.parameters.items()}
+        if self.samples:
+            arrays |= {f"parameters/{name}": value for name, value in self.parameters.items()}
         texts = {"messages": json.dumps(self.messages), "provenance": json.dumps(self.provenance)}
+        if self.statistics:
+            found, texts["statistics"] = self.statistics.to_arrays()
+            arrays |= {f"statistics/{name}": value for name, value in found.items()}
+        if self.kept is not None:
+            arrays |= {f"kept/{name}": value for name, value in self.kept.samples.items()}
+            arrays |= {"kept/members": self.kept_members}
+            arrays |= {f"kept/parameters/{name}": value for name, value in self.kept.parameters.items()}
         try:
             with part.open("wb") as file:
                 np.savez(file, **arrays, **texts)  # type: ignore[arg-type]
@@ -165,15 +195,50 @@ class Result:
         """Read what `save` wrote. Raises OSError or ValueError if it is not such a file."""
         with np.load(Path(path), allow_pickle=False) as data:
             content = {name: data[name] for name in data.files}
-        prefix = "parameters/"
-        return cls(
+        estimates = Estimates()
+        if "statistics" in content:
+            estimates = Estimates.from_arrays(_below("statistics/", content), str(content["statistics"]))
+        result = cls(
             time=content["time"],
             samples={name: content[name] for name in content if name in UNITS},
             status=content["status"].view(StatusArray),
             warnings=content["warnings"].view(WarningArray),
             **{name: content[name] for name in OF_MEMBERS if name not in ("status", "warnings")},
-            parameters={name.removeprefix(prefix): content[name] for name in content if name.startswith(prefix)},
+            parameters=_below("parameters/", content),
             messages=tuple(json.loads(str(content["messages"]))),
             provenance=(provenance := json.loads(str(content["provenance"]))),
             terms=from_list(provenance["scene"].get("terms", ())),
+            statistics=estimates,
         )
+        kept = _below("kept/", content)
+        if not kept:
+            return result
+        members = kept["members"]
+        few = replace(result.part(members), parameters=_below("parameters/", kept), statistics=Estimates())
+        few = replace(few, samples={name: kept[name] for name in kept if name in UNITS})
+        return replace(result, kept=few, kept_members=members)
+
+
+def _below(prefix: str, content: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """What is named so, without the prefix."""
+    return {name.removeprefix(prefix): value for name, value in content.items() if name.startswith(prefix)}
+
+
+class Drawn(Mapping[str, np.ndarray]):
+    """Parameters of an ensemble's first members, drawn when they are asked for: they take no memory before."""
+
+    def __init__(self, ensemble: Ensemble, members: int):
+        self._ensemble, self._members = ensemble, members
+
+    @functools.cached_property
+    def _drawn(self) -> dict[str, np.ndarray]:
+        return self._ensemble.parameters(0, self._members)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self._drawn[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._drawn)
+
+    def __len__(self) -> int:
+        return len(self._drawn)

@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp import events, laws, notation, terms
+from lgvi_warp import statistics as kinds
 from lgvi_warp.errors import Faults, SceneError, holds_bool
 from lgvi_warp.machine import DTYPES
 from lgvi_warp.method import Method
 from lgvi_warp.sampling import sampling_of
+from lgvi_warp.statistics import until as stopping
 from lgvi_warp.status import CHECKS, ON_FAILURE
 from lgvi_warp.vehicle import Vehicle
 
@@ -130,11 +132,30 @@ def resolve_attitude(values: Mapping[str, np.ndarray]) -> np.ndarray:
     return notation.matrix_from_rotation_vector(values["rotation_vector"])
 
 
+KEEP = ("all", "none", "failed")
+
+
+def check_keep(faults: Faults, key: str, keep: Any, members: int | None = None) -> None:
+    """Which members' samples to keep: all, none, those that failed, or indices below the number of members."""
+    if isinstance(keep, str):
+        faults.choice(key, keep, KEEP)
+        return
+    indices = np.asarray(keep) if isinstance(keep, list | tuple | np.ndarray | range) else np.array(None)
+    if indices.ndim != 1 or indices.size == 0 or indices.dtype.kind not in "iu" or np.any(indices < 0):
+        faults.add(key, keep, "names no members", f"give {', '.join(map(repr, KEEP))}, or a list of indices from 0")
+    elif members is not None and np.any(indices >= members):
+        faults.add(
+            key, int(indices.max()), f"is beyond the last of {members} members", f"give indices up to {members - 1}"
+        )
+
+
 @dataclass(frozen=True)
 class RunSettings:
     """The [run] section of a scene file: method, step [s], duration [s], save_every [s], dtype. Raises SceneError.
 
     solver, iterations, tolerance, rtol, atol: of the method, as in Method. checks, on_failure: as in solve.
+    statistics: tables as in [[run.statistics]] or Statistic objects; keep: "all" samples of members, "none", "failed", or
+    indices of members; until: a table as in [run.until], or an Until.
     """
 
     method: str = "psi_s"
@@ -149,9 +170,18 @@ class RunSettings:
     atol: float | None = None
     checks: str = "safe"
     on_failure: str = "freeze"
+    keep: Any = "all"
+    statistics: Sequence[Any] = ()
+    until: Any = None
 
     def __post_init__(self) -> None:
         faults = Faults("run.")
+        check_keep(faults, "keep", self.keep)
+        with faults.including():
+            object.__setattr__(self, "statistics", kinds.from_list(self.statistics, "run.statistics"))
+        if self.until is not None:
+            with faults.including():
+                object.__setattr__(self, "until", stopping.from_dict(self.until))
         for name in ("step", "duration", "save_every"):
             if getattr(self, name) is not None:
                 faults.positive(name, getattr(self, name))
@@ -177,8 +207,17 @@ class RunSettings:
 
     def to_dict(self) -> dict[str, Any]:
         """As in a scene file: what is not left to the default, and the method and dtype."""
-        kept = {"method", "dtype"} | {one.name for one in fields(self) if getattr(self, one.name) != one.default}
-        return {key: value for key, value in vars(self).items() if key in kept}
+        kept = {"method", "dtype"}
+        for one in fields(self):
+            value = getattr(self, one.name)
+            if not isinstance(value, type(one.default)) or value != one.default:
+                kept.add(one.name)
+        content = {key: value for key, value in vars(self).items() if key in kept}
+        if "statistics" in content:
+            content["statistics"] = [one.to_dict() for one in self.statistics]
+        if "until" in content:
+            content["until"] = self.until.to_dict()
+        return content
 
 
 @dataclass(frozen=True)

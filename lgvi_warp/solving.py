@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,10 +18,13 @@ from lgvi_warp.errors import Faults, MembersFailed, SceneError, shown
 from lgvi_warp.executors import threads as thread_executor
 from lgvi_warp.keepers import Outcomes, Samples
 from lgvi_warp.method import Method
+from lgvi_warp.observation import Observation, notes, observe
 from lgvi_warp.plan import Plan
-from lgvi_warp.result import Result
+from lgvi_warp.result import Drawn, Result
 from lgvi_warp.saveat import SaveAt, time_grid
 from lgvi_warp.scene import Scene
+from lgvi_warp.statistics.estimate import Estimates
+from lgvi_warp.statistics.keeper import Gathered
 from lgvi_warp.status import Status, StatusArray, WarningArray, failure_text
 
 
@@ -38,6 +41,9 @@ def solve(
     checks: str | None = None,
     on_failure: str | None = None,
     progress: Callable[[float], None] | None = None,
+    statistics: Sequence[Any] | None = None,
+    keep: str | Sequence[int] | None = None,
+    until: Any = None,
 ) -> Result:
     """Advance every member of the fleet from t = 0 to t1 and keep the samples asked for.
 
@@ -53,6 +59,10 @@ def solve(
     run; "substep" makes a step that has no solution again in 2, 4, ... 1024 parts, for that member alone: order and the
     symmetry of each step are kept, symplecticity is not.
     progress: called with the fraction of the work that is done, from the threads that do it.
+    statistics: gathered over the members at every sample time while the run goes: lw.Mean("position"), ...; they are
+    in result.statistics. keep: "all" samples of members (default); "none", so that memory grows with neither members nor
+    steps; "failed", or indices of members: those are run again after the run, to the same bits, and are result.kept.
+    until: lw.Until(...), to stop before the last member, once a statistic's interval is narrow enough.
 
     Raises SceneError naming every fault of the arguments, MembersFailed as asked. Prints nothing. The same inputs give the
     same bits for any number of threads, on one type of machine.
@@ -62,15 +72,20 @@ def solve(
             [f"fleet = {shown(fleet)}: is neither an Ensemble nor a Scene; give lw.Scene(...) or lw.Ensemble(...)"]
         )
     ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
-    plan = make_plan(ensemble, method, h, t1, save, dtype, width=width, checks=checks, on_failure=on_failure)
     faults = Faults()
+    observed = Observation()
+    with faults.including():
+        observed = observe(ensemble.members, ensemble.scene.run, statistics, keep, until)
     if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
         faults.add("threads", threads, "is not a whole number above 0", "give 1 or more, or leave it out for all cores")
     faults.raise_if_any()
-    result = run_plan(plan, threads or machine.thread_count(), progress)
-    failures = failure_text(result) if plan.on_failure == "raise" else ""
-    if failures:
-        raise MembersFailed(failures, result)
+    plan = make_plan(
+        ensemble, method, h, t1, save, dtype, width=width, checks=checks, on_failure=on_failure, fields=observed.fields
+    )
+    result = run_plan(plan, threads or machine.thread_count(), progress, observed, (save or SaveAt()).fields)
+    failed = failure_text(result) if plan.on_failure == "raise" else ""
+    if failed:
+        raise MembersFailed(failed, result)
     return result
 
 
@@ -85,8 +100,12 @@ def make_plan(
     width: int | None = None,
     checks: str | None = None,
     on_failure: str | None = None,
+    fields: Callable[[Sequence[str]], tuple[str, ...]] = tuple,
 ) -> Plan:
-    """Settle a run's settings, from the arguments and then from the scene's [run]. Raises SceneError."""
+    """Settle a run's settings, from the arguments and then from the scene's [run]. Raises SceneError.
+
+    fields: from the fields that `save` asks for, those that the kernel writes.
+    """
     settings = ensemble.scene.run
     h = settings.step if h is None else h
     t1 = settings.duration if t1 is None else t1
@@ -119,7 +138,7 @@ def make_plan(
         number = f"{n} a solve, enough for" if n is not None else f"to the tolerance: {MOST_FIXED} are too few for"
         text = f"Newton steps {number} every member's start at twice the step"
         grid = replace(grid, messages=(*grid.messages, text))
-    return Plan(ensemble, chosen, grid, save.fields, dtype, width, checks, on_failure or settings.on_failure)
+    return Plan(ensemble, chosen, grid, fields(save.fields), dtype, width, checks, on_failure or settings.on_failure)
 
 
 # Beyond so many Newton steps a fixed number gains nothing over iterating to the tolerance.
@@ -153,12 +172,25 @@ class _Progress:
             self._report(self._done / self._total)
 
 
-def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None = None) -> Result:
-    """Run every block of the plan and gather the result."""
+def run_plan(
+    plan: Plan,
+    threads: int,
+    progress: Callable[[float], None] | None = None,
+    observed: Observation | None = None,
+    fields: Sequence[str] | None = None,
+) -> Result:
+    """Run every block of the plan, or as many as its statistics need, and gather the result.
+
+    observed: what is kept, by default the samples of all members; fields: which of them, by default all of the plan.
+    """
+    observed = observed or Observation()
+    fields = plan.fields if fields is None else fields
+    statistics, watch = observed.watch(plan.grid.times)
     compile_seconds = plan.compile()
     n = plan.ensemble.members
-    outcomes, samples = Outcomes(plan), Samples(plan)
-    keepers: tuple[Keeper, ...] = (outcomes, samples)
+    outcomes, samples = Outcomes(plan), Samples(plan, fields) if observed.samples else None
+    gathered = Gathered(plan, statistics) if statistics else None
+    keepers: tuple[Keeper, ...] = tuple(one for one in (outcomes, samples, gathered) if one is not None)
     counter = _Progress(n * plan.grid.steps, progress)
     stop = threading.Event()
 
@@ -171,29 +203,69 @@ def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None 
         for block, parts in in_order(runs, done):
             for keeper, part in zip(keepers, parts, strict=True):
                 keeper.merge(block, part)
+            if watch and gathered and watch.due(block.stop) and watch.reached(gathered.estimates(watch.statistic)):
+                n = block.stop
+                break
+    if progress and n < plan.ensemble.members:
+        progress(1.0)
     run_seconds = time.perf_counter() - start
-    status = outcomes.status
-    failed, stopped = status != 0, status >= Status.SURFACE
-    # An event's size is the part of its step that was made before it.
-    steps_made = outcomes.failed_step + np.where(stopped, outcomes.failed_size, 0.0)
+    parameters = Drawn(plan.ensemble, n)
+    estimates = gathered.result() if gathered else Estimates()
+    messages = plan.grid.messages + plan.ensemble.scene.vehicle.warnings + notes(estimates, plan.ensemble, n)
+    if watch:
+        messages += (watch.report(n, gathered.estimates(watch.statistic) if gathered else ()),)
+    indices, kept = again(plan, observed, outcomes.status[:n], fields, threads)
     return Result(
         time=plan.grid.times,
-        samples=samples.fields,
-        status=status.view(StatusArray),
-        warnings=outcomes.warnings.view(WarningArray),
-        warning_time=np.where(outcomes.warnings != 0, outcomes.warning_step * plan.grid.h, np.nan),
-        warning_value=outcomes.warning_value,
-        substeps=outcomes.substeps,
-        failure_time=np.where(failed, steps_made * plan.grid.h, np.nan),
-        failure_value=np.where(failed, np.where(stopped, 0.0, outcomes.failed_size), np.nan),
-        parameters=plan.ensemble.parameters(0, n),
-        messages=plan.grid.messages + plan.ensemble.scene.vehicle.warnings,
+        samples={} if samples is None else {name: values[:, :n] for name, values in samples.fields.items()},
+        **of_members(outcomes, n, plan.grid.h),
+        parameters=dict(parameters) if samples is not None else parameters,
+        messages=messages,
         provenance=provenance(plan)
-        | dict(zip(("steps_made", "steps_tried"), outcomes.chosen.mean(axis=0).tolist(), strict=False)),
+        | dict(zip(("steps_made", "steps_tried"), outcomes.chosen[:n].mean(axis=0).tolist(), strict=False))
+        | ({"members": n} if n < plan.ensemble.members else {})
+        | ({} if observed == Observation() else {"observed": observed.to_dict()}),
         terms=tuple(plan.ensemble.scene.terms),
+        statistics=estimates,
+        kept=kept,
+        kept_members=indices,
         compile_seconds=compile_seconds,
         run_seconds=run_seconds,
     )
+
+
+def of_members(outcomes: Outcomes, n: int, h: float) -> dict[str, Any]:
+    """What became of the first n members, as a Result has it (result.OF_MEMBERS)."""
+    status, size, warnings = outcomes.status[:n], outcomes.failed_size[:n], outcomes.warnings[:n]
+    failed, stopped = status != 0, status >= Status.SURFACE
+    # An event's size is the part of its step that was made before it.
+    steps_made = outcomes.failed_step[:n] + np.where(stopped, size, 0.0)
+    return {
+        "status": status.view(StatusArray),
+        "failure_time": np.where(failed, steps_made * h, np.nan),
+        "failure_value": np.where(failed, np.where(stopped, 0.0, size), np.nan),
+        "warnings": warnings.view(WarningArray),
+        "warning_time": np.where(warnings != 0, outcomes.warning_step[:n] * h, np.nan),
+        "warning_value": outcomes.warning_value[:n],
+        "substeps": outcomes.substeps[:n],
+    }
+
+
+def again(
+    plan: Plan, observed: Observation, status: np.ndarray, fields: Sequence[str], threads: int
+) -> tuple[np.ndarray, Result | None]:
+    """Indices of the members whose samples are wanted after all, and their result: the same members, to the same bits."""
+    indices = observed.again(status)
+    if not len(indices):
+        return indices, None
+    chosen = indices
+    if plan.method.adaptive:
+        # A packet chooses its steps: its members stay together.
+        width = plan.spec.width
+        chosen = np.unique(indices // width)[:, None] * width + np.arange(width)
+        chosen = chosen[chosen < plan.ensemble.members]
+    result = run_plan(plan.part([int(i) for i in chosen], fields), threads)
+    return indices, result if len(chosen) == len(indices) else result.part(np.searchsorted(chosen, indices))
 
 
 def provenance(plan: Plan) -> dict[str, Any]:

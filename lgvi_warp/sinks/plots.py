@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from lgvi_warp.result import Result
     from lgvi_warp.stability import StabilityMap
     from lgvi_warp.stability_grid import Line
+    from lgvi_warp.statistics import Estimate
     from lgvi_warp.tradeoffs import Tradeoff
 
 # Quantile pairs of the fan, outermost first, and how dark each band is.
@@ -67,6 +68,97 @@ def fan(axes: Any, time: np.ndarray, values: np.ndarray) -> None:
         axes.fill_between(time, curves[low], curves[high], color=COLOR, alpha=alpha, linewidth=0, label=label)
     axes.plot(time, curves[0.5], color="black", linewidth=1.0, label="median")
     axes.legend(loc="best", fontsize="small")
+
+
+# What of a run's statistics is drawn: so many panels, and lines in a panel, at most.
+PANELS, LINES = 12, 12
+
+
+def plot_statistics(result: Result, path: str | os.PathLike[str]) -> Path:
+    """Draw a run's statistics against time, a panel each: quantiles as a fan, others with their intervals.
+
+    Statistics of paths, which have one time, and covariances are left to the table. Returns the path. Raises ImportError
+    without matplotlib (extra: viz), ValueError when there is nothing to draw.
+    """
+    figure_of = _figure()
+    drawn = drawable(result)[:PANELS]
+    if not drawn:
+        raise ValueError("no statistic against time was gathered: there is nothing to draw; give statistics=[...]")
+    columns = min(3, len(drawn))
+    rows = -(-len(drawn) // columns)
+    figure = figure_of(figsize=(5.0 * columns, 3.8 * rows), layout="constrained")
+    for axes, one in zip(figure.subplots(rows, columns, squeeze=False).flat, drawn, strict=False):
+        _PANEL[one.settings["type"]](axes, one)
+        histogram = one.settings["type"] == "histogram"
+        axes.set(title=one.name, xlabel="time [s]", ylabel="" if histogram else f"[{one.unit}]")
+        axes.grid(True, alpha=0.3)
+        if "depth" in one.name or "position[2]" in one.name:
+            axes.set_ylabel("[m], down" if one.unit == "m" else f"[{one.unit}]")
+            if one.unit == "m":
+                axes.invert_yaxis()
+    for axes in list(figure.axes)[len(drawn) :]:
+        axes.set_axis_off()
+    figure.suptitle(f"{result.members} members, intervals of {drawn[0].confidence:.0%}")
+    target = Path(path)
+    figure.savefig(target, dpi=100)
+    return target
+
+
+def drawable(result: Result) -> list[Estimate]:
+    """The statistics that `plot_statistics` draws."""
+    return [one for one in result.statistics.values() if len(one.time) > 1 and one.settings["type"] in _PANEL]
+
+
+def _levels_panel(axes: Any, one: Estimate) -> None:
+    """Pairs of quantiles as bands about the middle one; for several components lines."""
+    levels = one.coordinates["level"]
+    for c in range(min(one.value.shape[2], LINES)):
+        color, values = COLORS[c % len(COLORS)], one.value[:, :, c]
+        for i in range(len(levels) // 2):
+            label = f"{levels[-1 - i] - levels[i]:.0%}" if c == 0 else None
+            axes.fill_between(
+                one.time, values[:, i], values[:, -1 - i], color=color, alpha=0.2, linewidth=0, label=label
+            )
+        if len(levels) % 2:
+            axes.plot(one.time, values[:, len(levels) // 2], color=color, label=one.coordinates["component"][c])
+    axes.legend(loc="best", fontsize="small")
+
+
+def _lines_panel(axes: Any, one: Estimate) -> None:
+    """A line for each component, its interval about it."""
+    shape = (len(one.time), -1)
+    value, lower, upper = (array.reshape(shape) for array in (one.value, one.lower, one.upper))
+    names = one.coordinates["component"] if one.coordinates["component"].size else np.array([one.name])
+    for c in range(min(value.shape[1], LINES)):
+        color = COLORS[c % len(COLORS)]
+        axes.plot(one.time, value[:, c], color=color, label=names[c] if c < len(names) else None)
+        axes.fill_between(one.time, lower[:, c], upper[:, c], color=color, alpha=0.3, linewidth=0)
+    axes.legend(loc="best", fontsize="small")
+
+
+def _extremes_panel(axes: Any, one: Estimate) -> None:
+    """From the smallest to the largest."""
+    for c in range(min(one.value.shape[1], LINES)):
+        label = one.coordinates["component"][c]
+        axes.fill_between(one.time, one["minimum"][:, c], one["maximum"][:, c], alpha=0.3, linewidth=0, label=label)
+    axes.legend(loc="best", fontsize="small")
+
+
+def _histogram_panel(axes: Any, one: Estimate) -> None:
+    """Fractions of the first component, bins against time."""
+    drawn = axes.pcolormesh(one.time, one.coordinates["bin"], one.value[:, 0].T, shading="nearest")
+    axes.figure.colorbar(drawn, ax=axes, label="fraction of members")
+
+
+_PANEL = {
+    "quantiles": _levels_panel,
+    "mean": _lines_panel,
+    "circular_mean": _lines_panel,
+    "exceedance": _lines_panel,
+    "first_passage": _lines_panel,
+    "extremes": _extremes_panel,
+    "histogram": _histogram_panel,
+}
 
 
 def _paths(axes: Any, position: np.ndarray) -> None:

@@ -1,0 +1,92 @@
+"""Statistics of 10^6 members at ten sample times beside the bare kernel, in turn: psi_s, float64, all threads; peak memory.
+
+Mean, covariance, quantiles and extremes of position, together and one by one, beside runs that keep nothing: with the same
+sample times, and without any. The least time of rounds in turn; core_s is that of all threads together, which other work
+on the machine disturbs less. Memory is that of a process of its own.
+"""
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+from statistics import median
+
+import lgvi_warp as lw
+from lgvi_warp import machine, speed
+from lgvi_warp.observation import Observation
+from lgvi_warp.solving import make_plan, run_plan
+
+ROOT = Path(__file__).resolve().parents[3]
+MEMORY = """
+import json, resource, sys
+sys.path[:0] = [{root!r}, {root!r} + "/kernels"]
+from benchmarks.cases.statistics import case
+seconds, _ = case.runs({members}, {steps})["statistics"]()
+print(json.dumps({{"run_s": seconds, "peak_MiB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024}}))
+"""
+
+
+def statistics():
+    return (
+        lw.Mean("position"),
+        lw.Covariance("position"),
+        lw.Quantiles("position", (0.05, 0.5, 0.95)),
+        lw.Extremes("position"),
+    )
+
+
+def runs(members, steps):
+    """Name -> a call that makes the run and returns its seconds, and those of all cores together."""
+    fleet, t1 = speed.fleet(members), 0.01 * steps
+    every = lw.SaveAt(every=t1 / 10)
+    threads = machine.thread_count()
+
+    def of(save, fields, observed):
+        plan = make_plan(fleet, "psi_s", 0.01, t1, save, fields=lambda asked: fields)
+
+        def call():
+            start = time.process_time()
+            result = run_plan(plan, threads, None, observed)
+            return result.run_seconds, time.process_time() - start
+
+        return call
+
+    nothing = Observation(keep="none")
+    one_by_one = {one.type: of(every, ("position",), Observation((one,), "none")) for one in statistics()}
+    return {
+        "no samples": of(lw.SaveAt(), (), nothing),
+        "samples dropped": of(every, ("position",), nothing),
+        "statistics": of(every, ("position",), Observation(statistics(), "none")),
+    } | one_by_one
+
+
+def run(quick):
+    members, steps, rounds = (20_000, 200, 2) if quick else (1_000_000, 1000, 5)
+    calls = runs(members, steps)
+    found = {name: [] for name in calls}
+    for call in calls.values():
+        call()
+    for _ in range(rounds):
+        for name, call in calls.items():
+            found[name].append(call())
+    least = {name: [min(column) for column in zip(*times, strict=True)] for name, times in found.items()}
+    for name, (wall, cores) in least.items():
+        pairs = zip(found[name], found["no samples"], strict=True)
+        yield {
+            "members": members,
+            "steps": steps,
+            "run": name,
+            "run_s": round(wall, 3),
+            "to_no_samples": round(wall / least["no samples"][0], 3),
+            "to_samples_dropped": round(wall / least["samples dropped"][0], 3),
+            "median_to_no_samples": round(median(one[0] / bare[0] for one, bare in pairs), 3),
+            "core_s": round(cores, 3),
+            "core_s_to_no_samples": round(cores / least["no samples"][1], 3),
+        }
+    for n in (members // 10, members):
+        code = MEMORY.format(root=str(ROOT), members=n, steps=steps)
+        done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+        yield {"members": n, "steps": steps, "run": "statistics, own process"} | {
+            name: round(value, 2) for name, value in json.loads(done.stdout.splitlines()[-1]).items()
+        }

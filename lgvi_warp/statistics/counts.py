@@ -1,0 +1,241 @@
+"""What is counted: histograms, probabilities that a condition holds, times until it first does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.errors import Faults
+from lgvi_warp.statistics import intervals
+from lgvi_warp.statistics.base import Statistic
+from lgvi_warp.statistics.estimate import Estimate, along
+from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate
+from lgvi_warp.statistics.tree import Part
+from lgvi_warp.statistics.values import Values
+
+
+class Counted(Statistic):
+    """Of whole numbers, which add up: the same in any order."""
+
+    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+        """The sums."""
+        return {key: left[key] + right[key] for key in left}
+
+
+@dataclass(frozen=True, eq=False)
+class Histogram(Counted):
+    """Fraction of members in each bin: value (k, d, bins); counts; below and above the edges (k, d).
+
+    edges: rising; or bins and limits=(low, high) for equal bins. A bin holds its lower edge, the last one its upper edge
+    too. Interval: Wilson's, for each bin.
+    """
+
+    type: ClassVar[str] = "histogram"
+
+    edges: Any = None
+    bins: int | None = None
+    limits: Any = None
+
+    def check(self, faults: Faults) -> None:
+        """Edges must rise."""
+        if self.edges is not None and self.bins is not None:
+            faults.add("edges", self.edges, "and bins are both given", "keep one of them")
+            return
+        if (self.edges is None) == (self.bins is None or self.limits is None):
+            faults.add("edges", self.edges, "or bins and limits are wanted, one of them", "give edges=(0, 10, 20)")
+            return
+        if self.edges is None:
+            limits, bins = faults.finite("limits", self.limits, (2,)), self.bins
+            if isinstance(bins, bool) or not isinstance(bins, int) or bins < 1:
+                faults.add("bins", bins, "is no whole number above 0", "give 50")
+                return
+            edges = None if limits is None else np.linspace(limits[0], limits[1], bins + 1)
+        else:
+            edges = faults.finite("edges", self.edges)
+        if edges is not None and (edges.ndim != 1 or len(edges) < 2 or np.any(np.diff(edges) <= 0.0)):
+            faults.add("edges", self.edges if self.edges is not None else self.limits, "do not rise", "sort them")
+        object.__setattr__(self, "_edges", edges)
+
+    def rows(self, values: Values) -> Part:
+        """Counts of the block."""
+        edges: np.ndarray = self._edges  # type: ignore[attr-defined]
+        k, d, _ = values.x.shape
+        # 0: below; 1 to B: bins; B + 1: above. The last edge belongs to the last bin.
+        at = np.searchsorted(edges, values.x, side="right")
+        at = np.where(values.x == edges[-1], len(edges) - 1, at)
+        stream = np.arange(k * d).reshape(k, d, 1) * (len(edges) + 1)
+        keep = (at + stream).ravel() if values.good is None else (at + stream)[self._kept(values, d)]
+        counts = np.bincount(keep, minlength=k * d * (len(edges) + 1)).reshape(k, d, len(edges) + 1)
+        return {"count": values.count, "counts": counts}
+
+    @staticmethod
+    def _kept(values: Values, d: int) -> np.ndarray:
+        assert values.good is not None
+        return np.repeat(values.good[:, None], d, axis=1)
+
+    def read(self, part: Part, time: np.ndarray) -> Estimate:
+        """Fractions of the members that count."""
+        edges: np.ndarray = self._edges  # type: ignore[attr-defined]
+        count, counts = part["count"], part["counts"]
+        n = count[:, None, None]
+        inside = counts[..., 1:-1]
+        value = empty_as_nan(inside / np.maximum(n, 1), count)
+        lower, upper = intervals.wilson(inside / np.maximum(n, 1), n, self.confidence)
+        arrays = {"value": value, "lower": lower, "upper": upper, "counts": inside}
+        dims = along(arrays, "time", "component", "bin")
+        arrays |= {"below": counts[..., 0], "above": counts[..., -1]}
+        dims |= {"below": ("time", "component"), "above": ("time", "component"), "count": ("time",)}
+        bins = {"bin": 0.5 * (edges[1:] + edges[:-1])}
+        found = estimate(self, "Wilson", dims, arrays | {"count": count}, time, bins, "1")
+        found.coordinates["edge"] = edges
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Condition(Statistic):
+    """A quantity above or below a number; with neither, where it is not 0: a function may say true or false."""
+
+    above: Any = None
+    below: Any = None
+
+    def check(self, faults: Faults) -> None:
+        """One number at most."""
+        if self.above is not None and self.below is not None:
+            faults.add("above and below", (self.above, self.below), "are both given", "keep one of them")
+        for name in ("above", "below"):
+            if getattr(self, name) is not None:
+                limit = faults.finite(name, getattr(self, name))
+                found = getattr(self, "_quantity", None)
+                fits = (1,) if found is None else (1, found.size)
+                if limit is not None and (limit.ndim > 1 or limit.size not in fits):
+                    faults.add(name, getattr(self, name), "is no number", "give one number, or one for each component")
+
+    @property
+    def key(self) -> str:
+        """What the result calls it: "exceedance depth above 50.0"."""
+        limits = [f" {word} {getattr(self, word)}" for word in ("above", "below") if getattr(self, word) is not None]
+        return self.name or f"{self.type} {self.quantity.name}{''.join(limits)}"
+
+    def holds(self, values: Values) -> np.ndarray:
+        """(k, d, n): for which members that count it holds."""
+        limit = self.above if self.above is not None else self.below
+        if limit is None:
+            found = values.x != 0.0
+        else:
+            level = np.broadcast_to(np.asarray(limit, dtype=np.float64).reshape(-1, 1), (values.x.shape[1], 1))
+            found = values.x > level if self.above is not None else values.x < level
+        return found if values.good is None else found & values.good[:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class Exceedance(Condition, Counted):
+    """Probability that a quantity is above (or below) a number at each sample time: value (k, d). Interval: Wilson's."""
+
+    type: ClassVar[str] = "exceedance"
+
+    def rows(self, values: Values) -> Part:
+        """Counts of the block."""
+        return {"count": values.count, "hits": self.holds(values).sum(axis=2)}
+
+    def read(self, part: Part, time: np.ndarray) -> Estimate:
+        """The fraction of members."""
+        count = part["count"]
+        n = count[:, None]
+        fraction = part["hits"] / np.maximum(n, 1)
+        lower, upper = intervals.wilson(fraction, n, self.confidence)
+        arrays = {"value": empty_as_nan(fraction, count), "lower": lower, "upper": upper, "count": count}
+        return estimate(self, "Wilson", component_dims("value", "lower", "upper"), arrays, time, unit="1")
+
+
+class _Passages:
+    """Of a block: the first sample at which the condition holds for each member, or the last one that is known of it."""
+
+    def __init__(self, statistic: FirstPassage, times: int, count: int):
+        self._statistic, self._times = statistic, times
+        self._passed = np.full(count, times, np.int64)
+        self._known = np.zeros(count, np.int64)
+
+    def take(self, values: Values, when: slice) -> None:
+        """Look at these times."""
+        holds = self._statistic.holds(values)[:, 0]
+        first = np.where(holds.any(axis=0), when.start + holds.argmax(axis=0), self._times)
+        open_ = (self._passed == self._times) & (self._known == when.start)
+        if values.good is None:
+            self._known[open_] = when.stop
+        else:
+            # A member that is lost stays lost: what comes after is not looked at.
+            lost = ~values.good
+            good = np.where(lost.any(axis=0), lost.argmax(axis=0), len(lost))
+            self._known = np.where(open_, when.start + good, self._known)
+            first = np.where(first < when.start + good, first, self._times)
+        self._passed = np.where(open_, first, self._passed)
+
+    def close(self) -> Part:
+        """How many pass at each time, and how many are lost before it without having passed."""
+        length = self._times + 1
+        passed = np.bincount(self._passed, minlength=length)
+        lost = np.bincount(self._known[self._passed == self._times], minlength=length)
+        return {"passed": passed, "lost": lost}
+
+
+@dataclass(frozen=True, eq=False)
+class FirstPassage(Condition, Counted):
+    """Time until a quantity is first above (or below) a number, seen at the sample times.
+
+    value (k,): probability to have passed by each time, Kaplan & Meier's estimate: a member that fails before it passes
+    counts until its last good sample. survival is 1 - value. Interval: Wilson's with the number of members that has
+    Greenwood's variance. passed, lost (k,): members that pass at a time, and that failed before it without having
+    passed; count (k,): members at risk of passing at each time; censored: those that were good to the end and did not
+    pass. passage_time (levels,) [s]: the first sample time by which that fraction has passed, infinite if it never has,
+    with passage_time_lower, _upper from the interval of value. A passage lies between the sample before and the one that
+    sees it; one that comes and goes between two is not seen (an event of the scene sees every step).
+    """
+
+    type: ClassVar[str] = "first_passage"
+
+    levels: Any = (0.05, 0.5, 0.95)
+
+    def check(self, faults: Faults) -> None:
+        """Of one component."""
+        super().check(faults)
+        levels = faults.finite("levels", self.levels)
+        if levels is not None and (levels.ndim != 1 or np.any(levels <= 0.0) or np.any(levels >= 1.0)):
+            faults.add("levels", self.levels, "are no numbers between 0 and 1", "give (0.05, 0.5, 0.95)")
+        if self.of is not None and getattr(self, "_quantity", None) is not None and self.quantity.size != 1:
+            faults.add("of", self.of, f"has {self.quantity.size} components", f"give one: {self.quantity.labels[0]!r}")
+
+    def open(self, times: int, count: int) -> _Passages:
+        """What follows the members of a block."""
+        return _Passages(self, times, count)
+
+    def read(self, part: Part, time: np.ndarray) -> Estimate:
+        """Kaplan & Meier 1958, Greenwood 1926."""
+        passed, lost = part["passed"][:-1], part["lost"][:-1]
+        total = int(part["passed"].sum())
+        risk = total - np.cumsum(lost) - (np.cumsum(passed) - passed)
+        n = np.maximum(risk, 1)
+        survival = np.cumprod(1.0 - passed / n)
+        left = np.maximum(n - passed, 1)
+        greenwood = np.cumsum(passed / (n * left)) * survival**2
+        some = (greenwood > 0.0) & (survival > 0.0)
+        members = np.where(some, survival * (1.0 - survival) / np.where(some, greenwood, 1.0), risk + np.cumsum(passed))
+        lower, upper = intervals.wilson(1.0 - survival, members, self.confidence)
+        value = 1.0 - survival
+        arrays = {"value": value, "lower": lower, "upper": upper, "survival": survival, "passed": passed, "lost": lost}
+        arrays |= {"count": risk}
+        dims = along(arrays, "time")
+        arrays |= {"censored": part["lost"][-1]}
+        dims["censored"] = ()
+        curves = {"passage_time": value, "passage_time_lower": upper, "passage_time_upper": lower}
+        arrays |= {name: self._first(curve, time) for name, curve in curves.items()}
+        dims |= along(curves, "level")
+        levels = {"level": np.asarray(self.levels, dtype=np.float64)}
+        return estimate(self, "Wilson with Greenwood's variance", dims, arrays, time, levels, "1", labels=())
+
+    def _first(self, curve: np.ndarray, time: np.ndarray) -> np.ndarray:
+        """The first time at which a rising curve reaches each level."""
+        found: Sequence[np.ndarray] = [time[curve >= level][:1] for level in np.asarray(self.levels)]
+        return np.array([one[0] if len(one) else np.inf for one in found])

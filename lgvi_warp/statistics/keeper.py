@@ -1,0 +1,92 @@
+"""Statistics as what a run keeps: gathered block by block, joined in the order of the blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.blocks import Block, Fields, blocks
+from lgvi_warp.statistics.base import Statistic
+from lgvi_warp.statistics.estimate import Estimate, Estimates
+from lgvi_warp.statistics.tree import Part, Tree
+from lgvi_warp.statistics.values import Values
+
+if TYPE_CHECKING:
+    from lgvi_warp.ensemble import Members
+    from lgvi_warp.packets import Outcome
+    from lgvi_warp.plan import Plan
+
+
+class Gathered:
+    """The statistics of a run, so far: a tree of parts for each."""
+
+    # What a store calls its parts.
+    name = "statistics"
+
+    def __init__(self, plan: Plan, statistics: Sequence[Statistic]):
+        self._statistics, self.time = tuple(statistics), plan.grid.times
+        self._size = blocks(plan.ensemble.members)[0].count
+        self._trees = [Tree(one.join) for one in self._statistics]
+
+    def open(self, plan: Plan, block: Block, members: Members) -> _BlockStatistics:
+        """What gathers those of one block."""
+        place = (block.first, block.first // self._size, self._size)
+        return _BlockStatistics(self._statistics, members, place, len(self.time))
+
+    def merge(self, block: Block, part: list[Part]) -> None:
+        """Take in a block's part: of each statistic, named arrays."""
+        # A member that is about to fail may be too large to be squared: the statistic then says so, and NumPy need not.
+        with np.errstate(invalid="ignore", over="ignore"):
+            for tree, one in zip(self._trees, part, strict=True):
+                tree.add(block.first // self._size, one)
+
+    def estimates(self, chosen: Statistic | None = None) -> list[Estimate]:
+        """What all say of the blocks so far, or one of them."""
+        found: list[Estimate] = []
+        for statistic, tree in zip(self._statistics, self._trees, strict=True):
+            if chosen is None or statistic is chosen:
+                with np.errstate(invalid="ignore", over="ignore"):
+                    found += statistic.estimates(tree.parts(), self.time)
+        return found
+
+    def result(self) -> Estimates:
+        """All of them, by name."""
+        return Estimates(self.estimates())
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What another process needs to gather blocks: not what was gathered here."""
+        return {name: value for name, value in vars(self).items() if name != "_trees"}
+
+    @staticmethod
+    def to_arrays(part: Sequence[Part]) -> tuple[dict[str, np.ndarray], Any]:
+        """A block's part as named arrays, for a file, and the number of statistics."""
+        return {f"{i}/{name}": array for i, one in enumerate(part) for name, array in one.items()}, len(part)
+
+    @staticmethod
+    def from_arrays(arrays: Mapping[str, np.ndarray], content: Any) -> list[Part]:
+        """What `to_arrays` gave: merged later, it gives the same bits."""
+        prefixes = [f"{i}/" for i in range(content)]
+        return [{n.removeprefix(one): a for n, a in arrays.items() if n.startswith(one)} for one in prefixes]
+
+
+class _BlockStatistics:
+    def __init__(self, statistics: Sequence[Statistic], members: Members, place: tuple[int, int, int], times: int):
+        self._statistics, self._members, self._place = statistics, members, place
+        self._open = [one.open(times, members.count) for one in statistics]
+
+    def take(self, when: slice, samples: Fields) -> None:
+        """Hand each statistic the values of its quantity; statistics of the same quantity share them."""
+        made: dict[Any, Values] = {}
+        for statistic, gathers in zip(self._statistics, self._open, strict=True):
+            quantity = statistic.quantity
+            key = (quantity.name, quantity.function, statistic.stopped)
+            if key not in made:
+                x = quantity(samples, self._members)
+                made[key] = Values(x, samples.good(statistic.stopped == "held"), *self._place)
+            gathers.take(made[key], when)
+
+    def close(self, outcome: Outcome) -> list[Part]:
+        """Of each statistic, named arrays."""
+        return [one.close() for one in self._open]

@@ -1,0 +1,175 @@
+"""Means, covariances, and the moments that their errors follow from; joined by shifts to the common mean (Chan 1979)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from lgvi_warp.statistics import intervals
+from lgvi_warp.statistics.base import Statistic
+from lgvi_warp.statistics.estimate import Dims, Estimate, along
+from lgvi_warp.statistics.tree import Part
+from lgvi_warp.statistics.values import Values
+
+
+def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """sum over members of a_i b_j: (k, d, n) and (k, d, n) to (k, d, d)."""
+    # A few rows by thousands of members: beyond some rows BLAS pays, which makes threads of its own for larger products.
+    if a.shape[1] <= 4:
+        return np.einsum("kin,kjn->kij", a, b)
+    parts = (a[..., i : i + 512] @ np.swapaxes(b[..., i : i + 512], 1, 2) for i in range(0, a.shape[2], 512))
+    return np.asarray(sum(parts))
+
+
+def joined_means(left: Part, right: Part) -> tuple[Part, np.ndarray, np.ndarray]:
+    """count and mean of both; and how far each one's mean lies above the common one, (k, d)."""
+    n = left["count"] + right["count"]
+    share = (right["count"] / np.maximum(n, 1))[:, None]
+    delta = right["mean"] - left["mean"]
+    none = (left["count"] == 0)[:, None]
+    mean = np.where(none, right["mean"], left["mean"] + share * delta)
+    return {"count": n, "mean": mean}, -share * delta, (1.0 - share) * delta
+
+
+def outer(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """a_i b_j, (k, d, d)."""
+    return np.asarray(a[:, :, None] * b[:, None, :])
+
+
+def moved(part: Part, a: np.ndarray) -> Part:
+    """Second to fourth moments about another point, `a` (k, d) below the mean: sums of (x_i + a_i)(x_j + a_j) and so on.
+
+    m11 [i, j]: sum of x_i x_j; m21: of x_i^2 x_j; m22: of x_i^2 x_j^2; x less its mean.
+    """
+    n, m11, aa = part["count"][:, None, None], part["m11"], outer(a, a)
+    found = {"m11": m11 + n * aa}
+    if "m21" in part:
+        squares = np.einsum("kii->ki", m11)
+        m20, m02, ai, aj = squares[:, :, None], squares[:, None], a[:, :, None], a[:, None]
+        m21, m12 = part["m21"], np.swapaxes(part["m21"], 1, 2)
+        found["m21"] = m21 + 2.0 * ai * m11 + aj * m20 + n * ai * aa
+        found["m22"] = (
+            part["m22"] + 2.0 * (aj * m21 + ai * m12) + aj**2 * m20 + ai**2 * m02 + 4.0 * aa * m11 + n * aa**2
+        )
+    return found
+
+
+def joined(left: Part, right: Part) -> Part:
+    """Of two sets of members, of both."""
+    both, a, b = joined_means(left, right)
+    first, second = moved(left, a), moved(right, b)
+    return both | {key: first[key] + second[key] for key in first}
+
+
+def empty_as_nan(values: np.ndarray, count: np.ndarray, least: int = 1) -> np.ndarray:
+    """NaN at times with fewer members than `least`: the count says why."""
+    few = (count < least).reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray(np.where(few, np.nan, values))
+
+
+def component_dims(*names: str) -> Dims:
+    """Dimensions (time, component) of these arrays, and of the count."""
+    return {"count": ("time",)} | along(names, "time", "component")
+
+
+@dataclass(frozen=True, eq=False)
+class Mean(Statistic):
+    """Mean and standard deviation over members: value and standard_deviation (k, d), standard_error of the mean.
+
+    Interval: Student's t.
+    """
+
+    type: ClassVar[str] = "mean"
+
+    def rows(self, values: Values) -> Part:
+        """Count, mean, and the sum of squares about it."""
+        c = values.centred
+        return {"count": values.count, "mean": values.mean, "m2": np.einsum("kdn,kdn->kd", c, c)}
+
+    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+        """Chan, Golub & LeVeque 1979."""
+        both, a, b = joined_means(left, right)
+        n, m = left["count"][:, None], right["count"][:, None]
+        return both | {"m2": left["m2"] + n * a**2 + (right["m2"] + m * b**2)}
+
+    def read(self, part: Part, time: np.ndarray) -> Estimate:
+        """Mean -+ t s / sqrt(n)."""
+        count = part["count"]
+        n = count[:, None]
+        mean = empty_as_nan(part["mean"], count)
+        deviation = empty_as_nan(np.sqrt(part["m2"] / np.maximum(n - 1, 1)), count, 2)
+        error = deviation / np.sqrt(np.maximum(n, 1))
+        lower, upper = intervals.about(mean, error, intervals.student(n, self.confidence))
+        arrays = {"value": mean, "lower": lower, "upper": upper, "standard_error": error}
+        arrays |= {"standard_deviation": deviation, "count": count}
+        return estimate(self, "Student's t", component_dims(*list(arrays)[:-1]), arrays, time)
+
+
+@dataclass(frozen=True, eq=False)
+class Covariance(Statistic):
+    """Covariance matrix over members, within a quantity or across several: value (k, d, d), divided by n - 1; correlation.
+
+    of=("position", "speed") takes four components together. Interval: normal theory with the standard error that the
+    members' own fourth moments give (delta method), which needs no normal members.
+    """
+
+    type: ClassVar[str] = "covariance"
+
+    def rows(self, values: Values) -> Part:
+        """Count, mean, and moments about it."""
+        c = values.centred
+        square = c * c
+        found = {"count": values.count, "mean": values.mean, "m11": sums(c, c)}
+        return found | {"m21": sums(square, c), "m22": sums(square, square)}
+
+    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+        """Moments about the common mean."""
+        return joined(left, right)
+
+    def read(self, part: Part, time: np.ndarray) -> Estimate:
+        """s_ij -+ t sqrt((E[x_i^2 x_j^2] - E[x_i x_j]^2) / (n - 1))."""
+        count = part["count"]
+        n = count[:, None, None]
+        value = empty_as_nan(part["m11"] / np.maximum(n - 1, 1), count, 2)
+        some = np.maximum(n, 1)
+        spread = np.maximum(part["m22"] / some - (part["m11"] / some) ** 2, 0.0)
+        error = empty_as_nan(np.sqrt(spread / np.maximum(n - 1, 1)), count, 2)
+        lower, upper = intervals.about(value, error, intervals.student(n, self.confidence))
+        deviation = np.sqrt(np.einsum("kii->ki", value))
+        scale = outer(deviation, deviation)
+        correlation = value / np.where(scale > 0.0, scale, np.inf)
+        arrays = {"value": value, "lower": lower, "upper": upper, "standard_error": error, "correlation": correlation}
+        arrays |= {"mean": empty_as_nan(part["mean"], count), "count": count}
+        dims = along(arrays, "time", "component", "component_2")
+        dims |= {"mean": ("time", "component"), "count": ("time",)}
+        labels = {"component_2": np.array(self.quantity.labels)}
+        unit = self.quantity.unit
+        unit = "products of the components' units" if "," in unit else f"({unit})^2"
+        return estimate(self, "delta method: fourth moments", dims, arrays, time, labels, unit)
+
+
+def estimate(
+    statistic: Statistic,
+    interval: str,
+    dims: Dims,
+    arrays: dict[str, np.ndarray],
+    time: np.ndarray,
+    coordinates: dict[str, np.ndarray] | None = None,
+    unit: str | None = None,
+    labels: Sequence[str] | None = None,
+) -> Estimate:
+    """An Estimate of this statistic; components are those of its quantity unless labels are given."""
+    components = np.array(statistic.quantity.labels if labels is None else labels)
+    return Estimate(
+        statistic.key,
+        statistic.to_dict(),
+        statistic.quantity.unit if unit is None else unit,
+        statistic.confidence,
+        interval,
+        dims,
+        arrays,
+        {"time": time, "component": components} | (coordinates or {}),
+    )

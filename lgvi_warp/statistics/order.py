@@ -1,0 +1,144 @@
+"""Extremes and quantiles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.errors import Faults
+from lgvi_warp.statistics import intervals, sketch
+from lgvi_warp.statistics.base import Statistic
+from lgvi_warp.statistics.estimate import Estimate, along
+from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate
+from lgvi_warp.statistics.tree import Part
+from lgvi_warp.statistics.values import Values
+
+# Numbers of sketches: some 50 bytes are needed for each.
+SORTED_AT_ONCE = 2_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Extremes(Statistic):
+    """Smallest and largest value, and whose they are: minimum, maximum, minimum_member, maximum_member (k, d).
+
+    value is the maximum. No interval holds the extremes of what was not drawn; instead beyond (k,): with this confidence,
+    at most this fraction of all members that could be drawn lies above the maximum, and as much below the minimum.
+    """
+
+    type: ClassVar[str] = "extremes"
+
+    def rows(self, values: Values) -> Part:
+        """Extremes of the block."""
+        found: Part = {"count": values.count}
+        for name, best, beyond in (("minimum", np.argmin, np.inf), ("maximum", np.argmax, -np.inf)):
+            x = values.filled(beyond)
+            at = best(x, axis=2)
+            found[name] = np.take_along_axis(x, at[:, :, None], axis=2)[:, :, 0]
+            found[f"{name}_member"] = np.where(values.count[:, None] > 0, at + values.first, -1)
+        return found
+
+    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+        """The more extreme; the first member's of equal ones."""
+        both: Part = {"count": left["count"] + right["count"]}
+        for name, better in (
+            ("minimum", right["minimum"] < left["minimum"]),
+            ("maximum", right["maximum"] > left["maximum"]),
+        ):
+            for key in (name, f"{name}_member"):
+                both[key] = np.where(better, right[key], left[key])
+        return both
+
+    def read(self, part: Part, time: np.ndarray) -> Estimate:
+        """P(a fraction above the maximum > b) = (1 - b)^n."""
+        count = part["count"]
+        arrays = {name: empty_as_nan(part[name], count) for name in ("minimum", "maximum")}
+        arrays |= {name: part[name] for name in ("minimum_member", "maximum_member")}
+        dims = component_dims("value", *arrays) | {"beyond": ("time",)}
+        beyond = np.where(count > 0, -np.expm1(np.log(1.0 - self.confidence) / np.maximum(count, 1)), 1.0)
+        arrays = {"value": arrays["maximum"]} | arrays | {"beyond": beyond, "count": count}
+        return estimate(self, "none: beyond bounds what lies outside", dims, arrays, time)
+
+
+@dataclass(frozen=True, eq=False)
+class Quantiles(Statistic):
+    """Quantiles over members: value (k, levels, d). Exact up to `size` members; then from a sketch with a proven bound.
+
+    levels: between 0 and 1. size: numbers that each level of the sketch keeps, a power of two. rank_error (k,): proven
+    bound on the rank's error as a fraction of the members; what is to be expected is several times smaller.
+    Interval: from the ranks of sorted values (binomial, no assumption on the distribution), widened by the sketch's
+    standard error; infinite where too few members lie beyond the level.
+    """
+
+    type: ClassVar[str] = "quantiles"
+    shared: ClassVar[frozenset[str]] = frozenset({"weights", "error", "variance", "shift"})
+
+    levels: Any = (0.05, 0.25, 0.5, 0.75, 0.95)
+    size: int = 2048
+
+    def check(self, faults: Faults) -> None:
+        """Levels lie between 0 and 1."""
+        levels = faults.finite("levels", self.levels)
+        if levels is not None:
+            if levels.ndim > 1 or levels.size == 0 or np.any(levels <= 0.0) or np.any(levels >= 1.0):
+                faults.add("levels", self.levels, "are no numbers between 0 and 1", "give (0.05, 0.5, 0.95)")
+            object.__setattr__(self, "levels", tuple(np.unique(levels).tolist()))
+        n = self.size
+        if isinstance(n, bool) or not isinstance(n, int) or n < 64 or n & (n - 1):
+            faults.add("size", n, "is no power of two from 64", "give 2048")
+
+    def rows(self, values: Values) -> Part:
+        """The block's values, sorted; every other one, and so on, down to `size`."""
+        x = values.filled(np.inf)
+        # Sorting is most of the work, and half as much of numbers half as long.
+        x = x.astype(np.float32) if values.single else x
+        return {"count": values.count} | sketch.of(x, values.size, self.size, values.block)
+
+    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+        """One sketch of two."""
+        return {"count": left["count"] + right["count"]} | sketch.join(left, right, self.size, place)
+
+    def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
+        """Some times after others: sorting all at once would take more memory than the sketches do."""
+        numbers = sum(part["values"][0].size for part in parts)
+        rows = max(1, SORTED_AT_ONCE // numbers)
+        found = []
+        for first in range(0, len(time), rows):
+            at = slice(first, first + rows)
+            some = [part | {key: part[key][at] for key in part.keys() - self.shared} for part in parts]
+            found.append(self.read(self.whole(some), time[at]))
+        arrays = {name: np.concatenate([one[name] for one in found]) for name in found[0].arrays}
+        return [replace(found[0], arrays=arrays, coordinates=found[0].coordinates | {"time": time})]
+
+    def whole(self, parts: Sequence[Part]) -> Part:
+        """All that is kept, side by side."""
+        return {"count": np.sum([part["count"] for part in parts], axis=0)} | sketch.together(parts)
+
+    def read(self, part: Part, time: np.ndarray) -> Estimate:
+        """Linear between sorted values, as np.quantile; its interval by ranks."""
+        count = part["count"]
+        level = np.array(self.levels)[None, :]
+        n = count[:, None]
+        values, middles = sketch.sorted_values(part)
+        finite = np.isfinite(values)
+
+        def at(rank: np.ndarray) -> np.ndarray:
+            return sketch.at_rank(
+                values, middles, finite, np.broadcast_to(rank[:, :, None], (*rank.shape, values.shape[1]))
+            )
+
+        value = empty_as_nan(at((n - 1) * level), count)
+        low, high = intervals.ranks(n, level, self.confidence)
+        # The sketch's own error adds to the ranks' variance.
+        own = n * level * (1.0 - level)
+        more = intervals.normal(self.confidence) * (np.sqrt(own + part["variance"][0]) - np.sqrt(own))
+        low, high = low - more, high + more
+        lower = np.where((low < 1.0)[:, :, None], -np.inf, at(np.maximum(low - 1.0, 0.0)))
+        upper = np.where((high > n)[:, :, None], np.inf, at(np.maximum(np.minimum(high, n) - 1.0, 0.0)))
+        error = part["error"][0] / np.maximum(count, 1)
+        arrays = {"value": value, "lower": empty_as_nan(lower, count), "upper": empty_as_nan(upper, count)}
+        dims = along(arrays, "time", "level", "component") | {"count": ("time",), "rank_error": ("time",)}
+        arrays |= {"rank_error": error, "count": count}
+        return estimate(self, "order statistics: binomial ranks", dims, arrays, time, {"level": level[0]})

@@ -1,0 +1,166 @@
+"""What a statistic is of: a quantity of each member at each sample time, by name or as a function of the samples."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp import invariants
+from lgvi_warp.errors import SceneError, closest, shown
+from lgvi_warp.saveat import FIELDS
+
+if TYPE_CHECKING:
+    from lgvi_warp.blocks import Fields
+    from lgvi_warp.ensemble import Members
+    from lgvi_warp.terms import Term
+
+Function = Callable[["Fields", "Members"], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A function of a block's samples, (k times, n members): numbers (k, n), or (k, n, d) for d components.
+
+    function(samples, members): samples["position"] (k, n, 3) and so on, samples.time (k,) [s], samples.terms; members
+    as lw.Ensemble.select gives them. fields: the samples that it needs. labels: names of the components. What is not
+    finite leaves its member out at that time.
+    """
+
+    name: str
+    function: Function
+    unit: str = ""
+    fields: tuple[str, ...] = FIELDS
+    labels: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.labels:
+            object.__setattr__(self, "labels", (self.name,))
+
+    @property
+    def size(self) -> int:
+        """Number of components."""
+        return len(self.labels)
+
+    def __call__(self, samples: Fields, members: Members) -> np.ndarray:
+        """Its numbers (k, d, n), contiguous: float32 where they are numbers of such a run as they stand, else float64."""
+        values = np.asarray(self.function(samples, members))
+        k, n = len(samples.time), members.count
+        if values.shape not in ((k, n), (k, n, self.size)) or (values.ndim == 2 and self.size != 1):
+            wanted = f"({k}, {n})" if self.size == 1 else f"({k}, {n}, {self.size})"
+            raise ValueError(f"quantity {self.name}: gave shape {values.shape}; {wanted} is wanted: times, members")
+        real = np.float32 if values.dtype == np.float32 else np.float64
+        return np.ascontiguousarray(np.moveaxis(values.reshape(k, n, self.size), 2, 1), dtype=real)
+
+
+def _field(name: str) -> Function:
+    return lambda samples, members: samples[name].reshape(*samples[name].shape[:2], -1)
+
+
+def _speed(samples: Fields, members: Members) -> np.ndarray:
+    v = samples["velocity"].astype(np.float64, copy=False)
+    return np.sqrt(v[..., 0] ** 2 + v[..., 1] ** 2 + v[..., 2] ** 2)
+
+
+def _velocity_inertial(samples: Fields, members: Members) -> np.ndarray:
+    R, v = samples["attitude"], samples["velocity"].astype(np.float64, copy=False)
+    return R[..., 0] * v[..., :1] + R[..., 1] * v[..., 1:2] + R[..., 2] * v[..., 2:]
+
+
+def _euler(samples: Fields, members: Members) -> np.ndarray:
+    """(roll, pitch, yaw) of R = Rz(yaw) Ry(pitch) Rx(roll), Fossen's zyx convention."""
+    R = samples["attitude"].astype(np.float64, copy=False)
+    pitch = -np.arcsin(np.clip(R[..., 2, 0], -1.0, 1.0))
+    return np.stack([np.arctan2(R[..., 2, 1], R[..., 2, 2]), pitch, np.arctan2(R[..., 1, 0], R[..., 0, 0])], axis=-1)
+
+
+def _energy(samples: Fields, members: Members) -> np.ndarray:
+    """That of `Result.energy`."""
+    terms: Sequence[Term] = samples.terms
+
+    def own(term: Term) -> dict[str, np.ndarray]:
+        return {name: members.parameters[f"{term.key}.{name}"] for name in term.parameters()}
+
+    fields = {name: samples[name] for name in FIELDS}
+    block: Any = SimpleNamespace(**fields, time=samples.time, parameters=members.parameters, terms=terms, own=own)
+    return invariants.energy(block)
+
+
+def _labels(name: str, *shape: int) -> tuple[str, ...]:
+    return tuple(f"{name}[{', '.join(map(str, index))}]" for index in np.ndindex(*shape))
+
+
+KNOWN: dict[str, Quantity] = {
+    one.name: one
+    for one in (
+        Quantity("position", _field("position"), "m", ("position",), _labels("position", 3)),
+        Quantity("depth", lambda samples, members: samples["position"][..., 2], "m", ("position",)),
+        Quantity("velocity", _field("velocity"), "m/s", ("velocity",), _labels("velocity", 3)),
+        Quantity("velocity_inertial", _velocity_inertial, "m/s", ("attitude", "velocity"), _labels("velocity_inertial", 3)),
+        Quantity("speed", _speed, "m/s", ("velocity",)),
+        Quantity(
+            "angular_velocity", _field("angular_velocity"), "rad/s", ("angular_velocity",), _labels("angular_velocity", 3)
+        ),
+        Quantity("attitude", _field("attitude"), "1", ("attitude",), _labels("attitude", 3, 3)),
+        Quantity("euler", _euler, "rad", ("attitude",), _labels("euler", 3)),
+        Quantity("energy", _energy, "J"),
+    )
+}  # fmt: skip
+
+
+def quantity(key: str, of: Any) -> Quantity:
+    """The quantity that `of` means: a name, a name with an index, a Quantity, a function, or a list of these, as one.
+
+    Raises SceneError naming `key` where it means none.
+    """
+    if isinstance(of, Quantity):
+        return of
+    if isinstance(of, str):
+        return _named(key, of)
+    if callable(of):
+        return Quantity(str(getattr(of, "__name__", type(of).__name__)), of)
+    if isinstance(of, Sequence) and len(of):
+        return _joined([quantity(f"{key}[{i}]", one) for i, one in enumerate(of)])
+    remedy = f"give one of {', '.join(KNOWN)}, one component as in 'position[2]', or a function of (samples, members)"
+    raise SceneError([f"{key} = {shown(of)}: is no quantity; {remedy}"])
+
+
+def _named(key: str, text: str) -> Quantity:
+    found = re.fullmatch(r"(\w+)(\[[\d, ]+\])?", text.strip())
+    base = KNOWN.get(found[1]) if found else None
+    if base is None:
+        raise SceneError([f"{key} = {shown(text)}: is not known; {closest(text, KNOWN)}"])
+    assert found is not None
+    if found[2] is None:
+        return base
+    label = f"{base.name}[{', '.join(found[2][1:-1].replace(' ', '').split(','))}]"
+    if label not in base.labels:
+        what = "has one component" if base.size == 1 else f"has the components {', '.join(base.labels)}"
+        raise SceneError([f"{key} = {shown(text)}: {base.name} {what}; give one of them"])
+    return component(base, base.labels.index(label))
+
+
+def component(base: Quantity, i: int) -> Quantity:
+    """One component of a quantity."""
+    if base.size == 1:
+        return base
+    inner = base.function
+    return replace(base, name=base.labels[i], labels=(base.labels[i],), function=lambda s, m: inner(s, m)[..., i])
+
+
+def _joined(parts: Sequence[Quantity]) -> Quantity:
+    """Several as one: their components side by side."""
+    if len(parts) == 1:
+        return parts[0]
+
+    def function(samples: Fields, members: Members) -> np.ndarray:
+        return np.moveaxis(np.concatenate([part(samples, members) for part in parts], axis=1), 1, 2)
+
+    fields = tuple(name for name in FIELDS if any(name in part.fields for part in parts))
+    units: Mapping[str, None] = dict.fromkeys(part.unit for part in parts)
+    labels = tuple(label for part in parts for label in part.labels)
+    return Quantity(", ".join(part.name for part in parts), function, ", ".join(units), fields, labels)

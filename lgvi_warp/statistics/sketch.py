@@ -1,0 +1,104 @@
+"""A sketch of sorted values: quantiles of any number of values from a few thousand, with a proven bound on the rank.
+
+A tree of buffers after Munro & Paterson (1980) with the coin flips of Karnin, Lang & Liberty (2016). Two sorted buffers
+whose values stand for w each are merged, and every other value stays, standing for 2 w: which of the two, a coin decides.
+If the first of each pair stays, the count of those up to any number grows by w or not at all, if the second, it falls by
+w or not at all; the half of it, which the coin tells, is put right by `shift`, so that the rank errs by w / 2, up or down
+as the coin fell. Of N values in buffers of s the sum of these bounds is at most N (log2(N / s) + 2) / (4 s), proven for
+every order and any coins; the sum of their squares is at most (N / 2 s)^2, so that the error exceeds t N / 2 s with a
+probability below 2 exp(-t^2 / 2) (Hoeffding 1963).
+The coin of a merge hangs on its place in the tree: so the sketch of a set of blocks has the same bits in whatever order
+they come. Many streams (times, components) of the same number of values share coins and one array.
+Values that do not count are +inf: ranks of the others are as they were.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+
+import numpy as np
+
+from lgvi_warp.statistics.tree import Part
+
+
+def coin(level: int, place: int, sides: int) -> int:
+    """0 to sides - 1, fixed by the place: the same for every run."""
+    digest = hashlib.blake2b(b"%d %d" % (level, place), digest_size=8).digest()
+    return int.from_bytes(digest, "little") % sides
+
+
+def of(x: np.ndarray, members: int, size: int, block: int) -> Part:
+    """A block's sketch: x (k, d, n), filled up to `members` values with +inf, at most `size` of them kept."""
+    k, d, n = x.shape
+    values = np.empty((k, d, max(members, n)), x.dtype)
+    values[..., :n] = x
+    values[..., n:] = np.inf
+    values.sort(axis=2)
+    weight = max(1, values.shape[2] // size)
+    first = coin(-1, block, weight)
+    if weight > 1:
+        values = np.ascontiguousarray(values[..., first::weight])
+    # Of w values one stays: counts change by -first to w - 1 - first.
+    error = 0.5 * (weight - 1)
+    return _part(values, np.full(values.shape[2], weight), error, error**2, error - first)
+
+
+def _part(values: np.ndarray, weights: np.ndarray, error: float, variance: float, shift: float) -> Part:
+    numbers = {"error": error, "variance": variance, "shift": shift}
+    return {"values": values, "weights": weights} | {name: np.array([value]) for name, value in numbers.items()}
+
+
+def merged(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Sorted rows of two arrays of sorted rows: NumPy's stable sort finds the two runs and merges them."""
+    both = np.concatenate([left, right], axis=2)
+    both.sort(axis=2, kind="stable")
+    return both
+
+
+def join(left: Part, right: Part, size: int, place: tuple[int, int]) -> Part:
+    """One sketch of two of equal weight and length."""
+    a, b = left["values"].shape[2], right["values"].shape[2]
+    error, variance, shift = (float(left[key][0] + right[key][0]) for key in ("error", "variance", "shift"))
+    weight = int(left["weights"][0])
+    if a != b or weight != right["weights"][0]:
+        raise ValueError(f"sketches of {a} and {b} values are no neighbours")
+    values = merged(left["values"], right["values"])
+    if a + b > size:
+        first, half = coin(*place, 2), 0.5 * weight
+        values = np.ascontiguousarray(values[..., first::2])
+        return _part(values, np.full(a, 2 * weight), error + half, variance + half**2, shift + half - first * weight)
+    return _part(values, np.full(a + b, weight), error, variance, shift)
+
+
+def together(parts: Sequence[Part]) -> Part:
+    """Sketches of any weights side by side."""
+    values = np.concatenate([part["values"] for part in parts], axis=2)
+    weights = np.concatenate([part["weights"] for part in parts])
+    numbers = (float(sum(part[key][0] for part in parts)) for key in ("error", "variance", "shift"))
+    return _part(values, weights, *numbers)
+
+
+def sorted_values(part: Part) -> tuple[np.ndarray, np.ndarray]:
+    """Values (k, d, m) in order, and their ranks, counted from 0: the middle of those that each stands for, put right."""
+    values, weights = part["values"], part["weights"]
+    if np.all(weights == 1):
+        values = np.sort(values, axis=2, kind="stable")
+        return values, np.broadcast_to(np.arange(values.shape[2], dtype=np.float64), values.shape)
+    order = np.argsort(values, axis=2, kind="stable")
+    stands = weights[order]
+    middles = np.cumsum(stands, axis=2) - 0.5 * (stands + 1) - part["shift"][0]
+    return np.take_along_axis(values, order, axis=2), middles
+
+
+def at_rank(values: np.ndarray, middles: np.ndarray, finite: np.ndarray, rank: np.ndarray) -> np.ndarray:
+    """Values at ranks (k, q, d), linear between those kept, never beyond the finite ones."""
+    k, d = values.shape[:2]
+    found = np.full(rank.shape, np.nan)
+    last = finite.sum(axis=2) - 1
+    for i in range(k):
+        for j in range(d):
+            if last[i, j] >= 0:
+                stop = last[i, j] + 1
+                found[i, :, j] = np.interp(rank[i, :, j], middles[i, j, :stop], values[i, j, :stop])
+    return found

@@ -1,0 +1,98 @@
+"""A run's statistics at the end, as lines of text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from lgvi_warp.statistics.estimate import Estimate, Estimates
+
+
+def table(estimates: Estimates) -> list[str]:
+    """One line for each number: what it is of, its value, its interval, the members that it is of."""
+    found = []
+    for one in estimates.values():
+        unit = "" if one.unit == "1" or one.unit.startswith("products") else f" {one.unit}"
+        members = one.count[0] if one.settings["type"] == "first_passage" else one.count[-1]
+        for label, value, lower, upper in _LINES.get(one.settings["type"], _entries)(one):
+            ends = f"{lower:.5g} to {upper:.5g}" if np.isfinite(lower) or np.isfinite(upper) else "no interval"
+            found.append((label, f"{value:.6g}{unit}", ends, f"{int(members):,} members"))
+    widths = [max((len(row[i]) for row in found), default=0) for i in range(3)]
+    return [
+        "  ".join([*(text.ljust(width) for text, width in zip(row, widths, strict=False)), row[3]]) for row in found
+    ]
+
+
+Line = tuple[str, float, float, float]
+
+
+def _labels(one: Estimate) -> list[str]:
+    """What each component is called, with the kind of statistic before it unless it has a name of its own."""
+    kind = one.settings["type"]
+    if one.name != f"{kind} {', '.join(one.name.split(' ', 1)[1:])}" or len(one.coordinates["component"]) == 1:
+        names = [one.name] if len(one.coordinates["component"]) == 1 else one.coordinates["component"].tolist()
+        return names if len(names) == 1 else [f"{one.name}: {name}" for name in names]
+    return [f"{kind} {name}" for name in one.coordinates["component"]]
+
+
+def _entries(one: Estimate) -> Iterator[Line]:
+    """Each component at the last time."""
+    for i, label in enumerate(_labels(one)):
+        yield label, one.value[-1, i], one.lower[-1, i], one.upper[-1, i]
+
+
+def _quantiles(one: Estimate) -> Iterator[Line]:
+    for i, label in enumerate(_labels(one)):
+        for j, level in enumerate(one.coordinates["level"]):
+            yield f"{label} {level:g}", one.value[-1, j, i], one.lower[-1, j, i], one.upper[-1, j, i]
+
+
+def _covariance(one: Estimate) -> Iterator[Line]:
+    names = one.coordinates["component"]
+    for i, first in enumerate(names):
+        for j, second in enumerate(names[: i + 1] if len(names) <= 3 else [first]):
+            at = (-1, i, j) if len(names) <= 3 else (-1, i, i)
+            yield f"covariance {first}, {second}", one.value[at], one.lower[at], one.upper[at]
+
+
+def _extremes(one: Estimate) -> Iterator[Line]:
+    for i, label in enumerate(_labels(one)):
+        for name in ("minimum", "maximum"):
+            member = int(one[f"{name}_member"][-1, i])
+            yield f"{label}: {name} (member {member})", one[name][-1, i], -np.inf, np.inf
+
+
+def _passage(one: Estimate) -> Iterator[Line]:
+    yield one.name, one.value[-1], one.lower[-1], one.upper[-1]
+    for j, level in enumerate(one.coordinates["level"]):
+        lower, upper = (float(one[f"passage_time_{name}"][j]) for name in ("lower", "upper"))
+        yield f"{one.name}: time [s] of {level:g}", float(one["passage_time"][j]), lower, upper
+
+
+def _attitude(one: Estimate) -> Iterator[Line]:
+    yield f"{one.name}: dispersion [rad]", one["dispersion"][-1], -np.inf, np.inf
+    for i, half in enumerate(one["rotation_half_width"][-1]):
+        yield f"{one.name}: about {'xyz'[i]} [rad]", 0.0, -half, half
+
+
+def _histogram(one: Estimate) -> Iterator[Line]:
+    for i, label in enumerate(_labels(one)):
+        best = int(np.argmax(one["counts"][-1, i]))
+        middle = one.coordinates["bin"][best]
+        yield (
+            f"{label}: fullest bin, at {middle:g}",
+            one.value[-1, i, best],
+            one.lower[-1, i, best],
+            one.upper[-1, i, best],
+        )
+
+
+_LINES: dict[str, Callable[[Estimate], Iterator[Line]]] = {
+    "quantiles": _quantiles,
+    "covariance": _covariance,
+    "extremes": _extremes,
+    "first_passage": _passage,
+    "mean_attitude": _attitude,
+    "histogram": _histogram,
+}

@@ -1,0 +1,159 @@
+"""When a run has members enough: a statistic's interval is as narrow as was asked for."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.errors import Faults, SceneError, closest
+from lgvi_warp.statistics.base import Statistic
+from lgvi_warp.statistics.estimate import Estimate
+from lgvi_warp.statistics.moments import Mean
+from lgvi_warp.statistics.quantity import KNOWN
+
+# Looks are made at every block until this share of the members is a block, then whenever so many came to them.
+GROWTH = 0.05
+
+
+@dataclass(frozen=True)
+class Until:
+    """Run blocks of members until a statistic's interval is narrow enough, the ensemble's members at most.
+
+    statistic: the name of one of the run's statistics, such as "mean position", or one component of it, "mean position[2]";
+    a mean of any quantity is gathered if it is not among them. half_width: in the statistic's unit, above 0; every component
+    and level must keep it. at: sample time [s], by default the end; "all": at every sample time. members: no look before so
+    many (a small sample may look narrower than it is). The run stops at a block's end; looks are made in the order of
+    the blocks, so members and bits do not depend on threads. docs/statistics.md says what stopping does to coverage.
+
+    Raises SceneError naming every fault.
+    """
+
+    statistic: str
+    half_width: float
+    at: Any = None
+    members: int = 1024
+
+    def __post_init__(self) -> None:
+        faults = Faults("until.")
+        if not isinstance(self.statistic, str):
+            faults.add("statistic", self.statistic, "is no name", 'give "mean position[2]"')
+        faults.positive("half_width", self.half_width, "in the unit of the statistic")
+        if self.at is not None and self.at != "all":
+            faults.number("at", self.at, "s", least=0.0)
+        if isinstance(self.members, bool) or not isinstance(self.members, int) or self.members < 2:
+            faults.add("members", self.members, "is no whole number from 2", "give 1024")
+        faults.raise_if_any()
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in a scene file."""
+        defaults = {"at": None, "members": 1024}
+        return {name: value for name, value in vars(self).items() if name not in defaults or value != defaults[name]}
+
+
+def from_dict(given: Any) -> Until:
+    """An Until, or one from a table of a scene file. Raises SceneError."""
+    if isinstance(given, Until):
+        return given
+    faults = Faults()
+    example = 'write [run.until] and statistic = "mean position[2]", half_width = 0.01'
+    if not isinstance(given, dict):
+        faults.add("until", given, "is no table", example)
+    else:
+        faults.keys("until", given, Until.__dataclass_fields__)
+        for name in ("statistic", "half_width"):
+            if name not in given:
+                faults.add(f"until.{name}", "", "is missing", example)
+    faults.raise_if_any()
+    return Until(**given)
+
+
+@dataclass
+class Watch:
+    """An Until at work on a run's statistics: which, and which of its numbers."""
+
+    until: Until
+    statistic: Statistic
+    name: str
+    component: int | None
+    rows: np.ndarray
+    looked: int = 0
+
+    def due(self, members: int) -> bool:
+        """Whether to look, with so many members done."""
+        if members < self.until.members or members < self.looked * (1.0 + GROWTH):
+            return False
+        self.looked = members
+        return True
+
+    def reached(self, estimates: Sequence[Estimate]) -> bool:
+        """Whether what is watched is narrow enough."""
+        return self.widest(estimates) <= self.until.half_width
+
+    def report(self, members: int, estimates: Sequence[Estimate]) -> str:
+        """How it ended, for the user."""
+        widest = self.widest(estimates)
+        word = "reached" if widest <= self.until.half_width else "not reached"
+        asked = f"half width {self.until.half_width:g} of {self.until.statistic}"
+        return f"{asked}: {word} with {members} members, {widest:.3g}"
+
+    def widest(self, estimates: Sequence[Estimate]) -> float:
+        """The largest half width of what is watched; infinite where a number has none."""
+        estimate = next(one for one in estimates if one.name == self.name)
+        half = estimate.half_width
+        dims = estimate.dims["value"]
+        if "time" in dims and half.shape[0] > 1:
+            half = half[self.rows]
+        if self.component is not None and "component" in dims:
+            half = np.take(half, [self.component], axis=dims.index("component"))
+            if "component_2" in dims:
+                half = np.take(half, [self.component], axis=dims.index("component_2"))
+        return float(np.max(np.where(np.isnan(half), np.inf, half)))
+
+
+def watch(until: Until, statistics: Sequence[Statistic], times: np.ndarray) -> Watch:
+    """Find what is to be watched; a Mean that is not among the statistics is made. Raises SceneError."""
+    faults = Faults("until.")
+    rows = np.array([len(times) - 1])
+    if until.at == "all":
+        rows = np.arange(len(times))
+    elif until.at is not None:
+        rows = np.flatnonzero(np.abs(times - until.at) <= 1e-9 * max(1.0, times[-1]))
+        if not len(rows):
+            faults.add("at", until.at, "is no sample time", "give a time at which samples are kept, or leave it out")
+    found = _find(until.statistic, statistics)
+    if found is None:
+        names = [part.key for one in statistics for part in one.parts()]
+        faults.add(
+            "statistic", until.statistic, "is none of the run's statistics", closest(until.statistic, names or KNOWN)
+        )
+    faults.raise_if_any()
+    assert found is not None
+    if found[0].type == "extremes":
+        faults.add("statistic", until.statistic, "has no interval", "watch a quantile")
+    faults.raise_if_any()
+    return Watch(until, *found, rows)
+
+
+def _find(name: str, statistics: Sequence[Statistic]) -> tuple[Statistic, str, int | None] | None:
+    """The statistic that gathers what is called so, the estimate's name, and the component that is meant."""
+    for whole in statistics:
+        for one in whole.parts():
+            if one.key == name:
+                return whole, one.key, None
+            labels = one.quantity.labels
+            for i, label in enumerate(labels):
+                index = label[label.find("[") :] if "[" in label else f"[{i}]"
+                if name in (f"{one.key}{index}", f"{one.type} {label}"):
+                    return whole, one.key, i
+    mean = re.fullmatch(r"mean (.+)", name)
+    if mean is None:
+        return None
+    try:
+        added = Mean(mean[1])
+    except SceneError:
+        return None
+    return added, added.key, None

@@ -1,0 +1,45 @@
+"""A quantity of a block's members at some sample times, with what several statistics need of it made once."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+
+class Values:
+    """x (k, d, n): numbers of n members at k times, float64; good (k, n), or None where all count.
+
+    A member counts at a time if it had not failed by then and each of its numbers is finite. first: index of the
+    block's first member; block: the block's number, and size: the members of a whole block. single: whether the numbers
+    are float32 as they stand, so that what only sorts them may do so.
+    """
+
+    def __init__(self, x: np.ndarray, good: np.ndarray | None = None, first: int = 0, block: int = 0, size: int = 0):
+        self.first, self.block, self.size = first, block, max(size, x.shape[2])
+        self.single = x.dtype == np.float32
+        x = x.astype(np.float64, copy=False)
+        if good is None and np.isfinite(x.sum(axis=2)).all():
+            self.x, self.good = x, None
+            self.count = np.full(len(x), x.shape[2], np.int64)
+        else:
+            finite = np.isfinite(x).all(axis=1)
+            self.good = finite if good is None else finite & good
+            self.x = np.where(self.good[:, None], x, 0.0)
+            self.count = self.good.sum(axis=1)
+
+    def filled(self, value: float) -> np.ndarray:
+        """x with this number where a member does not count."""
+        return self.x if self.good is None else np.where(self.good[:, None], self.x, value)
+
+    @functools.cached_property
+    def mean(self) -> np.ndarray:
+        """(k, d), 0 where no member counts."""
+        return self.x.sum(axis=2) / np.maximum(self.count, 1)[:, None]
+
+    @functools.cached_property
+    def centred(self) -> np.ndarray:
+        """x less its mean, 0 where a member does not count."""
+        if self.good is None:
+            return self.x - self.mean[:, :, None]
+        return np.where(self.good[:, None], self.x - self.mean[:, :, None], 0.0)

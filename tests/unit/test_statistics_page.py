@@ -1,0 +1,46 @@
+"""The snippets of the page on statistics run as they stand."""
+
+import re
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from tests.conftest import ROOT
+
+PAGE = (ROOT / "docs" / "statistics.md").read_text()
+
+
+def snippets(language):
+    """(line, text) of every fenced snippet of a language."""
+    found = re.finditer(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
+    return [pytest.param(one[1], id=f"line {PAGE[: one.start()].count(chr(10)) + 1}") for one in found]
+
+
+@pytest.mark.parametrize("text", snippets("toml"))
+def test_toml(text, tmp_path):
+    (tmp_path / "scene.toml").write_text((ROOT / "examples" / "paper.toml").read_text() + text)
+    assert len(lw.Scene.load(tmp_path / "scene.toml").run.statistics) == 3
+
+
+@pytest.mark.parametrize("text", snippets("python"))
+def test_python(text, scene, capsys):
+    exec(text, {"lw": lw, "np": np, "scene": scene})
+
+
+def test_shapes_are_those_of_the_page(scene):
+    names = {"lw": lw, "np": np, "scene": scene}
+    exec(snippets("python")[0].values[0], names)
+    depth = names["depth"]
+    assert depth.time.shape == depth.count.shape == (6,) and depth.value.shape == depth.lower.shape == (6, 3, 1)
+    assert names["result"].statistics["mean position"].half_width.shape == (6, 3)
+
+
+def test_there_are_snippets():
+    assert len(snippets("toml")) == 1 and len(snippets("python")) == 4
+
+
+def test_every_type_is_on_the_page():
+    from lgvi_warp.statistics import TYPES
+
+    assert all(f"`{name}`" in PAGE and f"`lw.{kind.__name__}`" in PAGE for name, kind in TYPES.items())

@@ -118,13 +118,17 @@ class Faults:
 
     def symmetric(self, key: str, value: Any, unit: str, size: int = 3) -> np.ndarray | None:
         """A symmetric matrix, or the diagonal of one; None after noting a fault."""
-        array = np.asarray(value, dtype=object) if isinstance(value, list | tuple) else np.asarray(value)
+        try:
+            array = np.asarray(value, dtype=object) if isinstance(value, list | tuple) else np.asarray(value)
+        except ValueError:  # lists within lists, of different lengths
+            array = np.zeros(0)
         if array.shape == (size,):
             diagonal = self.finite(key, value, (size,), unit)
             return None if diagonal is None else np.diag(diagonal)
         if array.shape != (size, size):
             wanted = f"{size} numbers or a symmetric {size}x{size} matrix [{unit}]"
-            self.add(key, value, f"has shape {array.shape}", f"give {wanted}")
+            what = f"has shape {array.shape}" if array.size else "is no matrix"
+            self.add(key, value, what, f"give {wanted}")
             return None
         matrix = self.finite(key, value, (size, size), unit)
         if matrix is None:

@@ -135,7 +135,11 @@ def _check_ensemble(settings: EnsembleSettings, scene: Scene | None, parameters:
     if scene is None:
         check_names(settings.vary, parameters)
     else:
-        Ensemble(scene, settings.members, settings.seed, settings.vary)
+        try:
+            Ensemble(scene, settings.members, settings.seed, settings.vary)
+        except MemoryError:
+            text = f"ensemble.members = {settings.members}: do not fit into memory; give less, and run the rest with other seeds"
+            raise SceneError([text]) from None
 
 
 def _build(faults: Faults, name: str, kind: Callable[..., Any], table: Mapping[str, Any]) -> Any:

@@ -38,6 +38,15 @@ def holds_bool(value: Any) -> bool:
     return isinstance(value, bool) or (isinstance(value, list | tuple) and any(holds_bool(item) for item in value))
 
 
+def ragged(value: Any) -> bool:
+    """Whether lists within lists have lengths so different that NumPy makes no array of them, not even of objects."""
+    try:
+        np.asarray(value, dtype=object)
+    except ValueError:
+        return True
+    return False
+
+
 class Faults:
     """Collects faults, so that a user sees all of them at once."""
 
@@ -118,10 +127,10 @@ class Faults:
 
     def symmetric(self, key: str, value: Any, unit: str, size: int = 3) -> np.ndarray | None:
         """A symmetric matrix, or the diagonal of one; None after noting a fault."""
-        try:
-            array = np.asarray(value, dtype=object) if isinstance(value, list | tuple) else np.asarray(value)
-        except ValueError:  # lists within lists, of different lengths
+        if ragged(value):
             array = np.zeros(0)
+        else:
+            array = np.asarray(value, dtype=object) if isinstance(value, list | tuple) else np.asarray(value)
         if array.shape == (size,):
             diagonal = self.finite(key, value, (size,), unit)
             return None if diagonal is None else np.diag(diagonal)

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
-from lgvi_warp.errors import Faults, SceneError, closest
+from lgvi_warp.errors import Faults, SceneError, closest, ragged
 from lgvi_warp.terms.base import Packed, Setting, Term, quantity
 from lgvi_warp.terms.control_fins import ControlFins
 from lgvi_warp.terms.cross_flow import CrossFlow
@@ -124,6 +124,8 @@ def build(where: str, kind: type[AnyTerm], table: Mapping[str, Any]) -> AnyTerm:
     for name, one in fields.items():
         if one.default is dataclasses.MISSING and name not in given:
             faults.add(f"{where}.{name}", "", "is missing", f"give it [{one.metadata.get('unit', '')}]")
+        elif name in given and ragged(given[name]):
+            faults.add(f"{where}.{name}", given[name], "has rows of different lengths", "give rows of one length")
     faults.raise_if_any()
     return kind(**given)
 

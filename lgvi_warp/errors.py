@@ -39,9 +39,9 @@ def holds_bool(value: Any) -> bool:
 
 
 def ragged(value: Any) -> bool:
-    """Whether lists within lists have lengths so different that NumPy makes no array of them, not even of objects."""
+    """Whether lists within lists differ in length, so that NumPy makes no array of them."""
     try:
-        np.asarray(value, dtype=object)
+        np.asarray(value)
     except ValueError:
         return True
     return False

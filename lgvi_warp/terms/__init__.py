@@ -124,10 +124,16 @@ def build(where: str, kind: type[AnyTerm], table: Mapping[str, Any]) -> AnyTerm:
     for name, one in fields.items():
         if one.default is dataclasses.MISSING and name not in given:
             faults.add(f"{where}.{name}", "", "is missing", f"give it [{one.metadata.get('unit', '')}]")
-        elif name in given and ragged(given[name]):
-            faults.add(f"{where}.{name}", given[name], "has rows of different lengths", "give rows of one length")
     faults.raise_if_any()
-    return kind(**given)
+    try:
+        return kind(**given)
+    except SceneError:
+        raise
+    except ValueError:  # what a law makes of its numbers before they are checked
+        for name in (name for name in fields if name in given and ragged(given[name])):
+            faults.add(f"{where}.{name}", given[name], "has rows of different lengths", "give rows of one length")
+        faults.raise_if_any()
+        raise
 
 
 __all__ = [

@@ -22,7 +22,7 @@ from lgvi_kernels.lanes import (
     vec3,
 )
 from lgvi_kernels.method import make_method
-from lgvi_kernels.packet import failures, put, renormalise
+from lgvi_kernels.packet import failures, put, renormalise, turned_too_far
 from lgvi_kernels.state import alarm_struct, inertia_struct, state_struct, struct, view_struct
 from lgvi_kernels.sums import at_rest, choose, settled
 from lgvi_kernels.terms import drag
@@ -143,6 +143,7 @@ def make_advance(spec):
     renormalised, composed, paired = real == wp.float32, spec.composed, spec.paired
     # A packet that chooses its steps goes on with them in the next launch, and waits for no frozen lane.
     paced, compensated = spec.explicit is not None and spec.explicit.adaptive, spec.compensated
+    turned = any(letter[0] == "R" for letter, _ in spec.maps)
     fields, per_sample = spec.fields, sum(spec.sample_fields.values())
 
     @wp.func
@@ -330,6 +331,8 @@ def make_advance(spec):
                     x = watch(x, c, real(h))
             repeat = int(0)
             if wp.static(checked):
+                if wp.static(turned):
+                    x.alarm = turned_too_far(x.alarm)
                 code = failures(x, frozen)
                 if any_positive(code):
                     if n > 1:

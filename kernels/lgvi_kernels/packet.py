@@ -6,6 +6,7 @@ import warp as wp
 
 from lgvi_kernels.lanes import add, dot, mul, ones, positive, sub, vec3  # noqa: F401
 
+STEP_TOO_LARGE = 1
 NON_FINITE = 3
 
 
@@ -57,6 +58,20 @@ def probe(x: Any):
     s = x.R0 + x.R1 + x.R2 + x.b + x.p + x.pi
     s = s - s
     return s.x + s.y + s.z
+
+
+@wp.func
+def turned_too_far(alarm: Any):
+    """STEP_TOO_LARGE where half the angle of a turn, y, reached 1: alarm.size holds the least 1 - y^2, and y^2 after it.
+
+    Beyond, the series of the tangent has no digit of it, and shears by t multiply rounding errors by t^2.
+    """
+    one = ones(alarm.size)
+    zero = one - one
+    over = zero - alarm.size
+    alarm.code = positive(over, one.dtype(wp.static(float(STEP_TOO_LARGE))) * one, alarm.code)
+    alarm.size = positive(over, one + over, zero)
+    return alarm
 
 
 @wp.func

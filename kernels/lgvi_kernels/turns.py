@@ -8,7 +8,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes import add, div, mul, neg, ones, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes import add, div, least, mul, neg, ones, sub, vec3  # noqa: F401
 from lgvi_kernels.sums import carried, moved, twisted, with_turned
 
 
@@ -160,8 +160,10 @@ def tangent(y: Any, third: Any):
     return y + (y * y) * (third * y)
 
 
-def make_turn(axis, pitched, following, compensated):
+def make_turn(axis, pitched, following, compensated, watched=False):
     """R_i: turn about one axis, for `pitched` with a slide along it (a screw); following: the axis of the next turn.
+
+    watched: leaves the least 1 - y^2, y half the angle, in alarm.size (see packet.turned_too_far).
 
     A step is one chain of turns, each waiting for the momentum about its axis from the one before: what decides its time
     is how soon that component is there, so all that need not wait is written apart from what must.
@@ -177,6 +179,8 @@ def make_turn(axis, pitched, following, compensated):
         g = h * component(c.inertia.half_over_J)
         y = g * component(x.pi)
         t = tangent(y, h.dtype(wp.static(1.0 / 3.0)))
+        if wp.static(watched):
+            x.alarm.size = least(x.alarm.size, one - y * y)
         if wp.static(pitched):
             # t and -w are the tangents of half the angles by pi_i and by p_i. With n = t - w, m = 1 + t w,
             # q = 1 + t^2, r = 1 + w^2: m^2 + n^2 = q r, and one division serves n / m, 2 n m / (q r) and the slide's 1 / r.

@@ -240,7 +240,7 @@ def _vehicle_checks(p: Mapping[str, np.ndarray], varied: set[str]) -> dict[str, 
     checks: dict[str, np.ndarray] = {}
     if "vehicle.mass" in p:
         mass = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
-        heavy = np.isfinite(p["vehicle.mass"]) & (p["vehicle.mass"] > 0.0)
+        heavy = np.isfinite(p["vehicle.mass"]) & (p["vehicle.mass"] >= vehicles.LEAST)
         checks |= {
             "vehicle.mass": ~heavy,
             "vehicle.inertia": ~_positive_definite(p["vehicle.inertia"]),
@@ -297,7 +297,7 @@ def check_names(vary: Mapping[str, Distribution], parameters: Sequence[str]) -> 
 def _explicit_parameter(faults: Faults, key: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     array = _floats(faults, key, value)
     if key in MATRICES and array.shape == shape[:2]:
-        return array[:, :, None] * np.eye(shape[1])
+        return np.where(np.eye(shape[1], dtype=bool), array[:, :, None], 0.0)
     if array.shape != shape:
         also = f" or {shape[:2]}" if key in MATRICES else ""
         faults.add(key, value, f"has shape {array.shape}", f"give an array of shape {shape}{also}")
@@ -310,4 +310,4 @@ def _positive_definite(matrices: np.ndarray) -> np.ndarray:
     """Which symmetric matrices (n, d, d) are positive definite; False where a number is not finite."""
     finite = np.isfinite(matrices).all(axis=(1, 2))
     safe = np.where(finite[:, None, None], matrices, np.eye(matrices.shape[-1]))
-    return np.asarray(finite & (np.linalg.eigvalsh(safe)[:, 0] > 0.0))
+    return np.asarray(finite & (np.linalg.eigvalsh(safe)[:, 0] >= vehicles.LEAST))

@@ -34,6 +34,8 @@ UNITS = {
     "center_of_gravity": "m",
     "center_of_buoyancy": "m",
 }
+# The least mass or inertia: what is smaller has no inverse in float64.
+LEAST = float(np.finfo(np.float64).tiny)
 SYMMETRIC = ("added_mass", "inertia", "rigid_body_mass_matrix", "added_mass_matrix")
 
 
@@ -95,9 +97,9 @@ class Vehicle:
         given = (0.0, 0.0, 0.0) if self.added_mass is None else self.added_mass
         added = faults.symmetric("added_mass", given, "kg")
         inertia = None if self.inertia is None else faults.symmetric("inertia", self.inertia, "kg m2")
-        if inertia is not None and np.linalg.eigvalsh(inertia)[0] <= 0.0:
+        if inertia is not None and np.linalg.eigvalsh(inertia)[0] < LEAST:
             faults.add("inertia", self.inertia, "is not positive definite", "give principal inertias above 0 [kg m2]")
-        if mass is not None and added is not None and np.linalg.eigvalsh(mass * np.eye(3) + added)[0] <= 0.0:
+        if mass is not None and added is not None and np.linalg.eigvalsh(mass * np.eye(3) + added)[0] < LEAST:
             faults.add("added_mass", given, "with the mass is not positive definite", SIGN)
         warnings = unusual("inertia", inertia) if inertia is not None else ()
         return {"mass": mass, "added_mass": added, "inertia": inertia, "warnings": warnings}
@@ -181,7 +183,7 @@ SIGN = "added mass is positive here: minus Fossen's X_udot, Y_vdot, Z_wdot ..."
 
 
 def _definite(matrix: np.ndarray) -> bool:
-    return bool(np.linalg.eigvalsh(matrix)[0] > 0.0)
+    return bool(np.linalg.eigvalsh(matrix)[0] >= LEAST)
 
 
 def compact(matrix: np.ndarray) -> list[Any]:

@@ -22,7 +22,7 @@ def healthy(n, dragged=False, laws=()):
     """n different members, in many packets of any width."""
     states = random_states(7, n, 0.5, 0.5)
     if dragged:
-        group = cases.Group("", H, STEPS, (cases.Case("", net=0.3, Br=(0.0, 0.0, -0.5), linear=(0.1,) * 6, quadratic=(0.2,) * 6),), True)
+        group = cases.Group("", H, STEPS, (cases.Case("", net=0.3, Br=(0.0, 0.0, -0.5), linear=(1e-3,) * 6, quadratic=(1e-4,) * 6),), True)
         one = cases.ensemble(group)
         shared = {name: np.repeat(value, n, axis=0) for name, value in one.parameters(0, 1).items() if not np.ndim(value) == 0}
         shared = {name: shared[name] for name in one._explicit if name in shared}
@@ -61,10 +61,14 @@ def with_sick(fleet, parameters, sick):
                 states["angular_velocity"][i] = 1e4
             case 3:
                 states["velocity"][i] = 1e36
-            case 4:  # the Munk moment speeds it up until a step is too large
-                states["velocity"][i] = (0.0, 40.0 + k % 7, 30.0)
+            case 4:  # the Munk oscillation at h w = 3.4: what is small grows step by step until a step is too large
+                states["velocity"][i] = (1e-6, 1e-7 * (k % 7), 35.0)
+                states["angular_velocity"][i] = 0.0
     return lw.Ensemble.from_states(fleet.scene, *states.values(), parameters)
 
+
+# Methods of order 2, for which h w = 3.4 is unstable; higher ones may pass, and explicit ones know no step too large.
+LOW = ("psi_s", "psi_x", "psi", "psi_1", "psi_w")
 
 SETTINGS = [
     ("psi_s", {"dragged": True}, ()),
@@ -97,11 +101,10 @@ def test_not_one_bit(method, scene, dtype):
 
     reference, found = run(fleet), run(with_sick(fleet, parameters, sick))
     assert (np.asarray(reference.status) == Status.OK).all()
-    # Explicit methods know no step that is too large: what spins too fast for them need not fail.
     failed = np.asarray(found.status) != Status.OK
     assert failed[~sick].sum() == 0 and failed[sick].mean() > 0.5
-    assert method in ("rk8", "rkmk4") or failed[sick].all()
-    assert (np.asarray(found.failure_time)[failed] > H).any() or method in ("rk8", "rkmk4")
+    if method in LOW:
+        assert failed[sick].all() and (found.failure_time[failed] > H).any()
     for name in FIELDS:
         assert getattr(reference, name)[:, ~sick].tobytes() == getattr(found, name)[:, ~sick].tobytes()
 

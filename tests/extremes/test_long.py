@@ -171,9 +171,8 @@ def test_many_steps_of_a_free_spheroid(steps, dtype):
     orthogonal = np.abs(np.swapaxes(Q, -1, -2) @ Q - np.eye(3)).max()
     E, L = result.energy, invariants.angular_momentum(result)
     drift = np.abs(E / E[0] - 1.0).max(), np.abs(L - L[0]).max() / np.linalg.norm(L[0, 0])
-    # Two products a step, each rounding to either side: a walk of sqrt(2 steps) units, ten deviations of three entries; or,
-    # if a rounding has a mean (the same few numbers come again), up to 2 steps of it: 0.1 units is allowed.
-    walk = unit * (30.0 * np.sqrt(2.0 * steps) + 0.2 * steps)
+    # Two products a step, each rounding to either side: a walk of sqrt(2 steps) units, ten deviations of three entries.
+    walk = 30.0 * unit * np.sqrt(2.0 * steps)
     if dtype == "float64":
         # Every product of R is also an error of phase, and one of pi a rate of it: sqrt(steps^3 / 3) in a random walk.
         phase = unit * h * np.sqrt(steps / 3.0) * steps * 3.0 + 2.0 * walk

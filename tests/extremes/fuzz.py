@@ -1,10 +1,12 @@
 """Broken scene files: every one is accepted, or refused with SceneError naming a key; and never anything else.
 
-python -m tests.extremes.fuzz KIND FIRST STOP writes one line of JSON per case, so that the last line tells which case hung
-or killed the process. Kinds: "files" (bytes and tokens of scene files), "set" (--set of the command line).
+python -m tests.extremes.fuzz KIND FIRST STOP KERNELS writes one line of JSON per case, so that the last line tells which
+case hung or killed the process. Kinds: "files" (bytes and tokens of scene files), "set" (--set of the command line).
+KERNELS: accepted scenes are run for two steps if they need the paper's kernel or one of so many others: each takes seconds.
 """
 
 import faulthandler
+import functools
 import json
 import os
 import re
@@ -12,6 +14,7 @@ import resource
 import subprocess
 import sys
 import tempfile
+import traceback
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +30,8 @@ ROOT = Path(__file__).parents[2]
 SECONDS = 60
 # What a case may take in memory; a request beyond it raises MemoryError, which no scene file may.
 BYTES = 8 << 30
-# Accepted scenes of so many kernels are run; kernels take seconds to compile.
-KERNELS = 3
+# Scenes with more members are read only, with more than the second number planned only.
+MOST_PLANNED, MOST_RUN = 1_000_000, 5000
 
 NUMBERS = """0 -0.0 1 -1 2 3.5 nan inf -inf 1e308 -1e308 1e-308 5e-324 1e400 1e38 1e-38 9223372036854775808 -9223372036854775809
 1e5 1e-9 0x7fffffff 1_000 1__0 1000000000000000000000000000000 true false "" "x" 'nan' [] {} [[]] [0.0] [1,2,3] [1.0,true,2.0]
@@ -43,6 +46,7 @@ method step duration save_every dtype terms events type name rigid_body_mass_mat
 controller source drag tether current surface floor box depth lower upper [[ ]] [ ] { } = , . " ' # \\n""".split()
 
 
+@functools.cache
 def sources():
     """The texts that are broken: the examples, the vehicles, and one scene for each term, all terms and all events."""
     files = sorted([*(ROOT / "examples").glob("*.toml"), *(ROOT / "lgvi_warp" / "vehicles").glob("*.toml")])
@@ -124,7 +128,7 @@ def mutated_tokens(rng, text):
 
 
 def case_of_file(seed):
-    """The bytes of this case; every tenth is a file that nothing was done to but one number."""
+    """The bytes of this case."""
     rng = np.random.default_rng([3, seed])
     texts = sources()
     text = pick(rng, texts)
@@ -201,46 +205,46 @@ def run_two_steps(plan):
     return ""
 
 
-def work(kind, first, stop):
+def judged_file(seed):
+    """What becomes of a broken file."""
+    data = case_of_file(seed)
+    with tempfile.NamedTemporaryFile(suffix=".toml") as file:
+        Path(file.name).write_bytes(data)
+        return judged(lambda: lw.Scene.load(file.name), data.decode("utf-8", "replace"))
+
+
+def judged_set(seed):
+    """What becomes of broken --set arguments."""
+    chosen = cli.parser().parse_args(case_of_set(seed))
+    return judged(lambda: lw.Scene.load(chosen.scene, cli.overrides(chosen)), " ".join(chosen.set))
+
+
+def work(kind, first, stop, most):
     """Judge these cases, a line of JSON for each."""
     resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
-    kernels = set()
+    kernels = {make_plan(lw.Ensemble.from_scene(lw.Scene.load(ROOT / "examples" / "paper.toml"))).spec}
     for seed in range(first, stop):
         faulthandler.dump_traceback_later(SECONDS, exit=True)
         print(json.dumps([seed, "begun", ""]), flush=True)
-        outcome, detail = "", ""
         try:
-            if kind == "files":
-                data = case_of_file(seed)
-                with tempfile.NamedTemporaryFile(suffix=".toml") as file:
-                    Path(file.name).write_bytes(data)
-                    outcome, detail, scene = judged(lambda: lw.Scene.load(file.name), data.decode("utf-8", "replace"))  # noqa: B023
-            else:
-                chosen = cli.parser().parse_args(case_of_set(seed))
-                outcome, detail, scene = judged(
-                    lambda: lw.Scene.load(chosen.scene, cli.overrides(chosen)), " ".join(chosen.set)  # noqa: B023
-                )
-            if scene is not None and lw.Ensemble.from_scene(scene).members <= 1_000_000:
-                plan = planned(scene)
-                if plan is not None and (plan.spec in kernels or len(kernels) < KERNELS):
-                    if plan.ensemble.members <= 5000:
-                        kernels.add(plan.spec)
-                        fault = run_two_steps(plan)
-                        outcome, detail = ("wrong result", fault) if fault else ("ran", "")
+            outcome, detail, scene = judged_file(seed) if kind == "files" else judged_set(seed)
+            plan = None if scene is None or lw.Ensemble.from_scene(scene).members > MOST_PLANNED else planned(scene)
+            if plan is not None and plan.ensemble.members <= MOST_RUN and (plan.spec in kernels or len(kernels) <= most):
+                kernels.add(plan.spec)
+                fault = run_two_steps(plan)
+                outcome, detail = ("wrong result", fault) if fault else ("ran", "")
         except BaseException as error:  # every kind is what is looked for
-            import traceback
-
             where = traceback.extract_tb(error.__traceback__)[-1]
             outcome, detail = type(error).__name__, f"{error} at {where.filename}:{where.lineno}"[-600:]
         print(json.dumps([seed, outcome, detail[:600]]), flush=True)
     faulthandler.cancel_dump_traceback_later()
 
 
-def outcomes(kind, first, stop):
+def outcomes(kind, first, stop, most):
     """Seed -> (outcome, detail) of these cases, judged in a process of its own; a hang or a crash is one too, and the rest goes on."""
     found = {}
     while first < stop:
-        command = [sys.executable, "-m", "tests.extremes.fuzz", kind, str(first), str(stop)]
+        command = [sys.executable, "-m", "tests.extremes.fuzz", kind, str(first), str(stop), str(most)]
         environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "kernels")])}
         done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
         for line in done.stdout.splitlines():
@@ -257,4 +261,4 @@ def outcomes(kind, first, stop):
 GOOD = ("accepted", "refused", "ran")
 
 if __name__ == "__main__":
-    work(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))
+    work(sys.argv[1], *(int(number) for number in sys.argv[2:]))

@@ -53,12 +53,11 @@ class Case:
 class Group:
     """Cases that one kernel advances together, with this step [s] and so many steps."""
 
-    name: str
+    title: str
     h: float
     steps: int
     cases: tuple
     dragged: bool = False
-    about: str = ""
 
 
 def array(cases, name):
@@ -134,7 +133,9 @@ def turning():
     for x in (1e-12, 1e-9, 1e-6, 1e-3, 0.1, 0.5, 1.0, 1.5, 1.9, 1.9999, 2.001, np.pi, 3.99, 4.01, 100.0, 1e6, 1e12):
         status = (OK,) if x < 2.0 else BEYOND if x < 4.0 else (TOO_LARGE,)
         for i in range(3):
-            cases.append(Case(f"spin about axis {i + 1}, h Om = {x:.5g}", Om=x / h * axes[i], status=status, aligned=True))
+            cases.append(
+                Case(f"spin about axis {i + 1}, h Om = {x:.5g}", Om=x / h * axes[i], status=status, aligned=True)
+            )
     for x in (1e-12, 1e-6, 1e-3, 0.1, 0.5, 1.0):
         cases.append(Case(f"tumbling, h Om = {x:g}", Om=oblique(x / h), nu=oblique(0.1)))
     for x in (5.0, 1e3, 1e9):
@@ -149,31 +150,54 @@ def turning():
         for x in (1e-3, 0.1, 0.5, 1.5):
             mild = x * x * r <= 1.0
             status = (OK,) if mild else SLENDER
-            cases.append(Case(f"rod, J = (1/{r:g}, 1, 1), h Om = {x:g}", J=(1.0 / r, 1.0, 1.0), Om=oblique(x / h), status=status))
+            cases.append(
+                Case(f"rod, J = (1/{r:g}, 1, 1), h Om = {x:g}", J=(1.0 / r, 1.0, 1.0), Om=oblique(x / h), status=status)
+            )
         rod = Case(f"rod, J = (1/{r:g}, 1, 1), spun about its length", J=(1.0 / r, 1.0, 1.0), Om=(10.0, 1e-3, 1e-3))
         cases += [rod, Case(f"J = (1/{r:g}, 1/{r:g}, 1): no body, h Om = 0.5", J=(1.0 / r, 1.0 / r, 1.0), Om=oblique(5.0),
                             status=FLAGGED | ({"psi_s": (OK, NOT_CONVERGED)} if r < 1e3 else {}))]  # fmt: skip
     for e in (0.0, 1e-12, 1e-9, 1e-6):
-        cases.append(Case(f"sphere, inertias {e:g} apart, h Om = 0.5", J=(1.0, 1.0 + e, 1.0 + 2.0 * e), Om=oblique(5.0)))
+        cases.append(
+            Case(f"sphere, inertias {e:g} apart, h Om = 0.5", J=(1.0, 1.0 + e, 1.0 + 2.0 * e), Om=oblique(5.0))
+        )
     for e in (0.0, 1e-12, 1e-6):
-        cases.append(Case(f"plate, J1 + J2 = (1 + {e:g}) J3, h Om = 0.5", J=(1.0, 1.5, 2.5 / (1.0 + e)), Om=oblique(5.0)))
+        cases.append(
+            Case(f"plate, J1 + J2 = (1 + {e:g}) J3, h Om = 0.5", J=(1.0, 1.5, 2.5 / (1.0 + e)), Om=oblique(5.0))
+        )
     for m in (1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9):
         size = (m / 1000.0) ** (1.0 / 3.0)
         J, M = m * size**2 * np.array([0.2, 0.3, 0.4]), m * np.array([1.0, 1.2, 1.5])
         cases.append(Case(f"mass {m:g} kg", M, J, nu=oblique(0.5 * size), Om=oblique(1.0), b=(size, 0.0, -size)))
     for a in (0.0, 1.0, 10.0, 100.0):
-        cases.append(Case(f"added mass {a:g} times the mass, along one axis", (10.0, 10.0, 10.0 + 10.0 * a), nu=oblique(0.1), Om=oblique(0.5)))
+        cases.append(
+            Case(
+                f"added mass {a:g} times the mass, along one axis",
+                (10.0, 10.0, 10.0 + 10.0 * a),
+                nu=oblique(0.1),
+                Om=oblique(0.5),
+            )
+        )
     for a in (1.0, 100.0):
-        cases.append(Case(f"added mass {a:g} times the mass, all axes", (10.0 + 10.0 * a,) * 3, nu=oblique(0.1), Om=oblique(0.5)))
+        cases.append(
+            Case(f"added mass {a:g} times the mass, all axes", (10.0 + 10.0 * a,) * 3, nu=oblique(0.1), Om=oblique(0.5))
+        )
     for hw in (0.1, 0.5, 1.0, 1.5, 2.0, 2.2, 2.5, 3.0, 5.0):
         # Broadside motion is stable: w^2 = |p|^2 (1/M_min - 1/M_max) / J_min, here 0.3 rad from it.
         p = hw / h / np.sqrt(1.0 - 1.0 / 100.0)
         nu = p * np.array([np.sin(0.3), 0.01 * np.cos(0.3), 0.0])
         status = (OK,) if hw <= 2.0 else (TOO_LARGE,)
-        cases.append(Case(f"Munk oscillation of 0.3 rad, M = (1, 100, 100), h w = {hw:g}", (1.0, 100.0, 100.0), (1.0,) * 3, nu=nu, status=status))
+        cases.append(
+            Case(
+                f"Munk oscillation of 0.3 rad, M = (1, 100, 100), h w = {hw:g}",
+                (1.0, 100.0, 100.0),
+                (1.0,) * 3,
+                nu=nu,
+                status=status,
+            )
+        )
     for r in (1e3, 1e7, 1e12):
         cases.append(Case(f"{r:g} m from the origin", b=(r, -r, r), nu=oblique(0.5), Om=oblique(0.5)))
-    return Group("free", h, 60, tuple(cases), about="Free bodies, no force at all.")
+    return Group("Free bodies", h, 60, tuple(cases))
 
 
 def forced():
@@ -188,7 +212,14 @@ def forced():
         cases.append(Case(f"quadratic drag, h q |v| / I = {k:g}", nu=nu, Om=Om, quadratic=k / h * J6 / speed))
         one = np.where(np.arange(6) == 1, k / h * J6, 0.0)
         cases.append(Case(f"linear drag on one axis, h l / I = {k:g}", nu=nu, Om=Om, linear=one))
-        net = Case(f"sinking, linear and quadratic drag, h l / I = {k:g}", nu=nu, Om=Om, net=3.0, linear=k / h * J6, quadratic=k / h * J6)
+        net = Case(
+            f"sinking, linear and quadratic drag, h l / I = {k:g}",
+            nu=nu,
+            Om=Om,
+            net=3.0,
+            linear=k / h * J6,
+            quadratic=k / h * J6,
+        )
         cases.append(net)
     for net in (0.0, 1e-9, -1e-9, 5.0, -5.0):
         word = "neutral" if net == 0.0 else "sinking" if net > 0.0 else "rising"
@@ -209,14 +240,16 @@ def forced():
                           linear=0.1 * scale, quadratic=0.1 * scale))  # fmt: skip
     cases.append(Case("no gravity", gravity=0.0, nu=nu, Om=Om, linear=0.1 * J6))
     cases.append(Case("no gravity, buoyancy of 5 N", gravity=0.0, net=-5.0, Br=(0.0, 0.0, -0.5), nu=nu, Om=Om))
-    return Group("forced", h, 60, tuple(cases), dragged=True, about="Weight, restoring moment and drag along the axes.")
+    return Group("Weight, restoring moment and drag", h, 60, tuple(cases), dragged=True)
 
 
 def steps_of(h):
     """The same few bodies with a step from a nanosecond to ten seconds: h Om = 5e-11 to 0.5."""
     cases = [Case(f"h = {h:g} s", b=(1.0, -2.0, 3.0), nu=oblique(0.02), Om=oblique(0.05))]
-    cases += [Case(f"h = {h:g} s, h Om = {x:g}", nu=oblique(0.1 / h), Om=oblique(x / h), J=100.0 * J0) for x in (0.1, 1.0)]
-    return Group("free", h, 60, tuple(cases), about=f"Steps of {h:g} s.")
+    cases += [
+        Case(f"h = {h:g} s, h Om = {x:g}", nu=oblique(0.1 / h), Om=oblique(x / h), J=100.0 * J0) for x in (0.1, 1.0)
+    ]
+    return Group("Short and long steps", h, 60, tuple(cases))
 
 
 GROUPS = {make.__name__: make for make in (turning, forced)}
@@ -242,7 +275,7 @@ ROUNDINGS = 12
 CONSTANTS = 4
 
 
-def measured(group, method, dtype, truth=None):
+def measured(group, method, dtype, truth=None, solver="quartic"):
     """Run a group and compare it with the same map in extended precision.
 
     Bound: a step adds ROUNDINGS units of relative error and what its solves of (24) leave, the tolerance each, with either
@@ -251,7 +284,7 @@ def measured(group, method, dtype, truth=None):
     """
     body, x0 = twin(group)
     x, growth, far, way = truth or extended_run(group, method)
-    result = lw.solve(ensemble(group), method, h=group.h, t1=group.h * group.steps, dtype=dtype)
+    result = lw.solve(ensemble(group), lw.Method(method, solver), h=group.h, t1=group.h * group.steps, dtype=dtype)
     M, J = body.M.astype(float), body.J.astype(float)
     R, p, pi = result.attitude[-1], M * result.velocity[-1], J * result.angular_velocity[-1]
     real = extended.REAL

@@ -184,7 +184,9 @@ def with_growth(x, body, h, steps, method="psi_s", aligned=False):
     """The states at the end, how much a relative error of any step grows at most (n,), and the longest |b| and way (n,)."""
     rng, n = np.random.default_rng(2), len(x.b)
     many = repeated(x, n, DIRECTIONS)
-    y = perturbed(many, rng, np.broadcast_to(aligned, n * DIRECTIONS) if np.ndim(aligned) == 0 else np.tile(aligned, DIRECTIONS))
+    y = perturbed(
+        many, rng, np.broadcast_to(aligned, n * DIRECTIONS) if np.ndim(aligned) == 0 else np.tile(aligned, DIRECTIONS)
+    )
     bodies = repeated(body, n, DIRECTIONS)
     growth, far, way = np.ones(n), np.abs(x.b).max(axis=1), np.zeros(n)
     for k in range(steps):

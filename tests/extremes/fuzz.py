@@ -51,18 +51,22 @@ def sources():
     """The texts that are broken: the examples, the vehicles, and one scene for each term, all terms and all events."""
     files = sorted([*(ROOT / "examples").glob("*.toml"), *(ROOT / "lgvi_warp" / "vehicles").glob("*.toml")])
     texts = [path.read_text(encoding="utf-8") for path in files]
-    start = '[start]\nposition = [0.0, 0.0, 10.0]\neuler_deg = [1.0, 2.0, 3.0]\nvelocity = [0.5, 0.1, 0.0]\n'
-    small = "[vehicle]\nmass = 30.0\nadded_mass = [1.0, 30.0, 30.0]\ninertia = [0.2, 3.5, 3.5]\nbuoyancy = 296.0\n" + start
+    start = "[start]\nposition = [0.0, 0.0, 10.0]\neuler_deg = [1.0, 2.0, 3.0]\nvelocity = [0.5, 0.1, 0.0]\n"
+    small = (
+        "[vehicle]\nmass = 30.0\nadded_mass = [1.0, 30.0, 30.0]\ninertia = [0.2, 3.5, 3.5]\nbuoyancy = 296.0\n" + start
+    )
     run = '[run]\nmethod = "psi_s"\nstep = 0.05\nduration = 0.5\nsave_every = 0.1\n'
     laws = []
     for page in sorted((ROOT / "docs" / "terms").glob("*.md")):
-        laws += [block for block in re.findall(r"```toml\n(.*?)```", page.read_text(), re.DOTALL) if "[[terms]]" in block]
+        laws += [
+            block for block in re.findall(r"```toml\n(.*?)```", page.read_text(), re.DOTALL) if "[[terms]]" in block
+        ]
     stops = "".join(
         f"[[events]]\n{text}\n"
         for text in ('type = "surface"', 'type = "floor"\ndepth = 50.0', 'type = "time"\nat = 3.0',
                      'type = "box"\nlower = [-9.0, -9.0, -9.0]\nupper = [9.0, 9.0, 90.0]')
     )  # fmt: skip
-    named = '[vehicle]\nname = "remus_100"\n' + start + run + '[ensemble]\nmembers = 20\nseed = 3\n[ensemble.vary]\n'
+    named = '[vehicle]\nname = "remus_100"\n' + start + run + "[ensemble]\nmembers = 20\nseed = 3\n[ensemble.vary]\n"
     named += '"start.velocity" = { truncated_normal = { std = 0.1, width = 2.0 } }\n"drag.quadratic" = { lognormal = { sigma = 0.1 } }\n'
     matrices = "[vehicle]\n" + "".join(
         f"{name} = {np.diag(diagonal).tolist()}\n"
@@ -229,7 +233,11 @@ def work(kind, first, stop, most):
         try:
             outcome, detail, scene = judged_file(seed) if kind == "files" else judged_set(seed)
             plan = None if scene is None or lw.Ensemble.from_scene(scene).members > MOST_PLANNED else planned(scene)
-            if plan is not None and plan.ensemble.members <= MOST_RUN and (plan.spec in kernels or len(kernels) <= most):
+            if (
+                plan is not None
+                and plan.ensemble.members <= MOST_RUN
+                and (plan.spec in kernels or len(kernels) <= most)
+            ):
                 kernels.add(plan.spec)
                 fault = run_two_steps(plan)
                 outcome, detail = ("wrong result", fault) if fault else ("ran", "")

@@ -42,3 +42,14 @@ def test_accurate_or_flagged(name, method, dtype):
         elif status == OK and dtype == "float64" and len(case.expected(method)) == 1 and found.bound[i] > TELLING:
             faults.append(f"{case.name}: a bound of {found.bound[i]:.2g} says nothing")
     assert not faults, "\n".join(faults)
+
+
+@pytest.mark.parametrize("dtype", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
+def test_cayley_solves_what_the_quartic_cannot(dtype):
+    # Slender bodies at large steps: the quartic's root is lost among its fourth powers, Cayley's parameter is not.
+    group = GROUPS["turning"]()
+    quartic = outcome("turning", "psi_s", dtype)[1]
+    cayley = cases.measured(group, "psi_s", dtype, truth("turning", "psi_s"), "cayley")
+    lost = quartic.status == Status.NOT_CONVERGED
+    assert lost.sum() >= 5 and (cayley.status[lost] == OK).all()
+    assert (cayley.error[lost] <= cayley.bound[lost]).all()

@@ -13,7 +13,12 @@ PROCESSES = 2
 
 @pytest.mark.parametrize(
     ("kind", "cases", "kernels"),
-    [("files", 500, 0), ("set", 200, 0), pytest.param("files", 10_000, 4, marks=SLOW), pytest.param("set", 4000, 4, marks=SLOW)],
+    [
+        ("files", 500, 0),
+        ("set", 200, 0),
+        pytest.param("files", 10_000, 4, marks=SLOW),
+        pytest.param("set", 4000, 4, marks=SLOW),
+    ],
 )
 def test_broken_input(kind, cases, kernels):
     # The long run draws cases of its own, beyond those of the short one.

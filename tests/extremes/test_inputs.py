@@ -70,7 +70,9 @@ def test_huge_states(dtype):
     assert (np.asarray(result.status[2:]) != Status.OK).all()
 
 
-@pytest.mark.parametrize("name", ["vehicle.mass", "vehicle.inertia", "vehicle.added_mass", "vehicle.buoyancy", "environment.gravity"])
+@pytest.mark.parametrize(
+    "name", ["vehicle.mass", "vehicle.inertia", "vehicle.added_mass", "vehicle.buoyancy", "environment.gravity"]
+)
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_parameters_that_are_not_finite_are_refused(name, bad):
     states = random_states(5, 3, 0.5, 0.5)

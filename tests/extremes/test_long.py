@@ -53,15 +53,23 @@ def test_energy_never_grows_by_a_drag_matrix(dtype):
     I6 = np.diag([10.0] * 3 + [1.0] * 3)
     D = np.sqrt(I6) @ D @ np.sqrt(I6)
     m = len(D)
-    scene = lw.Scene(lw.Vehicle(10.0, (1.0,) * 3, buoyancy=98.0), lw.Environment(9.8), [lw.DragMatrix(linear=np.eye(6), quadratic=np.eye(6))])
+    scene = lw.Scene(
+        lw.Vehicle(10.0, (1.0,) * 3, buoyancy=98.0),
+        lw.Environment(9.8),
+        [lw.DragMatrix(linear=np.eye(6), quadratic=np.eye(6))],
+    )
     b, R, nu, Om = random_states(3, 2 * m, 1.0, 0.5)
     quadratic = np.zeros((2 * m, 6, 6))
     quadratic[m:] = np.concatenate([k / h * I6 for k in KAPPAS]).reshape(-1, 6, 6).repeat(n, axis=0)
     linear = np.concatenate([D, np.zeros((m, 6, 6))])
-    fleet = lw.Ensemble.from_states(scene, b, R, nu, Om, {"drag_matrix.linear": linear, "drag_matrix.quadratic": quadratic})
+    fleet = lw.Ensemble.from_states(
+        scene, b, R, nu, Om, {"drag_matrix.linear": linear, "drag_matrix.quadratic": quadratic}
+    )
     result = lw.solve(fleet, h=h, t1=20.0, save=lw.SaveAt(every=h), dtype=dtype)
     assert (np.asarray(result.status) == Status.OK).all()
-    energy = 5.0 * (result.velocity.astype(float) ** 2).sum(-1) + 0.5 * (result.angular_velocity.astype(float) ** 2).sum(-1)
+    energy = 5.0 * (result.velocity.astype(float) ** 2).sum(-1) + 0.5 * (
+        result.angular_velocity.astype(float) ** 2
+    ).sum(-1)
     # What a solve of 6 equations rounds grows with the size of its right side, the energy of the step before.
     assert rising(np.maximum(energy, 1e-30 * energy[0]), UNIT[dtype]) < 400.0
 
@@ -70,7 +78,11 @@ def test_energy_never_grows_by_a_drag_matrix(dtype):
 def test_a_linear_drag_matrix_step(kappa):
     # Two stages with gamma = 1 - 1/sqrt(2) on v' = -z v / h: v <- v (1 + (2 gamma - 1) z) / (1 + gamma z)^2.
     h, M = 0.1, 10.0
-    scene = lw.Scene(lw.Vehicle(M, (1.0,) * 3, buoyancy=98.0), lw.Environment(9.8), [lw.DragMatrix(linear=np.eye(6), quadratic=np.eye(6))])
+    scene = lw.Scene(
+        lw.Vehicle(M, (1.0,) * 3, buoyancy=98.0),
+        lw.Environment(9.8),
+        [lw.DragMatrix(linear=np.eye(6), quadratic=np.eye(6))],
+    )
     fleet = lw.Ensemble.from_states(scene, [[0.0] * 3], [np.eye(3)], [[2.0, 0.0, 0.0]], [[0.0] * 3],
                                     {"drag_matrix.linear": [kappa * M / h * np.eye(6)], "drag_matrix.quadratic": np.zeros((1, 6, 6))})  # fmt: skip
     u = lw.solve(fleet, h=h, t1=h).velocity[-1, 0, 0]

@@ -22,9 +22,17 @@ def healthy(n, dragged=False, laws=()):
     """n different members, in many packets of any width."""
     states = random_states(7, n, 0.5, 0.5)
     if dragged:
-        group = cases.Group("", H, STEPS, (cases.Case("", net=0.3, Br=(0.0, 0.0, -0.5), linear=(1e-3,) * 6, quadratic=(1e-4,) * 6),), True)
+        group = cases.Group(
+            "",
+            H,
+            STEPS,
+            (cases.Case("", net=0.3, Br=(0.0, 0.0, -0.5), linear=(1e-3,) * 6, quadratic=(1e-4,) * 6),),
+            True,
+        )
         one = cases.ensemble(group)
-        shared = {name: np.repeat(value, n, axis=0) for name, value in one.parameters(0, 1).items() if not np.ndim(value) == 0}
+        shared = {
+            name: np.repeat(value, n, axis=0) for name, value in one.parameters(0, 1).items() if not np.ndim(value) == 0
+        }
         shared = {name: shared[name] for name in one._explicit if name in shared}
         return lw.Ensemble.from_states(one.scene, *states, shared), shared
     scene = lw.Scene(GENERAL.vehicle, GENERAL.environment, terms=laws)
@@ -90,7 +98,9 @@ SETTINGS = [
 
 
 @pytest.mark.parametrize("dtype", ["float64", pytest.param("float32", marks=SLOW)])
-@pytest.mark.parametrize(("method", "scene"), [pytest.param(m, s, marks=k, id=f"{m}-{'-'.join(s) or 'free'}") for m, s, k in SETTINGS])
+@pytest.mark.parametrize(
+    ("method", "scene"), [pytest.param(m, s, marks=k, id=f"{m}-{'-'.join(s) or 'free'}") for m, s, k in SETTINGS]
+)
 def test_not_one_bit(method, scene, dtype):
     n = 3 * WIDEST * WIDEST
     fleet, parameters = healthy(n, **scene)

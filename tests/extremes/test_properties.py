@@ -31,7 +31,9 @@ HARD = HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_
 
 def searched(examples):
     """Hypothesis's settings: the fast run is the same every time, the long one is not."""
-    return settings(max_examples=examples, deadline=None, derandomize=examples < 100, suppress_health_check=HARD, database=None)
+    return settings(
+        max_examples=examples, deadline=None, derandomize=examples < 100, suppress_health_check=HARD, database=None
+    )
 
 
 def unit(v):
@@ -44,7 +46,7 @@ def free(u):
     mass = 10.0 ** (1.5 + 7.5 * u[0])
     size = (mass / 1000.0) ** (1.0 / 3.0)
     second = 10.0 ** (-2.0 + 2.0 * u[1:3])  # second moments along the axes: any three are a body's
-    J = mass * size**2 * np.array([second[0] + second[1], 1.0 + second[1], 1.0 + second[0]]) 
+    J = mass * size**2 * np.array([second[0] + second[1], 1.0 + second[1], 1.0 + second[0]])
     M = mass * (1.0 + 10.0 ** (2.0 * u[3:6]))
     x = 10.0 ** (-3.65 + 4.35 * u[6])
     R = lw.notation.matrix_from_rotation_vector(3.0 * u[7:10])
@@ -71,7 +73,12 @@ def test_momenta_are_kept_or_the_status_says_why(method, dtype, examples):
         well = np.asarray(result.status) == Status.OK
         tried["ok"] += well.sum()
         tried["flagged"] += (~well).sum()
-        assert set(np.unique(result.status)) <= {Status.OK, Status.STEP_TOO_LARGE, Status.NOT_CONVERGED, Status.NON_FINITE}
+        assert set(np.unique(result.status)) <= {
+            Status.OK,
+            Status.STEP_TOO_LARGE,
+            Status.NOT_CONVERGED,
+            Status.NON_FINITE,
+        }
         R, P, L = result.attitude.astype(float), invariants.linear_momentum(result), invariants.angular_momentum(result)
         # A walk of STEPS steps with a dozen roundings each, and the rounding of samples: mathematics.md, section 5. psi_x turns
         # by shears of up to 4/3, 1 + t^2 a turn.
@@ -84,7 +91,9 @@ def test_momenta_are_kept_or_the_status_says_why(method, dtype, examples):
         assert (np.abs(P - P[:1]).max(axis=(0, 2)) <= bound * size.max(axis=0))[well].all()
         net = fleet_residual(fleet) * H * STEPS
         way = np.abs(result.position).max(axis=(0, 2)) + 1.0
-        assert (np.abs(L - L[:1]).max(axis=(0, 2)) <= bound * (spin.max(axis=0) + 4.0 * weight + largest) + net * way)[well].all()
+        assert (np.abs(L - L[:1]).max(axis=(0, 2)) <= bound * (spin.max(axis=0) + 4.0 * weight + largest) + net * way)[
+            well
+        ].all()
 
     check()
     assert tried["ok"] > 0.3 * MEMBERS * examples and tried["flagged"] > 0.03 * MEMBERS * examples

@@ -145,7 +145,7 @@ class Faults:
         if np.abs(matrix - matrix.T).max() > 1e-9 * np.abs(matrix).max():
             self.add(key, value, "is not symmetric", "give a symmetric matrix")
             return None
-        return 0.5 * (matrix + matrix.T)
+        return 0.5 * matrix + 0.5 * matrix.T
 
     def __bool__(self) -> bool:
         """Whether a fault was noted."""

@@ -64,7 +64,7 @@ def coupling(I6: np.ndarray) -> np.ndarray:
         scaled = np.linalg.solve(Lm, C) @ np.linalg.inv(np.swapaxes(Lj, -1, -2))
     except np.linalg.LinAlgError:
         return np.full(len(I6), np.inf)
-    finite = np.isfinite(scaled).all(axis=(-2, -1))
+    finite = np.asarray(np.isfinite(scaled).all(axis=(-2, -1)))
     norms = np.linalg.norm(np.where(finite[:, None, None], scaled, 0.0), ord=2, axis=(-2, -1))
     return np.where(finite, norms, np.inf)
 

@@ -138,8 +138,8 @@ def _check_ensemble(settings: EnsembleSettings, scene: Scene | None, parameters:
         try:
             Ensemble(scene, settings.members, settings.seed, settings.vary)
         except MemoryError:
-            text = f"ensemble.members = {settings.members}: do not fit into memory; give less, and run the rest with other seeds"
-            raise SceneError([text]) from None
+            remedy = "give less, and run the rest with other seeds"
+            raise SceneError([f"ensemble.members = {settings.members}: do not fit into memory; {remedy}"]) from None
 
 
 def _build(faults: Faults, name: str, kind: Callable[..., Any], table: Mapping[str, Any]) -> Any:

@@ -236,8 +236,10 @@ def forced():
         size = (m / 1000.0) ** (1.0 / 3.0)
         J, M = m * size**2 * np.array([0.2, 0.3, 0.4]), m * np.array([1.0, 1.2, 1.5])
         scale = np.concatenate([M, J])
-        cases.append(Case(f"mass {m:g} kg with weight, arm and drag", M, J, net=0.1 * m * min(size, 1.0), Br=(0.0, 0.0, -0.1 * m * size**2), nu=oblique(0.5 * size), Om=oblique(0.5),
-                          linear=0.1 * scale, quadratic=0.1 * scale))  # fmt: skip
+        drag = {"linear": 0.1 * scale, "quadratic": 0.1 * scale}
+        arm, net = (0.0, 0.0, -0.1 * m * size**2), 0.1 * m * min(size, 1.0)
+        text = f"mass {m:g} kg with weight, arm and drag"
+        cases.append(Case(text, M, J, net=net, Br=arm, nu=oblique(0.5 * size), Om=oblique(0.5), **drag))
     cases.append(Case("no gravity", gravity=0.0, nu=nu, Om=Om, linear=0.1 * J6))
     cases.append(Case("no gravity, buoyancy of 5 N", gravity=0.0, net=-5.0, Br=(0.0, 0.0, -0.5), nu=nu, Om=Om))
     return Group("Weight, restoring moment and drag", h, 60, tuple(cases), dragged=True)
@@ -282,7 +284,7 @@ def measured(group, method, dtype, truth=None, solver="quartic"):
     sign (a random walk, three standard deviations); the kernel's rounded constants add up step by step; an error grows at
     most as perturbations of the extended run do. Positions also round where they are, in every drift.
     """
-    body, x0 = twin(group)
+    body, _ = twin(group)
     x, growth, far, way = truth or extended_run(group, method)
     result = lw.solve(ensemble(group), lw.Method(method, solver), h=group.h, t1=group.h * group.steps, dtype=dtype)
     M, J = body.M.astype(float), body.J.astype(float)

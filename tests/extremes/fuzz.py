@@ -5,6 +5,7 @@ case hung or killed the process. Kinds: "files" (bytes and tokens of scene files
 KERNELS: accepted scenes are run for two steps if they need the paper's kernel or one of so many others: each takes seconds.
 """
 
+import contextlib
 import faulthandler
 import functools
 import json
@@ -33,17 +34,26 @@ BYTES = 8 << 30
 # Scenes with more members are read only, with more than the second number planned only.
 MOST_PLANNED, MOST_RUN = 1_000_000, 5000
 
-NUMBERS = """0 -0.0 1 -1 2 3.5 nan inf -inf 1e308 -1e308 1e-308 5e-324 1e400 1e38 1e-38 9223372036854775808 -9223372036854775809
-1e5 1e-9 0x7fffffff 1_000 1__0 1000000000000000000000000000000 true false "" "x" 'nan' [] {} [[]] [0.0] [1,2,3] [1.0,true,2.0]
-[nan,0,0] [1,2,3,4,5,6] [[1,0,0],[0,1,0],[0,0,1]] [["a"]] 1979-05-27 07:32:00 {a=1} {normal={std=1}} {normal={std=-1}}
-{uniform={low=1,high=0}} {lognormal={sigma=800.0}} {normal={}} {} {normal=3} "psi_s" "kl8(psi_x)" "tj4(rk4)" "gauss4" "float32"
-"float64" "sphere" "remus_100" """.split()
+NUMBERS = [
+    "0", "-0.0", "1", "-1", "2", "3.5", "nan", "inf", "-inf", "1e308", "-1e308", "1e-308", "5e-324", "1e400", "1e38",
+    "1e-38", "9223372036854775808", "-9223372036854775809", "1e5", "1e-9", "0x7fffffff", "1_000", "1__0",
+    "1000000000000000000000000000000", "true", "false", '""', '"x"', "'nan'", "[]", "{}", "[[]]", "[0.0]", "[1,2,3]",
+    "[1.0,true,2.0]", "[nan,0,0]", "[1,2,3,4,5,6]", "[[1,0,0],[0,1,0],[0,0,1]]", '[["a"]]', "1979-05-27", "07:32:00",
+    "{a=1}", "{normal={std=1}}", "{normal={std=-1}}", "{uniform={low=1,high=0}}", "{lognormal={sigma=800.0}}",
+    "{normal={}}", "{}", "{normal=3}", '"psi_s"', '"kl8(psi_x)"', '"tj4(rk4)"', '"gauss4"', '"float32"', '"float64"',
+    '"sphere"', '"remus_100"',
+]  # fmt: skip
 NUMBER = re.compile(r"(?<![\w.\"])[+-]?(?:\d[\d_]*\.?\d*(?:[eE][+-]?\d+)?|nan|inf)(?![\w\"])")
 TOKEN = re.compile(r"\"[^\"\n]*\"|[\w.+-]+|\s+|.", re.DOTALL)
-WORDS = """vehicle mass added_mass inertia buoyancy center_of_buoyancy environment gravity water_density start position
-rotation_vector quaternion_wxyz euler_deg attitude velocity velocity_inertial angular_velocity ensemble members seed vary run
-method step duration save_every dtype terms events type name rigid_body_mass_matrix added_mass_matrix weight center_of_gravity
-controller source drag tether current surface floor box depth lower upper [[ ]] [ ] { } = , . " ' # \\n""".split()
+WORDS = [
+    "vehicle", "mass", "added_mass", "inertia", "buoyancy", "center_of_buoyancy", "environment", "gravity",
+    "water_density", "start", "position", "rotation_vector", "quaternion_wxyz", "euler_deg", "attitude", "velocity",
+    "velocity_inertial", "angular_velocity", "ensemble", "members", "seed", "vary", "run", "method", "step",
+    "duration", "save_every", "dtype", "terms", "events", "type", "name", "rigid_body_mass_matrix",
+    "added_mass_matrix", "weight", "center_of_gravity", "controller", "source", "drag", "tether", "current",
+    "surface", "floor", "box", "depth", "lower", "upper", "[[", "]]", "[", "]", "{", "}", "=", ",", ".", '"', "'",
+    "#", "\\n",
+]  # fmt: skip
 
 
 @functools.cache
@@ -67,7 +77,8 @@ def sources():
                      'type = "box"\nlower = [-9.0, -9.0, -9.0]\nupper = [9.0, 9.0, 90.0]')
     )  # fmt: skip
     named = '[vehicle]\nname = "remus_100"\n' + start + run + "[ensemble]\nmembers = 20\nseed = 3\n[ensemble.vary]\n"
-    named += '"start.velocity" = { truncated_normal = { std = 0.1, width = 2.0 } }\n"drag.quadratic" = { lognormal = { sigma = 0.1 } }\n'
+    named += '"start.velocity" = { truncated_normal = { std = 0.1, width = 2.0 } }\n'
+    named += '"drag.quadratic" = { lognormal = { sigma = 0.1 } }\n'
     matrices = "[vehicle]\n" + "".join(
         f"{name} = {np.diag(diagonal).tolist()}\n"
         for name, diagonal in (("rigid_body_mass_matrix", [30.0, 30.0, 30.0, 0.2, 3.5, 3.5]),
@@ -148,7 +159,8 @@ def case_of_set(seed):
     keys = [f"{name}.{key}" for name in ("vehicle", "start", "run", "ensemble", "environment") for key in WORDS]
     content = scene.to_dict()
     own = [f"{name}.{key}" for name in content for key in content[name]]
-    keys += [*scene.parameters(), 'ensemble.vary."vehicle.mass"', "ensemble.vary.start.position", "terms.0", "", ".", "a.b.c", "vehicle.",
+    keys += [*scene.parameters(), 'ensemble.vary."vehicle.mass"', "ensemble.vary.start.position", "terms.0", "",
+             ".", "a.b.c", "vehicle.",
              "ensemble.vary", "ensemble.vary.", "source.x", "vehicle..mass", "vehicle.mass=3", "run.method"]  # fmt: skip
     arguments = ["run", str(ROOT / "examples" / "paper.toml")]
     for _ in range(pick(rng, (1, 1, 2, 3))):
@@ -164,8 +176,9 @@ def case_of_set(seed):
 def named_key(fault, scene_text=""):
     """Whether a fault's text begins with something that is in the scene: a section, a term, an event or its name."""
     head = re.split(r"[.=\[:( ]", fault.strip("\"' "), maxsplit=1)[0]
-    known = {*SECTIONS, *terms.TYPES, *events.TYPES, "law", "method", "environment", "attitude", "position", "save", "step", "h", "t1",
-             "duration", "dtype", "velocity", "angular_velocity", "scene", "normal", "uniform", "--set", "vehicle file"}  # fmt: skip
+    known = {*SECTIONS, *terms.TYPES, *events.TYPES, "law", "method", "attitude", "position", "save", "step", "h", "t1",
+             "duration", "dtype", "velocity", "angular_velocity", "scene", "normal", "uniform",
+             "--set", "vehicle file"}  # fmt: skip
     return head in known or head in scene_text or "is not TOML" in fault or "is not a dotted key" in fault
 
 
@@ -188,11 +201,9 @@ def planned(scene):
     """The plan of two steps of some of the members, or None where it is refused."""
     fleet = lw.Ensemble.from_scene(scene)
     h = scene.run.step or 0.01
-    try:
-        # As the user would run it, and for two steps: what takes long must be refused before it starts.
+    # As the user would run it, and for two steps: what takes long must be refused before it starts.
+    with contextlib.suppress(lw.SceneError):
         make_plan(fleet)
-    except lw.SceneError:
-        pass
     try:
         return make_plan(fleet, h=h, t1=2.0 * h)
     except lw.SceneError:
@@ -249,7 +260,7 @@ def work(kind, first, stop, most):
 
 
 def outcomes(kind, first, stop, most):
-    """Seed -> (outcome, detail) of these cases, judged in a process of its own; a hang or a crash is one too, and the rest goes on."""
+    """Seed -> (outcome, detail), judged in a process of its own; a hang or a crash is an outcome too, and the rest goes on."""
     found = {}
     while first < stop:
         command = [sys.executable, "-m", "tests.extremes.fuzz", kind, str(first), str(stop), str(most)]

@@ -22,10 +22,11 @@ or the status that the vehicle was flagged with. `tests/extremes/test_extremes.p
 
 * **error**: the largest of |R - R*|, |p - p*| / |p| and |pi - pi*| / |pi|: what rounding made of the map. The error of the
   map itself, of second order in the step, is no part of it: it is that of the method (docs/accuracy_and_speed.md).
-* **bound**: G (3 sqrt(n) ({roundings} u + 2 t) + {constants} n u) for n steps: u is the unit of round-off (2^-53 or 2^-24), t the
-  tolerance to which psi_s solves its equation (24) twice a step (psi_x solves none), {constants} the constants that are rounded once
-  for all steps, and G how much a small error grows during the run, from runs in extended precision that start beside it. Where
-  the bound is above 1 the motion is so unstable that this precision says nothing about its phase: *lost*.
+* **bound**: G (3 sqrt(n) ({roundings} u + 2 t) + {constants} n u) for n steps: u is the unit of round-off (2^-53 or 2^-24),
+  t the tolerance to which psi_s solves its equation (24) twice a step (psi_x solves none), {constants} the constants that
+  are rounded once for all steps, and G how much a small error grows during the run, from runs in extended precision that
+  start beside it. Where the bound is above 1 the motion is so unstable that this precision says nothing about its phase:
+  *lost*.
 * Positions are asserted as well, to the bound times the way, and 4 n u of the distance from the origin: in float32 at
   1e7 m that is a metre a step, more than the vehicle moves. `dtype="float32_compensated"` has no such error.
 
@@ -78,7 +79,8 @@ def table(groups):
     """One table for groups of the same kind."""
     heads = [f"{method} {dtype}" for method in METHODS for dtype in DTYPES]
     first = groups[0]
-    text = [f"## {first.title}", "", f"{first.steps} steps of {first.h:g} s." if len(groups) == 1 else f"{first.steps} steps.", "",
+    length = f" of {first.h:g} s" if len(groups) == 1 else ""
+    text = [f"## {first.title}", "", f"{first.steps} steps{length}.", "",
             f"| case | must be | {' | '.join(heads)} |", "| --- " * (2 + len(heads)) + "|"]  # fmt: skip
     return "\n".join([*text, *(line for group in groups for line in lines(group))])
 

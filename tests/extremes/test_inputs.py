@@ -48,8 +48,9 @@ def test_every_member_fails_at_once(dtype, bad, field):
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_subnormal_states_are_no_fault(dtype):
     tiny = 5e-324 if dtype == "float64" else 1e-45
-    group = Group("free", 0.1, 60, (Case("subnormal velocities", nu=oblique(1.0) * tiny, Om=(tiny, -tiny, tiny)),
-                                    Case("subnormal beside normal", nu=(tiny, 1.0, tiny), Om=(tiny, 1.0, 0.0), b=(tiny, 0.0, 0.0))))  # fmt: skip
+    alone = Case("subnormal velocities", nu=oblique(1.0) * tiny, Om=(tiny, -tiny, tiny))
+    beside = Case("subnormal beside normal", nu=(tiny, 1.0, tiny), Om=(tiny, 1.0, 0.0), b=(tiny, 0.0, 0.0))
+    group = Group("", 0.1, 60, (alone, beside))
     result = lw.solve(ensemble(group), h=group.h, t1=group.h * group.steps, dtype=dtype)
     assert result.status.counts() == {"ok": 2} and finite(result, slice(None))
     found = measured(group, "psi_s", dtype)

@@ -9,7 +9,7 @@ from lgvi_warp import invariants
 from lgvi_warp.status import Status
 from tests.extremes import extended
 from tests.extremes.cases import DTYPES, UNIT, Case, Group, ensemble, oblique, twin
-from tests.tools import random_states, scene_of
+from tests.tools import random_states
 
 SLOW = pytest.mark.slow
 KAPPAS = tuple(10.0**k for k in range(-6, 7))
@@ -84,7 +84,8 @@ def test_a_linear_drag_matrix_step(kappa):
         [lw.DragMatrix(linear=np.eye(6), quadratic=np.eye(6))],
     )
     fleet = lw.Ensemble.from_states(scene, [[0.0] * 3], [np.eye(3)], [[2.0, 0.0, 0.0]], [[0.0] * 3],
-                                    {"drag_matrix.linear": [kappa * M / h * np.eye(6)], "drag_matrix.quadratic": np.zeros((1, 6, 6))})  # fmt: skip
+                                    {"drag_matrix.linear": [kappa * M / h * np.eye(6)],
+                                     "drag_matrix.quadratic": np.zeros((1, 6, 6))})  # fmt: skip
     u = lw.solve(fleet, h=h, t1=h).velocity[-1, 0, 0]
     factor = (1.0 + (2.0 * GAMMA - 1.0) * kappa) / (1.0 + GAMMA * kappa) ** 2
     # The difference 1 - ... loses digits where little is left: absolute, in units of what there was.
@@ -96,9 +97,9 @@ def test_a_linear_drag_matrix_step(kappa):
 def fall(case, h, steps):
     """Speed and depth of a vertical fall, step by step in extended precision: half a drift, kick, drag, kick, half a drift."""
     real = extended.REAL
-    M, l, q = (real(x) for x in (case.M[2], case.linear[2], case.quadratic[2]))
+    M, lin, q = (real(x) for x in (case.M[2], case.linear[2], case.quadratic[2]))
     half, a = real(h) / 2, real(case.net) / M
-    z = real(h) * l / M
+    z = real(h) * lin / M
     decay, s = np.exp(-z), (-np.expm1(-z) / z if z else real(1.0))
     w, b = real(0.0), real(0.0)
     for _ in range(steps):
@@ -194,5 +195,3 @@ def test_many_steps_of_a_free_spheroid(steps, dtype):
         # Renormalised every 128 steps: 128 products of 6e-8 to either side, three entries.
         assert orthogonal < 3e-6
     assert max(drift) < walk
-    print(f"{steps:g} steps, {dtype}: |R - exact| {np.abs(Q[-1, 0] - R.astype(float)).max():.2g}, |R^T R - I| {orthogonal:.2g}, "
-          f"energy {drift[0]:.2g}, momentum {drift[1]:.2g}, {result.run_seconds:.1f} s")  # fmt: skip

@@ -80,8 +80,8 @@ def test_momenta_are_kept_or_the_status_says_why(method, dtype, examples):
             Status.NON_FINITE,
         }
         R, P, L = result.attitude.astype(float), invariants.linear_momentum(result), invariants.angular_momentum(result)
-        # A walk of STEPS steps with a dozen roundings each, and the rounding of samples: mathematics.md, section 5. psi_x turns
-        # by shears of up to 4/3, 1 + t^2 a turn.
+        # A walk of STEPS steps with a dozen roundings each, and the rounding of samples: mathematics.md, section 5. psi_x
+        # turns by shears of up to 4/3, 1 + t^2 a turn.
         bound = UNIT[dtype] * (20.0 * np.sqrt(12.0 * STEPS) + 40.0)
         assert np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3))[:, well].max(initial=0.0) < bound
         size = np.linalg.norm(P, axis=-1)

@@ -145,7 +145,8 @@ class Faults:
         if np.abs(matrix - matrix.T).max() > 1e-9 * np.abs(matrix).max():
             self.add(key, value, "is not symmetric", "give a symmetric matrix")
             return None
-        return 0.5 * matrix + 0.5 * matrix.T
+        # What is symmetric keeps its bits, subnormal and largest numbers too.
+        return np.where(matrix == matrix.T, matrix, 0.5 * matrix + 0.5 * matrix.T)
 
     def __bool__(self) -> bool:
         """Whether a fault was noted."""

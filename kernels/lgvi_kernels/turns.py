@@ -1,7 +1,8 @@
 """The turns of psi_x: the kinetic energy of rotation as a sum of three squares, each solved exactly by a turn or a screw.
 
 In axes where Js is diagonal, 1/2 (pi - E^T p).Js^-1 (pi - E^T p) with E moved to upper triangular form U by the choice of
-an origin for each axis. Without coupling U = 0: three plain turns. No equation is solved; the map exists for every step.
+an origin for each axis. Without coupling U = 0: three plain turns. No equation is solved; the map exists for every step,
+but where half the angle of a turn reaches 1 it has no digit of the motion: a member there is marked.
 """
 
 from typing import Any

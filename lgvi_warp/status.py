@@ -36,9 +36,9 @@ class Status(IntEnum):
 _TEXT = {
     Status.OK: "ran to the end",
     Status.STEP_TOO_LARGE: "the step is too large: |J^-1 a| reached 1, where equation (24) may have no solution, or half the "
-    "angle of a turn of psi_x did; shorten the step below 1 / |angular velocity| (psi and psi_s: below 2 / |angular velocity|; "
-    "rkn*: a quarter turn in a part; psi_x: below 4 / |angular velocity|, and shorter for slender bodies, whose turns about "
-    "their length it splits off: there psi_s is better)",
+    "angle of a turn of psi_x did; shorten the step below 1 / |angular velocity| (psi and psi_s: below 2 / |angular "
+    "velocity|; rkn*: a quarter turn in a part; psi_x: below 4 / |angular velocity|, and shorter for slender bodies, whose "
+    "turns about their length it splits off: there psi_s is better)",
     Status.NOT_CONVERGED: "the solve of the implicit rotation (equation (24); psi_w: its coupled form; gauss*: the stages) "
     "kept a residual above the tolerance; give a shorter step, more iterations or a larger tolerance "
     '(for slender bodies, whose inertias are 100 times apart and more: solver="cayley")',

@@ -46,7 +46,7 @@ class Result:
     attitude (k, n, 3, 3) body to inertial, velocity (k, n, 3) [m/s, body], angular_velocity (k, n, 3) [rad/s, body]).
     status: (n,), see Status; failure_time: (n,) [s], the time of the last good state, for an event its own
     time, interpolated within the step; NaN where there was neither. failure_value: (n,), the |J^-1 a| or relative residual
-    that crossed its limit (psi_x: half the angle of a turn), 0 for a non-finite state and for an event.
+    that crossed its limit (psi_x: half the angle of its turns), 0 for a non-finite state and for an event.
     messages: what the user should know; provenance: scene, settings, versions, seed, machine.
     """
 

@@ -62,15 +62,14 @@ def probe(x: Any):
 
 @wp.func
 def turned_too_far(alarm: Any):
-    """STEP_TOO_LARGE where half the angle of a turn, y, reached 1: alarm.size holds the least 1 - y^2, and y^2 after it.
+    """STEP_TOO_LARGE where half the angles of the turns, h |Om| / 4, reached 1: alarm.size holds the largest square of it.
 
-    Beyond, the series of the tangent has no digit of it, and shears by t multiply rounding errors by t^2.
+    Beyond, the series of the tangent has no digit of the angle, and shears by it multiply rounding errors by its square.
     """
     one = ones(alarm.size)
-    zero = one - one
-    over = zero - alarm.size
+    over = alarm.size - one
     alarm.code = positive(over, one.dtype(wp.static(float(STEP_TOO_LARGE))) * one, alarm.code)
-    alarm.size = positive(over, one + over, zero)
+    alarm.size = positive(over, alarm.size, one - one)
     return alarm
 
 

@@ -261,13 +261,14 @@ METHODS, DTYPES = ("psi_s", "psi_x"), ("float64", "float32")
 
 @dataclass(frozen=True)
 class Measured:
-    """What came of a group: per member status, error and its bound, of attitude and momenta (relative) and of position [m]."""
+    """What came of a group, per member: status; error and bound of attitude and momenta (relative); of position, way [m]."""
 
     status: np.ndarray
     error: np.ndarray
     bound: np.ndarray
     position_error: np.ndarray
     position_bound: np.ndarray
+    way: np.ndarray
 
 
 # Roundings that a component goes through in a step: two drifts, two turns (or six of three shears, of which it sees four), a
@@ -300,6 +301,7 @@ def measured(group, method, dtype, truth=None, solver="quartic"):
         bound=bound,
         position_error=np.abs(y.b - x.b).max(axis=1).astype(float),
         position_bound=way * bound + 4.0 * UNIT[dtype] * group.steps * far,
+        way=way,
     )
 
 

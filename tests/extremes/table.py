@@ -14,6 +14,9 @@ from tests.extremes.cases import DTYPES, GROUPS, METHODS, OK
 
 TARGET = Path(__file__).parents[2] / "docs" / "extremes.md"
 
+# A position that is off by more than this part of the way is worth a word.
+TELLING = 0.01
+
 TEXT = """# At the extremes
 
 Each line is one vehicle at an extreme, run by the kernel and, step by step the same, by the same map in extended precision
@@ -27,8 +30,9 @@ or the status that the vehicle was flagged with. `tests/extremes/test_extremes.p
   are rounded once for all steps, and G how much a small error grows during the run, from runs in extended precision that
   start beside it. Where the bound is above 1 the motion is so unstable that this precision says nothing about its phase:
   *lost*.
-* Positions are asserted as well, to the bound times the way, and 4 n u of the distance from the origin: in float32 at
-  1e7 m that is a metre a step, more than the vehicle moves. `dtype="float32_compensated"` has no such error.
+* Positions are asserted as well, to the bound times the way and 4 n u of the distance from the origin: in float32 at 1e7 m
+  that is metres a step, more than the vehicle moves, and its status is OK. Where a position is off by more than a
+  hundredth of the way, the cell says so. `dtype="float32_compensated"` has no such error.
 
 Statuses: {statuses}.
 
@@ -50,7 +54,10 @@ def cell(found, i):
         return status.name
     if found.bound[i] > 1.0:
         return "*lost*"
-    return f"{found.error[i]:.1e} < {found.bound[i]:.0e}"
+    text = f"{found.error[i]:.1e} < {found.bound[i]:.0e}"
+    if found.position_error[i] > TELLING * found.way[i] > 0.0:
+        text += f"; position off by {found.position_error[i]:.1g} m on a way of {found.way[i]:.1g} m"
+    return text
 
 
 def expected(case):

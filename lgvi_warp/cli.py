@@ -181,6 +181,9 @@ def main(arguments: list[str] | None = None) -> int:
     except OSError as error:
         print(f"lgvi-warp: {error.filename or ''}: {error.strerror or error}", file=sys.stderr)
         return 1
+    except MemoryError as error:
+        print(f"lgvi-warp: {error or 'out of memory'}; run fewer members or keep fewer samples", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         print("lgvi-warp: interrupted; nothing was written", file=sys.stderr)
         return 130

@@ -359,7 +359,7 @@ def _vehicle_checks(p: Mapping[str, np.ndarray], varied: set[str]) -> dict[str, 
     checks: dict[str, np.ndarray] = {}
     if "vehicle.mass" in p:
         mass = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
-        heavy = np.isfinite(p["vehicle.mass"]) & (p["vehicle.mass"] > 0.0)
+        heavy = np.isfinite(p["vehicle.mass"]) & (p["vehicle.mass"] >= vehicles.LEAST)
         checks |= {
             "vehicle.mass": ~heavy,
             "vehicle.inertia": ~_positive_definite(p["vehicle.inertia"]),
@@ -406,7 +406,7 @@ def check_names(vary: Mapping[str, Any], parameters: Sequence[str]) -> None:
 def _explicit_parameter(faults: Faults, key: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     array = _floats(faults, key, value)
     if key in MATRICES and array.shape == shape[:2]:
-        return array[:, :, None] * np.eye(shape[1])
+        return np.where(np.eye(shape[1], dtype=bool), array[:, :, None], 0.0)
     if array.shape != shape:
         also = f" or {shape[:2]}" if key in MATRICES else ""
         faults.add(key, value, f"has shape {array.shape}", f"give an array of shape {shape}{also}")
@@ -422,7 +422,7 @@ def _positive_definite(matrices: np.ndarray) -> np.ndarray:
     good = np.isfinite(matrices).all(axis=(1, 2))
     for k in range(d):
         pivot = left[:, k, k]
-        good &= pivot > 0.0
+        good &= pivot >= vehicles.LEAST
         row = left[:, k, k + 1 :] / np.where(good, pivot, 1.0)[:, None]
         left[:, k + 1 :, k + 1 :] -= left[:, k + 1 :, k, None] * row[:, None, :]
     return np.asarray(good)

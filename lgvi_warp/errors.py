@@ -46,6 +46,15 @@ def holds_bool(value: Any) -> bool:
     return isinstance(value, bool) or (isinstance(value, list | tuple) and any(holds_bool(item) for item in value))
 
 
+def ragged(value: Any) -> bool:
+    """Whether lists within lists differ in length, so that NumPy makes no array of them."""
+    try:
+        np.asarray(value)
+    except ValueError:
+        return True
+    return False
+
+
 class Faults:
     """Collects faults, so that a user sees all of them at once."""
 
@@ -126,13 +135,17 @@ class Faults:
 
     def symmetric(self, key: str, value: Any, unit: str, size: int = 3) -> np.ndarray | None:
         """A symmetric matrix, or the diagonal of one; None after noting a fault."""
-        array = np.asarray(value, dtype=object) if isinstance(value, list | tuple) else np.asarray(value)
+        if ragged(value):
+            array = np.zeros(0)
+        else:
+            array = np.asarray(value, dtype=object) if isinstance(value, list | tuple) else np.asarray(value)
         if array.shape == (size,):
             diagonal = self.finite(key, value, (size,), unit)
             return None if diagonal is None else np.diag(diagonal)
         if array.shape != (size, size):
             wanted = f"{size} numbers or a symmetric {size}x{size} matrix [{unit}]"
-            self.add(key, value, f"has shape {array.shape}", f"give {wanted}")
+            what = f"has shape {array.shape}" if array.size else "is no matrix"
+            self.add(key, value, what, f"give {wanted}")
             return None
         matrix = self.finite(key, value, (size, size), unit)
         if matrix is None:
@@ -140,7 +153,8 @@ class Faults:
         if np.abs(matrix - matrix.T).max() > 1e-9 * np.abs(matrix).max():
             self.add(key, value, "is not symmetric", "give a symmetric matrix")
             return None
-        return 0.5 * (matrix + matrix.T)
+        # What is symmetric keeps its bits, subnormal and largest numbers too.
+        return np.where(matrix == matrix.T, matrix, 0.5 * matrix + 0.5 * matrix.T)
 
     def __bool__(self) -> bool:
         """Whether a fault was noted."""

@@ -54,11 +54,19 @@ def moved(I6: np.ndarray, origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
 
 
 def coupling(I6: np.ndarray) -> np.ndarray:
-    """The coupling norm k (n,), 0 to 1: the largest singular value of M^-1/2 C J^-1/2."""
+    """The coupling norm k (n,), 0 to 1: the largest singular value of M^-1/2 C J^-1/2.
+
+    Infinite where round-off or overflow leaves no definite matrix.
+    """
     M, C, J = blocks(I6)
-    Lm, Lj = np.linalg.cholesky(M), np.linalg.cholesky(J)
-    scaled = np.linalg.solve(Lm, C) @ np.linalg.inv(np.swapaxes(Lj, -1, -2))
-    return np.linalg.norm(scaled, ord=2, axis=(-2, -1))
+    try:
+        Lm, Lj = np.linalg.cholesky(M), np.linalg.cholesky(J)
+        scaled = np.linalg.solve(Lm, C) @ np.linalg.inv(np.swapaxes(Lj, -1, -2))
+    except np.linalg.LinAlgError:
+        return np.full(len(I6), np.inf)
+    finite = np.asarray(np.isfinite(scaled).all(axis=(-2, -1)))
+    norms = np.linalg.norm(np.where(finite[:, None, None], scaled, 0.0), ord=2, axis=(-2, -1))
+    return np.where(finite, norms, np.inf)
 
 
 @dataclass(frozen=True)
@@ -137,7 +145,9 @@ def uncoupled_frame(I6: np.ndarray) -> tuple[Frame, np.ndarray]:
     origin = -vee(E)
     Q, J = notation.principal_axes(Js)
     rest = moved(I6, origin, Q)
-    left = np.where(np.any(E, axis=(-2, -1)), coupling(rest), 0.0)
+    some, left = np.any(E, axis=(-2, -1)), np.zeros(len(E))
+    if some.any():
+        left[some] = coupling(rest[some])
     none = np.zeros_like(rest[:, :3, :3])
     return Frame(Q, origin, origin, rest[:, :3, :3], J, none, none), left
 

@@ -61,7 +61,7 @@ class Result:
     attitude (k, n, 3, 3) body to inertial, velocity (k, n, 3) [m/s, body], angular_velocity (k, n, 3) [rad/s, body]).
     status: (n,), see Status; failure_time: (n,) [s], the time of the last good state, for an event its own
     time, interpolated within the step; NaN where there was neither. failure_value: (n,), the |J^-1 a| or relative residual
-    that crossed its limit, 0 for a non-finite state and for an event.
+    that crossed its limit (psi_x: half the angle of its turns), 0 for a non-finite state and for an event.
     warnings: (n,), bits of Warnings; warning_time (n,) [s] and warning_value (n,): when a member's most serious warning was
     first seen (0 for one that its start gives), and the value then; NaN without. Motion is looked at once in 128 steps and at
     the end, with checks="all" only. substeps: (n,), steps that were divided (on_failure="substep").

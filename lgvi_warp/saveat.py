@@ -15,6 +15,8 @@ FIELDS = ("position", "attitude", "velocity", "angular_velocity")
 
 # A step more than this many times shorter than the one asked for is refused, not silently taken.
 MOST_SHORTENING = 20
+# Samples that a run keeps at most: of one member they are 1.4 GB.
+MOST_SAMPLES = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -78,16 +80,17 @@ def time_grid(h: float, t1: float, save: SaveAt) -> TimeGrid:
         faults.add("save.at", max(save.at), f"lies beyond the end, {t1} s", "drop it or run longer")
     if save.every is not None and t1 > 0 and save.every > t1 * (1 + 1e-12):
         faults.add("save.every", save.every, f"is longer than the run, {t1} s", "save more often or run longer")
+    if save.every is not None and t1 > 0 and 0 < save.every < t1 / MOST_SAMPLES:
+        faults.add(
+            "save.every", save.every, f"asks for more than {MOST_SAMPLES} samples", "save less often, or run in parts"
+        )
     faults.raise_if_any()
     end, meant = _exact(t1), _exact(h)
-    wanted = {Fraction(0), end}
-    if save.every is not None:
-        every = _exact(save.every)
-        wanted |= {i * every for i in range(1, int(end / every) + 1)}
-    wanted |= {_exact(t) for t in save.at or ()}
-    times = sorted(wanted)
-    spacing = Fraction(0)
-    for t in {b - a for a, b in zip(times, times[1:], strict=False)}:
+    every = end if save.every is None else _exact(save.every)
+    regular = int(end / every)
+    rest = sorted({_exact(t) for t in save.at or ()} | {Fraction(0), end})
+    spacing = every
+    for t in rest:
         spacing = Fraction(
             math.gcd(spacing.numerator * t.denominator, t.numerator * spacing.denominator),
             spacing.denominator * t.denominator,
@@ -108,9 +111,7 @@ def time_grid(h: float, t1: float, save: SaveAt) -> TimeGrid:
     messages: tuple[str, ...] = ()
     if step != meant:
         messages = (f"step shortened from {h} s to {float(step):.9g} s, so that it divides every sample time",)
-    return TimeGrid(
-        float(step),
-        np.array([int(t / step) for t in times], dtype=np.int64),
-        np.array([float(t) for t in times]),
-        messages,
-    )
+    steps = np.union1d(np.arange(regular + 1) * int(every / step), [int(t / step) for t in rest])
+    # Whole numbers divided: the nearest number to each time, however many there are.
+    times = [k * step.numerator / step.denominator for k in steps.tolist()]
+    return TimeGrid(float(step), steps.astype(np.int64), np.array(times), messages)

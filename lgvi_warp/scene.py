@@ -35,6 +35,8 @@ UNITS = {"position": "m", "rotation_vector": "rad", "euler_deg": "deg", "velocit
          "angular_velocity": "rad/s"}  # fmt: skip
 # How far from orthogonal an attitude may be: the round-off of printing one with ten digits, and no more.
 ORTHOGONAL = 1e-9
+# Members of one ensemble: their states alone are 14 GB.
+MOST_MEMBERS = 100_000_000
 
 
 @dataclass(frozen=True)
@@ -242,6 +244,8 @@ class EnsembleSettings:
                 continue
             if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
                 faults.add(name, value, f"is not a whole number from {least}", f"give {least} or more")
+            elif name == "members" and value > MOST_MEMBERS:
+                faults.add(name, value, f"is above {MOST_MEMBERS}", "give less, and run the rest with other seeds")
         if self.indices is not None and not _whole_numbers(self.indices):
             faults.add("indices", self.indices, "is no list of whole numbers from 0", "give members: indices = [17]")
         if isinstance(self.vary, Mapping):

@@ -149,7 +149,11 @@ def _check_ensemble(settings: EnsembleSettings, scene: Scene | None, parameters:
     if scene is None:
         check_names(settings.vary, parameters)
     else:
-        Ensemble.of(scene, settings)
+        try:
+            Ensemble.of(scene, settings)
+        except MemoryError:
+            remedy = "give less, and run the rest with other seeds"
+            raise SceneError([f"ensemble.members = {settings.members}: do not fit into memory; {remedy}"]) from None
 
 
 def _build(faults: Faults, name: str, kind: Callable[..., Any], table: Mapping[str, Any]) -> Any:

@@ -42,11 +42,13 @@ class Status(IntEnum):
 
 _TEXT = {
     Status.OK: "ran to the end",
-    Status.STEP_TOO_LARGE: "the step is too large: |J^-1 a| reached 1, where equation (24) may have no solution; "
-    "shorten the step below 1 / |angular velocity| (psi and psi_s: below 2 / |angular velocity|; "
-    "rkn*: a quarter turn in a part)",
+    Status.STEP_TOO_LARGE: "the step is too large: |J^-1 a| reached 1, where equation (24) may have no solution, or half the "
+    "angle of a turn of psi_x did; shorten the step below 1 / |angular velocity| (psi and psi_s: below 2 / |angular "
+    "velocity|; rkn*: a quarter turn in a part; psi_x: below 4 / |angular velocity|, and shorter for slender bodies, whose "
+    "turns about their length it splits off: there psi_s is better)",
     Status.NOT_CONVERGED: "the solve of the implicit rotation (equation (24); psi_w: its coupled form; gauss*: the stages) "
-    "kept a residual above the tolerance; give a shorter step, more iterations or a larger tolerance",
+    "kept a residual above the tolerance; give a shorter step, more iterations or a larger tolerance "
+    '(for slender bodies, whose inertias are 100 times apart and more: solver="cayley")',
     Status.FORCES_NOT_CONVERGED: "the iteration for nonconservative forces in Phi* did not settle: they are stiff; "
     "shorten the step, or use psi_s or psi_x, which treat drag implicitly",
     Status.STEP_TOO_SMALL: "the steps that the tolerance asks for became too small, or too many (100,000 within one h); "

@@ -34,6 +34,8 @@ UNITS = {
     "center_of_gravity": "m",
     "center_of_buoyancy": "m",
 }
+# The least mass or inertia: what is smaller has no inverse in float64.
+LEAST = float(np.finfo(np.float64).tiny)
 SYMMETRIC = ("added_mass", "inertia", "rigid_body_mass_matrix", "added_mass_matrix")
 
 
@@ -93,11 +95,13 @@ class Vehicle:
                 faults.add(name, None, "is missing", f"give it [{UNITS[name]}]")
         mass = None if self.mass is None else faults.positive("mass", self.mass, "kg")
         given = (0.0, 0.0, 0.0) if self.added_mass is None else self.added_mass
+        if mass is not None and mass < LEAST:
+            faults.add("mass", self.mass, "has no inverse in float64", f"give a mass from {LEAST:.3g} kg")
         added = faults.symmetric("added_mass", given, "kg")
         inertia = None if self.inertia is None else faults.symmetric("inertia", self.inertia, "kg m2")
-        if inertia is not None and np.linalg.eigvalsh(inertia)[0] <= 0.0:
+        if inertia is not None and not _definite(inertia):
             faults.add("inertia", self.inertia, "is not positive definite", "give principal inertias above 0 [kg m2]")
-        if mass is not None and added is not None and np.linalg.eigvalsh(mass * np.eye(3) + added)[0] <= 0.0:
+        if mass is not None and added is not None and not _definite(added, mass * np.eye(3)):
             faults.add("added_mass", given, "with the mass is not positive definite", SIGN)
         warnings = unusual("inertia", inertia) if inertia is not None else ()
         return {"mass": mass, "added_mass": added, "inertia": inertia, "warnings": warnings}
@@ -129,7 +133,7 @@ class Vehicle:
                 what = f"has principal inertias {moments} kg m2, two of which sum to less than the third: no rigid body has"
                 remedy = "give the rigid body's own inertia here, and added inertia in added_mass_matrix"
                 faults.add("rigid_body_mass_matrix", rigid[3:, 3:], what, remedy)
-        if rigid is not None and added is not None and _definite(rigid) and not _definite(rigid + added):
+        if rigid is not None and added is not None and _definite(rigid) and not _definite(added, rigid):
             faults.add("added_mass_matrix", given, "with the rigid body's is not positive definite", SIGN)
         values = {"rigid_body_mass_matrix": rigid, "added_mass_matrix": added, "weight": weight}
         return values | {"center_of_gravity": center, "warnings": warnings}
@@ -180,8 +184,11 @@ class Vehicle:
 SIGN = "added mass is positive here: minus Fossen's X_udot, Y_vdot, Z_wdot ..."
 
 
-def _definite(matrix: np.ndarray) -> bool:
-    return bool(np.linalg.eigvalsh(matrix)[0] > 0.0)
+def _definite(matrix: np.ndarray, other: Any = 0.0) -> bool:
+    """Whether the sum is positive definite; False where it overflows."""
+    with np.errstate(over="ignore"):
+        total = matrix + other
+    return bool(np.isfinite(total).all() and np.linalg.eigvalsh(total)[0] >= LEAST)
 
 
 def compact(matrix: np.ndarray) -> list[Any]:
@@ -193,7 +200,7 @@ def compact(matrix: np.ndarray) -> list[Any]:
 def unusual(name: str, inertia: Any) -> tuple[str, ...]:
     """Warns of principal inertias that no rigid body has (J_i + J_j < J_k); added inertia can have them."""
     small, middle, large = np.linalg.eigvalsh(inertia)
-    if small + middle >= large * (1.0 - 1e-12):
+    if small >= large * (1.0 - 1e-12) - middle:
         return ()
     text = f"vehicle.{name}: principal inertias {small:.6g} + {middle:.6g} < {large:.6g} [kg m2]"
     return (text + ": no rigid body has these; that is right only if added inertia makes the difference",)

@@ -23,7 +23,7 @@ from lgvi_kernels.lanes import (
     vec3,
 )
 from lgvi_kernels.method import make_method
-from lgvi_kernels.packet import failures, put, renormalise
+from lgvi_kernels.packet import failures, put, renormalise, turned_too_far
 from lgvi_kernels.state import alarm_struct, damping_struct, inertia_struct, state_struct, struct, view_struct
 from lgvi_kernels.sums import at_rest, choose, settled
 from lgvi_kernels.terms import drag, drag_directions
@@ -168,6 +168,7 @@ def make_advance(spec):
     renormalised, composed, paired = real == wp.float32, spec.composed, spec.paired
     # A packet that chooses its steps goes on with them in the next launch, and waits for no frozen lane.
     paced, compensated = spec.explicit is not None and spec.explicit.adaptive, spec.compensated
+    turned = any(letter[0] == "R" for letter, _ in spec.maps)
     fields, per_sample = spec.fields, sum(spec.sample_fields.values())
     looks, energetic, backward, substepped = spec.looks, spec.energy, spec.backward, spec.substep
     Monitor = monitors.monitor_struct(width, real, looks, energetic, backward, substepped)
@@ -506,6 +507,8 @@ def make_advance(spec):
                     x = one_step(x, c, monitor, k + j, h, stage_h, lead_h, first_h, opening)
             repeat = int(0)
             if wp.static(checked):
+                if wp.static(turned):
+                    x.alarm = turned_too_far(x.alarm)
                 if wp.static(energetic):
                     if singles > 0:
                         # Of a chunk that is made again, only those lanes are looked at that made it necessary.

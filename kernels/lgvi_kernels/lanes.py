@@ -127,6 +127,9 @@ for _real in REALS:
         @wp.func_native(_native_here("AB", "A < B ? A : B"))
         def least(a: _L, b: _L) -> _L: ...
 
+        @wp.func_native(_native_here("AB", "A < B ? B : A"))
+        def largest(a: _L, b: _L) -> _L: ...
+
         @wp.func_native(_native_here("", "V() + (S)1"))
         def ones(like: _L) -> _L:
             """1 in every lane."""

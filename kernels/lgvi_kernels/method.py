@@ -202,7 +202,8 @@ def make_method(spec):
         if letter[0] == "R":
             axes = [int(other[1]) - 1 for other, _ in (*spec.maps[i:], *spec.maps[:i]) if other[0] == "R"]
             following = next((axis for axis in axes if axis != axes[0]), axes[0])
-            turn = turns.make_turn(axes[0], pitched[axes[0]], following, spec.compensated)
+            watched = spec.checked and not any(other[0] == "R" for other, _ in spec.maps[i + 1 :])
+            turn = turns.make_turn(axes[0], pitched[axes[0]], following, spec.compensated, watched)
             maps.append((turn, coefficient))
         else:
             maps.append((letters[letter], coefficient))

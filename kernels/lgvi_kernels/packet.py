@@ -6,6 +6,7 @@ import warp as wp
 
 from lgvi_kernels.lanes import add, dot, mul, ones, positive, sub, vec3  # noqa: F401
 
+STEP_TOO_LARGE = 1
 NON_FINITE = 3
 
 
@@ -57,6 +58,19 @@ def probe(x: Any):
     s = x.R0 + x.R1 + x.R2 + x.b + x.p + x.pi
     s = s - s
     return s.x + s.y + s.z
+
+
+@wp.func
+def turned_too_far(alarm: Any):
+    """STEP_TOO_LARGE where half the angles of the turns, h |Om| / 4, reached 1: alarm.size holds the largest square of it.
+
+    Beyond, the series of the tangent has no digit of the angle, and shears by it multiply rounding errors by its square.
+    """
+    one = ones(alarm.size)
+    over = alarm.size - one
+    alarm.code = positive(over, one.dtype(wp.static(float(STEP_TOO_LARGE))) * one, alarm.code)
+    alarm.size = positive(over, alarm.size, one - one)
+    return alarm
 
 
 @wp.func

@@ -1,14 +1,15 @@
 """The turns of psi_x: the kinetic energy of rotation as a sum of three squares, each solved exactly by a turn or a screw.
 
 In axes where Js is diagonal, 1/2 (pi - E^T p).Js^-1 (pi - E^T p) with E moved to upper triangular form U by the choice of
-an origin for each axis. Without coupling U = 0: three plain turns. No equation is solved; the map exists for every step.
+an origin for each axis. Without coupling U = 0: three plain turns. No equation is solved; the map exists for every step,
+but where half the angle of a turn reaches 1 rad it has no digit of the motion: a member there is marked.
 """
 
 from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes import add, div, mul, neg, ones, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes import add, div, dot, largest, mul, neg, ones, sub, vec3  # noqa: F401
 from lgvi_kernels.sums import carried, moved, twisted, with_turned
 
 
@@ -160,8 +161,12 @@ def tangent(y: Any, third: Any):
     return y + (y * y) * (third * y)
 
 
-def make_turn(axis, pitched, following, compensated):
+def make_turn(axis, pitched, following, compensated, watched=False):
     """R_i: turn about one axis, for `pitched` with a slide along it (a screw); following: the axis of the next turn.
+
+    watched: the last turn of a step, about the axis of the least J, leaves in alarm.size the largest Y.Y, Y half the angles
+    about all axes (see packet.turned_too_far). Turns keep |pi|, so Y is not below half the angle of the turn about the axis of
+    the largest J, nor, as J3 <= 2 J2 for a rigid body, below a half of that about the middle one.
 
     A step is one chain of turns, each waiting for the momentum about its axis from the one before: what decides its time
     is how soon that component is there, so all that need not wait is written apart from what must.
@@ -193,6 +198,9 @@ def make_turn(axis, pitched, following, compensated):
             length = k2 * (w - (y * (q * m)) * inverse)
         else:
             s = (t + t) / (one + t * t)
+        if wp.static(watched):
+            Y = (h * c.inertia.half_over_J) * x.pi
+            x.alarm.size = largest(x.alarm.size, dot(Y, Y))
         x = turn(x, t, s)
         if wp.static(pitched):
             x = shift(x, length)

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
-from lgvi_warp.errors import Faults, SceneError, closest
+from lgvi_warp.errors import Faults, SceneError, closest, ragged
 from lgvi_warp.terms.base import Packed, Setting, Term, quantity
 from lgvi_warp.terms.control_fins import ControlFins
 from lgvi_warp.terms.cross_flow import CrossFlow
@@ -125,7 +125,15 @@ def build(where: str, kind: type[AnyTerm], table: Mapping[str, Any]) -> AnyTerm:
         if one.default is dataclasses.MISSING and name not in given:
             faults.add(f"{where}.{name}", "", "is missing", f"give it [{one.metadata.get('unit', '')}]")
     faults.raise_if_any()
-    return kind(**given)
+    try:
+        return kind(**given)
+    except SceneError:
+        raise
+    except ValueError:  # what a law makes of its numbers before they are checked
+        for name in (name for name in fields if name in given and ragged(given[name])):
+            faults.add(f"{where}.{name}", given[name], "has rows of different lengths", "give rows of one length")
+        faults.raise_if_any()
+        raise
 
 
 __all__ = [

@@ -33,6 +33,18 @@ def test_step_too_large(scene, method, solver, axis):
     np.testing.assert_array_equal(result.angular_velocity[1, 1:], Om[1:])
 
 
+@pytest.mark.parametrize("method", ["psi_x", pytest.param("psi_x8", marks=pytest.mark.slow)])
+def test_turns_too_large(scene, method):
+    # Half the angle of a turn, h Om / 4, stays below 1; the tangent's series is
+    # wrong beyond, and shears by it multiply rounding errors.
+    h, axis = 0.1, 0
+    Om = np.outer([3.99 / h, 4.01 / h, 1e6], np.eye(3)[axis])
+    result = lw.solve(one(scene, Om=Om), method, h=h, t1=h)
+    assert list(result.status) == [Status.OK, Status.STEP_TOO_LARGE, Status.STEP_TOO_LARGE]
+    np.testing.assert_allclose(result.failure_value[1:], 0.25 * h * Om[1:, axis], rtol=1e-9)
+    np.testing.assert_array_equal(result.angular_velocity[1, 1:], Om[1:])
+
+
 def test_the_twin_agrees_on_what_is_solvable(scene):
     # Kernel and twin: the twin finds no solution on a principal axis beyond the bound.
     J = scene.vehicle.inertia
@@ -131,5 +143,5 @@ def test_every_status_says_what_to_do():
 def test_codes_are_those_of_the_kernel():
     from lgvi_kernels import packet, solve
 
-    kernel = (solve.STEP_TOO_LARGE, solve.NOT_CONVERGED, packet.NON_FINITE)
-    assert kernel == (Status.STEP_TOO_LARGE, Status.NOT_CONVERGED, Status.NON_FINITE)
+    kernel = (solve.STEP_TOO_LARGE, packet.STEP_TOO_LARGE, solve.NOT_CONVERGED, packet.NON_FINITE)
+    assert kernel == (Status.STEP_TOO_LARGE, Status.STEP_TOO_LARGE, Status.NOT_CONVERGED, Status.NON_FINITE)

@@ -88,3 +88,8 @@ def test_what_cannot_be_met_is_refused(h, t1, save, text):
 def test_faults_of_save_at(named, text):
     with pytest.raises(lw.SceneError, match=text):
         lw.SaveAt(**named)
+
+
+def test_too_many_samples_are_refused_before_they_are_counted():
+    with pytest.raises(lw.SceneError, match=r"save.every = 1e-300: asks for more than 10000000 samples"):
+        time_grid(0.1, 1.0, lw.SaveAt(every=1e-300))

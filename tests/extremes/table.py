@@ -1,0 +1,111 @@
+"""Every extreme, what must come of it and what came: writes docs/extremes.md.
+
+python -m tests.extremes.table
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from lgvi_warp import machine, warp_setup
+from lgvi_warp.status import Status
+from tests.extremes import cases
+from tests.extremes.cases import DTYPES, GROUPS, METHODS, OK
+
+TARGET = Path(__file__).parents[2] / "docs" / "extremes.md"
+
+# A position that is off by more than this part of the way is worth a word.
+TELLING = 0.01
+
+TEXT = """# At the extremes
+
+Each line is one vehicle at an extreme, run by the kernel and, step by step the same, by the same map in extended precision
+(NumPy's longdouble, `tests/extremes/extended.py`). A cell holds the error at the end and the bound that was derived for it,
+or the status that the vehicle was flagged with. `tests/extremes/test_extremes.py` runs every line and asserts both.
+
+* **error**: the largest of |R - R*|, |p - p*| / |p| and |pi - pi*| / |pi|: what rounding made of the map. The error of the
+  map itself, of second order in the step, is no part of it: it is that of the method (docs/accuracy_and_speed.md).
+* **bound**: G (3 sqrt(n) ({roundings} u + 2 t) + {constants} n u) for n steps: u is the unit of round-off (2^-53 or 2^-24),
+  t the tolerance to which psi_s solves its equation (24) twice a step (psi_x solves none), {constants} the constants that
+  are rounded once for all steps, and G how much a small error grows during the run, from runs in extended precision that
+  start beside it. Where the bound is above 1 the motion is so unstable that this precision says nothing about its phase:
+  *lost*.
+* Positions are asserted as well, to the bound times the way and 4 n u of the distance from the origin: in float32 at 1e7 m
+  that is metres a step, more than the vehicle moves, and its status is OK. Where a position is off by more than a
+  hundredth of the way, the cell says so. `dtype="float32_compensated"` has no such error.
+
+Statuses: {statuses}.
+
+What no line shows: a negative, zero, infinite, or subnormal mass or inertia is refused before the run; a start that is not
+finite gets NON_FINITE or STEP_TOO_LARGE, alone among 100,000 or all at once; no bit of another vehicle changes for it
+(`tests/extremes/test_inputs.py`, `test_neighbours.py`). rk8 with tolerances shares its steps within a packet, so there the
+neighbours of a failing vehicle change, within their tolerance. Explicit methods know no step that is too large.
+
+Machine: {cpu}, {simd}. Written by `python -m tests.extremes.table`; do not edit.
+
+{tables}
+"""
+
+
+def cell(found, i):
+    """What came of one case in one run."""
+    status = Status(int(found.status[i]))
+    if status != OK:
+        return status.name
+    if found.bound[i] > 1.0:
+        return "*lost*"
+    text = f"{found.error[i]:.1e} < {found.bound[i]:.0e}"
+    if found.position_error[i] > TELLING * found.way[i] > 0.0:
+        text += f"; position off by {found.position_error[i]:.1g} m on a way of {found.way[i]:.1g} m"
+    return text
+
+
+def expected(case):
+    """What must come of it: the same for every method, or by method."""
+    words = {
+        method: " or ".join("accurate" if s == OK else s.name for s in case.expected(method)) for method in METHODS
+    }
+    if len(set(words.values())) == 1:
+        return words[METHODS[0]]
+    return "; ".join(f"{method}: {word}" for method, word in words.items())
+
+
+def lines(group):
+    """A line for each case of a group."""
+    found = {}
+    for method in METHODS:
+        truth = cases.extended_run(group, method)
+        for dtype in DTYPES:
+            found[method, dtype] = cases.measured(group, method, dtype, truth)
+    for i, case in enumerate(group.cases):
+        cells = " | ".join(cell(one, i) for one in found.values())
+        yield f"| {case.name} | {expected(case)} | {cells} |"
+
+
+def table(groups):
+    """One table for groups of the same kind."""
+    heads = [f"{method} {dtype}" for method in METHODS for dtype in DTYPES]
+    first = groups[0]
+    length = f" of {first.h:g} s" if len(groups) == 1 else ""
+    text = [f"## {first.title}", "", f"{first.steps} steps{length}.", "",
+            f"| case | must be | {' | '.join(heads)} |", "| --- " * (2 + len(heads)) + "|"]  # fmt: skip
+    return "\n".join([*text, *(line for group in groups for line in lines(group))])
+
+
+def main():
+    """Measure and write."""
+    warp_setup.start()
+    made = [make() for make in GROUPS.values()]
+    titles = list(dict.fromkeys(group.title for group in made))
+    tables = "\n\n".join(table([group for group in made if group.title == title]) for title in titles)
+    described = machine.describe()
+    statuses = "; ".join(
+        f"{s.name}: {s.text}" for s in (Status.STEP_TOO_LARGE, Status.NOT_CONVERGED, Status.NON_FINITE)
+    )
+    with np.errstate(all="ignore"):
+        TARGET.write_text(TEXT.format(tables=tables, cpu=described["cpu"], simd=described["simd"], statuses=statuses,
+                                      roundings=cases.ROUNDINGS, constants=cases.CONSTANTS), encoding="utf-8")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,34 @@
+"""Thousands of broken scene files and --set arguments: accepted or refused by name, never anything else."""
+
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from tests.extremes.fuzz import GOOD, outcomes
+
+SLOW = pytest.mark.slow
+PROCESSES = 2
+
+
+@pytest.mark.parametrize(
+    ("kind", "cases", "kernels"),
+    [
+        ("files", 500, 0),
+        ("set", 200, 0),
+        pytest.param("files", 10_000, 4, marks=SLOW),
+        pytest.param("set", 4000, 4, marks=SLOW),
+    ],
+)
+def test_broken_input(kind, cases, kernels):
+    # The long run draws cases of its own, beyond those of the short one.
+    first = 0 if not kernels else 100_000
+    edges = [first + cases * i // PROCESSES for i in range(PROCESSES + 1)]
+    with ThreadPoolExecutor(PROCESSES) as pool:
+        parts = list(pool.map(lambda ends: outcomes(kind, *ends, kernels), zip(edges, edges[1:])))
+    found = {seed: outcome for part in parts for seed, outcome in part.items()}
+    faults = [f"{kind} {seed}: {outcome}: {detail}" for seed, (outcome, detail) in found.items() if outcome not in GOOD]
+    counts = Counter(outcome for outcome, _ in found.values())
+    assert not faults, "\n".join(faults[:20])
+    # What is drawn must try both ways out, and the kernel.
+    assert len(found) == cases and counts["refused"] > cases // 2 and counts["ran"] > cases // 200

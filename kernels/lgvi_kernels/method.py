@@ -138,7 +138,7 @@ def make_method(spec):
     if spec.drag and spec.explicit is None:
         by_axes = laws[0] is drag
         prepare, exact = (
-            drag.make_E(spec.drag, spec.real == wp.float32)
+            drag.make_E(spec.drag, spec.compensated)
             if by_axes
             else drag_directions.make_E(spec.drag, velocities_of_forces)
         )

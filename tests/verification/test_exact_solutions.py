@@ -117,17 +117,3 @@ def test_shear_turns_into_relative_speed():
     r = run(sphere(), [profile], {"nu": (0.0, 0.0, w)}, 0.05, 10.0)
     assert r.velocity[-1, 0] == pytest.approx((0.0, 0.0, w), abs=1e-12)
     assert r.position[-1, 0] == pytest.approx((0.0, 0.0, w * 10.0), abs=1e-11)
-
-
-def test_weak_drag_in_float32():
-    # v = v0 e^(-l t / M): x = l h / M = 1e-3 a step. Each of 2,000 steps rounds v by 3e-8 of it, now up and now down: 1.3e-6
-    # together, and a member beyond 5 times that is none in a million. e^-x itself, rounded to 3e-8, would take too much or
-    # too little off at every step: up to 6e-5.
-    members, steps = 64, 2_000
-    linear = np.linspace(0.9, 1.1, members)[:, None] * np.full(6, 3.0)
-    scene = lw.Scene(sphere(), lw.Environment(gravity=GRAVITY), terms=[terms.Drag(linear=linear[0])])
-    still, R = np.zeros((members, 3)), np.broadcast_to(np.eye(3), (members, 3, 3))
-    fleet = lw.Ensemble.from_states(scene, still, R, still + np.array((1.0, 0.7, 1.3)), still, {"drag.linear": linear})
-    r = lw.solve(fleet, "psi_s", h=0.01, t1=0.01 * steps, dtype="float32")
-    exact = r.velocity[0] * np.exp(-linear[:, :3] * 0.01 * steps / 30.0)
-    assert np.abs(r.velocity[-1] / exact - 1.0).max() < 7e-6

@@ -82,8 +82,8 @@ def make_taken(linear, quadratic):
 def make_E(parts, by_changes):
     """(prepare, E) with the parts of PARTS that some member has.
 
-    by_changes: momenta change by what E takes off them. In float32 e^-x has few digits of a small x, and compensated sums
-    have no other way.
+    by_changes: momenta change by what E takes off them, as compensated sums need it. A factor has more digits where drag
+    leaves little of a momentum, a change where it takes little off.
     """
     linear_force, linear_torque, quadratic_force, quadratic_torque = (part in parts for part in PARTS)
 

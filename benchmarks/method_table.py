@@ -1,0 +1,97 @@
+"""Measure every method in every precision at every width and write docs/methods.md: some 500 kernels, half an hour.
+
+python benchmarks/method_table.py [file of JSON lines: those of `python benchmarks/run.py methods`, in place of measuring]
+"""
+
+import json
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from benchmarks.cases.methods import case
+from lgvi_warp import machine, warp_setup
+
+TARGET = Path(__file__).resolve().parent.parent / "docs" / "methods.md"
+SOUND = 1.5
+
+TEXT = """# Methods, precisions and widths
+
+Nanoseconds per vehicle and step of the paper's vehicle on one core, at the default width; for rk5 and rk8 that choose
+their steps, per step of the grid. `ratio` is float64 over float32. `worst` is the width of this precision that makes the
+worst use of the core's rate of fused multiply-adds at that width, and how many times worse it is than the default width:
+a method's operations are the same at every width, so above {sound} something was not vectorised as it should be. `load`
+is the longest that a kernel of the row took to compile, or to load from Warp's cache [s].
+
+{cpu}, {simd}. Written by `python benchmarks/method_table.py`; do not edit.
+
+| method | float64 [ns] | worst | float32 [ns] | worst | ratio | float32_compensated [ns] | worst | load [s] |
+| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |
+{rows}
+
+{notes}
+"""
+
+
+def cells(records, method, dtype):
+    """Time at the default width, and the worst width with how far off it is."""
+    found = [one for one in records if one["method"] == method and one["dtype"] == dtype and "width" in one]
+    if not found:
+        return None, "", ""
+    default = next(one for one in found if one["default"])
+    worst = max(found, key=lambda one: one["off"])
+    return (
+        default["ns_per_vehicle_step"],
+        f"{default['ns_per_vehicle_step']:.1f}",
+        f"{worst['width']}: {worst['off']:.2f}",
+    )
+
+
+def row(records, method):
+    """A line of the table."""
+    (t64, c64, w64), (t32, c32, w32), (_, cc, wc) = (cells(records, method, dtype) for dtype in case.DTYPES)
+    ratio = f"{t64 / t32:.2f}" if t64 and t32 else ""
+    load = max(one["load_seconds"] for one in records if one["method"] == method and "width" in one)
+    return f"| `{method}` | {c64} | {w64} | {c32} | {w32} | {ratio} | {cc} | {wc} | {load:.1f} |"
+
+
+def notes(records):
+    """Where a width is worse than it should be, where single precision gains less than 1.9, and what takes long to load."""
+    timed = [one for one in records if "width" in one]
+    off = [
+        f"`{one['method']}` {one['dtype']} at {one['width']} ({one['off']:.2f})" for one in timed if one["off"] > SOUND
+    ]
+    lines = [f"Further off than {SOUND}: {', '.join(off) or 'none'}."]
+    slow = []
+    for method in case.METHODS:
+        t64, t32 = (cells(records, method, dtype)[0] for dtype in ("float64", "float32"))
+        if t64 and t32 and t64 < 1.9 * t32:
+            slow.append(f"`{method}` ({t64 / t32:.2f})")
+    lines.append(f"float32 less than 1.9 times as fast as float64: {', '.join(slow) or 'none'}.")
+    late = [
+        f"`{one['method']}` {one['dtype']} at {one['width']} ({one['load_seconds']:.0f} s)"
+        for one in timed
+        if one["load_seconds"] > 15
+    ]
+    lines.append(f"Compiled for longer than 15 s: {', '.join(late) or 'none'}.")
+    return "\n\n".join(lines)
+
+
+def main():
+    warp_setup.start()
+    if len(sys.argv) > 1:
+        lines = Path(sys.argv[1]).read_text().splitlines()
+        records = [one for one in map(json.loads, lines) if "method" in one]
+    else:
+        records = []
+        for one in case.run(False):
+            records.append(one)
+            print(json.dumps(one), flush=True)
+    described = machine.describe()
+    rows = "\n".join(row(records, method) for method in case.METHODS)
+    text = TEXT.format(cpu=described["cpu"], simd=described["simd"], rows=rows, notes=notes(records), sound=SOUND)
+    TARGET.write_text(text)
+
+
+if __name__ == "__main__":
+    main()

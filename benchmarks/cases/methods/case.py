@@ -27,7 +27,7 @@ def method_of(name):
 
 
 def run(quick):
-    members, steps = (512, 50) if quick else (2048, 100)
+    members, steps = (512, 50) if quick else (1024, 400)
     names = QUICK if quick else METHODS
     for dtype in DTYPES:
         real = "float64" if dtype == "float64" else "float32"

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from lgvi_kernels.advance import PACE_FIELDS, STATE_FIELDS
 from lgvi_kernels.collocation import SLOPE_FIELDS
 from lgvi_kernels.lanes import int_lane
 from lgvi_kernels.monitor import ENERGY_FIELDS
+from lgvi_kernels.rows import PACE_FIELDS, STATE_FIELDS
 from lgvi_kernels.terms import LAWS
 from lgvi_warp import inertia, limits, model, modified_inertia, notation, vehicle
 from lgvi_warp.ensemble import Ensemble, Members

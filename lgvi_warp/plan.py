@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from lgvi_kernels.advance import CHUNK, SAMPLE_FIELDS, Advance, Spec, make_advance
+from lgvi_kernels.advance import CHUNK, Advance, Spec, make_advance
 from lgvi_kernels.explicit import Explicit
 from lgvi_kernels.lanes import WIDTHS
+from lgvi_kernels.rows import SAMPLE_FIELDS
 from lgvi_kernels.stops import STOPS
 from lgvi_kernels.terms import LAWS
 from lgvi_warp import limits, warp_setup

@@ -20,10 +20,10 @@ from lgvi_kernels.lanes import (
     ones,
     positive,
     sub,  # noqa: F401
-    vec3,
 )
 from lgvi_kernels.method import make_method
-from lgvi_kernels.packet import failures, put, renormalise, turned_too_far
+from lgvi_kernels.packet import failures, renormalise, turned_too_far
+from lgvi_kernels.rows import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS, make_rows, make_sample
 from lgvi_kernels.state import alarm_struct, damping_struct, inertia_struct, state_struct, struct, view_struct
 from lgvi_kernels.sums import at_rest, choose, settled
 from lgvi_kernels.terms import drag, drag_directions
@@ -36,14 +36,6 @@ SINGLE_LOOKS = 8
 
 # A step without a solution is divided into at most so many.
 MOST_PARTS = 1024
-
-# Numbers of a packet's state in `state[packet, field]`: R row by row, b, p (or R p, see Spec.inertial), pi; with compensated
-# sums as many low parts more, or those of its pace (see pace_struct).
-STATE_FIELDS = 18
-PACE_FIELDS = 4
-
-# Sampled quantity -> numbers per sample, in the order they are written.
-SAMPLE_FIELDS = {"position": 3, "attitude": 9, "velocity": 3, "angular_velocity": 3}
 
 
 class Spec(NamedTuple):
@@ -157,69 +149,25 @@ def make_advance(spec):
         **({"drag": DragFlow} if dragged else {}),
     )
     method = make_method(spec)
-    step, lead, velocities, prepare = method.step, method.lead, method.velocities, method.prepare
-    flow, momentum = superpose(spec.laws, "flow"), method.momentum
-    has_lead, drifts, watched = spec.lead is not None, flow is not None, bool(spec.events)
+    step, lead, prepare, momentum = method.step, method.lead, method.prepare, method.momentum
+    has_lead, watched = spec.lead is not None, bool(spec.events)
     watch, passage = make_watch(spec.events, View, "origin" in spec.parts) if watched else (step, step)
     lead_coefficient = spec.lead[1] if has_lead else 0.0
     # A drift that leads has passed half of its time when a step begins; with stages, of the first one's.
     lead_time = spec.lead_time if has_lead and spec.lead[0] in ("Ab", "T", "B") else 0.0
-    water_velocity = method.water_velocity
     renormalised, composed, paired = real == wp.float32, spec.composed, spec.paired
     # A packet that chooses its steps goes on with them in the next launch, and waits for no frozen lane.
     paced, compensated = spec.explicit is not None and spec.explicit.adaptive, spec.compensated
     turned = any(letter[0] == "R" for letter, _ in spec.maps)
-    fields, per_sample = spec.fields, sum(spec.sample_fields.values())
+    per_sample = sum(spec.sample_fields.values())
     looks, energetic, backward, substepped = spec.looks, spec.energy, spec.backward, spec.substep
     Monitor = monitors.monitor_struct(width, real, looks, energetic, backward, substepped)
     apart = spec.explicit is None
     warned, looking = bool(looks), bool(looks) or energetic
     look_at, energies, supplies, growth, drag_back = _watchers(spec, method)
 
-    @wp.func
-    def read(state: wp.array2d(dtype=Lane), i: int):
-        x = State()
-        x.R0 = vec3(state[i, 0], state[i, 1], state[i, 2])
-        x.R1 = vec3(state[i, 3], state[i, 4], state[i, 5])
-        x.R2 = vec3(state[i, 6], state[i, 7], state[i, 8])
-        x.b = vec3(state[i, 9], state[i, 10], state[i, 11])
-        x.p = vec3(state[i, 12], state[i, 13], state[i, 14])
-        x.pi = vec3(state[i, 15], state[i, 16], state[i, 17])
-        if wp.static(paced):
-            x.pace.stride = state[i, 18][0]
-            x.pace.before = state[i, 19][0]
-            x.pace.made = state[i, 20][0]
-            x.pace.tried = state[i, 21][0]
-        if wp.static(compensated):
-            x.R0_low = vec3(state[i, 18], state[i, 19], state[i, 20])
-            x.R1_low = vec3(state[i, 21], state[i, 22], state[i, 23])
-            x.R2_low = vec3(state[i, 24], state[i, 25], state[i, 26])
-            x.b_low = vec3(state[i, 27], state[i, 28], state[i, 29])
-            x.p_low = vec3(state[i, 30], state[i, 31], state[i, 32])
-            x.pi_low = vec3(state[i, 33], state[i, 34], state[i, 35])
-        return x
-
-    @wp.func
-    def write(state: wp.array2d(dtype=Lane), i: int, x: State):
-        put(state, i, 0, x.R0)
-        put(state, i, 3, x.R1)
-        put(state, i, 6, x.R2)
-        put(state, i, 9, x.b)
-        put(state, i, 12, x.p)
-        put(state, i, 15, x.pi)
-        if wp.static(paced):
-            one = ones(x.b.x)
-            state[i, 18] = x.pace.stride * one
-            state[i, 19] = x.pace.before * one
-            state[i, 20] = x.pace.made * one
-            state[i, 21] = x.pace.tried * one
-        if wp.static(compensated):
-            put(state, i, 18, x.R0_low)
-            put(state, i, 21, x.R1_low)
-            put(state, i, 24, x.R2_low)
-            put(state, i, 27, x.b_low)
-            put(state, i, 30, x.p_low)
-            put(state, i, 33, x.pi_low)
+    read, write, back_up = make_rows(Lane, State, paced, compensated)
+    sample = make_sample(Lane, spec.fields, compensated, method, superpose(spec.laws, "flow") is not None)
 
     @wp.func
     def at_step(x: State, k: int, h: wp.float64):
@@ -235,39 +183,6 @@ def make_advance(spec):
         if wp.static(has_lead):
             x = lead(x, c, length)
         return x
-
-    @wp.func
-    def sample(out: wp.array2d(dtype=Lane), i: int, first: int, x: State, c: Constants, h: real):
-        """Write the chosen fields of one sample: b, R, nu (that of the water added), Om."""
-        o = first
-        if wp.static("position" in fields):
-            put(out, i, o, x.b)
-            o += 3
-            if wp.static(compensated):
-                put(out, i, o, x.b_low)
-                o += 3
-        if wp.static("attitude" in fields):
-            put(out, i, o, x.R0)
-            put(out, i, o + 3, x.R1)
-            put(out, i, o + 6, x.R2)
-            o += 9
-        if wp.static(momentum is not None):
-            x.p = momentum(x)
-        nu, Om = velocities(c.inertia, x.p, x.pi)
-        if wp.static("velocity" in fields):
-            if wp.static(drifts):
-                nu = nu + water_velocity(x, c, h)
-            put(out, i, o, nu)
-            o += 3
-        if wp.static("angular_velocity" in fields):
-            put(out, i, o, Om)
-
-    @wp.func
-    def back_up(memory: wp.array2d(dtype=Lane), i: int, source: int, target: int):
-        """Copy the rows that laws remember."""
-        rows = memory.shape[1] // 2
-        for j in range(rows):
-            memory[i, target * rows + j] = memory[i, source * rows + j]
 
     @wp.func
     def one_step(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, stage_h: wp.array(dtype=real),

@@ -33,6 +33,11 @@ is the longest that a kernel of the row took to compile, or to load from Warp's 
 """
 
 
+WHY = """Four float32 are passed as two pairs by the calling convention of x86-64, and LLVM keeps the pairs: a register half as
+wide as it should be; no default on AVX uses that width. The operations of a turn of `psi_x`, and of a solve of (24), wait
+for one another: a narrower packet has fewer of them under way at a time, which is why `psi_x` takes two registers."""
+
+
 def cells(records, method, dtype):
     """Time at the default width, and the worst width with how far off it is."""
     found = [one for one in records if one["method"] == method and one["dtype"] == dtype and "width" in one]
@@ -57,11 +62,17 @@ def row(records, method):
 
 def notes(records):
     """Where a width is worse than it should be, where single precision gains less than 1.9, and what takes long to load."""
-    timed = [one for one in records if "width" in one]
-    off = [
-        f"`{one['method']}` {one['dtype']} at {one['width']} ({one['off']:.2f})" for one in timed if one["off"] > SOUND
-    ]
-    lines = [f"Further off than {SOUND}: {', '.join(off) or 'none'}."]
+    timed, lines = [one for one in records if "width" in one], []
+    for dtype in case.DTYPES:
+        for width in sorted({one["width"] for one in timed}):
+            here = [one for one in timed if one["dtype"] == dtype and one["width"] == width]
+            off = [one for one in here if one["off"] > SOUND]
+            if off:
+                most = max(one["off"] for one in off)
+                names = "every method" if len(off) == len(here) else ", ".join(f"`{one['method']}`" for one in off)
+                lines.append(f"* {dtype} at {width}: {names}; up to {most:.2f}.")
+    text = f"Further off than {SOUND}:\n\n" + "\n".join(lines) if lines else f"Nothing is further off than {SOUND}."
+    lines = [text, WHY]
     slow = []
     for method in case.METHODS:
         t64, t32 = (cells(records, method, dtype)[0] for dtype in ("float64", "float32"))

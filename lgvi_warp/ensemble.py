@@ -220,15 +220,22 @@ class Ensemble:
         position, nu, Om = (np.broadcast_to(x, (m, 3)) for x in (start["position"], nu, start["angular_velocity"]))
         return Members(self.parameters(first, stop), position, R, nu, Om, self.indices[first:stop], self.seed)
 
+    def varied(self) -> list[str]:
+        """Names of the parameters that have a number for each member."""
+        return [name for name in self._base if name in self.vary or name in self._explicit]
+
     def subset(self, indices: Sequence[int]) -> Ensemble:
         """These members, in this order, as an ensemble of its own with the same numbers."""
         chosen = [self.select(int(i), int(i) + 1) for i in indices]
         b, R, nu, Om = (np.concatenate([getattr(one, name) for one in chosen]) for name in STATES)
-        varied = [name for name in self._base if name in self.vary or name in self._explicit]
-        parameters = {name: np.concatenate([one.parameters[name] for one in chosen]) for name in varied}
+        parameters = {name: np.concatenate([one.parameters[name] for one in chosen]) for name in self.varied()}
         ensemble = Ensemble.from_states(self.scene, b, R, nu, Om, parameters)
         ensemble.indices, ensemble.seed = self.indices[np.asarray(indices, dtype=int)], self.seed
         return ensemble
+
+    def explicit(self) -> dict[str, np.ndarray]:
+        """States and parameters that were given as arrays, by name, (n, ...); empty for an ensemble that is drawn."""
+        return dict(self._explicit)
 
     def to_dict(self) -> dict[str, Any]:
         """members, seed and vary as in a scene file, and the names that were given as arrays."""

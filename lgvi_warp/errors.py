@@ -18,6 +18,10 @@ class SceneError(ValueError):
         head = "" if len(self.faults) == 1 else f"{len(self.faults)} faults:\n  "
         super().__init__(head + "\n  ".join(self.faults))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Made again from its faults, in the process that asked."""
+        return SceneError, (self.faults,)
+
 
 def closest(word: str, known: Iterable[str]) -> str:
     """ "did you mean ..." or the list of what is known."""

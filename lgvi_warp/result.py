@@ -5,13 +5,14 @@ from __future__ import annotations
 import functools
 import json
 import os
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp import invariants, notation
+from lgvi_warp import invariants, member_fields, notation
 from lgvi_warp.status import StatusArray
 from lgvi_warp.terms import Term, from_list
 
@@ -48,17 +49,19 @@ class Result:
     time, interpolated within the step; NaN where there was neither. failure_value: (n,), the |J^-1 a| or relative residual
     that crossed its limit, 0 for a non-finite state and for an event.
     messages: what the user should know; provenance: scene, settings, versions, seed, machine.
+    store: the folder that samples and parameters are read from, each time that they are asked for; None in memory.
     """
 
     time: np.ndarray
-    samples: dict[str, np.ndarray]
+    samples: Mapping[str, np.ndarray]
     status: StatusArray
     failure_time: np.ndarray
     failure_value: np.ndarray
-    parameters: dict[str, np.ndarray]
+    parameters: Mapping[str, np.ndarray]
     messages: tuple[str, ...]
     provenance: dict[str, Any]
     terms: tuple[Term, ...] = ()
+    store: Path | None = None
     compile_seconds: float = field(default=0.0, compare=False)
     run_seconds: float = field(default=0.0, compare=False)
 
@@ -101,6 +104,11 @@ class Result:
         """A term's numbers, by field, with a leading dimension of 1 or n."""
         return {name: self.parameters[f"{term.key}.{name}"] for name in term.parameters()}
 
+    def _member_fields(self) -> list[member_fields.MemberField]:
+        """Those that are attributes of a result."""
+        own = {one.name for one in fields(self)}
+        return [one for one in member_fields.FIELDS if one.name in own]
+
     @property
     def members(self) -> int:
         """n."""
@@ -108,11 +116,18 @@ class Result:
 
     @functools.cached_property
     def dataset(self) -> xarray.Dataset:
-        """The samples as an xarray Dataset with dimensions time, realization, component (extra: store)."""
+        """The samples as an xarray Dataset with dimensions time, realization, component (extra: store).
+
+        Of a run in a store, a view of it: values are read when they are used, and energy is left out.
+        """
         try:
             import xarray as xr
         except ImportError as error:
             raise ImportError("result.dataset needs xarray: pip install 'lgvi-warp[store]'") from error
+        if self.store is not None:
+            from lgvi_warp.stored import dataset
+
+            return dataset(self.store)
         dims = {1: ("component",), 2: ("row", "column")}
         names = [*self.samples] + ["energy"] * (len(self.samples) == 4)
         data = {}
@@ -120,7 +135,8 @@ class Result:
             values = getattr(self, name)
             attributes = {"units": UNITS[name], "long_name": MEANINGS[name]}
             data[name] = (("time", "realization", *dims.get(values.ndim - 2, ())), values, attributes)
-        data["status"] = (("realization",), np.asarray(self.status), {"long_name": "0 ok, see lgvi_warp.Status"})
+        for one in self._member_fields():
+            data[one.name] = (("realization",), np.asarray(getattr(self, one.name)), one.attributes)
         coordinates = {"time": ("time", self.time, {"units": "s", "long_name": "time since the start"})}
         attributes = {"Conventions": "CF-1.11", "provenance": json.dumps(self.provenance)}
         return xr.Dataset(data, coordinates, attributes)
@@ -129,8 +145,8 @@ class Result:
         """Write everything to an .npz file, whole or not at all. Returns its path. Raises OSError."""
         target = Path(path)
         part = target.with_name(target.name + ".part")
-        arrays = {"time": self.time, **self.samples, "status": np.asarray(self.status)}
-        arrays |= {"failure_time": self.failure_time, "failure_value": self.failure_value}
+        arrays = {"time": self.time, **self.samples}
+        arrays |= {one.name: np.asarray(getattr(self, one.name)) for one in self._member_fields()}
         arrays |= {f"parameters/{name}": value for name, value in self.parameters.items()}
         texts = {"messages": json.dumps(self.messages), "provenance": json.dumps(self.provenance)}
         try:
@@ -142,6 +158,13 @@ class Result:
         return target
 
     @classmethod
+    def per_member(cls, arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
+        """Arguments of a result that are arrays over members, out of arrays by name."""
+        own = {one.name for one in fields(cls)}
+        found: dict[str, Any] = {f.name: arrays[f.name] for f in member_fields.FIELDS if f.name in own & arrays.keys()}
+        return found | {"status": found["status"].view(StatusArray)}
+
+    @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Result:
         """Read what `save` wrote. Raises OSError or ValueError if it is not such a file."""
         with np.load(Path(path), allow_pickle=False) as data:
@@ -150,9 +173,7 @@ class Result:
         return cls(
             time=content["time"],
             samples={name: content[name] for name in content if name in UNITS},
-            status=content["status"].view(StatusArray),
-            failure_time=content["failure_time"],
-            failure_value=content["failure_value"],
+            **cls.per_member(content),
             parameters={name.removeprefix(prefix): content[name] for name in content if name.startswith(prefix)},
             messages=tuple(json.loads(str(content["messages"]))),
             provenance=(provenance := json.loads(str(content["provenance"]))),

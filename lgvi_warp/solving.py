@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-import threading
+import os
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,18 +10,22 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp import machine
-from lgvi_warp.blocks import Block, Keeper, blocks, in_order, run_block
+from lgvi_warp import machine, member_fields
+from lgvi_warp.blocks import Work, blocks
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError, shown
-from lgvi_warp.executors import threads as thread_executor
+from lgvi_warp.executors import Executor, executor_of
+from lgvi_warp.executors.threads import Threads
 from lgvi_warp.keepers import Outcomes, Samples
 from lgvi_warp.method import Method
 from lgvi_warp.plan import Plan
 from lgvi_warp.result import Result
+from lgvi_warp.running import Progress, Stored, run_blocks
 from lgvi_warp.saveat import SaveAt, time_grid
 from lgvi_warp.scene import Scene
-from lgvi_warp.status import Status, StatusArray
+from lgvi_warp.status import Status
+from lgvi_warp.store import Store
+from lgvi_warp.stored import result_of
 
 
 def solve(
@@ -37,6 +40,10 @@ def solve(
     width: int | None = None,
     checks: str = "safe",
     progress: Callable[[float], None] | None = None,
+    store: Store | str | os.PathLike[str] | None = None,
+    executor: Executor | str = "threads",
+    scheduler: str | None = None,
+    only: range | None = None,
 ) -> Result:
     """Advance every member of the fleet from t = 0 to t1 and keep the samples asked for.
 
@@ -48,6 +55,9 @@ def solve(
     threads: default all cores. width: vehicles per packet, default from the CPU.
     checks: "safe" gives each member a status and freezes it when it fails; "none" leaves that code out.
     progress: called with the fraction of the work that is done, from the threads that do it.
+    store: a folder "runs/x/run.zarr", or a Store with more settings: samples go there block by block and not into memory,
+    and a run that was stopped goes on with lw.resume. executor: "threads", "processes" or "dask", or an object that runs
+    blocks; scheduler: the address of Dask's. only: with a store, indices of the blocks to run, for a run in parts.
 
     Raises SceneError naming every fault of the arguments. Prints nothing. The same inputs give the same bits for any
     number of threads, on one type of machine.
@@ -58,11 +68,20 @@ def solve(
         )
     ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
     plan = make_plan(ensemble, method, h, t1, save, dtype, width=width, checks=checks)
-    faults = Faults()
-    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
-        faults.add("threads", threads, "is not a whole number above 0", "give 1 or more, or leave it out for all cores")
-    faults.raise_if_any()
-    return run_plan(plan, threads or machine.thread_count(), progress)
+    runner = executor_of(executor, threads, scheduler)
+    if store is None:
+        if only is not None:
+            raise SceneError([f"only = {only}: is for a run into a store; give store=..., or leave it out"])
+        return run_plan(plan, threads or machine.thread_count(), progress, runner)
+    check_blocks(only, plan)
+    return run_stored(plan, store if isinstance(store, Store) else Store(store), runner, progress, only)
+
+
+def check_blocks(only: range | None, plan: Plan) -> None:
+    """The blocks of a run in parts must be there. Raises SceneError."""
+    count = len(blocks(plan.ensemble.members))
+    if only is not None and not (len(only) and 0 <= only[0] and only[-1] < count):
+        raise SceneError([f"blocks {only.start}:{only.stop}: are not within the {count} of this run; give 0:{count} or less"])
 
 
 def make_plan(
@@ -129,57 +148,46 @@ def enough_iterations(ensemble: Ensemble, method: Method, h: float, dtype: str) 
     return None
 
 
-class _Progress:
-    """Fraction of the vehicle-steps made so far, counted from several threads."""
-
-    def __init__(self, total: int, report: Callable[[float], None] | None):
-        self._total, self._done, self._report, self._lock = total, 0, report, threading.Lock()
-
-    def add(self, vehicle_steps: int) -> None:
-        if self._report is None:
-            return
-        with self._lock:
-            self._done += vehicle_steps
-            self._report(self._done / self._total)
-
-
-def run_plan(plan: Plan, threads: int, progress: Callable[[float], None] | None = None) -> Result:
-    """Run every block of the plan and gather the result."""
+def run_plan(
+    plan: Plan, threads: int, progress: Callable[[float], None] | None = None, executor: Executor | None = None
+) -> Result:
+    """Run every block of the plan and gather the result in memory; executor: default so many threads."""
     compile_seconds = plan.compile()
     n = plan.ensemble.members
     outcomes, samples = Outcomes(plan), Samples(plan)
-    keepers: tuple[Keeper, ...] = (outcomes, samples)
-    counter = _Progress(n * plan.grid.steps, progress)
-    stop = threading.Event()
-
-    def work(block: Block) -> tuple[Any, ...] | None:
-        return run_block(plan, block, keepers, stop.is_set, counter.add)
-
+    made = Progress(n * plan.grid.steps, progress)
     start = time.perf_counter()
-    runs = blocks(n)
-    with contextlib.closing(thread_executor.run(runs, work, threads, stop)) as done:
-        for block, parts in in_order(runs, done):
-            for keeper, part in zip(keepers, parts, strict=True):
-                keeper.merge(block, part)
+    run_blocks(Work(plan, (outcomes, samples)), blocks(n), executor or Threads(threads), made.at)
     run_seconds = time.perf_counter() - start
-    status = outcomes.status
-    failed, stopped = status != 0, status >= Status.SURFACE
-    # An event's size is the part of its step that was made before it.
-    steps_made = outcomes.failed_step + np.where(stopped, outcomes.failed_size, 0.0)
+    assert samples.fields is not None
     return Result(
         time=plan.grid.times,
         samples=samples.fields,
-        status=status.view(StatusArray),
-        failure_time=np.where(failed, steps_made * plan.grid.h, np.nan),
-        failure_value=np.where(failed, np.where(stopped, 0.0, outcomes.failed_size), np.nan),
+        **Result.per_member(member_fields.of(plan, outcomes)),
         parameters=plan.ensemble.parameters(0, n),
-        messages=plan.grid.messages + plan.ensemble.scene.vehicle.warnings,
+        messages=messages(plan),
         provenance=provenance(plan)
         | dict(zip(("steps_made", "steps_tried"), outcomes.chosen.mean(axis=0).tolist(), strict=False)),
         terms=tuple(plan.ensemble.scene.terms),
         compile_seconds=compile_seconds,
         run_seconds=run_seconds,
     )
+
+
+def run_stored(
+    plan: Plan, store: Store, executor: Executor, progress: Callable[[float], None] | None, only: range | None = None
+) -> Result:
+    """Run every block of the plan, or `only` some, into a store, and give a result that reads from it."""
+    compile_seconds = plan.compile()
+    start = time.perf_counter()
+    folder = Stored(plan, store, provenance(plan), messages(plan), (), only).run(executor, progress)
+    result = result_of(folder, messages=messages(plan), terms=plan.ensemble.scene.terms)
+    return replace(result, compile_seconds=compile_seconds, run_seconds=time.perf_counter() - start)
+
+
+def messages(plan: Plan) -> tuple[str, ...]:
+    """What the user should know before the run."""
+    return plan.grid.messages + tuple(plan.ensemble.scene.vehicle.warnings)
 
 
 def provenance(plan: Plan) -> dict[str, Any]:
@@ -201,6 +209,7 @@ def provenance(plan: Plan) -> dict[str, Any]:
         "width": plan.spec.width,
         "checks": plan.checks,
         "terms": [term.type for term, _ in plan.model.laws],
+        "kernel": plan.kernel_hash,
         "versions": machine.versions(),
         "machine": machine.describe(),
     }

@@ -1,0 +1,191 @@
+"""Blocks through an executor, their parts to the keepers in the order of the blocks; with a store, from where it stopped."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from lgvi_warp.blocks import Block, Keeper, PartKeeper, Work, blocks, in_order
+from lgvi_warp.errors import Faults, SceneError
+from lgvi_warp.executors import Executor
+from lgvi_warp.plan import Plan
+from lgvi_warp.recipe import refuse_another
+from lgvi_warp.store import Folder, Sink, Store, check, create, held, skeleton
+from lgvi_warp.store_layout import columns
+
+# What the system says when a disk takes no more, or not from us.
+FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+
+
+class Progress:
+    """Fraction of the vehicle-steps made so far, told by blocks from several threads."""
+
+    def __init__(self, total: int, report: Callable[[float], None] | None):
+        self._total, self._report, self._lock = total, report, threading.Lock()
+        self._made: dict[int, int] = {}
+        self._sum = 0
+
+    def at(self, block: Block, vehicle_steps: int) -> None:
+        """A block has made so many; a block that runs again begins anew."""
+        if self._report is None:
+            return
+        with self._lock:
+            self._sum += vehicle_steps - self._made.get(block.first, 0)
+            self._made[block.first] = vehicle_steps
+            self._report(self._sum / self._total)
+
+
+def run_blocks(
+    work: Work, runs: Sequence[Block], executor: Executor, advanced: Callable[[Block, int], None]
+) -> None:
+    """Run these blocks and hand their parts to the keepers in order."""
+    with contextlib.closing(executor.run(work, runs, advanced)) as done:
+        for block, parts in in_order(runs, done):
+            merge(work.keepers, block, parts)
+
+
+def merge(keepers: Sequence[Keeper], block: Block, parts: Sequence[Any]) -> None:
+    """A block's parts, each to its keeper."""
+    for keeper, part in zip(keepers, parts, strict=True):
+        keeper.merge(block, part)
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A run into a store, begun or gone on with.
+
+    keepers: what else is kept of it, beside the store: their parts lie in it. only: indices of the blocks to run, default
+    all; the run is complete when every block is there.
+    """
+
+    plan: Plan
+    store: Store
+    provenance: dict[str, Any]
+    messages: tuple[str, ...] = ()
+    keepers: tuple[Keeper, ...] = ()
+    only: range | None = None
+
+    def run(self, executor: Executor, progress: Callable[[float], None] | None = None) -> Folder:
+        """Run what is missing. Raises SceneError for what is refused, OSError where the disk takes no more."""
+        check_keepers(self.keepers)
+        self._begin()
+        path = self.store.folder
+        with held(path):
+            sink = Sink(path, columns(self.plan, self.store.dtype, self.store.fields))
+            sink.remove_unfinished()
+            self._mend()
+            left = self._left(sink)
+            try:
+                self._blocks(sink, left, executor, progress)
+            except OSError as error:
+                raise explained(error, path) from error
+            finally:
+                sink.remove_unfinished()
+            folder = Folder(path)
+            if not folder.unfinished():
+                folder.finish()
+        return folder
+
+    def _begin(self) -> None:
+        """Make the folder, or see that what lies there is this run."""
+        path, store = self.store.folder, self.store
+        there = path.exists()
+        if there and store.existing == "refuse":
+            remedy = "go on with `lgvi-warp resume` (existing=\"resume\"), or replace it with --overwrite (existing=\"overwrite\")"
+            raise SceneError([f"{path}: holds a run already; {remedy}"])
+        if there and store.existing == "resume":
+            folder = Folder(path)
+            refuse_another(path, folder.provenance, self.provenance, store.force)
+            asked = {"dtype": store.dtype, "fields": list(store.fields) if store.fields is not None else None}
+            if folder.recipe["store"] != asked:
+                raise SceneError([f"{path}: stores {folder.recipe['store']}, not {asked}; ask for the same, or overwrite"])
+            return
+        try:
+            if there:
+                with held(path):
+                    create(store, self.plan, self.provenance, self.messages)
+            else:
+                create(store, self.plan, self.provenance, self.messages)
+        except OSError as error:
+            raise explained(error, path) from error
+
+    def _mend(self) -> None:
+        """Write anew what is damaged of the files that belong to no block."""
+        path = self.store.folder
+        if not Folder(path).damage():
+            return
+        import shutil
+
+        beside = path.with_name(path.name + ".new")
+        shutil.rmtree(beside, ignore_errors=True)
+        skeleton(beside, self.store, self.plan, self.provenance, self.messages)
+        for one in sorted(beside.rglob("*")):
+            target = path / one.relative_to(beside)
+            if one.is_file() and one != beside / "zarr.json":
+                target.parent.mkdir(parents=True, exist_ok=True)
+                one.replace(target)
+        shutil.rmtree(beside)
+
+    def _left(self, sink: Sink) -> list[Block]:
+        """Blocks to be run, without those that are finished and whole; a damaged one loses its marker."""
+        runs = blocks(self.plan.ensemble.members)
+        chosen = runs if self.only is None else [runs[i] for i in self.only]
+        left = []
+        for block, faults in check(sink, chosen, len(self.plan.grid.times), self.keepers):
+            if faults:
+                sink.marker(block).unlink(missing_ok=True)
+                left.append(block)
+        return left
+
+    def _blocks(
+        self, sink: Sink, left: Sequence[Block], executor: Executor, progress: Callable[[float], None] | None
+    ) -> None:
+        """Run blocks; parts of the finished ones come from the store, all in order."""
+        n, steps = self.plan.ensemble.members, self.plan.grid.steps
+        runs = blocks(n)
+        chosen = runs if self.only is None else [runs[i] for i in self.only]
+        made = Progress(n * steps, progress)
+        for block in set(chosen) - set(left):
+            made.at(block, block.count * steps)
+        work = Work(self.plan, self.keepers, sink)
+        if left:
+            self.plan.compile()
+        with contextlib.closing(executor.run(work, left, made.at) if left else iter_nothing()) as done:
+            fresh = in_order(left, done)
+            wanted = {block.first for block in left}
+            for block in chosen:
+                parts = next(fresh)[1] if block.first in wanted else sink.parts(block, self.keepers)
+                merge(self.keepers, block, parts)
+
+
+def iter_nothing() -> Any:
+    """No blocks."""
+    yield from ()
+
+
+def check_keepers(keepers: Sequence[Keeper]) -> None:
+    """Each must be able to leave its parts in a store, under a name of its own. Raises SceneError."""
+    faults = Faults("keepers.")
+    for keeper in keepers:
+        if not isinstance(keeper, PartKeeper):
+            faults.add(type(keeper).__name__, keeper, "cannot be stored", "give it name, to_arrays and from_arrays")
+    names = [keeper.name for keeper in keepers if isinstance(keeper, PartKeeper)]
+    for name in sorted({name for name in names if names.count(name) > 1 or "/" in name}):
+        faults.add("name", name, "is no file name of its own", "give each keeper another name, without /")
+    faults.raise_if_any()
+
+
+def explained(error: OSError, path: os.PathLike[str]) -> OSError:
+    """The same error with what it means for the run."""
+    if error.errno in FULL:
+        text = f"{error.strerror}: the blocks that were finished are kept; make room, then `lgvi-warp resume {path}`"
+    elif error.errno in (errno.EROFS, errno.EACCES, errno.EPERM):
+        text = f"{error.strerror}: choose a folder that can be written"
+    else:
+        return error
+    return OSError(error.errno, text, error.filename or str(path))

@@ -1,0 +1,116 @@
+"""Runs that lie in a store, read when they are asked for."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.errors import SceneError
+from lgvi_warp.result import UNITS, Result
+from lgvi_warp.store import Folder
+from lgvi_warp.terms import Term, from_list
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@dataclass(frozen=True)
+class Arrays(Mapping[str, np.ndarray]):
+    """Arrays of a store by name, read anew each time; `whole` ones are in memory. members: which to read, along `axis`."""
+
+    group: Any
+    names: tuple[str, ...]
+    axis: int
+    members: Any = None
+    whole: Mapping[str, np.ndarray] | None = None
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if self.whole is not None and name in self.whole:
+            return self.whole[name]
+        if name not in self.names:
+            raise KeyError(name)
+        chosen = slice(None) if self.members is None else self.members
+        at = (*(slice(None),) * self.axis, chosen)
+        array = self.group[name]
+        return np.asarray(array[at] if isinstance(chosen, slice) else array.oindex[at])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter((*self.names, *(self.whole or {})))
+
+    def __len__(self) -> int:
+        return len(self.names) + len(self.whole or {})
+
+
+def folder_of(path: str | os.PathLike[str]) -> Path:
+    """The store that a path is, or the one .zarr in it. Raises SceneError."""
+    given = Path(path)
+    if given.suffix == ".zarr":
+        return given
+    found = sorted(given.glob("*.zarr")) if given.is_dir() else []
+    if len(found) != 1:
+        what = f"holds {len(found)} stores" if given.exists() else "is not there"
+        remedy = "give the folder of a run made with --store zarr" if not found else f"name one: {found[0]}"
+        raise SceneError([f"{given}: {what}; {remedy}"])
+    return found[0]
+
+
+def open_run(
+    path: str | os.PathLike[str], members: slice | Sequence[int] | None = None, incomplete: bool = False
+) -> Result:
+    """A run in a store, or in a folder with one store: a Result whose samples and parameters are read when asked for.
+
+    members: only these, (m,) indices or a slice. `result.dataset` is a view of all of it by xarray, read piece by piece.
+    incomplete: also a run that has not ended; what its blocks have not reached reads as NaN and status 0.
+    Raises SceneError where there is no run, or it is not complete.
+    """
+    folder = Folder(folder_of(path))
+    messages = folder.messages
+    if not folder.complete:
+        left = len(folder.unfinished())
+        text = f"{folder.path}: is not complete: {left} blocks are missing"
+        if not incomplete:
+            raise SceneError([f"{text}; go on with `lgvi-warp resume {folder.path.parent}`, or give incomplete=True"])
+        messages = (*messages, text)
+    return result_of(folder, members, messages)
+
+
+def result_of(
+    folder: Folder, members: Any = None, messages: tuple[str, ...] = (), terms: Sequence[Term] | None = None
+) -> Result:
+    """The Result of a folder; terms: those of the scene, where its file does not tell them."""
+    group = folder.group()
+    at = members if members is None or isinstance(members, slice) else np.asarray(members, dtype=int)
+    arrays = {name: array for name, array in group.arrays()}
+    fields = tuple(name for name in arrays if name in UNITS)
+    varied = tuple(name for name in arrays if "." in name)
+    small = Arrays(group, tuple(name for name in arrays if name not in (*fields, *varied)), 0, at)
+    shared = {name: np.asarray(value, dtype=np.float64) for name, value in folder.shared.items()}
+    provenance = dict(folder.provenance)
+    for name in ("steps_made", "steps_tried"):
+        if name in arrays:
+            provenance[name] = float(small[name].mean())
+    return Result(
+        time=group["time"][:],
+        samples=Arrays(group, fields, 1, at),
+        **Result.per_member(small),
+        parameters=Arrays(group, varied, 0, at, shared),
+        messages=messages,
+        provenance=provenance,
+        terms=tuple(from_list(provenance["scene"].get("terms", ())) if terms is None else terms),
+        store=folder.path,
+    )
+
+
+def dataset(path: Path) -> xarray.Dataset:
+    """A store as xarray sees it, in pieces of its chunks if dask is there."""
+    import importlib.util
+
+    import xarray
+
+    chunks: Any = {} if importlib.util.find_spec("dask") else None
+    return xarray.open_dataset(path, engine="zarr", chunks=chunks)

@@ -43,11 +43,11 @@ if TYPE_CHECKING:
     from lgvi_warp.coefficients import from_fossen, vehicles
     from lgvi_warp.coefficients_sdf import from_sdf
     from lgvi_warp.coefficients_yaml import from_yaml
-    from lgvi_warp.law_check import check_law
     from lgvi_warp.export import export
+    from lgvi_warp.law_check import check_law
     from lgvi_warp.plan import Plan
-    from lgvi_warp.resuming import merge, resume
     from lgvi_warp.prediction import predict
+    from lgvi_warp.resuming import merge, resume
     from lgvi_warp.sinks.plots import plot, plot_tradeoff
     from lgvi_warp.sinks.rerun import log_rerun
     from lgvi_warp.solving import solve

@@ -30,6 +30,8 @@ EPILOG = """examples:
   lgvi-warp run examples/paper.toml --out runs/paper
   lgvi-warp run examples/paper.toml --members 20000 --dtype float32 --set vehicle.mass=120
   lgvi-warp run examples/paper.toml --error 1e-3
+  lgvi-warp run examples/paper.toml --members 1000000 --store zarr --out runs/large
+  lgvi-warp resume runs/large
   lgvi-warp tradeoff examples/paper.toml --out runs/tradeoff
   lgvi-warp info
 """
@@ -56,8 +58,21 @@ def parser() -> argparse.ArgumentParser:
     run.add_argument("--method", help="psi_s, psi_1, psi, phi, phi_adjoint, or a composition such as kl6(psi_s)")
     run.add_argument("--step", metavar="S", help="time step [s]")
     run.add_argument("--dtype", help="float64, float32, or float32_compensated: sums of two float32")
-    run.add_argument("--threads", metavar="N", type=int, help="threads (default: all cores)")
     run.add_argument("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
+    _add_executor(run)
+    run.add_argument(
+        "--store",
+        choices=["npz", "zarr"],
+        default="npz",
+        help="result.npz when the run ends (default), or run.zarr block by block, which resume can go on with",
+    )
+    run.add_argument("--store-dtype", metavar="D", help="float32: store the samples of a float64 run so")
+    run.add_argument("--blocks", metavar="A:B", help="with --store zarr: run only these blocks, to be merged later")
+    there = run.add_mutually_exclusive_group()
+    there.add_argument("--overwrite", action="store_true", help="replace a run.zarr that is there")
+    there.add_argument("--resume", action="store_true", help="go on with a run.zarr that is there, if it is this run")
+    _add_plan(verbs)
+    _add_store_verbs(verbs)
     trade = verbs.add_parser(
         "tradeoff", help="speed against accuracy of every method, step and precision: tradeoff.json, .csv and .png"
     )
@@ -71,12 +86,53 @@ def parser() -> argparse.ArgumentParser:
         default=45.0,
         help="about how long to measure (default 45)",
     )
-    info = verbs.add_parser("info", help="machine, versions, SIMD width, threads and the core's peak")
-    info.set_defaults(scene=None)
+    info = verbs.add_parser(
+        "info", help="what a run's folder holds; without one, the machine, versions, the core's peak"
+    )
+    info.add_argument("dir", metavar="DIR", type=Path, nargs="?", help="a store, or a folder with one")
     bench = verbs.add_parser("bench", help="speed of the kernel on this machine, beside the core's peak")
     bench.add_argument("--members", type=int, default=4096, help="vehicles (default 4096)")
     bench.add_argument("--steps", type=int, default=1000, help="steps (default 1000)")
     return top
+
+
+def _add_executor(verb: argparse.ArgumentParser) -> None:
+    """Where blocks run."""
+    verb.add_argument("--threads", metavar="N", type=int, help="threads, processes or workers (default: all cores)")
+    verb.add_argument("--executor", default="threads", help="threads (default), processes or dask")
+    verb.add_argument("--scheduler", metavar="ADDRESS", help="of Dask; without one, a cluster on this machine")
+
+
+def _add_plan(verbs: Any) -> None:
+    """The verb plan."""
+    plan = verbs.add_parser(
+        "plan", help="time, memory and disk that a run would take, from a small one on this machine"
+    )
+    _add_scene(plan, "runs/NAME of the scene")
+    plan.add_argument("--method", help="as for run")
+    plan.add_argument("--step", metavar="S", help="time step [s]")
+    plan.add_argument("--dtype", help="as for run")
+    plan.add_argument("--threads", metavar="N", type=int, help="threads (default: all cores)")
+    plan.add_argument("--store", choices=["npz", "zarr"], default="npz", help="as for run")
+    plan.add_argument("--store-dtype", metavar="D", help="as for run")
+
+
+def _add_store_verbs(verbs: Any) -> None:
+    """The verbs that work on a store."""
+    resume = verbs.add_parser("resume", help="go on with a run that was stopped, and mend what is damaged of it")
+    resume.add_argument("dir", metavar="DIR", type=Path, help="a store, or a folder with one")
+    _add_executor(resume)
+    resume.add_argument("--force", action="store_true", help="even on another machine or with other versions")
+    resume.add_argument("--quiet", action="store_true", help="no progress and no summary")
+    merge = verbs.add_parser("merge", help="put runs of some blocks each (run --blocks) together")
+    merge.add_argument("dirs", metavar="DIR", type=Path, nargs="+", help="stores, or folders with one each")
+    merge.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the whole run")
+    merge.add_argument("--overwrite", action="store_true", help="replace a run.zarr that is there")
+    merge.add_argument("--quiet", action="store_true", help="no summary")
+    export = verbs.add_parser("export", help="write a run as one NetCDF or Parquet file")
+    export.add_argument("dir", metavar="DIR", type=Path, help="a store, or a folder with one")
+    export.add_argument("--to", required=True, help="netcdf or parquet")
+    export.add_argument("--out", metavar="FILE", type=Path, help="the file (default: beside the store)")
 
 
 def _add_scene(verb: argparse.ArgumentParser, folder: str) -> None:
@@ -96,7 +152,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the command. Returns the exit code: 0, 1 for a run that failed, 2 for a scene or argument that is refused."""
     chosen = parser().parse_args(arguments)
     try:
-        return {"run": run, "tradeoff": tradeoff, "info": info, "bench": bench}[chosen.verb](chosen)
+        return VERBS[chosen.verb](chosen)
     except SceneError as error:
         print(f"lgvi-warp: {error}", file=sys.stderr)
         return 2
@@ -104,7 +160,9 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"lgvi-warp: {error.filename or ''}: {error.strerror or error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print("lgvi-warp: interrupted; nothing was written", file=sys.stderr)
+        kept = chosen.verb == "resume" or getattr(chosen, "store", None) == "zarr"
+        text = "finished blocks are kept: go on with lgvi-warp resume" if kept else "nothing was written"
+        print(f"lgvi-warp: interrupted; {text}", file=sys.stderr)
         return 130
 
 
@@ -130,6 +188,7 @@ def run(chosen: argparse.Namespace) -> int:
     begun = time.perf_counter()
     scene = Scene.load(chosen.scene, overrides(chosen))
     out: Path = chosen.out or Path("runs") / Path(chosen.scene).stem
+    store, only = store_settings(chosen, out), block_range(chosen)
     out.mkdir(parents=True, exist_ok=True)
     warm = _import_in_background()
     from lgvi_warp.solving import solve
@@ -137,18 +196,82 @@ def run(chosen: argparse.Namespace) -> int:
     suggested = suggestion(scene, chosen)
     progress = None if chosen.quiet else Progress(sys.stderr)
     settings = suggested.settings if suggested else {}
-    result = solve(scene, threads=chosen.threads, width=chosen.width, progress=progress, **settings)
+    result = solve(
+        scene, threads=chosen.threads, width=chosen.width, progress=progress, store=store, executor=chosen.executor,
+        scheduler=chosen.scheduler, only=only, **settings,
+    )  # fmt: skip
     if progress:
         progress.close()
     warm.join()
-    files, faults = write(result, out)
-    if not chosen.quiet:
-        print(summary(result, files, time.perf_counter() - begun))
+    faults = report(result, out, chosen.quiet, begun)
     if suggested:
         faults += check_error(scene, result, suggested, chosen.quiet)
     for fault in faults:
         print(f"lgvi-warp: {fault}", file=sys.stderr)
     return 1 if faults or (result.status != 0).all() else 0
+
+
+def store_settings(chosen: argparse.Namespace, out: Path) -> Any:
+    """The store that the arguments ask for, None without one. Raises SceneError."""
+    if chosen.store == "npz":
+        names = ("store_dtype", "blocks", "overwrite", "resume")
+        given = [f"--{name.replace('_', '-')}" for name in names if getattr(chosen, name)]
+        if given:
+            raise SceneError([f"{' and '.join(given)}: is for runs in a store; add --store zarr, or leave it out"])
+        return None
+    from lgvi_warp.store import Store
+
+    existing = "overwrite" if chosen.overwrite else "resume" if chosen.resume else "refuse"
+    return Store(out / "run.zarr", chosen.store_dtype, existing=existing)
+
+
+def block_range(chosen: argparse.Namespace) -> range | None:
+    """The blocks of --blocks A:B. Raises SceneError."""
+    if chosen.blocks is None:
+        return None
+    first, colon, stop = chosen.blocks.partition(":")
+    if not (colon and first.isdigit() and stop.isdigit()):
+        raise SceneError(
+            [f"--blocks {chosen.blocks}: is no range of blocks; write --blocks 0:100 for the first hundred"]
+        )
+    return range(int(first), int(stop))
+
+
+def report(result: Any, out: Path, quiet: bool, begun: float) -> list[str]:
+    """Write the files of a finished run, print its summary, and return what failed."""
+    if result.store is not None and not complete(result):
+        if not quiet:
+            print(f"members     {result.members:,} of a run in parts, in {result.store}; next: lgvi-warp merge")
+        return []
+    drawn = shown_members(result)
+    files, faults = write(result, drawn, out)
+    if not quiet:
+        print(summary(result, drawn, files, time.perf_counter() - begun))
+    return faults
+
+
+def complete(result: Any) -> bool:
+    """Whether a store holds the whole run."""
+    from lgvi_warp.store import Folder
+
+    return Folder(result.store).complete
+
+
+# Plots and drift are of so many numbers at most, of the first members: a store may be larger than the memory.
+MOST_DRAWN = 30_000_000
+
+
+def shown_members(result: Any) -> Any:
+    """The result, or of a large one in a store its first members, in memory."""
+    if result.store is None:
+        return result
+    from dataclasses import replace
+
+    from lgvi_warp.stored import open_run
+
+    most = max(1, MOST_DRAWN // (18 * len(result.time)))
+    part = open_run(result.store, slice(0, min(most, result.members)))
+    return replace(part, samples=dict(part.samples), parameters=dict(part.parameters))
 
 
 def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:
@@ -236,18 +359,21 @@ def _import_in_background() -> threading.Thread:
     return thread
 
 
-def write(result: Any, out: Path) -> tuple[list[Path], list[str]]:
-    """Write result.npz, fleet.png and fleet.rrd side by side. Returns the files, and a text for each that failed."""
+def write(result: Any, drawn: Any, out: Path) -> tuple[list[Path], list[str]]:
+    """Write result.npz, fleet.png and fleet.rrd side by side. Returns the files, and a text for each that failed.
+
+    drawn: the members of the pictures. A result in a store is written already.
+    """
     from concurrent.futures import ThreadPoolExecutor
 
     from lgvi_warp.sinks.plots import plot
     from lgvi_warp.sinks.rerun import log_rerun
 
-    files, faults = [], []
+    files, faults = [result.store] if result.store else [], []
     writers: dict[str, Callable[[Path], Path]] = {
-        "result.npz": result.save,
-        "fleet.png": lambda path: plot(result, path),
-        "fleet.rrd": lambda path: log_rerun(result, path),
+        **({} if result.store else {"result.npz": result.save}),
+        "fleet.png": lambda path: plot(drawn, path),
+        "fleet.rrd": lambda path: log_rerun(drawn, path),
     }
     with ThreadPoolExecutor(len(writers)) as pool:
         jobs = {out / name: pool.submit(writer, out / name) for name, writer in writers.items()}
@@ -259,24 +385,23 @@ def write(result: Any, out: Path) -> tuple[list[Path], list[str]]:
     return files, faults
 
 
-def summary(result: Any, files: list[Path], seconds: float) -> str:
+def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
     """The run in a few lines."""
     from lgvi_warp import invariants
     from lgvi_warp.status import Status
 
     settings = result.provenance
     steps = settings["steps"]
-    rate = result.members * steps / result.run_seconds
-    drift = invariants.drift(result)
+    drift = invariants.drift(drawn)
+    whose = "all members" if drawn.members == result.members else f"the first {drawn.members:,} members"
     lines = [
         *(f"note        {message}" for message in result.messages),
         f"members     {result.members:,}, {settings['method']['name']}, {settings['dtype']}, "
         f"step {settings['step']:g} s, {steps:,} steps",
-        f"speed       {rate:.3g} vehicle-steps per second ({result.run_seconds:.2f} s; kernel loaded in "
-        f"{result.compile_seconds:.2f} s; {seconds:.2f} s in all)",
+        *_speed(result, seconds),
         "status      " + ", ".join(f"{name} {number:,}" for name, number in result.status.counts().items()),
         f"drift       energy {drift['energy']:.2g} J, horizontal momentum {drift['horizontal_momentum']:.2g} N s, "
-        f"vertical angular momentum {drift['vertical_angular_momentum']:.2g} N m s (largest of all members)",
+        f"vertical angular momentum {drift['vertical_angular_momentum']:.2g} N m s (largest of {whose})",
     ]
     for code in Status:
         failed = (result.status == code).nonzero()[0]
@@ -285,8 +410,26 @@ def summary(result: Any, files: list[Path], seconds: float) -> str:
             lines.append(
                 f"  {code.name.lower()}: {code.text} (first: member {first} at {result.failure_time[first]:g} s)"
             )
-    lines += [f"file        {path} ({path.stat().st_size / 1e6:.1f} MB)" for path in files]
+    lines += [f"file        {path} ({size_of(path) / 1e6:.1f} MB)" for path in files]
     return "\n".join(lines)
+
+
+def _speed(result: Any, seconds: float) -> list[str]:
+    """The summary's line on speed; none for a run that went on, of which not all was made now."""
+    if not result.run_seconds:
+        return []
+    rate = result.members * result.provenance["steps"] / result.run_seconds
+    return [
+        f"speed       {rate:.3g} vehicle-steps per second ({result.run_seconds:.2f} s; kernel loaded in "
+        f"{result.compile_seconds:.2f} s; {seconds:.2f} s in all)"
+    ]
+
+
+def size_of(path: Path) -> int:
+    """Bytes of a file, or of all in a folder."""
+    return (
+        path.stat().st_size if path.is_file() else sum(one.stat().st_size for one in path.rglob("*") if one.is_file())
+    )
 
 
 class Progress:
@@ -318,6 +461,8 @@ class Progress:
 
 def info(chosen: argparse.Namespace) -> int:
     """lgvi-warp info."""
+    if chosen.dir is not None:
+        return info_of_run(chosen.dir)
     from lgvi_warp import machine
 
     described, memory = machine.describe(), machine.memory_bytes()
@@ -333,6 +478,81 @@ def info(chosen: argparse.Namespace) -> int:
     return 0
 
 
+def info_of_run(path: Path) -> int:
+    """What a store holds. Returns 0 if it is complete and whole, else 1."""
+    from lgvi_warp.resuming import state
+
+    found = state(path)
+    own = found["provenance"]
+    print(f"run         {found['path']} ({found['bytes'] / 1e6:.1f} MB), lgvi-warp {own['versions']['lgvi-warp']}")
+    print(f"members     {found['members']:,}, {own['method']['name']}, {own['dtype']}, step {own['step']:g} s, "
+          f"{own['steps']:,} steps")  # fmt: skip
+    print(f"samples     {found['samples']} times of {', '.join(found['fields']) or 'nothing'}")
+    print(f"blocks      {found['finished']} of {found['blocks']} finished; "
+          + ("complete" if found["complete"] else f"not complete: lgvi-warp resume {path}"))  # fmt: skip
+    for text in found["damage"]:
+        print(f"damage      {text}")
+    return 0 if found["complete"] else 1
+
+
+def resume(chosen: argparse.Namespace) -> int:
+    """lgvi-warp resume."""
+    from lgvi_warp.resuming import resume as go_on
+
+    begun = time.perf_counter()
+    progress = None if chosen.quiet else Progress(sys.stderr)
+    result = go_on(
+        chosen.dir, executor=chosen.executor, threads=chosen.threads, scheduler=chosen.scheduler, progress=progress,
+        force=chosen.force,
+    )  # fmt: skip
+    if progress:
+        progress.close()
+    assert result.store is not None
+    faults = report(result, result.store.parent, chosen.quiet, begun)
+    for fault in faults:
+        print(f"lgvi-warp: {fault}", file=sys.stderr)
+    return 1 if faults else 0
+
+
+def merge(chosen: argparse.Namespace) -> int:
+    """lgvi-warp merge."""
+    from lgvi_warp.resuming import merge as put_together
+
+    folder = put_together(chosen.dirs, chosen.out, chosen.overwrite)
+    left = len(folder.unfinished())
+    if left:
+        print(f"lgvi-warp: {folder.path}: {left} blocks are in none of the folders; lgvi-warp resume {folder.path} runs them",
+              file=sys.stderr)  # fmt: skip
+    elif not chosen.quiet:
+        print(f"file        {folder.path} ({size_of(folder.path) / 1e6:.1f} MB), complete")
+    return 1 if left else 0
+
+
+def export(chosen: argparse.Namespace) -> int:
+    """lgvi-warp export."""
+    from lgvi_warp.export import export as write_as
+
+    path = write_as(chosen.dir, chosen.to, chosen.out)
+    print(f"file        {path} ({size_of(path) / 1e6:.1f} MB)")
+    return 0
+
+
+def plan(chosen: argparse.Namespace) -> int:
+    """lgvi-warp plan."""
+    from lgvi_warp.prediction import predict
+    from lgvi_warp.scene import Scene
+
+    scene = Scene.load(chosen.scene, overrides(chosen))
+    out: Path = chosen.out or Path("runs") / Path(chosen.scene).stem
+    store = None
+    if chosen.store == "zarr":
+        from lgvi_warp.store import Store
+
+        store = Store(out / "run.zarr", chosen.store_dtype)
+    print(predict(scene, threads=chosen.threads, store=store))
+    return 0
+
+
 def bench(chosen: argparse.Namespace) -> int:
     """lgvi-warp bench."""
     from lgvi_warp.speed import measure
@@ -340,6 +560,18 @@ def bench(chosen: argparse.Namespace) -> int:
     for line in measure(chosen.members, chosen.steps):
         print(line, flush=True)
     return 0
+
+
+VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
+    "run": run,
+    "resume": resume,
+    "plan": plan,
+    "merge": merge,
+    "export": export,
+    "tradeoff": tradeoff,
+    "info": info,
+    "bench": bench,
+}
 
 
 def entry() -> None:

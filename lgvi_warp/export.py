@@ -60,7 +60,7 @@ def _netcdf(folder: Folder, target: Path) -> None:
                 if dim not in file.dimensions:
                     file.createDimension(dim, size)
             chunks = [min(c, size) for c, size in zip(array.chunks, array.shape, strict=True)]
-            variable = file.createVariable(name, array.dtype, dims, chunksizes=chunks, fill_value=False)
+            variable = file.createVariable(name, array.dtype.name, dims, chunksizes=chunks, fill_value=False)
             for key, value in array.attrs.asdict().items():
                 variable.setncattr(key, np.asarray(value, array.dtype) if key == "flag_values" else value)
             for at in _pieces(array, blocks(folder.members)):

@@ -60,6 +60,11 @@ class Samples(_Unsent):
     def __init__(self, plan: Plan):
         self.fields = _empty(plan, plan.ensemble.members)
 
+    @classmethod
+    def elsewhere(cls) -> Samples:
+        """As another process has it: each block's samples are its part."""
+        return cls.__new__(cls)
+
     def open(self, plan: Plan, block: Block, members: Members) -> _BlockSamples:
         """A view of the block's places, or places of its own far from them."""
         if self.fields is None:

@@ -41,14 +41,17 @@ def plan_of(made: Mapping[str, Any], ensemble: Ensemble, sample_steps: np.ndarra
 
 
 def ensemble_of(
-    scene: Mapping[str, Any], settings: Mapping[str, Any], explicit: Mapping[str, np.ndarray], indices: np.ndarray | None
+    scene: Mapping[str, Any],
+    settings: Mapping[str, Any],
+    explicit: Mapping[str, np.ndarray],
+    indices: np.ndarray | None,
 ) -> Ensemble:
     """The ensemble that provenance tells of; explicit: its arrays; indices: of a subset. Raises SceneError."""
     own = Scene.from_dict(scene)
     if explicit:
-        states = [explicit[f"start.{name}"] for name in STATES]
+        states = {name: explicit[f"start.{name}"] for name in STATES}
         parameters = {name: value for name, value in explicit.items() if not name.startswith("start.")}
-        ensemble = Ensemble.from_states(own, *states, parameters=parameters)
+        ensemble = Ensemble.from_states(own, **states, parameters=parameters)
         ensemble.seed = int(settings["seed"])
         if indices is not None:
             ensemble.indices = indices
@@ -92,8 +95,10 @@ def refuse_another(path: Any, stored: Mapping[str, Any], now: Mapping[str, Any],
     found = same_run(stored, now)
     machine = [text for text in found if text.startswith(("machine.", "versions.", "kernel"))]
     if found and (not force or len(machine) < len(found)):
-        remedy = "give --overwrite, or another folder"
+        what = "is another run; give --overwrite, or another folder"
         if len(machine) == len(found):
-            remedy = "go on where it began, or give --force and let some members differ in their last bits"
-        raise SceneError(f"{path}: {text}: the same bits cannot be promised; {remedy}" for text in found)
+            what = (
+                "the same bits cannot be promised; go on where it began, or give --force and take it that some differ"
+            )
+        raise SceneError(f"{path}: {text}: {what}" for text in found)
     return tuple(f"continued although {text}" for text in found)

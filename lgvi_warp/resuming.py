@@ -17,7 +17,7 @@ from lgvi_warp.recipe import refuse_another
 from lgvi_warp.result import Result
 from lgvi_warp.running import Stored
 from lgvi_warp.scene import Scene
-from lgvi_warp.store import CREATED, ROOT, Folder, Sink, Store, check, held, read_marker
+from lgvi_warp.store import CREATED, ROOT, Folder, Sink, Store, check, read_marker
 from lgvi_warp.store_layout import columns
 from lgvi_warp.stored import folder_of, result_of
 

@@ -40,9 +40,7 @@ class Progress:
             self._report(self._sum / self._total)
 
 
-def run_blocks(
-    work: Work, runs: Sequence[Block], executor: Executor, advanced: Callable[[Block, int], None]
-) -> None:
+def run_blocks(work: Work, runs: Sequence[Block], executor: Executor, advanced: Callable[[Block, int], None]) -> None:
     """Run these blocks and hand their parts to the keepers in order."""
     with contextlib.closing(executor.run(work, runs, advanced)) as done:
         for block, parts in in_order(runs, done):
@@ -96,14 +94,16 @@ class Stored:
         path, store = self.store.folder, self.store
         there = path.exists()
         if there and store.existing == "refuse":
-            remedy = "go on with `lgvi-warp resume` (existing=\"resume\"), or replace it with --overwrite (existing=\"overwrite\")"
+            remedy = 'go on with `lgvi-warp resume` (existing="resume"), or replace it with --overwrite (existing="overwrite")'
             raise SceneError([f"{path}: holds a run already; {remedy}"])
         if there and store.existing == "resume":
             folder = Folder(path)
             refuse_another(path, folder.provenance, self.provenance, store.force)
             asked = {"dtype": store.dtype, "fields": list(store.fields) if store.fields is not None else None}
             if folder.recipe["store"] != asked:
-                raise SceneError([f"{path}: stores {folder.recipe['store']}, not {asked}; ask for the same, or overwrite"])
+                raise SceneError(
+                    [f"{path}: stores {folder.recipe['store']}, not {asked}; ask for the same, or overwrite"]
+                )
             return
         try:
             if there:
@@ -160,7 +160,7 @@ class Stored:
             wanted = {block.first for block in left}
             for block in chosen:
                 parts = next(fresh)[1] if block.first in wanted else sink.parts(block, self.keepers)
-                merge(self.keepers, block, parts)
+                merge(self.keepers, block, parts or ())
 
 
 def iter_nothing() -> Any:

@@ -57,7 +57,8 @@ def solve(
     progress: called with the fraction of the work that is done, from the threads that do it.
     store: a folder "runs/x/run.zarr", or a Store with more settings: samples go there block by block and not into memory,
     and a run that was stopped goes on with lw.resume. executor: "threads", "processes" or "dask", or an object that runs
-    blocks; scheduler: the address of Dask's. only: with a store, indices of the blocks to run, for a run in parts.
+    blocks; scheduler: the address of Dask's. only: with a store, the blocks to run, range(0, 100), for a run in parts:
+    the result then is of their members.
 
     Raises SceneError naming every fault of the arguments. Prints nothing. The same inputs give the same bits for any
     number of threads, on one type of machine.
@@ -80,8 +81,10 @@ def solve(
 def check_blocks(only: range | None, plan: Plan) -> None:
     """The blocks of a run in parts must be there. Raises SceneError."""
     count = len(blocks(plan.ensemble.members))
-    if only is not None and not (len(only) and 0 <= only[0] and only[-1] < count):
-        raise SceneError([f"blocks {only.start}:{only.stop}: are not within the {count} of this run; give 0:{count} or less"])
+    if only is not None and not (only.step == 1 and len(only) and only[0] >= 0 and only[-1] < count):
+        raise SceneError(
+            [f"blocks {only.start}:{only.stop}: are not within the {count} of this run; give 0:{count} or less"]
+        )
 
 
 def make_plan(
@@ -181,7 +184,9 @@ def run_stored(
     compile_seconds = plan.compile()
     start = time.perf_counter()
     folder = Stored(plan, store, provenance(plan), messages(plan), (), only).run(executor, progress)
-    result = result_of(folder, messages=messages(plan), terms=plan.ensemble.scene.terms)
+    runs = blocks(plan.ensemble.members)
+    members = None if only is None else slice(runs[only[0]].first, runs[only[-1]].stop)
+    result = result_of(folder, members, messages(plan), plan.ensemble.scene.terms)
     return replace(result, compile_seconds=compile_seconds, run_seconds=time.perf_counter() - start)
 
 

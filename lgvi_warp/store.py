@@ -199,7 +199,9 @@ class Folder:
         except (ValueError, KeyError, TypeError):
             good = False
         if not good:
-            raise SceneError([f"{path / ROOT}: is damaged, or of another version of the format; run again (--overwrite)"])
+            raise SceneError(
+                [f"{path / ROOT}: is damaged, or of another version of the format; run again (--overwrite)"]
+            )
         self.provenance, self.recipe, messages, self.shared = (json.loads(text) for text in texts)
         self.messages: tuple[str, ...] = tuple(messages)
 
@@ -295,7 +297,9 @@ def skeleton(root: Path, store: Store, plan: Plan, provenance: Mapping[str, Any]
     import zarr
 
     shared = {
-        name: values.tolist() for name, values in plan.ensemble.parameters(0, 1).items() if name not in plan.ensemble.varied()
+        name: values.tolist()
+        for name, values in plan.ensemble.parameters(0, 1).items()
+        if name not in plan.ensemble.varied()
     }
     made = recipe(plan) | {"store": {"dtype": store.dtype, "fields": store.fields}}
     texts = [json.dumps(one) for one in (provenance, made, list(messages), shared)]

@@ -22,9 +22,7 @@ MOST_DEATHS = 3
 class Executor(Protocol):
     """Runs blocks, in any order and anywhere: the bits do not depend on it."""
 
-    def run(
-        self, work: Work, blocks: Sequence[Block], advanced: Advanced
-    ) -> Generator[tuple[Block, Any], None, None]:
+    def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
         """Do the work of every block; each block and its result, as they are done. Closing it ends what still runs."""
 
 
@@ -77,5 +75,7 @@ def received(data: bytes, name: str) -> Work:
 
 
 def _refusal(name: str, what: str, error: Exception) -> str:
-    remedy = 'define laws and functions at the top level of a module that the workers can import, or use executor="threads"'
+    remedy = (
+        'define laws and functions at the top level of a module that the workers can import, or use executor="threads"'
+    )
     return f"executor = {name!r}: the run {what} ({type(error).__name__}: {error}); {remedy}"

@@ -26,9 +26,7 @@ class Dask:
     scheduler: Any = None
     workers: int = 1
 
-    def run(
-        self, work: Work, blocks: Sequence[Block], advanced: Advanced
-    ) -> Generator[tuple[Block, Any], None, None]:
+    def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
         """Each block and its result, as they are done. Raises SceneError for work that cannot be sent."""
         data, topic = sent(work, "dask"), f"lgvi_warp-{uuid.uuid4()}"
         with self._client() as client:
@@ -38,9 +36,7 @@ class Dask:
             # A task, not data put on a worker: when that worker dies, the scheduler makes it again.
             held = client.submit(bytes, data, pure=False)
             client.subscribe_topic(topic, lambda event: advanced(Block(*event[1][:2]), event[1][2]))
-            waiting = {
-                client.submit(_work, held, block, topic, kind, pure=False, retries=0): block for block in blocks
-            }
+            waiting = {client.submit(_work, held, block, topic, kind, pure=False, retries=0): block for block in blocks}
             try:
                 for future in as_completed(list(waiting)):
                     block = waiting.pop(future)
@@ -68,18 +64,20 @@ class Dask:
                 client = distributed.Client(self.scheduler, timeout=10)
             except (OSError, ValueError) as error:
                 what = f"does not answer ({type(error).__name__}: {error})"
-                raise SceneError([f"scheduler = {self.scheduler!r}: {what}; give the address that dask scheduler prints"]) from error
+                raise SceneError(
+                    [f"scheduler = {self.scheduler!r}: {what}; give the address that dask scheduler prints"]
+                ) from error
             with client:
                 yield client
             return
         import logging
 
         with (
-            distributed.LocalCluster(  # type: ignore[no-untyped-call]
+            distributed.LocalCluster(
                 n_workers=self.workers, threads_per_worker=1, processes=True, memory_limit=None, dashboard_address=None,
                 silence_logs=logging.CRITICAL,
             ) as cluster,
-            distributed.Client(cluster) as client,  # type: ignore[no-untyped-call]
+            distributed.Client(cluster) as client,
         ):  # fmt: skip
             yield client
 

@@ -28,9 +28,7 @@ class Processes:
 
     workers: int
 
-    def run(
-        self, work: Work, blocks: Sequence[Block], advanced: Advanced
-    ) -> Generator[tuple[Block, Any], None, None]:
+    def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
         """Each block and its result, as they are done. Raises SceneError for work that cannot be sent."""
         data = sent(work, "processes")
         left = dict(enumerate(blocks))

@@ -19,9 +19,7 @@ class Threads:
 
     threads: int
 
-    def run(
-        self, work: Work, blocks: Sequence[Block], advanced: Advanced
-    ) -> Generator[tuple[Block, Any], None, None]:
+    def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
         """Each block and its result, as they are done.
 
         The first exception, an interrupt from the keyboard among them, halts what runs; blocks that have not begun are

@@ -131,7 +131,7 @@ def state(path: str | os.PathLike[str]) -> dict[str, Any]:
     folder = Folder(folder_of(path))
     runs = blocks(folder.members)
     damage = folder.damage()
-    samples = len(folder.group()["time"][:])
+    samples = int(folder.group()["time"].shape[0])
     try:
         own = folder.recipe["store"]
         found = columns(folder.plan(), own["dtype"], own["fields"])

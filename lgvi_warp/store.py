@@ -228,13 +228,17 @@ class Folder:
 
     def plan(self, ensemble: Ensemble | None = None) -> Plan:
         """The run's plan, made again; ensemble: where a scene file cannot tell it (laws of your own). Raises SceneError."""
-        group = self.group()
-        if ensemble is None:
+        try:
+            group = self.group()
+            steps, times = group["step"][:].astype(np.int64), group["time"][:]
             given = {name: np.asarray(array[:]) for name, array in group["explicit"].arrays()}
+        except (ValueError, OSError, KeyError) as error:
+            remedy = "run the same scene again with --store zarr --resume, which mends it"
+            raise SceneError([f"{self.path}: {'; '.join(self.damage()) or error}; {remedy}"]) from error
+        if ensemble is None:
             indices = given.pop("indices", None)
-            provenance = self.provenance
-            ensemble = ensemble_of(provenance["scene"], provenance["ensemble"], given, indices)
-        return plan_of(self.recipe, ensemble, group["step"][:].astype(np.int64), group["time"][:])
+            ensemble = ensemble_of(self.provenance["scene"], self.provenance["ensemble"], given, indices)
+        return plan_of(self.recipe, ensemble, steps, times)
 
     def damage(self) -> list[str]:
         """What is wrong with the files that do not belong to a block."""

@@ -39,6 +39,9 @@ class Arrays(Mapping[str, np.ndarray]):
         array = self.group[name]
         return np.asarray(array[at] if isinstance(chosen, slice) else array.oindex[at])
 
+    def __contains__(self, name: object) -> bool:
+        return name in self.names or name in (self.whole or {})
+
     def __iter__(self) -> Iterator[str]:
         return iter((*self.names, *(self.whole or {})))
 
@@ -88,7 +91,7 @@ def result_of(
     arrays = {name: array for name, array in group.arrays()}
     fields = tuple(name for name in arrays if name in UNITS)
     varied = tuple(name for name in arrays if "." in name)
-    small = Arrays(group, tuple(name for name in arrays if name not in (*fields, *varied)), 0, at)
+    small = Arrays(group, tuple(name for name in arrays if name not in (*fields, *varied, "time", "step")), 0, at)
     shared = {name: np.asarray(value, dtype=np.float64) for name, value in folder.shared.items()}
     provenance = dict(folder.provenance)
     for name in ("steps_made", "steps_tried"):

@@ -17,6 +17,8 @@ from lgvi_warp.executors import MOST_DEATHS, Advanced, received, sent
 
 # How often a worker tells how far it is [s].
 PERIOD = 0.2
+# How long a scheduler may take to answer [s].
+TIMEOUT = 10.0
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,9 @@ class Dask:
             try:
                 for future in as_completed(list(waiting)):
                     block = waiting.pop(future)
-                    yield block, future.result()
+                    value = future.result()
+                    advanced(block, block.count * work.plan.grid.steps)
+                    yield block, value
             except KilledWorker as error:
                 raise RuntimeError(
                     f"workers died {MOST_DEATHS} times over a block: too little memory, or killed from outside; give them "
@@ -61,7 +65,7 @@ class Dask:
             return
         if self.scheduler is not None:
             try:
-                client = distributed.Client(self.scheduler, timeout=10)
+                client = distributed.Client(self.scheduler, timeout=TIMEOUT)
             except (OSError, ValueError) as error:
                 what = f"does not answer ({type(error).__name__}: {error})"
                 raise SceneError(

@@ -62,8 +62,8 @@ class Processes:
                     advanced(left[i], made[i])
                 for future in done:
                     value = future.result()
-                    i = waiting.pop(future)
-                    yield left.pop(i), value
+                    block = left.pop(waiting.pop(future))
+                    yield block, value
         except BrokenProcessPool:
             # What was finished in the same moment is kept, the rest runs again in a new pool.
             for future, i in waiting.items():

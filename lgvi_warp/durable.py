@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import functools
 import os
 import socket
 from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,23 @@ def checksum(data: Any, before: int = 0) -> int:
     view = memoryview(data)
     # The extension takes an array, and no memoryview.
     return int(google_crc32c.extend(before, np.frombuffer(view, np.uint8))) if view.nbytes else before
+
+
+@functools.cache
+def _syncs() -> ThreadPoolExecutor:
+    """Threads that wait for the disk."""
+    return ThreadPoolExecutor(8, thread_name_prefix="lgvi_warp_sync")
+
+
+def sync_file(names: tuple[Path, Path]) -> None:
+    """Wait until a file is on the disk: where it lies, and what it will be called."""
+    beside, target = names
+    descriptor = os.open(beside, os.O_RDONLY)
+    try:
+        with named(target):
+            os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def sync_folder(folder: Path) -> None:
@@ -60,17 +79,11 @@ class Files:
 
     def finish(self) -> None:
         """Sync the files, put them in their places, and sync their folders."""
-        for beside, target in self._waiting:
-            descriptor = os.open(beside, os.O_RDONLY)
-            try:
-                with named(target):
-                    os.fsync(descriptor)
-            finally:
-                os.close(descriptor)
+        # Syncs that run side by side share the file system's commits.
+        list(_syncs().map(sync_file, self._waiting))
         for beside, target in self._waiting:
             beside.replace(target)
-        for folder in {target.parent for _, target in self._waiting}:
-            sync_folder(folder)
+        list(_syncs().map(sync_folder, sorted({target.parent for _, target in self._waiting})))
         self._waiting.clear()
 
     def drop(self) -> None:

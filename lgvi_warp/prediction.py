@@ -100,7 +100,7 @@ def predict(
     count = threads or machine.thread_count()
     set_up, step = costs(plan, count)
     into = store if isinstance(store, Store) or store is None else Store(store)
-    disk = size(plan, into.dtype, into.fields) if into else _result_bytes(plan)
+    disk = size(plan, into) if into else _result_bytes(plan)
     place = _existing(into.folder) if into else Path.cwd()
     n, steps = ensemble.members, plan.grid.steps
     return Prediction(
@@ -175,7 +175,7 @@ def memory(plan: Plan, threads: int, store: Store | None) -> int:
     each = 3 * segment
     if store is None:
         return _result_bytes(plan) + working * each
-    each += sum(one.bytes for one in columns(plan, store.dtype, store.fields))
+    each += sum(one.bytes for one in columns(plan, store))
     return working * each + n * sum(np.dtype(one.dtype).itemsize for one in member_fields.present(plan))
 
 

@@ -56,7 +56,7 @@ def store_of(folder: Folder, force: bool = False) -> Store:
     """The settings that a folder was made with, to go on with."""
     own = folder.recipe["store"]
     fields = None if own["fields"] is None else tuple(own["fields"])
-    return Store(folder.path, own["dtype"], fields, "resume", force)
+    return Store(folder.path, own["dtype"], fields, "resume", force, own["chunk_bytes"])
 
 
 def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], overwrite: bool = False) -> Folder:
@@ -133,8 +133,7 @@ def state(path: str | os.PathLike[str]) -> dict[str, Any]:
     damage = folder.damage()
     samples = int(folder.group()["time"].shape[0])
     try:
-        own = folder.recipe["store"]
-        found = columns(folder.plan(), own["dtype"], own["fields"])
+        found = columns(folder.plan(), store_of(folder))
     except SceneError:  # a law that this process does not know: the markers alone say what there should be
         found = ()
     finished = 0

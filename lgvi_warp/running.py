@@ -74,7 +74,7 @@ class Stored:
         self._begin()
         path = self.store.folder
         with held(path):
-            sink = Sink(path, columns(self.plan, self.store.dtype, self.store.fields))
+            sink = Sink(path, columns(self.plan, self.store))
             sink.remove_unfinished()
             self._mend()
             left = self._left(sink)
@@ -99,7 +99,7 @@ class Stored:
         if there and store.existing == "resume":
             folder = Folder(path)
             refuse_another(path, folder.provenance, self.provenance, store.force)
-            asked = {"dtype": store.dtype, "fields": list(store.fields) if store.fields is not None else None}
+            asked = store.layout()
             if folder.recipe["store"] != asked:
                 raise SceneError(
                     [f"{path}: stores {folder.recipe['store']}, not {asked}; ask for the same, or overwrite"]

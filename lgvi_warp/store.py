@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from lgvi_warp.plan import Plan
 
 FORMAT = 1
+# Few enough bytes a chunk for its memory, enough that files and their syncs cost little.
+CHUNK_BYTES = 10_000_000
 EXISTING = ("refuse", "resume", "overwrite")
 ROOT, CREATED = "zarr.json", "created.json"
 # Room that is left on a disk: markers, metadata, folders.
@@ -47,7 +49,8 @@ class Store:
     """Where a run is written, and how.
 
     path: a folder whose name ends in .zarr. dtype: "float32" stores the samples of a float64 run in single precision.
-    fields: those of the samples to store, default all that are kept. existing: what to do where a run lies already:
+    fields: those of the samples to store, default all that are kept. chunk_bytes: about so large a chunk becomes at most;
+    each block at work holds one of each field. existing: what to do where a run lies already:
     "refuse", "resume" (go on where it stopped, if it is the same run) or "overwrite". force: go on even on another
     machine or with other versions. Raises SceneError naming every fault.
     """
@@ -57,6 +60,7 @@ class Store:
     fields: tuple[str, ...] | None = None
     existing: str = "refuse"
     force: bool = False
+    chunk_bytes: int = CHUNK_BYTES
 
     def __post_init__(self) -> None:
         faults = Faults("store.")
@@ -67,8 +71,14 @@ class Store:
         faults.choice("existing", self.existing, EXISTING)
         for name in self.fields or ():
             faults.choice("fields", name, FIELDS)
+        faults.number("chunk_bytes", self.chunk_bytes, "bytes", least=1)
         faults.raise_if_any()
         needed()
+
+    def layout(self) -> dict[str, Any]:
+        """What the bytes in it depend on, as JSON has it."""
+        fields = None if self.fields is None else list(self.fields)
+        return {"dtype": self.dtype, "fields": fields, "chunk_bytes": int(self.chunk_bytes)}
 
     @property
     def folder(self) -> Path:
@@ -264,7 +274,7 @@ def checksum_of(texts: Sequence[str]) -> int:
 def create(store: Store, plan: Plan, provenance: Mapping[str, Any], messages: Sequence[str]) -> None:
     """Make the store's folder with all of its metadata, whole or not at all. Raises SceneError or OSError."""
     target = store.folder
-    free_enough(target, size(plan, store.dtype, store.fields))
+    free_enough(target, size(plan, store))
     target.parent.mkdir(parents=True, exist_ok=True)
     beside = target.with_name(target.name + ".new")
     shutil.rmtree(beside, ignore_errors=True)
@@ -305,13 +315,13 @@ def skeleton(root: Path, store: Store, plan: Plan, provenance: Mapping[str, Any]
         for name, values in plan.ensemble.parameters(0, 1).items()
         if name not in plan.ensemble.varied()
     }
-    made = recipe(plan) | {"store": {"dtype": store.dtype, "fields": store.fields}}
+    made = recipe(plan) | {"store": store.layout()}
     texts = [json.dumps(one) for one in (provenance, made, list(messages), shared)]
     group = zarr.create_group(root, zarr_format=3, attributes=_attributes(texts, provenance))
     k, n = len(plan.grid.times), plan.ensemble.members
     _whole(group, "time", plan.grid.times, ("time",), {"units": "s", "long_name": "time since the start", "axis": "T"})
     _whole(group, "step", plan.grid.sample_steps, ("time",), {"units": "1", "long_name": "steps made until then"})
-    for column in columns(plan, store.dtype, store.fields):
+    for column in columns(plan, store):
         _array(group, column.name, column.shape(k, n), column.chunk, column.dtype, column.fill, column.dims,
                column.attributes)  # fmt: skip
     _explicit(group.create_group("explicit"), plan)

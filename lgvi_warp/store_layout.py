@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +14,8 @@ from lgvi_warp.result import MEANINGS, UNITS
 
 if TYPE_CHECKING:
     from lgvi_warp.plan import Plan
+    from lgvi_warp.store import Store
 
-# About so many bytes a chunk: few enough for its memory, enough that files and their syncs cost little.
-CHUNK_BYTES = 10_000_000
 MEMBER = "realization"
 # The last dimensions of an array, by their sizes; others are named after the array.
 TAILS = {(): (), (3,): ("component",), (3, 3): ("row", "column")}
@@ -72,30 +70,27 @@ class Column:
         return int(np.prod(self.chunk)) * np.dtype(self.dtype).itemsize + 4
 
 
-def columns(plan: Plan, dtype: str | None = None, fields: Sequence[str] | None = None) -> tuple[Column, ...]:
-    """The arrays that a run of this plan fills, block by block.
-
-    dtype: "float32" stores the samples of a float64 run in single precision; fields: those of the samples to store.
-    """
+def columns(plan: Plan, store: Store) -> tuple[Column, ...]:
+    """The arrays that a run of this plan fills, block by block, with the store's dtype, fields and size of chunks."""
     length = blocks(plan.ensemble.members)[0].count
     return (
-        *_samples(plan, length, dtype, plan.spec.fields if fields is None else fields),
+        *_samples(plan, length, store),
         Column(MEMBER, (), "<i8", length, 0, {"standard_name": "realization", "long_name": "member of the ensemble"}),
         *(Column(one.name, (), one.dtype, length, 0, one.attributes) for one in member_fields.present(plan)),
         *_parameters(plan, length),
     )
 
 
-def _samples(plan: Plan, length: int, dtype: str | None, fields: Sequence[str]) -> list[Column]:
+def _samples(plan: Plan, length: int, store: Store) -> list[Column]:
     real = np.dtype(machine.DTYPES[plan.dtype])
     k = len(plan.grid.times)
     found = []
-    for name in (name for name in plan.spec.fields if name in fields):
+    for name in (name for name in plan.spec.fields if store.fields is None or name in store.fields):
         own = np.dtype("f8") if plan.spec.compensated and name == "position" else real
-        stored = np.dtype(dtype) if dtype else own
+        stored = np.dtype(store.dtype) if store.dtype else own
         row = length * int(np.prod(SHAPES[name])) * stored.itemsize
         # Equal chunks: the last of the times is nearly full as well.
-        pieces = -(-k // max(1, CHUNK_BYTES // row))
+        pieces = -(-k // max(1, store.chunk_bytes // row))
         attributes = {"units": UNITS[name], "long_name": MEANINGS[name]}
         found.append(Column(name, SHAPES[name], stored.newbyteorder("<").str, length, -(-k // pieces), attributes))
     return found
@@ -126,8 +121,8 @@ def parameter_units(scene: Any) -> dict[str, str]:
     return {name: known.get(name) or "1" for name in scene.parameters()}
 
 
-def size(plan: Plan, dtype: str | None = None, fields: Sequence[str] | None = None) -> int:
+def size(plan: Plan, store: Store) -> int:
     """Bytes of the chunks of the whole run."""
     k, runs = len(plan.grid.times), len(blocks(plan.ensemble.members))
-    each = sum(one.bytes * len(one.keys(Block(0, one.length), k)) for one in columns(plan, dtype, fields))
+    each = sum(one.bytes * len(one.keys(Block(0, one.length), k)) for one in columns(plan, store))
     return each * runs

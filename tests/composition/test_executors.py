@@ -131,9 +131,8 @@ def test_dask(client, memory, tmp_path):
 def test_a_killed_dask_worker_costs_its_block_only(client, tmp_path, whole):
     from lgvi_warp.executors.dask import Dask
 
-    killer = Killer(
-        lambda: list(client.run(os.getpid).values()) if killer.killed is None else [], tmp_path / "run.zarr"
-    )
+    pids = list(client.run(os.getpid).values())
+    killer = Killer(lambda: pids, tmp_path / "run.zarr")
     lw.solve(fleet(MANY), **LONG, executor=Dask(client), store=tmp_path / "run.zarr", progress=killer)
     check_killed(killer, tmp_path / "run.zarr", whole)
 

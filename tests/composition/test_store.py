@@ -84,7 +84,7 @@ def test_chunks_are_raw_numbers_with_a_checksum_one_block_each(whole, memory):
 
 def test_long_runs_are_cut_in_equal_chunks_of_about_10_mb():
     plan = make_plan(fleet(8192), "psi_s", h=0.01, t1=100.0, save=lw.SaveAt(every=0.01))
-    found = {one.name: one for one in store_layout.columns(plan)}
+    found = {one.name: one for one in store_layout.columns(plan, lw.Store("run.zarr"))}
     assert [found[name].times for name in FIELDS] == [1429, 527, 1429, 1429]
     assert all(0.6e7 < found[name].bytes <= 1.01e7 for name in FIELDS)
     assert found["position"].key(blocks(8192)[3], 2) == "position/c.2.3.0"
@@ -92,7 +92,7 @@ def test_long_runs_are_cut_in_equal_chunks_of_about_10_mb():
 
 def test_a_column_for_each_number_of_a_member():
     plan = make_plan(fleet(20), lw.Method("rk5", rtol=1e-6, atol=1e-9), h=0.1, t1=1.0)
-    names = [one.name for one in store_layout.columns(plan) if not one.times]
+    names = [one.name for one in store_layout.columns(plan, lw.Store("run.zarr")) if not one.times]
     assert names == [
         "realization",
         "status",
@@ -104,9 +104,8 @@ def test_a_column_for_each_number_of_a_member():
     ]
 
 
-def test_time_chunks_come_together(monkeypatch, tmp_path, memory):
-    monkeypatch.setattr(store_layout, "CHUNK_BYTES", 50_000)
-    result = lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr")
+def test_time_chunks_come_together(tmp_path, memory):
+    result = lw.solve(fleet(), **SETTINGS, store=lw.Store(tmp_path / "run.zarr", chunk_bytes=50_000))
     assert len(list((tmp_path / "run.zarr" / "position").glob("c.*"))) == 4 * 4
     assert all(result.samples[name].tobytes() == memory.samples[name].tobytes() for name in FIELDS)
 

@@ -29,7 +29,7 @@ def checksum(data: Any, before: int = 0) -> int:
 @functools.cache
 def _syncs() -> ThreadPoolExecutor:
     """Threads that wait for the disk."""
-    return ThreadPoolExecutor(8, thread_name_prefix="lgvi_warp_sync")
+    return ThreadPoolExecutor(16, thread_name_prefix="lgvi_warp_sync")
 
 
 def sync_file(names: tuple[Path, Path]) -> None:
@@ -64,18 +64,18 @@ class Files:
         self._mark = f".{socket.gethostname()}-{os.getpid()}{UNFINISHED}"
         self.sums: dict[str, list[int]] = {}
 
-    def write(self, key: str, *parts: Any) -> None:
-        """Write a file below the root out of its parts, and note its size and checksum."""
+    def write(self, key: str, data: Any, *, checked: bool = False) -> None:
+        """Write a file below the root, and note its size and checksum; checked: with the data's own checksum at its end."""
         target = self._root / key
         beside = target.with_name(target.name + self._mark)
         self._waiting.append((beside, target))
-        size, crc = 0, 0
+        view = memoryview(data).cast("B")
+        crc = checksum(view)
+        tail = crc.to_bytes(4, "little") if checked else b""
         with named(target), beside.open("wb", buffering=0) as file:
-            for part in parts:
-                view = memoryview(part).cast("B")
-                write_all(file, view)
-                size, crc = size + len(view), checksum(view, crc)
-        self.sums[key] = [size, crc]
+            write_all(file, view)
+            write_all(file, memoryview(tail))
+        self.sums[key] = [len(view) + len(tail), checksum(tail, crc)]
 
     def finish(self) -> None:
         """Sync the files, put them in their places, and sync their folders."""

@@ -18,7 +18,7 @@ import shutil
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +29,7 @@ from lgvi_warp.blocks import Block, Keeper, PartKeeper, blocks
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.recipe import ensemble_of, plan_of, recipe
 from lgvi_warp.saveat import FIELDS
+from lgvi_warp.store_blocks import BlockWriter, Room
 from lgvi_warp.store_layout import MEMBER, Column, columns, parameter_units, size
 
 if TYPE_CHECKING:
@@ -107,12 +108,11 @@ class Sink:
 
     root: Path
     columns: tuple[Column, ...]
+    room: Room = field(default_factory=Room, compare=False)
 
-    def open(self, plan: Plan, block: Block, members: Any) -> Any:
+    def open(self, plan: Plan, block: Block, members: Any) -> BlockWriter:
         """A writer of the block's chunks."""
-        from lgvi_warp.store_blocks import BlockWriter
-
-        return BlockWriter(self.root, self.columns, plan, block, members)
+        return BlockWriter(self.root, self.columns, self.room, plan, block, members)
 
     def merge(self, block: Block, part: Any) -> None:
         """The block is in its place already."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lgvi_warp import member_fields
 from lgvi_warp.blocks import Block
-from lgvi_warp.durable import Files, checksum
+from lgvi_warp.durable import Files
 from lgvi_warp.store_layout import MEMBER, Column
 
 if TYPE_CHECKING:
@@ -18,15 +18,36 @@ if TYPE_CHECKING:
     from lgvi_warp.plan import Plan
 
 
+class Room(list[dict[str, np.ndarray]]):
+    """Chunks that no block uses at the moment: fresh memory costs more than what is written into it."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Each process has its own."""
+        return Room, ()
+
+    @staticmethod
+    def made(columns: tuple[Column, ...]) -> dict[str, np.ndarray]:
+        """A chunk of each field, with anything in it."""
+        return {one.name: np.empty(one.chunk, one.dtype) for one in columns if one.times}
+
+
 class BlockWriter:
     """The keeper of one block of a store."""
 
-    def __init__(self, root: Path, columns: tuple[Column, ...], plan: Plan, block: Block, members: Members):
+    def __init__(self, root: Path, columns: tuple[Column, ...], room: Room, plan: Plan, block: Block, members: Members):
         self._plan, self._block, self._members = plan, block, members
         self._columns = columns
         self._samples = len(plan.grid.times)
         self._files = Files(root)
-        self._chunks = {one.name: _empty(one) for one in columns if one.times}
+        self._room = room
+        try:
+            self._chunks = room.pop()
+        except IndexError:
+            self._chunks = room.made(columns)
+        if block.count < columns[0].length:
+            for one in columns:
+                if one.times:
+                    self._chunks[one.name][:, block.count :] = one.fill
 
     def take(self, when: slice, samples: dict[str, np.ndarray]) -> None:
         """Put samples into their chunks, and write the chunks that are full."""
@@ -48,7 +69,7 @@ class BlockWriter:
             t = stop
 
     def _write(self, column: Column, number: int, chunk: np.ndarray) -> None:
-        self._files.write(column.key(self._block, number), chunk, checksum(chunk).to_bytes(4, "little"))
+        self._files.write(column.key(self._block, number), chunk, checked=True)
 
     def close(self, outcome: Outcome) -> Files:
         """Write what is known of each member. Returns the files, which are not durable yet."""
@@ -59,6 +80,7 @@ class BlockWriter:
                 chunk = _empty(column)
                 chunk[: self._block.count] = values[column.name]
                 self._write(column, 0, chunk)
+        self._room.append(self._chunks)
         return self._files
 
 

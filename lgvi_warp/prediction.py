@@ -22,12 +22,12 @@ from lgvi_warp.keepers import Samples
 from lgvi_warp.plan import SEGMENT_SAMPLE_BYTES, Plan
 from lgvi_warp.saveat import TimeGrid
 from lgvi_warp.scene import Scene
-from lgvi_warp.store import Store
+from lgvi_warp.store import Store, create
 from lgvi_warp.store_layout import columns, size
 
-# A trial's time [s], and bytes written to learn how fast a disk is.
+# A trial's time [s]; bytes, and small files, written to learn how fast a disk is.
 TRIAL_SECONDS = 0.3
-PROBE_BYTES = 64_000_000
+PROBE_BYTES, SYNCS = 64_000_000, 4
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def predict(
         compile=compile_seconds,
         set_up=set_up,
         advance=step * steps,
-        write=disk / disk_speed(place, count) if into else 0.0,
+        write=writing(plan, into, place, count) if into else 0.0,
         memory=_resident() + memory(plan, count, into),
         disk=disk,
         free_memory=machine.memory_bytes(),
@@ -177,6 +177,23 @@ def memory(plan: Plan, threads: int, store: Store | None) -> int:
         return _result_bytes(plan) + working * each
     each += sum(one.bytes for one in columns(plan, store))
     return working * each + n * sum(np.dtype(one.dtype).itemsize for one in member_fields.present(plan))
+
+
+def writing(plan: Plan, store: Store, folder: Path, threads: int) -> float:
+    """Seconds that a store's disk takes: its metadata, its bytes, and for each block the wait until they are safe."""
+    from lgvi_warp.solving import messages, provenance
+
+    runs = blocks(plan.ensemble.members)
+    with tempfile.TemporaryDirectory(dir=folder) as name:
+        start = time.perf_counter()
+        create(replace(store, path=Path(name) / "run.zarr"), plan, provenance(plan), messages(plan))
+        begin = time.perf_counter() - start
+        start = time.perf_counter()
+        for i in range(SYNCS):
+            durable.write_whole(Path(name) / f"{i}", b"0")
+        # Its chunks, then its marker; several blocks wait at a time.
+        wait = 2.0 * (time.perf_counter() - start) / SYNCS / min(2 * threads, len(runs))
+    return begin + size(plan, store) / disk_speed(folder, threads) + wait * len(runs)
 
 
 def disk_speed(folder: Path, threads: int) -> float:

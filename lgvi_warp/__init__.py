@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from lgvi_warp.coefficients import from_fossen, vehicles
     from lgvi_warp.coefficients_sdf import from_sdf
     from lgvi_warp.coefficients_yaml import from_yaml
-    from lgvi_warp.export import export
+    from lgvi_warp.exporting import export
     from lgvi_warp.law_check import check_law
     from lgvi_warp.plan import Plan
     from lgvi_warp.prediction import predict
@@ -65,7 +65,7 @@ _LAZY = {
     "open_run": "lgvi_warp.stored",
     "resume": "lgvi_warp.resuming",
     "merge": "lgvi_warp.resuming",
-    "export": "lgvi_warp.export",
+    "export": "lgvi_warp.exporting",
     "predict": "lgvi_warp.prediction",
     "suggest": "lgvi_warp.suggestion",
     "tradeoff": "lgvi_warp.tradeoffs",

@@ -265,13 +265,10 @@ def shown_members(result: Any) -> Any:
     """The result, or of a large one in a store its first members, in memory."""
     if result.store is None:
         return result
-    from dataclasses import replace
-
-    from lgvi_warp.stored import open_run
+    from lgvi_warp.stored import chosen
 
     most = max(1, MOST_DRAWN // (18 * len(result.time)))
-    part = open_run(result.store, slice(0, min(most, result.members)))
-    return replace(part, samples=dict(part.samples), parameters=dict(part.parameters))
+    return chosen(result, range(min(most, result.members)))
 
 
 def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:
@@ -530,7 +527,7 @@ def merge(chosen: argparse.Namespace) -> int:
 
 def export(chosen: argparse.Namespace) -> int:
     """lgvi-warp export."""
-    from lgvi_warp.export import export as write_as
+    from lgvi_warp.exporting import export as write_as
 
     path = write_as(chosen.dir, chosen.to, chosen.out)
     print(f"file        {path} ({size_of(path) / 1e6:.1f} MB)")

@@ -15,7 +15,7 @@ from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.executors import Executor
 from lgvi_warp.plan import Plan
 from lgvi_warp.recipe import refuse_another
-from lgvi_warp.store import Folder, Sink, Store, check, create, held, skeleton
+from lgvi_warp.store import Folder, Sink, Store, check, create, held, names_of, skeleton
 from lgvi_warp.store_layout import columns
 
 # What the system says when a disk takes no more, or not from us.
@@ -99,18 +99,20 @@ class Stored:
         if there and store.existing == "resume":
             folder = Folder(path)
             refuse_another(path, folder.provenance, self.provenance, store.force)
-            asked = store.layout()
-            if folder.recipe["store"] != asked:
-                raise SceneError(
-                    [f"{path}: stores {folder.recipe['store']}, not {asked}; ask for the same, or overwrite"]
-                )
+            there_is, asked = (
+                (folder.recipe["store"], folder.recipe["keepers"]),
+                (store.layout(), names_of(self.keepers)),
+            )
+            for one, other in zip(there_is, asked, strict=True):
+                if one != other:
+                    raise SceneError([f"{path}: stores {one}, not {other}; ask for the same, or overwrite"])
             return
         try:
             if there:
                 with held(path):
-                    create(store, self.plan, self.provenance, self.messages)
+                    create(store, self.plan, self.provenance, self.messages, self.keepers)
             else:
-                create(store, self.plan, self.provenance, self.messages)
+                create(store, self.plan, self.provenance, self.messages, self.keepers)
         except OSError as error:
             raise explained(error, path) from error
 
@@ -123,7 +125,7 @@ class Stored:
 
         beside = path.with_name(path.name + ".new")
         shutil.rmtree(beside, ignore_errors=True)
-        skeleton(beside, self.store, self.plan, self.provenance, self.messages)
+        skeleton(beside, self.store, self.plan, self.provenance, self.messages, self.keepers)
         for one in sorted(beside.rglob("*")):
             target = path / one.relative_to(beside)
             if one.is_file() and one != beside / "zarr.json":
@@ -174,7 +176,7 @@ def check_keepers(keepers: Sequence[Keeper]) -> None:
     for keeper in keepers:
         if not isinstance(keeper, PartKeeper):
             faults.add(type(keeper).__name__, keeper, "cannot be stored", "give it name, to_arrays and from_arrays")
-    names = [keeper.name for keeper in keepers if isinstance(keeper, PartKeeper)]
+    names = names_of(keepers)
     for name in sorted({name for name in names if names.count(name) > 1 or "/" in name}):
         faults.add("name", name, "is no file name of its own", "give each keeper another name, without /")
     faults.raise_if_any()

@@ -271,18 +271,22 @@ def checksum_of(texts: Sequence[str]) -> int:
     return durable.checksum("\0".join(texts).encode())
 
 
-def create(store: Store, plan: Plan, provenance: Mapping[str, Any], messages: Sequence[str]) -> None:
-    """Make the store's folder with all of its metadata, whole or not at all. Raises SceneError or OSError."""
+def create(
+    store: Store, plan: Plan, provenance: Mapping[str, Any], messages: Sequence[str], keepers: Sequence[Keeper] = ()
+) -> None:
+    """Make the store's folder with all of its metadata, whole or not at all. Raises SceneError or OSError.
+
+    keepers: whose parts it will hold; the recipe has their names.
+    """
     target = store.folder
     free_enough(target, size(plan, store))
     target.parent.mkdir(parents=True, exist_ok=True)
-    beside = target.with_name(target.name + ".new")
-    shutil.rmtree(beside, ignore_errors=True)
+    beside, old = (target.with_name(target.name + end) for end in (".new", ".old"))
+    for one in (beside, old):
+        shutil.rmtree(one, ignore_errors=True)
     try:
-        skeleton(beside, store, plan, provenance, messages)
+        skeleton(beside, store, plan, provenance, messages, keepers)
         if target.exists():
-            old = target.with_name(target.name + ".old")
-            shutil.rmtree(old, ignore_errors=True)
             target.replace(old)
             beside.replace(target)
             shutil.rmtree(old)
@@ -292,6 +296,11 @@ def create(store: Store, plan: Plan, provenance: Mapping[str, Any], messages: Se
     except BaseException:
         shutil.rmtree(beside, ignore_errors=True)
         raise
+
+
+def names_of(keepers: Sequence[Keeper]) -> list[str]:
+    """What the parts of keepers are called by."""
+    return [keeper.name for keeper in keepers if isinstance(keeper, PartKeeper)]
 
 
 def free_enough(path: Path, wanted: int) -> None:
@@ -306,7 +315,14 @@ def free_enough(path: Path, wanted: int) -> None:
         raise SceneError([f"store = {path}: {what}; {remedy}"])
 
 
-def skeleton(root: Path, store: Store, plan: Plan, provenance: Mapping[str, Any], messages: Sequence[str]) -> None:
+def skeleton(
+    root: Path,
+    store: Store,
+    plan: Plan,
+    provenance: Mapping[str, Any],
+    messages: Sequence[str],
+    keepers: Sequence[Keeper] = (),
+) -> None:
     """Groups and arrays without their blocks, on the disk."""
     import zarr
 
@@ -315,7 +331,7 @@ def skeleton(root: Path, store: Store, plan: Plan, provenance: Mapping[str, Any]
         for name, values in plan.ensemble.parameters(0, 1).items()
         if name not in plan.ensemble.varied()
     }
-    made = recipe(plan) | {"store": store.layout()}
+    made = recipe(plan) | {"store": store.layout(), "keepers": names_of(keepers)}
     texts = [json.dumps(one) for one in (provenance, made, list(messages), shared)]
     group = zarr.create_group(root, zarr_format=3, attributes=_attributes(texts, provenance))
     k, n = len(plan.grid.times), plan.ensemble.members

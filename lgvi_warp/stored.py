@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -107,6 +107,12 @@ def result_of(
         terms=tuple(from_list(provenance["scene"].get("terms", ())) if terms is None else terms),
         store=folder.path,
     )
+
+
+def chosen(result: Result, members: Sequence[int]) -> Result:
+    """Some members of a run in a store, in memory."""
+    part = result_of(Folder(Path(result.store or "")), members, result.messages, result.terms)
+    return replace(part, samples=dict(part.samples), parameters=dict(part.parameters), store=None)
 
 
 def dataset(path: Path) -> xarray.Dataset:

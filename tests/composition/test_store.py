@@ -257,6 +257,24 @@ def test_explicit_states_and_subsets_go_on_from_the_store_alone(tmp_path):
     assert list(lw.open_run(tmp_path / "a.zarr").dataset.realization.values[:2]) == [599, 598]
 
 
+class Mine(lw.Wrench):
+    """A law of a user, which no scene file knows."""
+
+    type = "mine"
+
+
+def test_a_law_of_your_own_goes_on_with_its_ensemble(tmp_path):
+    scene = lw.Scene(fleet().scene.vehicle, terms=[Mine(force=[0.1, 0.0, 0.0], torque=[0.0, 0.0, 0.0])])
+    own = lw.Ensemble(scene, 300, 1, {"mine.force": lw.Normal(std=0.1)})
+    whole = lw.solve(own, **SETTINGS, store=tmp_path / "a.zarr")
+    lw.solve(own, **SETTINGS, store=tmp_path / "b.zarr", only=range(0, 1))
+    with pytest.raises(lw.SceneError, match=r"'mine': is not known"):
+        lw.resume(tmp_path / "b.zarr")
+    assert lw.resume(tmp_path / "b.zarr", own).energy.tobytes() == whole.energy.tobytes()
+    assert differing(tmp_path / "a.zarr", tmp_path / "b.zarr") == []
+    assert resuming.state(tmp_path / "b.zarr")["complete"]
+
+
 def test_another_version_or_machine_is_refused_unless_forced(copy, monkeypatch):
     versions = machine.versions() | {"numpy": "0.1"}
     monkeypatch.setattr(machine, "versions", lambda: versions)
@@ -380,6 +398,8 @@ def test_parts_of_keepers_lie_in_the_store(tmp_path, memory):
     assert one.sums.tobytes() == two.sums.tobytes()
     np.testing.assert_allclose(one.sums, memory.position[..., 2].sum(axis=1), rtol=1e-12)
     assert differing(tmp_path / "a.zarr", tmp_path / "b.zarr") == []
+    with pytest.raises(lw.SceneError, match=r"stores \['depth sum'\], not \[\]"):
+        lw.resume(tmp_path / "b.zarr")
     path = tmp_path / "b.zarr" / "parts" / "000000512" / "depth sum.npz"
     flip(path)
     assert any("depth sum.npz has changed" in text for text in resuming.state(tmp_path / "b.zarr")["damage"])

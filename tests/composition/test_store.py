@@ -5,6 +5,8 @@ import json
 import os
 import resource
 import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -118,6 +120,26 @@ def test_float32_and_fewer_fields(tmp_path, memory):
     with pytest.raises(AttributeError, match="velocity was not kept"):
         _ = result.velocity
     lw.resume(tmp_path)
+
+
+LARGER = """
+import resource, sys
+import lgvi_warp as lw
+from tests.stores import fleet
+lw.solve(fleet(20000), "psi_s", h=0.01, t1=5.0, save=lw.SaveAt(every=0.01), threads=2, store=sys.argv[1])
+assert lw.open_run(sys.argv[1], [7]).position.shape == (501, 1, 3)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+"""
+
+
+@pytest.mark.slow
+def test_samples_may_be_larger_than_the_memory_of_the_run(tmp_path):
+    """1.44 GB of samples by a process that never has half of that."""
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    arguments = [sys.executable, "-c", LARGER, str(tmp_path / "run.zarr")]
+    peak = int(subprocess.run(arguments, capture_output=True, text=True, env=env, check=True).stdout)
+    stored = sum(path.stat().st_size for path in tmp_path.rglob("c.*"))
+    assert stored > 1.4e9 and peak < stored / 2
 
 
 def test_the_same_run_leaves_the_same_bytes(whole, tmp_path):

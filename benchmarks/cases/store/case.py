@@ -35,10 +35,11 @@ def into_store(plan, folder, threads, samples):
     chosen = Store(folder / "run.zarr", existing="overwrite")
     create(chosen, plan, provenance(plan), ())
     sink = Sink(chosen.folder, columns(plan, chosen))
-    k = len(plan.grid.times)
+    k, runs = len(plan.grid.times), blocks(plan.ensemble.members)
+    members = {block.first: plan.ensemble.select(block.first, block.stop) for block in runs}
 
     def one(block):
-        writer = sink.open(plan, block, plan.ensemble.select(block.first, block.stop))
+        writer = sink.open(plan, block, members[block.first])
         for first in range(0, k, 10):
             when = slice(first, min(first + 10, k))
             writer.take(when, {name: values[when, : block.count] for name, values in samples.items()})
@@ -46,7 +47,7 @@ def into_store(plan, folder, threads, samples):
 
     start = time.perf_counter()
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(one, blocks(plan.ensemble.members)))
+        list(pool.map(one, runs))
     seconds = time.perf_counter() - start
     sizes = [path.stat().st_size for path in chosen.folder.rglob("c.*")]
     shutil.rmtree(chosen.folder)
@@ -54,15 +55,16 @@ def into_store(plan, folder, threads, samples):
 
 
 def into_files(folder, threads, sizes):
-    """Seconds to write plain files of these sizes and sync each."""
-    data = np.random.default_rng(1).bytes(max(sizes))
+    """Seconds to write plain files of these sizes, each its own part of memory, and sync each."""
+    ends = np.cumsum(sizes)
+    data = np.arange(-(-int(ends[-1]) // 8)).view(np.uint8)
     place = folder / "plain"
     place.mkdir()
 
     def one(numbered):
         i, size = numbered
         descriptor = os.open(place / str(i), os.O_CREAT | os.O_WRONLY)
-        view = memoryview(data)[:size]
+        view = memoryview(data)[int(ends[i]) - size : int(ends[i])]
         while len(view):
             view = view[os.write(descriptor, view) :]
         os.fsync(descriptor)
@@ -132,7 +134,7 @@ def run_record(folder, quick):
 
 def statistics_record(folder, quick):
     """A keeper of sums alone: with a store that takes no samples, beside without a store."""
-    members, threads = (8192, machine.thread_count()) if quick else (65536, machine.thread_count())
+    members, threads = (8192, machine.thread_count()) if quick else (262_144, machine.thread_count())
     plan = make_plan(speed.fleet(members), "psi_s", h=0.01, t1=10.0, save=SaveAt(every=1.0))
     plan.compile()
     found = []

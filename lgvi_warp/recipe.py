@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 def recipe(plan: Plan) -> dict[str, Any]:
     """Settings of a plan beyond its ensemble and its times: JSON has all of their digits."""
     return {
+        "members": plan.ensemble.members,
         "method": dataclasses.asdict(plan.method),
         "step": plan.grid.h,
         "messages": list(plan.grid.messages),

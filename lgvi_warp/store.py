@@ -223,7 +223,7 @@ class Folder:
     @property
     def members(self) -> int:
         """n."""
-        return int(self.provenance["ensemble"]["members"])
+        return int(self.recipe["members"])
 
     def group(self) -> Any:
         """The zarr group, for reading."""

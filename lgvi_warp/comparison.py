@@ -373,6 +373,10 @@ def biases(result: Result, reference: Result) -> dict[str, float]:
 def part(result: Result, members: Sequence[int]) -> Result:
     """Some members of a result."""
     at = np.asarray(members)
+    if result.store is not None:
+        from lgvi_warp.stored import chosen
+
+        return chosen(result, members)
     return replace(
         result,
         samples={name: values[:, at] for name, values in result.samples.items()},

@@ -3,7 +3,7 @@
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import cli, prediction
+from lgvi_warp import cli, member_fields, prediction
 from lgvi_warp.solving import make_plan
 from tests.conftest import ROOT
 from tests.stores import SETTINGS, fleet, tree

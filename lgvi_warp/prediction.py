@@ -7,6 +7,7 @@ import os
 import shutil
 import tempfile
 import time
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,12 +16,13 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp import durable, machine, member_fields
-from lgvi_warp.blocks import SHAPES, Block, Work, blocks
+from lgvi_warp.blocks import SHAPES, Block, Keeper, Work, blocks
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.executors.threads import Threads
 from lgvi_warp.keepers import Samples
+from lgvi_warp.observation import Observation, Observing, observe
 from lgvi_warp.plan import SEGMENT_SAMPLE_BYTES, Plan
-from lgvi_warp.saveat import TimeGrid
+from lgvi_warp.saveat import SaveAt, TimeGrid
 from lgvi_warp.scene import Scene
 from lgvi_warp.store import Store, create
 from lgvi_warp.store_layout import columns, size
@@ -88,19 +90,26 @@ def predict(
 ) -> Prediction:
     """What lw.solve(fleet, **settings) will take, from a trial of about a second on so many threads.
 
-    settings: those of solve that decide the plan (method, h, t1, save, dtype, width, checks). store: as for solve; the disk
-    is that of its folder. A run whose cost changes on the way (events, steps that are chosen) costs something else.
+    settings: those of solve that decide the plan and what is kept (method, h, t1, save, dtype, width, checks, statistics,
+    keep, until: the whole ensemble is predicted). store: as for solve; the disk is that of its folder. What statistics
+    keep of each block counts for time, not for memory and disk; members that are run again for their samples do not.
+    A run whose cost changes on the way (events, steps that are chosen) costs something else.
     Raises SceneError.
     """
-    from lgvi_warp.solving import make_plan
+    from lgvi_warp.solving import make_plan, settled
 
     ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
-    plan = make_plan(ensemble, **settings)
+    asked = [settings.pop(name, None) for name in ("statistics", "keep", "until")]
+    observed = observe(ensemble.members, ensemble.scene.run, *asked)
+    fields = (settings.get("save") or SaveAt()).fields
+    plan = make_plan(ensemble, **settings, fields=observed.fields)
+    kept = fields if observed.samples else ()
     compile_seconds = plan.compile()
     count = threads or machine.thread_count()
-    set_up, step = costs(plan, count)
+    set_up, step = costs(plan, count, observed)
     into = store if isinstance(store, Store) or store is None else Store(store)
-    disk = size(plan, into) if into else _result_bytes(plan)
+    into = settled(into, plan, observed, fields) if into else None
+    disk = size(plan, into) if into else _result_bytes(plan, kept)
     place = _existing(into.folder) if into else Path.cwd()
     n, steps = ensemble.members, plan.grid.steps
     return Prediction(
@@ -112,14 +121,14 @@ def predict(
         set_up=set_up,
         advance=step * steps,
         write=writing(plan, into, place, count) if into else 0.0,
-        memory=_resident() + memory(plan, count, into),
+        memory=_resident() + memory(plan, count, into, kept),
         disk=disk,
         free_memory=machine.memory_bytes(),
         free_disk=shutil.disk_usage(place).free,
     )
 
 
-def costs(plan: Plan, threads: int) -> tuple[float, float]:
+def costs(plan: Plan, threads: int, observed: Observation | None = None) -> tuple[float, float]:
     """Seconds to set up, and of one step of all members with its samples, of all threads together.
 
     From trials of one block a thread: the steps are doubled until they take long enough, and half of them are taken away
@@ -128,35 +137,39 @@ def costs(plan: Plan, threads: int) -> tuple[float, float]:
     runs = blocks(plan.ensemble.members)
     chosen = runs[:threads]
     steps, most = min(64, plan.grid.steps), plan.grid.steps
-    while (high := _seconds(plan, steps, chosen, threads)) < TRIAL_SECONDS and steps < most:
+    while (high := _seconds(plan, steps, chosen, threads, observed)) < TRIAL_SECONDS and steps < most:
         steps = min(most, steps * max(2, min(64, int(TRIAL_SECONDS / max(high, 1e-4)))))
     half = max(1, steps // 2)
-    high = min(high, _seconds(plan, steps, chosen, threads))
-    low = min(_seconds(plan, half, chosen, threads) for _ in range(2))
+    high = min(high, _seconds(plan, steps, chosen, threads, observed))
+    low = min(_seconds(plan, half, chosen, threads, observed) for _ in range(2))
     slope = (high - low) / (steps - half) if steps > half and high > low else high / steps
     # In the last round of a run of few blocks some threads are idle.
     rounds = math.ceil(len(runs) / threads) if len(runs) < 8 * threads else len(runs) / threads
     return max(0.0, high - slope * steps) * rounds, slope * rounds
 
 
-def _seconds(plan: Plan, steps: int, chosen: list[Block], threads: int) -> float:
+def _seconds(plan: Plan, steps: int, chosen: list[Block], threads: int, observed: Observation | None) -> float:
     """Time of these blocks until a step, with the samples due by then."""
     due = plan.grid.sample_steps[plan.grid.sample_steps < steps]
     due = np.append(due, steps)
     trial = replace(plan, grid=TimeGrid(plan.grid.h, due, due * plan.grid.h), width=plan.spec.width)
     trial.compile()
-    work = Work(trial, (Samples.elsewhere(trial.fields),))
+    keepers: tuple[Keeper, ...] = (Samples.elsewhere(trial.fields),)
+    if observed is not None:
+        statistics = Observing(replace(observed, until=None), trial.grid.times, plan.ensemble.members).keepers
+        keepers = (*(keepers if observed.samples else ()), *statistics)
+    work = Work(trial, keepers)
     start = time.perf_counter()
     for _ in Threads(threads).run(work, chosen, lambda block, vehicle_steps: None):
         pass
     return time.perf_counter() - start
 
 
-def _result_bytes(plan: Plan) -> int:
-    """Of a result in memory, and about those of its file."""
+def _result_bytes(plan: Plan, fields: Sequence[str] | None = None) -> int:
+    """Of a result in memory, and about those of its file; fields: of its samples, by default all of the plan."""
     k, n = len(plan.grid.times), plan.ensemble.members
     real = np.dtype(machine.DTYPES[plan.dtype]).itemsize
-    sizes = {name: int(np.prod(SHAPES[name])) * real for name in plan.fields}
+    sizes = {name: int(np.prod(SHAPES[name])) * real for name in (plan.fields if fields is None else fields)}
     if plan.spec.compensated and "position" in sizes:
         sizes["position"] = 24
     one = plan.ensemble.parameters(0, 1)
@@ -164,7 +177,7 @@ def _result_bytes(plan: Plan) -> int:
     return n * (k * sum(sizes.values()) + varied + sum(np.dtype(f.dtype).itemsize for f in member_fields.present(plan)))
 
 
-def memory(plan: Plan, threads: int, store: Store | None) -> int:
+def memory(plan: Plan, threads: int, store: Store | None, fields: Sequence[str] | None = None) -> int:
     """Bytes that a run adds to the process: its result or its chunks, and what the blocks at work hold."""
     runs = blocks(plan.ensemble.members)
     count, n = runs[0].count, plan.ensemble.members
@@ -174,7 +187,7 @@ def memory(plan: Plan, threads: int, store: Store | None) -> int:
     # A segment's samples: the kernel's, the members' in order, and turned or moved copies.
     each = 3 * segment
     if store is None:
-        return _result_bytes(plan) + working * each
+        return _result_bytes(plan, fields) + working * each
     each += sum(one.bytes for one in columns(plan, store))
     return working * each + n * sum(np.dtype(one.dtype).itemsize for one in member_fields.present(plan))
 

@@ -275,15 +275,20 @@ def run_stored(
     compile_seconds = plan.compile()
     start = time.perf_counter()
     observing = Observing(observed, plan.grid.times, plan.ensemble.members)
-    asked = set(plan.fields if fields is None else fields) if observed.samples else set()
-    own = asked if store.fields is None else asked & set(store.fields)
-    into = replace(store, fields=tuple(name for name in FIELDS if name in own))
+    into = settled(store, plan, observed, fields)
     told = provenance(plan, observed, fields)
     folder = Stored(plan, into, told, messages(plan), observing.keepers, only, observing.enough).run(executor, progress)
     runs = blocks(plan.ensemble.members)
     members = None if only is None else slice(runs[only[0]].first, runs[only[-1]].stop)
     result = result_of(folder, members, messages(plan), plan.ensemble.scene.terms, observing)
     return replace(result, compile_seconds=compile_seconds, run_seconds=time.perf_counter() - start)
+
+
+def settled(store: Store, plan: Plan, observed: Observation, fields: Sequence[str] | None) -> Store:
+    """The store with the fields of the samples that it will hold: none where those of all members are not kept."""
+    asked = set(plan.fields if fields is None else fields) if observed.samples else set()
+    own = asked if store.fields is None else asked & set(store.fields)
+    return replace(store, fields=tuple(name for name in FIELDS if name in own))
 
 
 def messages(plan: Plan) -> tuple[str, ...]:

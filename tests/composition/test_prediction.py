@@ -45,7 +45,7 @@ def test_a_store_needs_no_memory_for_samples():
 def test_costs_are_those_of_a_machine_that_keeps_its_word(monkeypatch, members, threads, rounds):
     """Blocks side by side that take 5 ms and 3 us a step: the run is as many rounds of them as its blocks are."""
 
-    def seconds(plan, steps, chosen, threads):
+    def seconds(plan, steps, chosen, threads, observed):
         assert len(chosen) <= threads
         return 0.005 + 3e-6 * steps
 
@@ -81,3 +81,15 @@ def test_too_little_room_is_said():
     text = str(prediction.Prediction(**given, memory=10**10, disk=10**12, free_memory=10**10, free_disk=10**11))
     assert "2.0 h" in text and "100% of the memory" in text
     assert "use --store zarr" in text and "more than the disk holds" in text
+
+
+def test_statistics_without_samples_take_little(tmp_path):
+    own = {"statistics": [lw.Mean("position")], "keep": "none"}
+    path = tmp_path / "run.zarr"
+    found = lw.predict(fleet(), **SETTINGS, **own, store=path)
+    assert found.advance > 0.0 and lw.predict(fleet(), **SETTINGS, **own).disk < 100_000
+    lw.solve(fleet(), **SETTINGS, **own, store=path)
+    assert (
+        sum(len(data) for name, data in tree(path).items() if "/c." in name and not name.startswith("time"))
+        >= found.disk
+    )

@@ -7,6 +7,15 @@ from lgvi_warp import speed
 
 # 4 blocks of 256 members, the last one ragged; 31 samples.
 MEMBERS, SETTINGS = 1003, {"method": "psi_s", "h": 0.01, "t1": 3.0, "save": lw.SaveAt(every=0.1)}
+STATISTICS = [lw.Mean("position"), lw.Quantiles("depth"), lw.PathMaximum("speed"), lw.Covariance("angular_velocity")]
+# Reached with 512 members.
+UNTIL = lw.Until("mean angular_velocity[0]", 3.7e-3, members=256)
+
+
+def bits(result):
+    """All arrays of a result's statistics, as bytes, and what else they say."""
+    arrays, text = result.statistics.to_arrays()
+    return {name: values.tobytes() for name, values in arrays.items()}, text
 
 
 def fleet(members=MEMBERS):

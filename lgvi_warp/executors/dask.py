@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import functools
 import time
 import uuid
+from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -52,7 +54,11 @@ class Dask:
                 ) from error
             finally:
                 client.unsubscribe_topic(topic)
-                client.cancel(list(waiting))
+                if waiting:
+                    client.cancel(list(waiting))
+                    # A block that is at work when the run ends must not write into its store afterwards.
+                    with contextlib.suppress(OSError, TimeoutError):
+                        client.run(_end, topic, on_error="ignore")
 
     @contextlib.contextmanager
     def _client(self) -> Iterator[Any]:
@@ -99,7 +105,23 @@ def _work(data: bytes, block: Block, topic: str, kind: dict[str, str]) -> Any:
             [f"worker {own}: is not of the kind of the machine that asks, {kind}, and would give other bits; "
              "let workers be of one kind, and run from one of them"]
         )  # fmt: skip
-    return _received(data)(block, advanced=_teller(topic, block))
+    _at_work[topic] += 1
+    try:
+        return _received(data)(block, lambda: topic in _ended, _teller(topic, block))
+    finally:
+        _at_work[topic] -= 1
+
+
+# On a worker: blocks at work of each run, and runs that ended early.
+_at_work: Counter[str] = Counter()
+_ended: set[str] = set()
+
+
+async def _end(topic: str) -> None:
+    """On a worker: halt the blocks of a run, and wait until none is at work."""
+    _ended.add(topic)
+    while _at_work[topic] > 0:
+        await asyncio.sleep(0.05)
 
 
 def _teller(topic: str, block: Block) -> Callable[[int], None]:

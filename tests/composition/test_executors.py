@@ -18,7 +18,7 @@ from lgvi_warp.executors.processes import Processes
 from lgvi_warp.keepers import Outcomes, Samples
 from lgvi_warp.plan import _one_at_a_time
 from lgvi_warp.solving import make_plan
-from tests.stores import SETTINGS, differing, fleet
+from tests.stores import SETTINGS, STATISTICS, UNTIL, bits, differing, fleet
 
 FIELDS = ("position", "attitude", "velocity", "angular_velocity")
 # Long enough that a worker can be killed before the end: 16 blocks of 256 members.
@@ -126,6 +126,19 @@ def test_dask(client, memory, tmp_path):
     address = client.scheduler_info()["address"]
     stored = lw.solve(fleet(), **SETTINGS, executor="dask", scheduler=address, store=tmp_path / "run.zarr")
     assert same(stored, memory)
+
+
+@pytest.mark.slow
+def test_statistics_on_dask_end_with_the_run(client, tmp_path):
+    """Blocks that are at work when there are members enough leave nothing in the store."""
+    from lgvi_warp.executors.dask import Dask
+
+    settings = {**SETTINGS, "statistics": STATISTICS, "until": UNTIL}
+    lw.solve(fleet(), **settings, threads=1, store=tmp_path / "one.zarr")
+    result = lw.solve(fleet(), **settings, executor=Dask(client), store=tmp_path / "run.zarr")
+    assert result.members == 512 and bits(result) == bits(lw.open_run(tmp_path / "one.zarr"))
+    time.sleep(0.5)
+    assert differing(tmp_path / "one.zarr", tmp_path / "run.zarr") == []
 
 
 def test_a_killed_dask_worker_costs_its_block_only(client, tmp_path, whole):

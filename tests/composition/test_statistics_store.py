@@ -16,16 +16,7 @@ from lgvi_warp.observation import observation_of, observe
 from lgvi_warp.solving import make_plan, messages, provenance
 from lgvi_warp.store import Folder, create
 from tests.conftest import ROOT
-from tests.stores import SETTINGS, differing, fleet, tree
-
-STATISTICS = [lw.Mean("position"), lw.Quantiles("depth"), lw.PathMaximum("speed"), lw.Covariance("angular_velocity")]
-UNTIL = lw.Until("mean angular_velocity[0]", 3.7e-3, members=256)
-
-
-def bits(result):
-    """All arrays of a result's statistics, as bytes, and what else they say."""
-    arrays, text = result.statistics.to_arrays()
-    return {name: values.tobytes() for name, values in arrays.items()}, text
+from tests.stores import SETTINGS, STATISTICS, UNTIL, bits, differing, fleet, tree
 
 
 @pytest.fixture(scope="module")
@@ -115,8 +106,7 @@ def test_until_stops_a_resumed_store_at_the_same_block(stopped, tmp_path):
 CODE = """
 import sys
 import lgvi_warp as lw
-from tests.composition.test_statistics_store import STATISTICS
-from tests.stores import fleet
+from tests.stores import STATISTICS, fleet
 lw.solve(fleet(2048), "psi_s", h=0.01, t1=60.0, save=lw.SaveAt(every=0.5), threads=1, statistics=STATISTICS,
          keep=sys.argv[2], store=sys.argv[1])
 """

@@ -26,13 +26,14 @@ TEXT = """# From 1,000 to 10 million members
 
 A run is cut into **blocks** of 256 to 4096 members. Each block goes through all of its steps by itself, so a run of
 any size needs memory for the blocks at work and for what it keeps, and nothing more. What it keeps decides which of
-three ways fits:
+four ways fits:
 
 | members | keep | how |
 |---|---|---|
 | up to about 100,000 | all samples in memory | `lw.solve(fleet, ...)`, `lgvi-warp run SCENE` |
 | more, or longer than you want to lose | all samples in a store on disk | `store="runs/x/run.zarr"`, `--store zarr` |
 | more than the disk holds | fewer times or fields | `lw.SaveAt(every=..., fields=("position",))`, `--store-dtype float32` |
+| any number | [statistics](statistics.md), outcomes | `statistics=[...], keep="none"`, with a store to resume |
 
 ## Before the run: `lgvi-warp plan`
 
@@ -61,6 +62,15 @@ what `lw.predict` said before the run, over what was measured.
 Machine: {cpu}, {simd}, {threads} threads. Written by `python benchmarks/large_table.py`; do not edit.
 
 {table}
+
+**Statistics in a store.** With `statistics=[...]`, or `[[run.statistics]]` in the scene file, the store holds what each
+block gave to them; `keep="none"` leaves the samples out, so that status, warnings and varied parameters of each
+member are all that is there beside. `lw.open_run` joins the blocks' parts again, and `resume` takes the statistics, `keep`
+and `until` of the run from the store. A run that `until` ends early is complete with fewer members, and so it is after a
+crash: at the same block, with the same bytes. Statistics of functions of your own are not in the file:
+`lw.resume(path, statistics=[...])` and `lw.open_run(path, statistics=[...])` take them again. The samples of members that
+`keep="failed"` or `keep=[3, 17]` asks for are run again when the run ends and are in memory only (`result.kept`), not in
+the store. A run in parts (`--blocks`) cannot have `until`.
 
 ## After a crash: `lgvi-warp resume`
 

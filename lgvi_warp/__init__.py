@@ -62,13 +62,18 @@ if TYPE_CHECKING:
     from lgvi_warp.coefficients import from_fossen, vehicles
     from lgvi_warp.coefficients_sdf import from_sdf
     from lgvi_warp.coefficients_yaml import from_yaml
+    from lgvi_warp.exporting import export
     from lgvi_warp.law_check import check_law
     from lgvi_warp.plan import Plan
+    from lgvi_warp.prediction import predict
+    from lgvi_warp.resuming import merge, resume
     from lgvi_warp.sinks.plots import plot, plot_stability, plot_statistics, plot_tradeoff
     from lgvi_warp.sinks.rerun import log_rerun
     from lgvi_warp.sinks.sensitivity import plot_sensitivity
     from lgvi_warp.solving import solve
     from lgvi_warp.stability import StabilityMap, stability_map
+    from lgvi_warp.store import Store
+    from lgvi_warp.stored import open_run
     from lgvi_warp.suggestion import suggest
     from lgvi_warp.tradeoffs import tradeoff
 
@@ -77,6 +82,12 @@ __version__ = "0.1.0"
 # Loaded when first used: Warp takes a second to import, and a scene can be read and checked without it.
 _LAZY = {
     "solve": "lgvi_warp.solving",
+    "Store": "lgvi_warp.store",
+    "open_run": "lgvi_warp.stored",
+    "resume": "lgvi_warp.resuming",
+    "merge": "lgvi_warp.resuming",
+    "export": "lgvi_warp.exporting",
+    "predict": "lgvi_warp.prediction",
     "suggest": "lgvi_warp.suggestion",
     "tradeoff": "lgvi_warp.tradeoffs",
     "Plan": "lgvi_warp.plan",
@@ -153,6 +164,7 @@ __all__ = [
     "Start",
     "Status",
     "StopTime",
+    "Store",
     "Stratification",
     "Surface",
     "Table",
@@ -171,17 +183,22 @@ __all__ = [
     "WrenchNoise",
     "WrenchSchedule",
     "check_law",
+    "export",
     "from_fossen",
     "from_sdf",
     "from_yaml",
     "log_rerun",
+    "merge",
+    "open_run",
     "plot",
     "plot_sensitivity",
     "plot_stability",
     "plot_statistics",
     "plot_tradeoff",
+    "predict",
     "quantity",
     "register",
+    "resume",
     "solve",
     "stability_map",
     "suggest",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from lgvi_warp.ensemble import Members
     from lgvi_warp.packets import Outcome
     from lgvi_warp.plan import Plan
+    from lgvi_warp.store import Sink
 
 SHAPES: dict[str, tuple[int, ...]] = {
     "position": (3,),
@@ -94,6 +95,59 @@ class Keeper(Protocol):
 
     def merge(self, block: Block, part: Any) -> None:
         """What a block's keeper closed with; in the order of the blocks, in the thread that asked for the run."""
+
+
+@runtime_checkable
+class PartKeeper(Keeper, Protocol):
+    """A keeper whose parts a store can hold, so that a run that goes on later has those of its finished blocks."""
+
+    @property
+    def name(self) -> str:
+        """What its file is called by: unlike that of any other keeper of the run."""
+
+    def to_arrays(self, part: Any) -> tuple[dict[str, np.ndarray], Any]:
+        """A part as arrays by name, and what JSON holds."""
+
+    def from_arrays(self, arrays: dict[str, np.ndarray], content: Any) -> Any:
+        """The part again, with the same bits."""
+
+
+@dataclass(frozen=True)
+class Work:
+    """What executors do to each block: advance it, and put it into the store if there is one. Can be pickled.
+
+    sink: the store. Called with a block, it returns what each keeper closed with, or None if it was halted; a block that
+    the store has is not run again. advanced: called with the vehicle-steps made of this block so far.
+    """
+
+    plan: Plan
+    keepers: tuple[Keeper, ...]
+    sink: Sink | None = None
+
+    def __call__(
+        self,
+        block: Block,
+        halted: Callable[[], bool] = lambda: False,
+        advanced: Callable[[int], None] = lambda vehicle_steps: None,
+    ) -> tuple[Any, ...] | None:
+        """Do the work of one block."""
+        made = 0
+
+        def add(vehicle_steps: int) -> None:
+            nonlocal made
+            made += vehicle_steps
+            advanced(made)
+
+        if self.sink is None:
+            return run_block(self.plan, block, self.keepers, halted, add)
+        there = self.sink.parts(block, self.keepers)
+        if there is not None:
+            return there
+        parts = run_block(self.plan, block, (*self.keepers, self.sink), halted, add)
+        if parts is None:
+            return None
+        self.sink.finish(block, parts[-1], self.keepers, parts[:-1])
+        return parts[:-1]
 
 
 def run_block(

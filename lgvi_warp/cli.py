@@ -38,6 +38,8 @@ EPILOG = """examples:
   lgvi-warp run examples/paper.toml --out runs/paper
   lgvi-warp run examples/paper.toml --members 20000 --dtype float32 --set vehicle.mass=120
   lgvi-warp run examples/paper.toml --error 1e-3
+  lgvi-warp run examples/paper.toml --members 1000000 --store zarr --out runs/large
+  lgvi-warp resume runs/large
   lgvi-warp tradeoff examples/paper.toml --out runs/tradeoff
   lgvi-warp sensitivity examples/paper.toml --of "position[2]" --out runs/sensitivity
   lgvi-warp stability examples/paper.toml --out runs/stability
@@ -82,8 +84,21 @@ def parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--keep", help="samples of members to keep: all, none or failed (statistics are those of the scene)"
     )
-    run.add_argument("--threads", metavar="N", type=int, help="threads (default: all cores)")
     run.add_argument("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
+    _add_executor(run)
+    run.add_argument(
+        "--store",
+        choices=["npz", "zarr"],
+        default="npz",
+        help="result.npz when the run ends (default), or run.zarr block by block, which resume can go on with",
+    )
+    run.add_argument("--store-dtype", metavar="D", help="float32: store the samples of a float64 run so")
+    run.add_argument("--blocks", metavar="A:B", help="with --store zarr: run only these blocks, to be merged later")
+    there = run.add_mutually_exclusive_group()
+    there.add_argument("--overwrite", action="store_true", help="replace a run.zarr that is there")
+    there.add_argument("--resume", action="store_true", help="go on with a run.zarr that is there, if it is this run")
+    _add_plan(verbs)
+    _add_store_verbs(verbs)
     trade = verbs.add_parser(
         "tradeoff", help="speed against accuracy of every method, step and precision: tradeoff.json, .csv and .png"
     )
@@ -99,7 +114,10 @@ def parser() -> argparse.ArgumentParser:
     )
     _add_sensitivity(verbs)
     _add_stability(verbs)
-    info = verbs.add_parser("info", help="machine, versions, SIMD width, threads and the core's peak")
+    info = verbs.add_parser(
+        "info", help="what a run's folder holds; without one, the machine, versions, the core's peak"
+    )
+    info.add_argument("dir", metavar="DIR", type=Path, nargs="?", help="a store, or a folder with one")
     info.set_defaults(scene=None)
     bench = verbs.add_parser("bench", help="speed of the kernel on this machine, beside the core's peak")
     bench.add_argument("--members", type=int, default=4096, help="vehicles (default 4096)")
@@ -155,6 +173,45 @@ def _add_stability(verbs: Any) -> None:
     verb.add_argument("--of", default="attitude", help=f"what --error is of (default: attitude); {OF}")
 
 
+def _add_executor(verb: argparse.ArgumentParser) -> None:
+    """Where blocks run."""
+    verb.add_argument("--threads", metavar="N", type=int, help="threads, processes or workers (default: all cores)")
+    verb.add_argument("--executor", default="threads", help="threads (default), processes or dask")
+    verb.add_argument("--scheduler", metavar="ADDRESS", help="of Dask; without one, a cluster on this machine")
+
+
+def _add_plan(verbs: Any) -> None:
+    """The verb plan."""
+    plan = verbs.add_parser(
+        "plan", help="time, memory and disk that a run would take, from a small one on this machine"
+    )
+    _add_scene(plan, "runs/NAME of the scene")
+    plan.add_argument("--method", help="as for run")
+    plan.add_argument("--step", metavar="S", help="time step [s]")
+    plan.add_argument("--dtype", help="as for run")
+    plan.add_argument("--threads", metavar="N", type=int, help="threads (default: all cores)")
+    plan.add_argument("--store", choices=["npz", "zarr"], default="npz", help="as for run")
+    plan.add_argument("--store-dtype", metavar="D", help="as for run")
+
+
+def _add_store_verbs(verbs: Any) -> None:
+    """The verbs that work on a store."""
+    resume = verbs.add_parser("resume", help="go on with a run that was stopped, and mend what is damaged of it")
+    resume.add_argument("dir", metavar="DIR", type=Path, help="a store, or a folder with one")
+    _add_executor(resume)
+    resume.add_argument("--force", action="store_true", help="even on another machine or with other versions")
+    resume.add_argument("--quiet", action="store_true", help="no progress and no summary")
+    merge = verbs.add_parser("merge", help="put runs of some blocks each (run --blocks) together")
+    merge.add_argument("dirs", metavar="DIR", type=Path, nargs="+", help="stores, or folders with one each")
+    merge.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the whole run")
+    merge.add_argument("--overwrite", action="store_true", help="replace a run.zarr that is there")
+    merge.add_argument("--quiet", action="store_true", help="no summary")
+    export = verbs.add_parser("export", help="write a run as one NetCDF or Parquet file")
+    export.add_argument("dir", metavar="DIR", type=Path, help="a store, or a folder with one")
+    export.add_argument("--to", required=True, help="netcdf or parquet")
+    export.add_argument("--out", metavar="FILE", type=Path, help="the file (default: beside the store)")
+
+
 def _add_scene(verb: argparse.ArgumentParser, folder: str, ensemble: bool = True) -> None:
     """The arguments of a verb that runs a scene."""
     verb.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
@@ -173,8 +230,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the command. Returns the exit code: 0, 1 for a run that failed, 2 for a scene or argument that is refused."""
     chosen = parser().parse_args(arguments)
     try:
-        verbs = {"run": run, "tradeoff": tradeoff, "sensitivity": sensitivity, "stability": stability}
-        return (verbs | {"info": info, "bench": bench})[chosen.verb](chosen)
+        return VERBS[chosen.verb](chosen)
     except SceneError as error:
         print(f"lgvi-warp: {error}", file=sys.stderr)
         return 2
@@ -185,7 +241,9 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"lgvi-warp: {error or 'out of memory'}; run fewer members or keep fewer samples", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print("lgvi-warp: interrupted; nothing was written", file=sys.stderr)
+        kept = chosen.verb == "resume" or getattr(chosen, "store", None) == "zarr"
+        text = "finished blocks are kept: go on with lgvi-warp resume" if kept else "nothing was written"
+        print(f"lgvi-warp: interrupted; {text}", file=sys.stderr)
         return 130
 
 
@@ -211,6 +269,7 @@ def run(chosen: argparse.Namespace) -> int:
     begun = time.perf_counter()
     scene = Scene.load(chosen.scene, overrides(chosen))
     out: Path = chosen.out or Path("runs") / Path(chosen.scene).stem
+    store, only = store_settings(chosen, out), block_range(chosen)
     out.mkdir(parents=True, exist_ok=True)
     warm = _import_in_background()
     from lgvi_warp.solving import solve
@@ -220,21 +279,83 @@ def run(chosen: argparse.Namespace) -> int:
     settings = suggested.settings if suggested else {}
     failures = []
     try:
-        result = solve(scene, threads=chosen.threads, width=chosen.width, progress=progress, **settings)
+        result = solve(
+            scene, threads=chosen.threads, width=chosen.width, progress=progress, store=store, executor=chosen.executor,
+            scheduler=chosen.scheduler, only=only, **settings,
+        )  # fmt: skip
     except MembersFailed as error:
         result, failures = error.result, [str(error)]
     if progress:
         progress.close()
     warm.join()
-    files, faults = write(result, out)
-    faults += failures
-    if not chosen.quiet:
-        print(summary(result, files, time.perf_counter() - begun))
+    faults = report(result, out, chosen.quiet, begun) + failures
     if suggested:
         faults += check_error(scene, result, suggested, chosen.quiet)
     for fault in faults:
         print(f"lgvi-warp: {fault}", file=sys.stderr)
     return 1 if faults or (result.status != 0).all() else 0
+
+
+def store_settings(chosen: argparse.Namespace, out: Path) -> Any:
+    """The store that the arguments ask for, None without one. Raises SceneError."""
+    if chosen.store == "npz":
+        names = ("store_dtype", "blocks", "overwrite", "resume")
+        given = [f"--{name.replace('_', '-')}" for name in names if getattr(chosen, name)]
+        if given:
+            raise SceneError([f"{' and '.join(given)}: is for runs in a store; add --store zarr, or leave it out"])
+        return None
+    from lgvi_warp.store import Store
+
+    existing = "overwrite" if chosen.overwrite else "resume" if chosen.resume else "refuse"
+    return Store(out / "run.zarr", chosen.store_dtype, existing=existing)
+
+
+def block_range(chosen: argparse.Namespace) -> range | None:
+    """The blocks of --blocks A:B. Raises SceneError."""
+    if chosen.blocks is None:
+        return None
+    first, colon, stop = chosen.blocks.partition(":")
+    if not (colon and first.isdigit() and stop.isdigit()):
+        raise SceneError(
+            [f"--blocks {chosen.blocks}: is no range of blocks; write --blocks 0:100 for the first hundred"]
+        )
+    return range(int(first), int(stop))
+
+
+def report(result: Any, out: Path, quiet: bool, begun: float) -> list[str]:
+    """Write the files of a finished run, print its summary, and return what failed."""
+    if result.store is not None and not complete(result):
+        if not quiet:
+            print(f"members     {result.members:,} of a run in parts, in {result.store}; next: lgvi-warp merge")
+        return []
+    drawn = shown_members(result)
+    files, faults = write(result, drawn, out)
+    if not quiet:
+        print(summary(result, drawn, files, time.perf_counter() - begun))
+    return faults
+
+
+def complete(result: Any) -> bool:
+    """Whether a store holds the whole run."""
+    from lgvi_warp.store import Folder
+
+    return Folder(result.store).complete
+
+
+# Plots and drift are of so many numbers at most, of the first members: a store may be larger than the memory.
+MOST_DRAWN = 30_000_000
+
+
+def shown_members(result: Any) -> Any:
+    """The result, or of a large one in a store its first members, in memory; without samples, those kept, or None."""
+    if not result.samples:
+        return result.kept
+    if result.store is None:
+        return result
+    from lgvi_warp.stored import chosen
+
+    most = max(1, MOST_DRAWN // (18 * len(result.time)))
+    return chosen(result, range(min(most, result.members)))
 
 
 def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:
@@ -414,23 +535,26 @@ def _import_in_background() -> threading.Thread:
     return thread
 
 
-def write(result: Any, out: Path) -> tuple[list[Path], list[str]]:
+def write(result: Any, drawn: Any, out: Path) -> tuple[list[Path], list[str]]:
     """Write result.npz, fleet.png, fleet.rrd and statistics.png side by side: what there is of them.
 
-    Returns the files, and a text for each that failed.
+    drawn: the members of the pictures, None without. A result in a store is written already. Returns the files, and a text
+    for each that failed.
     """
     from concurrent.futures import ThreadPoolExecutor
 
     from lgvi_warp.sinks.plots import drawable, plot, plot_statistics
     from lgvi_warp.sinks.rerun import log_rerun
 
-    files, faults = [], []
-    writers: dict[str, Callable[[Path], Path]] = {"result.npz": result.save}
-    shown = result if result.samples else result.kept
-    if shown is not None:
-        writers |= {"fleet.png": lambda path: plot(shown, path), "fleet.rrd": lambda path: log_rerun(shown, path)}
+    files: list[Path] = [result.store] if result.store else []
+    faults: list[str] = []
+    writers: dict[str, Callable[[Path], Path]] = {} if result.store else {"result.npz": result.save}
+    if drawn is not None:
+        writers |= {"fleet.png": lambda path: plot(drawn, path), "fleet.rrd": lambda path: log_rerun(drawn, path)}
     if drawable(result):
         writers["statistics.png"] = lambda path: plot_statistics(result, path)
+    if not writers:
+        return files, faults
     with ThreadPoolExecutor(len(writers)) as pool:
         jobs = {out / name: pool.submit(writer, out / name) for name, writer in writers.items()}
     for path, job in jobs.items():
@@ -441,7 +565,7 @@ def write(result: Any, out: Path) -> tuple[list[Path], list[str]]:
     return files, faults
 
 
-def summary(result: Any, files: list[Path], seconds: float) -> str:
+def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
     """The run in a few lines."""
     from lgvi_warp import invariants
     from lgvi_warp.statistics.table import table
@@ -449,20 +573,19 @@ def summary(result: Any, files: list[Path], seconds: float) -> str:
 
     settings = result.provenance
     steps = settings["steps"]
-    rate = result.members * steps / result.run_seconds
     lines = [
         *(f"note        {message}" for message in result.messages),
         f"members     {result.members:,}, {settings['method']['name']}, {settings['dtype']}, "
         f"step {settings['step']:g} s, {steps:,} steps",
-        f"speed       {rate:.3g} vehicle-steps per second ({result.run_seconds:.2f} s; kernel loaded in "
-        f"{result.compile_seconds:.2f} s; {seconds:.2f} s in all)",
+        *_speed(result, seconds),
         "status      " + ", ".join(f"{name} {number:,}" for name, number in result.status.counts().items()),
     ]
     if result.samples:
-        drift = invariants.drift(result)
+        drift = invariants.drift(drawn)
+        whose = "all members" if drawn.members == result.members else f"the first {drawn.members:,} members"
         lines.append(
             f"drift       energy {drift['energy']:.2g} J, horizontal momentum {drift['horizontal_momentum']:.2g} N s, "
-            f"vertical angular momentum {drift['vertical_angular_momentum']:.2g} N m s (largest of all members)"
+            f"vertical angular momentum {drift['vertical_angular_momentum']:.2g} N m s (largest of {whose})"
         )
     elif result.kept is not None:
         lines.append(f"kept        {result.kept.members:,} members' samples, run again")
@@ -483,7 +606,7 @@ def summary(result: Any, files: list[Path], seconds: float) -> str:
     if result.statistics:
         lines.append(f"statistics  at {result.time[-1]:g} s, with intervals")
         lines += [f"  {line}" for line in table(result.statistics)]
-    lines += [f"file        {path} ({path.stat().st_size / 1e6:.1f} MB)" for path in files]
+    lines += [f"file        {path} ({size_of(path) / 1e6:.1f} MB)" for path in files]
     return "\n".join(lines)
 
 
@@ -504,6 +627,24 @@ def _warning_lines(result: Any) -> list[str]:
             when = f"first: member {first} at {result.warning_time[first]:g} s, {value}"
             lines.append(f"  {str(one.name).lower()}: {one.text} ({when})")
     return lines
+
+
+def _speed(result: Any, seconds: float) -> list[str]:
+    """The summary's line on speed; none for a run that went on, of which not all was made now."""
+    if not result.run_seconds:
+        return []
+    rate = result.members * result.provenance["steps"] / result.run_seconds
+    return [
+        f"speed       {rate:.3g} vehicle-steps per second ({result.run_seconds:.2f} s; kernel loaded in "
+        f"{result.compile_seconds:.2f} s; {seconds:.2f} s in all)"
+    ]
+
+
+def size_of(path: Path) -> int:
+    """Bytes of a file, or of all in a folder."""
+    return (
+        path.stat().st_size if path.is_file() else sum(one.stat().st_size for one in path.rglob("*") if one.is_file())
+    )
 
 
 class Progress:
@@ -535,6 +676,8 @@ class Progress:
 
 def info(chosen: argparse.Namespace) -> int:
     """lgvi-warp info."""
+    if chosen.dir is not None:
+        return info_of_run(chosen.dir)
     from lgvi_warp import machine
 
     described, memory = machine.describe(), machine.memory_bytes()
@@ -550,6 +693,87 @@ def info(chosen: argparse.Namespace) -> int:
     return 0
 
 
+def info_of_run(path: Path) -> int:
+    """What a store holds. Returns 0 if it is complete and whole, else 1."""
+    from lgvi_warp.resuming import state
+
+    found = state(path)
+    own = found["provenance"]
+    print(f"run         {found['path']} ({found['bytes'] / 1e6:.1f} MB), lgvi-warp {own['versions']['lgvi-warp']}")
+    print(f"members     {found['members']:,}, {own['method']['name']}, {own['dtype']}, step {own['step']:g} s, "
+          f"{own['steps']:,} steps")  # fmt: skip
+    print(f"samples     {found['samples']} times of {', '.join(found['fields']) or 'nothing'}")
+    if found["keepers"]:
+        print(f"parts       {', '.join(found['keepers'])} of each block")
+    print(f"blocks      {found['finished']} of {found['blocks']} finished; "
+          + ("complete" if found["complete"] else f"not complete: lgvi-warp resume {path}"))  # fmt: skip
+    for text in found["damage"]:
+        print(f"damage      {text}")
+    return 0 if found["complete"] else 1
+
+
+def resume(chosen: argparse.Namespace) -> int:
+    """lgvi-warp resume."""
+    from lgvi_warp.resuming import resume as go_on
+
+    begun = time.perf_counter()
+    progress = None if chosen.quiet else Progress(sys.stderr)
+    failures = []
+    try:
+        result = go_on(
+            chosen.dir, executor=chosen.executor, threads=chosen.threads, scheduler=chosen.scheduler, progress=progress,
+            force=chosen.force,
+        )  # fmt: skip
+    except MembersFailed as error:
+        result, failures = error.result, [str(error)]
+    if progress:
+        progress.close()
+    assert result.store is not None
+    faults = report(result, result.store.parent, chosen.quiet, begun) + failures
+    for fault in faults:
+        print(f"lgvi-warp: {fault}", file=sys.stderr)
+    return 1 if faults else 0
+
+
+def merge(chosen: argparse.Namespace) -> int:
+    """lgvi-warp merge."""
+    from lgvi_warp.resuming import merge as put_together
+
+    folder = put_together(chosen.dirs, chosen.out, chosen.overwrite)
+    left = len(folder.unfinished())
+    if left:
+        print(f"lgvi-warp: {folder.path}: {left} blocks are in none of the folders; lgvi-warp resume {folder.path} runs them",
+              file=sys.stderr)  # fmt: skip
+    elif not chosen.quiet:
+        print(f"file        {folder.path} ({size_of(folder.path) / 1e6:.1f} MB), complete")
+    return 1 if left else 0
+
+
+def export(chosen: argparse.Namespace) -> int:
+    """lgvi-warp export."""
+    from lgvi_warp.exporting import export as write_as
+
+    path = write_as(chosen.dir, chosen.to, chosen.out)
+    print(f"file        {path} ({size_of(path) / 1e6:.1f} MB)")
+    return 0
+
+
+def plan(chosen: argparse.Namespace) -> int:
+    """lgvi-warp plan."""
+    from lgvi_warp.prediction import predict
+    from lgvi_warp.scene import Scene
+
+    scene = Scene.load(chosen.scene, overrides(chosen))
+    out: Path = chosen.out or Path("runs") / Path(chosen.scene).stem
+    store = None
+    if chosen.store == "zarr":
+        from lgvi_warp.store import Store
+
+        store = Store(out / "run.zarr", chosen.store_dtype)
+    print(predict(scene, threads=chosen.threads, store=store))
+    return 0
+
+
 def bench(chosen: argparse.Namespace) -> int:
     """lgvi-warp bench."""
     from lgvi_warp.speed import measure
@@ -557,6 +781,20 @@ def bench(chosen: argparse.Namespace) -> int:
     for line in measure(chosen.members, chosen.steps):
         print(line, flush=True)
     return 0
+
+
+VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
+    "run": run,
+    "resume": resume,
+    "plan": plan,
+    "merge": merge,
+    "export": export,
+    "tradeoff": tradeoff,
+    "sensitivity": sensitivity,
+    "stability": stability,
+    "info": info,
+    "bench": bench,
+}
 
 
 def entry() -> None:

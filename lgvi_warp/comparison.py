@@ -20,7 +20,7 @@ from lgvi_warp.result import Result
 from lgvi_warp.saveat import FIELDS, TimeGrid
 from lgvi_warp.scene import Scene
 from lgvi_warp.solving import run_plan
-from lgvi_warp.status import Status, StatusArray
+from lgvi_warp.status import Status
 
 # What errors are of, with their units. Attitude is the angle between the two.
 QUANTITIES = {"position": "m", "attitude": "rad", "velocity": "m/s", "angular_velocity": "rad/s", "energy": "J"}
@@ -373,11 +373,8 @@ def biases(result: Result, reference: Result) -> dict[str, float]:
 def part(result: Result, members: Sequence[int]) -> Result:
     """Some members of a result."""
     at = np.asarray(members)
-    return replace(
-        result,
-        samples={name: values[:, at] for name, values in result.samples.items()},
-        status=result.status[at].view(StatusArray),
-        failure_time=result.failure_time[at],
-        failure_value=result.failure_value[at],
-        parameters={key: value[at] if len(value) > 1 else value for key, value in result.parameters.items()},
-    )
+    if result.store is not None:
+        from lgvi_warp.stored import chosen
+
+        return chosen(result, members)
+    return result.part(at)

@@ -310,6 +310,12 @@ class Ensemble:
         indices = np.arange(first, stop) if self._indices is self._places is None else self.indices[first:stop]
         return Members(values, position, R, nu, Om, indices, self.seed)
 
+    def varied(self) -> list[str]:
+        """Names of the parameters that have a number for each member."""
+        drawn = {target.name for one in self._variations for target in one.targets}
+        own = drawn | {target.name for target, _ in self._columns} | self._explicit.keys()
+        return [name for name in self._base if name in own]
+
     def subset(self, indices: Sequence[int] | np.ndarray) -> Ensemble:
         """These members, in this order, as an ensemble of its own with the same numbers. Raises IndexError."""
         chosen = np.asarray(indices)
@@ -327,6 +333,14 @@ class Ensemble:
     def member(self, index: int) -> Ensemble:
         """One member alone, with the bits that it has among all. Raises IndexError where there is none."""
         return self.subset([operator.index(index)])
+
+    def explicit(self) -> dict[str, np.ndarray]:
+        """What was given as arrays, by name: states and parameters of the whole, (members of the whole, ...), and "indices".
+
+        Empty for an ensemble that is drawn, with `indices` of its own alone if they were set.
+        """
+        own = {} if self._indices is None else {"indices": np.asarray(self._indices, dtype=np.int64)}
+        return dict(self._explicit) | own
 
     def to_dict(self) -> dict[str, Any]:
         """members, seed, vary, sampling and indices as in a scene file, and the names that were given as arrays."""

@@ -18,6 +18,10 @@ class SceneError(ValueError):
         head = "" if len(self.faults) == 1 else f"{len(self.faults)} faults:\n  "
         super().__init__(head + "\n  ".join(self.faults))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Made again from its faults, in the process that asked."""
+        return SceneError, (self.faults,)
+
 
 class MembersFailed(RuntimeError):  # noqa: N818
     """Members failed in a run with on_failure="raise". `result` holds all that the run came to: nothing is lost."""

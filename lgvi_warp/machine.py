@@ -61,8 +61,13 @@ def memory_bytes() -> int | None:
 
 def versions() -> dict[str, str]:
     """Versions of what a result depends on."""
-    names = ("lgvi-warp", "warp-lang", "numpy")
+    names = ("lgvi-warp", "warp-lang", "numpy", "scipy")
     return {"python": platform.python_version()} | {name: metadata.version(name) for name in names}
+
+
+def kind() -> dict[str, str]:
+    """What the same inputs give the same bits on: processor, SIMD extension, versions of what computes."""
+    return {"cpu": cpu_name(), "simd": simd()} | {name: v for name, v in versions().items() if name != "python"}
 
 
 def describe() -> dict[str, Any]:

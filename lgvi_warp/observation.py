@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from lgvi_warp import statistics as kinds
-from lgvi_warp.ensemble import Ensemble
-from lgvi_warp.errors import Faults
+from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.saveat import FIELDS
 from lgvi_warp.scene import check_keep
-from lgvi_warp.statistics import Estimate, Statistic
+from lgvi_warp.statistics import Estimate, Estimates, Quantity, Statistic
+from lgvi_warp.statistics.keeper import Gathered
 from lgvi_warp.statistics.until import Until, Watch, from_dict, watch
 from lgvi_warp.status import Status
 
@@ -66,7 +66,70 @@ class Observation:
         content: dict[str, Any] = {"keep": self.keep if isinstance(self.keep, str) else [int(i) for i in self.keep]}
         if self.statistics:
             content["statistics"] = [one.to_dict() for one in self.statistics]
-        return content | ({"until": self.until.to_dict()} if self.until else {})
+        content |= {"until": self.until.to_dict()} if self.until else {}
+        own = [one.key for one in self.statistics if _of_functions(one)]
+        return content | ({"functions": own} if own else {})
+
+
+def _of_functions(value: Any) -> bool:
+    """Whether a statistic is of functions or quantities of the user, which its table does not tell."""
+    if isinstance(value, Statistic):
+        return any(_of_functions(getattr(value, one.name)) for one in fields(value))
+    if isinstance(value, list | tuple):
+        return any(_of_functions(one) for one in value)
+    return isinstance(value, Quantity) or callable(value)
+
+
+def observation_of(told: Mapping[str, Any] | None, statistics: Any = None) -> Observation:
+    """What `to_dict` told. statistics: the run's own, needed where they are of functions. Raises SceneError."""
+    if told is None:
+        if statistics:
+            raise SceneError([f"statistics = {statistics}: the run gathered none; leave them out"])
+        return Observation()
+    if statistics is None and told.get("functions"):
+        names = ", ".join(told["functions"])
+        raise SceneError(
+            [f"statistics: {names}: are of functions that a store does not hold; give statistics=[...] again"]
+        )
+    keep = told["keep"] if isinstance(told["keep"], str) else tuple(told["keep"])
+    until = from_dict(told["until"]) if "until" in told else None
+    found = Observation(kinds.from_list(told.get("statistics", ()) if statistics is None else statistics), keep, until)
+    made, wanted = found.to_dict(), {name: value for name, value in told.items() if name != "fields"}
+    if made != wanted:
+        raise SceneError(
+            [f"statistics = {made.get('statistics')}: are not the run's, {wanted.get('statistics')}; give those"]
+        )
+    return found
+
+
+class Observing:
+    """An Observation at work: the keeper of its statistics, when there are members enough, and what it then says.
+
+    time: (k,) [s], of the samples; members: of the whole ensemble. Raises SceneError.
+    """
+
+    def __init__(self, observed: Observation, time: np.ndarray, members: int):
+        statistics, self._watch = observed.watch(time)
+        self._gathered = Gathered(time, members, statistics) if statistics else None
+
+    @property
+    def keepers(self) -> tuple[Gathered, ...]:
+        """That of the statistics, if there are any."""
+        return (self._gathered,) if self._gathered else ()
+
+    def enough(self, members: int) -> bool:
+        """Whether the run may end with so many members: asked in the order of the blocks, after each."""
+        watch = self._watch
+        return bool(watch and watch.due(members) and watch.reached(self._watched()))
+
+    def _watched(self) -> list[Estimate]:
+        return self._gathered.estimates(self._watch.statistic) if self._gathered and self._watch else []
+
+    def read(self, ensemble: Mapping[str, Any], members: int) -> tuple[Estimates, tuple[str, ...]]:
+        """(statistics, what the user should know of them) of a run of so many members; ensemble: its provenance."""
+        estimates = self._gathered.result() if self._gathered else Estimates()
+        said = notes(estimates, ensemble.get("sampling", "random"), members)
+        return estimates, said + ((self._watch.report(members, self._watched()),) if self._watch else ())
 
 
 def watch_fields(until: Until, statistics: Sequence[Statistic]) -> tuple[str, ...]:
@@ -94,15 +157,14 @@ def observe(plan_members: int, settings: Any, given: Any, keep: Any, until: Any)
     return Observation(found, chosen, stop)
 
 
-def notes(estimates: Mapping[str, Estimate], ensemble: Ensemble, members: int) -> tuple[str, ...]:
-    """What a user should know of his statistics."""
+def notes(estimates: Mapping[str, Estimate], sampling: Any, members: int) -> tuple[str, ...]:
+    """What a user should know of his statistics; sampling: as in a scene file."""
     found: tuple[str, ...] = ()
     if not estimates:
         return found
     counts = [one.count for one in estimates.values() if one.settings["type"] != "first_passage"]
     fewest = min((int(count.min()) for count in counts), default=members)
-    sampling = getattr(ensemble, "sampling", "random")
-    kind = str(getattr(sampling, "kind", sampling))
+    kind = sampling if isinstance(sampling, str) else next(iter(sampling))
     if fewest < members:
         text = f"statistics leave members out from their failure on: {fewest} of {members} count where fewest do"
         found += (f"{text} (count of each statistic)",)

@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from lgvi_kernels.lanes import WIDTHS
 from lgvi_kernels.rows import SAMPLE_FIELDS
 from lgvi_kernels.stops import STOPS
 from lgvi_kernels.terms import LAWS
-from lgvi_warp import limits, warp_setup
+from lgvi_warp import durable, limits, warp_setup
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.gauss import gauss
@@ -40,6 +41,23 @@ SEGMENT_SAMPLE_BYTES = 16_000_000
 
 # Warp builds and launches kernels for one thread at a time.
 build_lock = threading.Lock()
+
+
+@contextlib.contextmanager
+def _one_at_a_time() -> Iterator[None]:
+    """Let one process compile while others wait for what it puts into Warp's cache.
+
+    Without it each would compile the same kernel: that is safe, since Warp renames finished folders into their places, but
+    slow.
+    """
+    path = Path(wp.config.kernel_cache_dir) / "lgvi_warp.lock"
+    try:
+        path.touch()
+    except OSError:  # a cache that is only read
+        yield
+        return
+    with durable.locked(path, wait=True):
+        yield
 
 
 @dataclass(frozen=True)
@@ -200,11 +218,21 @@ class Plan:
                 [f"law {', '.join(own)}: {what}; lw.check_law(term) says where, docs/add_a_law.md how"]
             ) from error
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Made again from its settings: kernels cannot be sent, and are found in Warp's cache."""
+        own = (self.ensemble, self.method, self.grid, self.fields, self.dtype, self.width, self.checks, self.on_failure)
+        return Plan, own
+
+    @property
+    def kernel_hash(self) -> str:
+        """What Warp's cache knows the kernel by: its source, its constants and the options of the compiler."""
+        return str(self.advance.kernel.module.get_module_hash().hex())
+
     def compile(self) -> float:
         """Load the kernel, compiling it if Warp's cache has none. Returns the seconds it took."""
         start = time.perf_counter()
         warp_setup.start()
-        with build_lock, self._laws_compile():
+        with build_lock, self._laws_compile(), _one_at_a_time():
             wp.load_module(self.advance.kernel.module, device="cpu")
         _ = self.dtypes, self.times  # made here, before threads ask for them
         return time.perf_counter() - start

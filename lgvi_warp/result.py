@@ -6,13 +6,13 @@ import functools
 import json
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp import invariants, notation
+from lgvi_warp import invariants, member_fields, notation
 from lgvi_warp.statistics.estimate import Estimates
 from lgvi_warp.status import StatusArray, WarningArray
 from lgvi_warp.terms import Term, from_list
@@ -39,17 +39,6 @@ MEANINGS = {
     "energy": "kinetic and potential energy",
 }
 
-# Fields with one number of each member, and their meaning.
-OF_MEMBERS = {
-    "status": "0 ok, see lgvi_warp.Status",
-    "failure_time": "time of the last good state, or of the event [s]",
-    "failure_value": "value that crossed its limit",
-    "warnings": "bits of lgvi_warp.Warnings",
-    "warning_time": "first crossing of the most serious warning [s]",
-    "warning_value": "its value then",
-    "substeps": "steps that were divided",
-}
-
 
 @dataclass(frozen=True, eq=False)
 class Result:
@@ -67,10 +56,11 @@ class Result:
     the end, with checks="all" only. substeps: (n,), steps that were divided (on_failure="substep").
     statistics: what was gathered while the run went, by name. kept: samples of the members kept_members (m,), where not
     all were kept. messages: what the user should know; provenance: scene, settings, versions, seed, machine.
+    store: the folder that samples and parameters are read from, each time that they are asked for; None in memory.
     """
 
     time: np.ndarray
-    samples: dict[str, np.ndarray]
+    samples: Mapping[str, np.ndarray]
     status: StatusArray
     failure_time: np.ndarray
     failure_value: np.ndarray
@@ -85,6 +75,7 @@ class Result:
     statistics: Estimates = field(default_factory=Estimates)
     kept: Result | None = None
     kept_members: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
+    store: Path | None = None
     compile_seconds: float = field(default=0.0, compare=False)
     run_seconds: float = field(default=0.0, compare=False)
 
@@ -135,8 +126,13 @@ class Result:
         """The same of the members in these places, in this order."""
         own = {name: values[places] if len(values) > 1 else values for name, values in self.parameters.items()}
         samples = {name: values[:, places] for name, values in self.samples.items()}
-        of_members = {name: getattr(self, name)[places] for name in OF_MEMBERS}
+        of_members = {one.name: getattr(self, one.name)[places] for one in self._member_fields()}
         return replace(self, samples=samples, parameters=own, **of_members)
+
+    def _member_fields(self) -> list[member_fields.MemberField]:
+        """Those that are attributes of a result."""
+        own = {one.name for one in fields(self)}
+        return [one for one in member_fields.FIELDS if one.name in own]
 
     @property
     def members(self) -> int:
@@ -145,11 +141,18 @@ class Result:
 
     @functools.cached_property
     def dataset(self) -> xarray.Dataset:
-        """The samples as an xarray Dataset with dimensions time, realization, component (extra: store)."""
+        """The samples as an xarray Dataset with dimensions time, realization, component (extra: store).
+
+        Of a run in a store, a view of it: values are read when they are used, and energy is left out.
+        """
         try:
             import xarray as xr
         except ImportError as error:
             raise ImportError("result.dataset needs xarray: pip install 'lgvi-warp[store]'") from error
+        if self.store is not None:
+            from lgvi_warp.stored import dataset
+
+            return dataset(self.store)
         dims = {1: ("component",), 2: ("row", "column")}
         names = [*self.samples] + ["energy"] * (len(self.samples) == 4)
         data = {}
@@ -157,8 +160,8 @@ class Result:
             values = getattr(self, name)
             attributes = {"units": UNITS[name], "long_name": MEANINGS[name]}
             data[name] = (("time", "realization", *dims.get(values.ndim - 2, ())), values, attributes)
-        for name, meaning in OF_MEMBERS.items():
-            data[name] = (("realization",), np.asarray(getattr(self, name)), {"long_name": meaning})
+        for one in self._member_fields():
+            data[one.name] = (("realization",), np.asarray(getattr(self, one.name)), one.attributes)
         coordinates = {"time": ("time", self.time, {"units": "s", "long_name": "time since the start"})}
         attributes = {"Conventions": "CF-1.11", "provenance": json.dumps(self.provenance)}
         return xr.Dataset(data, coordinates, attributes)
@@ -171,7 +174,7 @@ class Result:
         target = Path(path)
         part = target.with_name(target.name + ".part")
         arrays = {"time": self.time, **self.samples}
-        arrays |= {name: np.asarray(getattr(self, name)) for name in OF_MEMBERS}
+        arrays |= {one.name: np.asarray(getattr(self, one.name)) for one in self._member_fields()}
         if self.samples:
             arrays |= {f"parameters/{name}": value for name, value in self.parameters.items()}
         texts = {"messages": json.dumps(self.messages), "provenance": json.dumps(self.provenance)}
@@ -191,6 +194,13 @@ class Result:
         return target
 
     @classmethod
+    def per_member(cls, arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
+        """Arguments of a result that are arrays over members, out of arrays by name."""
+        own = {one.name for one in fields(cls)}
+        found: dict[str, Any] = {f.name: arrays[f.name] for f in member_fields.FIELDS if f.name in own & arrays.keys()}
+        return found | {"status": found["status"].view(StatusArray), "warnings": found["warnings"].view(WarningArray)}
+
+    @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Result:
         """Read what `save` wrote. Raises OSError or ValueError if it is not such a file."""
         with np.load(Path(path), allow_pickle=False) as data:
@@ -201,9 +211,7 @@ class Result:
         result = cls(
             time=content["time"],
             samples={name: content[name] for name in content if name in UNITS},
-            status=content["status"].view(StatusArray),
-            warnings=content["warnings"].view(WarningArray),
-            **{name: content[name] for name in OF_MEMBERS if name not in ("status", "warnings")},
+            **cls.per_member(content),
             parameters=_below("parameters/", content),
             messages=tuple(json.loads(str(content["messages"]))),
             provenance=(provenance := json.loads(str(content["provenance"]))),

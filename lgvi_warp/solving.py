@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-import threading
+import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -11,21 +10,23 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp import machine
-from lgvi_warp.blocks import Block, Keeper, blocks, in_order, run_block
+from lgvi_warp import machine, member_fields
+from lgvi_warp.blocks import Work, blocks
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, MembersFailed, SceneError, shown
-from lgvi_warp.executors import threads as thread_executor
+from lgvi_warp.executors import Executor, executor_of
+from lgvi_warp.executors.threads import Threads
 from lgvi_warp.keepers import Outcomes, Samples
 from lgvi_warp.method import Method
-from lgvi_warp.observation import Observation, notes, observe
+from lgvi_warp.observation import Observation, Observing, observe
 from lgvi_warp.plan import Plan
 from lgvi_warp.result import Drawn, Result
-from lgvi_warp.saveat import SaveAt, time_grid
+from lgvi_warp.running import Progress, Stored, run_blocks
+from lgvi_warp.saveat import FIELDS, SaveAt, time_grid
 from lgvi_warp.scene import Scene
-from lgvi_warp.statistics.estimate import Estimates
-from lgvi_warp.statistics.keeper import Gathered
-from lgvi_warp.status import Status, StatusArray, WarningArray, failure_text
+from lgvi_warp.status import Status, failure_text
+from lgvi_warp.store import Store
+from lgvi_warp.stored import result_of
 
 
 def solve(
@@ -44,6 +45,10 @@ def solve(
     statistics: Sequence[Any] | None = None,
     keep: str | Sequence[int] | None = None,
     until: Any = None,
+    store: Store | str | os.PathLike[str] | None = None,
+    executor: Executor | str = "threads",
+    scheduler: str | None = None,
+    only: range | None = None,
 ) -> Result:
     """Advance every member of the fleet from t = 0 to t1 and keep the samples asked for.
 
@@ -63,6 +68,10 @@ def solve(
     in result.statistics. keep: "all" samples of members (default); "none", so that memory grows with neither members nor
     steps; "failed", or indices of members: those are run again after the run, to the same bits, and are result.kept.
     until: lw.Until(...), to stop before the last member, once a statistic's interval is narrow enough.
+    store: a folder "runs/x/run.zarr", or a Store with more settings: samples go there block by block and not into memory,
+    and a run that was stopped goes on with lw.resume. executor: "threads", "processes" or "dask", or an object that runs
+    blocks; scheduler: the address of Dask's. only: with a store, the blocks to run, range(0, 100), for a run in parts:
+    the result then is of their members.
 
     Raises SceneError naming every fault of the arguments, MembersFailed as asked. Prints nothing. The same inputs give the
     same bits for any number of threads, on one type of machine.
@@ -73,20 +82,48 @@ def solve(
         )
     ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
     faults = Faults()
-    observed = Observation()
+    observed, runner = Observation(), None
     with faults.including():
         observed = observe(ensemble.members, ensemble.scene.run, statistics, keep, until)
-    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
-        faults.add("threads", threads, "is not a whole number above 0", "give 1 or more, or leave it out for all cores")
+    with faults.including():
+        runner = executor_of(executor, threads, scheduler)
+    if only is not None and store is None:
+        faults.add("only", only, "is for a run into a store", "give store=..., or leave it out")
+    if only is not None and observed.until is not None:
+        faults.add("only", only, "runs in parts, where until looks at the whole", "leave out one of them")
     faults.raise_if_any()
+    assert runner is not None
     plan = make_plan(
         ensemble, method, h, t1, save, dtype, width=width, checks=checks, on_failure=on_failure, fields=observed.fields
     )
-    result = run_plan(plan, threads or machine.thread_count(), progress, observed, (save or SaveAt()).fields)
+    asked, count = (save or SaveAt()).fields, threads or machine.thread_count()
+    if store is None:
+        return finished(run_plan(plan, count, progress, observed, asked, runner), plan, observed, asked, count)
+    check_blocks(only, plan)
+    into = store if isinstance(store, Store) else Store(store)
+    result = run_stored(plan, into, runner, progress, only, observed, asked)
+    return result if only is not None else finished(result, plan, observed, asked, count)
+
+
+def finished(
+    result: Result, plan: Plan, observed: Observation, fields: Sequence[str], threads: int | None = None
+) -> Result:
+    """The result with the samples of members that are wanted after all. Raises MembersFailed as the plan says."""
+    indices, kept = again(plan, observed, result.status, fields, threads or machine.thread_count())
+    result = replace(result, kept=kept, kept_members=indices)
     failed = failure_text(result) if plan.on_failure == "raise" else ""
     if failed:
         raise MembersFailed(failed, result)
     return result
+
+
+def check_blocks(only: range | None, plan: Plan) -> None:
+    """The blocks of a run in parts must be there. Raises SceneError."""
+    count = len(blocks(plan.ensemble.members))
+    if only is not None and not (only.step == 1 and len(only) and only[0] >= 0 and only[-1] < count):
+        raise SceneError(
+            [f"blocks {only.start}:{only.stop}: are not within the {count} of this run; give 0:{count} or less"]
+        )
 
 
 def make_plan(
@@ -158,97 +195,50 @@ def enough_iterations(ensemble: Ensemble, method: Method, h: float, dtype: str) 
     return None
 
 
-class _Progress:
-    """Fraction of the vehicle-steps made so far, counted from several threads."""
-
-    def __init__(self, total: int, report: Callable[[float], None] | None):
-        self._total, self._done, self._report, self._lock = total, 0, report, threading.Lock()
-
-    def add(self, vehicle_steps: int) -> None:
-        if self._report is None:
-            return
-        with self._lock:
-            self._done += vehicle_steps
-            self._report(self._done / self._total)
-
-
 def run_plan(
     plan: Plan,
     threads: int,
     progress: Callable[[float], None] | None = None,
     observed: Observation | None = None,
     fields: Sequence[str] | None = None,
+    executor: Executor | None = None,
 ) -> Result:
-    """Run every block of the plan, or as many as its statistics need, and gather the result.
+    """Run every block of the plan, or as many as its statistics need, and gather the result in memory.
 
     observed: what is kept, by default the samples of all members; fields: which of them, by default all of the plan.
+    executor: by default so many threads.
     """
     observed = observed or Observation()
-    fields = plan.fields if fields is None else fields
-    statistics, watch = observed.watch(plan.grid.times)
     compile_seconds = plan.compile()
-    n = plan.ensemble.members
+    total = plan.ensemble.members
     outcomes, samples = Outcomes(plan), Samples(plan, fields) if observed.samples else None
-    gathered = Gathered(plan, statistics) if statistics else None
-    keepers: tuple[Keeper, ...] = tuple(one for one in (outcomes, samples, gathered) if one is not None)
-    counter = _Progress(n * plan.grid.steps, progress)
-    stop = threading.Event()
-
-    def work(block: Block) -> tuple[Any, ...] | None:
-        return run_block(plan, block, keepers, stop.is_set, counter.add)
-
+    observing = Observing(observed, plan.grid.times, total)
+    keepers = (outcomes, *((samples,) if samples else ()), *observing.keepers)
+    made = Progress(total * plan.grid.steps, progress)
     start = time.perf_counter()
-    runs = blocks(n)
-    with contextlib.closing(thread_executor.run(runs, work, threads, stop)) as done:
-        for block, parts in in_order(runs, done):
-            for keeper, part in zip(keepers, parts, strict=True):
-                keeper.merge(block, part)
-            if watch and gathered and watch.due(block.stop) and watch.reached(gathered.estimates(watch.statistic)):
-                n = block.stop
-                break
-    if progress and n < plan.ensemble.members:
+    n = run_blocks(Work(plan, keepers), blocks(total), executor or Threads(threads), made.at, enough=observing.enough)
+    if progress and n < total:
         progress(1.0)
     run_seconds = time.perf_counter() - start
+    told = provenance(plan, observed, fields)
+    estimates, said = observing.read(told["ensemble"], n)
     parameters = Drawn(plan.ensemble, n)
-    estimates = gathered.result() if gathered else Estimates()
-    messages = plan.grid.messages + plan.ensemble.scene.vehicle.warnings + notes(estimates, plan.ensemble, n)
-    if watch:
-        messages += (watch.report(n, gathered.estimates(watch.statistic) if gathered else ()),)
-    indices, kept = again(plan, observed, outcomes.status[:n], fields, threads)
+    of_members = {name: values[:n] for name, values in member_fields.of(plan, outcomes).items()}
+    found = samples.fields if samples and samples.fields else {}
     return Result(
         time=plan.grid.times,
-        samples={} if samples is None else {name: values[:, :n] for name, values in samples.fields.items()},
-        **of_members(outcomes, n, plan.grid.h),
+        samples={name: values[:, :n] for name, values in found.items()},
+        **Result.per_member(of_members),
         parameters=dict(parameters) if samples is not None else parameters,
-        messages=messages,
-        provenance=provenance(plan)
-        | dict(zip(("steps_made", "steps_tried"), outcomes.chosen[:n].mean(axis=0).tolist(), strict=False))
-        | ({"members": n} if n < plan.ensemble.members else {})
-        | ({} if observed == Observation() else {"observed": observed.to_dict()}),
+        messages=messages(plan) + said,
+        provenance=told
+        | {name: float(of_members[name].mean()) for name in ("steps_made", "steps_tried") if name in of_members}
+        | ({"members": n} if n < total else {}),
         terms=tuple(plan.ensemble.scene.terms),
         statistics=estimates,
-        kept=kept,
-        kept_members=indices,
         compile_seconds=compile_seconds,
         run_seconds=run_seconds,
     )
-
-
-def of_members(outcomes: Outcomes, n: int, h: float) -> dict[str, Any]:
-    """What became of the first n members, as a Result has it (result.OF_MEMBERS)."""
-    status, size, warnings = outcomes.status[:n], outcomes.failed_size[:n], outcomes.warnings[:n]
-    failed, stopped = status != 0, status >= Status.SURFACE
-    # An event's size is the part of its step that was made before it.
-    steps_made = outcomes.failed_step[:n] + np.where(stopped, size, 0.0)
-    return {
-        "status": status.view(StatusArray),
-        "failure_time": np.where(failed, steps_made * h, np.nan),
-        "failure_value": np.where(failed, np.where(stopped, 0.0, size), np.nan),
-        "warnings": warnings.view(WarningArray),
-        "warning_time": np.where(warnings != 0, outcomes.warning_step[:n] * h, np.nan),
-        "warning_value": outcomes.warning_value[:n],
-        "substeps": outcomes.substeps[:n],
-    }
 
 
 def again(
@@ -268,9 +258,50 @@ def again(
     return indices, result if len(chosen) == len(indices) else result.part(np.searchsorted(chosen, indices))
 
 
-def provenance(plan: Plan) -> dict[str, Any]:
-    """Everything that the result follows from: scene, ensemble, settings, versions, machine."""
-    return {
+def run_stored(
+    plan: Plan,
+    store: Store,
+    executor: Executor,
+    progress: Callable[[float], None] | None = None,
+    only: range | None = None,
+    observed: Observation | None = None,
+    fields: Sequence[str] | None = None,
+) -> Result:
+    """Run the blocks of the plan, or `only` some, into a store, and give a result that reads from it.
+
+    observed, fields: as for run_plan; where samples of all members are not kept, the store has none.
+    """
+    observed = observed or Observation()
+    compile_seconds = plan.compile()
+    start = time.perf_counter()
+    observing = Observing(observed, plan.grid.times, plan.ensemble.members)
+    into = settled(store, plan, observed, fields)
+    told = provenance(plan, observed, fields)
+    folder = Stored(plan, into, told, messages(plan), observing.keepers, only, observing.enough).run(executor, progress)
+    runs = blocks(plan.ensemble.members)
+    members = None if only is None else slice(runs[only[0]].first, runs[only[-1]].stop)
+    result = result_of(folder, members, messages(plan), plan.ensemble.scene.terms, observing)
+    return replace(result, compile_seconds=compile_seconds, run_seconds=time.perf_counter() - start)
+
+
+def settled(store: Store, plan: Plan, observed: Observation, fields: Sequence[str] | None) -> Store:
+    """The store with the fields of the samples that it will hold: none where those of all members are not kept."""
+    asked = set(plan.fields if fields is None else fields) if observed.samples else set()
+    own = asked if store.fields is None else asked & set(store.fields)
+    return replace(store, fields=tuple(name for name in FIELDS if name in own))
+
+
+def messages(plan: Plan) -> tuple[str, ...]:
+    """What the user should know before the run."""
+    return plan.grid.messages + tuple(plan.ensemble.scene.vehicle.warnings)
+
+
+def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence[str] | None = None) -> dict[str, Any]:
+    """Everything that the result follows from: scene, ensemble, settings, versions, machine.
+
+    observed: what is kept of it, told where that is not all; fields: of the samples that are.
+    """
+    content = {
         "scene": plan.ensemble.scene.to_dict(),
         "ensemble": plan.ensemble.to_dict(),
         "method": {
@@ -288,6 +319,10 @@ def provenance(plan: Plan) -> dict[str, Any]:
         "checks": plan.checks,
         "on_failure": plan.on_failure,
         "terms": [term.type for term, _ in plan.model.laws],
+        "kernel": plan.kernel_hash,
         "versions": machine.versions(),
         "machine": machine.describe(),
     }
+    if observed is not None and observed != Observation():
+        content["observed"] = observed.to_dict() | ({} if observed.samples else {"fields": list(fields or plan.fields)})
+    return content

@@ -1,1 +1,81 @@
-"""Where blocks run."""
+"""Where blocks run: threads of this process, processes of this machine, or workers of a Dask cluster."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable, Generator, Sequence
+from typing import Any, Protocol, runtime_checkable
+
+from lgvi_warp import machine
+from lgvi_warp.blocks import Block, Work
+from lgvi_warp.errors import Faults, SceneError, closest
+
+# Called with a block and the vehicle-steps made of it so far, from any thread.
+Advanced = Callable[[Block, int], None]
+
+NAMES = ("threads", "processes", "dask")
+# A block whose worker died this many times is not tried again: the block itself may be what kills them.
+MOST_DEATHS = 3
+
+
+@runtime_checkable
+class Executor(Protocol):
+    """Runs blocks, in any order and anywhere: the bits do not depend on it."""
+
+    def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
+        """Do the work of every block; each block and its result, as they are done. Closing it ends what still runs."""
+
+
+def executor_of(given: Any, threads: int | None = None, scheduler: str | None = None) -> Executor:
+    """The executor that a name stands for, with so many threads (default: all cores), or the one given.
+
+    scheduler: the address of a Dask scheduler; without one, "dask" starts a cluster on this machine.
+    Raises SceneError.
+    """
+    faults = Faults()
+    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
+        faults.add("threads", threads, "is not a whole number above 0", "give 1 or more, or leave it out for all cores")
+    if not isinstance(given, Executor) and given not in NAMES:
+        faults.add("executor", given, "is not known", f"{closest(str(given), NAMES)}; or give an object with run(...)")
+    if scheduler is not None and given != "dask":
+        faults.add("scheduler", scheduler, "is for the executor dask alone", 'give executor="dask", or leave it out')
+    faults.raise_if_any()
+    if isinstance(given, Executor):
+        return given
+    count = threads or machine.thread_count()
+    if given == "processes":
+        from lgvi_warp.executors.processes import Processes
+
+        return Processes(count)
+    if given == "dask":
+        from lgvi_warp.executors.dask import Dask
+
+        return Dask(scheduler, count)
+    from lgvi_warp.executors.threads import Threads
+
+    return Threads(count)
+
+
+def sent(work: Work, name: str) -> bytes:
+    """The work as bytes for another process. Raises SceneError naming what cannot be sent, and why."""
+    try:
+        return pickle.dumps(work, pickle.HIGHEST_PROTOCOL)
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise SceneError([_refusal(name, "cannot be sent to other processes", error)]) from error
+
+
+def received(data: bytes, name: str) -> Work:
+    """The work again, in the process that got it. Raises SceneError where it cannot be read there."""
+    try:
+        work: Work = pickle.loads(data)
+    except (pickle.UnpicklingError, AttributeError, ImportError) as error:
+        raise SceneError([_refusal(name, "cannot be read by other processes", error)]) from error
+    work.plan.compile()
+    return work
+
+
+def _refusal(name: str, what: str, error: Exception) -> str:
+    remedy = (
+        'define laws and functions at the top level of a module that the workers can import, or use executor="threads"'
+    )
+    return f"executor = {name!r}: the run {what} ({type(error).__name__}: {error}); {remedy}"

@@ -2,32 +2,46 @@
 
 from __future__ import annotations
 
+import functools
 import threading
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
 from typing import Any
 
-from lgvi_warp.blocks import Block
+from lgvi_warp.blocks import Block, Work
+from lgvi_warp.executors import Advanced
 
 
-def run(
-    blocks: Sequence[Block], work: Callable[[Block], Any], threads: int, stop: threading.Event
-) -> Generator[tuple[Block, Any], None, None]:
-    """Do the work of every block, on this many threads; each block and its result, as they are done.
+@dataclass(frozen=True)
+class Threads:
+    """So many threads of this process."""
 
-    The first exception, an interrupt from the keyboard among them, sets `stop`, which work looks at now and then; blocks
-    that have not begun are dropped, and the exception is raised.
-    """
-    if threads == 1:
-        for block in blocks:
-            yield block, work(block)
-        return
-    with ThreadPoolExecutor(threads, thread_name_prefix="lgvi_warp") as pool:
-        futures = {pool.submit(work, block): block for block in blocks}
-        try:
-            for future in as_completed(futures):
-                yield futures.pop(future), future.result()
-        except BaseException:
-            stop.set()
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    threads: int
+
+    def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
+        """Each block and its result, as they are done.
+
+        The first exception, an interrupt from the keyboard among them, halts what runs; blocks that have not begun are
+        dropped, and the exception is raised.
+        """
+        stop = threading.Event()
+
+        def one(block: Block) -> Any:
+            return work(block, stop.is_set, functools.partial(advanced, block))
+
+        # With a store a block waits for the disk at its end: another computes meanwhile.
+        count = self.threads if work.sink is None or self.threads == 1 else 2 * self.threads
+        if count == 1:
+            for block in blocks:
+                yield block, one(block)
+            return
+        with ThreadPoolExecutor(count, thread_name_prefix="lgvi_warp") as pool:
+            futures = {pool.submit(one, block): block for block in blocks}
+            try:
+                for future in as_completed(futures):
+                    yield futures.pop(future), future.result()
+            except BaseException:
+                stop.set()
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise

@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 
 class Gathered:
-    """The statistics of a run, so far: a tree of parts for each."""
+    """The statistics of a run of n members, so far: a tree of parts for each; time: (k,) [s], of its samples."""
 
     # What a store calls its parts.
     name = "statistics"
 
-    def __init__(self, plan: Plan, statistics: Sequence[Statistic]):
-        self._statistics, self.time = tuple(statistics), plan.grid.times
-        self._size = blocks(plan.ensemble.members)[0].count
+    def __init__(self, time: np.ndarray, members: int, statistics: Sequence[Statistic]):
+        self._statistics, self.time = tuple(statistics), time
+        self._size = blocks(members)[0].count
         self._trees = [Tree(one.join) for one in self._statistics]
 
     def open(self, plan: Plan, block: Block, members: Members) -> _BlockStatistics:

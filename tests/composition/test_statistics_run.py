@@ -126,7 +126,10 @@ def test_parts_pass_through_files(fleet, whole, tmp_path):
     plan = make_plan(fleet, **SETTINGS)
     statistics = tuple(EVERY)
     # What gathers blocks elsewhere was pickled.
-    gathered, again = pickle.loads(pickle.dumps(Gathered(plan, statistics))), Gathered(plan, statistics)
+    gathered, again = (
+        pickle.loads(pickle.dumps(Gathered(plan.grid.times, plan.ensemble.members, statistics))),
+        Gathered(plan.grid.times, plan.ensemble.members, statistics),
+    )
     from lgvi_warp.blocks import run_block
 
     plan.compile()
@@ -155,7 +158,7 @@ def test_intervals_of_dependent_members_are_said_to_be(scene, whole, sampling, w
     sampled = lw.Ensemble(
         scene, 16, 1, {"start.position[0]": lw.Normal(std=1.0), "vehicle.mass": lw.Normal(std=1.0)}, sampling
     )
-    (text,) = observation.notes(whole.statistics, sampled, 1003) or ("",)
+    (text,) = observation.notes(whole.statistics, sampled.to_dict().get("sampling", "random"), 1003) or ("",)
     assert words in text and bool(text) == (sampling != "random")
 
 

@@ -13,7 +13,7 @@ SOURCE_ROOTS = {"lgvi_warp": ROOT, "lgvi_kernels": ROOT / "kernels"}
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 
 # What pyproject.toml declares, by import name; the optional ones take long to import, or may be absent.
-OPTIONAL = {"SALib", "matplotlib", "rerun", "xarray"}
+OPTIONAL = {"SALib", "matplotlib", "rerun", "xarray", "zarr", "google_crc32c", "distributed", "netCDF4", "pyarrow"}
 DEPENDENCIES = {"numpy", "scipy", "warp"} | OPTIONAL
 
 

@@ -126,6 +126,56 @@ def test_every_member_failing_is_an_exit_code_and_a_reason(tmp_path, capsys):
     assert "fleet.png was not written" in out.err and (tmp_path / "result.npz").exists()
 
 
+def test_a_run_in_a_store(tmp_path, capsys):
+    """run --store zarr, refused a second time, gone on with, described, exported."""
+    out = tmp_path / "whole"
+    run = ["run", PAPER, *SMALL, "--store", "zarr", "--out", str(out)]
+    assert cli.main(run) == 0
+    assert "run.zarr" in capsys.readouterr().out
+    assert sorted(path.name for path in out.iterdir()) == ["fleet.png", "fleet.rrd", "run.zarr"]
+    assert cli.main([*run, "--quiet"]) == 2
+    assert "holds a run already" in capsys.readouterr().err
+    assert cli.main([*run, "--quiet", "--resume"]) == 0 and cli.main([*run, "--quiet", "--overwrite"]) == 0
+    assert cli.main(["resume", str(out)]) == 0
+    assert "ok 20" in capsys.readouterr().out
+    assert cli.main(["info", str(out)]) == 0
+    text = capsys.readouterr().out
+    assert "1 of 1 finished; complete" in text and "5 times of position" in text
+    assert cli.main(["export", str(out), "--to", "parquet"]) == 0 and (out / "run.parquet").exists()
+
+
+def test_a_run_in_parts(tmp_path, capsys):
+    """run --blocks into two folders, merge; what is in none of them is named and resumed."""
+    run = ["run", PAPER, "--members", "600", *SMALL[2:], "--store", "zarr", "--quiet"]
+    for name, part in (("a", "0:1"), ("b", "2:3"), ("c", "1:2")):
+        assert cli.main([*run, "--out", str(tmp_path / name), "--blocks", part]) == 0
+    parts = [str(tmp_path / name) for name in "abc"]
+    assert cli.main(["info", parts[0]]) == 1
+    assert "1 of 3 finished; not complete: lgvi-warp resume" in capsys.readouterr().out
+    assert cli.main(["merge", *parts[:2], "--out", str(tmp_path / "some")]) == 1
+    assert "1 blocks are in none of the folders" in capsys.readouterr().err
+    assert cli.main(["merge", *parts, "--out", str(tmp_path / "all")]) == 0
+    assert "complete" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--resume"], ["--resume", "--store zarr"]),
+        (["--blocks", "0:2", "--overwrite"], ["--blocks and --overwrite", "--store zarr"]),
+        (["--store", "zarr", "--blocks", "3"], ["--blocks 3", "--blocks 0:100"]),
+        (["--store", "zarr", "--blocks", "5:9"], ["blocks 5:9", "within the 1"]),
+        (["--store", "zarr", "--store-dtype", "float16"], ["float16"]),
+        (["--executor", "thread"], ["did you mean 'threads'"]),
+        (["--scheduler", "tcp://x"], ["dask alone"]),
+    ],
+)
+def test_bad_arguments_of_stores_are_refused(arguments, words, tmp_path, capsys):
+    assert cli.main(["run", PAPER, "--out", str(tmp_path / "out"), *SMALL, *arguments]) == 2
+    text = capsys.readouterr().err
+    assert all(word in text for word in words) and "Traceback" not in text
+
+
 def test_progress_tells_the_time_left():
     import io
 

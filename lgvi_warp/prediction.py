@@ -1,0 +1,239 @@
+"""What a run will take before it begins: time, memory and disk, from a small run of the same plan on this machine."""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp import durable, machine, member_fields
+from lgvi_warp.blocks import SHAPES, Block, Keeper, Work, blocks
+from lgvi_warp.ensemble import Ensemble
+from lgvi_warp.executors.threads import Threads
+from lgvi_warp.keepers import Samples
+from lgvi_warp.observation import Observation, Observing, observe
+from lgvi_warp.plan import SEGMENT_SAMPLE_BYTES, Plan
+from lgvi_warp.saveat import SaveAt, TimeGrid
+from lgvi_warp.scene import Scene
+from lgvi_warp.store import Store, create
+from lgvi_warp.store_layout import columns, size
+
+# A trial's time [s]; bytes, and small files, written to learn how fast a disk is.
+TRIAL_SECONDS = 0.3
+PROBE_BYTES, SYNCS = 64_000_000, 4
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a run takes. compile, set_up, advance, write: seconds of each part; seconds: of the run without compilation.
+
+    compile is what loading the kernel took now, near 0 if Warp's cache had it. Writing goes on while blocks advance: the
+    slower of the two decides. memory: of the process at its peak [bytes], what it holds already included; disk [bytes].
+    """
+
+    members: int
+    steps: int
+    blocks: int
+    threads: int
+    compile: float
+    set_up: float
+    advance: float
+    write: float
+    memory: int
+    disk: int
+    free_memory: int | None
+    free_disk: int | None
+
+    @property
+    def seconds(self) -> float:
+        """Of the run, without compilation."""
+        return self.set_up + max(self.advance, self.write)
+
+    def __str__(self) -> str:
+        lines = [
+            f"members     {self.members:,} in {self.blocks:,} blocks, {self.steps:,} steps, {self.threads} threads",
+            f"time        {_duration(self.seconds)}: set-up {_duration(self.set_up)}, steps {_duration(self.advance)}, disk "
+            f"{_duration(self.write)} meanwhile; kernel loaded in {self.compile:.2f} s",
+            f"memory      {self.memory / 1e9:.2f} GB" + _share(self.memory, self.free_memory, "the memory"),
+            f"disk        {self.disk / 1e9:.3f} GB" + _share(self.disk, self.free_disk, "what is free"),
+        ]
+        if self.free_memory and self.memory > 0.8 * self.free_memory:
+            lines.append("note        more than the memory holds: use --store zarr, save less often or fewer fields")
+        if self.free_disk is not None and self.disk > self.free_disk:
+            lines.append(
+                "note        more than the disk holds: save less often, fewer fields, or --store-dtype float32"
+            )
+        return "\n".join(lines)
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 120.0:
+        return f"{seconds:.2g} s" if seconds < 10.0 else f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.1f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
+
+
+def _share(wanted: int, there: int | None, of: str) -> str:
+    return f" ({wanted / there:.0%} of {of})" if there else ""
+
+
+def predict(
+    fleet: Ensemble | Scene, *, threads: int | None = None, store: Store | str | None = None, **settings: Any
+) -> Prediction:
+    """What lw.solve(fleet, **settings) will take, from a trial of about a second on so many threads.
+
+    settings: those of solve that decide the plan and what is kept (method, h, t1, save, dtype, width, checks, statistics,
+    keep, until: the whole ensemble is predicted). store: as for solve; the disk is that of its folder. What statistics
+    keep of each block counts for time, not for memory and disk; members that are run again for their samples do not.
+    A run whose cost changes on the way (events, steps that are chosen) costs something else.
+    Raises SceneError.
+    """
+    from lgvi_warp.solving import make_plan, settled
+
+    ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
+    asked = [settings.pop(name, None) for name in ("statistics", "keep", "until")]
+    observed = observe(ensemble.members, ensemble.scene.run, *asked)
+    fields = (settings.get("save") or SaveAt()).fields
+    plan = make_plan(ensemble, **settings, fields=observed.fields)
+    kept = fields if observed.samples else ()
+    compile_seconds = plan.compile()
+    count = threads or machine.thread_count()
+    set_up, step = costs(plan, count, observed)
+    into = store if isinstance(store, Store) or store is None else Store(store)
+    into = settled(into, plan, observed, fields) if into else None
+    disk = size(plan, into) if into else _result_bytes(plan, kept)
+    place = _existing(into.folder) if into else Path.cwd()
+    n, steps = ensemble.members, plan.grid.steps
+    return Prediction(
+        members=n,
+        steps=steps,
+        blocks=len(blocks(n)),
+        threads=count,
+        compile=compile_seconds,
+        set_up=set_up,
+        advance=step * steps,
+        write=writing(plan, into, place, count) if into else 0.0,
+        memory=_resident() + memory(plan, count, into, kept),
+        disk=disk,
+        free_memory=machine.memory_bytes(),
+        free_disk=shutil.disk_usage(place).free,
+    )
+
+
+def costs(plan: Plan, threads: int, observed: Observation | None = None) -> tuple[float, float]:
+    """Seconds to set up, and of one step of all members with its samples, of all threads together.
+
+    From trials of one block a thread: the steps are doubled until they take long enough, and half of them are taken away
+    again, so that what they cost is told from what a block costs before its first step.
+    """
+    runs = blocks(plan.ensemble.members)
+    chosen = runs[:threads]
+    steps, most = min(64, plan.grid.steps), plan.grid.steps
+    while (high := _seconds(plan, steps, chosen, threads, observed)) < TRIAL_SECONDS and steps < most:
+        steps = min(most, steps * max(2, min(64, int(TRIAL_SECONDS / max(high, 1e-4)))))
+    half = max(1, steps // 2)
+    high = min(high, _seconds(plan, steps, chosen, threads, observed))
+    low = min(_seconds(plan, half, chosen, threads, observed) for _ in range(2))
+    slope = (high - low) / (steps - half) if steps > half and high > low else high / steps
+    # In the last round of a run of few blocks some threads are idle.
+    rounds = math.ceil(len(runs) / threads) if len(runs) < 8 * threads else len(runs) / threads
+    return max(0.0, high - slope * steps) * rounds, slope * rounds
+
+
+def _seconds(plan: Plan, steps: int, chosen: list[Block], threads: int, observed: Observation | None) -> float:
+    """Time of these blocks until a step, with the samples due by then."""
+    due = plan.grid.sample_steps[plan.grid.sample_steps < steps]
+    due = np.append(due, steps)
+    trial = replace(plan, grid=TimeGrid(plan.grid.h, due, due * plan.grid.h), width=plan.spec.width)
+    trial.compile()
+    keepers: tuple[Keeper, ...] = (Samples.elsewhere(trial.fields),)
+    if observed is not None:
+        statistics = Observing(replace(observed, until=None), trial.grid.times, plan.ensemble.members).keepers
+        keepers = (*(keepers if observed.samples else ()), *statistics)
+    work = Work(trial, keepers)
+    start = time.perf_counter()
+    for _ in Threads(threads).run(work, chosen, lambda block, vehicle_steps: None):
+        pass
+    return time.perf_counter() - start
+
+
+def _result_bytes(plan: Plan, fields: Sequence[str] | None = None) -> int:
+    """Of a result in memory, and about those of its file; fields: of its samples, by default all of the plan."""
+    k, n = len(plan.grid.times), plan.ensemble.members
+    real = np.dtype(machine.DTYPES[plan.dtype]).itemsize
+    sizes = {name: int(np.prod(SHAPES[name])) * real for name in (plan.fields if fields is None else fields)}
+    if plan.spec.compensated and "position" in sizes:
+        sizes["position"] = 24
+    one = plan.ensemble.parameters(0, 1)
+    varied = sum(one[name].nbytes for name in plan.ensemble.varied())
+    return n * (k * sum(sizes.values()) + varied + sum(np.dtype(f.dtype).itemsize for f in member_fields.present(plan)))
+
+
+def memory(plan: Plan, threads: int, store: Store | None, fields: Sequence[str] | None = None) -> int:
+    """Bytes that a run adds to the process: its result or its chunks, and what the blocks at work hold."""
+    runs = blocks(plan.ensemble.members)
+    count, n = runs[0].count, plan.ensemble.members
+    working = min(len(runs), threads * (2 if store and threads > 1 else 1))
+    row = sum(plan.spec.sample_fields.values()) * np.dtype(machine.DTYPES[plan.dtype]).itemsize
+    segment = min(SEGMENT_SAMPLE_BYTES, row * count * len(plan.grid.times))
+    # A segment's samples: the kernel's, the members' in order, and turned or moved copies.
+    each = 3 * segment
+    if store is None:
+        return _result_bytes(plan, fields) + working * each
+    each += sum(one.bytes for one in columns(plan, store))
+    return working * each + n * sum(np.dtype(one.dtype).itemsize for one in member_fields.present(plan))
+
+
+def writing(plan: Plan, store: Store, folder: Path, threads: int) -> float:
+    """Seconds that a store's disk takes: its metadata, its bytes, and for each block the wait until they are safe."""
+    from lgvi_warp.solving import messages, provenance
+
+    runs = blocks(plan.ensemble.members)
+    with tempfile.TemporaryDirectory(dir=folder) as name:
+        start = time.perf_counter()
+        create(replace(store, path=Path(name) / "run.zarr"), plan, provenance(plan), messages(plan))
+        begin = time.perf_counter() - start
+        start = time.perf_counter()
+        for i in range(SYNCS):
+            durable.write_whole(Path(name) / f"{i}", b"0")
+        # Its chunks, then its marker; several blocks wait at a time.
+        wait = 2.0 * (time.perf_counter() - start) / SYNCS / min(2 * threads, len(runs))
+    return begin + size(plan, store) / disk_speed(folder, threads) + wait * len(runs)
+
+
+def disk_speed(folder: Path, threads: int) -> float:
+    """Bytes per second that so many threads write into a folder, synced."""
+    data = np.random.default_rng(0).bytes(PROBE_BYTES // threads)
+
+    def write(i: int) -> None:
+        durable.write_whole(place / f"{i}", data)
+
+    with tempfile.TemporaryDirectory(dir=folder) as name, ThreadPoolExecutor(threads) as pool:
+        place = Path(name)
+        start = time.perf_counter()
+        list(pool.map(write, range(threads)))
+        return len(data) * threads / (time.perf_counter() - start)
+
+
+def _existing(folder: Path) -> Path:
+    """The nearest folder above that is there."""
+    folder = folder.absolute()
+    while not folder.is_dir():
+        folder = folder.parent
+    return folder
+
+
+def _resident() -> int:
+    """Bytes of this process in memory; 0 where the system does not tell."""
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError):
+        return 0

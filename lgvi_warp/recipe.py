@@ -1,0 +1,110 @@
+"""A plan as plain numbers and texts, and back: what a store keeps so that a run can go on elsewhere and later."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.ensemble import STATES, Ensemble
+from lgvi_warp.errors import SceneError
+from lgvi_warp.method import Method
+from lgvi_warp.saveat import TimeGrid
+from lgvi_warp.scene import Scene
+
+if TYPE_CHECKING:
+    from lgvi_warp.plan import Plan
+
+
+def recipe(plan: Plan) -> dict[str, Any]:
+    """Settings of a plan beyond its ensemble and its times: JSON has all of their digits."""
+    return {
+        "members": plan.ensemble.members,
+        "method": dataclasses.asdict(plan.method),
+        "step": plan.grid.h,
+        "messages": list(plan.grid.messages),
+        "fields": list(plan.fields),
+        "dtype": plan.dtype,
+        "width": plan.spec.width,
+        "checks": plan.checks,
+        "on_failure": plan.on_failure,
+    }
+
+
+def plan_of(made: Mapping[str, Any], ensemble: Ensemble, sample_steps: np.ndarray, times: np.ndarray) -> Plan:
+    """The plan of a recipe. Raises SceneError."""
+    from lgvi_warp.plan import Plan
+
+    grid = TimeGrid(made["step"], sample_steps, times, tuple(made["messages"]))
+    method, fields = Method(**made["method"]), tuple(made["fields"])
+    settings = (made[name] for name in ("dtype", "width", "checks", "on_failure"))
+    return Plan(ensemble, method, grid, fields, *settings)
+
+
+def ensemble_of(
+    scene: Mapping[str, Any],
+    settings: Mapping[str, Any],
+    explicit: Mapping[str, np.ndarray],
+    noise: np.ndarray | None,
+) -> Ensemble:
+    """The ensemble that provenance tells of; explicit: its arrays; noise: `indices` where they were set. Raises SceneError."""
+    own = Scene.from_dict(scene)
+    if explicit:
+        states = {name: explicit[f"start.{name}"] for name in STATES}
+        parameters = {name: value for name, value in explicit.items() if not name.startswith("start.")}
+        ensemble = Ensemble.from_states(own, **states, parameters=parameters)
+        ensemble.seed = int(settings["seed"])
+        if "indices" in settings:
+            ensemble = ensemble.subset(settings["indices"])
+    else:
+        ensemble = Ensemble.from_scene(Scene.from_dict({**scene, "ensemble": dict(settings)}))
+        ensemble.scene = own
+    if noise is not None:
+        ensemble.indices = noise
+    return ensemble
+
+
+def same_run(stored: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
+    """What differs between two provenances that the bits depend on, one text each: key, value there, value here."""
+    return [
+        f"{key} is {there!r} in the store and {here!r} here"
+        for key, there, here in differences(_comparable(stored), _comparable(now))
+    ]
+
+
+def _comparable(provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """Without what changes no bit: the number of threads, the version of Python, the scene's own [ensemble] and [run]."""
+    content = dict(provenance)
+    content["scene"] = {key: value for key, value in content["scene"].items() if key not in ("ensemble", "run")}
+    content["machine"] = {key: value for key, value in content["machine"].items() if key in ("cpu", "simd")}
+    content["versions"] = {key: value for key, value in content["versions"].items() if key != "python"}
+    return content
+
+
+def differences(there: Any, here: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """(dotted key, value, value) of each leaf that is not the same in two nested tables."""
+    if isinstance(there, Mapping) and isinstance(here, Mapping):
+        for name in [*there, *(name for name in here if name not in there)]:
+            yield from differences(there.get(name), here.get(name), f"{key}.{name}" if key else name)
+    elif there != here:
+        yield key, there, here
+
+
+def refuse_another(path: Any, stored: Mapping[str, Any], now: Mapping[str, Any], force: bool) -> tuple[str, ...]:
+    """Raise SceneError where two provenances are of different runs; with `force`, say so in messages instead.
+
+    Only machine and versions can be forced: another scene or method makes another run.
+    """
+    found = same_run(stored, json.loads(json.dumps(now)))
+    machine = [text for text in found if text.startswith(("machine.", "versions.", "kernel"))]
+    if found and (not force or len(machine) < len(found)):
+        what = "is another run; give --overwrite, or another folder"
+        if len(machine) == len(found):
+            what = (
+                "the same bits cannot be promised; go on where it began, or give --force and take it that some differ"
+            )
+        raise SceneError(f"{path}: {text}: {what}" for text in found)
+    return tuple(f"continued although {text}" for text in found)

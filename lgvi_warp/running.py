@@ -1,0 +1,216 @@
+"""Blocks through an executor, their parts to the keepers in the order of the blocks; with a store, from where it stopped."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import threading
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from lgvi_warp.blocks import Block, Keeper, PartKeeper, Work, blocks, in_order
+from lgvi_warp.errors import Faults, SceneError
+from lgvi_warp.executors import Executor
+from lgvi_warp.plan import Plan
+from lgvi_warp.recipe import refuse_another
+from lgvi_warp.store import Folder, Sink, Store, check, create, held, names_of, skeleton
+from lgvi_warp.store_layout import columns
+
+# What the system says when a disk takes no more, or not from us.
+FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+
+
+class Progress:
+    """Fraction of the vehicle-steps made so far, told by blocks from several threads."""
+
+    def __init__(self, total: int, report: Callable[[float], None] | None):
+        self._total, self._report, self._lock = total, report, threading.Lock()
+        self._made: dict[int, int] = {}
+        self._sum = 0
+
+    def at(self, block: Block, vehicle_steps: int) -> None:
+        """A block has made so many; a block that runs again begins anew."""
+        if self._report is None:
+            return
+        with self._lock:
+            self._sum += vehicle_steps - self._made.get(block.first, 0)
+            self._made[block.first] = vehicle_steps
+            self._report(self._sum / self._total)
+
+
+def run_blocks(
+    work: Work,
+    runs: Sequence[Block],
+    executor: Executor,
+    advanced: Callable[[Block, int], None],
+    left: Sequence[Block] | None = None,
+    enough: Callable[[int], bool] = lambda members: False,
+) -> int:
+    """Run blocks and hand their parts to the keepers in order. Returns where the members end that were merged.
+
+    left: those of the blocks that the store of the work has not, by default all. enough: asked after each block, with the
+    members so far: the first yes ends the run, and blocks that are ahead of it are lost or of no account.
+    """
+    with contextlib.closing(_in_turn(work, runs, runs if left is None else left, executor, advanced)) as done:
+        for block, parts in done:
+            for keeper, part in zip(work.keepers, parts, strict=True):
+                keeper.merge(block, part)
+            if enough(block.stop):
+                return block.stop
+    return runs[-1].stop
+
+
+def _in_turn(
+    work: Work, runs: Sequence[Block], left: Sequence[Block], executor: Executor, advanced: Callable[[Block, int], None]
+) -> Generator[tuple[Block, Any], None, None]:
+    """Blocks and their parts, in order: from the store, or as they are run; nothing runs before the first is wanted."""
+    wanted = {block.first for block in left}
+    with contextlib.ExitStack() as stack:
+        fresh: Iterator[tuple[Block, Any]] | None = None
+        for block in runs:
+            if block.first not in wanted:
+                assert work.sink is not None
+                yield block, work.sink.parts(block, work.keepers) or ()
+                continue
+            if fresh is None:
+                work.plan.compile()
+                fresh = in_order(left, stack.enter_context(contextlib.closing(executor.run(work, left, advanced))))
+            yield next(fresh)
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A run into a store, begun or gone on with.
+
+    keepers: what else is kept of it, beside the store: their parts lie in it. only: indices of the blocks to run, default
+    all; the run is complete when every block is there, or as many as `enough` (see run_blocks) asks for.
+    """
+
+    plan: Plan
+    store: Store
+    provenance: dict[str, Any]
+    messages: tuple[str, ...] = ()
+    keepers: tuple[Keeper, ...] = ()
+    only: range | None = None
+    enough: Callable[[int], bool] = lambda members: False
+
+    def run(self, executor: Executor, progress: Callable[[float], None] | None = None) -> Folder:
+        """Run what is missing. Raises SceneError for what is refused, OSError where the disk takes no more."""
+        check_keepers(self.keepers)
+        self._begin()
+        path = self.store.folder
+        with held(path):
+            sink = Sink(path, columns(self.plan, self.store))
+            sink.remove_unfinished()
+            self._mend()
+            left = self._left(sink)
+            try:
+                members = self._blocks(sink, left, executor, progress)
+            except OSError as error:
+                raise explained(error, path) from error
+            finally:
+                sink.remove_unfinished()
+            folder = Folder(path)
+            beyond = [] if self.only else [block for block in self._runs() if block.first >= members]
+            if beyond:
+                # Blocks that were ahead of the last one depend on the number of threads: the store holds none of them.
+                sink.remove(beyond, len(self.plan.grid.times))
+            if beyond or not folder.unfinished():
+                folder.finish(members if beyond else None)
+        return folder
+
+    def _runs(self) -> list[Block]:
+        """The blocks of this run, in order."""
+        runs = blocks(self.plan.ensemble.members)
+        return runs if self.only is None else [runs[i] for i in self.only]
+
+    def _begin(self) -> None:
+        """Make the folder, or see that what lies there is this run."""
+        path, store = self.store.folder, self.store
+        there = path.exists()
+        if there and store.existing == "refuse":
+            remedy = 'go on with `lgvi-warp resume` (existing="resume"), or replace it with --overwrite (existing="overwrite")'
+            raise SceneError([f"{path}: holds a run already; {remedy}"])
+        if there and store.existing == "resume":
+            folder = Folder(path)
+            refuse_another(path, folder.provenance, self.provenance, store.force)
+            there_is, asked = (
+                (folder.recipe["store"], folder.recipe["keepers"]),
+                (store.layout(), names_of(self.keepers)),
+            )
+            for one, other in zip(there_is, asked, strict=True):
+                if one != other:
+                    raise SceneError([f"{path}: stores {one}, not {other}; ask for the same, or overwrite"])
+            return
+        try:
+            if there:
+                with held(path):
+                    create(store, self.plan, self.provenance, self.messages, self.keepers)
+            else:
+                create(store, self.plan, self.provenance, self.messages, self.keepers)
+        except OSError as error:
+            raise explained(error, path) from error
+
+    def _mend(self) -> None:
+        """Write anew what is damaged of the files that belong to no block."""
+        path = self.store.folder
+        if not Folder(path).damage():
+            return
+        import shutil
+
+        beside = path.with_name(path.name + ".new")
+        shutil.rmtree(beside, ignore_errors=True)
+        skeleton(beside, self.store, self.plan, self.provenance, self.messages, self.keepers)
+        for one in sorted(beside.rglob("*")):
+            target = path / one.relative_to(beside)
+            if one.is_file() and one != beside / "zarr.json":
+                target.parent.mkdir(parents=True, exist_ok=True)
+                one.replace(target)
+        shutil.rmtree(beside)
+
+    def _left(self, sink: Sink) -> list[Block]:
+        """Blocks to be run, without those that are finished and whole; a damaged one loses its marker."""
+        left = []
+        for block, faults in check(sink, self._runs(), len(self.plan.grid.times), self.keepers):
+            if faults:
+                sink.marker(block).unlink(missing_ok=True)
+                left.append(block)
+        return left
+
+    def _blocks(
+        self, sink: Sink, left: Sequence[Block], executor: Executor, progress: Callable[[float], None] | None
+    ) -> int:
+        """Run blocks; parts of the finished ones come from the store, all in order. Returns where their members end."""
+        runs, n, steps = self._runs(), self.plan.ensemble.members, self.plan.grid.steps
+        made = Progress(n * steps, progress)
+        for block in set(runs) - set(left):
+            made.at(block, block.count * steps)
+        members = run_blocks(Work(self.plan, self.keepers, sink), runs, executor, made.at, left, self.enough)
+        if progress and members < runs[-1].stop:
+            progress(1.0)
+        return members
+
+
+def check_keepers(keepers: Sequence[Keeper]) -> None:
+    """Each must be able to leave its parts in a store, under a name of its own. Raises SceneError."""
+    faults = Faults("keepers.")
+    for keeper in keepers:
+        if not isinstance(keeper, PartKeeper):
+            faults.add(type(keeper).__name__, keeper, "cannot be stored", "give it name, to_arrays and from_arrays")
+    names = names_of(keepers)
+    for name in sorted({name for name in names if names.count(name) > 1 or "/" in name}):
+        faults.add("name", name, "is no file name of its own", "give each keeper another name, without /")
+    faults.raise_if_any()
+
+
+def explained(error: OSError, path: os.PathLike[str]) -> OSError:
+    """The same error with what it means for the run."""
+    if error.errno in FULL:
+        text = f"{error.strerror}: the blocks that were finished are kept; make room, then `lgvi-warp resume {path}`"
+    elif error.errno in (errno.EROFS, errno.EACCES, errno.EPERM):
+        text = f"{error.strerror}: choose a folder that can be written"
+    else:
+        return error
+    return OSError(error.errno, text, error.filename or str(path))

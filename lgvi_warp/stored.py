@@ -1,0 +1,165 @@
+"""Runs that lie in a store, read when they are asked for."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.errors import SceneError
+from lgvi_warp.observation import Observation, Observing, observation_of
+from lgvi_warp.result import UNITS, Result
+from lgvi_warp.statistics.estimate import Estimates
+from lgvi_warp.store import Folder, Sink
+from lgvi_warp.terms import Term, from_list
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@dataclass(frozen=True)
+class Arrays(Mapping[str, np.ndarray]):
+    """Arrays of a store by name, read anew each time; `whole` ones are in memory. members: which to read, along `axis`."""
+
+    group: Any
+    names: tuple[str, ...]
+    axis: int
+    members: Any = None
+    whole: Mapping[str, np.ndarray] | None = None
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if self.whole is not None and name in self.whole:
+            return self.whole[name]
+        if name not in self.names:
+            raise KeyError(name)
+        chosen = slice(None) if self.members is None else self.members
+        at = (*(slice(None),) * self.axis, chosen)
+        array = self.group[name]
+        return np.asarray(array[at] if isinstance(chosen, slice) else array.oindex[at])
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names or name in (self.whole or {})
+
+    def __iter__(self) -> Iterator[str]:
+        return iter((*self.names, *(self.whole or {})))
+
+    def __len__(self) -> int:
+        return len(self.names) + len(self.whole or {})
+
+
+def folder_of(path: str | os.PathLike[str]) -> Path:
+    """The store that a path is, or the one .zarr in it. Raises SceneError."""
+    given = Path(path)
+    if given.suffix == ".zarr":
+        return given
+    found = sorted(given.glob("*.zarr")) if given.is_dir() else []
+    if len(found) != 1:
+        what = f"holds {len(found)} stores" if given.exists() else "is not there"
+        remedy = "give the folder of a run made with --store zarr" if not found else f"name one: {found[0]}"
+        raise SceneError([f"{given}: {what}; {remedy}"])
+    return found[0]
+
+
+def open_run(
+    path: str | os.PathLike[str],
+    members: slice | Sequence[int] | None = None,
+    incomplete: bool = False,
+    statistics: Sequence[Any] | None = None,
+) -> Result:
+    """A run in a store, or in a folder with one store: a Result whose samples and parameters are read when asked for.
+
+    members: only these, (m,) indices or a slice. `result.dataset` is a view of all of it by xarray, read piece by piece.
+    incomplete: also a run that has not ended; what its blocks have not reached reads as NaN and status 0.
+    result.statistics are those of a complete run's members, all of them; statistics: the run's own, needed for those of
+    functions, which a store does not hold. Raises SceneError where there is no run, or it is not complete, IndexError for
+    members that it has not.
+    """
+    folder = Folder(folder_of(path))
+    messages = folder.messages
+    if not folder.complete:
+        left = len(folder.unfinished())
+        text = f"{folder.path}: is not complete: {left} blocks are missing"
+        if not incomplete:
+            raise SceneError([f"{text}; go on with `lgvi-warp resume {folder.path.parent}`, or give incomplete=True"])
+        return result_of(folder, members, (*messages, text))
+    told = folder.provenance.get("observed")
+    if members is not None or told is None or (statistics is None and told.get("functions")):
+        return result_of(folder, members, messages)
+    return result_of(folder, None, messages, observing=gathered(folder, observation_of(told, statistics)))
+
+
+def gathered(folder: Folder, observed: Observation) -> Observing:
+    """The statistics of a complete run, from the parts of its blocks."""
+    observing = Observing(observed, folder.group()["time"][:], int(folder.recipe["members"]))
+    sink = Sink(folder.path, ())
+    for block in folder.runs:
+        for keeper, part in zip(observing.keepers, sink.parts(block, observing.keepers) or (), strict=True):
+            keeper.merge(block, part)
+    return observing
+
+
+def result_of(
+    folder: Folder,
+    members: Any = None,
+    messages: tuple[str, ...] = (),
+    terms: Sequence[Term] | None = None,
+    observing: Observing | None = None,
+) -> Result:
+    """The Result of a folder; terms: those of the scene, where its file does not tell them; observing: its statistics."""
+    group = folder.group()
+    n, whole = folder.members, int(folder.recipe["members"])
+    at = _places(members, n)
+    arrays = {name: array for name, array in group.arrays()}
+    fields = tuple(name for name in arrays if name in UNITS)
+    varied = tuple(name for name in arrays if "." in name)
+    small = Arrays(group, tuple(name for name in arrays if name not in (*fields, *varied, "time", "step")), 0, at)
+    shared = {name: np.asarray(value, dtype=np.float64) for name, value in folder.shared.items()}
+    provenance = dict(folder.provenance)
+    for name in ("steps_made", "steps_tried"):
+        if name in arrays:
+            provenance[name] = float(small[name].mean())
+    if n < whole:
+        provenance["members"] = n
+    estimates, said = observing.read(provenance["ensemble"], n) if observing else (Estimates(), ())
+    return Result(
+        time=group["time"][:],
+        samples=Arrays(group, fields, 1, at),
+        **Result.per_member(small),
+        parameters=Arrays(group, varied, 0, at, shared),
+        messages=messages + said,
+        provenance=provenance,
+        statistics=estimates,
+        terms=tuple(from_list(provenance["scene"].get("terms", ())) if terms is None else terms),
+        store=folder.path,
+    )
+
+
+def _places(members: Any, n: int) -> slice | np.ndarray:
+    """Which of n members are meant, all by default. Raises IndexError."""
+    if members is None or isinstance(members, slice):
+        return slice(*(members or slice(None)).indices(n))
+    found = np.asarray(members, dtype=int)
+    if len(found) and (found.min() < 0 or found.max() >= n):
+        raise IndexError(f"members {found.min()} to {found.max()} of {n}")
+    return found
+
+
+def chosen(result: Result, members: Sequence[int]) -> Result:
+    """Some members of a run in a store, in memory."""
+    part = result_of(Folder(Path(result.store or "")), members, result.messages, result.terms)
+    return replace(part, samples=dict(part.samples), parameters=dict(part.parameters), store=None)
+
+
+def dataset(path: Path) -> xarray.Dataset:
+    """A store as xarray sees it, in pieces of its chunks if dask is there."""
+    import importlib.util
+
+    import xarray
+
+    chunks: Any = {} if importlib.util.find_spec("dask") else None
+    whole = xarray.open_dataset(path, engine="zarr", chunks=chunks)
+    return whole.isel(realization=slice(0, whole.attrs["members"])) if "members" in whole.attrs else whole

@@ -1,0 +1,35 @@
+"""What the tests of stores need: a small run, and whether two folders hold the same bytes."""
+
+from pathlib import Path
+
+import lgvi_warp as lw
+from lgvi_warp import speed
+
+# 4 blocks of 256 members, the last one ragged; 31 samples.
+MEMBERS, SETTINGS = 1003, {"method": "psi_s", "h": 0.01, "t1": 3.0, "save": lw.SaveAt(every=0.1)}
+STATISTICS = [lw.Mean("position"), lw.Quantiles("depth"), lw.PathMaximum("speed"), lw.Covariance("angular_velocity")]
+# Reached with 512 members.
+UNTIL = lw.Until("mean angular_velocity[0]", 3.7e-3, members=256)
+
+
+def bits(result):
+    """All arrays of a result's statistics, as bytes, and what else they say."""
+    arrays, text = result.statistics.to_arrays()
+    return {name: values.tobytes() for name, values in arrays.items()}, text
+
+
+def fleet(members=MEMBERS):
+    """Members of the paper's vehicle with other rates and masses."""
+    vary = {"start.angular_velocity": lw.Normal(relative=0.1), "vehicle.mass": lw.Normal(relative=0.001)}
+    return lw.Ensemble(speed.example(), members, 1, vary)
+
+
+def tree(path):
+    """{name: bytes} of every file below a folder."""
+    return {one.relative_to(path).as_posix(): one.read_bytes() for one in Path(path).rglob("*") if one.is_file()}
+
+
+def differing(path, other):
+    """Names of files that are not in both folders with the same bytes."""
+    left, right = tree(path), tree(other)
+    return sorted(name for name in left.keys() | right.keys() if left.get(name) != right.get(name))

@@ -10,7 +10,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lane_math import decay
-from lgvi_kernels.lanes import absolute, add, div, lane3, mul, ones, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes import absolute, add, div, lane3, mul, ones, positive, sub, vec3  # noqa: F401
 from lgvi_kernels.state import struct
 from lgvi_kernels.sums import pushed, twisted
 
@@ -34,6 +34,19 @@ def flow_struct(width, real):
 def decay3(x: Any):
     """(1 - e^-x)/x on three axes."""
     return vec3(decay(x.x), decay(x.y), decay(x.z))
+
+
+@wp.func
+def remaining(x: Any, s: Any):
+    """e^-x from s = (1 - e^-x)/x; beyond x = 37, where only the round-off of the difference is left, 0."""
+    one = ones(x)
+    return positive(x - one.dtype(37.0) * one, one - one, one - x * s)
+
+
+@wp.func
+def remaining3(x: Any, s: Any):
+    """The same on three axes."""
+    return vec3(remaining(x.x, s.x), remaining(x.y, s.y), remaining(x.z, s.z))
 
 
 @wp.func
@@ -96,7 +109,7 @@ def make_E(parts, by_changes):
             s = decay3(x)
             e.decay_force = x * s
             if wp.static(not by_changes):
-                e.decay_force = vec3(ones(x.x), ones(x.x), ones(x.x)) - e.decay_force
+                e.decay_force = remaining3(x, s)
             if wp.static(quadratic_force):
                 e.gain_force = h * (p.quadratic_force * s)
         else:
@@ -107,7 +120,7 @@ def make_E(parts, by_changes):
             t = decay3(y)
             e.decay_torque = y * t
             if wp.static(not by_changes):
-                e.decay_torque = vec3(ones(y.x), ones(y.x), ones(y.x)) - e.decay_torque
+                e.decay_torque = remaining3(y, t)
             if wp.static(quadratic_torque):
                 e.gain_torque = h * (p.quadratic_torque * t)
         else:

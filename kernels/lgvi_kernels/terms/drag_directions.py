@@ -55,7 +55,7 @@ COMPONENTS = (component_x, component_y, component_z)
 
 def make_E(parts, velocities):
     """(prepare, E) as for drag; `velocities` are those at the origin of the forces."""
-    prepare_exact, _ = make_exact(parts, compensated=False)
+    prepare_exact, _ = make_exact(parts, by_changes=False)
     force = [make_axis(c, PARTS[0] in parts, PARTS[2] in parts) for c in COMPONENTS]
     torque = [make_axis(c, PARTS[1] in parts, PARTS[3] in parts) for c in COMPONENTS]
     fx, fy, fz = force

@@ -12,6 +12,17 @@ from lgvi_warp.reference.terms.restoring import Restoring
 from lgvi_warp.reference.terms.weight import Weight
 
 ROOT = Path(__file__).parent.parent
+SLOW = [line for line in (ROOT / "tests" / "slow.txt").read_text().splitlines() if line and not line.startswith("#")]
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Mark as slow what slow.txt names."""
+    left = tuple(line for line in SLOW if not line.startswith("!"))
+    here = tuple(line[1:] for line in SLOW if line.startswith("!"))
+    for item in items:
+        if item.nodeid.startswith(left) and not item.nodeid.startswith(here):
+            item.add_marker(pytest.mark.slow)
 
 
 @pytest.fixture(scope="session")

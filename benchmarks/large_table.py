@@ -122,14 +122,17 @@ lost later.
 
 def measure(members, kind, folder):
     """One run, in this process: prediction, seconds, peak memory and bytes on the disk."""
-    chosen = None
-    if kind != "memory":
+    chosen, observed = None, {}
+    if kind == "statistics":
+        kept = (lw.Mean("position"), lw.Covariance("position"), lw.Extremes("position"), lw.Quantiles("position"))
+        observed = {"statistics": kept, "keep": "none"}
+    elif kind != "memory":
         fields = ("position",) if kind == "float32" else None
         chosen = lw.Store(folder / "run.zarr", dtype="float32" if fields else None, fields=fields, existing="overwrite")
     fleet = speed.fleet(members)
-    predicted = lw.predict(fleet, **SETTINGS, store=chosen)
+    predicted = lw.predict(fleet, **SETTINGS, store=chosen, **observed)
     start = time.perf_counter()
-    lw.solve(fleet, **SETTINGS, store=chosen)
+    lw.solve(fleet, **SETTINGS, store=chosen, **observed)
     seconds = time.perf_counter() - start
     disk = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
@@ -149,7 +152,12 @@ def in_process(members, kind, folder):
     return json.loads(done.stdout)
 
 
-KINDS = {"memory": "in memory", "store": "store", "float32": "store, positions in float32"}
+KINDS = {
+    "memory": "in memory",
+    "statistics": "mean, covariance, extremes, quantiles of position",
+    "store": "store",
+    "float32": "store, positions in float32",
+}
 
 
 def rows(most, folder):
@@ -188,7 +196,8 @@ def main():
     head = "| members | kept | time | peak | disk | predicted: time, memory |\n|---:|---|---:|---:|---:|---|\n"
     table = head + "\n".join(line(*row) for row in found)
     floor, more = (
-        min(r["peak"] for _, kind, r in found if (kind == "memory") == alone) / 1e6 for alone in (True, False)
+        min(r["peak"] for _, kind, r in found if (kind in ("memory", "statistics")) == alone) / 1e6
+        for alone in (True, False)
     )
     about = machine.describe()
     text = TEXT.format(

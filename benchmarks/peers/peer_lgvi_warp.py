@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
@@ -49,6 +50,12 @@ METHODS: tuple[tuple[str | Method, str, tuple[float, ...]], ...] = (
 SAVE = SaveAt(fields=("position", "attitude"))
 
 
+@functools.cache
+def pool_of(threads: int) -> ThreadPoolExecutor:
+    """Threads that stay, as those of the other systems do: a new one begins on a core that is busy."""
+    return ThreadPoolExecutor(threads)
+
+
 class Fleet:
     """The members of a plan, in as many parts as threads, and their ends."""
 
@@ -64,8 +71,7 @@ class Fleet:
         """All steps, from the start."""
         if len(self.parts) == 1:
             return self._part(0)
-        with ThreadPoolExecutor(len(self.parts)) as pool:
-            list(pool.map(self._part, range(len(self.parts))))
+        list(pool_of(len(self.parts)).map(self._part, range(len(self.parts))))
 
     def _part(self, i: int) -> None:
         wp.copy(self.parts[i].state, self.starts[i])

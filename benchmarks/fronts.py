@@ -62,7 +62,7 @@ def cheapest(found, error):
 def section(name, make):
     """The text of one scene."""
     fleet, t1 = make()
-    found = lw.tradeoff(fleet, t1=t1)
+    found = lw.tradeoff(fleet, t1=t1, seconds=90.0)
     picture = ROOT / "docs" / f"accuracy_{name}.png"
     lw.plot_tradeoff(found, picture)
     lines = [f"## {make.__doc__.strip()}", "", f"![errors and cost]({picture.name})", ""]

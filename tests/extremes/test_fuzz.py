@@ -15,7 +15,7 @@ PROCESSES = 2
     ("kind", "cases", "kernels"),
     [
         ("files", 500, 0),
-        ("set", 200, 0),
+        ("set", 100, 0),
         pytest.param("files", 10_000, 4, marks=SLOW),
         pytest.param("set", 4000, 4, marks=SLOW),
     ],

@@ -14,6 +14,7 @@ import numpy as np
 from lgvi_warp import machine, speed
 from lgvi_warp.blocks import Work, blocks
 from lgvi_warp.executors.threads import Threads
+from lgvi_warp.packets import Outcome
 from lgvi_warp.running import Progress, Stored, run_blocks
 from lgvi_warp.saveat import SaveAt
 from lgvi_warp.solving import make_plan, messages, provenance, run_plan
@@ -22,12 +23,11 @@ from lgvi_warp.store_layout import columns
 from tests.toy_keeper import DepthSum
 
 
-class Outcome:
-    """Of members that came through."""
-
-    def __init__(self, count):
-        self.status, self.failed_step = np.zeros(count, np.uint8), np.zeros(count, np.int64)
-        self.failed_size, self.chosen = np.zeros(count), np.zeros((count, 0), np.int64)
+def came_through(count):
+    """The outcome of so many members without fault."""
+    none, long = np.zeros(count), np.zeros(count, np.int64)
+    chosen, bits = np.zeros((count, 0), np.int64), np.zeros(count, np.uint16)
+    return Outcome(np.zeros(count, np.uint8), long, none, chosen, bits, long, none, long)
 
 
 def into_store(plan, folder, threads, samples):
@@ -43,7 +43,7 @@ def into_store(plan, folder, threads, samples):
         for first in range(0, k, 10):
             when = slice(first, min(first + 10, k))
             writer.take(when, {name: values[when, : block.count] for name, values in samples.items()})
-        sink.finish(block, writer.close(Outcome(block.count)), (), ())
+        sink.finish(block, writer.close(came_through(block.count)), (), ())
 
     start = time.perf_counter()
     with ThreadPoolExecutor(threads) as pool:

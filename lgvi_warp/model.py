@@ -125,7 +125,7 @@ def make_model(
         drag = term.parts(ensemble.own(term, p))
         module = laws["drag" if has_exact_flow(frame) else "drag_directions"]
         acting = [(term, module), *((t, m) for t, m in acting if t is not term)]
-        _check_backward_drag(ensemble, method, frame, term, h)
+        _check_backward_drag(ensemble, method, term, h)
     dense = damping or (bool(drags) and not exact) or flow == "varying"
     memory = any(term.memory for term, _ in acting)
     _check(ensemble, method, frame, p, dense=dense, flow=flow, memory=memory, acting=acting)
@@ -202,7 +202,7 @@ def _conservative(ensemble: Ensemble, p: Parameters, acting: list[tuple[Term, An
 MOST_BACKWARD_DRAG = 0.5
 
 
-def _check_backward_drag(ensemble: Ensemble, method: Method, frame: Frame, term: Drag, h: float) -> None:
+def _check_backward_drag(ensemble: Ensemble, method: Method, term: Drag, h: float) -> None:
     """Refuse drag that is too strong for the stages of a composition that go backward, by the members' starts."""
     back = -h * min(0.0, *method.stages)
     if back == 0.0:
@@ -210,8 +210,9 @@ def _check_backward_drag(ensemble: Ensemble, method: Method, frame: Frame, term:
     members = ensemble.select(0, ensemble.members)
     own = ensemble.own(term, members.parameters)
     speeds = np.abs(np.concatenate([members.velocity, members.angular_velocity], axis=1))
-    inertias = np.concatenate([np.einsum("nii->ni", frame.M), frame.J], axis=1)
-    number = float((back * (own["linear"] + own["quadratic"] * speeds) / inertias.min(axis=0)).max())
+    # What an axis of the user's gives way with to a force along it, the other axes free.
+    mobilities = np.einsum("nii->ni", np.linalg.inv(vehicle.inertia6(members.parameters)))
+    number = float((back * (own["linear"] + own["quadratic"] * speeds) * mobilities).max())
     if number > MOST_BACKWARD_DRAG:
         faults = Faults()
         what = f"goes backward by {back:.3g} s, where {term.key} has a drag number up to {number:.3g}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 import os
@@ -36,6 +35,7 @@ from lgvi_warp.stability_runs import (
     run_method,
 )
 from lgvi_warp.status import Status
+from lgvi_warp.tables import write_csv
 from lgvi_warp.tradeoffs import _finite, check_of, chosen_methods
 
 METHODS = ("psi", "psi_s", "psi_x", "rk4")
@@ -177,13 +177,7 @@ class StabilityMap:
 
     def to_csv(self, path: str | os.PathLike[str]) -> Path:
         """Write the rows to a CSV file. Returns its path."""
-        rows, target = self.rows(), Path(path)
-        names = list(dict.fromkeys(key for row in rows for key in row))
-        with target.open("w", newline="") as file:
-            writer = csv.DictWriter(file, names)
-            writer.writeheader()
-            writer.writerows(rows)
-        return target
+        return write_csv(self.rows(), path)
 
     def save(self, folder: str | os.PathLike[str], name: str = "stability") -> list[Path]:
         """Write NAME.json and NAME.csv into a folder. Returns their paths."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 import os
@@ -24,6 +23,7 @@ from lgvi_warp.plan import DTYPES, Plan
 from lgvi_warp.result import Result
 from lgvi_warp.scene import Scene
 from lgvi_warp.speed import interleaved, void
+from lgvi_warp.tables import write_csv
 
 # Tried in this order; a name that this version does not know, or that a scene refuses, is left out.
 CANDIDATES = ("kl8(psi_x)", "psi_x", "psi_s", "su4(psi_x)", "kl6(psi_x)", "rk8", "su8_15(psi_x)", "ss6_13(psi_x)",
@@ -134,13 +134,7 @@ class Tradeoff:
 
     def to_csv(self, path: str | os.PathLike[str]) -> Path:
         """Write the rows to a CSV file. Returns its path."""
-        rows, target = self.rows(), Path(path)
-        names = list(dict.fromkeys(key for row in rows for key in row))
-        with target.open("w", newline="") as file:
-            writer = csv.DictWriter(file, names)
-            writer.writeheader()
-            writer.writerows(rows)
-        return target
+        return write_csv(self.rows(), path)
 
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write tradeoff.json and tradeoff.csv into a folder. Returns their paths."""

@@ -8,7 +8,6 @@ The designs and the estimates are SALib's (extra: uq).
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -26,6 +25,7 @@ from lgvi_warp.saveat import FIELDS, SaveAt
 from lgvi_warp.scene import EnsembleSettings, Scene
 from lgvi_warp.solving import solve
 from lgvi_warp.status import Status
+from lgvi_warp.tables import write_csv
 
 # Members that are run together: what is kept of their paths stays small.
 AT_ONCE = 16_384
@@ -192,10 +192,7 @@ class Indices:
         target.mkdir(parents=True, exist_ok=True)
         paths = [target / f"sensitivity.{ending}" for ending in ("txt", "csv", "json")]
         paths[0].write_text(f"{self}\n", encoding="utf-8")
-        with paths[1].open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, ("quantity", "factor", "other", "index", "value", "confidence"))
-            writer.writeheader()
-            writer.writerows(self.rows())
+        write_csv(list(self.rows()), paths[1])
         paths[2].write_text(json.dumps(self.to_dict(), indent=1), encoding="utf-8")
         return paths
 

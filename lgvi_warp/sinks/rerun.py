@@ -32,25 +32,33 @@ def log_rerun(result: Result, path: str | os.PathLike[str]) -> Path:
     """Write the fleet as an .rrd recording. Returns the path.
 
     At most MOST_BODIES members are shown, spread evenly; members that failed stay where they stopped, in red.
-    Needs all fields. Raises ImportError without rerun-sdk (extra: viz).
+    Needs all fields. The file is there whole or not at all. Raises ImportError without rerun-sdk (extra: viz), OSError.
     """
     try:
         import rerun as rr
     except ImportError as error:
         raise ImportError("recordings need rerun-sdk: pip install 'lgvi-warp[viz]'") from error
     target = Path(path)
+    part = target.with_name(target.name + ".part")
     recording = rr.RecordingStream("lgvi_warp", recording_id="fleet")
     finite = np.isfinite(result.position[0]).all(axis=-1) & np.isfinite(result.attitude[0]).all(axis=(-1, -2))
     shown = np.flatnonzero(finite)
     shown = shown[np.unique(np.linspace(0, len(shown) - 1, min(MOST_BODIES, len(shown))).astype(int))]
     position = result.position[:, shown].astype(np.float32)
-    recording.save(target, default_blueprint=_blueprint(result.time, position))
-    _world(recording, rr, result, shown, position)
-    _curves(recording, rr, result)
-    text = "```json\n" + json.dumps(result.provenance, indent=2) + "\n```"
-    recording.log("run", rr.TextDocument(text, media_type="text/markdown"), static=True, strict=True)
-    recording.flush()
-    recording.disconnect()
+    recording.save(part, default_blueprint=_blueprint(result.time, position))
+    try:
+        _world(recording, rr, result, shown, position)
+        _curves(recording, rr, result)
+        text = "```json\n" + json.dumps(result.provenance, indent=2) + "\n```"
+        recording.log("run", rr.TextDocument(text, media_type="text/markdown"), static=True, strict=True)
+        recording.flush()
+        recording.disconnect()
+        part.replace(target)
+    except RuntimeError as error:
+        # rerun's word for a writer that could not go on; it says why on stderr.
+        raise OSError(f"the recording could not be written ({error}); is the disk full?") from error
+    finally:
+        part.unlink(missing_ok=True)
     return target
 
 

@@ -147,7 +147,7 @@ def observe(plan_members: int, settings: Any, given: Any, keep: Any, until: Any)
         found = kinds.from_list(settings.statistics if given is None else given)
     with faults.including():
         asked = settings.until if until is None else until
-        stop = None if asked is None else from_dict(asked)
+        stop = None if asked is None or asked is False else from_dict(asked)
     check_keep(faults, "keep", keep, plan_members)
     if stop is not None and not faults:
         with faults.including():

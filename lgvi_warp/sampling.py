@@ -118,17 +118,18 @@ class Replicated(Sampling):
             faults.add("replicates", R, f"is no power of two from 1 to {MOST_REPLICATES}", "give 8, 16, 32 or 64")
         self.check_own(faults)
         faults.raise_if_any()
+        object.__setattr__(self, "replicates", int(R))
 
     def check_own(self, faults: Faults) -> None:
         """Note what is wrong with its other settings."""
 
     def replicates_of_members(self) -> int:
         """As given."""
-        return int(self.replicates)
+        return self.replicates
 
     def group_size(self, space: Space) -> int:
         """One point of each replicate."""
-        return int(self.replicates)
+        return self.replicates
 
     def dealt(self, members: np.ndarray) -> Iterator[tuple[int, np.ndarray | slice, np.ndarray]]:
         """(replicate, which of the members are its own, the indices of their points) of each that has any."""
@@ -166,11 +167,11 @@ class LatinHypercube(Replicated):
 
     def group_size(self, space: Space) -> int:
         """A hypercube for each replicate."""
-        return int(self.group) * int(self.replicates)
+        return int(self.group) * self.replicates
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
         """From the hypercube of each member's group; names by themselves, so that others do not change them."""
-        R = int(self.replicates)
+        R = self.replicates
         group, place = np.divmod(members, self.group * R)
         found = {}
         for key, size in zip(space.keys, space.sizes, strict=True):

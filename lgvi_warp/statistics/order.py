@@ -37,7 +37,7 @@ class Extremes(Statistic):
             x = values.filled(beyond)
             at = best(x, axis=2)
             found[name] = np.take_along_axis(x, at[:, :, None], axis=2)[:, :, 0]
-            found[f"{name}_member"] = np.where(values.count[:, None] > 0, at + values.first, -1)
+            found[f"{name}_member"] = np.where(values.count[:, None] > 0, values.members(at), -1)
         return found
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
@@ -47,6 +47,8 @@ class Extremes(Statistic):
             ("minimum", right["minimum"] < left["minimum"]),
             ("maximum", right["maximum"] > left["maximum"]),
         ):
+            member = f"{name}_member"
+            better |= (right[name] == left[name]) & (right[member] < left[member])
             for key in (name, f"{name}_member"):
                 both[key] = np.where(better, right[key], left[key])
         return both

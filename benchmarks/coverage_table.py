@@ -75,7 +75,7 @@ def stopped(repetitions, until, draw, truth, most=100):
     """Coverage of a mean where each repetition stops by itself, and the members it took on average."""
     rng = np.random.default_rng(2)
     statistic = lw.Mean(quantity())
-    watch = Watch(until, statistic, statistic.key, None, np.zeros(1, int))
+    watch = Watch(until, statistic, statistic.key, {}, np.zeros(1, int))
     good, members = np.zeros(repetitions, bool), np.zeros(repetitions)
     blocks = (draw(rng, (repetitions, BLOCK, 1)) for _ in range(most))
     for i, tree in enumerate(parts(statistic, blocks), 1):

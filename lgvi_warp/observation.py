@@ -118,6 +118,8 @@ class Observing:
 
     def __init__(self, observed: Observation, time: np.ndarray, members: int, replicates: int = 1):
         statistics, self._watch = observed.watch(time)
+        if self._watch is not None:
+            self._watch.doubling = replicates > 1
         self._gathered = Gathered(time, members, statistics, replicates) if statistics else None
 
     @property

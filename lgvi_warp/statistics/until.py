@@ -76,7 +76,11 @@ def from_dict(given: Any) -> Until:
 
 @dataclass
 class Watch:
-    """An Until at work on a run's statistics: which, and which of its numbers."""
+    """An Until at work on a run's statistics: which, and which of its numbers.
+
+    doubling: looks at powers of two of members only. With replicates a design is balanced there, and the spread of a few
+    estimates comes out small by chance too often for many looks.
+    """
 
     until: Until
     statistic: Statistic
@@ -85,10 +89,13 @@ class Watch:
     entry: Mapping[str, int]
     rows: np.ndarray
     looked: int = 0
+    doubling: bool = False
 
     def due(self, members: int) -> bool:
         """Whether to look, with so many members done."""
         if members < self.until.members or members < self.looked * (1.0 + GROWTH):
+            return False
+        if self.doubling and members & (members - 1):
             return False
         self.looked = members
         return True

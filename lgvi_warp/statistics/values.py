@@ -71,4 +71,5 @@ def dealt(
     rows = np.moveaxis(x.reshape(k, d, n // R, R), 3, 1).reshape(k * R, d, n // R)
     if good is not None:
         good = np.swapaxes(good.reshape(k, n // R, R), 1, 2).reshape(k * R, n // R)
-    return Values(rows, good, first, block, size // R, R)
+    # Sums along rows that lie apart would be added in another order, with other bits.
+    return Values(np.ascontiguousarray(rows), good, first, block, size // R, R)

@@ -56,15 +56,17 @@ def of_replicates(each: np.ndarray, confidence: float) -> tuple[np.ndarray, np.n
 
 
 def probability_of_replicates(
-    probability: np.ndarray, each: np.ndarray, count: np.ndarray, confidence: float
+    probability: np.ndarray, each: np.ndarray, count: np.ndarray, confidence: float, least: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Wilson's interval with the number of trials that has the variance of R independent estimates (R, ...), and t's factor.
 
-    Where these are all the same, their spread says nothing (an event that no member saw): the interval is that of
-    `count` independent members, which a stratified sample's error does not exceed. 0 to 1 where an estimate is missing.
+    The standard error is taken to be that of `least` members or more of `count`: replicates that all count the same may
+    owe it to chance. Where no member or each was counted the spread says nothing: the interval is that of `count`
+    independent members. 0 to 1 where an estimate is missing.
     """
-    error, half = of_replicates(each, confidence)
-    spread = np.isfinite(error) & (error > 0.0) & (probability > 0.0) & (probability < 1.0)
+    error, _ = of_replicates(each, confidence)
+    error = np.fmax(error, least / np.maximum(count, 1))
+    spread = np.isfinite(error) & (probability > 0.0) & (probability < 1.0)
     variance = np.where(spread, error, 1.0) ** 2
     n = np.where(spread, probability * (1.0 - probability) / variance, np.where(np.isfinite(error), count, 0))
     t = float(student(np.array(len(each)), confidence))

@@ -156,7 +156,8 @@ class Quantiles(Statistic):
 
         def ends(value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             below = np.stack([sketch.fraction(parts, value) for parts in each])
-            low, high = intervals.probability_of_replicates(level, below, n, self.confidence)
+            least = float(np.sqrt(1.0 + whole["variance"][0]))
+            low, high = intervals.probability_of_replicates(level, below, n, self.confidence, least)
             return n * low, n * high + 1.0
 
         return self._read(whole, time, ends, f"order statistics: ranks by Student's t of {len(each)} replicates")

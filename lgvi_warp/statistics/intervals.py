@@ -60,12 +60,12 @@ def probability_of_replicates(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Wilson's interval with the number of trials that has the variance of R independent estimates (R, ...), and t's factor.
 
-    The standard error is taken to be that of `least` members or more of `count`: replicates that all count the same may
-    owe it to chance. Where no member or each was counted the spread says nothing: the interval is that of `count`
+    To the standard error that of `least` members of `count` is added, in squares: what is counted is whole, and replicates
+    that all count the same may owe it to chance. Where no member or each was counted the spread says nothing: the interval is that of `count`
     independent members. 0 to 1 where an estimate is missing.
     """
     error, _ = of_replicates(each, confidence)
-    error = np.fmax(error, least / np.maximum(count, 1))
+    error = np.hypot(error, least / np.maximum(count, 1))
     spread = np.isfinite(error) & (probability > 0.0) & (probability < 1.0)
     variance = np.where(spread, error, 1.0) ** 2
     n = np.where(spread, probability * (1.0 - probability) / variance, np.where(np.isfinite(error), count, 0))

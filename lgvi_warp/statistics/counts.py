@@ -288,7 +288,9 @@ class FirstPassage(Condition, Counted):
     ) -> dict[str, np.ndarray]:
         """When the curves (k, pieces) reach each level."""
         curves = {"passage_time": value, "passage_time_lower": upper, "passage_time_upper": lower}
-        return {name: np.array([self._reached(one, level, time) for level in self.levels]) for name, one in curves.items()}
+        return {
+            name: np.array([self._reached(one, level, time) for level in self.levels]) for name, one in curves.items()
+        }
 
     def _reached(self, curve: np.ndarray, level: float, time: np.ndarray) -> float:
         """The time at which a rising curve reaches a level: linear within a piece, or a sample time if there is no line."""

@@ -61,8 +61,8 @@ def probability_of_replicates(
     """Wilson's interval with the number of trials that has the variance of R independent estimates (R, ...), and t's factor.
 
     To the standard error that of `least` members of `count` is added, in squares: what is counted is whole, and replicates
-    that all count the same may owe it to chance. Where no member or each was counted the spread says nothing: the interval is that of `count`
-    independent members. 0 to 1 where an estimate is missing.
+    that all count the same may owe it to chance. Where no member or each was counted the spread says nothing: the
+    interval is that of `count` independent members. 0 to 1 where an estimate is missing.
     """
     error, _ = of_replicates(each, confidence)
     error = np.hypot(error, least / np.maximum(count, 1))

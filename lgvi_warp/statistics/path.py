@@ -110,7 +110,6 @@ class _PathExtreme(Statistic):
             found += one.estimates([own(part, i) for part in parts], time[-1:])
         return found
 
-
     def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
         """Each statistic's own."""
         found: Part = {}

@@ -28,9 +28,11 @@ class Until:
     statistic: the name of one of the run's statistics, such as "mean position"; one component of it, "mean position[2]";
     one level of it, "quantiles depth 0.95" or "quantiles position[2] 0.95"; one entry of a covariance, "covariance
     position[0], position[2]": as the command prints them. A mean of any quantity is gathered if it is not among them.
-    half_width: in the statistic's unit, above 0; every component and level of what is named must keep it. at: sample time [s], by default the end; "all": at every sample time. members: no look before so
-    many (a small sample may look narrower than it is). The run stops at a block's end; looks are made in the order of
-    the blocks, so members and bits do not depend on threads. docs/statistics.md says what stopping does to coverage.
+    half_width: in the statistic's unit, above 0; every component and level of what is named must keep it. at: sample
+    time [s], by default the end; "all": at every sample time. members: no look before so many (a small sample may look
+    narrower than it is). The run stops at a block's end; looks are made in the order of the blocks, so members and bits do
+    not depend on threads; with replicates of a design, at powers of two of members. docs/statistics.md says what stopping
+    does to coverage.
 
     Raises SceneError naming every fault.
     """
@@ -167,11 +169,11 @@ def _entries(one: Statistic) -> dict[str, dict[str, int]]:
     found: dict[str, dict[str, int]] = {one.key: {}}
     for i, label in enumerate(one.quantity.labels):
         index = label[label.find("[") :] if "[" in label else f"[{i}]"
-        found |= dict.fromkeys((f"{one.key}{index}", f"{one.type} {label}"), {"component": i, "component_2": i})
+        found[f"{one.key}{index}"] = found[f"{one.type} {label}"] = {"component": i, "component_2": i}
     if isinstance(one, Quantiles):
         for name, entry in list(found.items()):
             for j, level in enumerate(one.levels):
-                found |= dict.fromkeys((f"{name} {level!r}", f"{name} {level:g}"), entry | {"level": j})
+                found[f"{name} {level!r}"] = found[f"{name} {level:g}"] = entry | {"level": j}
     if isinstance(one, Covariance):
         pairs = itertools.product(enumerate(one.quantity.labels), repeat=2)
         found |= {f"{one.type} {a}, {b}": {"component": i, "component_2": j} for (i, a), (j, b) in pairs}

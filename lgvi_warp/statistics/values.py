@@ -59,9 +59,7 @@ class Values:
         return np.where(self.good[:, None], self.x - self.mean[:, :, None], 0.0)
 
 
-def dealt(
-    x: np.ndarray, good: np.ndarray | None, first: int, block: int, size: int, replicates: int
-) -> Values:
+def dealt(x: np.ndarray, good: np.ndarray | None, first: int, block: int, size: int, replicates: int) -> Values:
     """Values with a row for each time and replicate, where member i is of replicate i mod R.
 
     x (k, d, n), good (k, n): of all members, n a multiple of R.

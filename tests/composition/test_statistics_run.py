@@ -348,7 +348,9 @@ def designed(scene):
     """1,024 members of the paper's scene by each sampling, to t = 5: sampling -> result."""
     save = lw.SaveAt(every=1.0)
     return {
-        sampling: lw.solve(lw.Ensemble(scene, 1024, 1, STARTS, sampling), h=0.01, t1=5.0, save=save, statistics=REPLICATED)
+        sampling: lw.solve(
+            lw.Ensemble(scene, 1024, 1, STARTS, sampling), h=0.01, t1=5.0, save=save, statistics=REPLICATED
+        )
         for sampling in ("random", "sobol", lw.Sobol(replicates=16), lw.LatinHypercube(64, replicates=16))
     }
 
@@ -370,7 +372,9 @@ def test_values_of_replicates_are_those_of_the_samples(designed):
     found, b = r.statistics, r.position
     np.testing.assert_allclose(found["mean position"].value, b.mean(axis=1), rtol=0, atol=1e-13)
     means = b.reshape(6, 64, 16, 3).mean(axis=1)
-    np.testing.assert_allclose(found["mean position"]["standard_error"], means.std(axis=1, ddof=1) / 4.0, rtol=1e-10, atol=1e-15)
+    np.testing.assert_allclose(
+        found["mean position"]["standard_error"], means.std(axis=1, ddof=1) / 4.0, rtol=1e-10, atol=1e-15
+    )
     deepest = found["extremes depth"]
     np.testing.assert_array_equal(deepest["maximum_member"][:, 0], b[..., 2].argmax(axis=1))
     np.testing.assert_array_equal(deepest["maximum"][:, 0], b[..., 2].max(axis=1))
@@ -404,7 +408,9 @@ def test_a_run_of_replicates_stops_at_a_power_of_two():
     # Of 0.95 it takes more: the density there is a quarter of that in the middle.
     both = lw.solve(fleet, **fleet_of, until=lw.Until("quantiles position[2] 0.95", 0.02))
     assert both.members > r.members and both.statistics["quantiles position"].half_width[-1, 1, 2] <= 0.02
-    assert any("reached with" in text for text in both.messages) and not any("balanced" in text for text in both.messages)
+    assert any("reached with" in text for text in both.messages) and not any(
+        "balanced" in text for text in both.messages
+    )
 
 
 @pytest.mark.parametrize(("given", "text"), [

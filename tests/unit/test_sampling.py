@@ -28,7 +28,11 @@ VARY = {
 }
 SPACE = Space(3, ("a", "b"), (2, 1), (("a[0]", (0,)), ("a[1]", (1,)), ("b", (2,))))
 SEQUENCES = ("random", "sobol", "halton", {"latin_hypercube": {"group": 40}})
-REPLICATED = ({"sobol": {"replicates": 8}}, {"halton": {"replicates": 4}}, {"latin_hypercube": {"group": 10, "replicates": 4}})
+REPLICATED = (
+    {"sobol": {"replicates": 8}},
+    {"halton": {"replicates": 4}},
+    {"latin_hypercube": {"group": 10, "replicates": 4}},
+)
 # 6 factors vary, three of them joint laws: groups of 14 or 8 members, and paths of 7.
 DESIGNS = ({"saltelli": {"second_order": True}}, {"saltelli": {"second_order": False}}, "morris")
 

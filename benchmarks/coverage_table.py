@@ -109,7 +109,11 @@ def stopped(repetitions, until, blocks, truth, replicates=1):
         good[now] = ((found.lower <= truth) & (truth <= found.upper))[now, 0]
         if members.all():
             break
-    assert members.all()
+    # Who never had enough keeps the interval of all.
+    left = members == 0
+    assert not left.any() or i * BLOCK == watch.looked
+    members[left] = i * BLOCK
+    good[left] = ((found.lower <= truth) & (truth <= found.upper))[left, 0]
     return float(good.mean()), float(members.mean())
 
 
@@ -189,7 +193,9 @@ def main():
     for law, least, wanted, part, taken in stops(n):
         print(f"| {law} | {least} | {wanted} | {part:.1%} | {taken:.0f} |", flush=True)
     few = max(1, n // 5)
-    print(f"\n| {few:,} intervals of 95 %, each of {MEMBERS:,} members | {' | '.join(map(called, DESIGNS))} |")
+    print(
+        f"\n| {few:,} intervals of 95 %, each of {MEMBERS:,} members: hold, width | {' | '.join(map(called, DESIGNS))} |"
+    )
     print("|---|" + "---|" * len(DESIGNS))
     columns = [list(replicated(few, design)) for design in DESIGNS]
     for row in zip(*columns, strict=True):

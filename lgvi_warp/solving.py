@@ -213,7 +213,7 @@ def run_plan(
     compile_seconds = plan.compile()
     total = plan.ensemble.members
     outcomes, samples = Outcomes(plan), Samples(plan, fields) if observed.samples else None
-    observing = Observing(observed, plan.grid.times, total)
+    observing = Observing(observed, plan.grid.times, total, plan.ensemble.replicates)
     keepers = (outcomes, *((samples,) if samples else ()), *observing.keepers)
     made = Progress(total * plan.grid.steps, progress)
     start = time.perf_counter()
@@ -275,7 +275,7 @@ def run_stored(
     observed = observed or Observation()
     compile_seconds = plan.compile()
     start = time.perf_counter()
-    observing = Observing(observed, plan.grid.times, plan.ensemble.members)
+    observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
     into = settled(store, plan, observed, fields)
     told = provenance(plan, observed, fields)
     folder = Stored(plan, into, told, messages(plan), observing.keepers, only, observing.enough).run(executor, progress)

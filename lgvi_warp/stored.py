@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.errors import SceneError
-from lgvi_warp.observation import Observation, Observing, observation_of
+from lgvi_warp.observation import Observation, Observing, observation_of, replicates_of
 from lgvi_warp.result import UNITS, Result
 from lgvi_warp.statistics.estimate import Estimates
 from lgvi_warp.store import Folder, Sink
@@ -94,7 +94,8 @@ def open_run(
 
 def gathered(folder: Folder, observed: Observation) -> Observing:
     """The statistics of a complete run, from the parts of its blocks."""
-    observing = Observing(observed, folder.group()["time"][:], int(folder.recipe["members"]))
+    time, replicates = folder.group()["time"][:], replicates_of(folder.provenance["ensemble"])
+    observing = Observing(observed, time, int(folder.recipe["members"]), replicates)
     sink = Sink(folder.path, ())
     for block in folder.runs:
         for keeper, part in zip(observing.keepers, sink.parts(block, observing.keepers) or (), strict=True):

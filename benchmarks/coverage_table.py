@@ -46,7 +46,7 @@ def parts(statistic, blocks, replicates=1):
     """The tree after each block of values (repetitions, members, d): repetitions stand where times do."""
     tree = Tree(statistic.join)
     for i, x in enumerate(blocks):
-        gathers = statistic.open(len(x), x.shape[1])
+        gathers = statistic.open(np.arange(float(len(x))), x.shape[1])
         given = np.ascontiguousarray(np.moveaxis(x, 2, 1)), None, i * BLOCK, i, BLOCK
         gathers.take(Values(*given) if replicates == 1 else dealt(*given, replicates), slice(0, len(x)))
         tree.add(i, gathers.close())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from numbers import Integral
 from typing import Any, ClassVar
 
 import numpy as np
@@ -92,8 +93,10 @@ class Quantiles(Statistic):
                 faults.add("levels", self.levels, "are no numbers between 0 and 1", "give (0.05, 0.5, 0.95)")
             object.__setattr__(self, "levels", tuple(np.unique(levels).tolist()))
         n = self.size
-        if isinstance(n, bool) or not isinstance(n, int) or n < 64 or n & (n - 1):
+        if isinstance(n, bool) or not isinstance(n, Integral) or n < 64 or int(n) & (int(n) - 1):
             faults.add("size", n, "is no power of two from 64", "give 2048")
+        else:
+            object.__setattr__(self, "size", int(n))
 
     def rows(self, values: Values) -> Part:
         """The block's values, sorted; every other one, and so on, down to `size`."""

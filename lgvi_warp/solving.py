@@ -222,9 +222,9 @@ def run_plan(
         progress(1.0)
     run_seconds = time.perf_counter() - start
     told = provenance(plan, observed, fields)
-    estimates, said = observing.read(told["ensemble"], n)
     parameters = Drawn(plan.ensemble, n)
     of_members = {name: values[:n] for name, values in member_fields.of(plan, outcomes).items()}
+    estimates, said = observing.read(told["ensemble"], of_members["status"])
     found = samples.fields if samples and samples.fields else {}
     return Result(
         time=plan.grid.times,

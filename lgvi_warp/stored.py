@@ -125,7 +125,9 @@ def result_of(
             provenance[name] = float(small[name].mean())
     if n < whole:
         provenance["members"] = n
-    estimates, said = observing.read(provenance["ensemble"], n) if observing else (Estimates(), ())
+    estimates, said = Estimates(), tuple[str, ...]()
+    if observing is not None:
+        estimates, said = observing.read(provenance["ensemble"], small["status"])
     return Result(
         time=group["time"][:],
         samples=Arrays(group, fields, 1, at),

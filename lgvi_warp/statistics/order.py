@@ -73,8 +73,9 @@ class Extremes(Statistic):
 class Quantiles(Statistic):
     """Quantiles over members: value (k, levels, d). Exact up to `size` members; then from a sketch with a proven bound.
 
-    levels: between 0 and 1. size: numbers that each level of the sketch keeps, a power of two. rank_error (k,): proven
-    bound on the rank's error as a fraction of the members; what is to be expected is several times smaller.
+    levels: between 0 and 1. size: numbers that each level of the sketch keeps, a power of two; below 256 no block is
+    exact, however few its members. rank_error (k,): proven bound on the rank's error as a fraction of the members; what is
+    to be expected is several times smaller.
     Interval: from the ranks of sorted values (binomial, no assumption on the distribution), widened by the sketch's
     standard error; infinite where too few members lie beyond the level. Each replicate has a sketch of its own.
     """

@@ -151,10 +151,10 @@ class Condition(Statistic):
     def holds(self, values: Values) -> np.ndarray:
         """(k, d, n): for which members that count it holds."""
         above, below = self.limits(values.x.shape[1])
-        if above is None and below is None:
-            found = values.x != 0.0
+        if below is None:
+            found = values.x != 0.0 if above is None else values.x > above
         else:
-            found = (above is None or values.x > above) & (below is None or values.x < below)
+            found = values.x < below if above is None else (values.x > above) & (values.x < below)
         return found if values.good is None else found & values.good[:, None]
 
 

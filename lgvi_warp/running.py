@@ -107,7 +107,8 @@ class Stored:
             self._mend()
             left = self._left(sink)
             try:
-                members = self._blocks(sink, left, executor, progress)
+                with sink.commits:
+                    members = self._blocks(sink, left, executor, progress)
             except OSError as error:
                 raise explained(error, path) from error
             finally:

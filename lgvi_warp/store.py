@@ -2,7 +2,7 @@
 
     run.zarr/zarr.json            attributes: provenance, recipe, messages, complete
     run.zarr/position/c.0.3.0     chunk: times 0, block 3 (see store_layout)
-    run.zarr/parts/000000768/     what keepers closed the block with, one .npz each
+    run.zarr/parts/000000768.npz  what keepers closed the block with
     run.zarr/blocks/000000768.json   the block that begins with member 768 is finished: its files, sizes, checksums
 
 Nothing in it tells the time of day: the same run leaves the same bytes.
@@ -26,6 +26,7 @@ import numpy as np
 
 from lgvi_warp import durable, machine
 from lgvi_warp.blocks import Block, Keeper, PartKeeper, blocks
+from lgvi_warp.commits import Commits
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.recipe import ensemble_of, plan_of, recipe
 from lgvi_warp.saveat import FIELDS
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
     from lgvi_warp.ensemble import Ensemble
     from lgvi_warp.plan import Plan
 
-FORMAT = 1
+FORMAT = 2
 # Few enough bytes a chunk for its memory, enough that files and their syncs cost little.
 CHUNK_BYTES = 10_000_000
 EXISTING = ("refuse", "resume", "overwrite")
@@ -109,6 +110,7 @@ class Sink:
     root: Path
     columns: tuple[Column, ...]
     room: Room = field(default_factory=Room, compare=False)
+    commits: Commits = field(default_factory=Commits, compare=False)
 
     def open(self, plan: Plan, block: Block, members: Any) -> BlockWriter:
         """A writer of the block's chunks."""
@@ -118,16 +120,15 @@ class Sink:
         """The block is in its place already."""
 
     def finish(self, block: Block, files: durable.Files, keepers: Sequence[Keeper], parts: Sequence[Any]) -> None:
-        """Make a block durable, with the parts of keepers, and mark it."""
-        for keeper, part in zip(keepers, parts, strict=True):
-            assert isinstance(keeper, PartKeeper)
-            key = f"parts/{name_of(block)}/{keeper.name}.npz"
-            (self.root / key).parent.mkdir(exist_ok=True)
-            files.write(key, packed(*keeper.to_arrays(part)))
-        files.finish()
-        if parts:
-            durable.sync_folder(self.root / "parts")
-        durable.write_whole(self.marker(block), marker(files.sums))
+        """Hand a block over to be made durable, with the parts of keepers, and marked. Raises OSError."""
+        if keepers:
+            files.write(self.parts_key(block), packed(keepers, parts))
+        self.commits.add(files, self.marker(block), marker(files.sums))
+
+    @staticmethod
+    def parts_key(block: Block) -> str:
+        """The file of what keepers closed a block with, below the root."""
+        return f"parts/{name_of(block)}.npz"
 
     def marker(self, block: Block) -> Path:
         """The file that says that a block is finished."""
@@ -137,12 +138,7 @@ class Sink:
         """The parts of a finished block; None if it is not finished."""
         if read_marker(self.marker(block)) is None:
             return None
-        found = []
-        for keeper in keepers:
-            assert isinstance(keeper, PartKeeper)
-            path = self.root / "parts" / name_of(block) / f"{keeper.name}.npz"
-            found.append(keeper.from_arrays(*unpacked(path.read_bytes())))
-        return tuple(found)
+        return unpacked(keepers, self.root / self.parts_key(block)) if keepers else ()
 
     def faults(self, block: Block, samples: int, keepers: Sequence[Keeper]) -> list[str]:
         """What is wrong with a finished block's files; "is not finished" alone for one that is not."""
@@ -150,7 +146,7 @@ class Sink:
         if sums is None:
             return ["is not finished"]
         wanted = [key for column in self.columns for key in column.keys(block, samples)]
-        wanted += [f"parts/{name_of(block)}/{keeper.name}.npz" for keeper in keepers if isinstance(keeper, PartKeeper)]
+        wanted += [self.parts_key(block)] if keepers else []
         found = [(key, "is not in the marker") for key in wanted if key not in sums]
         found += [(key, text) for key, one in sums.items() if (text := durable.fault(self.root, key, *one))]
         return [f"{key} {text}" for key, text in found]
@@ -163,27 +159,37 @@ class Sink:
             for column in self.columns:
                 for key in column.keys(block, samples):
                     (self.root / key).unlink(missing_ok=True)
-            shutil.rmtree(self.root / "parts" / name_of(block), ignore_errors=True)
+            (self.root / self.parts_key(block)).unlink(missing_ok=True)
 
     def remove_unfinished(self) -> None:
         """Remove what killed writers left."""
-        parts = self.root / "parts"
-        own = [self.root / column.name for column in self.columns]
-        durable.remove_unfinished([self.root, self.root / "blocks", *own, *(parts.iterdir() if parts.is_dir() else ())])
+        names = ("blocks", "parts", *(column.name for column in self.columns))
+        durable.remove_unfinished([self.root, *(self.root / name for name in names)])
 
 
-def packed(arrays: Mapping[str, np.ndarray], content: Any) -> bytes:
-    """Arrays and what JSON holds as the bytes of an .npz file, always the same."""
+def packed(keepers: Sequence[Keeper], parts: Sequence[Any]) -> bytes:
+    """What keepers closed a block with, as the bytes of an .npz file, always the same: keeper/array, keeper/json."""
+    arrays: dict[str, Any] = {}
+    for keeper, part in zip(keepers, parts, strict=True):
+        assert isinstance(keeper, PartKeeper)
+        own, content = keeper.to_arrays(part)
+        arrays[f"{keeper.name}/json"] = np.array(json.dumps(content, sort_keys=True))
+        arrays |= {f"{keeper.name}/array.{name}": values for name, values in own.items()}
     buffer = io.BytesIO()
-    np.savez(buffer, json=np.array(json.dumps(content, sort_keys=True)), **{f"array.{k}": v for k, v in arrays.items()})  # type: ignore[arg-type]
+    np.savez(buffer, **arrays)
     return buffer.getvalue()
 
 
-def unpacked(data: bytes) -> tuple[dict[str, np.ndarray], Any]:
-    """What was packed."""
-    with np.load(io.BytesIO(data), allow_pickle=False) as file:
-        arrays = {name.removeprefix("array."): file[name] for name in file.files if name != "json"}
-        return arrays, json.loads(str(file["json"]))
+def unpacked(keepers: Sequence[Keeper], path: Path) -> tuple[Any, ...]:
+    """What was packed, of these keepers."""
+    parts = []
+    with np.load(path, allow_pickle=False) as file:
+        for keeper in keepers:
+            assert isinstance(keeper, PartKeeper)
+            head = f"{keeper.name}/array."
+            own = {name.removeprefix(head): file[name] for name in file.files if name.startswith(head)}
+            parts.append(keeper.from_arrays(own, json.loads(str(file[f"{keeper.name}/json"]))))
+    return tuple(parts)
 
 
 def marker(sums: Mapping[str, list[int]]) -> bytes:

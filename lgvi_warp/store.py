@@ -347,6 +347,7 @@ def skeleton(
 ) -> None:
     """Groups and arrays without their blocks, on the disk."""
     import zarr
+    from zarr.storage import MemoryStore
 
     shared = {
         name: values.tolist()
@@ -355,7 +356,10 @@ def skeleton(
     }
     made = recipe(plan) | {"store": store.layout(), "keepers": names_of(keepers)}
     texts = [json.dumps(one) for one in (provenance, made, list(messages), shared)]
-    group = zarr.create_group(root, zarr_format=3, attributes=_attributes(texts, provenance))
+    # zarr writes into memory and `files` onto the disk, side by side: one by one the files would take several times as long.
+    inside: dict[str, Any] = {}
+    own = MemoryStore(inside)
+    group = zarr.create_group(own, zarr_format=3, attributes=_attributes(texts, provenance))
     k, n = len(plan.grid.times), plan.ensemble.members
     _whole(group, "time", plan.grid.times, ("time",), {"units": "s", "long_name": "time since the start", "axis": "T"})
     _whole(group, "step", plan.grid.sample_steps, ("time",), {"units": "1", "long_name": "steps made until then"})
@@ -366,10 +370,15 @@ def skeleton(
     with warnings.catch_warnings():
         # Consolidated metadata is what lets xarray open the store in one read; zarr remarks that version 3 has no rule for it.
         warnings.simplefilter("ignore")
-        zarr.consolidate_metadata(root, zarr_format=3)
-    for name in ("blocks", "parts"):
-        (root / name).mkdir()
-    _sync(root)
+        zarr.consolidate_metadata(own, zarr_format=3)
+    for folder in {os.path.dirname(key) for key in inside} | {"blocks", "parts"}:
+        (root / folder).mkdir(parents=True, exist_ok=True)
+    files = durable.Files(root)
+    for key in sorted(inside):
+        files.write(key, inside.pop(key).as_numpy_array())
+    # The root's metadata will change: it has a checksum of its own.
+    files.write(CREATED, marker({key: one for key, one in files.sums.items() if key != ROOT}))
+    files.finish()
 
 
 def _attributes(texts: Sequence[str], provenance: Mapping[str, Any]) -> dict[str, Any]:
@@ -413,22 +422,6 @@ def _explicit(group: Any, plan: Plan) -> None:
     for name, values in given.items():
         dims = (f"{MEMBER}_given" if name != "indices" else MEMBER, *(f"{name}_{i}" for i in range(values.ndim - 1)))
         _whole(group, name, values, dims, {"units": units.get(name, "1")})
-
-
-def _sync(root: Path) -> None:
-    """Note every file but the root's metadata with its checksum, and sync all."""
-    sums = {}
-    for folder, _, files in os.walk(root):
-        for name in files:
-            path = Path(folder) / name
-            data = path.read_bytes()
-            if path != root / ROOT:
-                sums[path.relative_to(root).as_posix()] = [len(data), durable.checksum(data)]
-            descriptor = os.open(path, os.O_RDONLY)
-            os.fsync(descriptor)
-            os.close(descriptor)
-        durable.sync_folder(Path(folder))
-    durable.write_whole(root / CREATED, marker(sums))
 
 
 def check(

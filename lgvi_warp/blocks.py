@@ -117,7 +117,9 @@ class Work:
     """What executors do to each block: advance it, and put it into the store if there is one. Can be pickled.
 
     sink: the store. Called with a block, it returns what each keeper closed with, or None if it was halted; a block that
-    the store has is not run again. advanced: called with the vehicle-steps made of this block so far.
+    the store has is not run again. A copy in another process returns when its block is durable; in the run's own process
+    the run waits at its end for the blocks that are not durable yet.
+    advanced: called with the vehicle-steps made of this block so far.
     """
 
     plan: Plan

@@ -103,7 +103,7 @@ class PartKeeper(Keeper, Protocol):
 
     @property
     def name(self) -> str:
-        """What its file is called by: unlike that of any other keeper of the run."""
+        """What its parts are called by: unlike those of any other keeper of the run."""
 
     def to_arrays(self, part: Any) -> tuple[dict[str, np.ndarray], Any]:
         """A part as arrays by name, and what JSON holds."""

@@ -2,7 +2,7 @@
 
     run.zarr/zarr.json            attributes: provenance, recipe, messages, complete
     run.zarr/position/c.0.3.0     chunk: times 0, block 3 (see store_layout)
-    run.zarr/parts/000000768.npz  what keepers closed the block with
+    run.zarr/parts/000000768.npy  what keepers closed the block with
     run.zarr/blocks/000000768.json   the block that begins with member 768 is finished: its files, sizes, checksums
 
 Nothing in it tells the time of day: the same run leaves the same bytes.
@@ -128,7 +128,7 @@ class Sink:
     @staticmethod
     def parts_key(block: Block) -> str:
         """The file of what keepers closed a block with, below the root."""
-        return f"parts/{name_of(block)}.npz"
+        return f"parts/{name_of(block)}.npy"
 
     def marker(self, block: Block) -> Path:
         """The file that says that a block is finished."""
@@ -168,28 +168,26 @@ class Sink:
 
 
 def packed(keepers: Sequence[Keeper], parts: Sequence[Any]) -> bytes:
-    """What keepers closed a block with, as the bytes of an .npz file, always the same: keeper/array, keeper/json."""
-    arrays: dict[str, Any] = {}
+    """What keepers closed a block with, always the same bytes: a JSON text, then the arrays, each as in an .npy file."""
+    told: list[tuple[str, list[str], Any]] = []
+    arrays: list[np.ndarray] = []
     for keeper, part in zip(keepers, parts, strict=True):
         assert isinstance(keeper, PartKeeper)
         own, content = keeper.to_arrays(part)
-        arrays[f"{keeper.name}/json"] = np.array(json.dumps(content, sort_keys=True))
-        arrays |= {f"{keeper.name}/array.{name}": values for name, values in own.items()}
+        told.append((keeper.name, list(own), content))
+        arrays += own.values()
     buffer = io.BytesIO()
-    np.savez(buffer, **arrays)
+    for values in (np.array(json.dumps(told, sort_keys=True)), *arrays):
+        np.save(buffer, values, allow_pickle=False)
     return buffer.getvalue()
 
 
 def unpacked(keepers: Sequence[Keeper], path: Path) -> tuple[Any, ...]:
-    """What was packed, of these keepers."""
-    parts = []
-    with np.load(path, allow_pickle=False) as file:
-        for keeper in keepers:
-            assert isinstance(keeper, PartKeeper)
-            head = f"{keeper.name}/array."
-            own = {name.removeprefix(head): file[name] for name in file.files if name.startswith(head)}
-            parts.append(keeper.from_arrays(own, json.loads(str(file[f"{keeper.name}/json"]))))
-    return tuple(parts)
+    """The parts of these keepers, of all that were packed."""
+    with path.open("rb") as file:
+        told = json.loads(str(np.load(file)))
+        found = {name: ({one: np.load(file) for one in arrays}, content) for name, arrays, content in told}
+    return tuple(keeper.from_arrays(*found[keeper.name]) for keeper in keepers if isinstance(keeper, PartKeeper))
 
 
 def marker(sums: Mapping[str, list[int]]) -> bytes:

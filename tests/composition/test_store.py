@@ -458,11 +458,24 @@ def test_parts_of_keepers_lie_in_the_store(tmp_path, memory):
     assert differing(tmp_path / "a.zarr", tmp_path / "b.zarr") == []
     with pytest.raises(lw.SceneError, match=r"stores \['depth sum'\], not \[\]"):
         lw.resume(tmp_path / "b.zarr")
-    path = tmp_path / "b.zarr" / "parts" / "000000512.npz"
+    path = tmp_path / "b.zarr" / "parts" / "000000512.npy"
     flip(path)
-    assert any("000000512.npz has changed" in text for text in resuming.state(tmp_path / "b.zarr")["damage"])
+    assert any("000000512.npy has changed" in text for text in resuming.state(tmp_path / "b.zarr")["damage"])
     assert run("b.zarr", existing="resume").sums.tobytes() == one.sums.tobytes()
     assert differing(tmp_path / "a.zarr", tmp_path / "b.zarr") == []
+
+
+def test_parts_of_several_keepers_lie_in_one_file(tmp_path):
+    plan = make_plan(fleet(10), **SETTINGS)
+    several = DepthSum(plan), DepthSum(plan), DepthSum(plan)
+    given = np.arange(4.0), np.zeros(0), np.array([-0.0, np.nan])
+    for keeper, name in zip(several, ("second", "a third", "first"), strict=True):
+        keeper.name = name
+    path = tmp_path / "000000000.npy"
+    path.write_bytes(store.packed(several, given))
+    found = store.unpacked(several[::-1], path)
+    assert [one.tobytes() for one in found] == [one.tobytes() for one in given[::-1]]
+    assert [one.tobytes() for one in store.unpacked(several[1:2], path)] == [b""]
 
 
 def test_keepers_that_cannot_be_stored_are_refused(tmp_path):

@@ -182,7 +182,7 @@ def memory(plan: Plan, threads: int, store: Store | None, fields: Sequence[str] 
     """Bytes that a run adds to the process: its result or its chunks, and what the blocks at work hold."""
     runs = blocks(plan.ensemble.members)
     count, n = runs[0].count, plan.ensemble.members
-    working = min(len(runs), threads * (2 if store and threads > 1 else 1))
+    working = min(len(runs), threads)
     row = sum(plan.spec.sample_fields.values()) * np.dtype(machine.DTYPES[plan.dtype]).itemsize
     segment = min(SEGMENT_SAMPLE_BYTES, row * count * len(plan.grid.times))
     # A segment's samples: the kernel's, the members' in order, and turned or moved copies.
@@ -194,10 +194,9 @@ def memory(plan: Plan, threads: int, store: Store | None, fields: Sequence[str] 
 
 
 def writing(plan: Plan, store: Store, folder: Path, threads: int) -> float:
-    """Seconds that a store's disk takes: its metadata, its bytes, and for each block the wait until they are safe."""
+    """Seconds that a store's disk takes: its metadata, its bytes, and the wait until the last blocks are safe."""
     from lgvi_warp.solving import messages, provenance
 
-    runs = blocks(plan.ensemble.members)
     with tempfile.TemporaryDirectory(dir=folder) as name:
         start = time.perf_counter()
         create(replace(store, path=Path(name) / "run.zarr"), plan, provenance(plan), messages(plan))
@@ -205,9 +204,9 @@ def writing(plan: Plan, store: Store, folder: Path, threads: int) -> float:
         start = time.perf_counter()
         for i in range(SYNCS):
             durable.write_whole(Path(name) / f"{i}", b"0")
-        # Its chunks, then its marker; several blocks wait at a time.
-        wait = 2.0 * (time.perf_counter() - start) / SYNCS / min(2 * threads, len(runs))
-    return begin + size(plan, store) / disk_speed(folder, threads) + wait * len(runs)
+        # Their files, then their markers.
+        wait = 2.0 * (time.perf_counter() - start) / SYNCS
+    return begin + size(plan, store) / disk_speed(folder, threads) + wait
 
 
 def disk_speed(folder: Path, threads: int) -> float:

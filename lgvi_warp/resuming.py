@@ -10,6 +10,7 @@ from typing import Any
 
 from lgvi_warp import durable
 from lgvi_warp.blocks import Block, Keeper
+from lgvi_warp.commits import Commits
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import SceneError
 from lgvi_warp.executors import Executor, executor_of
@@ -90,8 +91,9 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
     shutil.rmtree(beside, ignore_errors=True)
     shutil.copytree(first.path, beside, ignore=lambda folder, names: _of_blocks(first.path, folder, names))
     made = Folder(beside)
-    for block in first.runs:
-        _copy_block(parts, block, beside)
+    with Commits() as commits:
+        for block in first.runs:
+            _copy_block(parts, block, beside, commits)
     if not made.unfinished():
         made.finish()
     shutil.rmtree(target, ignore_errors=True)
@@ -107,7 +109,7 @@ def _of_blocks(root: Path, folder: str, names: Sequence[str]) -> set[str]:
     return {name for name in names if (Path(folder) / name).is_file() and (inside / name).as_posix() not in made}
 
 
-def _copy_block(parts: Sequence[Folder], block: Block, target: Path) -> None:
+def _copy_block(parts: Sequence[Folder], block: Block, target: Path, commits: Commits) -> None:
     """A block from the first of the stores that has it whole. Raises SceneError where each has it damaged."""
     damage = []
     for part in parts:
@@ -121,15 +123,13 @@ def _copy_block(parts: Sequence[Folder], block: Block, target: Path) -> None:
                 data = (part.path / key).read_bytes()
             except FileNotFoundError:
                 data = b""
-            (target / key).parent.mkdir(parents=True, exist_ok=True)
             files.write(key, data)
             if files.sums[key][1] != crc:
                 damage.append(f"{part.path / key}: is torn, missing or changed; `lgvi-warp resume {part.path}` first")
                 files.drop()
                 break
         else:
-            files.finish()
-            durable.write_whole(target / "blocks" / sink.marker(block).name, sink.marker(block).read_bytes())
+            commits.add(files, target / "blocks" / sink.marker(block).name, sink.marker(block).read_bytes())
             return
     if damage:
         raise SceneError(damage)

@@ -340,6 +340,38 @@ def test_a_full_disk_keeps_what_is_finished(tmp_path, whole, monkeypatch, capsys
     assert differing(whole, path) == []
 
 
+def test_a_disk_that_is_full_when_a_block_was_written_already(tmp_path, whole, monkeypatch):
+    """Some systems find out when they sync: the run ends, and all other blocks that were written are there."""
+
+    def limited(beside, target, sync=durable.sync_file):
+        if target.name == "000000256.json":
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        sync(beside, target)
+
+    monkeypatch.setattr(durable, "sync_file", limited)
+    path = tmp_path / "run.zarr"
+    with pytest.raises(OSError, match=r"No space left on device: the blocks that were finished are kept"):
+        lw.solve(fleet(), **SETTINGS, store=path, threads=1)
+    assert resuming.state(path)["damage"] == [] and 1 <= resuming.state(path)["finished"] <= 3
+    assert not list(path.rglob(f"*{durable.UNFINISHED}")) and not resuming.state(path)["complete"]
+    monkeypatch.undo()
+    lw.resume(path)
+    assert differing(whole, path) == []
+
+
+def test_an_interrupted_run_keeps_the_blocks_that_were_written(tmp_path, whole):
+    def interrupted(fraction):
+        if fraction > 0.8:
+            raise KeyboardInterrupt
+
+    path = tmp_path / "run.zarr"
+    with pytest.raises(KeyboardInterrupt):
+        lw.solve(fleet(), **SETTINGS, store=path, threads=1, progress=interrupted)
+    assert resuming.state(path)["finished"] == 3 and not list(path.rglob(f"*{durable.UNFINISHED}"))
+    lw.resume(path)
+    assert differing(whole, path) == []
+
+
 def test_a_file_that_may_not_grow_is_told_as_a_full_disk(tmp_path, capsys):
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     arguments = ["run", str(ROOT / "examples" / "paper.toml"), "--members", "500", "--set", "run.save_every=0.1",
@@ -426,11 +458,24 @@ def test_parts_of_keepers_lie_in_the_store(tmp_path, memory):
     assert differing(tmp_path / "a.zarr", tmp_path / "b.zarr") == []
     with pytest.raises(lw.SceneError, match=r"stores \['depth sum'\], not \[\]"):
         lw.resume(tmp_path / "b.zarr")
-    path = tmp_path / "b.zarr" / "parts" / "000000512" / "depth sum.npz"
+    path = tmp_path / "b.zarr" / "parts" / "000000512.npy"
     flip(path)
-    assert any("depth sum.npz has changed" in text for text in resuming.state(tmp_path / "b.zarr")["damage"])
+    assert any("000000512.npy has changed" in text for text in resuming.state(tmp_path / "b.zarr")["damage"])
     assert run("b.zarr", existing="resume").sums.tobytes() == one.sums.tobytes()
     assert differing(tmp_path / "a.zarr", tmp_path / "b.zarr") == []
+
+
+def test_parts_of_several_keepers_lie_in_one_file(tmp_path):
+    plan = make_plan(fleet(10), **SETTINGS)
+    several = DepthSum(plan), DepthSum(plan), DepthSum(plan)
+    given = np.arange(4.0), np.zeros(0), np.array([-0.0, np.nan])
+    for keeper, name in zip(several, ("second", "a third", "first"), strict=True):
+        keeper.name = name
+    path = tmp_path / "000000000.npy"
+    path.write_bytes(store.packed(several, given))
+    found = store.unpacked(several[::-1], path)
+    assert [one.tobytes() for one in found] == [one.tobytes() for one in given[::-1]]
+    assert [one.tobytes() for one in store.unpacked(several[1:2], path)] == [b""]
 
 
 def test_keepers_that_cannot_be_stored_are_refused(tmp_path):

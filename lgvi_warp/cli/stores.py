@@ -1,0 +1,51 @@
+"""The verbs merge, export, and info of a folder."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from lgvi_warp.cli.report import size_of
+
+
+def merge(chosen: argparse.Namespace) -> int:
+    """lgvi-warp merge."""
+    from lgvi_warp.resuming import merge as put_together
+
+    folder = put_together(chosen.dirs, chosen.out, chosen.overwrite)
+    left = len(folder.unfinished())
+    if left:
+        print(f"lgvi-warp: {folder.path}: {left} blocks are in none of the folders; lgvi-warp resume {folder.path} runs them",
+              file=sys.stderr)  # fmt: skip
+    elif not chosen.quiet:
+        print(f"file        {folder.path} ({size_of(folder.path) / 1e6:.1f} MB), complete")
+    return 1 if left else 0
+
+
+def export(chosen: argparse.Namespace) -> int:
+    """lgvi-warp export."""
+    from lgvi_warp.exporting import export as write_as
+
+    path = write_as(chosen.dir, chosen.to, chosen.out)
+    print(f"file        {path} ({size_of(path) / 1e6:.1f} MB)")
+    return 0
+
+
+def info_of_run(path: Path) -> int:
+    """What a store holds. Returns 0 if it is complete and whole, else 1."""
+    from lgvi_warp.resuming import state
+
+    found = state(path)
+    own = found["provenance"]
+    print(f"run         {found['path']} ({found['bytes'] / 1e6:.1f} MB), lgvi-warp {own['versions']['lgvi-warp']}")
+    print(f"members     {found['members']:,}, {own['method']['name']}, {own['dtype']}, step {own['step']:g} s, "
+          f"{own['steps']:,} steps")  # fmt: skip
+    print(f"samples     {found['samples']} times of {', '.join(found['fields']) or 'nothing'}")
+    if found["keepers"]:
+        print(f"parts       {', '.join(found['keepers'])} of each block")
+    print(f"blocks      {found['finished']} of {found['blocks']} finished; "
+          + ("complete" if found["complete"] else f"not complete: lgvi-warp resume {path}"))  # fmt: skip
+    for text in found["damage"]:
+        print(f"damage      {text}")
+    return 0 if found["complete"] else 1

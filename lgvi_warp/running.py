@@ -85,7 +85,8 @@ class Stored:
     """A run into a store, begun or gone on with.
 
     keepers: what else is kept of it, beside the store: their parts lie in it. only: indices of the blocks to run, default
-    all; the run is complete when every block is there, or as many as `enough` (see run_blocks) asks for.
+    all; the run is complete when every block is there, or as many as `enough` (see run_blocks) asks for, and `last` has
+    done what there is to do then: called with this run, its members, the executor and the progress.
     """
 
     plan: Plan
@@ -95,6 +96,7 @@ class Stored:
     keepers: tuple[Keeper, ...] = ()
     only: range | None = None
     enough: Callable[[int], bool] = lambda members: False
+    last: Callable[[Stored, int, Executor, Callable[[float], None] | None], None] = lambda *_: None
 
     def run(self, executor: Executor, progress: Callable[[float], None] | None = None) -> Folder:
         """Run what is missing. Raises SceneError for what is refused, OSError where the disk takes no more."""
@@ -109,7 +111,7 @@ class Stored:
             try:
                 members = self._blocks(sink, left, executor, progress)
             except OSError as error:
-                raise explained(error, path) from error
+                raise explained(error, self.store.whole) from error
             finally:
                 sink.remove_unfinished()
             folder = Folder(path)
@@ -118,6 +120,7 @@ class Stored:
                 # Blocks that were ahead of the last one depend on the number of threads: the store holds none of them.
                 sink.remove(beyond, len(self.plan.grid.times))
             if beyond or not folder.unfinished():
+                self.last(self, members if beyond else self.plan.ensemble.members, executor, progress)
                 folder.finish(members if beyond else None)
         return folder
 
@@ -151,7 +154,7 @@ class Stored:
             else:
                 create(store, self.plan, self.provenance, self.messages, self.keepers)
         except OSError as error:
-            raise explained(error, path) from error
+            raise explained(error, self.store.whole) from error
 
     def _mend(self) -> None:
         """Write anew what is damaged of the files that belong to no block."""

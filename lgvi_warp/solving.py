@@ -16,6 +16,7 @@ from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, MembersFailed, SceneError, shown
 from lgvi_warp.executors import Executor, executor_of
 from lgvi_warp.executors.threads import Threads
+from lgvi_warp.kept import KeptRun
 from lgvi_warp.keepers import Outcomes, Samples
 from lgvi_warp.method import Method
 from lgvi_warp.observation import Observation, Observing, observe
@@ -108,9 +109,10 @@ def solve(
 def finished(
     result: Result, plan: Plan, observed: Observation, fields: Sequence[str], threads: int | None = None
 ) -> Result:
-    """The result with the samples of members that are wanted after all. Raises MembersFailed as the plan says."""
-    indices, kept = again(plan, observed, result.status, fields, threads or machine.thread_count())
-    result = replace(result, kept=kept, kept_members=indices)
+    """The result with the samples of members that are wanted after all, which a store has. Raises MembersFailed."""
+    if result.store is None:
+        indices, kept = again(plan, observed, result.status, fields, threads or machine.thread_count())
+        result = replace(result, kept=kept, kept_members=indices)
     failed = failure_text(result) if plan.on_failure == "raise" else ""
     if failed:
         raise MembersFailed(failed, result)
@@ -248,12 +250,7 @@ def again(
     indices = observed.again(status)
     if not len(indices):
         return indices, None
-    chosen = indices
-    if plan.method.adaptive:
-        # A packet chooses its steps: its members stay together.
-        width = plan.spec.width
-        chosen = np.unique(indices // width)[:, None] * width + np.arange(width)
-        chosen = chosen[chosen < plan.ensemble.members]
+    chosen = plan.with_neighbours(indices)
     result = run_plan(plan.part([int(i) for i in chosen], fields), threads)
     return indices, result if len(chosen) == len(indices) else result.part(np.searchsorted(chosen, indices))
 
@@ -276,8 +273,11 @@ def run_stored(
     start = time.perf_counter()
     observing = Observing(observed, plan.grid.times, plan.ensemble.members)
     into = settled(store, plan, observed, fields)
-    told = provenance(plan, observed, fields)
-    folder = Stored(plan, into, told, messages(plan), observing.keepers, only, observing.enough).run(executor, progress)
+    kept = tuple(name for name in fields or plan.fields if store.fields is None or name in store.fields)
+    told = provenance(plan, observed, kept)
+    folder = Stored(
+        plan, into, told, messages(plan), observing.keepers, only, observing.enough, KeptRun(observed, kept)
+    ).run(executor, progress)
     runs = blocks(plan.ensemble.members)
     members = None if only is None else slice(runs[only[0]].first, runs[only[-1]].stop)
     result = result_of(folder, members, messages(plan), plan.ensemble.scene.terms, observing)
@@ -324,5 +324,5 @@ def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence
         "machine": machine.describe(),
     }
     if observed is not None and observed != Observation():
-        content["observed"] = observed.to_dict() | ({} if observed.samples else {"fields": list(fields or plan.fields)})
+        content["observed"] = observed.to_dict() | ({} if observed.samples else {"fields": list(plan.fields if fields is None else fields)})
     return content

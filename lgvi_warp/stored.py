@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.errors import SceneError
+from lgvi_warp.kept import keep_of, members_kept
 from lgvi_warp.observation import Observation, Observing, observation_of
 from lgvi_warp.result import UNITS, Result
 from lgvi_warp.statistics.estimate import Estimates
-from lgvi_warp.store import Folder, Sink
+from lgvi_warp.store import KEPT, Folder, Sink
+from lgvi_warp.store_layout import KEPT_MEMBER, MEMBER
 from lgvi_warp.terms import Term, from_list
 
 if TYPE_CHECKING:
@@ -74,15 +76,16 @@ def open_run(
 
     members: only these, (m,) indices or a slice. `result.dataset` is a view of all of it by xarray, read piece by piece.
     incomplete: also a run that has not ended; what its blocks have not reached reads as NaN and status 0.
-    result.statistics are those of a complete run's members, all of them; statistics: the run's own, needed for those of
-    functions, which a store does not hold. Raises SceneError where there is no run, or it is not complete, IndexError for
+    result.statistics and result.kept are those of a complete run's members, all of them; statistics: the run's own, needed
+    for those of functions, which a store does not hold. Raises SceneError where there is no run, or it is not complete, IndexError for
     members that it has not.
     """
     folder = Folder(folder_of(path))
     messages = folder.messages
     if not folder.complete:
         left = len(folder.unfinished())
-        text = f"{folder.path}: is not complete: {left} blocks are missing"
+        missing = f"{left} blocks are missing" if left else "the members that it keeps have not been run again yet"
+        text = f"{folder.path}: is not complete: {missing}"
         if not incomplete:
             raise SceneError([f"{text}; go on with `lgvi-warp resume {folder.path.parent}`, or give incomplete=True"])
         return result_of(folder, members, (*messages, text))
@@ -125,6 +128,8 @@ def result_of(
     if n < whole:
         provenance["members"] = n
     estimates, said = observing.read(provenance["ensemble"], n) if observing else (Estimates(), ())
+    of_scene = tuple(from_list(provenance["scene"].get("terms", ())) if terms is None else terms)
+    indices, kept = kept_of(folder, of_scene) if members is None else (np.empty(0, np.int64), None)
     return Result(
         time=group["time"][:],
         samples=Arrays(group, fields, 1, at),
@@ -133,9 +138,31 @@ def result_of(
         messages=messages + said,
         provenance=provenance,
         statistics=estimates,
-        terms=tuple(from_list(provenance["scene"].get("terms", ())) if terms is None else terms),
+        terms=of_scene,
+        kept=kept,
+        kept_members=indices,
         store=folder.path,
     )
+
+
+def kept_of(folder: Folder, terms: Sequence[Term]) -> tuple[np.ndarray, Result | None]:
+    """(indices, samples) of the members that a complete run keeps after all. Raises SceneError where they are lost."""
+    wanted = members_kept(keep_of(folder.provenance), folder) if folder.complete else np.empty(0, np.int64)
+    if not len(wanted):
+        return wanted, None
+    path = folder.path / KEPT
+    if not path.exists():
+        raise SceneError([f"{path}: is missing; `lgvi-warp resume {folder.path}` makes it again"])
+    group = Folder(path)
+    found = result_of(group, _chosen_places(group.group()), group.messages, terms)
+    ensemble = found.provenance["ensemble"]
+    places = np.asarray(ensemble.get("indices", range(folder.members)))[wanted]
+    return wanted, replace(found, provenance=found.provenance | {"ensemble": ensemble | {"indices": places.tolist()}})
+
+
+def _chosen_places(group: Any) -> np.ndarray | None:
+    """Places of the kept members among those that were run with them; None where these are all."""
+    return np.flatnonzero(group["chosen"][:]) if "chosen" in group else None
 
 
 def _places(members: Any, n: int) -> slice | np.ndarray:
@@ -162,4 +189,8 @@ def dataset(path: Path) -> xarray.Dataset:
 
     chunks: Any = {} if importlib.util.find_spec("dask") else None
     whole = xarray.open_dataset(path, engine="zarr", chunks=chunks)
+    if KEPT_MEMBER in whole.dims:
+        whole = whole.swap_dims({KEPT_MEMBER: MEMBER})
+    if "chosen" in whole:
+        whole = whole.isel(realization=np.flatnonzero(whole.chosen.values))
     return whole.isel(realization=slice(0, whole.attrs["members"])) if "members" in whole.attrs else whole

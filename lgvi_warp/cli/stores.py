@@ -44,6 +44,8 @@ def info_of_run(path: Path) -> int:
     print(f"samples     {found['samples']} times of {', '.join(found['fields']) or 'nothing'}")
     if found["keepers"]:
         print(f"parts       {', '.join(found['keepers'])} of each block")
+    if found["kept"]:
+        print(f"kept        {found['kept']:,} members' samples, run again")
     print(f"blocks      {found['finished']} of {found['blocks']} finished; "
           + ("complete" if found["complete"] else f"not complete: lgvi-warp resume {path}"))  # fmt: skip
     for text in found["damage"]:

@@ -82,7 +82,9 @@ class KeptRun:
         store, path = run.store, run.store.folder / KEPT
         wanted = members_kept(self.observed.keep, Folder(store.folder), members)
         beside = run.plan.with_neighbours(wanted)
-        group = KeptStore(path, store.dtype, None, "resume", store.force, store.chunk_bytes, beside, np.isin(beside, wanted))
+        group = KeptStore(
+            path, store.dtype, None, "resume", store.force, store.chunk_bytes, beside, np.isin(beside, wanted)
+        )
         shutil.rmtree(path.with_name(f"{KEPT}.new"), ignore_errors=True)
         if not len(wanted) or not group.is_there():
             shutil.rmtree(path, ignore_errors=True)

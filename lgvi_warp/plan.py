@@ -80,7 +80,9 @@ class Plan:
     spec: Spec = field(init=False)
     advance: Advance = field(init=False)
     # The plan that it is a part of, its members and fields.
-    _whole: tuple[Plan, Sequence[int], Sequence[str]] | None = field(default=None, init=False, compare=False, repr=False)
+    _whole: tuple[Plan, Sequence[int], Sequence[str]] | None = field(
+        default=None, init=False, compare=False, repr=False
+    )
 
     def __post_init__(self) -> None:
         faults = Faults()

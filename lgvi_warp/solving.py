@@ -16,8 +16,8 @@ from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, MembersFailed, SceneError, shown
 from lgvi_warp.executors import Executor, executor_of
 from lgvi_warp.executors.threads import Threads
-from lgvi_warp.kept import KeptRun
 from lgvi_warp.keepers import Outcomes, Samples
+from lgvi_warp.kept import KeptRun
 from lgvi_warp.method import Method
 from lgvi_warp.observation import Observation, Observing, observe
 from lgvi_warp.plan import Plan
@@ -324,5 +324,7 @@ def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence
         "machine": machine.describe(),
     }
     if observed is not None and observed != Observation():
-        content["observed"] = observed.to_dict() | ({} if observed.samples else {"fields": list(plan.fields if fields is None else fields)})
+        content["observed"] = observed.to_dict() | (
+            {} if observed.samples else {"fields": list(plan.fields if fields is None else fields)}
+        )
     return content

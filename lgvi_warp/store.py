@@ -102,7 +102,10 @@ class Store:
         given, units = plan.ensemble.explicit(), parameter_units(plan.ensemble.scene)
         explicit = group.create_group("explicit")
         for name, values in given.items():
-            dims = (f"{MEMBER}_given" if name != "indices" else MEMBER, *(f"{name}_{i}" for i in range(values.ndim - 1)))
+            dims = (
+                f"{MEMBER}_given" if name != "indices" else MEMBER,
+                *(f"{name}_{i}" for i in range(values.ndim - 1)),
+            )
             whole_array(explicit, name, values, dims, {"units": units.get(name, "1")})
 
 
@@ -391,7 +394,9 @@ def skeleton(
     texts = [json.dumps(one) for one in (provenance, made, list(messages), shared)]
     group = zarr.create_group(root, zarr_format=3, attributes=_attributes(texts, provenance))
     k, n = len(plan.grid.times), plan.ensemble.members
-    whole_array(group, "time", plan.grid.times, ("time",), {"units": "s", "long_name": "time since the start", "axis": "T"})
+    whole_array(
+        group, "time", plan.grid.times, ("time",), {"units": "s", "long_name": "time since the start", "axis": "T"}
+    )
     whole_array(group, "step", plan.grid.sample_steps, ("time",), {"units": "1", "long_name": "steps made until then"})
     for column in columns(plan, store):
         _array(group, column.name, column.shape(k, n), column.chunk, column.dtype, column.fill, column.dims,

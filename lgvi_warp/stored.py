@@ -77,8 +77,8 @@ def open_run(
     members: only these, (m,) indices or a slice. `result.dataset` is a view of all of it by xarray, read piece by piece.
     incomplete: also a run that has not ended; what its blocks have not reached reads as NaN and status 0.
     result.statistics and result.kept are those of a complete run's members, all of them; statistics: the run's own, needed
-    for those of functions, which a store does not hold. Raises SceneError where there is no run, or it is not complete, IndexError for
-    members that it has not.
+    for those of functions, which a store does not hold. Raises SceneError where there is no run, or it is not complete,
+    IndexError for members that it has not.
     """
     folder = Folder(folder_of(path))
     messages = folder.messages

@@ -143,7 +143,7 @@ def interrupted(path, whole):
 
 def test_a_run_is_complete_only_with_them(whole, tmp_path, capsys):
     path = interrupted(tmp_path / "run.zarr", whole)
-    with pytest.raises(lw.SceneError, match="members that it keeps have not been run again yet.*resume"):
+    with pytest.raises(lw.SceneError, match=r"members that it keeps have not been run again yet.*resume"):
         lw.open_run(path)
     assert lw.open_run(path, incomplete=True).kept is None and cli.main(["info", str(path)]) == 1
     # What is left of others that were killed there.
@@ -170,19 +170,18 @@ lw.solve(failing(), **SETTINGS, keep="failed", threads=1, store=lw.Store(sys.arg
 """
 
 
-def test_killed_among_its_kept_members(tmp_path):
+@pytest.mark.parametrize("wanted", ["zarr.json", pytest.param("blocks/000000000.json", marks=pytest.mark.slow)])
+def test_killed_among_its_kept_members(wanted, tmp_path):
     env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     path, other = tmp_path / "run.zarr", tmp_path / "other.zarr"
     lw.solve(failing(), **SETTINGS, keep="failed", store=lw.Store(other, chunk_bytes=20_000))
-    for wanted in ("kept/zarr.json", "kept/blocks/000000000.json"):
-        process = subprocess.Popen([sys.executable, "-c", CODE, str(path)], env=env)
-        while not (path / wanted).exists() and process.poll() is None:
-            time.sleep(0.0005)
-        process.kill()
-        process.wait()
-        lw.resume(path)
-        assert differing(other, path) == []
-        shutil.rmtree(path)
+    process = subprocess.Popen([sys.executable, "-c", CODE, str(path)], env=env)
+    while not (path / "kept" / wanted).exists() and process.poll() is None:
+        time.sleep(0.0005)
+    process.kill()
+    assert process.wait() != 0
+    lw.resume(path)
+    assert differing(other, path) == []
 
 
 def test_with_statistics_until_and_fewer_fields(tmp_path):
@@ -201,6 +200,7 @@ def test_with_statistics_until_and_fewer_fields(tmp_path):
     assert lw.resume(tmp_path).kept.position.tobytes() == result.kept.position.tobytes() and tree(tmp_path) == before
 
 
+@pytest.mark.slow  # for its kernels: rk5 that chooses its steps
 def test_members_that_share_their_steps_lie_beside_those_that_are_kept(tmp_path):
     method = lw.Method("rk5", rtol=1e-6, atol=1e-9)
     settings = {"method": method, "h": 0.1, "t1": 1.0, "save": lw.SaveAt(every=0.5), "width": 4}
@@ -248,3 +248,28 @@ def cli_scene():
     from tests.conftest import ROOT
 
     return ROOT / "examples" / "paper.toml"
+
+
+@pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
+def test_netcdf_has_them_in_a_group(whole, memory, tmp_path):
+    import xarray
+
+    failed = np.flatnonzero(memory.status)
+    path = lw.export(whole, "netcdf", tmp_path / "run.nc")
+    with xarray.open_dataset(path, group="kept", engine="netcdf4") as group:
+        np.testing.assert_array_equal(group.member.values, failed)
+        np.testing.assert_array_equal(group.attitude.values, memory.attitude[:, failed])
+        assert group.position.attrs["units"] == "m" and group.attrs["Conventions"] == "CF-1.11"
+    with xarray.open_datatree(path, engine="netcdf4") as tree:
+        assert tree.sizes["realization"] == MEMBERS and tree["kept"].sizes["member"] == len(failed)
+
+
+def test_parquet_has_the_rows_of_those_that_are_kept(whole, memory, tmp_path):
+    import pandas
+
+    failed = np.flatnonzero(memory.status)
+    table = pandas.read_parquet(lw.export(whole, "parquet", tmp_path / "run.parquet"))
+    assert len(table) == len(failed) * 31 and table.attrs["units"]["velocity_2"] == "m s-1"
+    one = table[table.realization == failed[300]]
+    np.testing.assert_array_equal(one.position_2, memory.position[:, failed[300], 2])
+    assert set(one["vehicle.mass"]) == {memory.parameters["vehicle.mass"][failed[300]]}

@@ -462,6 +462,11 @@ def test_parquet(whole, memory, tmp_path):
     assert table["realization"][at].as_py() == 700 and table["time"][at].as_py() == memory.time[11]
     assert table["position_2"][at].as_py() == memory.position[11, 700, 2]
     assert table["attitude_12"][at].as_py() == memory.attitude[11, 700, 1, 2]
+    assert table["vehicle.mass"][at].as_py() == memory.parameters["vehicle.mass"][700]
+    assert [table.schema.field(name).metadata for name in ("velocity_0", "vehicle.mass")] == [
+        {b"units": b"m s-1"},
+        {b"units": b"kg"},
+    ]
     with pytest.raises(lw.SceneError, match=r"to = 'csv'"):
         lw.export(whole, "csv")
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import copy
+import functools
 import operator
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
+from lgvi_warp import machine, variations
 from lgvi_warp import scene as scenes
-from lgvi_warp import variations
 from lgvi_warp import vehicle as vehicles
 from lgvi_warp.errors import Faults, closest, shown
 from lgvi_warp.sampling import Sampling
@@ -233,8 +235,12 @@ class Ensemble:
         targets = [target for one in self._variations for target in one.targets] + [one for one, _ in self._columns]
         varied = {name for name in (*(target.name for target in targets), *self._explicit) if name in self._base}
         found: dict[str, _Unphysical] = {}
-        for first in range(0, self.members if varied else 0, CHECKED_AT_ONCE):
-            self._look_at(first, min(first + CHECKED_AT_ONCE, self.members), varied, found)
+        for part in over_members(functools.partial(self._look_at, varied), self.members if varied else 0):
+            for key, one in part.items():
+                if key not in found:
+                    found[key] = one
+                elif not one.shared:
+                    found[key].count += one.count
         faults = Faults()
         for key, one in found.items():
             drawn = any(name in {t.name for v in self._variations for t in v.targets} for name in key.split(" + "))
@@ -243,7 +249,7 @@ class Ensemble:
             faults.add(f"{key} of member {one.first}", one.value, what, remedy)
         faults.raise_if_any()
 
-    def _look_at(self, first: int, stop: int, varied: set[str], found: dict[str, _Unphysical]) -> None:
+    def _look_at(self, varied: set[str], first: int, stop: int) -> dict[str, _Unphysical]:
         with np.errstate(over="ignore", invalid="ignore"):
             p = self.parameters(first, stop)
             checks = _vehicle_checks(p, varied)
@@ -251,16 +257,16 @@ class Ensemble:
                 own = self.own(one, p)
                 if any(f"{one.key}.{name}" in varied for name in own):
                     checks |= {f"{one.key}.{name}": bad for name, bad in one.unphysical(own).items()}
+        found = {}
         for key, bad in checks.items():
             bad = np.atleast_1d(bad)
-            if not np.any(bad):
-                continue
-            if key not in found:
+            if np.any(bad):
                 names = key.split(" + ")
                 i = int(np.argmax(bad))
                 value = sum(p[name][i % len(p[name])] for name in names if p[name].ndim == p[names[-1]].ndim)
-                found[key] = _Unphysical(first + i, value, len(bad) == 1 and stop - first > 1, len(bad))
-            found[key].count += 0 if found[key].shared and first else int(bad.sum())
+                shared = len(bad) == 1 and stop - first > 1
+                found[key] = _Unphysical(first + i, value, shared, len(bad), int(bad.sum()))
+        return found
 
     @staticmethod
     def own(term: Any, parameters: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -348,8 +354,16 @@ class Ensemble:
         return settings.to_dict() | ({"explicit": sorted(self._explicit)} if self._explicit else {})
 
 
-# Members whose numbers are looked at together when an ensemble is made: some tens of megabytes.
-CHECKED_AT_ONCE = 65_536
+# Members whose numbers are looked at together before a run: some tens of megabytes a thread.
+AT_ONCE = 16_384
+Found = TypeVar("Found")
+
+
+def over_members(look: Callable[[int, int], Found], members: int) -> list[Found]:
+    """What look(first, stop) finds of all members, so many at a time that memory stays small, on all cores; in order."""
+    firsts = range(0, members, AT_ONCE)
+    with ThreadPoolExecutor(min(machine.thread_count(), max(1, len(firsts)))) as pool:
+        return list(pool.map(lambda first: look(first, min(first + AT_ONCE, members)), firsts))
 
 
 @dataclass
@@ -360,7 +374,7 @@ class _Unphysical:
     value: Any
     shared: bool
     of: int
-    count: int = 0
+    count: int
 
 
 def _is_name(name: Any) -> bool:

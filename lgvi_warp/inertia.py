@@ -37,7 +37,9 @@ def blocks(I6: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def joined(M: np.ndarray, C: np.ndarray, J: np.ndarray) -> np.ndarray:
     """I6 (n, 6, 6)."""
-    return np.block([[M, C], [np.swapaxes(C, -1, -2), J]])
+    I6 = np.empty((len(M), 6, 6))
+    I6[:, :3, :3], I6[:, :3, 3:], I6[:, 3:, :3], I6[:, 3:, 3:] = M, C, np.swapaxes(C, -1, -2), J
+    return I6
 
 
 def motion_from(origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
@@ -132,8 +134,13 @@ def _broadcast(Q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def schur(I6: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """M, E = M^-1 C, and Js = J - C^T E."""
     M, C, J = blocks(I6)
-    E = np.linalg.solve(M, C)
-    return M, E, J - np.swapaxes(C, -1, -2) @ E
+    some = np.any(C, axis=(-2, -1))
+    if not some.any():
+        return M, np.zeros_like(C), J
+    E, Js = np.zeros_like(C), J.copy()
+    E[some] = np.linalg.solve(M[some], C[some])
+    Js[some] -= np.swapaxes(C[some], -1, -2) @ E[some]
+    return M, E, Js
 
 
 def uncoupled_frame(I6: np.ndarray) -> tuple[Frame, np.ndarray]:
@@ -141,15 +148,15 @@ def uncoupled_frame(I6: np.ndarray) -> tuple[Frame, np.ndarray]:
 
     The coupling vanishes there if and only if E is skew; its largest remaining value tells whether it does.
     """
-    _, E, Js = schur(I6)
+    M, E, Js = schur(I6)
     origin = -vee(E)
     Q, J = notation.principal_axes(Js)
-    rest = moved(I6, origin, Q)
     some, left = np.any(E, axis=(-2, -1)), np.zeros(len(E))
     if some.any():
-        left[some] = coupling(rest[some])
-    none = np.zeros_like(rest[:, :3, :3])
-    return Frame(Q, origin, origin, rest[:, :3, :3], J, none, none), left
+        left[some] = coupling(moved(I6[some], origin[some], Q[some]))
+    none = np.zeros_like(M)
+    # Mass does not depend on the origin.
+    return Frame(Q, origin, origin, np.swapaxes(Q, -1, -2) @ M @ Q, J, none, none), left
 
 
 def ascending(Q: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -41,7 +41,10 @@ class Outcomes(_Unsent):
         """Put a block's outcome into its place."""
         at = slice(block.first, block.stop)
         for field in dataclasses.fields(part):
-            getattr(self, field.name)[at] = getattr(part, field.name)
+            values = getattr(part, field.name)
+            # Memory that nothing is written into is none: runs without faults have no outcomes to hold.
+            if np.any(values):
+                getattr(self, field.name)[at] = values
 
 
 class _BlockOutcome:

@@ -1,77 +1,39 @@
-"""What a scene needs of a kernel: the frame, the laws that act and how each enters, the method's program for them.
+"""What a scene needs of a kernel: the laws that act and how each enters, the method's program for them.
 
-Decided once for a run, from the numbers of all members; the members' own numbers come later, block by block.
+Decided once for a run, from what a survey of all members says; their own numbers come later, block by block.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from lgvi_warp import inertia, terms, vehicle
-from lgvi_warp.ensemble import Ensemble
+from lgvi_warp import terms, vehicle
+from lgvi_warp.ensemble import Ensemble, over_members
 from lgvi_warp.errors import Faults, closest
-from lgvi_warp.inertia import Frame
-from lgvi_warp.method import FORCED, Method, Program, divided, merged, middle_axis, simplified, with_hops
-from lgvi_warp.terms.base import Setting, Term
-from lgvi_warp.terms.drag import Drag, has_exact_flow
-
-Parameters = Mapping[str, np.ndarray]
-
-# Off-diagonal elements below this fraction of the largest element are the round-off of turning the axes.
-DIAGONAL = 1e-14
-# A coupling norm below this is the round-off of moving the origin.
-UNCOUPLED = 1e-9
-
-
-def shape_of_mass(M: np.ndarray) -> str:
-    """ "isotropic", "diagonal" or "full": the simplest that holds every matrix of M (n, 3, 3)."""
-    off = np.abs(M[:, ~np.eye(3, dtype=bool)]).max(axis=1)
-    diagonal = np.einsum("nii->ni", M)
-    if np.any(off > DIAGONAL * np.abs(diagonal).max(axis=1)):
-        return "full"
-    return "isotropic" if np.all(diagonal == diagonal[:, :1]) else "diagonal"
-
-
-def frame_of(method: Method, parameters: Parameters) -> tuple[Frame, np.ndarray]:
-    """The frame that the method wants, and U (n, 3, 3) of the turns (zero without)."""
-    I6 = vehicle.inertia6(parameters)
-    if method.turns:
-        return inertia.turns_frame(I6, middle_axis(method.program))
-    if method.base == "psi_w":
-        frame = inertia.symmetric_frame(I6)
-    elif method.tableau:
-        frame = _explicit_frame(I6)
-    else:
-        frame, _ = inertia.uncoupled_frame(I6)
-    return frame, np.zeros_like(frame.M)
-
-
-def _explicit_frame(I6: np.ndarray) -> Frame:
-    """Where E is symmetric, so that a vehicle without coupling has none in the kernel."""
-    frame = inertia.symmetric_frame(I6)
-    left = inertia.uncoupled_frame(I6)[1]
-    E = np.where(left[:, None, None] > UNCOUPLED, frame.E, 0.0)
-    return replace(frame, E=E, E_forces=E)
+from lgvi_warp.method import FORCED, Method, Program, divided, merged, simplified, with_hops
+from lgvi_warp.survey import COUPLINGS, SHAPES_OF_MASS, UNCOUPLED, Survey, survey
+from lgvi_warp.terms.base import Term
+from lgvi_warp.terms.drag import PARTS, Drag
 
 
 @dataclass(frozen=True)
 class Model:
     """The choices for one run.
 
-    frame: of all members; aligned: as Setting's. laws: (term, module of its device code); drag by its exact flow first
-    where it is used, and `drag` its parts. flow: "none", "steady", "uniform" or "varying". coupling: which of U12, U13, U23
-    and of the pitches are there. program: sub-maps of one stage. averages: alpha and beta of (15), (16), or None.
-    conservative: no force creates energy, and the potential of all is known to the kernel.
+    aligned: as Setting's; moved: whether the state's origin is not the user's. laws: (term, module of its device code); drag
+    by its exact flow first where it is used, and `drag` its parts. flow: "none", "steady", "uniform" or "varying".
+    coupling: which of U12, U13, U23 and of the pitches are there. program: sub-maps of one stage. averages: alpha and beta
+    of (15), (16), or None. conservative: no force creates energy, and the potential of all is known to the kernel.
     steady: forces never change in inertial axes.
     """
 
     method: Method
-    frame: Frame
     aligned: bool
+    moved: bool
     laws: tuple[tuple[Term, Any], ...]
     events: tuple[tuple[Term, Any], ...]
     mass: str
@@ -100,11 +62,9 @@ def make_model(
 
     checked: whether energy is watched where the scene conserves it or loses it.
     """
-    p = ensemble.parameters(0, ensemble.members)
-    frame, U = frame_of(method, p)
+    seen = survey(ensemble, method, h)
     explicit = method.tableau is not None
-    setting = Setting(p, frame, ensemble.indices, ensemble.seed, h, frame.aligned)
-    acting = _acting(ensemble, p, setting, laws)
+    acting = _acting(ensemble, seen, laws)
     events = tuple((one, _module(one, one.device, stops, "distance")) for one in ensemble.scene.events)
     damping = any(hasattr(module, "damping") for term, module in acting if not isinstance(term, Drag))
     flow = _flow([module for _, module in acting])
@@ -115,22 +75,21 @@ def make_model(
     forced = method.base in FORCED and nonconservative
     if explicit:
         # Along the kernel's axes drag is six numbers and no matrix.
-        exact = len(drags) == 1 and has_exact_flow(frame)
+        exact = len(drags) == 1 and not seen.bent
     else:
         exact = len(drags) == 1 and not damping and flow != "varying" and not forced
     drag: tuple[str, ...] = ()
     if exact:
         term = drags[0][0]
         assert isinstance(term, Drag)
-        drag = term.parts(ensemble.own(term, p))
-        module = laws["drag" if has_exact_flow(frame) else "drag_directions"]
+        drag = tuple(part for part in PARTS if part in seen.drag)
+        module = laws["drag_directions" if seen.bent else "drag"]
         acting = [(term, module), *((t, m) for t, m in acting if t is not term)]
         _check_backward_drag(ensemble, method, term, h)
     dense = damping or (bool(drags) and not exact) or flow == "varying"
     memory = any(term.memory for term, _ in acting)
-    _check(ensemble, method, frame, p, dense=dense, flow=flow, memory=memory, acting=acting)
-    mass = shape_of_mass(frame.M)
-    coupled = frame.coupled
+    _check(method, seen, dense=dense, flow=flow, memory=memory, acting=acting)
+    mass, coupled = SHAPES_OF_MASS[seen.mass], seen.coupled
     program = FORCED[method.base] if forced else simplified(method.program, mass == "isotropic" and not coupled)
     if not acting:
         program = tuple((letter, coefficient) for letter, coefficient in program if letter != "K")
@@ -148,24 +107,24 @@ def make_model(
             lead, maps = None, method.program
     elif events or (lead is not None and lead[0] == "K" and not undone):
         lead, maps = None, program
-    conservative = checked and _conservative(ensemble, p, acting, laws)
+    conservative = checked and _conservative(seen, acting, laws)
     # Events, water and the potential are where the user or the forces have their origin.
-    elsewhere = bool(events) or flow != "none" or (conservative and np.any(frame.origin != frame.forces))
+    elsewhere = bool(events) or flow != "none" or (conservative and seen.apart)
     asked = {"rates": explicit,
              "turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
              "modified": method.two_part, "dense": dense, "water": flow in ("uniform", "varying"),
-             "origin": bool(elsewhere and (np.any(frame.origin) or np.any(frame.forces)))}  # fmt: skip
+             "origin": bool(elsewhere and (seen.moved or seen.forces_moved))}  # fmt: skip
     return Model(
         method=method,
-        frame=frame,
-        aligned=setting.aligned,
+        aligned=not seen.turned,
+        moved=seen.moved,
         laws=tuple(acting),
         events=events,
         mass="full" if coupled and mass == "isotropic" else mass,
         drag=drag,
         flow=flow,
         parts=tuple(name for name, wanted in asked.items() if wanted),
-        coupling=tuple(bool(np.any(U[:, i, j])) for i, j in ((0, 1), (0, 2), (1, 2), (0, 0), (1, 1), (2, 2))),
+        coupling=tuple(i in seen.couplings for i in range(len(COUPLINGS))),
         timed=any(one.timed for one, _ in (*acting, *events)),
         memory=memory or method.gauss > 0,
         program=maps,
@@ -181,13 +140,13 @@ def _steady(module: Any) -> bool:
     return hasattr(module, "steady_force") or not any(hasattr(module, role) for role in ("law", "damping", "evolve"))
 
 
-def _conservative(ensemble: Ensemble, p: Parameters, acting: list[tuple[Term, Any]], laws: Mapping[str, Any]) -> bool:
+def _conservative(seen: Survey, acting: list[tuple[Term, Any]], laws: Mapping[str, Any]) -> bool:
     """Whether no law creates energy, kinetic energy relative to the water, and each potential's device code tells it."""
     tethered = any(module is laws["tether"] for _, module in acting)
     for term, module in acting:
         if module is laws["current"]:
             # A uniform current carries the vehicle past an anchor, or along the vertical that weight acts on.
-            passive = not tethered and not np.any(ensemble.own(term, p)["velocity"][:, 2])
+            passive = not tethered and term.key not in seen.rising
         else:
             dissipates = term.dissipative or not hasattr(module, "damping")
             bounded = hasattr(module, "supply") or hasattr(module, "push")
@@ -207,12 +166,16 @@ def _check_backward_drag(ensemble: Ensemble, method: Method, term: Drag, h: floa
     back = -h * min(0.0, *method.stages)
     if back == 0.0:
         return
-    members = ensemble.select(0, ensemble.members)
-    own = ensemble.own(term, members.parameters)
-    speeds = np.abs(np.concatenate([members.velocity, members.angular_velocity], axis=1))
-    # What an axis of the user's gives way with to a force along it, the other axes free.
-    mobilities = np.einsum("nii->ni", np.linalg.inv(vehicle.inertia6(members.parameters)))
-    number = float((back * (own["linear"] + own["quadratic"] * speeds) * mobilities).max())
+
+    def largest(first: int, stop: int) -> float:
+        members = ensemble.select(first, stop)
+        own = ensemble.own(term, members.parameters)
+        speeds = np.abs(np.concatenate([members.velocity, members.angular_velocity], axis=1))
+        # What an axis of the user's gives way with to a force along it, the other axes free.
+        mobilities = np.einsum("nii->ni", np.linalg.inv(vehicle.inertia6(members.parameters)))
+        return float((back * (own["linear"] + own["quadratic"] * speeds) * mobilities).max())
+
+    number = max(over_members(largest, ensemble.members))
     if number > MOST_BACKWARD_DRAG:
         faults = Faults()
         what = f"goes backward by {back:.3g} s, where {term.key} has a drag number up to {number:.3g}"
@@ -262,17 +225,11 @@ ROLES = ("law", "damping", "flow", "evolve")
 FLOWS = ("none", "steady", "uniform", "varying")
 
 
-def _acting(ensemble: Ensemble, p: Parameters, setting: Setting, laws: Mapping[str, Any]) -> list[tuple[Term, Any]]:
+def _acting(ensemble: Ensemble, seen: Survey, laws: Mapping[str, Any]) -> list[tuple[Term, Any]]:
     """The terms that some member feels, with their device code, in a fixed order."""
-    acting: list[tuple[Term, Any]] = []
-    for term in terms.IMPLIED:
-        if any(np.any(value) for value in term.packed({}, setting).values.values()):
-            acting.append((term, laws[term.device]))
-    for term in ensemble.scene.terms:
-        module = _module(term, term.device_in(setting.aligned), laws, *ROLES)
-        if term.present(ensemble.own(term, p)):
-            acting.append((term, module))
-    return acting
+    acting = [(term, laws[term.device]) for term in terms.IMPLIED]
+    acting += [(term, _module(term, term.device_in(not seen.turned), laws, *ROLES)) for term in ensemble.scene.terms]
+    return [(term, module) for term, module in acting if term.key in seen.felt]
 
 
 def _flow(modules: list[Any]) -> str:
@@ -281,10 +238,8 @@ def _flow(modules: list[Any]) -> str:
 
 
 def _check(
-    ensemble: Ensemble,
     method: Method,
-    frame: Frame,
-    p: Parameters,
+    seen: Survey,
     *,
     dense: bool,
     flow: str,
@@ -293,12 +248,10 @@ def _check(
 ) -> None:
     """Refuse what a method cannot do, with the reason."""
     faults = Faults()
-    if not method.turns and method.base != "psi_w" and not method.tableau:
-        left = inertia.uncoupled_frame(vehicle.inertia6(p))[1]
-        if left.max() > UNCOUPLED:
-            k = f"coupling norm up to {left.max():.3g} at the best origin"
-            remedy = "use psi_x, psi_x8 or psi_w, which take any 6x6 inertia"
-            faults.add("method", method.name, f"cannot couple velocities and rates ({k})", remedy)
+    if seen.left > UNCOUPLED:
+        k = f"coupling norm up to {seen.left:.3g} at the best origin"
+        remedy = "use psi_x, psi_x8 or psi_w, which take any 6x6 inertia"
+        faults.add("method", method.name, f"cannot couple velocities and rates ({k})", remedy)
     composed = len(method.stages) > 1
     noisy = any(getattr(module, "NOISE", False) for _, module in acting)
     if composed and not method.two_part and (dense or flow in ("uniform", "varying") or memory or noisy):
@@ -320,7 +273,7 @@ def _check(
     kicks = sum(letter in ("K", "Phi", "Phi*") for letter, _ in method.program)
     if noisy and not composed and not method.tableau and kicks != 1:
         faults.add("method", method.name, "would draw noise more than once a step", "use psi_s, psi_x or psi_w")
-    if flow in ("uniform", "varying") and np.any(p["environment.gravity"] == 0.0) and np.any(p["vehicle.buoyancy"]):
+    if flow in ("uniform", "varying") and seen.weightless and seen.buoyant:
         faults.add("environment.gravity", 0.0, "leaves the displaced mass unknown, which water that accelerates pushes",
                    "give gravity, or buoyancy = 0")  # fmt: skip
     faults.raise_if_any()

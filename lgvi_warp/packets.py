@@ -13,12 +13,13 @@ from lgvi_kernels.lanes import int_lane
 from lgvi_kernels.monitor import ENERGY_FIELDS
 from lgvi_kernels.rows import PACE_FIELDS, STATE_FIELDS
 from lgvi_kernels.terms import LAWS
-from lgvi_warp import inertia, limits, model, modified_inertia, notation, vehicle
+from lgvi_warp import inertia, limits, modified_inertia, notation, vehicle
 from lgvi_warp.ensemble import Ensemble, Members
 from lgvi_warp.events import Event
 from lgvi_warp.machine import DTYPES
 from lgvi_warp.plan import Plan, build_lock
 from lgvi_warp.status import Status
+from lgvi_warp.survey import frame_of
 from lgvi_warp.terms.base import Packed, Setting
 from lgvi_warp.terms.drag import Drag
 
@@ -66,7 +67,7 @@ class Packets:
 
     def __init__(self, plan: Plan, members: Members):
         self.plan, self.members = plan, members
-        self.frame, self.U = model.frame_of(plan.method, members.parameters)
+        self.frame, self.U, _ = frame_of(plan.method, members.parameters)
         self.scale = self.frame.J.max(axis=1)
         if not plan.spec.scaled:
             self.scale = np.ones_like(self.scale)

@@ -164,7 +164,7 @@ class Plan:
     def _sampled(self) -> tuple[str, ...]:
         """The fields that samples hold: those asked for, and what they are made of where the origin is moved."""
         needed = set(self.fields)
-        if np.any(self.model.frame.origin):
+        if self.model.moved:
             needed |= {"attitude"} if "position" in needed else set()
             needed |= {"angular_velocity"} if "velocity" in needed else set()
         return tuple(name for name in SAMPLE_FIELDS if name in needed)

@@ -15,6 +15,13 @@ from lgvi_warp.terms.base import Numbers, Packed, Setting, Term, quantity
 ZEROS = (0.0,) * 6
 # Off-diagonal elements below this fraction of the largest are the round-off of turning the axes.
 DIAGONAL = 1e-12
+# Part of the exact flow -> the coefficients that it is of.
+PARTS = {
+    "linear_force": ("linear", slice(0, 3)),
+    "linear_torque": ("linear", slice(3, 6)),
+    "quadratic_force": ("quadratic", slice(0, 3)),
+    "quadratic_torque": ("quadratic", slice(3, 6)),
+}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -36,13 +43,7 @@ class Drag(Term):
 
     def parts(self, own: Numbers) -> tuple[str, ...]:
         """Which parts of the exact flow some member has."""
-        halves = {"force": slice(0, 3), "torque": slice(3, 6)}
-        return tuple(
-            f"{kind}_{where}"
-            for kind in ("linear", "quadratic")
-            for where, part in halves.items()
-            if np.any(own[kind][:, part])
-        )
+        return tuple(part for part, (kind, half) in PARTS.items() if np.any(own[kind][:, half]))
 
     def packed_exact(self, own: Numbers, frame: Frame, scale: np.ndarray) -> Packed:
         """For the exact flow: l / I [1/s], and q / I per momentum, which is kept divided by scale (1 or n,)."""

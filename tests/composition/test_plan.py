@@ -11,10 +11,10 @@ from lgvi_kernels.advance import make_advance
 from lgvi_kernels.terms import restoring, weight
 from lgvi_warp.blocks import blocks
 from lgvi_warp.method import Method
-from lgvi_warp.model import shape_of_mass
 from lgvi_warp.packets import pack
 from lgvi_warp.plan import SEGMENT_SAMPLE_BYTES
 from lgvi_warp.solving import make_plan
+from lgvi_warp.survey import shape_of_mass
 from tests.tools import TURN, one, scene_of
 
 

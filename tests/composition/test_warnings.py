@@ -8,6 +8,7 @@ from lgvi_warp import limits, terms
 from lgvi_warp.method import Method
 from lgvi_warp.solving import make_plan
 from lgvi_warp.status import Status, Warnings
+from lgvi_warp.survey import frame_of
 from lgvi_warp.terms import hydrostatics
 from tests.tools import one, random_states, scene_of
 
@@ -249,13 +250,14 @@ def test_energy_where_the_forces_have_another_origin(monkeypatch):
     scene = lw.Scene(named.vehicle, named.environment)
     fleet = one(scene, *random_states(5, 16, 0.5, 0.5))
     plan = make_plan(fleet, "psi_x", h=0.02, t1=1.0)
-    assert np.any(plan.model.frame.origin != plan.model.frame.forces) and "origin" in plan.spec.parts
+    frame, _, _ = frame_of(plan.method, fleet.parameters(0, 1))
+    assert np.any(frame.origin != frame.forces) and "origin" in plan.spec.parts
     result = lw.solve(fleet, "psi_x", h=0.02, t1=128 * 0.02, checks="all")
     nu = np.concatenate([result.velocity, result.angular_velocity], axis=-1)
     I6 = scene.vehicle.rigid_body_mass_matrix + scene.vehicle.added_mass_matrix
     T = 0.5 * np.einsum("kni,ij,knj->kn", nu, I6, nu)
     E = result.energy
-    p, frame = result.parameters, plan.model.frame
+    p = result.parameters
     net = hydrostatics.net(p)[0]
     moment = (hydrostatics.moment(p) + net * frame.forces)[0]
     supply = T[0] + result.attitude[0, :, 2] @ moment + np.linalg.norm(moment)

@@ -146,7 +146,7 @@ def test_the_product_imports_what_it_declares():
 
 
 def test_only_the_plan_and_the_machine_know_the_kernels():
-    those = {"lgvi_warp.plan", "lgvi_warp.packets", "lgvi_warp.machine", "lgvi_warp.law_check"}
+    those = {"lgvi_warp.plan", "lgvi_warp.packets", "lgvi_warp.machine", "lgvi_warp.law_bench", "lgvi_warp.law_check"}
     assert importers("lgvi_kernels") == those
 
 

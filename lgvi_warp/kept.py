@@ -81,18 +81,22 @@ class KeptRun:
         """Write what is missing or damaged of those among the first `members`. Raises SceneError, OSError."""
         store, path = run.store, run.store.folder / KEPT
         wanted = members_kept(self.observed.keep, Folder(store.folder), members)
-        beside = run.plan.with_neighbours(wanted)
-        group = KeptStore(
-            path, store.dtype, None, "resume", store.force, store.chunk_bytes, beside, np.isin(beside, wanted)
-        )
+        group = group_of(store, run.plan, wanted)
         shutil.rmtree(path.with_name(f"{KEPT}.new"), ignore_errors=True)
         if not len(wanted) or not group.is_there():
             shutil.rmtree(path, ignore_errors=True)
         if len(wanted):
-            plan = run.plan.part(beside.tolist(), self.fields)
+            plan = run.plan.part(group.members.tolist(), self.fields)
             told = {key: value for key, value in run.provenance.items() if key != "observed"}
             again = Stored(plan, group, told | {"kernel": plan.kernel_hash}, run.messages)
-            again.run(executor, progress and _after(progress, members, len(beside)))
+            again.run(executor, progress and _after(progress, members, len(group.members)))
+
+
+def group_of(store: Store, plan: Plan, wanted: np.ndarray) -> KeptStore:
+    """The group of a store for these members of its run; resumed where it is there."""
+    beside = plan.with_neighbours(wanted)
+    chosen = np.isin(beside, wanted)
+    return KeptStore(store.folder / KEPT, store.dtype, None, "resume", store.force, store.chunk_bytes, beside, chosen)
 
 
 def _after(progress: Callable[[float], None], before: int, more: int) -> Callable[[float], None]:

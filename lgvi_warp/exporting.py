@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import itertools
 import json
 import os
@@ -13,6 +14,7 @@ import numpy as np
 
 from lgvi_warp.blocks import Block
 from lgvi_warp.errors import Faults, SceneError
+from lgvi_warp.resuming import state
 from lgvi_warp.saveat import FIELDS
 from lgvi_warp.store import KEPT, Folder
 from lgvi_warp.store_layout import KEPT_MEMBER, MEMBER
@@ -40,6 +42,9 @@ def export(path: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | 
     if not folder.complete:
         raise SceneError([f"{folder.path}: is not complete; go on with `lgvi-warp resume {folder.path.parent}` first"])
     target = Path(out) if out is not None else folder.path.with_suffix(FORMATS[to])
+    if target.is_dir():
+        raise SceneError([f"out = {target}: is a folder; give the name of a file"])
+    check_whole(folder)
     part = target.with_name(target.name + ".part")
     target.parent.mkdir(parents=True, exist_ok=True)
     try:
@@ -47,9 +52,21 @@ def export(path: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | 
         part.replace(target)
     except ImportError as error:
         raise SceneError([f"to = {to!r}: {error}; install it: pip install 'lgvi-warp[export]'"]) from error
+    except (OSError, RuntimeError) as error:
+        # Neither library names the file, and netCDF4 not what the system said.
+        what = getattr(error, "strerror", None) or f"was not written ({error}); is the disk full?"
+        raise OSError(getattr(error, "errno", None) or errno.EIO, what, str(target)) from error
     finally:
         part.unlink(missing_ok=True)
     return target
+
+
+def check_whole(folder: Folder) -> None:
+    """Every file must be as it was written: one that is missing would be exported as NaN. Raises SceneError."""
+    found = state(folder.path)
+    if not found["complete"]:
+        damage = found["damage"][:5] or [f"{found['blocks'] - found['finished']} blocks are not marked as finished"]
+        raise SceneError(f"{folder.path}: {text}; `lgvi-warp resume {folder.path}` mends it" for text in damage)
 
 
 def _netcdf(folder: Folder, target: Path) -> None:

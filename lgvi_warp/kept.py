@@ -77,19 +77,20 @@ class KeptRun:
 
     def __call__(
         self, run: Stored, members: int, executor: Executor, progress: Callable[[float], None] | None = None
-    ) -> None:
-        """Write what is missing or damaged of those among the first `members`. Raises SceneError, OSError."""
+    ) -> int:
+        """Write what is missing or damaged of those among the first `members`. Returns blocks run. Raises as the run does."""
         store, path = run.store, run.store.folder / KEPT
         wanted = members_kept(self.observed.keep, Folder(store.folder), members)
         group = group_of(store, run.plan, wanted)
         shutil.rmtree(path.with_name(f"{KEPT}.new"), ignore_errors=True)
         if not len(wanted) or not group.is_there():
             shutil.rmtree(path, ignore_errors=True)
-        if len(wanted):
-            plan = run.plan.part(group.members.tolist(), self.fields)
-            told = {key: value for key, value in run.provenance.items() if key != "observed"}
-            again = Stored(plan, group, told | {"kernel": plan.kernel_hash}, run.messages)
-            again.run(executor, progress and _after(progress, members, len(group.members)))
+        if not len(wanted):
+            return 0
+        plan = run.plan.part(group.members.tolist(), self.fields)
+        told = {key: value for key, value in run.provenance.items() if key != "observed"}
+        again = Stored(plan, group, told | {"kernel": plan.kernel_hash}, run.messages)
+        return again.run(executor, progress and _after(progress, members, len(group.members))).ran
 
 
 def group_of(store: Store, plan: Plan, wanted: np.ndarray) -> KeptStore:

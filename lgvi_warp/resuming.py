@@ -16,7 +16,7 @@ from lgvi_warp.errors import MembersFailed, SceneError
 from lgvi_warp.executors import Executor, executor_of
 from lgvi_warp.kept import KeptRun, keep_of, members_kept
 from lgvi_warp.observation import Observing, observation_of
-from lgvi_warp.recipe import refuse_another
+from lgvi_warp.recipe import refuse_another, same_run
 from lgvi_warp.result import Result
 from lgvi_warp.running import Stored
 from lgvi_warp.scene import Scene
@@ -44,7 +44,7 @@ def resume(
     versions, where the bits may differ. keepers: those that the run had. statistics: those that it had, needed where they
     are of functions. Raises SceneError, OSError, or MembersFailed as the run was asked to.
     """
-    from lgvi_warp.solving import finished, provenance
+    from lgvi_warp.solving import finished, provenance, went_on
 
     folder = Folder(folder_of(path))
     given = Ensemble.from_scene(fleet) if isinstance(fleet, Scene) else fleet
@@ -60,9 +60,9 @@ def resume(
         plan, store_of(folder, force), folder.provenance, folder.messages, (*keepers, *observing.keepers), None,
         observing.enough, KeptRun(observed, tuple((told or {}).get("fields", ()))),
     )  # fmt: skip
-    result = result_of(
-        run.run(runner, progress), None, folder.messages + messages, plan.ensemble.scene.terms, observing
-    )
+    made = run.run(runner, progress)
+    told_now = messages + went_on(made)
+    result = result_of(made, None, folder.messages + told_now, plan.ensemble.scene.terms, observing)
     return finished(result, plan, observed, (told or {}).get("fields", ()), threads)
 
 
@@ -83,9 +83,10 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
     parts = [Folder(folder_of(path)) for path in paths]
     first = parts[0]
     for other in parts[1:]:
-        refuse_another(other.path, other.provenance, first.provenance, force=False)
-        if other.recipe != first.recipe:
-            raise SceneError([f"{other.path}: is of another run than {first.path}; merge parts of one run"])
+        found = same_run(other.provenance, first.provenance, str(other.path), str(first.path))
+        if found or other.recipe != first.recipe:
+            found = found or ["another recipe"]
+            raise SceneError(f"{text}: these are parts of different runs; merge parts of one run" for text in found)
     target = Path(out)
     target = target if target.suffix == ".zarr" else target / first.path.name
     if target.exists() and not overwrite:

@@ -86,7 +86,8 @@ class Stored:
 
     keepers: what else is kept of it, beside the store: their parts lie in it. only: indices of the blocks to run, default
     all; the run is complete when every block is there, or as many as `enough` (see run_blocks) asks for, and `last` has
-    done what there is to do then: called with this run, its members, the executor and the progress.
+    done what there is to do then: called with this run, its members, the executor and the progress, it says how many
+    blocks it ran.
     """
 
     plan: Plan
@@ -96,7 +97,7 @@ class Stored:
     keepers: tuple[Keeper, ...] = ()
     only: range | None = None
     enough: Callable[[int], bool] = lambda members: False
-    last: Callable[[Stored, int, Executor, Callable[[float], None] | None], None] = lambda *_: None
+    last: Callable[[Stored, int, Executor, Callable[[float], None] | None], int] = lambda *_: 0
 
     def run(self, executor: Executor, progress: Callable[[float], None] | None = None) -> Folder:
         """Run what is missing. Raises SceneError for what is refused, OSError where the disk takes no more."""
@@ -115,12 +116,14 @@ class Stored:
             finally:
                 sink.remove_unfinished()
             folder = Folder(path)
+            folder.ran = sum(block.first < members for block in left)
+            folder.found = sum(block.first < members for block in self._runs()) - folder.ran
             beyond = [] if self.only else [block for block in self._runs() if block.first >= members]
             if beyond:
                 # Blocks that were ahead of the last one depend on the number of threads: the store holds none of them.
                 sink.remove(beyond, len(self.plan.grid.times))
             if beyond or not folder.unfinished():
-                self.last(self, members if beyond else self.plan.ensemble.members, executor, progress)
+                folder.ran_kept = self.last(self, members if beyond else self.plan.ensemble.members, executor, progress)
                 folder.finish(members if beyond else None)
         return folder
 
@@ -159,6 +162,8 @@ class Stored:
     def _mend(self) -> None:
         """Write anew what is damaged of the files that belong to no block."""
         path = self.store.folder
+        for name in ("blocks", "parts"):
+            (path / name).mkdir(exist_ok=True)
         if not Folder(path).damage():
             return
         import shutil

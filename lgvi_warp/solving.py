@@ -26,7 +26,7 @@ from lgvi_warp.running import Progress, Stored, run_blocks
 from lgvi_warp.saveat import FIELDS, SaveAt, time_grid
 from lgvi_warp.scene import Scene
 from lgvi_warp.status import Status, failure_text
-from lgvi_warp.store import Store
+from lgvi_warp.store import Folder, Store
 from lgvi_warp.stored import result_of
 
 
@@ -280,8 +280,22 @@ def run_stored(
     ).run(executor, progress)
     runs = blocks(plan.ensemble.members)
     members = None if only is None else slice(runs[only[0]].first, runs[only[-1]].stop)
-    result = result_of(folder, members, messages(plan), plan.ensemble.scene.terms, observing)
+    there = went_on(folder)
+    result = result_of(folder, members, messages(plan) + there, plan.ensemble.scene.terms, observing)
+    if there:
+        return result  # what was measured is not the whole run
     return replace(result, compile_seconds=compile_seconds, run_seconds=time.perf_counter() - start)
+
+
+def went_on(folder: Folder) -> tuple[str, ...]:
+    """What the user should know of a run of which some blocks were there already."""
+    found, ran, ran_kept = folder.found, folder.ran, folder.ran_kept
+    if not found:
+        return ()
+    if not ran and not ran_kept:
+        return (f"nothing was missing: {found} of {found} blocks were there and whole",)
+    kept = f", and {ran_kept} of kept members" if ran_kept else ""
+    return (f"went on: {found} of {found + ran} blocks were there and whole, {ran} ran{kept}",)
 
 
 def settled(store: Store, plan: Plan, observed: Observation, fields: Sequence[str] | None) -> Store:

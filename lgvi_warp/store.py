@@ -246,6 +246,8 @@ class Folder:
             )
         self.provenance, self.recipe, messages, self.shared = (json.loads(text) for text in texts)
         self.messages: tuple[str, ...] = tuple(messages)
+        # What this process did: blocks that it found whole, those that it ran, and those of kept members that it ran.
+        self.found, self.ran, self.ran_kept = 0, 0, 0
 
     @property
     def complete(self) -> bool:
@@ -276,9 +278,13 @@ class Folder:
     def plan(self, ensemble: Ensemble | None = None) -> Plan:
         """The run's plan, made again; ensemble: where a scene file cannot tell it (laws of your own). Raises SceneError."""
         try:
+            # A chunk that is missing reads as NaN or 0.
+            lost = [text for text in self.damage() if text.startswith(("time/", "step/", "explicit/"))]
             group = self.group()
             steps, times = group["step"][:].astype(np.int64), group["time"][:]
             given = {name: np.asarray(array[:]) for name, array in group["explicit"].arrays()}
+            if lost or not np.isfinite(times).all():
+                raise ValueError("times are missing")
         except (ValueError, OSError, KeyError) as error:
             remedy = "run the same scene again with --store zarr --resume, which mends it"
             raise SceneError([f"{self.path}: {'; '.join(self.damage()) or error}; {remedy}"]) from error

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp import durable
 from lgvi_warp.errors import SceneError
 from lgvi_warp.kept import keep_of, members_kept
 from lgvi_warp.observation import Observation, Observing, observation_of
 from lgvi_warp.result import UNITS, Result
 from lgvi_warp.statistics.estimate import Estimates
-from lgvi_warp.store import KEPT, Folder, Sink
+from lgvi_warp.store import KEPT, Folder, Sink, name_of, read_marker
 from lgvi_warp.store_layout import KEPT_MEMBER, MEMBER
 from lgvi_warp.terms import Term, from_list
 
@@ -59,11 +60,15 @@ def folder_of(path: str | os.PathLike[str]) -> Path:
     if given.suffix == ".zarr":
         return given
     found = sorted(given.glob("*.zarr")) if given.is_dir() else []
-    if len(found) != 1:
-        what = f"holds {len(found)} stores" if given.exists() else "is not there"
-        remedy = "give the folder of a run made with --store zarr" if not found else f"name one: {found[0]}"
-        raise SceneError([f"{given}: {what}; {remedy}"])
-    return found[0]
+    if len(found) == 1:
+        return found[0]
+    what = "is not there" if not given.exists() else "is a file" if given.is_file() else "holds no store"
+    if found:
+        what = f"holds {len(found)} stores"
+    remedy = (
+        f"name one: {', '.join(map(str, found[:5]))}" if found else "give the folder of a run made with --store zarr"
+    )
+    raise SceneError([f"{given}: {what}; {remedy}"])
 
 
 def open_run(
@@ -95,14 +100,37 @@ def open_run(
     return result_of(folder, None, messages, observing=gathered(folder, observation_of(told, statistics)))
 
 
+def times_of(folder: Folder) -> np.ndarray:
+    """(k,) [s], of the samples. Raises SceneError where they are lost."""
+    try:
+        time = np.asarray(folder.group()["time"][:])
+        if np.isfinite(time).all():
+            return time
+    except (ValueError, KeyError):
+        pass
+    remedy = "run the same scene again with --store zarr --resume, which mends it"
+    raise SceneError([f"{folder.path}: {'; '.join(folder.damage()) or 'times are lost'}; {remedy}"])
+
+
 def gathered(folder: Folder, observed: Observation) -> Observing:
     """The statistics of a complete run, from the parts of its blocks."""
-    observing = Observing(observed, folder.group()["time"][:], int(folder.recipe["members"]))
+    observing = Observing(observed, times_of(folder), int(folder.recipe["members"]))
     sink = Sink(folder.path, ())
     for block in folder.runs:
+        _check_parts(folder, read_marker(sink.marker(block)), name_of(block))
         for keeper, part in zip(observing.keepers, sink.parts(block, observing.keepers) or (), strict=True):
             keeper.merge(block, part)
     return observing
+
+
+def _check_parts(folder: Folder, sums: Mapping[str, Sequence[int]] | None, name: str) -> None:
+    """A block's parts must be those that were written. Raises SceneError."""
+    keys = [key for key in sums or () if key.startswith("parts/")]
+    found = [f"{key} {text}" for key in keys if sums and (text := durable.fault(folder.path, key, *sums[key]))]
+    if sums is None:
+        found = [f"blocks/{name}.json is missing or damaged"]
+    if found:
+        raise SceneError(f"{folder.path}: {text}; `lgvi-warp resume {folder.path}` mends it" for text in found)
 
 
 def result_of(
@@ -113,7 +141,7 @@ def result_of(
     observing: Observing | None = None,
 ) -> Result:
     """The Result of a folder; terms: those of the scene, where its file does not tell them; observing: its statistics."""
-    group = folder.group()
+    group, time = folder.group(), times_of(folder)
     n, whole = folder.members, int(folder.recipe["members"])
     at = _places(members, n)
     arrays = {name: array for name, array in group.arrays()}
@@ -131,7 +159,7 @@ def result_of(
     of_scene = tuple(from_list(provenance["scene"].get("terms", ())) if terms is None else terms)
     indices, kept = kept_of(folder, of_scene) if members is None else (np.empty(0, np.int64), None)
     return Result(
-        time=group["time"][:],
+        time=time,
         samples=Arrays(group, fields, 1, at),
         **Result.per_member(small),
         parameters=Arrays(group, varied, 0, at, shared),

@@ -19,6 +19,9 @@ EPILOG = """examples:
   lgvi-warp sensitivity examples/paper.toml --of "position[2]" --out runs/sensitivity
   lgvi-warp stability examples/paper.toml --out runs/stability
   lgvi-warp info
+
+exit codes: 0 done; 1 members, files or the disk failed, or info or merge found a run that is not whole; 2 refused: a scene,
+an argument, or what lies in a folder; 130 interrupted. Results go to stdout, progress and faults to stderr.
 """
 
 
@@ -56,9 +59,7 @@ def parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--on-failure", help="freeze a member that fails (default), raise: exit code 1, or substep: divide its step"
     )
-    run.add_argument(
-        "--keep", help="samples of members to keep: all, none or failed (statistics are those of the scene)"
-    )
+    _add_keep(run)
     run.add_argument("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
     _add_executor(run)
     run.add_argument(
@@ -148,6 +149,12 @@ def _add_stability(verbs: Any) -> None:
     verb.add_argument("--of", default="attitude", help=f"what --error is of (default: attitude); {OF}")
 
 
+def _add_keep(verb: argparse.ArgumentParser) -> None:
+    """Whose samples are kept."""
+    kinds = "all (default), none, failed, or indices 3,17"
+    verb.add_argument("--keep", help=f"samples of members to keep: {kinds} (statistics are those of the scene)")
+
+
 def _add_executor(verb: argparse.ArgumentParser) -> None:
     """Where blocks run."""
     verb.add_argument("--threads", metavar="N", type=int, help="threads, processes or workers (default: all cores)")
@@ -164,6 +171,7 @@ def _add_plan(verbs: Any) -> None:
     plan.add_argument("--method", help="as for run")
     plan.add_argument("--step", metavar="S", help="time step [s]")
     plan.add_argument("--dtype", help="as for run")
+    _add_keep(plan)
     plan.add_argument("--threads", metavar="N", type=int, help="threads (default: all cores)")
     plan.add_argument("--store", choices=["npz", "zarr"], default="npz", help="as for run")
     plan.add_argument("--store-dtype", metavar="D", help="as for run")
@@ -184,7 +192,9 @@ def _add_store_verbs(verbs: Any) -> None:
     export = verbs.add_parser("export", help="write a run as one NetCDF or Parquet file")
     export.add_argument("dir", metavar="DIR", type=Path, help="a store, or a folder with one")
     export.add_argument("--to", required=True, help="netcdf or parquet")
-    export.add_argument("--out", metavar="FILE", type=Path, help="the file (default: beside the store)")
+    export.add_argument(
+        "--out", metavar="FILE", type=Path, help="the file, replaced if it exists (default: beside the store)"
+    )
 
 
 def _add_scene(verb: argparse.ArgumentParser, folder: str, ensemble: bool = True) -> None:

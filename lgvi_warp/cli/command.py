@@ -11,6 +11,7 @@ from collections.abc import Callable
 from lgvi_warp.cli.arguments import parser
 from lgvi_warp.cli.machine import bench, info
 from lgvi_warp.cli.runs import plan, resume, run
+from lgvi_warp.cli.settings import RUN, out_of
 from lgvi_warp.cli.stores import export, merge
 from lgvi_warp.cli.studies import sensitivity, stability, tradeoff
 from lgvi_warp.errors import SceneError
@@ -30,7 +31,7 @@ VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command. Returns the exit code: 0, 1 for a run that failed, 2 for a scene or argument that is refused."""
+    """Run the command. Returns its exit code, see arguments.EPILOG."""
     chosen = parser().parse_args(arguments)
     try:
         return VERBS[chosen.verb](chosen)
@@ -38,16 +39,27 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"lgvi-warp: {error}", file=sys.stderr)
         return 2
     except OSError as error:
-        print(f"lgvi-warp: {error.filename or ''}: {error.strerror or error}", file=sys.stderr)
+        where = f"{error.filename}: " if error.filename else ""
+        print(f"lgvi-warp: {where}{error.strerror or error}", file=sys.stderr)
         return 1
     except MemoryError as error:
         print(f"lgvi-warp: {error or 'out of memory'}; run fewer members or keep fewer samples", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        kept = chosen.verb == "resume" or getattr(chosen, "store", None) == "zarr"
-        text = "finished blocks are kept: go on with lgvi-warp resume" if kept else "nothing was written"
-        print(f"lgvi-warp: interrupted; {text}", file=sys.stderr)
+        print(f"lgvi-warp: interrupted; {left(chosen)}", file=sys.stderr)
         return 130
+
+
+def left(chosen: argparse.Namespace) -> str:
+    """What an interrupted verb leaves."""
+    if chosen.verb in ("info", "plan", "bench"):
+        return "nothing was to be written"
+    there = chosen.dir if chosen.verb == "resume" else None
+    if chosen.verb == "run" and chosen.store == "zarr" and (out_of(chosen) / RUN).exists():
+        there = out_of(chosen)
+    if there is None:
+        return "nothing was written"
+    return f"finished blocks are kept: go on with lgvi-warp resume {there}"
 
 
 def entry() -> None:

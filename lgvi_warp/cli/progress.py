@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TextIO
 
 
@@ -24,7 +26,8 @@ class Progress:
             if now - self._last < self._interval:
                 return
             self._last, self._shown = now, True
-            text = f"{fraction:6.1%}, {now * (1.0 / fraction - 1.0):.0f} s left"
+            left = f", {now * (1.0 / fraction - 1.0):.0f} s left" if fraction > 0.0 else ""
+            text = f"{fraction:6.1%}{left}"
             self._stream.write(f"\r{text}   " if self._terminal else f"{text}\n")
             self._stream.flush()
 
@@ -33,6 +36,17 @@ class Progress:
         if self._terminal and self._shown:
             self._stream.write("\r" + " " * 40 + "\r")
             self._stream.flush()
+
+
+@contextlib.contextmanager
+def shown(quiet: bool) -> Iterator[Progress | None]:
+    """Progress on stderr, whose line is clean afterwards, whatever happens; None where nothing is to be said."""
+    progress = None if quiet else Progress(sys.stderr)
+    try:
+        yield progress
+    finally:
+        if progress:
+            progress.close()
 
 
 def part_of(progress: Progress | None, i: int, n: int) -> Callable[[float], None] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -12,12 +13,20 @@ def report(result: Any, out: Path, quiet: bool, begun: float) -> list[str]:
     """Write the files of a finished run, print its summary, and return what failed."""
     if result.store is not None and not complete(result):
         if not quiet:
-            print(f"members     {result.members:,} of a run in parts, in {result.store}; next: lgvi-warp merge")
+            print(f"members     {result.members:,} of a run in parts, in {result.store}")
+            print(f"next        lgvi-warp merge {out} ... --out DIR, with the folders of the other parts")
         return []
     drawn = shown_members(result)
     files, faults = write(result, drawn, out)
     if not quiet:
         print(summary(result, drawn, files, time.perf_counter() - begun))
+    return faults
+
+
+def told(faults: list[str]) -> list[str]:
+    """The faults, said on stderr."""
+    for fault in faults:
+        print(f"lgvi-warp: {fault}", file=sys.stderr)
     return faults
 
 
@@ -35,7 +44,7 @@ MOST_DRAWN = 30_000_000
 def shown_members(result: Any) -> Any:
     """The result, or of a large one in a store its first members, in memory; without samples, those kept, or None."""
     if not result.samples:
-        return result.kept
+        return result.kept and shown_members(result.kept)
     if result.store is None:
         return result
     from lgvi_warp.stored import chosen
@@ -98,6 +107,8 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
         )
     elif result.kept is not None:
         lines.append(f"kept        {result.kept.members:,} members' samples, run again")
+    elif settings.get("observed", {}).get("keep") == "failed":
+        lines.append("kept        no samples: no member failed")
     for code in Status:
         failed = (result.status == code).nonzero()[0]
         if code and len(failed):

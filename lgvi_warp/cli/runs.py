@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import threading
 import time
-from pathlib import Path
 from typing import Any
 
-from lgvi_warp.cli.progress import Progress
-from lgvi_warp.cli.report import report
-from lgvi_warp.cli.settings import block_range, overrides, store_settings
+from lgvi_warp.cli.progress import shown
+from lgvi_warp.cli.report import report, told
+from lgvi_warp.cli.settings import block_range, folder, overrides, store_settings
 from lgvi_warp.errors import MembersFailed, SceneError
 
 
@@ -21,32 +19,34 @@ def run(chosen: argparse.Namespace) -> int:
 
     begun = time.perf_counter()
     scene = Scene.load(chosen.scene, overrides(chosen))
-    out: Path = chosen.out or Path("runs") / Path(chosen.scene).stem
-    store, only = store_settings(chosen, out), block_range(chosen)
-    out.mkdir(parents=True, exist_ok=True)
+    store, only = store_settings(chosen), block_range(chosen)
+    out = folder(chosen)
     warm = _import_in_background()
     from lgvi_warp.solving import solve
 
     suggested = suggestion(scene, chosen)
-    progress = None if chosen.quiet else Progress(sys.stderr)
     settings = suggested.settings if suggested else {}
     failures = []
-    try:
-        result = solve(
-            scene, threads=chosen.threads, width=chosen.width, progress=progress, store=store, executor=chosen.executor,
-            scheduler=chosen.scheduler, only=only, **settings,
-        )  # fmt: skip
-    except MembersFailed as error:
-        result, failures = error.result, [str(error)]
-    if progress:
-        progress.close()
+    with shown(chosen.quiet) as progress:
+        try:
+            result = solve(
+                scene, threads=chosen.threads, width=chosen.width, progress=progress, store=store,
+                executor=chosen.executor, scheduler=chosen.scheduler, only=only, **settings,
+            )  # fmt: skip
+        except MembersFailed as error:
+            result, failures = error.result, [str(error)]
     warm.join()
     faults = report(result, out, chosen.quiet, begun) + failures
     if suggested:
         faults += check_error(scene, result, suggested, chosen.quiet)
-    for fault in faults:
-        print(f"lgvi-warp: {fault}", file=sys.stderr)
-    return 1 if faults or (result.status != 0).all() else 0
+    return 1 if told(faults) or all_failed(result) else 0
+
+
+def all_failed(result: Any) -> bool:
+    """Whether no member got to its end, or to the event that ended it."""
+    from lgvi_warp.status import Status
+
+    return bool(((result.status != 0) & (result.status < Status.SURFACE)).all())
 
 
 def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:
@@ -65,12 +65,11 @@ def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:
             raise SceneError([f"{text}; leave out --{name} or --error"])
     from lgvi_warp.suggestion import suggest
 
-    progress = None if chosen.quiet else Progress(sys.stderr)
     methods = [chosen.method] if chosen.method else None
     of = chosen.of or "position"
-    found = suggest(scene, chosen.error, of, methods=methods, threads=chosen.threads, progress=progress)
-    if progress:
-        progress.close()
+    with shown(chosen.quiet) as progress:
+        found = suggest(scene, chosen.error, of, methods=methods, threads=chosen.threads, progress=progress)
+    if not chosen.quiet:
         print(found, flush=True)
     return found
 
@@ -114,22 +113,18 @@ def resume(chosen: argparse.Namespace) -> int:
     from lgvi_warp.resuming import resume as go_on
 
     begun = time.perf_counter()
-    progress = None if chosen.quiet else Progress(sys.stderr)
     failures = []
-    try:
-        result = go_on(
-            chosen.dir, executor=chosen.executor, threads=chosen.threads, scheduler=chosen.scheduler, progress=progress,
-            force=chosen.force,
-        )  # fmt: skip
-    except MembersFailed as error:
-        result, failures = error.result, [str(error)]
-    if progress:
-        progress.close()
+    with shown(chosen.quiet) as progress:
+        try:
+            result = go_on(
+                chosen.dir, executor=chosen.executor, threads=chosen.threads, scheduler=chosen.scheduler,
+                progress=progress, force=chosen.force,
+            )  # fmt: skip
+        except MembersFailed as error:
+            result, failures = error.result, [str(error)]
     assert result.store is not None
     faults = report(result, result.store.parent, chosen.quiet, begun) + failures
-    for fault in faults:
-        print(f"lgvi-warp: {fault}", file=sys.stderr)
-    return 1 if faults else 0
+    return 1 if told(faults) or all_failed(result) else 0
 
 
 def plan(chosen: argparse.Namespace) -> int:
@@ -138,11 +133,5 @@ def plan(chosen: argparse.Namespace) -> int:
     from lgvi_warp.scene import Scene
 
     scene = Scene.load(chosen.scene, overrides(chosen))
-    out: Path = chosen.out or Path("runs") / Path(chosen.scene).stem
-    store = None
-    if chosen.store == "zarr":
-        from lgvi_warp.store import Store
-
-        store = Store(out / "run.zarr", chosen.store_dtype)
-    print(predict(scene, threads=chosen.threads, store=store))
+    print(predict(scene, threads=chosen.threads, store=store_settings(chosen)))
     return 0

@@ -8,6 +8,8 @@ from typing import Any
 
 from lgvi_warp.errors import SceneError
 
+# The store in a run's folder.
+RUN = "run.zarr"
 # Command-line option -> key of the scene file that it replaces.
 OPTIONS = {
     "method": "run.method",
@@ -33,7 +35,7 @@ def overrides(chosen: argparse.Namespace) -> dict[str, Any]:
     for name, key in OPTIONS.items():
         value = getattr(chosen, name, None)
         if value is not None:
-            changes[key] = value
+            changes[key] = PLAIN.get(name, str)(value)
     for text in chosen.set:
         key, equals, value = text.partition("=")
         if not equals:
@@ -42,18 +44,50 @@ def overrides(chosen: argparse.Namespace) -> dict[str, Any]:
     return changes
 
 
-def store_settings(chosen: argparse.Namespace, out: Path) -> Any:
+def whole(text: str) -> str:
+    """1e6 as 1000000: TOML knows no other whole numbers."""
+    try:
+        number = float(text)
+    except ValueError:
+        return text
+    return str(int(number)) if number.is_integer() else text
+
+
+def listed(text: str) -> str:
+    """Indices 3,17 as [3,17]."""
+    return f"[{text}]" if text.replace(",", "").replace(" ", "").isdigit() else text
+
+
+PLAIN = {"members": whole, "seed": whole, "keep": listed}
+
+
+def out_of(chosen: argparse.Namespace, suffix: str = "") -> Path:
+    """The folder for the files: --out, or one named after the scene."""
+    return chosen.out or Path("runs") / f"{Path(chosen.scene).stem}{suffix}"
+
+
+def folder(chosen: argparse.Namespace, suffix: str = "") -> Path:
+    """The folder for the files, made if it is not there. Raises SceneError where it is a file, OSError."""
+    out = out_of(chosen, suffix)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise SceneError([f"--out {out}: is a file; give a folder"]) from None
+    return out
+
+
+def store_settings(chosen: argparse.Namespace) -> Any:
     """The store that the arguments ask for, None without one. Raises SceneError."""
     if chosen.store == "npz":
         names = ("store_dtype", "blocks", "overwrite", "resume")
-        given = [f"--{name.replace('_', '-')}" for name in names if getattr(chosen, name)]
+        given = [f"--{name.replace('_', '-')}" for name in names if getattr(chosen, name, None)]
         if given:
             raise SceneError([f"{' and '.join(given)}: is for runs in a store; add --store zarr, or leave it out"])
         return None
     from lgvi_warp.store import Store
 
-    existing = "overwrite" if chosen.overwrite else "resume" if chosen.resume else "refuse"
-    return Store(out / "run.zarr", chosen.store_dtype, existing=existing)
+    existing = next((name for name in ("overwrite", "resume") if getattr(chosen, name, False)), "refuse")
+    return Store(out_of(chosen) / RUN, chosen.store_dtype, existing=existing)
 
 
 def block_range(chosen: argparse.Namespace) -> range | None:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
-from lgvi_warp.cli.report import size_of
+from lgvi_warp.cli.report import size_of, told
 
 
 def merge(chosen: argparse.Namespace) -> int:
@@ -14,13 +13,16 @@ def merge(chosen: argparse.Namespace) -> int:
     from lgvi_warp.resuming import merge as put_together
 
     folder = put_together(chosen.dirs, chosen.out, chosen.overwrite)
-    left = len(folder.unfinished())
-    if left:
-        print(f"lgvi-warp: {folder.path}: {left} blocks are in none of the folders; lgvi-warp resume {folder.path} runs them",
-              file=sys.stderr)  # fmt: skip
+    if not folder.complete:
+        left = len(folder.unfinished())
+        missing = (
+            f"{left} of {len(folder.runs)} blocks are in none of the folders; lgvi-warp resume {folder.path} runs them"
+        )
+        kept = f"the members that it keeps are missing; lgvi-warp resume {folder.path} runs them, or says why not"
+        told([f"{folder.path}: {missing if left else kept}"])
     elif not chosen.quiet:
         print(f"file        {folder.path} ({size_of(folder.path) / 1e6:.1f} MB), complete")
-    return 1 if left else 0
+    return 0 if folder.complete else 1
 
 
 def export(chosen: argparse.Namespace) -> int:
@@ -30,6 +32,10 @@ def export(chosen: argparse.Namespace) -> int:
     path = write_as(chosen.dir, chosen.to, chosen.out)
     print(f"file        {path} ({size_of(path) / 1e6:.1f} MB)")
     return 0
+
+
+# Lines on damage.
+MOST_SAID = 20
 
 
 def info_of_run(path: Path) -> int:
@@ -48,6 +54,8 @@ def info_of_run(path: Path) -> int:
         print(f"kept        {found['kept']:,} members' samples, run again")
     print(f"blocks      {found['finished']} of {found['blocks']} finished; "
           + ("complete" if found["complete"] else f"not complete: lgvi-warp resume {path}"))  # fmt: skip
-    for text in found["damage"]:
+    for text in found["damage"][:MOST_SAID]:
         print(f"damage      {text}")
+    if (more := len(found["damage"]) - MOST_SAID) > 0:
+        print(f"damage      and {more:,} more files")
     return 0 if found["complete"] else 1

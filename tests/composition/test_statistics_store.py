@@ -54,6 +54,19 @@ def test_it_is_exported_with_its_statistics(whole, memory, tmp_path):
     assert table.column_names == ["realization", "vehicle.mass", "status", "failure_time"] and table.num_rows == 1003
 
 
+def test_statistics_of_damaged_parts_are_refused(whole, tmp_path):
+    path = shutil.copytree(whole, tmp_path / "run.zarr")
+    part = next(one for one in (path / "parts").rglob("*.npz") if "000000256" in str(one))
+    data = bytearray(part.read_bytes())
+    data[len(data) // 2] ^= 1
+    part.write_bytes(data)
+    with pytest.raises(lw.SceneError, match=r"parts/000000256.* has changed; `lgvi-warp resume .*` mends it"):
+        lw.open_run(path)
+    (path / "blocks" / "000000256.json").unlink()
+    with pytest.raises(lw.SceneError, match=r"blocks/000000256.json is missing or damaged; `lgvi-warp resume"):
+        lw.open_run(path)
+
+
 def test_samples_and_statistics_together(memory, tmp_path):
     save = lw.SaveAt(every=0.1, fields=("attitude",))
     result = lw.solve(fleet(), **SETTINGS | {"save": save}, statistics=STATISTICS, store=tmp_path / "run.zarr")

@@ -71,8 +71,8 @@ def solve(
     until: lw.Until(...), to stop before the last member, once a statistic's interval is narrow enough.
     store: a folder "runs/x/run.zarr", or a Store with more settings: samples go there block by block and not into memory,
     and a run that was stopped goes on with lw.resume. executor: "threads", "processes" or "dask", or an object that runs
-    blocks; scheduler: the address of Dask's. only: with a store, the blocks to run, range(0, 100), for a run in parts:
-    the result then is of their members.
+    blocks; scheduler: the address of Dask's. only: with a store, the blocks to run, range(0, 100), for a run in parts
+    (the last may ask for more than there are): the result then is of their members.
 
     Raises SceneError naming every fault of the arguments, MembersFailed as asked. Prints nothing. The same inputs give the
     same bits for any number of threads, on one type of machine.
@@ -100,7 +100,7 @@ def solve(
     asked, count = (save or SaveAt()).fields, threads or machine.thread_count()
     if store is None:
         return finished(run_plan(plan, count, progress, observed, asked, runner), plan, observed, asked, count)
-    check_blocks(only, plan)
+    only = blocks_there(only, plan)
     into = store if isinstance(store, Store) else Store(store)
     result = run_stored(plan, into, runner, progress, only, observed, asked)
     return result if only is not None else finished(result, plan, observed, asked, count)
@@ -119,13 +119,17 @@ def finished(
     return result
 
 
-def check_blocks(only: range | None, plan: Plan) -> None:
-    """The blocks of a run in parts must be there. Raises SceneError."""
+def blocks_there(only: range | None, plan: Plan) -> range | None:
+    """The blocks of a run in parts that it has: the last part may ask for more. Raises SceneError where it has none."""
     count = len(blocks(plan.ensemble.members))
-    if only is not None and not (only.step == 1 and len(only) and only[0] >= 0 and only[-1] < count):
+    if only is None:
+        return None
+    there = range(only.start, min(only.stop, count))
+    if only.step != 1 or only.start < 0 or not there:
         raise SceneError(
             [f"blocks {only.start}:{only.stop}: are not within the {count} of this run; give 0:{count} or less"]
         )
+    return there
 
 
 def make_plan(
@@ -273,7 +277,8 @@ def run_stored(
     start = time.perf_counter()
     observing = Observing(observed, plan.grid.times, plan.ensemble.members)
     into = settled(store, plan, observed, fields)
-    kept = tuple(name for name in fields or plan.fields if store.fields is None or name in store.fields)
+    asked = plan.fields if fields is None else fields
+    kept = tuple(name for name in asked if store.fields is None or name in store.fields)
     told = provenance(plan, observed, kept)
     folder = Stored(
         plan, into, told, messages(plan), observing.keepers, only, observing.enough, KeptRun(observed, kept)

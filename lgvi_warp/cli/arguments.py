@@ -69,7 +69,11 @@ def parser() -> argparse.ArgumentParser:
         help="result.npz when the run ends (default), or run.zarr block by block, which resume can go on with",
     )
     run.add_argument("--store-dtype", metavar="D", help="float32: store the samples of a float64 run so")
-    run.add_argument("--blocks", metavar="A:B", help="with --store zarr: run only these blocks, to be merged later")
+    run.add_argument(
+        "--blocks",
+        metavar="A:B",
+        help="with --store zarr: run only these blocks, to be merged later (as many of them as there are)",
+    )
     there = run.add_mutually_exclusive_group()
     there.add_argument("--overwrite", action="store_true", help="replace a run.zarr that is there")
     there.add_argument("--resume", action="store_true", help="go on with a run.zarr that is there, if it is this run")

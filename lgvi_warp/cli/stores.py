@@ -47,7 +47,8 @@ def info_of_run(path: Path) -> int:
     print(f"run         {found['path']} ({found['bytes'] / 1e6:.1f} MB), lgvi-warp {own['versions']['lgvi-warp']}")
     print(f"members     {found['members']:,}, {own['method']['name']}, {own['dtype']}, step {own['step']:g} s, "
           f"{own['steps']:,} steps")  # fmt: skip
-    print(f"samples     {found['samples']} times of {', '.join(found['fields']) or 'nothing'}")
+    fields = ", ".join(found["fields"])
+    print(f"samples     {found['samples']} times" + (f" of {fields}" if fields else ", not of all members"))
     if found["keepers"]:
         print(f"parts       {', '.join(found['keepers'])} of each block")
     if found["kept"]:

@@ -340,8 +340,12 @@ def test_only_parts_of_one_run_are_merged(tmp_path, whole):
 
 
 def test_blocks_beyond_the_run_are_refused(tmp_path):
-    with pytest.raises(lw.SceneError, match="blocks 0:9: are not within the 4"):
-        lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", only=range(0, 9))
+    for only in (range(4, 9), range(2, 2), range(-1, 2), range(0, 4, 2)):
+        with pytest.raises(lw.SceneError, match=f"blocks {only.start}:{only.stop}: are not within the 4"):
+            lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", only=only)
+    assert list(tmp_path.iterdir()) == []
+    # The last of equal parts may be shorter.
+    assert lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", only=range(3, 6)).members == 1003 - 768
     with pytest.raises(lw.SceneError, match="is for a run into a store"):
         lw.solve(fleet(), **SETTINGS, only=range(0, 1))
 

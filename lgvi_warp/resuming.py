@@ -20,7 +20,7 @@ from lgvi_warp.recipe import refuse_another, same_run
 from lgvi_warp.result import Result
 from lgvi_warp.running import Stored
 from lgvi_warp.scene import Scene
-from lgvi_warp.store import CREATED, KEPT, ROOT, Folder, Sink, Store, check, name_of, read_marker
+from lgvi_warp.store import CREATED, KEPT, ROOT, Folder, Sink, Store, check, held, name_of, read_marker
 from lgvi_warp.store_layout import columns
 from lgvi_warp.stored import folder_of, result_of
 
@@ -91,10 +91,11 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
     target = target if target.suffix == ".zarr" else target / first.path.name
     if target.exists() and not overwrite:
         raise SceneError([f"{target}: holds a run already; give --overwrite, or another folder"])
+    _not_in_use(target)
     beside = target.with_name(target.name + ".new")
     shutil.rmtree(beside, ignore_errors=True)
     base = _undamaged(parts)
-    shutil.copytree(base.path, beside, ignore=lambda folder, names: _of_blocks(base.path, folder, names))
+    _copy_frame(base.path, beside)
     made = Folder(beside)
     made.reopen()
     for block in first.runs:
@@ -103,6 +104,7 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
     again = whole and len(members_kept(keep_of(made.provenance), made)) > 0
     if whole and not again:
         made.finish()
+    _not_in_use(target)
     shutil.rmtree(target, ignore_errors=True)
     beside.replace(target)
     durable.sync_folder(target.parent)
@@ -111,6 +113,13 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
         with contextlib.suppress(SceneError, MembersFailed):
             resume(target)
     return Folder(target)
+
+
+def _not_in_use(target: Path) -> None:
+    """Refuse to replace a store that another run is writing into. Raises SceneError."""
+    if target.exists():
+        with held(target):
+            pass
 
 
 def _undamaged(parts: Sequence[Folder]) -> Folder:
@@ -123,12 +132,15 @@ def _undamaged(parts: Sequence[Folder]) -> Folder:
     raise SceneError(damage)
 
 
-def _of_blocks(root: Path, folder: str, names: Sequence[str]) -> set[str]:
-    """Names in a folder that are not in the list of what was made with the store."""
-    made = {*(read_marker(root / CREATED) or {}), ROOT, CREATED}
-    inside = Path(folder).relative_to(root)
-    files = {name for name in names if (Path(folder) / name).is_file() and (inside / name).as_posix() not in made}
-    return files | ({KEPT} & set(names) if inside == Path() else set())
+def _copy_frame(root: Path, target: Path) -> None:
+    """All of a store that belongs to no block: what was made with it."""
+    files = durable.Files(target)
+    for name in ("blocks", "parts"):
+        (target / name).mkdir(parents=True)
+    for key in (*(read_marker(root / CREATED) or {}), CREATED, ROOT):
+        (target / key).parent.mkdir(parents=True, exist_ok=True)
+        files.write(key, (root / key).read_bytes())
+    files.finish()
 
 
 def _copy_block(parts: Sequence[Folder], block: Block, target: Path) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import errno
+import os
 from pathlib import Path
 from typing import Any
 
@@ -67,12 +69,19 @@ def out_of(chosen: argparse.Namespace, suffix: str = "") -> Path:
 
 
 def folder(chosen: argparse.Namespace, suffix: str = "") -> Path:
-    """The folder for the files, made if it is not there. Raises SceneError where it is a file, OSError."""
+    """The folder for the files, made if it is not there. Raises SceneError where it is a file, OSError.
+
+    Before the run: what cannot be written afterwards is lost.
+    """
     out = out_of(chosen, suffix)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except FileExistsError:
         raise SceneError([f"--out {out}: is a file; give a folder"]) from None
+    if not os.access(out, os.W_OK | os.X_OK):
+        raise PermissionError(
+            errno.EACCES, f"{os.strerror(errno.EACCES)}: choose a folder that can be written", str(out)
+        )
     return out
 
 

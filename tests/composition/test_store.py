@@ -320,6 +320,24 @@ def test_parts_of_a_run_are_merged(tmp_path, whole):
     assert not lost.complete and lw.resume(lost.path).members == MEMBERS and differing(whole, lost.path) == []
 
 
+def test_a_store_in_use_is_not_replaced_by_a_merge(copy, tmp_path):
+    with store.held(copy), pytest.raises(lw.SceneError, match="another run is writing"):
+        lw.merge([copy], tmp_path, overwrite=True)
+    assert lw.merge([copy], tmp_path, overwrite=True).complete
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["run.zarr"]
+
+
+def test_parts_that_may_only_be_read_are_merged(copy, whole, tmp_path):
+    """What comes of them may be written: modes are not copied."""
+    for one in copy.rglob("*"):
+        one.chmod(0o555 if one.is_dir() else 0o444)
+    made = lw.merge([copy], tmp_path / "all").path
+    assert differing(whole, made) == []
+    assert all(one.stat().st_mode & 0o200 for one in made.rglob("*"))
+    for one in copy.rglob("*"):
+        one.chmod(0o755)
+
+
 def test_a_part_that_is_damaged_lends_no_times(tmp_path, whole):
     for name, only in (("a", range(0, 2)), ("b", range(2, 4))):
         lw.solve(fleet(), **SETTINGS, store=tmp_path / name / "run.zarr", only=only)

@@ -11,7 +11,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
-from lgvi_warp.cli import command
+from lgvi_warp.cli import command, settings
 from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.runs import all_failed
 from tests.conftest import ROOT
@@ -232,6 +232,21 @@ def test_a_file_where_a_folder_should_be_is_named(tmp_path, capsys):
     for verb in (["info"], ["resume"], ["export", "--to", "netcdf"]):
         assert cli.main([*verb, str(tmp_path / "file")]) == 2
         assert "file: is a file; give the folder of a run made with --store zarr" in capsys.readouterr().err
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_the_run(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(settings.os, "access", lambda path, mode: False)
+    monkeypatch.setattr(lw.Scene, "load", lambda *_: None)
+    for verb in ("run", "tradeoff"):
+        assert cli.main([verb, PAPER, "--out", str(tmp_path)]) == 1
+        text = f"lgvi-warp: {tmp_path}: Permission denied: choose a folder that can be written\n"
+        assert capsys.readouterr().err == text
+
+
+def test_a_recording_that_cannot_be_begun_is_told(finished, tmp_path):
+    result = lw.Result.load(finished[0] / "result.npz")
+    with pytest.raises(OSError, match=r"could not be written .*; is the disk full, or the folder read-only"):
+        lw.log_rerun(result, tmp_path / "none" / "fleet.rrd")
 
 
 def test_what_an_interrupt_leaves_is_said(tmp_path, monkeypatch, capsys):

@@ -91,7 +91,8 @@ class Dask:
         with deaf():
             cluster = distributed.LocalCluster(
                 n_workers=self.workers, threads_per_worker=1, processes=True, memory_limit=None, dashboard_address=None,
-                silence_logs=logging.CRITICAL,
+                # The scheduler's own pages: any free port, and of this machine alone.
+                scheduler_kwargs={"dashboard_address": "127.0.0.1:0"}, silence_logs=logging.CRITICAL,
             )  # fmt: skip
         with cluster, distributed.Client(cluster) as client:
             yield client

@@ -3,7 +3,9 @@
 python benchmarks/coverage_table.py
 
 The second table stops each repetition by itself as lw.Until does: looks at blocks of 256 members from `members` on, then
-whenever 5 % came to them, until the interval of a mean is narrow enough.
+whenever 5 % came to them, until the interval of a mean is narrow enough. The third is of designs with replicates: functions
+of x = a . z, z four normal numbers from four columns of the unit cube; with the median width of the intervals, over that of
+as many independent members'. The fourth stops these, with looks at powers of two. These take a fifth of the repetitions.
 """
 
 import argparse
@@ -16,31 +18,53 @@ from scipy.special import ive, ndtr, ndtri
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import lgvi_warp as lw
+from lgvi_warp.sampling import sampling_of
 from lgvi_warp.statistics.tree import Tree
 from lgvi_warp.statistics.until import Watch
-from lgvi_warp.statistics.values import Values
+from lgvi_warp.statistics.values import Values, dealt
+from lgvi_warp.variations import Space
 
 BLOCK = 256
+# Of the designs with replicates: members, and the weights of four normal numbers, those of another sum backwards.
+MEMBERS = 1024
+A = np.sqrt([0.49, 0.25, 0.16, 0.1])
+SPACE = ("z",), (4,), tuple((f"z[{i}]", (i,)) for i in range(4))
+DESIGNS = (
+    {"sobol": {"replicates": 8}},
+    {"sobol": {"replicates": 16}},
+    {"sobol": {"replicates": 32}},
+    {"halton": {"replicates": 16}},
+    {"latin_hypercube": {"group": 64, "replicates": 16}},
+)
 
 
 def quantity(d=1):
     return lw.Quantity("x", lambda samples, members: None, "1", (), tuple(f"x[{i}]" for i in range(d)))
 
 
-def parts(statistic, blocks):
+def parts(statistic, blocks, replicates=1):
     """The tree after each block of values (repetitions, members, d): repetitions stand where times do."""
     tree = Tree(statistic.join)
     for i, x in enumerate(blocks):
         gathers = statistic.open(len(x), x.shape[1])
-        gathers.take(Values(np.ascontiguousarray(np.moveaxis(x, 2, 1)), None, i * BLOCK, i, BLOCK), slice(0, len(x)))
+        given = np.ascontiguousarray(np.moveaxis(x, 2, 1)), None, i * BLOCK, i, BLOCK
+        gathers.take(Values(*given) if replicates == 1 else dealt(*given, replicates), slice(0, len(x)))
         tree.add(i, gathers.close())
         yield tree
 
 
-def last(statistic, x):
+def said(statistic, tree, repetitions, replicates=1):
+    """The estimate of what the tree holds."""
+    time = np.arange(repetitions, dtype=float)
+    if replicates == 1:
+        return statistic.estimates(tree.parts(), time)[0]
+    return statistic.estimates_of_replicates(tree.parts(), time, replicates)[0]
+
+
+def last(statistic, x, replicates=1):
     """The estimate of all."""
-    *_, tree = parts(statistic, np.split(x, range(BLOCK, x.shape[1], BLOCK), axis=1))
-    return statistic.estimates(tree.parts(), np.arange(len(x), dtype=float))[0]
+    *_, tree = parts(statistic, np.split(x, range(BLOCK, x.shape[1], BLOCK), axis=1), replicates)
+    return said(statistic, tree, len(x), replicates)
 
 
 def held(found, truth, value=""):
@@ -71,23 +95,25 @@ def kinds(repetitions, members):
     yield "resultant length", held(circle, ive(1, 2.0) / ive(0, 2.0), "resultant_length_")
 
 
-def stopped(repetitions, until, draw, truth, most=100):
+def stopped(repetitions, until, blocks, truth, replicates=1):
     """Coverage of a mean where each repetition stops by itself, and the members it took on average."""
-    rng = np.random.default_rng(2)
     statistic = lw.Mean(quantity())
-    watch = Watch(until, statistic, statistic.key, None, np.zeros(1, int))
+    watch = Watch(until, statistic, statistic.key, {}, np.zeros(1, int), doubling=replicates > 1)
     good, members = np.zeros(repetitions, bool), np.zeros(repetitions)
-    blocks = (draw(rng, (repetitions, BLOCK, 1)) for _ in range(most))
-    for i, tree in enumerate(parts(statistic, blocks), 1):
+    for i, tree in enumerate(parts(statistic, blocks, replicates), 1):
         if not watch.due(i * BLOCK):
             continue
-        (found,) = statistic.estimates(tree.parts(), np.arange(repetitions, dtype=float))
+        found = said(statistic, tree, repetitions, replicates)
         now = (members == 0) & (found.half_width[:, 0] <= until.half_width)
         members[now] = i * BLOCK
         good[now] = ((found.lower <= truth) & (truth <= found.upper))[now, 0]
         if members.all():
             break
-    assert members.all()
+    # Who never had enough keeps the interval of all.
+    left = members == 0
+    assert not left.any() or i * BLOCK == watch.looked
+    members[left] = i * BLOCK
+    good[left] = ((found.lower <= truth) & (truth <= found.upper))[left, 0]
     return float(good.mean()), float(members.mean())
 
 
@@ -102,7 +128,57 @@ def stops(repetitions):
     for law, (draw, truth, deviation) in LAWS.items():
         for least, wanted in ((256, 512), (1024, 512), (256, 4096)):
             half = 1.96 * deviation / np.sqrt(wanted)
-            yield law, least, wanted, *stopped(repetitions, lw.Until("mean x", half, members=least), draw, truth)
+            rng = np.random.default_rng(2)
+            blocks = (draw(rng, (repetitions, BLOCK, 1)) for _ in range(100))
+            yield law, least, wanted, *stopped(repetitions, lw.Until("mean x", half, members=least), blocks, truth)
+
+
+def sums(repetitions, design, members=MEMBERS):
+    """(repetitions, members, 2): the two sums of normal numbers of members of a design, with other seeds."""
+    sampling, weights = sampling_of(design), np.stack([A, A[::-1]], axis=1)
+    drawn = (sampling.draw(Space(seed, *SPACE), np.arange(members))["z"] for seed in range(repetitions))
+    return np.stack([ndtri(u) @ weights for u in drawn])
+
+
+def judged(xy, replicates):
+    """(name, part of the intervals that hold, their median width) of statistics of these members."""
+    x = xy[..., :1]
+    c, levels = A @ A[::-1], np.array([0.1, 0.5, 0.9])
+    angles = (1.0 + 0.8 * x + np.pi) % (2.0 * np.pi) - np.pi
+    cases = [
+        ("mean of a linear function", lw.Mean(quantity()), x, 0.0),
+        ("mean, lognormal", lw.Mean(quantity()), np.exp(x), np.exp(0.5)),
+        ("covariance", lw.Covariance(quantity(2)), xy, np.array([[1.0, c], [c, 1.0]])),
+        ("quantiles 0.1, 0.5, 0.9", lw.Quantiles(quantity(), levels), x, ndtri(levels)[:, None]),
+        ("probability of 0.16", lw.Exceedance(quantity(), above=1.0), x, ndtr(-1.0)),
+        ("probability of 0.01", lw.Exceedance(quantity(), above=2.3263), x, ndtr(-2.3263)),
+        ("circular mean", lw.CircularMean(quantity()), angles, 1.0),
+    ]
+    for name, statistic, values, truth in cases:
+        found = last(statistic, values, replicates)
+        yield name, held(found, truth), float(np.median(found.upper - found.lower))
+
+
+def replicated(repetitions, design):
+    """(name, part of the intervals that hold, their width over that of independent members')."""
+    (settings,) = design.values()
+    independent = judged(sums(repetitions, "random"), 1)
+    for (name, part, width), (_, _, wide) in zip(
+        judged(sums(repetitions, design), settings["replicates"]), independent, strict=True
+    ):
+        yield name, part, width / wide
+
+
+def replicated_stops(repetitions, design, most=16_384):
+    """(law, asked for, coverage, members taken) of means of linear and lognormal functions, first looked at with 1,024."""
+    (settings,) = design.values()
+    linear = sums(repetitions, design, most)[..., :1]
+    for law, wanted in (("normal", 50_000), ("normal", 1_000_000), ("lognormal", 10_000), ("lognormal", 40_000)):
+        _, truth, deviation = LAWS[law]
+        half = 1.96 * deviation / np.sqrt(wanted)
+        blocks = (linear[:, first : first + BLOCK] for first in range(0, most, BLOCK))
+        chosen = (np.exp(x) if law == "lognormal" else x for x in blocks)
+        yield law, wanted, *stopped(repetitions, lw.Until("mean x", half), chosen, truth, settings["replicates"])
 
 
 def main():
@@ -116,6 +192,24 @@ def main():
     print("\n| stopped: mean of | first look at | half width as of | holds | members taken |\n|---|---|---|---|---|")
     for law, least, wanted, part, taken in stops(n):
         print(f"| {law} | {least} | {wanted} | {part:.1%} | {taken:.0f} |", flush=True)
+    few = max(1, n // 5)
+    print(
+        f"\n| {few:,} intervals of 95 %, each of {MEMBERS:,} members: hold, width | {' | '.join(map(called, DESIGNS))} |"
+    )
+    print("|---|" + "---|" * len(DESIGNS))
+    columns = [list(replicated(few, design)) for design in DESIGNS]
+    for row in zip(*columns, strict=True):
+        print(f"| {row[0][0]} | " + " | ".join(f"{part:.1%}, {width:.2f}" for _, part, width in row) + " |", flush=True)
+    print("\n| stopped: mean of | design | half width as of | holds | members taken |\n|---|---|---|---|---|")
+    for design in DESIGNS[:2]:
+        for law, wanted, part, taken in replicated_stops(few, design):
+            print(f"| {law} | {called(design)} | {wanted} | {part:.1%} | {taken:.0f} |", flush=True)
+
+
+def called(design):
+    """A design's name and replicates."""
+    ((kind, settings),) = design.items()
+    return f"`{kind}`, {settings['replicates']}"
 
 
 if __name__ == "__main__":

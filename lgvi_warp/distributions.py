@@ -17,6 +17,8 @@ from lgvi_warp.errors import Faults
 
 Spread = float | tuple[float, ...] | list[float] | np.ndarray
 
+# Standard deviations beyond which the tail of a normal is known by its logarithm.
+FAR = -20.0
 # Between two members that are asked for, it costs less to draw so many others than to start again.
 NEAR = 64
 
@@ -127,6 +129,16 @@ def ordered(low: np.ndarray, high: np.ndarray) -> bool:
         return False
 
 
+def varies_nothing(law: Distribution, bases: Sequence[np.ndarray]) -> str | None:
+    """Where a law is relative to the scene's value, and that is 0 in every entry: what its width is called; else None."""
+    if any(np.any(base) for base in bases):
+        return None
+    relative = getattr(law, "relative", None)
+    if relative is not None and np.any(relative):
+        return "relative"
+    return "sigma" if isinstance(law, LogNormal) and law.median is None and np.any(law.sigma) else None
+
+
 def _width(std: Spread | None, relative: Spread | None, base: np.ndarray) -> np.ndarray:
     """Absolute spread, from itself or as a fraction of the scene's value."""
     return np.asarray(std) if std is not None else np.abs(base) * np.asarray(relative)
@@ -209,7 +221,7 @@ class TruncatedNormal(Distribution):
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
         """The normal's quantile at a level between those of the bounds; upper tails by symmetry, for their digits."""
-        from scipy.special import ndtr, ndtri
+        from scipy.special import log_ndtr, ndtr, ndtri, ndtri_exp
 
         mean = base if self.mean is None else np.asarray(self.mean)
         std = _width(self.std, self.relative, base)
@@ -219,8 +231,13 @@ class TruncatedNormal(Distribution):
         b = np.minimum((high - mean) / scale, width)
         flip = a > 0.0
         a, b = np.where(flip, -b, a), np.where(flip, -a, b)
-        level = ndtr(a) + (ndtr(b) - ndtr(a)) * np.where(flip, 1.0 - u, u)
-        z = np.clip(ndtri(level), a, b)
+        u = np.where(flip, 1.0 - u, u)
+        z = ndtri(ndtr(a) + (ndtr(b) - ndtr(a)) * u)
+        if np.any(b < FAR):
+            with np.errstate(divide="ignore"):
+                level = np.logaddexp(log_ndtr(a) + np.log1p(-u), log_ndtr(b) + np.log(u))
+            z = np.where(b < FAR, ndtri_exp(level), z)
+        z = np.clip(z, a, b)
         return np.clip(mean + std * np.where(flip, -z, z), low, high)
 
     def _check_more(self, faults: Faults) -> None:

@@ -340,6 +340,11 @@ class Ensemble:
         """One member alone, with the bits that it has among all. Raises IndexError where there is none."""
         return self.subset([operator.index(index)])
 
+    @property
+    def replicates(self) -> int:
+        """Independent replicates of its design, member i of the i-th mod so many; 1 for chosen members: they are no design."""
+        return self.sampling.replicates_of_members() if self._places is None and not self._explicit else 1
+
     def explicit(self) -> dict[str, np.ndarray]:
         """What was given as arrays, by name: states and parameters of the whole, (members of the whole, ...), and "indices".
 

@@ -12,8 +12,10 @@ from lgvi_warp import inertia, notation
 from lgvi_warp.distributions import Distribution, Spread
 from lgvi_warp.errors import Faults
 
-# Of a covariance's largest eigenvalue: what a negative one may be by round-off.
+# Of a matrix's largest entry: what a negative eigenvalue of it may be by round-off.
 ROUND_OFF = 1e-12
+# What a negative eigenvalue of a correlation matrix may be: of one that was written with six digits.
+SIX_DIGITS = 1e-5
 
 
 def normals(u: np.ndarray) -> np.ndarray:
@@ -32,6 +34,22 @@ def combined(matrix: np.ndarray, z: np.ndarray) -> np.ndarray:
     for k in range(1, z.shape[1]):
         total = total + z[:, k : k + 1] * matrix[:, k]
     return total
+
+
+def correlation(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """std (d,) and correlation (d, d) of a covariance; 1 on the diagonal where the variance is 0.
+
+    Units and sizes of the entries play no part in it: metres beside newtons are judged alike.
+    """
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    scale = np.where(std > 0.0, std, 1.0)
+    return std, covariance / np.outer(scale, scale) + np.diag(np.where(std > 0.0, 0.0, 1.0))
+
+
+def root_of_covariance(covariance: np.ndarray) -> np.ndarray:
+    """L (d, d) with L L^T = covariance, from the correlation's."""
+    std, C = correlation(covariance)
+    return np.asarray(std[:, None] * root(C))
 
 
 def root(matrix: np.ndarray) -> np.ndarray:
@@ -69,16 +87,21 @@ def _covariance(faults: Faults, law: Any, size: int | None) -> np.ndarray | None
             faults.add("std", law.std, "is negative", "give a spread from 0")
             return None
         std = np.broadcast_to(std, n)
-        if name == "correlation" and np.any(np.abs(np.diag(matrix) - 1.0) > 1e-9):
+        if name == "correlation" and np.any(np.abs(np.diag(matrix) - 1.0) > SIX_DIGITS):
             faults.add(name, matrix, "has a diagonal that is not 1", "give 1 on the diagonal, or a covariance")
             return None
-        matrix = np.outer(std, std) * (matrix if name == "correlation" else np.eye(n))
-    values = np.linalg.eigvalsh(matrix)
-    if values[0] < -ROUND_OFF * max(values[-1], 0.0):
-        faults.add(name, getattr(law, name), f"is not positive semidefinite (eigenvalue {values[0]:.3g})",
-                   "give a covariance that some numbers can have")  # fmt: skip
+        matrix = np.outer(std, std) * (correlation(matrix)[1] if name == "correlation" else np.eye(n))
+    matrix = 0.5 * (matrix + matrix.T)
+    if np.any(np.diag(matrix) < 0.0):
+        faults.add(name, getattr(law, name), "has a negative variance on its diagonal", "give variances from 0")
         return None
-    return 0.5 * (matrix + matrix.T)
+    std, C = correlation(matrix)
+    least = -np.inf if np.any(matrix[std == 0.0]) else float(np.linalg.eigvalsh(C)[0])
+    if least < -SIX_DIGITS:
+        faults.add(name, getattr(law, name), f"is not positive semidefinite (eigenvalue {least:.3g} of the correlation)",
+                   "give what some numbers can have: no correlation beyond 1, and such that agree")  # fmt: skip
+        return None
+    return matrix
 
 
 def components(shapes: Sequence[tuple[int, ...]]) -> int:
@@ -126,7 +149,7 @@ class CorrelatedNormal(JointLaw):
             faults.finite("mean", self.mean)
         faults.raise_if_any()
         assert matrix is not None
-        object.__setattr__(self, "_root", root(matrix))
+        object.__setattr__(self, "_root", root_of_covariance(matrix))
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
         """As many rows as there are entries, unless one std serves all."""
@@ -174,7 +197,7 @@ class RotationNormal(JointLaw):
             faults.add("covariance", self.covariance, "is not 3 x 3", "give 3 x 3 numbers [rad^2], body axes")
         faults.raise_if_any()
         assert matrix is not None
-        object.__setattr__(self, "_root", root(matrix))
+        object.__setattr__(self, "_root", root_of_covariance(matrix))
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
         """The ensemble gives it attitudes only."""

@@ -109,10 +109,83 @@ class Frozen(Distribution):
             raise SceneError(f"{key}.{kind}: {fault}" for fault in error.faults) from None
 
 
+@dataclass(frozen=True, eq=False)
+class Histogram(Distribution):
+    """Numbers from bins: counts (k,), with any scale, between edges (k + 1,), uniform within each bin.
+
+    Absolute: the scene's own value plays no part. lw.Histogram is the statistic; this law is "histogram" in a scene file, and
+    scipy.stats.rv_histogram in `vary`.
+    """
+
+    counts: Any = ()
+    edges: Any = ()
+    kind: ClassVar[str] = "histogram"
+
+    def _check_more(self, faults: Faults) -> None:
+        counts, edges = (faults.finite(name, getattr(self, name)) for name in ("counts", "edges"))
+        if counts is None or edges is None:
+            return
+        if counts.ndim != 1 or not counts.size or not counts.sum() > 0.0:
+            faults.add("counts", self.counts, "weigh no bin", "give one from 0 for each bin, not all of them 0")
+        elif edges.shape != (len(counts) + 1,) or np.any(np.diff(edges) <= 0.0):
+            faults.add("edges", self.edges, f"do not bound {len(counts)} bins", "give one more than counts, rising")
+
+    def numbers(self) -> list[Any]:
+        """None of them is a component's."""
+        return []
+
+    def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
+        """Linear in each bin."""
+        counts = np.asarray(self.counts, dtype=np.float64)
+        levels = np.concatenate([[0.0], np.cumsum(counts)]) / counts.sum()
+        return np.interp(u, levels, np.asarray(self.edges, dtype=np.float64))
+
+
+@dataclass(frozen=True, eq=False)
+class OwnLaw(Distribution):
+    """A law by an object of the user's with quantiles: ppf(u), or icdf(u) as scipy's new distributions have.
+
+    Its values are absolute. A file has its words only: what is read from one wants the ensemble again.
+    """
+
+    law: Any = None
+    kind: ClassVar[str] = "own"
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        try:
+            good = bool(
+                np.all(np.isfinite(np.asarray(quantiles_of(self.law)(np.array([0.25, 0.75])), dtype=np.float64)))
+            )
+        except Exception:  # whatever a user's object raises
+            good = False
+        if not good:
+            faults.add("law", self.law, "gives no numbers at the levels 0.25 and 0.75", "give an object with ppf(u)")
+        faults.raise_if_any()
+
+    def numbers(self) -> list[Any]:
+        """None that are known."""
+        return []
+
+    def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
+        """The object's."""
+        return np.asarray(quantiles_of(self.law)(u), dtype=np.float64)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What it says of itself."""
+        return {self.kind: {"law": str(self.law)}}
+
+
+def quantiles_of(law: Any) -> Any:
+    """The quantile function of an object, ppf or icdf; None where it has none."""
+    found = getattr(law, "ppf", None) or getattr(law, "icdf", None)
+    return found if callable(found) else None
+
+
 KINDS: dict[str, type[Distribution]] = {
     law.kind: law
-    for law in (Normal, Uniform, LogNormal, TruncatedNormal, Choice, CorrelatedNormal, RotationNormal, UniformRotation,
-                PositiveDefinite, PhysicalInertia)
+    for law in (Normal, Uniform, LogNormal, TruncatedNormal, Choice, Histogram, CorrelatedNormal, RotationNormal,
+                UniformRotation, PositiveDefinite, PhysicalInertia)
 }  # fmt: skip
 
 
@@ -121,9 +194,25 @@ def is_frozen(value: Any) -> bool:
     return all(hasattr(value, name) for name in ("dist", "args", "kwds", "ppf"))
 
 
-def as_law(value: Any) -> Any:
-    """A frozen distribution of scipy.stats as a law; everything else as it is."""
-    return Frozen(value) if is_frozen(value) else value
+def as_law(key: str, value: Any) -> Any:
+    """What may stand in `vary` as a law: a table, what scipy.stats has, an object with quantiles; all else as it is.
+
+    Raises SceneError for a table that is none.
+    """
+    if isinstance(value, Distribution | type):
+        return value
+    if isinstance(value, Mapping):
+        return from_dict(key, value)
+    given = getattr(value, "args", ()) or getattr(value, "kwds", {})
+    whole = getattr(value, "dist", value)
+    if type(whole).__name__ == "rv_histogram" and not given:
+        edges = whole._histogram[1]
+        return Histogram(np.diff(whole.cdf(edges)).tolist(), np.asarray(edges).tolist())
+    if is_frozen(value):
+        return Frozen(value)
+    if type(value).__name__ == "multivariate_normal_frozen":
+        return CorrelatedNormal(covariance=np.asarray(value.cov).tolist(), mean=np.asarray(value.mean).tolist())
+    return OwnLaw(value) if quantiles_of(value) else value
 
 
 def from_dict(key: str, content: Any) -> Distribution:
@@ -134,7 +223,9 @@ def from_dict(key: str, content: Any) -> Distribution:
         faults.raise_if_any()
     kind, values = next(iter(content.items()))
     foreign = kind in SCIPY or kind == Frozen.kind
-    if not foreign and kind not in KINDS:
+    if kind == OwnLaw.kind:
+        faults.add(key, values, "is a law of your own, which a file does not hold", "give the ensemble again")
+    elif not foreign and kind not in KINDS:
         faults.keys(key, [kind], [*KINDS, *SCIPY, Frozen.kind])
     elif not isinstance(values, Mapping):
         faults.add(f"{key}.{kind}", values, "is not a table", "write { normal = { std = 1.0 } }")

@@ -21,6 +21,14 @@ from lgvi_warp.status import Status
 EVENLY_SPREAD = ("latin_hypercube", "sobol", "halton")
 
 
+def replicates_of(ensemble: Mapping[str, Any]) -> int:
+    """Independent replicates of an ensemble's design, from its provenance; 1 for chosen members: they are no design."""
+    sampling = ensemble.get("sampling", "random")
+    if isinstance(sampling, str) or "indices" in ensemble or ensemble.get("explicit"):
+        return 1
+    return int(sampling.get(next(iter(sampling)), {}).get("replicates", 1))
+
+
 @dataclass(frozen=True)
 class Observation:
     """statistics: gathered while the run goes. keep: "all" samples of members, "none", "failed", or indices of members.
@@ -105,12 +113,14 @@ def observation_of(told: Mapping[str, Any] | None, statistics: Any = None) -> Ob
 class Observing:
     """An Observation at work: the keeper of its statistics, when there are members enough, and what it then says.
 
-    time: (k,) [s], of the samples; members: of the whole ensemble. Raises SceneError.
+    time: (k,) [s], of the samples; members: of the whole ensemble; replicates: of its design. Raises SceneError.
     """
 
-    def __init__(self, observed: Observation, time: np.ndarray, members: int):
+    def __init__(self, observed: Observation, time: np.ndarray, members: int, replicates: int = 1):
         statistics, self._watch = observed.watch(time)
-        self._gathered = Gathered(time, members, statistics) if statistics else None
+        if self._watch is not None:
+            self._watch.doubling = replicates > 1
+        self._gathered = Gathered(time, members, statistics, replicates) if statistics else None
 
     @property
     def keepers(self) -> tuple[Gathered, ...]:
@@ -128,7 +138,7 @@ class Observing:
     def read(self, ensemble: Mapping[str, Any], members: int) -> tuple[Estimates, tuple[str, ...]]:
         """(statistics, what the user should know of them) of a run of so many members; ensemble: its provenance."""
         estimates = self._gathered.result() if self._gathered else Estimates()
-        said = notes(estimates, ensemble.get("sampling", "random"), members)
+        said = notes(estimates, ensemble, members)
         return estimates, said + ((self._watch.report(members, self._watched()),) if self._watch else ())
 
 
@@ -147,7 +157,7 @@ def observe(plan_members: int, settings: Any, given: Any, keep: Any, until: Any)
         found = kinds.from_list(settings.statistics if given is None else given)
     with faults.including():
         asked = settings.until if until is None else until
-        stop = None if asked is None else from_dict(asked)
+        stop = None if asked is None or asked is False else from_dict(asked)
     check_keep(faults, "keep", keep, plan_members)
     if stop is not None and not faults:
         with faults.including():
@@ -157,20 +167,27 @@ def observe(plan_members: int, settings: Any, given: Any, keep: Any, until: Any)
     return Observation(found, chosen, stop)
 
 
-def notes(estimates: Mapping[str, Estimate], sampling: Any, members: int) -> tuple[str, ...]:
-    """What a user should know of his statistics; sampling: as in a scene file."""
+def notes(estimates: Mapping[str, Estimate], ensemble: Mapping[str, Any], members: int) -> tuple[str, ...]:
+    """What a user should know of his statistics; ensemble: its provenance."""
     found: tuple[str, ...] = ()
     if not estimates:
         return found
     counts = [one.count for one in estimates.values() if one.settings["type"] != "first_passage"]
     fewest = min((int(count.min()) for count in counts), default=members)
+    sampling, R = ensemble.get("sampling", "random"), replicates_of(ensemble)
     kind = sampling if isinstance(sampling, str) else next(iter(sampling))
     if fewest < members:
         text = f"statistics leave members out from their failure on: {fewest} of {members} count where fewest do"
         found += (f"{text} (count of each statistic)",)
-    if kind in EVENLY_SPREAD:
+    if R > 1:
+        points = members // R
+        if kind == "sobol" and points & (points - 1):
+            low = 1 << (points.bit_length() - 1)
+            text = f"each of {R} replicates has {points} points of a Sobol sequence, which is balanced at powers of two"
+            found += (f"{text}: {low * R} or {2 * low * R} members would have narrower intervals for what they cost",)
+    elif kind in EVENLY_SPREAD:
         text = f"intervals are those of independent members, wider than need be for sampling {kind!r}"
-        found += (f"{text}: repetitions with other seeds show by how much",)
+        found += (f"{text}: with replicates, {{ {kind} = {{ replicates = 16 }} }}, they are those of its own spread",)
     elif kind != "random":
         text = f"intervals are those of independent members, which a {kind} does not give"
         found += (f"{text}: do not rely on them",)

@@ -160,8 +160,9 @@ def _seconds(plan: Plan, steps: int, chosen: list[Block], threads: int, observed
     trial.compile()
     keepers: tuple[Keeper, ...] = (Samples.elsewhere(trial.fields),)
     if observed is not None:
-        statistics = Observing(replace(observed, until=None), trial.grid.times, plan.ensemble.members).keepers
-        keepers = (*(keepers if observed.samples else ()), *statistics)
+        fleet = plan.ensemble
+        gathering = Observing(replace(observed, until=None), trial.grid.times, fleet.members, fleet.replicates)
+        keepers = (*(keepers if observed.samples else ()), *gathering.keepers)
     work = Work(trial, keepers)
     start = time.perf_counter()
     for _ in Threads(threads).run(work, chosen, lambda block, vehicle_steps: None):

@@ -51,7 +51,7 @@ def resume(
     plan = folder.plan(given)
     told = folder.provenance.get("observed")
     observed = observation_of(told, statistics)
-    observing = Observing(observed, plan.grid.times, plan.ensemble.members)
+    observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
     now = provenance(plan) | ({} if told is None else {"observed": told})
     messages = refuse_another(folder.path, folder.provenance, now, force)
     runner = executor_of(executor, threads, scheduler)

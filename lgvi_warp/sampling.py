@@ -12,7 +12,7 @@ import csv
 import functools
 import hashlib
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, ClassVar
@@ -26,6 +26,8 @@ from lgvi_warp.variations import Space
 # Of a Sobol sequence: a point is at the middle of one of 2^32 parts of each side, so that no level is 0 or 1.
 SOBOL_BITS = 32
 LARGEST_GROUP = 2**20
+# A block has as many members, or a multiple: it holds as many points of each replicate.
+MOST_REPLICATES = 64
 
 Drawn = dict[str, np.ndarray]
 
@@ -54,6 +56,10 @@ class Sampling:
 
     def group_size(self, space: Space) -> int:
         """Members come in whole groups of so many."""
+        return 1
+
+    def replicates_of_members(self) -> int:
+        """Independent replicates of the design, R: member i is point i // R of replicate i mod R. 1: it has none."""
         return 1
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
@@ -94,48 +100,101 @@ def generator(space: Space, name: str) -> np.random.Generator:
 
 
 @dataclass(frozen=True)
-class LatinHypercube(Sampling):
+class Replicated(Sampling):
+    """A design that may be drawn R times, independently: member i is point i // R of replicate i mod R.
+
+    replicates: R, a power of two from 1 to 64; members must be a multiple of it. Each replicate's estimate of a statistic
+    is independent of the others', and their spread is the error of their mean: intervals then follow from it (L'Ecuyer,
+    Nakayama, Owen & Tuffin 2023, Winter Simulation Conference). Raises SceneError.
+    """
+
+    replicates: int = field(default=1, kw_only=True)
+
+    def __post_init__(self) -> None:
+        R = self.replicates
+        faults = Faults(f"ensemble.sampling.{self.kind}.")
+        whole = isinstance(R, int | np.integer) and not isinstance(R, bool)
+        if not whole or not 1 <= R <= MOST_REPLICATES or R & (R - 1):
+            faults.add("replicates", R, f"is no power of two from 1 to {MOST_REPLICATES}", "give 8, 16, 32 or 64")
+        self.check_own(faults)
+        faults.raise_if_any()
+        object.__setattr__(self, "replicates", int(R))
+
+    def check_own(self, faults: Faults) -> None:
+        """Note what is wrong with its other settings."""
+
+    def replicates_of_members(self) -> int:
+        """As given."""
+        return self.replicates
+
+    def group_size(self, space: Space) -> int:
+        """One point of each replicate."""
+        return self.replicates
+
+    def dealt(self, members: np.ndarray) -> Iterator[tuple[int, np.ndarray | slice, np.ndarray]]:
+        """(replicate, which of the members are its own, the indices of their points) of each that has any."""
+        if self.replicates == 1:
+            yield 0, slice(None), members
+            return
+        point, replicate = np.divmod(members, self.replicates)
+        for r in np.unique(replicate):
+            own = replicate == r
+            yield int(r), own, point[own]
+
+    def name(self, replicate: int) -> str:
+        """What the replicate's random numbers are drawn by; one alone is the design without replicates."""
+        return self.kind if self.replicates == 1 else f"{self.kind} {replicate}"
+
+
+@dataclass(frozen=True)
+class LatinHypercube(Replicated):
     """Groups of `group` members, each a full Latin hypercube: every column has one member in each of `group` equal parts.
 
-    Members are added group by group, and names may be added. group: 2 to 2^20; members must be a multiple of it.
-    McKay, Beckman & Conover (1979); scipy.stats.qmc.LatinHypercube.
+    Members are added group by group, and names may be added. group: 2 to 2^20; members must be a multiple of it. With
+    replicates, as many groups are filled at once, a member of each in turn. McKay, Beckman & Conover (1979);
+    scipy.stats.qmc.LatinHypercube.
     """
 
     group: int = 0
     kind: ClassVar[str] = "latin_hypercube"
 
-    def __post_init__(self) -> None:
+    def check_own(self, faults: Faults) -> None:
+        """The group must be stated."""
         group = self.group
-        faults = Faults("ensemble.sampling.latin_hypercube.")
         if isinstance(group, bool) or not isinstance(group, int | np.integer) or not 2 <= group <= LARGEST_GROUP:
             faults.add("group", group, f"is not a whole number from 2 to {LARGEST_GROUP}",
                        "give how many members make a hypercube: group = 256")  # fmt: skip
-        faults.raise_if_any()
 
     def group_size(self, space: Space) -> int:
-        """As given."""
-        return int(self.group)
+        """A hypercube for each replicate."""
+        return int(self.group) * self.replicates
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
         """From the hypercube of each member's group; names by themselves, so that others do not change them."""
-        group, place = np.divmod(members, self.group)
+        R = self.replicates
+        group, place = np.divmod(members, self.group * R)
         found = {}
         for key, size in zip(space.keys, space.sizes, strict=True):
             found[key] = np.empty((len(members), size))
             for g in np.unique(group):
                 mine = group == g
-                cube = _hypercube(space.seed, key, int(g), int(self.group), size)
-                found[key][mine] = cube[place[mine]]
+                cubes = _hypercubes(space.seed, key, int(g) * R, R, int(self.group), size)
+                found[key][mine] = cubes[place[mine]]
         return found
 
 
 # A block of members lies in few groups: these are kept from one block to the next.
 @functools.lru_cache(maxsize=64)
-def _hypercube(seed: int, key: str, number: int, size: int, columns: int) -> np.ndarray:
+def _hypercubes(seed: int, key: str, first: int, number: int, size: int, columns: int) -> np.ndarray:
+    """So many hypercubes from the first on, a point of each in turn: (size * number, columns)."""
     from scipy.stats import qmc
 
-    rng = np.random.Generator(np.random.Philox(np.random.SeedSequence([*seed_words(seed, f"latin {key}"), number])))
-    return _inside(qmc.LatinHypercube(columns, rng=rng).random(size))
+    cubes = np.empty((size, number, columns))
+    for i in range(number):
+        words = [*seed_words(seed, f"latin {key}"), first + i]
+        rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(words)))
+        cubes[:, i] = qmc.LatinHypercube(columns, rng=rng).random(size)
+    return _inside(cubes.reshape(size * number, columns))
 
 
 def _inside(cube: np.ndarray) -> np.ndarray:
@@ -146,23 +205,26 @@ def _inside(cube: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Sobol(Sampling):
+class Sobol(Replicated):
     """A scrambled Sobol sequence (linear matrix scramble and digital shift, scipy.stats.qmc.Sobol): member i is point i.
 
     Members may be added: powers of two are balanced. What varies is part of the design: another name, another sequence.
-    At most 2^32 members.
+    At most 2^32 points. replicates: so many sequences, scrambled independently, a member of each in turn.
     """
 
     kind: ClassVar[str] = "sobol"
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
         """Points by their indices."""
-        return space.split(sobol_points(space.seed, "sobol", space.dimensions, members))
+        found = np.empty((len(members), space.dimensions))
+        for replicate, own, points in self.dealt(members):
+            found[own] = sobol_points(space.seed, self.name(replicate), space.dimensions, points)
+        return space.split(found)
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
         """There are 2^32 points."""
         super().check(faults, space, members)
-        if members > 2**SOBOL_BITS:
+        if members > self.replicates * 2**SOBOL_BITS:
             faults.add("members", members, f"are more than 2^{SOBOL_BITS} points", "use random sampling")
 
 
@@ -182,7 +244,8 @@ def sobol_points(seed: int, name: str, dimensions: int, indices: np.ndarray, scr
     return np.asarray((points.astype(np.float64) + 0.5) * 2.0**-SOBOL_BITS)
 
 
-@functools.lru_cache(maxsize=32)
+# Of every replicate, for a few numbers of bits.
+@functools.lru_cache(maxsize=8 * MOST_REPLICATES)
 def _sobol_basis(seed: int, name: str, dimensions: int, bits: int, scramble: bool) -> np.ndarray:
     """Point 0, and what each bit of an index changes in it: (bits + 1, dimensions), as whole numbers."""
     from scipy.stats import qmc
@@ -201,35 +264,38 @@ def _sobol_basis(seed: int, name: str, dimensions: int, bits: int, scramble: boo
 
 
 @dataclass(frozen=True)
-class Halton(Sampling):
+class Halton(Replicated):
     """A scrambled Halton sequence (random permutations of digits, scipy.stats.qmc.Halton): member i is point i.
 
     Members may be added, any number of them. What varies is part of the design: another name, another sequence.
+    replicates: so many sequences, scrambled independently, a member of each in turn.
     """
 
     kind: ClassVar[str] = "halton"
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
         """Points by their indices, neighbours together."""
-        ascending, place = np.unique(members, return_inverse=True)
-        runs = np.split(ascending, np.flatnonzero(np.diff(ascending) > 1) + 1)
-        points = np.concatenate([self._run(space, int(run[0]), len(run)) for run in runs])
-        return space.split(_inside(points)[place.reshape(-1)])
+        found = np.empty((len(members), space.dimensions))
+        for replicate, own, wanted in self.dealt(members):
+            ascending, place = np.unique(wanted, return_inverse=True)
+            runs = np.split(ascending, np.flatnonzero(np.diff(ascending) > 1) + 1)
+            points = np.concatenate([self._run(space, replicate, int(run[0]), len(run)) for run in runs])
+            found[own] = _inside(points)[place.reshape(-1)]
+        return space.split(found)
 
-    @staticmethod
-    def _run(space: Space, first: int, count: int) -> np.ndarray:
+    def _run(self, space: Space, replicate: int, first: int, count: int) -> np.ndarray:
         if not space.dimensions:
             return np.empty((count, 0))
-        engine = copy.copy(_halton(space.seed, space.dimensions))
+        engine = copy.copy(_halton(space.seed, self.name(replicate), space.dimensions))
         engine.num_generated = first
         return np.asarray(engine.random(count))
 
 
-@functools.lru_cache(maxsize=32)
-def _halton(seed: int, dimensions: int) -> Any:
+@functools.lru_cache(maxsize=2 * MOST_REPLICATES)
+def _halton(seed: int, name: str, dimensions: int) -> Any:
     from scipy.stats import qmc
 
-    rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed_words(seed, "halton"))))
+    rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed_words(seed, name))))
     return qmc.Halton(dimensions, scramble=True, rng=rng)
 
 

@@ -245,11 +245,16 @@ class EnsembleSettings:
             if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
                 faults.add(name, value, f"is not a whole number from {least}", f"give {least} or more")
             elif name == "members" and value > MOST_MEMBERS:
-                faults.add(name, value, f"is above {MOST_MEMBERS}", "give less, and run the rest with other seeds")
+                faults.add(
+                    name, value, f"is above {MOST_MEMBERS}", "give less; run the rest as ensembles with other seeds"
+                )
         if self.indices is not None and not _whole_numbers(self.indices):
             faults.add("indices", self.indices, "is no list of whole numbers from 0", "give members: indices = [17]")
         if isinstance(self.vary, Mapping):
-            named = {", ".join(key) if isinstance(key, tuple) else key: laws.as_law(v) for key, v in self.vary.items()}
+            named = {", ".join(key) if isinstance(key, tuple) else key: law for key, law in self.vary.items()}
+            for key, law in named.items():
+                with faults.including():
+                    named[key] = laws.as_law(f'vary."{key}"', law)
             object.__setattr__(self, "vary", named)
         with faults.including():
             object.__setattr__(self, "sampling", sampling_of(self.sampling))

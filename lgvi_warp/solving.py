@@ -68,7 +68,8 @@ def solve(
     statistics: gathered over the members at every sample time while the run goes: lw.Mean("position"), ...; they are
     in result.statistics. keep: "all" samples of members (default); "none", so that memory grows with neither members nor
     steps; "failed", or indices of members: those are run again after the run, to the same bits, and are result.kept.
-    until: lw.Until(...), to stop before the last member, once a statistic's interval is narrow enough.
+    until: lw.Until(...), to stop before the last member, once a statistic's interval is narrow enough; False: never, whatever
+    the scene says (statistics=() likewise gathers none).
     store: a folder "runs/x/run.zarr", or a Store with more settings: samples go there block by block and not into memory,
     and a run that was stopped goes on with lw.resume. executor: "threads", "processes" or "dask", or an object that runs
     blocks; scheduler: the address of Dask's. only: with a store, the blocks to run, range(0, 100), for a run in parts
@@ -218,7 +219,7 @@ def run_plan(
     compile_seconds = plan.compile()
     total = plan.ensemble.members
     outcomes, samples = Outcomes(plan), Samples(plan, fields) if observed.samples else None
-    observing = Observing(observed, plan.grid.times, total)
+    observing = Observing(observed, plan.grid.times, total, plan.ensemble.replicates)
     keepers = (outcomes, *((samples,) if samples else ()), *observing.keepers)
     made = Progress(total * plan.grid.steps, progress)
     start = time.perf_counter()
@@ -275,7 +276,7 @@ def run_stored(
     observed = observed or Observation()
     compile_seconds = plan.compile()
     start = time.perf_counter()
-    observing = Observing(observed, plan.grid.times, plan.ensemble.members)
+    observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
     into = settled(store, plan, observed, fields)
     asked = plan.fields if fields is None else fields
     kept = tuple(name for name in asked if store.fields is None or name in store.fields)

@@ -13,7 +13,7 @@ import numpy as np
 from lgvi_warp import durable
 from lgvi_warp.errors import SceneError
 from lgvi_warp.kept import keep_of, members_kept
-from lgvi_warp.observation import Observation, Observing, observation_of
+from lgvi_warp.observation import Observation, Observing, observation_of, replicates_of
 from lgvi_warp.result import UNITS, Result
 from lgvi_warp.statistics.estimate import Estimates
 from lgvi_warp.store import KEPT, Folder, Sink, name_of, read_marker
@@ -114,7 +114,8 @@ def times_of(folder: Folder) -> np.ndarray:
 
 def gathered(folder: Folder, observed: Observation) -> Observing:
     """The statistics of a complete run, from the parts of its blocks."""
-    observing = Observing(observed, times_of(folder), int(folder.recipe["members"]))
+    replicates = replicates_of(folder.provenance["ensemble"])
+    observing = Observing(observed, times_of(folder), int(folder.recipe["members"]), replicates)
     sink = Sink(folder.path, ())
     for block in folder.runs:
         _check_parts(folder, read_marker(sink.marker(block)), name_of(block))

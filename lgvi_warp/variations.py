@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp import vehicle as vehicles
-from lgvi_warp.distributions import Distribution
+from lgvi_warp.distributions import Distribution, varies_nothing
 from lgvi_warp.errors import Faults, closest
 from lgvi_warp.joint_laws import PhysicalInertia, PositiveDefinite, RotationNormal, UniformRotation
 
@@ -205,7 +205,8 @@ ROTATIONS = "give lw.RotationNormal or lw.UniformRotation, or give rotation_vect
 def variation(faults: Faults, key: str, law: Any, known: Mapping[str, np.ndarray]) -> Variation | None:
     """What a key of `vary` and its law say about a scene with these numbers; None after noting every fault."""
     if not isinstance(law, Distribution):
-        faults.add(f'"{key}"', law, "is not a distribution", "give lw.Normal(std=...) or another")
+        remedy = "give lw.Normal(std=...) or another, or an object with ppf(u), such as scipy.stats.gamma(2.0)"
+        faults.add(f'"{key}"', law, "is not a distribution", remedy)
         return None
     named = targets(key)
     if not all([known_target(faults, key, law, target, known) for target in named]):
@@ -234,6 +235,8 @@ def _misfit(found: Variation) -> tuple[str, str] | None:
         if isinstance(law, PhysicalInertia) and named[0].name not in RIGID:
             return "is a law of a rigid body's inertia", "use PositiveDefinite for added mass"
     wrong: tuple[str, str] | None = law.fault([base.shape for base in found.bases])
+    if wrong is None and (width := varies_nothing(law, found.bases)):
+        return f"is relative to the scene's value, 0, so that its {width} varies nothing", "give an absolute spread"
     if wrong is None and isinstance(law, PositiveDefinite):
         wrong = law.unusable(found.wholes[0])
     if wrong is None and law.kind == "choice" and law.joint and named[0].name in MATRICES and named[0].index is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -60,17 +61,33 @@ class CircularMean(Statistic):
         cc, cs, ss = (part[key] / scale for key in ("cc", "cs", "ss"))
         across = np.sqrt(np.maximum(v * v * cc - 2.0 * u * v * cs + u * u * ss, 0.0))
         along = np.sqrt(np.maximum(u * u * cc + 2.0 * u * v * cs + v * v * ss, 0.0))
-        factor = intervals.student(n, self.confidence)
-        value = np.arctan2(S, C)
-        error = across / safe
+        arrays = {"value": np.arctan2(S, C), "resultant_length": length}
+        arrays |= self._ends(arrays["value"], length, across, along, intervals.student(n, self.confidence))
+        arrays |= {"circular_deviation": np.sqrt(-2.0 * np.log(np.clip(length, 1e-300, 1.0))), "count": count}
+        return estimate(self, "delta method on the circle", component_dims(*list(arrays)[:-1]), arrays, time)
+
+    @staticmethod
+    def _ends(
+        value: np.ndarray, length: np.ndarray, across: np.ndarray, along: np.ndarray, factor: np.ndarray
+    ) -> dict[str, np.ndarray]:
+        """Intervals from the standard errors of the mean of (cosine, sine) across and along its direction."""
+        error = across / np.where(length > 0.0, length, 1.0)
         clear = np.isfinite(factor) & (np.where(np.isfinite(factor), factor, 0.0) * np.maximum(across, along) < length)
         half = np.where(clear, np.minimum(np.where(clear, factor, 0.0) * error, np.pi), np.pi)
         low, high = intervals.about(length, along, factor)
-        arrays = {"value": value, "lower": value - half, "upper": value + half, "standard_error": error}
-        arrays |= {"resultant_length": length, "resultant_length_lower": np.fmax(low, 0.0)}
-        arrays |= {"resultant_length_upper": np.fmin(high, 1.0)}
-        arrays |= {"circular_deviation": np.sqrt(-2.0 * np.log(np.clip(length, 1e-300, 1.0))), "count": count}
-        return estimate(self, "delta method on the circle", component_dims(*list(arrays)[:-1]), arrays, time)
+        found = {"lower": value - half, "upper": value + half, "standard_error": error}
+        return found | {"resultant_length_lower": np.fmax(low, 0.0), "resultant_length_upper": np.fmin(high, 1.0)}
+
+    def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
+        """The delta method again, with the covariance of the mean that the replicates' means have."""
+        turned = np.stack([one.value for one in each]) - whole.value
+        length = np.stack([one["resultant_length"] for one in each])
+        across, along = (
+            intervals.of_replicates(length * part, self.confidence)[0] for part in (np.sin(turned), np.cos(turned))
+        )
+        factor = intervals.student(np.array(len(each)), self.confidence)
+        found = self._ends(whole.value, whole["resultant_length"], across, along, factor)
+        return whole.with_interval(f"delta method on the circle, Student's t of {len(each)} replicates", found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,28 +146,41 @@ class MeanAttitude(Statistic):
         to_angle = (inverse @ np.einsum("ijk,tlj->tilk", vee, R).reshape(-1, 3, 9)).reshape(-1, 3, 9)
         n = np.maximum(count - 1, 1)[:, None, None]
         covariance = to_angle @ (part["m11"] / n) @ np.swapaxes(to_angle, 1, 2)
-        variance = np.einsum("kii->ki", covariance) / np.maximum(count, 1)[:, None]
-        error = np.where(known[:, None], np.sqrt(np.maximum(variance, 0.0)), np.inf)
-        factor = intervals.student(count, self.confidence)[:, None]
-        half = np.where(np.isfinite(error) & np.isfinite(factor), factor * np.where(known[:, None], error, 0.0), np.pi)
         # |R - X|^2 = 6 - 2 tr(R^T X), and the mean of X is M.
         dispersion = np.sqrt(np.maximum(3.0 - trace, 0.0))
-        entries = self._entries(R, covariance / np.maximum(count, 1)[:, None, None])
-        reach = np.where(known[:, None, None] & np.isfinite(factor)[:, None], factor[:, None] * entries, 2.0)
         value = empty_as_nan(R, count)
-        arrays = {
-            "value": value,
-            "lower": value - reach,
-            "upper": value + reach,
-            "covariance": empty_as_nan(covariance, count, 2),
-        }
-        dims = along(arrays, "time", "row", "column")
-        arrays |= {"rotation_half_width": np.minimum(half, np.pi), "standard_error": error, "dispersion": dispersion}
+        turn = covariance / np.maximum(count, 1)[:, None, None]
+        ends = self._ends(value, turn, known, intervals.student(count, self.confidence))
+        arrays = {"value": value} | ends | {"covariance": empty_as_nan(covariance, count, 2), "dispersion": dispersion}
+        dims = along(("value", "lower", "upper", "covariance"), "time", "row", "column")
         dims |= {"rotation_half_width": ("time", "axis"), "standard_error": ("time", "axis")}
         arrays |= {"count": count}
         dims |= {"dispersion": ("time",), "count": ("time",)}
         axes = {"row": np.arange(3), "column": np.arange(3), "axis": np.array(["x", "y", "z"])}
         return estimate(self, "delta method on SO(3)", dims, arrays, time, axes, labels=())
+
+    def _ends(self, R: np.ndarray, turn: np.ndarray, known: np.ndarray, factor: np.ndarray) -> dict[str, np.ndarray]:
+        """Intervals from the covariance (k, 3, 3) of the mean's small turns, where it is known (k,)."""
+        error = np.where(known[:, None], np.sqrt(np.maximum(np.einsum("kii->ki", turn), 0.0)), np.inf)
+        some = known & np.isfinite(factor)
+        t = np.where(some, factor, 0.0)
+        half = np.where(some[:, None], t[:, None] * np.where(known[:, None], error, 0.0), np.pi)
+        reach = np.where(some[:, None, None], t[:, None, None] * self._entries(R, turn), 2.0)
+        found = {"lower": R - reach, "upper": R + reach}
+        return found | {"rotation_half_width": np.minimum(half, np.pi), "standard_error": error}
+
+    def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
+        """The same from the turns of the replicates' means from that of all."""
+        X = np.swapaxes(whole.value, 1, 2) @ np.stack([one.value for one in each])
+        # v of X = exp(hat(v)), but for a third power of its length.
+        v = 0.5 * np.stack([X[..., j, i] - X[..., i, j] for i, j in ((1, 2), (2, 0), (0, 1))], axis=-1)
+        v = v - v.mean(axis=0)
+        n = len(each)
+        turn = np.einsum("rki,rkj->kij", v, v) / (n * (n - 1))
+        known = np.isfinite(whole["standard_error"]).all(axis=1) & np.isfinite(turn).all(axis=(1, 2))
+        factor = np.full(len(turn), intervals.student(np.array(n), self.confidence))
+        found = self._ends(whole.value, np.where(known[:, None, None], turn, 0.0), known, factor)
+        return whole.with_interval(f"rotations' Student's t of {n} replicates", found)
 
     @staticmethod
     def _entries(R: np.ndarray, turn: np.ndarray) -> np.ndarray:

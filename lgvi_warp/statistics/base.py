@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.errors import Faults, SceneError
+from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.estimate import Estimate
 from lgvi_warp.statistics.quantity import Quantity, component, quantity
 from lgvi_warp.statistics.tree import Part
@@ -126,6 +127,29 @@ class Statistic:
         """What it says."""
         return [self.read(self.whole(parts), time)]
 
+    # Members of R replicates: each array of a part then has R rows for one, those of a time side by side.
+
+    def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
+        """The part of one replicate's members."""
+        return {key: a if key in self.shared else a[replicate::replicates] for key, a in part.items()}
+
+    def each_replicate(self, parts: Sequence[Part], replicates: int) -> list[list[Part]]:
+        """The parts of each replicate's members."""
+        return [[self.of_replicate(part, r, replicates) for part in parts] for r in range(replicates)]
+
+    def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
+        """What it says where members are of so many independent replicates: values of all, intervals from their spread."""
+        each = self.each_replicate(parts, replicates)
+        (whole,) = self.estimates(together(each), time)
+        return [self.spread(whole, [self.estimates(own, time)[0] for own in each])]
+
+    def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
+        """The estimate of all members with the interval that the replicates' estimates give: Student's t."""
+        error, half = intervals.of_replicates(np.stack([one.value for one in each]), self.confidence)
+        found = {"lower": whole.value - half, "upper": whole.value + half}
+        found |= {"standard_error": error} if "standard_error" in whole.arrays else {}
+        return whole.with_interval(f"Student's t of {len(each)} replicates", found)
+
     def to_dict(self) -> dict[str, Any]:
         """As in a scene file: type, of, and what differs from the defaults; a function by its name."""
         content: dict[str, Any] = {"type": self.type}
@@ -139,6 +163,11 @@ class Statistic:
     def alone(self, i: int) -> Quantity:
         """One component of what it is of."""
         return component(self.quantity, i)
+
+
+def together(each: Sequence[Sequence[Part]]) -> list[Part]:
+    """The parts of all replicates, in the order of the blocks."""
+    return [part for parts in zip(*each, strict=True) for part in parts]
 
 
 def _made(kind: type[Statistic], given: dict[str, Any]) -> Statistic:

@@ -10,7 +10,7 @@ import numpy as np
 
 from lgvi_warp.errors import Faults
 from lgvi_warp.statistics import intervals
-from lgvi_warp.statistics.base import Statistic
+from lgvi_warp.statistics.base import Statistic, together
 from lgvi_warp.statistics.estimate import Estimate, along
 from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate
 from lgvi_warp.statistics.tree import Part
@@ -23,6 +23,18 @@ class Counted(Statistic):
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
         """The sums."""
         return {key: left[key] + right[key] for key in left}
+
+    def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
+        """Wilson's interval with the variance of the replicates' fractions."""
+        count = whole.count.reshape(-1, *[1] * (whole.value.ndim - 1))
+        fractions = np.stack([one.value for one in each])
+        lower, upper = intervals.probability_of_replicates(whole.value, fractions, count, self.confidence)
+        return whole.with_interval(by_replicates(len(each)), {"lower": lower, "upper": upper})
+
+
+def by_replicates(number: int) -> str:
+    """How an interval of a probability was formed."""
+    return f"Wilson with the variance and Student's t of {number} replicates"
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,48 +162,76 @@ class Exceedance(Condition, Counted):
         return estimate(self, "Wilson", component_dims("value", "lower", "upper"), arrays, time, unit="1")
 
 
+# What lies between two samples is counted in so many equal parts.
+PIECES = 8
+
+
 class _Passages:
-    """Of a block: the first sample at which the condition holds for each member, or the last one that is known of it."""
+    """Of a block: the first sample at which the condition holds for each member, or the last one that is known of it.
+
+    Members are those of the first replicate, then of the next.
+    """
 
     def __init__(self, statistic: FirstPassage, times: int, count: int):
         self._statistic, self._times = statistic, times
         self._passed = np.full(count, times, np.int64)
+        self._piece = np.full(count, PIECES - 1, np.int64)
         self._known = np.zeros(count, np.int64)
+        self._before: np.ndarray | None = None
+        self._replicates = 1
 
     def take(self, values: Values, when: slice) -> None:
         """Look at these times."""
-        holds = self._statistic.holds(values)[:, 0]
+        k = when.stop - when.start
+        self._replicates = values.replicates
+        x = values.x.reshape(k, -1)
+        holds = self._statistic.holds(values)[:, 0].reshape(k, -1)
         first = np.where(holds.any(axis=0), when.start + holds.argmax(axis=0), self._times)
         open_ = (self._passed == self._times) & (self._known == when.start)
         if values.good is None:
             self._known[open_] = when.stop
         else:
             # A member that is lost stays lost: what comes after is not looked at.
-            lost = ~values.good
+            lost = ~values.good.reshape(k, -1)
             good = np.where(lost.any(axis=0), lost.argmax(axis=0), len(lost))
             self._known = np.where(open_, when.start + good, self._known)
             first = np.where(first < when.start + good, first, self._times)
         self._passed = np.where(open_, first, self._passed)
+        self._place(x, when, np.flatnonzero(open_ & (first < self._times)))
+        self._before = x[-1]
+
+    def _place(self, x: np.ndarray, when: slice, now: np.ndarray) -> None:
+        """In which part of the time since the sample before these members passed: linear between the two."""
+        limit = self._statistic.limit
+        if self._before is None or limit is None:
+            return
+        at = self._passed[now] - when.start
+        before = np.where(at > 0, x[at - 1, now], self._before[now])
+        share = (limit - before) / (x[at, now] - before)
+        self._piece[now] = np.clip(np.floor(share * PIECES), 0, PIECES - 1)
 
     def close(self) -> Part:
-        """How many pass at each time, and how many are lost before it without having passed."""
-        length = self._times + 1
-        passed = np.bincount(self._passed, minlength=length)
-        lost = np.bincount(self._known[self._passed == self._times], minlength=length)
-        return {"passed": passed, "lost": lost}
+        """How many pass at each time, by parts of the time before it, and how many are lost before without having passed."""
+        R, length = self._replicates, self._times + 1
+        row = np.repeat(np.arange(R), len(self._passed) // R) * length
+        passed = np.bincount((row + self._passed) * PIECES + self._piece, minlength=R * length * PIECES)
+        open_ = self._passed == self._times
+        lost = np.bincount((row + self._known)[open_], minlength=R * length)
+        return {"passed": passed.reshape(R, length, PIECES), "lost": lost.reshape(R, length)}
 
 
 @dataclass(frozen=True, eq=False)
 class FirstPassage(Condition, Counted):
-    """Time until a quantity is first above (or below) a number, seen at the sample times.
+    """Time until a quantity is first above (or below) a number, as its samples tell.
 
     value (k,): probability to have passed by each time, Kaplan & Meier's estimate: a member that fails before it passes
     counts until its last good sample. survival is 1 - value. Interval: Wilson's with the number of members that has
     Greenwood's variance. passed, lost (k,): members that pass at a time, and that failed before it without having
     passed; count (k,): members at risk of passing at each time; censored: those that were good to the end and did not
-    pass. passage_time (levels,) [s]: the first sample time by which that fraction has passed, infinite if it never has,
-    with passage_time_lower, _upper from the interval of value. A passage lies between the sample before and the one that
-    sees it; one that comes and goes between two is not seen (an event of the scene sees every step).
+    pass. passage_time (levels,) [s]: the time by which that fraction has passed, infinite if it never has, with
+    passage_time_lower, _upper from the interval of value. A member passes between the sample before and the one that sees
+    it, where the line between the two does; of a quantity without a number, that is true or false, at the sample that sees
+    it. A passage that comes and goes between two samples is not seen (an event of the scene sees every step).
     """
 
     type: ClassVar[str] = "first_passage"
@@ -211,31 +251,81 @@ class FirstPassage(Condition, Counted):
         """What follows the members of a block."""
         return _Passages(self, times, count)
 
+    @property
+    def limit(self) -> float | None:
+        """The number to be passed, if there is one."""
+        limit = self.above if self.above is not None else self.below
+        return None if limit is None else float(np.asarray(limit, dtype=np.float64).reshape(()))
+
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         """Kaplan & Meier 1958, Greenwood 1926."""
-        passed, lost = part["passed"][:-1], part["lost"][:-1]
-        total = int(part["passed"].sum())
-        risk = total - np.cumsum(lost) - (np.cumsum(passed) - passed)
-        n = np.maximum(risk, 1)
-        survival = np.cumprod(1.0 - passed / n)
-        left = np.maximum(n - passed, 1)
-        greenwood = np.cumsum(passed / (n * left)) * survival**2
-        some = (greenwood > 0.0) & (survival > 0.0)
-        members = np.where(some, survival * (1.0 - survival) / np.where(some, greenwood, 1.0), risk + np.cumsum(passed))
-        lower, upper = intervals.wilson(1.0 - survival, members, self.confidence)
-        value = 1.0 - survival
-        arrays = {"value": value, "lower": lower, "upper": upper, "survival": survival, "passed": passed, "lost": lost}
-        arrays |= {"count": risk}
+        curve = _Curve(part)
+        lower, upper = intervals.wilson(curve.value, curve.members, self.confidence)
+        passed, lost = curve.passed.sum(axis=1), part["lost"][0]
+        arrays = {"value": curve.value[:, -1], "lower": lower[:, -1], "upper": upper[:, -1]}
+        arrays |= {"survival": curve.survival[:, -1], "passed": passed, "lost": lost[:-1], "count": curve.risk}
         dims = along(arrays, "time")
-        arrays |= {"censored": part["lost"][-1]}
+        arrays |= {"censored": lost[-1]}
         dims["censored"] = ()
-        curves = {"passage_time": value, "passage_time_lower": upper, "passage_time_upper": lower}
-        arrays |= {name: self._first(curve, time) for name, curve in curves.items()}
-        dims |= along(curves, "level")
         levels = {"level": np.asarray(self.levels, dtype=np.float64)}
-        return estimate(self, "Wilson with Greenwood's variance", dims, arrays, time, levels, "1", labels=())
+        text = "Wilson with Greenwood's variance"
+        arrays |= (times := self._times(curve.value, lower, upper, time))
+        return estimate(self, text, dims | along(times, "level"), arrays, time, levels, "1", labels=())
 
-    def _first(self, curve: np.ndarray, time: np.ndarray) -> np.ndarray:
-        """The first time at which a rising curve reaches each level."""
-        found: Sequence[np.ndarray] = [time[curve >= level][:1] for level in np.asarray(self.levels)]
-        return np.array([one[0] if len(one) else np.inf for one in found])
+    def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
+        """The intervals of probabilities from the spread of the replicates' curves."""
+        each = self.each_replicate(parts, replicates)
+        everything = self.whole(together(each))
+        curve = _Curve(everything)
+        curves = np.stack([_Curve(self.whole(own)).value for own in each])
+        ends = intervals.probability_of_replicates(curve.value, curves, curve.members, self.confidence)
+        found = {name: end[:, -1] for name, end in zip(("lower", "upper"), ends, strict=True)}
+        found |= self._times(curve.value, *ends, time)
+        return [self.read(everything, time).with_interval(by_replicates(replicates), found)]
+
+    def _times(
+        self, value: np.ndarray, lower: np.ndarray, upper: np.ndarray, time: np.ndarray
+    ) -> dict[str, np.ndarray]:
+        """When the curves (k, pieces) reach each level."""
+        curves = {"passage_time": value, "passage_time_lower": upper, "passage_time_upper": lower}
+        return {
+            name: np.array([self._reached(one, level, time) for level in self.levels]) for name, one in curves.items()
+        }
+
+    def _reached(self, curve: np.ndarray, level: float, time: np.ndarray) -> float:
+        """The time at which a rising curve reaches a level: linear within a piece, or a sample time if there is no line."""
+        there = np.flatnonzero(curve.ravel() >= level)
+        if not len(there):
+            return np.inf
+        i, piece = divmod(int(there[0]), PIECES)
+        if i == 0 or self.limit is None:
+            return float(time[i])
+        low, high = curve.ravel()[there[0] - 1], curve[i, piece]
+        return float(time[i - 1] + (time[i] - time[i - 1]) * (piece + (level - low) / (high - low)) / PIECES)
+
+
+class _Curve:
+    """Kaplan & Meier's curve at the end of each piece of the times before samples: survival, and value 1 less it, (k, pieces).
+
+    passed (k, pieces): members that pass in a piece; risk (k,): members at risk of passing at each sample time; members
+    (k, pieces): of independent ones, as many would have Greenwood's variance. A member that is lost is known up to the
+    last sample before, and at risk in no piece after it.
+    """
+
+    def __init__(self, part: Part):
+        self.passed, lost = part["passed"][0, :-1], part["lost"][0, :-1]
+        at = self.passed.sum(axis=1)
+        total = int(part["passed"][0].sum())
+        self.risk = total - np.cumsum(lost) - (np.cumsum(at) - at)
+        n = np.maximum(self.risk, 1)[:, None]
+        so_far = np.cumsum(self.passed, axis=1)
+        step, left = 1.0 - so_far / n, np.maximum(n - so_far, 1)
+        whole = np.cumprod(step[:, -1])
+        survival = self.survival = np.concatenate([[1.0], whole[:-1]])[:, None] * step
+        terms = so_far / (n * left)
+        sums = np.cumsum(terms[:, -1])
+        greenwood = (np.concatenate([[0.0], sums[:-1]])[:, None] + terms) * survival**2
+        some = (greenwood > 0.0) & (survival > 0.0)
+        self.value = 1.0 - survival
+        known = self.risk[:, None] + (np.cumsum(at) - at)[:, None] + so_far
+        self.members = np.where(some, survival * self.value / np.where(some, greenwood, 1.0), known)

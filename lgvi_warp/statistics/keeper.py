@@ -11,7 +11,7 @@ from lgvi_warp.blocks import Block, Fields, blocks
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.estimate import Estimate, Estimates
 from lgvi_warp.statistics.tree import Part, Tree
-from lgvi_warp.statistics.values import Values
+from lgvi_warp.statistics.values import Values, dealt
 
 if TYPE_CHECKING:
     from lgvi_warp.ensemble import Members
@@ -20,20 +20,24 @@ if TYPE_CHECKING:
 
 
 class Gathered:
-    """The statistics of a run of n members, so far: a tree of parts for each; time: (k,) [s], of its samples."""
+    """The statistics of a run of n members, so far: a tree of parts for each; time: (k,) [s], of its samples.
+
+    replicates: R where members are of so many independent ones, member i of the i-th mod R. Parts then hold each
+    replicate's numbers by themselves, R times as many.
+    """
 
     # What a store calls its parts.
     name = "statistics"
 
-    def __init__(self, time: np.ndarray, members: int, statistics: Sequence[Statistic]):
-        self._statistics, self.time = tuple(statistics), time
+    def __init__(self, time: np.ndarray, members: int, statistics: Sequence[Statistic], replicates: int = 1):
+        self._statistics, self.time, self._replicates = tuple(statistics), time, replicates
         self._size = blocks(members)[0].count
         self._trees = [Tree(one.join) for one in self._statistics]
 
     def open(self, plan: Plan, block: Block, members: Members) -> _BlockStatistics:
         """What gathers those of one block."""
         place = (block.first, block.first // self._size, self._size)
-        return _BlockStatistics(self._statistics, members, place, len(self.time))
+        return _BlockStatistics(self._statistics, members, place, len(self.time), self._replicates)
 
     def merge(self, block: Block, part: list[Part]) -> None:
         """Take in a block's part: of each statistic, named arrays."""
@@ -48,8 +52,14 @@ class Gathered:
         for statistic, tree in zip(self._statistics, self._trees, strict=True):
             if chosen is None or statistic is chosen:
                 with np.errstate(invalid="ignore", over="ignore"):
-                    found += statistic.estimates(tree.parts(), self.time)
+                    found += self.said(statistic, tree.parts())
         return found
+
+    def said(self, statistic: Statistic, parts: Sequence[Part]) -> list[Estimate]:
+        """What one statistic says of the parts of a tree."""
+        if self._replicates > 1:
+            return statistic.estimates_of_replicates(parts, self.time, self._replicates)
+        return statistic.estimates(parts, self.time)
 
     def result(self) -> Estimates:
         """All of them, by name."""
@@ -72,8 +82,16 @@ class Gathered:
 
 
 class _BlockStatistics:
-    def __init__(self, statistics: Sequence[Statistic], members: Members, place: tuple[int, int, int], times: int):
+    def __init__(
+        self,
+        statistics: Sequence[Statistic],
+        members: Members,
+        place: tuple[int, int, int],
+        times: int,
+        replicates: int,
+    ):
         self._statistics, self._members, self._place = statistics, members, place
+        self._replicates = replicates
         self._open = [one.open(times, members.count) for one in statistics]
 
     def take(self, when: slice, samples: Fields) -> None:
@@ -84,7 +102,9 @@ class _BlockStatistics:
             key = (quantity.name, quantity.function, statistic.stopped)
             if key not in made:
                 x = quantity(samples, self._members)
-                made[key] = Values(x, samples.good(statistic.stopped == "held"), *self._place)
+                good = samples.good(statistic.stopped == "held")
+                alone = self._replicates == 1
+                made[key] = Values(x, good, *self._place) if alone else dealt(x, good, *self._place, self._replicates)
             gathers.take(made[key], when)
 
     def close(self, outcome: Outcome) -> list[Part]:

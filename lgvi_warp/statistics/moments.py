@@ -113,7 +113,8 @@ class Covariance(Statistic):
     """Covariance matrix over members, within a quantity or across several: value (k, d, d), divided by n - 1; correlation.
 
     of=("position", "speed") takes four components together. Interval: normal theory with the standard error that the
-    members' own fourth moments give (delta method), which needs no normal members.
+    members' own fourth moments give (delta method), which needs no normal members; of a variance's logarithm, which is
+    nearer to normal.
     """
 
     type: ClassVar[str] = "covariance"
@@ -137,7 +138,7 @@ class Covariance(Statistic):
         some = np.maximum(n, 1)
         spread = np.maximum(part["m22"] / some - (part["m11"] / some) ** 2, 0.0)
         error = empty_as_nan(np.sqrt(spread / np.maximum(n - 1, 1)), count, 2)
-        lower, upper = intervals.about(value, error, intervals.student(n, self.confidence))
+        lower, upper = self._ends(value, error, intervals.student(n, self.confidence))
         deviation = np.sqrt(np.einsum("kii->ki", value))
         scale = outer(deviation, deviation)
         correlation = value / np.where(scale > 0.0, scale, np.inf)
@@ -148,7 +149,24 @@ class Covariance(Statistic):
         labels = {"component_2": np.array(self.quantity.labels)}
         unit = self.quantity.unit
         unit = "products of the components' units" if "," in unit else f"({unit})^2"
-        return estimate(self, "delta method: fourth moments", dims, arrays, time, labels, unit)
+        text = "delta method: fourth moments; of the logarithm for variances"
+        return estimate(self, text, dims, arrays, time, labels, unit)
+
+    @staticmethod
+    def _ends(value: np.ndarray, error: np.ndarray, factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """value -+ factor standard errors; of a variance s^2 exp(-+ that over s^2)."""
+        lower, upper = intervals.about(value, error, factor)
+        diagonal = np.eye(value.shape[-1], dtype=bool) & (value > 0.0) & np.isfinite(upper)
+        ratio = np.exp(np.where(diagonal, upper - value, 0.0) / np.where(diagonal, value, 1.0))
+        return np.where(diagonal, value / ratio, lower), np.where(diagonal, value * ratio, upper)
+
+    def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
+        """The same with the standard errors of the replicates' estimates."""
+        error, _ = intervals.of_replicates(np.stack([one.value for one in each]), self.confidence)
+        factor = intervals.student(np.array(len(each)), self.confidence)
+        found = dict(zip(("lower", "upper"), self._ends(whole.value, error, factor), strict=True))
+        text = f"Student's t of {len(each)} replicates; of the logarithm for variances"
+        return whole.with_interval(text, found | {"standard_error": error})
 
 
 def estimate(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from lgvi_warp.errors import Faults
 from lgvi_warp.statistics import intervals, sketch
-from lgvi_warp.statistics.base import Statistic
+from lgvi_warp.statistics.base import Statistic, together
 from lgvi_warp.statistics.estimate import Estimate, along
 from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate
 from lgvi_warp.statistics.tree import Part
@@ -37,7 +37,7 @@ class Extremes(Statistic):
             x = values.filled(beyond)
             at = best(x, axis=2)
             found[name] = np.take_along_axis(x, at[:, :, None], axis=2)[:, :, 0]
-            found[f"{name}_member"] = np.where(values.count[:, None] > 0, at + values.first, -1)
+            found[f"{name}_member"] = np.where(values.count[:, None] > 0, values.members(at), -1)
         return found
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
@@ -47,6 +47,8 @@ class Extremes(Statistic):
             ("minimum", right["minimum"] < left["minimum"]),
             ("maximum", right["maximum"] > left["maximum"]),
         ):
+            member = f"{name}_member"
+            better |= (right[name] == left[name]) & (right[member] < left[member])
             for key in (name, f"{name}_member"):
                 both[key] = np.where(better, right[key], left[key])
         return both
@@ -61,6 +63,10 @@ class Extremes(Statistic):
         arrays = {"value": arrays["maximum"]} | arrays | {"beyond": beyond, "count": count}
         return estimate(self, "none: beyond bounds what lies outside", dims, arrays, time)
 
+    def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
+        """Extremes have no interval."""
+        return whole
+
 
 @dataclass(frozen=True, eq=False)
 class Quantiles(Statistic):
@@ -69,7 +75,7 @@ class Quantiles(Statistic):
     levels: between 0 and 1. size: numbers that each level of the sketch keeps, a power of two. rank_error (k,): proven
     bound on the rank's error as a fraction of the members; what is to be expected is several times smaller.
     Interval: from the ranks of sorted values (binomial, no assumption on the distribution), widened by the sketch's
-    standard error; infinite where too few members lie beyond the level.
+    standard error; infinite where too few members lie beyond the level. Each replicate has a sketch of its own.
     """
 
     type: ClassVar[str] = "quantiles"
@@ -101,14 +107,28 @@ class Quantiles(Statistic):
         return {"count": left["count"] + right["count"]} | sketch.join(left, right, self.size, place)
 
     def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
+        """Of all members."""
+        return self._in_pieces(parts, time, 1, lambda some, when: self.read(self.whole(some), when))
+
+    def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
+        """Intervals between the sorted values of all members, by ranks that the replicates' spread gives."""
+
+        def read(some: Sequence[Part], when: np.ndarray) -> Estimate:
+            return self._read_replicates(self.each_replicate(some, replicates), when)
+
+        return self._in_pieces(parts, time, replicates, read)
+
+    def _in_pieces(
+        self, parts: Sequence[Part], time: np.ndarray, replicates: int, read: Callable[..., Estimate]
+    ) -> list[Estimate]:
         """Some times after others: sorting all at once would take more memory than the sketches do."""
-        numbers = sum(part["values"][0].size for part in parts)
+        numbers = sum(part["values"][0].size for part in parts) * replicates
         rows = max(1, SORTED_AT_ONCE // numbers)
         found = []
         for first in range(0, len(time), rows):
-            at = slice(first, first + rows)
+            at = slice(first * replicates, (first + rows) * replicates)
             some = [part | {key: part[key][at] for key in part.keys() - self.shared} for part in parts]
-            found.append(self.read(self.whole(some), time[at]))
+            found.append(read(some, time[first : first + rows]))
         arrays = {name: np.concatenate([one[name] for one in found]) for name in found[0].arrays}
         return [replace(found[0], arrays=arrays, coordinates=found[0].coordinates | {"time": time})]
 
@@ -118,27 +138,55 @@ class Quantiles(Statistic):
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         """Linear between sorted values, as np.quantile; its interval by ranks."""
+        n, level = part["count"][:, None], np.array(self.levels)[None, :]
+        low, high = intervals.ranks(n, level, self.confidence)
+        # The sketch's own error adds to the ranks' variance.
+        own = n * level * (1.0 - level)
+        more = intervals.normal(self.confidence) * (np.sqrt(own + part["variance"][0]) - np.sqrt(own))
+        ends = ((low - more)[:, :, None], (high + more)[:, :, None])
+        return self._read(part, time, lambda value: ends, "order statistics: binomial ranks")
+
+    def _read_replicates(self, each: Sequence[Sequence[Part]], time: np.ndarray) -> Estimate:
+        """Ranks from the spread of the replicates' fractions of members up to the quantile of all (Woodruff 1952).
+
+        The fractions hold the errors of their sketches.
+        """
+        whole = self.whole(together(each))
+        n, level = whole["count"][:, None, None], np.array(self.levels)[None, :, None]
+
+        def ends(value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            below = np.stack([sketch.fraction(parts, value) for parts in each])
+            least = float(np.sqrt(1.0 + whole["variance"][0]))
+            low, high = intervals.probability_of_replicates(level, below, n, self.confidence, least)
+            return n * low, n * high + 1.0
+
+        return self._read(whole, time, ends, f"order statistics: ranks by Student's t of {len(each)} replicates")
+
+    def _read(
+        self,
+        part: Part,
+        time: np.ndarray,
+        ends: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
+        interval: str,
+    ) -> Estimate:
+        """ends: value (k, levels, d) to the ranks, counted from 1, of its interval's ends."""
         count = part["count"]
         level = np.array(self.levels)[None, :]
-        n = count[:, None]
+        n = count[:, None, None]
         values, middles = sketch.sorted_values(part)
         finite = np.isfinite(values)
 
         def at(rank: np.ndarray) -> np.ndarray:
             return sketch.at_rank(
-                values, middles, finite, np.broadcast_to(rank[:, :, None], (*rank.shape, values.shape[1]))
+                values, middles, finite, np.broadcast_to(rank, (len(values), len(level[0]), values.shape[1]))
             )
 
-        value = empty_as_nan(at((n - 1) * level), count)
-        low, high = intervals.ranks(n, level, self.confidence)
-        # The sketch's own error adds to the ranks' variance.
-        own = n * level * (1.0 - level)
-        more = intervals.normal(self.confidence) * (np.sqrt(own + part["variance"][0]) - np.sqrt(own))
-        low, high = low - more, high + more
-        lower = np.where((low < 1.0)[:, :, None], -np.inf, at(np.maximum(low - 1.0, 0.0)))
-        upper = np.where((high > n)[:, :, None], np.inf, at(np.maximum(np.minimum(high, n) - 1.0, 0.0)))
+        value = empty_as_nan(at((n - 1) * level[:, :, None]), count)
+        low, high = ends(value)
+        lower = np.where(low < 1.0, -np.inf, at(np.maximum(low - 1.0, 0.0)))
+        upper = np.where(high > n, np.inf, at(np.maximum(np.minimum(high, n) - 1.0, 0.0)))
         error = part["error"][0] / np.maximum(count, 1)
         arrays = {"value": value, "lower": empty_as_nan(lower, count), "upper": empty_as_nan(upper, count)}
         dims = along(arrays, "time", "level", "component") | {"count": ("time",), "rank_error": ("time",)}
         arrays |= {"rank_error": error, "count": count}
-        return estimate(self, "order statistics: binomial ranks", dims, arrays, time, {"level": level[0]})
+        return estimate(self, interval, dims, arrays, time, {"level": level[0]})

@@ -20,23 +20,28 @@ from lgvi_warp.statistics.values import Values
 class _Path:
     """Of a block: the best so far of each member, and whether all its samples counted."""
 
-    def __init__(self, statistic: _PathExtreme, count: int):
-        self._statistic, self._whole = statistic, np.ones((1, count), bool)
+    def __init__(self, statistic: _PathExtreme):
+        self._statistic = statistic
+        # One row, or one of each replicate.
         self._best: np.ndarray | None = None
-        self._place, self._single = (0, 0, 0), False
+        self._whole: np.ndarray | None = None
+        self._place, self._single = (0, 0, 0, 1), False
 
     def take(self, values: Values, when: slice) -> None:
         """Look at these times."""
-        best = self._statistic.better.reduce(values.x, axis=0)[None]
+        rows = (-1, values.replicates)
+        best = self._statistic.better.reduce(values.x.reshape(*rows, *values.x.shape[1:]), axis=0)
         self._best = best if self._best is None else self._statistic.better(self._best, best)
         if values.good is not None:
-            self._whole &= values.good.all(axis=0)
-        self._place, self._single = (values.first, values.block, values.size), values.single
+            whole = values.good.reshape(*rows, values.good.shape[1]).all(axis=0)
+            self._whole = whole if self._whole is None else self._whole & whole
+        self._place = (values.first, values.block, values.size, values.replicates)
+        self._single = values.single
 
     def close(self) -> Part:
         """What each of the statistics keeps of the paths' bests."""
         assert self._best is not None
-        good = None if self._whole.all() else self._whole
+        good = None if self._whole is None or self._whole.all() else self._whole
         values = Values(self._best.astype(np.float32) if self._single else self._best, good, *self._place)
         found: Part = {}
         for i, one in enumerate(self._statistic.then_all):
@@ -89,7 +94,7 @@ class _PathExtreme(Statistic):
 
     def open(self, times: int, count: int) -> _Path:
         """What follows the members of a block."""
-        return _Path(self, count)
+        return _Path(self)
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
         """Each statistic's own."""
@@ -103,6 +108,20 @@ class _PathExtreme(Statistic):
         found: list[Estimate] = []
         for i, one in enumerate(self.then_all):
             found += one.estimates([own(part, i) for part in parts], time[-1:])
+        return found
+
+    def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
+        """Each statistic's own."""
+        found: Part = {}
+        for i, one in enumerate(self.then_all):
+            found |= {f"{i}/{key}": a for key, a in one.of_replicate(own(part, i), replicate, replicates).items()}
+        return found
+
+    def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
+        """Each statistic's, at the end."""
+        found: list[Estimate] = []
+        for i, one in enumerate(self.then_all):
+            found += one.estimates_of_replicates([own(part, i) for part in parts], time[-1:], replicates)
         return found
 
 

@@ -66,7 +66,7 @@ def _of_times(plan: Plan, statistics: Sequence[Statistic], count: int) -> Sizes:
     members = plan.ensemble.select(block.first, block.stop)
     start = {name: np.repeat(values, count, axis=0) for name, values in at_start(plan, members).items()}
     outcome = Packets(plan, members).outcome
-    keeper = Gathered(time, plan.ensemble.members, statistics)
+    keeper = Gathered(time, plan.ensemble.members, statistics, plan.ensemble.replicates)
     gathers = keeper.open(plan, block, members)
     _, taking = _peak(lambda: gathers.take(when, Fields(start, plan, when, outcome)))
     part = gathers.close(outcome())
@@ -76,7 +76,7 @@ def _of_times(plan: Plan, statistics: Sequence[Statistic], count: int) -> Sizes:
     with np.errstate(all="ignore"):
         for statistic, one in zip(statistics, part, strict=True):
             tree = _fullest(statistic, one, 1 + len(others))
-            read, more = _peak(lambda: statistic.estimates(tree, time))  # noqa: B023
+            read, more = _peak(lambda: keeper.said(statistic, tree))  # noqa: B023
             joined, reading = joined + sum(map(_bytes, tree)), max(reading, more)
             estimates += sum(_bytes(one.arrays) for one in read)
     return Sizes(file.tell(), sum(map(_bytes, part)), joined, estimates, taking, reading)

@@ -91,6 +91,16 @@ def sorted_values(part: Part) -> tuple[np.ndarray, np.ndarray]:
     return np.take_along_axis(values, order, axis=2), middles
 
 
+def fraction(parts: Sequence[Part], x: np.ndarray) -> np.ndarray:
+    """Which part of the members, (k, q, d), have values up to x (k, q, d); NaN where none count."""
+    below = sum(
+        part["weights"][0] * np.count_nonzero(part["values"][:, None] <= x[..., None], axis=3) - part["shift"][0]
+        for part in parts
+    )
+    count = np.sum([part["count"] for part in parts], axis=0)[:, None, None]
+    return np.where(count > 0, below / np.maximum(count, 1), np.nan)
+
+
 def at_rank(values: np.ndarray, middles: np.ndarray, finite: np.ndarray, rank: np.ndarray) -> np.ndarray:
     """Values at ranks (k, q, d), linear between those kept, never beyond the finite ones."""
     k, d = values.shape[:2]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +13,8 @@ import numpy as np
 from lgvi_warp.errors import Faults, SceneError, closest
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.estimate import Estimate
-from lgvi_warp.statistics.moments import Mean
+from lgvi_warp.statistics.moments import Covariance, Mean
+from lgvi_warp.statistics.order import Quantiles
 from lgvi_warp.statistics.quantity import KNOWN
 
 # Looks are made at every block until this share of the members is a block, then whenever so many came to them.
@@ -23,11 +25,14 @@ GROWTH = 0.05
 class Until:
     """Run blocks of members until a statistic's interval is narrow enough, the ensemble's members at most.
 
-    statistic: the name of one of the run's statistics, such as "mean position", or one component of it, "mean position[2]";
-    a mean of any quantity is gathered if it is not among them. half_width: in the statistic's unit, above 0; every component
-    and level must keep it. at: sample time [s], by default the end; "all": at every sample time. members: no look before so
-    many (a small sample may look narrower than it is). The run stops at a block's end; looks are made in the order of
-    the blocks, so members and bits do not depend on threads. docs/statistics.md says what stopping does to coverage.
+    statistic: the name of one of the run's statistics, such as "mean position"; one component of it, "mean position[2]";
+    one level of it, "quantiles depth 0.95" or "quantiles position[2] 0.95"; one entry of a covariance, "covariance
+    position[0], position[2]": as the command prints them. A mean of any quantity is gathered if it is not among them.
+    half_width: in the statistic's unit, above 0; every component and level of what is named must keep it. at: sample
+    time [s], by default the end; "all": at every sample time. members: no look before so many (a small sample may look
+    narrower than it is). The run stops at a block's end; looks are made in the order of the blocks, so members and bits do
+    not depend on threads; with replicates of a design, at powers of two of members. docs/statistics.md says what stopping
+    does to coverage.
 
     Raises SceneError naming every fault.
     """
@@ -73,18 +78,26 @@ def from_dict(given: Any) -> Until:
 
 @dataclass
 class Watch:
-    """An Until at work on a run's statistics: which, and which of its numbers."""
+    """An Until at work on a run's statistics: which, and which of its numbers.
+
+    doubling: looks at powers of two of members only. With replicates a design is balanced there, and the spread of a few
+    estimates comes out small by chance too often for many looks.
+    """
 
     until: Until
     statistic: Statistic
     name: str
-    component: int | None
+    # Dimension -> index: which entries along it are watched, all along others.
+    entry: Mapping[str, int]
     rows: np.ndarray
     looked: int = 0
+    doubling: bool = False
 
     def due(self, members: int) -> bool:
         """Whether to look, with so many members done."""
         if members < self.until.members or members < self.looked * (1.0 + GROWTH):
+            return False
+        if self.doubling and members & (members - 1):
             return False
         self.looked = members
         return True
@@ -107,10 +120,9 @@ class Watch:
         dims = estimate.dims["value"]
         if "time" in dims and half.shape[0] > 1:
             half = half[self.rows]
-        if self.component is not None and "component" in dims:
-            half = np.take(half, [self.component], axis=dims.index("component"))
-            if "component_2" in dims:
-                half = np.take(half, [self.component], axis=dims.index("component_2"))
+        for dim, i in self.entry.items():
+            if dim in dims:
+                half = np.take(half, [i], axis=dims.index(dim))
         return float(np.max(np.where(np.isnan(half), np.inf, half)))
 
 
@@ -124,12 +136,13 @@ def watch(until: Until, statistics: Sequence[Statistic], times: np.ndarray) -> W
         rows = np.flatnonzero(np.abs(times - until.at) <= 1e-9 * max(1.0, times[-1]))
         if not len(rows):
             faults.add("at", until.at, "is no sample time", "give a time at which samples are kept, or leave it out")
-    found = _find(until.statistic, statistics)
+    known = _named(statistics)
+    found = known.get(until.statistic) or _mean(until.statistic)
     if found is None:
-        names = [part.key for one in statistics for part in one.parts()]
-        faults.add(
-            "statistic", until.statistic, "is none of the run's statistics", closest(until.statistic, names or KNOWN)
-        )
+        hint = closest(until.statistic, known or KNOWN)
+        if known and not hint.startswith("did you mean"):  # of all names, those of whole statistics say enough
+            hint = closest(until.statistic, dict.fromkeys(name for _, name, _ in known.values()))
+        faults.add("statistic", until.statistic, "is none of the run's statistics", hint)
     faults.raise_if_any()
     assert found is not None
     if found[0].type == "extremes":
@@ -138,17 +151,37 @@ def watch(until: Until, statistics: Sequence[Statistic], times: np.ndarray) -> W
     return Watch(until, *found, rows)
 
 
-def _find(name: str, statistics: Sequence[Statistic]) -> tuple[Statistic, str, int | None] | None:
-    """The statistic that gathers what is called so, the estimate's name, and the component that is meant."""
-    for whole in statistics:
-        for one in whole.parts():
-            if one.key == name:
-                return whole, one.key, None
-            labels = one.quantity.labels
-            for i, label in enumerate(labels):
-                index = label[label.find("[") :] if "[" in label else f"[{i}]"
-                if name in (f"{one.key}{index}", f"{one.type} {label}"):
-                    return whole, one.key, i
+Named = tuple[Statistic, str, dict[str, int]]
+
+
+def _named(statistics: Sequence[Statistic]) -> dict[str, Named]:
+    """What can be watched, by every name of it: the statistic that gathers it, the estimate's name, and which entry."""
+    every = [(whole, one) for whole in statistics for one in whole.parts()]
+    found: dict[str, Named] = {one.key: (whole, one.key, {}) for whole, one in every}
+    for whole, one in every:
+        for name, entry in _entries(one).items():
+            found.setdefault(name, (whole, one.key, entry))
+    return found
+
+
+def _entries(one: Statistic) -> dict[str, dict[str, int]]:
+    """The names of one statistic, of its components, of their levels, and of the entries of a covariance."""
+    found: dict[str, dict[str, int]] = {one.key: {}}
+    for i, label in enumerate(one.quantity.labels):
+        index = label[label.find("[") :] if "[" in label else f"[{i}]"
+        found[f"{one.key}{index}"] = found[f"{one.type} {label}"] = {"component": i, "component_2": i}
+    if isinstance(one, Quantiles):
+        for name, entry in list(found.items()):
+            for j, level in enumerate(one.levels):
+                found[f"{name} {level!r}"] = found[f"{name} {level:g}"] = entry | {"level": j}
+    if isinstance(one, Covariance):
+        pairs = itertools.product(enumerate(one.quantity.labels), repeat=2)
+        found |= {f"{one.type} {a}, {b}": {"component": i, "component_2": j} for (i, a), (j, b) in pairs}
+    return found
+
+
+def _mean(name: str) -> Named | None:
+    """A mean that is not among the statistics."""
     mean = re.fullmatch(r"mean (.+)", name)
     if mean is None:
         return None
@@ -156,4 +189,4 @@ def _find(name: str, statistics: Sequence[Statistic]) -> tuple[Statistic, str, i
         added = Mean(mean[1])
     except SceneError:
         return None
-    return added, added.key, None
+    return added, added.key, {}

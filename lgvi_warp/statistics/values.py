@@ -12,11 +12,21 @@ class Values:
 
     A member counts at a time if it had not failed by then and each of its numbers is finite. first: index of the
     block's first member; block: the block's number, and size: the members of a whole block. single: whether the numbers
-    are float32 as they stand, so that what only sorts them may do so.
+    are float32 as they stand, so that what only sorts them may do so. replicates: R where each time has R rows, one of
+    each replicate's members (`dealt`), and all sizes are theirs.
     """
 
-    def __init__(self, x: np.ndarray, good: np.ndarray | None = None, first: int = 0, block: int = 0, size: int = 0):
+    def __init__(
+        self,
+        x: np.ndarray,
+        good: np.ndarray | None = None,
+        first: int = 0,
+        block: int = 0,
+        size: int = 0,
+        replicates: int = 1,
+    ):
         self.first, self.block, self.size = first, block, max(size, x.shape[2])
+        self.replicates = replicates
         self.single = x.dtype == np.float32
         x = x.astype(np.float64, copy=False)
         if good is None and np.isfinite(x.sum(axis=2)).all():
@@ -27,6 +37,10 @@ class Values:
             self.good = finite if good is None else finite & good
             self.x = np.where(self.good[:, None], x, 0.0)
             self.count = self.good.sum(axis=1)
+
+    def members(self, at: np.ndarray) -> np.ndarray:
+        """Indices of the members at these places (rows, d) of theirs."""
+        return self.first + at * self.replicates + (np.arange(len(at)) % self.replicates)[:, None]
 
     def filled(self, value: float) -> np.ndarray:
         """x with this number where a member does not count."""
@@ -43,3 +57,17 @@ class Values:
         if self.good is None:
             return self.x - self.mean[:, :, None]
         return np.where(self.good[:, None], self.x - self.mean[:, :, None], 0.0)
+
+
+def dealt(x: np.ndarray, good: np.ndarray | None, first: int, block: int, size: int, replicates: int) -> Values:
+    """Values with a row for each time and replicate, where member i is of replicate i mod R.
+
+    x (k, d, n), good (k, n): of all members, n a multiple of R.
+    """
+    k, d, n = x.shape
+    R = replicates
+    rows = np.moveaxis(x.reshape(k, d, n // R, R), 3, 1).reshape(k * R, d, n // R)
+    if good is not None:
+        good = np.swapaxes(good.reshape(k, n // R, R), 1, 2).reshape(k * R, n // R)
+    # Sums along rows that lie apart would be added in another order, with other bits.
+    return Values(np.ascontiguousarray(rows), good, first, block, size // R, R)

@@ -66,7 +66,10 @@ def evaluate(
     for first in range(0, fleet.members, AT_ONCE):
         chosen = np.arange(first, min(first + AT_ONCE, fleet.members))
         part = progress and _part(progress, first / fleet.members, len(chosen) / fleet.members)
-        result = solve(fleet.subset(chosen), save=save, progress=part, **settings)
+        # What the scene keeps of its own runs, and when those end, is no matter of a design that must be whole.
+        result = solve(
+            fleet.subset(chosen), save=save, progress=part, statistics=(), keep="all", until=False, **settings
+        )
         values.append([one.values(result) for one in asked])
         status.append(np.asarray(result.status))
         provenance = result.provenance

@@ -205,6 +205,22 @@ def test_another_observation_is_another_run(whole):
         lw.solve(fleet(), **SETTINGS, statistics=[lw.Mean("position")], keep="none", store=store)
 
 
+def test_replicates_of_a_store_are_those_of_memory(tmp_path):
+    base = fleet(2)
+    members = lw.Ensemble(base.scene, 1024, 1, base.vary, lw.Sobol(replicates=16))
+    asked = {"statistics": [*STATISTICS, lw.FirstPassage("depth", above=11.0)], "keep": "none"}
+    memory = lw.solve(members, **SETTINGS, **asked)
+    stored = lw.solve(members, **SETTINGS, **asked, store=tmp_path / "run.zarr", threads=2)
+    assert bits(memory) == bits(stored) == bits(lw.open_run(tmp_path))
+    assert memory.provenance["ensemble"]["sampling"] == {"sobol": {"replicates": 16}}
+    (tmp_path / "run.zarr/blocks/000000256.json").unlink()
+    assert bits(lw.resume(tmp_path)) == bits(memory)
+    again = lw.Store(tmp_path / "run.zarr", existing="resume")
+    for other in ("sobol", lw.Sobol(replicates=8)):
+        with pytest.raises(lw.SceneError, match=r"ensemble\.sampling"):
+            lw.solve(lw.Ensemble(base.scene, 1024, 1, base.vary, other), **SETTINGS, **asked, store=again)
+
+
 def test_a_run_in_parts_has_no_until(tmp_path):
     with pytest.raises(lw.SceneError, match="runs in parts"):
         lw.solve(fleet(), **SETTINGS, until=UNTIL, store=tmp_path / "run.zarr", only=range(1))
@@ -231,6 +247,8 @@ RATES = {"start.angular_velocity": lw.Normal(std=0.01)}
     ("vary", "sampling"),
     [
         (MASS | RATES, "sobol"),
+        (MASS | RATES, lw.Sobol(replicates=4)),
+        (MASS, lw.Halton(replicates=8)),
         (MASS, lw.LatinHypercube(8)),
         ({}, lw.Grid({"start.position[0]": [0.0, 1.0], "vehicle.mass": [123.0, 124.0, 125.0, 126.0]})),
         ({}, lw.Table(values={"vehicle.mass": np.linspace(123.0, 124.0, 8)})),

@@ -45,6 +45,20 @@ def found(scene):
     return uq.sobol(scene, [ishigami, "position[1]"], samples=2048, vary=BOX, seed=3, **RUN)
 
 
+def test_what_a_scene_keeps_of_its_own_runs_is_no_matter(scene, found):
+    own = {"keep": "none", "statistics": [{"type": "mean", "of": "depth"}],
+           "until": {"statistic": "mean depth", "half_width": 1e9}}  # fmt: skip
+    told = scene.to_dict()
+    other = lw.Scene.from_dict(told | {"run": told.get("run", {}) | own})
+    again = uq.sobol(other, [ishigami, "position[1]"], samples=2048, vary=BOX, seed=3, **RUN)
+    assert again.members == found.members and np.array_equal(again.first, found.first)
+    X = np.random.default_rng(0).uniform(-PI, PI, (1500, 3))
+    np.testing.assert_array_equal(*(uq.model(one, BOX, "position[1]", **RUN)(X) for one in (scene, other)))
+    # A run may leave them out as well.
+    whole = lw.solve(lw.Ensemble(other, 2000), keep="all", statistics=(), until=False, **RUN)
+    assert whole.position.shape[1] == 2000 and not whole.statistics
+
+
 def assert_close(values, errors, exact):
     assert (np.abs(values - exact) <= FIVE * errors + 1e-12).all(), (values, errors, exact)
 

@@ -143,6 +143,37 @@ def test_truncated_values_stay_within_their_bounds():
     assert (got >= 0.1).all() and (got <= 0.3).all()
 
 
+@pytest.mark.parametrize("bound", [15.0, 19.9, 20.1, 37.0, 40.0, 200.0])
+def test_far_tails_against_scipy(bound):
+    u = np.array([0.01, 0.5, 0.99])
+    for sign in (1.0, -1.0):
+        limits = {"low": bound} if sign > 0.0 else {"high": -bound}
+        got = lw.TruncatedNormal(std=1.0, **limits).quantile(u if sign > 0.0 else 1.0 - u, np.array(0.0))
+        # The tail beyond b falls like exp(-b z): scipy's truncnorm has the same to its own 1e-10 or so of the distance.
+        exact = stats.truncnorm(bound, np.inf).ppf(u)
+        np.testing.assert_allclose(sign * got - bound, exact - bound, rtol=1e-6, atol=0)
+    both = lw.TruncatedNormal(std=1.0, low=bound, high=bound + 0.5).quantile(u, np.array(0.0))
+    assert (np.diff(both) > 0.0).all() and both.min() > bound and both.max() < bound + 0.5
+
+
+def test_a_law_relative_to_nothing_is_refused(scene):
+    for law in (lw.Normal(relative=0.1), lw.Uniform(relative=0.1), lw.LogNormal(sigma=0.1)):
+        with pytest.raises(lw.SceneError, match=r"0, so that its \w+ varies nothing; give an absolute spread"):
+            lw.Ensemble(scene, 4, vary={"vehicle.center_of_buoyancy[0]": law})
+    lw.Ensemble(scene, 4, vary={"vehicle.center_of_buoyancy": lw.Normal(relative=0.1)})  # one entry is not 0
+    lw.Ensemble(scene, 4, vary={"vehicle.center_of_buoyancy[0]": lw.Normal(relative=0.0)})
+    lw.Ensemble(scene, 4, vary={"vehicle.center_of_buoyancy[0]": lw.LogNormal(sigma=0.1, median=0.01)})
+
+
+def test_tables_are_laws_in_code_too(scene):
+    fleet = lw.Ensemble(scene, 4, 1, {"vehicle.mass": {"normal": {"relative": 0.01}}})
+    assert fleet.vary == {"vehicle.mass": lw.Normal(relative=0.01)}
+    again = lw.Ensemble(scene, **fleet.to_dict())
+    np.testing.assert_array_equal(again.parameters(0, 4)["vehicle.mass"], fleet.parameters(0, 4)["vehicle.mass"])
+    with pytest.raises(lw.SceneError, match=r'vary."vehicle.mass".*did you mean .normal.'):
+        lw.Ensemble(scene, 4, 1, {"vehicle.mass": {"norml": {"relative": 0.01}}})
+
+
 # What is refused ---------------------------------------------------------------------------------------------------
 
 

@@ -93,6 +93,11 @@ def test_a_singular_covariance_keeps_what_it_says():
         ({"std": (1.0, -1.0)}, "negative"),
         ({"std": (1.0, 1.0, 1.0), "correlation": np.eye(2)}, "does not fit 2"),
         ({"std": 1.0, "correlation": 2.0 * np.eye(2)}, "diagonal that is not 1"),
+        # Metres beside newtons: the sizes of the entries say nothing about whether they can go together.
+        ({"std": (1e-3, 1e3), "correlation": [[1.0, 1.2], [1.2, 1.0]]}, "positive semidefinite"),
+        ({"covariance": [[1e-10, 50.0 * 1e-2], [50.0 * 1e-2, 1e6]]}, "positive semidefinite"),
+        ({"covariance": [[0.0, 0.1], [0.1, 1.0]]}, "positive semidefinite"),
+        ({"covariance": [[-1.0, 0.0], [0.0, 1.0]]}, "negative variance"),
     ],
 )
 def test_bad_covariances(values, text):
@@ -102,6 +107,21 @@ def test_bad_covariances(values, text):
 def test_all_faults_of_a_covariance_come_at_once():
     message = refused(lw.CorrelatedNormal, covariance="wide", mean=np.nan)
     assert "covariance = 'wide'" in message and "mean = nan" in message
+
+
+def test_a_singular_covariance_of_six_digits():
+    S = np.array([[0.333333, 0.471405], [0.471405, 0.666667]])
+    (x,) = drawn(lw.CorrelatedNormal(covariance=S.tolist()), [0.0, 0.0])
+    # The eigenvalue -1.1e-6 of the correlation is taken for 0: the spread changes by as much.
+    assert_covariance(x, 0.0, S)
+    np.testing.assert_allclose(x[:, 1], np.sqrt(2.0) * x[:, 0], rtol=0, atol=5e-3)
+
+
+def test_entries_of_any_sizes_have_their_covariance():
+    S = np.outer((1e-6, 1e3, 1.0), (1e-6, 1e3, 1.0)) * [[1.0, 0.9, 0.0], [0.9, 1.0, -0.3], [0.0, -0.3, 1.0]]
+    (x,) = drawn(lw.CorrelatedNormal(covariance=S.tolist()), np.zeros(3))
+    scale = 1.0 / np.array((1e-6, 1e3, 1.0))
+    assert_covariance(x * scale, 0.0, S * np.outer(scale, scale))
 
 
 # Attitudes -----------------------------------------------------------------------------------------------------------
@@ -306,6 +326,65 @@ def test_bad_tables_of_scipy(content, text):
 def test_what_is_no_frozen_law():
     assert "no frozen distribution" in refused(lw.Frozen, distribution=stats.gamma)
     assert "scipy.stats refuses" in refused(lw.Frozen, distribution=stats.gamma(-1.0))
+
+
+class Triangle:
+    """A law of a user's."""
+
+    def ppf(self, u):
+        return np.sqrt(u)
+
+    def __str__(self):
+        return "Triangle()"
+
+
+def test_whatever_has_quantiles_is_a_law(scene):
+    u = np.array([[0.25], [0.81]])
+    for law in (
+        Triangle(),
+        stats.Normal(mu=3.0, sigma=0.1),
+        stats.Mixture([stats.Normal(mu=20.0), stats.Normal(mu=29.0)]),
+    ):
+        found = lw.Ensemble(scene, 4, vary={"vehicle.buoyancy": law}).vary["vehicle.buoyancy"]
+        exact = law.ppf(u) if isinstance(law, Triangle) else law.icdf(u)
+        np.testing.assert_array_equal(found.quantile(u, np.array([7.0])), exact)
+    fleet = lw.Ensemble(scene, 4, vary={"vehicle.buoyancy": Triangle()})
+    assert fleet.to_dict()["vary"] == {"vehicle.buoyancy": {"own": {"law": "Triangle()"}}}
+    with pytest.raises(lw.SceneError, match="law of your own, which a file does not hold; give the ensemble again"):
+        from_dict("key", {"own": {"law": "Triangle()"}})
+    for nothing in (3.0, "wide", Triangle, np.ones(3)):
+        with pytest.raises(lw.SceneError, match="is not a distribution; give"):
+            lw.Ensemble(scene, 4, vary={"vehicle.buoyancy": nothing})
+    with pytest.raises(lw.SceneError, match=r"law = .* gives no numbers"):
+        lw.Ensemble(scene, 4, vary={"vehicle.buoyancy": type("Bad", (), {"ppf": lambda self, u: "x"})()})
+
+
+def test_histograms_are_laws_in_files_too(scene):
+    counts, edges = [1.0, 0.0, 3.0], [0.0, 1.0, 2.0, 2.5]
+    law = from_dict("key", {"histogram": {"counts": counts, "edges": edges}})
+    np.testing.assert_allclose(law.quantile(np.array([0.125, 0.25 + 1e-12, 0.625]), np.zeros(())), [0.5, 2.0, 2.25])
+    for density in (False, True):
+        mine = stats.rv_histogram((np.array(counts), np.array(edges)), density=density)
+        for one in (mine, mine()):
+            found = lw.Ensemble(scene, 4, vary={"vehicle.buoyancy": one}).vary["vehicle.buoyancy"]
+            u = np.linspace(0.01, 0.99, 50)
+            np.testing.assert_allclose(found.quantile(u, np.zeros(())), mine.ppf(u), rtol=1e-12)
+            assert from_dict("key", found.to_dict()).to_dict() == found.to_dict()
+    bad = [
+        ({"counts": [0.0], "edges": [0.0, 1.0]}, "weigh no bin"),
+        ({"counts": [1.0], "edges": [0.0]}, "bound 1"),
+        ({"counts": [1.0, 1.0], "edges": [0.0, 1.0, 1.0]}, "rising"),
+    ]
+    for values, text in bad:
+        with pytest.raises(lw.SceneError, match=text):
+            from_dict("key", {"histogram": values})
+
+
+def test_scipys_multivariate_normal_is_correlated_normals(scene):
+    law = stats.multivariate_normal([100.0, 200.0], [[1.0, 0.5], [0.5, 2.0]])
+    found = lw.Ensemble(scene, 4, vary={"vehicle.mass, vehicle.buoyancy": law}).vary
+    expected = lw.CorrelatedNormal(covariance=[[1.0, 0.5], [0.5, 2.0]], mean=[100.0, 200.0])
+    assert found == {"vehicle.mass, vehicle.buoyancy": expected}
 
 
 def test_choices_come_as_often_as_they_weigh():

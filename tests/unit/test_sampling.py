@@ -28,6 +28,11 @@ VARY = {
 }
 SPACE = Space(3, ("a", "b"), (2, 1), (("a[0]", (0,)), ("a[1]", (1,)), ("b", (2,))))
 SEQUENCES = ("random", "sobol", "halton", {"latin_hypercube": {"group": 40}})
+REPLICATED = (
+    {"sobol": {"replicates": 8}},
+    {"halton": {"replicates": 4}},
+    {"latin_hypercube": {"group": 10, "replicates": 4}},
+)
 # 6 factors vary, three of them joint laws: groups of 14 or 8 members, and paths of 7.
 DESIGNS = ({"saltelli": {"second_order": True}}, {"saltelli": {"second_order": False}}, "morris")
 
@@ -46,7 +51,7 @@ def cube(content, members, space=SPACE):
 # The same members ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("content", [*SEQUENCES, *DESIGNS], ids=str)
+@pytest.mark.parametrize("content", [*SEQUENCES, *DESIGNS, *REPLICATED], ids=str)
 def test_blocks_subsets_and_longer_ensembles_have_the_same_members(scene, content):
     n = members_of(content)
     fleet = lw.Ensemble(scene, n, 3, VARY, content)
@@ -63,13 +68,13 @@ def test_blocks_subsets_and_longer_ensembles_have_the_same_members(scene, conten
     assert_same(longer.select(0, n), whole, slice(0, n))
 
 
-@pytest.mark.parametrize("content", SEQUENCES, ids=str)
+@pytest.mark.parametrize("content", [*SEQUENCES, *REPLICATED], ids=str)
 def test_far_members(content):
     far = 10**8 + 3
     np.testing.assert_array_equal(cube(content, np.arange(far, far + 50))[[7, 30]], cube(content, [far + 7, far + 30]))
 
 
-@pytest.mark.parametrize("content", SEQUENCES, ids=str)
+@pytest.mark.parametrize("content", [*SEQUENCES, *REPLICATED], ids=str)
 def test_another_seed_gives_other_members(content):
     other = Space(4, *[getattr(SPACE, name) for name in ("keys", "sizes", "factors")])
     assert not np.any(cube(content, np.arange(80)) == cube(content, np.arange(80), other))
@@ -106,7 +111,7 @@ def test_varying_more_does_not_change_the_rest(scene, content):
 # The unit cube ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("content", [*SEQUENCES, "saltelli"], ids=str)
+@pytest.mark.parametrize("content", [*SEQUENCES, "saltelli", *REPLICATED], ids=str)
 def test_levels_are_uniform_within_the_open_cube(content):
     n = 8000
     u = cube(content, np.arange(n))
@@ -144,6 +149,40 @@ def test_every_group_is_a_latin_hypercube():
         for column in u[40 * group : 40 * group + 40].T:
             np.testing.assert_array_equal(np.sort(np.floor(column * 40)), np.arange(40))
     assert not np.any(u[:40] == u[40:80])
+
+
+def test_every_replicate_is_a_balanced_design_of_its_own():
+    sobol, halton = (cube({kind: {"replicates": 8}}, np.arange(512)) for kind in ("sobol", "halton"))
+    latin = cube({"latin_hypercube": {"group": 64, "replicates": 8}}, np.arange(512))
+    for r in range(8):
+        for u in (sobol[r::8], latin[r::8]):
+            for column in u.T:
+                np.testing.assert_array_equal(np.sort(np.floor(column * 64)), np.arange(64))
+        # Of Halton's sequence each base b: its first b^k points have one in each of so many parts.
+        for base, column in zip((2, 3, 5), halton[r::8].T, strict=True):
+            np.testing.assert_array_equal(np.sort(np.floor(column[: base**2] * base**2)), np.arange(base**2))
+    for u in (sobol, halton, latin):
+        points = u.reshape(64, 8, 3)
+        assert len(np.unique(points[:, :, 0])) == 512
+        assert len(np.unique((points**2).mean(axis=0)[:, 0])) == 8
+
+
+def test_replicates_of_a_latin_hypercube_fill_its_groups_in_turn():
+    plain, dealt = ({"latin_hypercube": {"group": 16, **more}} for more in ({}, {"replicates": 4}))
+    u, v = (cube(content, np.arange(128)).reshape(2, -1, 3) for content in (plain, dealt))
+    np.testing.assert_array_equal(u.reshape(2, 4, 16, 3), np.swapaxes(v.reshape(2, 16, 4, 3), 1, 2))
+
+
+@pytest.mark.parametrize("content", REPLICATED, ids=str)
+def test_replicates_are_told_and_read(scene, content):
+    fleet = lw.Ensemble(scene, 80, 3, VARY, content)
+    told = fleet.to_dict()
+    assert told["sampling"] == content and fleet.replicates == next(iter(content.values()))["replicates"]
+    again = lw.Scene.from_dict(scene.to_dict() | {"ensemble": told})
+    assert_same(lw.Ensemble.from_scene(again).select(0, 80), fleet.select(0, 80), slice(0, 80))
+    assert fleet.subset(range(40)).replicates == fleet.member(3).replicates == 1
+    assert lw.Ensemble(scene, 80, 3, VARY, "sobol").replicates == lw.Ensemble(scene, 80).replicates == 1
+    assert lw.Sobol(replicates=1).to_dict() == "sobol"
 
 
 @pytest.mark.parametrize("second_order", [True, False])
@@ -311,6 +350,12 @@ def test_a_scene_file_names_its_sampling(tmp_path):
         ({"sobol": {}, "halton": {}}, 8, ["is not a sampling"]),
         ({"sobol": 3}, 8, ["is not a table"]),
         ({"sobol": {"scramble": True}}, 8, ["unknown key"]),
+        ({"sobol": {"replicates": 12}}, 24, ["ensemble.sampling.sobol.replicates = 12", "no power of two", "give 8, 16"]),
+        ({"sobol": {"replicates": 128}}, 128, ["replicates = 128"]),
+        ({"halton": {"replicates": True}}, 8, ["replicates = True"]),
+        ({"halton": {"replicate": 8}}, 8, ["did you mean 'replicates'?"]),
+        ({"sobol": {"replicates": 16}}, 40, ["groups of 16", "32 or 48"]),
+        ({"latin_hypercube": {"group": 16, "replicates": 4}}, 80, ["groups of 64", "64 or 128"]),
         ("latin_hypercube", 8, ["group = 0", "256"]),
         ({"latin_hypercube": {"group": 2.5}}, 8, ["group = 2.5"]),
         ({"latin_hypercube": {"group": 30}}, 80, ["no whole number of groups of 30", "60 or 90"]),

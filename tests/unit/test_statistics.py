@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.statistics import intervals, sketch
+from lgvi_warp.statistics import Estimate, intervals, sketch
 from lgvi_warp.statistics.tree import Tree
-from lgvi_warp.statistics.values import Values
+from lgvi_warp.statistics.until import watch
+from lgvi_warp.statistics.values import Values, dealt
 
 LEVELS = (0.05, 0.5, 0.95)
 
@@ -17,7 +18,7 @@ def scalar(d=1):
     return lw.Quantity("x", lambda samples, members: None, "m", (), labels)
 
 
-def trees(statistic, x, good=None, block=256, order=None):
+def trees(statistic, x, good=None, block=256, order=None, replicates=1):
     """The tree of parts of values x (k, n, d), block by block, and of each row's time its number."""
     k, n = x.shape[:2]
     columns = np.ascontiguousarray(np.moveaxis(x, 2, 1))
@@ -27,19 +28,24 @@ def trees(statistic, x, good=None, block=256, order=None):
         gathers = statistic.open(k, at.stop - at.start)
         for when in (slice(0, 1), slice(1, k)) if k > 1 else (slice(0, 1),):
             here = None if good is None else good[when, at]
-            gathers.take(Values(columns[when, :, at], here, at.start, i, min(block, n) if n < block else block), when)
+            given = columns[when, :, at], here, at.start, i, min(block, n) if n < block else block
+            gathers.take(Values(*given) if replicates == 1 else dealt(*given, replicates), when)
         tree.add(i, gathers.close())
     return tree
 
 
-def gathered(statistic, x, **named):
-    """What a statistic says of values x (k, n, d)."""
-    return statistic.estimates(trees(statistic, x, **named).parts(), np.arange(len(x), dtype=float))
+def gathered(statistic, x, replicates=1, **named):
+    """What a statistic says of values x (k, n, d); replicates: of a design of so many, member i of the i-th mod R."""
+    parts, time = trees(statistic, x, replicates=replicates, **named).parts(), np.arange(len(x), dtype=float)
+    if replicates == 1:
+        return statistic.estimates(parts, time)
+    return statistic.estimates_of_replicates(parts, time, replicates)
 
 
-def of(kind, x, *arguments, good=None, block=256, **named):
+def of(kind, x, *arguments, good=None, block=256, replicates=1, **named):
     """The one estimate of a statistic of this kind."""
-    (found,) = gathered(kind(scalar(x.shape[2]), *arguments, **named), x, good=good, block=block)
+    statistic = kind(scalar(x.shape[2]), *arguments, **named)
+    (found,) = gathered(statistic, x, good=good, block=block, replicates=replicates)
     return found
 
 
@@ -143,8 +149,43 @@ def test_first_passage_is_kaplan_and_meiers():
         assert found["lost"][t] == np.sum((passed == k) & (known == t))
     assert found["passed"].sum() + found["lost"].sum() + found["censored"] == n
     time = found["passage_time"][1]
-    assert found.value[int(time)] >= 0.5 > found.value[int(time) - 1]
+    assert found.value[int(np.ceil(time))] >= 0.5 > found.value[int(np.ceil(time)) - 1]
     assert found["passage_time_lower"][1] <= time <= found["passage_time_upper"][1]
+
+
+@pytest.mark.parametrize("replicates", [1, 4])
+def test_a_passage_lies_on_the_line_between_two_samples(replicates):
+    rng = np.random.default_rng(18)
+    n, time = 4096, np.arange(6.0)
+    crossing = rng.uniform(-0.5, 5.5, n)
+    slope = rng.uniform(0.1, 3.0, n)
+    x = (7.0 + slope * (time[:, None] - crossing))[..., None]
+    found = of(lw.FirstPassage, x, 7.0, levels=(0.05, 0.3, 0.5, 0.9, 0.95), replicates=replicates)
+    # Of n members a quantile lies within one piece's width of that of all; below 1/12 all passed before the start.
+    exact = np.quantile(np.maximum(crossing, 0.0), (0.05, 0.3, 0.5, 0.9))
+    np.testing.assert_allclose(found["passage_time"][:4], exact, atol=0.01)
+    assert found["passage_time"][0] == 0.0 and np.isinf(found["passage_time"][4])
+    inside = slice(1, 4)
+    assert np.all(found["passage_time_lower"][inside] < found["passage_time"][inside])
+    assert np.all(found["passage_time"][inside] < found["passage_time_upper"][inside])
+    falling = of(lw.FirstPassage, -x, below=-7.0, levels=(0.3, 0.5), replicates=replicates)
+    np.testing.assert_array_equal(falling["passage_time"], found["passage_time"][1:3])
+    # What is true or false has no line.
+    yes = of(lw.FirstPassage, (x > 7.0).astype(float), levels=(0.3, 0.5), replicates=replicates)
+    np.testing.assert_array_equal(yes["passage_time"], np.ceil(exact[1:3]))
+    np.testing.assert_array_equal(yes.value, found.value)
+
+
+def test_members_that_are_lost_censor_passages_between_samples_too():
+    # Two hazards that know nothing of each other: passages are exponential in spite of the losses.
+    rng = np.random.default_rng(19)
+    n, time = 200_000, np.arange(6.0)
+    passage, loss = rng.exponential(2.5, n), rng.exponential(4.0, n)
+    x = time[:, None] - passage
+    found = of(lw.FirstPassage, x[..., None], 0.0, levels=(0.1, 0.5, 0.8), good=loss > time[:, None], block=4096)
+    exact = -2.5 * np.log1p(-np.array([0.1, 0.5, 0.8]))
+    assert np.all((found["passage_time_lower"] <= exact) & (exact <= found["passage_time_upper"]))
+    assert np.all(found["passage_time_upper"] - found["passage_time_lower"] < 0.1)
 
 
 def test_a_path_counts_once():
@@ -285,6 +326,187 @@ def test_coverage_of_first_passage():
         truth = -np.expm1(-times[1:] / 5.0)
         held.append((found.lower[1:] <= truth) & (truth <= found.upper[1:]))
     between(np.mean(held, axis=0))
+
+
+# Replicates of a design ------------------------------------------------------------------------------------------------
+
+EVERY = [
+    (lw.Mean, {}), (lw.Covariance, {}), (lw.Extremes, {}), (lw.Quantiles, {"size": 64}), (lw.Exceedance, {"above": 0.5}),
+    (lw.Histogram, {"bins": 4, "limits": (-2.0, 2.0)}), (lw.CircularMean, {}), (lw.FirstPassage, {"above": 1.0}),
+    (lw.PathMaximum, {"then": [lw.Mean(), lw.Quantiles(levels=(0.5,), size=64), lw.Extremes()]}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "settings"), EVERY, ids=lambda one: getattr(one, "__name__", ""))
+def test_parts_of_replicates_are_those_of_each_alone(kind, settings):
+    rng = np.random.default_rng(20)
+    R, n, d = 8, 8 * 520, 1 if kind is lw.FirstPassage else 2
+    x = rng.normal(size=(4, n, d))
+    good = np.arange(4)[:, None] < rng.integers(0, 20, n)
+    statistic = kind(scalar(d), **settings)
+    time = np.arange(4.0)
+    both = trees(statistic, x, good, 1024, replicates=R)
+    for r, parts in enumerate(statistic.each_replicate(both.parts(), R)):
+        alone = trees(statistic, x[:, r::R], good[:, r::R], 128)
+        for one, other in zip(statistic.estimates(parts, time), statistic.estimates(alone.parts(), time), strict=True):
+            members = {name for name in one.arrays if name.endswith("_member")}
+            same = [name for name in one.arrays.keys() - members if one[name].tobytes() != other[name].tobytes()]
+            assert not same, (r, same)
+            for name in members:
+                np.testing.assert_array_equal(one[name], other[name] * R + r)
+    # And the values of all are those without replicates, but for rounding, or the rank that a sketch may err by.
+    for one, other in zip(
+        gathered(statistic, x, R, good=good, block=1024), gathered(statistic, x, good=good), strict=True
+    ):
+        same = ("minimum", "maximum", "minimum_member", "maximum_member", "counts", "passed", "lost", "count")
+        for name in one.arrays.keys() & set(same):
+            np.testing.assert_array_equal(one[name], other[name])
+        if "rank_error" not in one.arrays:
+            np.testing.assert_allclose(one.value, other.value, rtol=1e-11, atol=1e-13)
+        else:
+            apart = np.abs(one.value - other.value)
+            assert np.all(apart <= np.fmax(one.half_width, other.half_width))
+        assert ("replicates" in one.interval) == (one.settings["type"] != "extremes")
+
+
+def test_an_interval_of_replicates_is_students():
+    from scipy import stats
+
+    x = np.random.default_rng(21).normal(size=(1, 1024, 1)) + np.tile(np.arange(16.0), 64)[:, None]
+    means = x[0, :, 0].reshape(64, 16).mean(axis=0)
+    found, low = of(lw.Mean, x, replicates=16), of(lw.Exceedance, x, 1e3, replicates=16)
+    expected = stats.t.interval(0.95, 15, means.mean(), stats.sem(means))
+    np.testing.assert_allclose([found.lower[0, 0], found.upper[0, 0]], expected, rtol=1e-12)
+    assert found["standard_error"][0, 0] == pytest.approx(stats.sem(means), rel=1e-12)
+    # Replicates that agree on nothing having happened do not know that it never does.
+    assert low.upper[0, 0] == of(lw.Exceedance, x, 1e3).upper[0, 0] > 0.0
+    fraction = of(lw.Exceedance, x, 8.0, replicates=16)
+    hits = (x[0, :, 0] > 8.0).reshape(64, 16).mean(axis=0)
+    p, t = hits.mean(), stats.t.ppf(0.975, 15)
+    for end in (fraction.lower[0, 0], fraction.upper[0, 0]):  # Wilson: of p0, the variance in proportion to p0 (1 - p0)
+        # To the spread comes the error of one member of 1,024.
+        error = np.hypot(stats.sem(hits), 1 / 1024) * np.sqrt(end * (1.0 - end) / (p * (1.0 - p)))
+        assert abs(p - end) == pytest.approx(t * error, rel=1e-9)
+
+
+def test_a_replicate_without_members_leaves_no_interval():
+    x = np.random.default_rng(22).normal(size=(2, 256, 1))
+    good = np.ones((2, 256), bool)
+    good[1, 3::8] = False
+    for kind, more, end in ((lw.Mean, {}, np.inf), (lw.Covariance, {}, np.inf), (lw.Quantiles, {}, np.inf),
+                            (lw.Exceedance, {"above": 0.0}, 1.0), (lw.CircularMean, {}, np.pi)):  # fmt: skip
+        with np.errstate(invalid="ignore"):
+            found = of(kind, x, good=good, replicates=8, **more)
+        at = (1, slice(None))
+        assert np.all(np.isfinite(found.value)) and np.all(
+            np.isfinite(found.half_width[0, ...]) | (kind is lw.Quantiles)
+        )
+        open_ = found.upper[at] - (found.value[at] if kind is lw.CircularMean else 0.0)
+        assert np.all(open_ == end), kind
+
+
+@pytest.fixture(scope="module")
+def hypercubes():
+    """(1000, 1024, 2) normal numbers: 16 Latin hypercubes each of 64 points, of which three columns make the numbers."""
+    from scipy.special import ndtri
+
+    rng = np.random.default_rng(23)
+    shape = (REPETITIONS, 64, 16, 3)
+    parts = rng.random(shape).argsort(axis=1)
+    z = ndtri((parts + rng.random(shape)) / 64)
+    return (z @ np.array([[0.6, 0.0], [0.8, 0.6], [0.0, 0.8]])).reshape(REPETITIONS, 1024, 2)
+
+
+def test_coverage_of_replicates(hypercubes):
+    from scipy.special import ndtr, ndtri
+
+    x = hypercubes
+    mean = of(lw.Mean, x, replicates=16)
+    between(coverage(mean, 0.0))
+    # A linear function of what is stratified.
+    assert np.median(mean.half_width) < 0.2 * np.median(of(lw.Mean, x).half_width)
+    between(coverage(of(lw.Covariance, x, replicates=16), np.array([[1.0, 0.48], [0.48, 1.0]])))
+    between(coverage(of(lw.Exceedance, x, 1.0, replicates=16), ndtr(-1.0)))
+    # Ranks are whole numbers: some more hold than need to.
+    held = coverage(of(lw.Quantiles, x, (0.1, 0.5, 0.9), replicates=16), ndtri([0.1, 0.5, 0.9])[:, None])
+    assert np.all((held >= 0.93) & (held <= 0.98)), held
+    angles = (3.0 + 0.8 * x + np.pi) % (2.0 * np.pi) - np.pi
+    circle = of(lw.CircularMean, angles, replicates=16)
+    turned = np.abs((circle.value - 3.0 + np.pi) % (2.0 * np.pi) - np.pi)
+    between(np.mean(turned <= circle.half_width, axis=0))
+    between(coverage(circle, np.exp(-0.32), "resultant_length"))
+
+
+def test_coverage_of_rotations_by_replicates():
+    from scipy.special import ndtri
+
+    rng = np.random.default_rng(24)
+    shape = (REPETITIONS, 16, 16, 3)
+    z = ndtri((rng.random(shape).argsort(axis=1) + rng.random(shape)) / 16)
+    v, R0 = z.reshape(REPETITIONS, 256, 3) * [0.2, 0.5, 0.3], rotations(np.array([0.5, -1.0, 2.0]))
+    X = (R0 @ rotations(v)).reshape(REPETITIONS, 256, 9)
+    (mean,), (plain,) = (gathered(lw.MeanAttitude(), X, R) for R in (16, 1))
+    np.testing.assert_allclose(mean.value, plain.value, atol=1e-12)
+    Y = np.swapaxes(mean.value, 1, 2) @ R0
+    angles = 0.5 * np.stack([Y[:, 2, 1] - Y[:, 1, 2], Y[:, 0, 2] - Y[:, 2, 0], Y[:, 1, 0] - Y[:, 0, 1]], axis=1)
+    between(np.mean(np.abs(angles) <= mean["rotation_half_width"], axis=0))
+    assert np.median(mean["rotation_half_width"]) < 0.5 * np.median(plain["rotation_half_width"])
+    between(np.mean((mean.lower <= R0) & (mean.upper >= R0), axis=0)[[0, 1, 2], [1, 2, 0]])
+
+
+@pytest.mark.slow
+def test_coverage_of_sobol_sequences():
+    from benchmarks.coverage_table import replicated
+
+    for name, held, narrower in replicated(REPETITIONS, {"sobol": {"replicates": 16}}):
+        # A mean of lognormal numbers has skewed estimates.
+        least = 0.9 if "lognormal" in name else 0.93
+        assert least <= held <= (0.985 if "quantile" in name or "0.01" in name else 0.97), (name, held)
+        assert narrower < 1.0, name
+        if name == "mean of a linear function":
+            assert narrower < 0.1
+
+
+WATCHED = [
+    lw.Mean("position"), lw.Quantiles("depth", (0.05, 0.5, 0.95)), lw.Quantiles("position", (0.5, 0.975)),
+    lw.Covariance(["position", "speed"]), lw.PathMaximum("speed", [lw.Quantiles(levels=(0.5, 0.99))]),
+    lw.Quantiles("speed", (0.123456789, 0.5), name="fast"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "estimate", "shape", "entries"), [
+    ("mean position[2]", "mean position", (3,), [2]), ("quantiles depth", "quantiles depth", (3, 1), [0, 1, 2]),
+    ("quantiles depth 0.95", "quantiles depth", (3, 1), [2]),
+    ("quantiles position 0.5", "quantiles position", (2, 3), [0, 1, 2]),
+    ("quantiles position[2]", "quantiles position", (2, 3), [2, 5]),
+    ("quantiles position[2] 0.975", "quantiles position", (2, 3), [5]), ("fast 0.5", "fast", (2, 1), [1]),
+    ("fast 0.123456789", "fast", (2, 1), [0]), ("fast 0.123457", "fast", (2, 1), [0]),
+    ("quantiles path_maximum speed 0.99", "quantiles path_maximum speed", (2, 1), [1]),
+    ("covariance position[2]", "covariance position, speed", (4, 4), [10]),
+    ("covariance position[2], speed", "covariance position, speed", (4, 4), [11]),
+    ("covariance position, speed", "covariance position, speed", (4, 4), list(range(16))),
+])  # fmt: skip
+def test_one_entry_is_watched(name, estimate, shape, entries):
+    found = watch(lw.Until(name, 1.0), WATCHED, np.zeros(1))
+    assert found.name == estimate
+    dims = {2: ("time", "level", "component"), 1: ("time", "component")}[len(shape)]
+    dims = ("time", "component", "component_2") if shape == (4, 4) else dims
+    for i in range(int(np.prod(shape))):
+        half = np.zeros(np.prod(shape))
+        half[i] = 2.0
+        arrays = {"value": np.zeros((1, *shape)), "lower": -half.reshape(1, *shape), "upper": half.reshape(1, *shape)}
+        one = Estimate(estimate, {}, "m", 0.95, "", {"value": dims}, arrays, {})
+        assert found.widest([one]) == (2.0 if i in entries else 0.0)
+
+
+@pytest.mark.parametrize(("name", "hint"), [
+    ("quantiles depth 0.9", "did you mean 'quantiles depth 0.95'"), ("quantiles dept", "did you mean 'quantiles depth'"),
+    ("quantiles position[3] 0.5", "did you mean 'quantiles position[2] 0.5'"), ("wholly else", "known: mean position,"),
+])  # fmt: skip
+def test_what_is_watched_has_a_name(name, hint):
+    with pytest.raises(lw.SceneError) as caught:
+        watch(lw.Until(name, 1.0), WATCHED, np.zeros(1))
+    assert hint in caught.value.faults[0] and "until.statistic" in caught.value.faults[0]
 
 
 def test_intervals_are_those_of_the_definitions():

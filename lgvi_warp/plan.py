@@ -79,6 +79,10 @@ class Plan:
     model: Model = field(init=False)
     spec: Spec = field(init=False)
     advance: Advance = field(init=False)
+    # The plan that it is a part of, its members and fields.
+    _whole: tuple[Plan, Sequence[int], Sequence[str]] | None = field(
+        default=None, init=False, compare=False, repr=False
+    )
 
     def __post_init__(self) -> None:
         faults = Faults()
@@ -135,6 +139,14 @@ class Plan:
                 faults.add("on_failure", "substep", f"{term.key} {why}", 'use on_failure="freeze", or a shorter step')
         faults.raise_if_any()
 
+    def with_neighbours(self, indices: np.ndarray) -> np.ndarray:
+        """(m,), these members, and where packets choose their steps the others of their packets: their bits hang on them."""
+        if not self.method.adaptive:
+            return indices
+        width = self.spec.width
+        found = np.unique(indices // width)[:, None] * width + np.arange(width)
+        return found[found < self.ensemble.members]
+
     def part(self, indices: Sequence[int], fields: Sequence[str]) -> Plan:
         """The plan for these members alone, whose samples have these fields; all that was chosen for the whole stays.
 
@@ -146,6 +158,7 @@ class Plan:
         object.__setattr__(part, "ensemble", self.ensemble.subset(indices))
         object.__setattr__(part, "fields", tuple(name for name in SAMPLE_FIELDS if name in fields))
         part._choose_kernel()
+        object.__setattr__(part, "_whole", (self, indices, fields))
         return part
 
     def _sampled(self) -> tuple[str, ...]:
@@ -220,6 +233,9 @@ class Plan:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Made again from its settings: kernels cannot be sent, and are found in Warp's cache."""
+        if self._whole:
+            # Of its members alone another kernel may be enough.
+            return Plan.part, self._whole
         own = (self.ensemble, self.method, self.grid, self.fields, self.dtype, self.width, self.checks, self.on_failure)
         return Plan, own
 

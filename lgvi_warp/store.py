@@ -4,6 +4,7 @@
     run.zarr/position/c.0.3.0     chunk: times 0, block 3 (see store_layout)
     run.zarr/parts/000000768.npy  what keepers closed the block with
     run.zarr/blocks/000000768.json   the block that begins with member 768 is finished: its files, sizes, checksums
+    run.zarr/kept/                a group like the run's own, of members that were run again for their samples (see kept)
 
 Nothing in it tells the time of day: the same run leaves the same bytes.
 """
@@ -41,7 +42,7 @@ FORMAT = 2
 # Few enough bytes a chunk for its memory, enough that files and their syncs cost little.
 CHUNK_BYTES = 10_000_000
 EXISTING = ("refuse", "resume", "overwrite")
-ROOT, CREATED = "zarr.json", "created.json"
+ROOT, CREATED, KEPT = "zarr.json", "created.json", "kept"
 # Room that is left on a disk: markers, metadata, folders.
 SPARE_BYTES = 20_000_000
 
@@ -66,7 +67,7 @@ class Store:
 
     def __post_init__(self) -> None:
         faults = Faults("store.")
-        if not isinstance(self.path, str | os.PathLike) or Path(self.path).suffix != ".zarr":
+        if not isinstance(self.path, str | os.PathLike) or self.whole.suffix != ".zarr":
             faults.add("path", self.path, "is no folder of a store", 'end its name in .zarr: "runs/x/run.zarr"')
         if self.dtype is not None:
             faults.choice("dtype", self.dtype, ("float32", "float64"))
@@ -86,6 +87,27 @@ class Store:
     def folder(self) -> Path:
         """Its path."""
         return Path(self.path)
+
+    @property
+    def along(self) -> str:
+        """What its arrays call the dimension of members."""
+        return MEMBER
+
+    @property
+    def whole(self) -> Path:
+        """The folder of the whole run."""
+        return self.folder
+
+    def write_given(self, group: Any, plan: Plan) -> None:
+        """States and parameters that were given as arrays: nothing else tells them."""
+        given, units = plan.ensemble.explicit(), parameter_units(plan.ensemble.scene)
+        explicit = group.create_group("explicit")
+        for name, values in given.items():
+            dims = (
+                f"{MEMBER}_given" if name != "indices" else MEMBER,
+                *(f"{name}_{i}" for i in range(values.ndim - 1)),
+            )
+            whole_array(explicit, name, values, dims, {"units": units.get(name, "1")})
 
 
 def needed() -> None:
@@ -228,6 +250,8 @@ class Folder:
             )
         self.provenance, self.recipe, messages, self.shared = (json.loads(text) for text in texts)
         self.messages: tuple[str, ...] = tuple(messages)
+        # What this process did: blocks that it found whole, those that it ran, and those of kept members that it ran.
+        self.found, self.ran, self.ran_kept = 0, 0, 0
 
     @property
     def complete(self) -> bool:
@@ -258,9 +282,13 @@ class Folder:
     def plan(self, ensemble: Ensemble | None = None) -> Plan:
         """The run's plan, made again; ensemble: where a scene file cannot tell it (laws of your own). Raises SceneError."""
         try:
+            # A chunk that is missing reads as NaN or 0.
+            lost = [text for text in self.damage() if text.startswith(("time/", "step/", "explicit/"))]
             group = self.group()
             steps, times = group["step"][:].astype(np.int64), group["time"][:]
             given = {name: np.asarray(array[:]) for name, array in group["explicit"].arrays()}
+            if lost or not np.isfinite(times).all():
+                raise ValueError("times are missing")
         except (ValueError, OSError, KeyError) as error:
             remedy = "run the same scene again with --store zarr --resume, which mends it"
             raise SceneError([f"{self.path}: {'; '.join(self.damage()) or error}; {remedy}"]) from error
@@ -279,11 +307,32 @@ class Folder:
     def finish(self, members: int | None = None) -> None:
         """Say that the run is complete; members: with so many, where it ended before the last of the ensemble."""
         if not self.complete:
-            content = json.loads((self.path / ROOT).read_bytes())
-            said = {"complete": True} | ({} if members is None else {"members": members})
-            content["attributes"] |= said
-            durable.write_whole(self.path / ROOT, json.dumps(content, indent=2).encode())
-            self.attributes |= said
+            self._say({"complete": True} | ({} if members is None else {"members": members}), below(self.path / KEPT))
+
+    def reopen(self) -> None:
+        """Say that the run is not complete."""
+        if self.complete:
+            self._say({"complete": False}, {})
+
+    def _say(self, said: dict[str, Any], kept: dict[str, Any]) -> None:
+        """Write attributes of the run, and what lies in the group of its kept members."""
+        content = json.loads((self.path / ROOT).read_bytes())
+        content["attributes"] |= said
+        arrays = content["consolidated_metadata"]["metadata"]
+        own = {name: one for name, one in arrays.items() if name.partition("/")[0] != KEPT}
+        content["consolidated_metadata"]["metadata"] = own | kept
+        durable.write_whole(self.path / ROOT, json.dumps(content, indent=2).encode())
+        self.attributes |= said
+
+
+def below(path: Path) -> dict[str, Any]:
+    """Metadata of a group and its arrays, as that of the group it lies in has them; none of one that is not there."""
+    if not path.exists():
+        return {}
+    own = json.loads((path / ROOT).read_bytes())
+    arrays = own["consolidated_metadata"]["metadata"]
+    own["consolidated_metadata"] = {**own["consolidated_metadata"], "metadata": {}}
+    return {path.name: own} | {f"{path.name}/{name}": one for name, one in arrays.items()}
 
 
 def checksum_of(texts: Sequence[str]) -> int:
@@ -359,12 +408,14 @@ def skeleton(
     own = MemoryStore(inside)
     group = zarr.create_group(own, zarr_format=3, attributes=_attributes(texts, provenance))
     k, n = len(plan.grid.times), plan.ensemble.members
-    _whole(group, "time", plan.grid.times, ("time",), {"units": "s", "long_name": "time since the start", "axis": "T"})
-    _whole(group, "step", plan.grid.sample_steps, ("time",), {"units": "1", "long_name": "steps made until then"})
+    whole_array(
+        group, "time", plan.grid.times, ("time",), {"units": "s", "long_name": "time since the start", "axis": "T"}
+    )
+    whole_array(group, "step", plan.grid.sample_steps, ("time",), {"units": "1", "long_name": "steps made until then"})
     for column in columns(plan, store):
         _array(group, column.name, column.shape(k, n), column.chunk, column.dtype, column.fill, column.dims,
                column.attributes)  # fmt: skip
-    _explicit(group.create_group("explicit"), plan)
+    store.write_given(group, plan)
     with warnings.catch_warnings():
         # Consolidated metadata is what lets xarray open the store in one read; zarr remarks that version 3 has no rule for it.
         warnings.simplefilter("ignore")
@@ -406,20 +457,12 @@ def _array(group: Any, name: str, shape: Any, chunks: Any, dtype: str, fill: Any
     )  # fmt: skip
 
 
-def _whole(group: Any, name: str, values: np.ndarray, dims: tuple[str, ...], attributes: dict[str, Any]) -> None:
+def whole_array(group: Any, name: str, values: np.ndarray, dims: tuple[str, ...], attributes: dict[str, Any]) -> None:
     """A small array, written at once."""
     values = np.ascontiguousarray(values)
     fill = np.nan if values.dtype.kind == "f" else 0
     dtype = values.dtype.newbyteorder("<").str
     _array(group, name, values.shape, values.shape, dtype, fill, dims, attributes)[:] = values
-
-
-def _explicit(group: Any, plan: Plan) -> None:
-    """States and parameters that were given as arrays: nothing else tells them."""
-    given, units = plan.ensemble.explicit(), parameter_units(plan.ensemble.scene)
-    for name, values in given.items():
-        dims = (f"{MEMBER}_given" if name != "indices" else MEMBER, *(f"{name}_{i}" for i in range(values.ndim - 1)))
-        _whole(group, name, values, dims, {"units": units.get(name, "1")})
 
 
 def check(

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from lgvi_warp.blocks import Block, Work
-from lgvi_warp.executors import MOST_DEATHS, Advanced, received, sent
+from lgvi_warp.executors import MOST_DEATHS, Advanced, deaf, received, sent
 
 # How often progress is looked at [s].
 PERIOD = 0.2
@@ -54,8 +54,9 @@ class Processes:
         )
         waiting: dict[Future[Any], int] = {}
         try:
-            for i, block in left.items():
-                waiting[pool.submit(_work, i, block)] = i
+            with deaf():
+                for i, block in left.items():
+                    waiting[pool.submit(_work, i, block)] = i
             while waiting:
                 done, _ = wait(waiting, PERIOD, FIRST_COMPLETED)
                 for i in waiting.values():

@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import speed
+from lgvi_warp import cli, speed
 from lgvi_warp.blocks import Block, Work, blocks
 from lgvi_warp.executors import executor_of, received, sent
 from lgvi_warp.executors.processes import Processes
 from lgvi_warp.keepers import Outcomes, Samples
 from lgvi_warp.plan import _one_at_a_time
 from lgvi_warp.solving import make_plan
+from tests.conftest import ROOT
 from tests.stores import SETTINGS, STATISTICS, UNTIL, bits, differing, fleet
 
 FIELDS = ("position", "attitude", "velocity", "angular_velocity")
@@ -178,7 +179,7 @@ def test_an_executor_of_your_own(memory):
     assert same(lw.solve(fleet(), **SETTINGS, executor=Backwards()), memory)
 
 
-def test_unknown_executors_are_refused(monkeypatch):
+def test_unknown_executors_are_refused(monkeypatch, tmp_path):
     from lgvi_warp.executors import dask
 
     monkeypatch.setattr(dask, "TIMEOUT", 0.3)
@@ -190,8 +191,39 @@ def test_unknown_executors_are_refused(monkeypatch):
     ):
         with pytest.raises(lw.SceneError, match=word):
             lw.solve(fleet(10), **SETTINGS, **arguments)
-    with pytest.raises(lw.SceneError, match="does not answer"):
-        next(executor_of("dask", 1, "tcp://127.0.0.1:9").run(Work(make_plan(fleet(10), **SETTINGS), ()), [], print))
+    for address in ("tcp://127.0.0.1:9", "nonsense"):
+        with pytest.raises(lw.SceneError, match="does not answer"):
+            lw.solve(fleet(10), **SETTINGS, executor="dask", scheduler=address, store=tmp_path / "run.zarr")
+    assert list(tmp_path.iterdir()) == []
+
+
+INTERRUPTED = """
+import sys
+from lgvi_warp.cli import entry
+sys.argv = ["lgvi-warp", *sys.argv[1:]]
+entry()
+"""
+
+
+@pytest.mark.parametrize(
+    "executor", ["threads", *(pytest.param(name, marks=pytest.mark.slow) for name in ("processes", "dask"))]
+)
+def test_an_interrupted_command_ends_in_a_line_and_goes_on(executor, tmp_path, capsys):
+    """From the keyboard: every process of the terminal hears it."""
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    scene, out = str(ROOT / "examples" / "paper.toml"), str(tmp_path)
+    arguments = ["run", scene, "--members", "4096", "--duration", "500", "--store", "zarr", "--out", out,
+                 "--executor", executor, "--threads", "1", "--quiet"]  # fmt: skip
+    process = subprocess.Popen([sys.executable, "-c", INTERRUPTED, *arguments], env=env, start_new_session=True,
+                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)  # fmt: skip
+    while not list(tmp_path.glob("run.zarr/blocks/*.json")) and process.poll() is None:
+        time.sleep(0.005)
+    os.killpg(process.pid, signal.SIGINT)
+    said = process.communicate(timeout=60)
+    line = f"lgvi-warp: interrupted; finished blocks are kept: go on with lgvi-warp resume {out}\n"
+    assert (process.returncode, *said) == (130, "", line)
+    assert 0 < len(list(tmp_path.glob("run.zarr/blocks/*.json"))) < 16
+    assert cli.main(["info", out]) == 1 and "of 16 finished; not complete" in capsys.readouterr().out
 
 
 def own_law(base):

@@ -43,6 +43,30 @@ def test_a_store_without_samples_has_statistics_and_arrays_of_members(whole, mem
     assert "mean_position" in stored.statistics.dataset and "position" not in stored.dataset
 
 
+@pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
+def test_it_is_exported_with_its_statistics(whole, memory, tmp_path):
+    import pyarrow.parquet as pq
+    import xarray
+
+    with xarray.open_dataset(lw.export(whole, "netcdf", tmp_path / "run.nc"), group="statistics") as found:
+        np.testing.assert_array_equal(found.mean_position.values, memory.statistics["mean position"].value)
+    table = pq.read_table(lw.export(whole, "parquet", tmp_path / "run.parquet"))
+    assert table.column_names == ["realization", "vehicle.mass", "status", "failure_time"] and table.num_rows == 1003
+
+
+def test_statistics_of_damaged_parts_are_refused(whole, tmp_path):
+    path = shutil.copytree(whole, tmp_path / "run.zarr")
+    part = path / "parts" / "000000256.npy"
+    data = bytearray(part.read_bytes())
+    data[len(data) // 2] ^= 1
+    part.write_bytes(data)
+    with pytest.raises(lw.SceneError, match=r"parts/000000256.* has changed; `lgvi-warp resume .*` mends it"):
+        lw.open_run(path)
+    (path / "blocks" / "000000256.json").unlink()
+    with pytest.raises(lw.SceneError, match=r"blocks/000000256.json is missing or damaged; `lgvi-warp resume"):
+        lw.open_run(path)
+
+
 def test_samples_and_statistics_together(memory, tmp_path):
     save = lw.SaveAt(every=0.1, fields=("attitude",))
     result = lw.solve(fleet(), **SETTINGS | {"save": save}, statistics=STATISTICS, store=tmp_path / "run.zarr")

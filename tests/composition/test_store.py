@@ -220,6 +220,65 @@ def test_damaged_times_are_mended_by_the_same_run(copy, whole):
     assert differing(whole, copy) == []
 
 
+def test_lost_times_are_not_taken_for_nan(copy, whole):
+    """A missing chunk reads as NaN: a run that went on with that would write it down as right."""
+    for name in ("time/c.0", "step/c.0"):
+        (copy / name).unlink()
+        before = tree(copy)
+        with pytest.raises(lw.SceneError, match=f"{name} is missing; run the same scene again"):
+            lw.resume(copy)
+        assert tree(copy) == before
+        if name.startswith("time"):
+            with pytest.raises(lw.SceneError, match=r"time/c.0 is missing"):
+                lw.open_run(copy)
+        lw.solve(fleet(), **SETTINGS, store=lw.Store(copy, existing="resume"))
+        assert differing(whole, copy) == []
+
+
+def test_lost_folders_are_made_again(copy, whole):
+    for name in ("blocks", "parts", "position"):
+        shutil.rmtree(copy / name)
+    lw.resume(copy)
+    assert differing(whole, copy) == []
+
+
+def test_what_was_there_is_told(copy):
+    (copy / "blocks" / "000000256.json").unlink()
+    assert "went on: 3 of 4 blocks were there and whole, 1 ran" in lw.resume(copy).messages
+    result = lw.solve(fleet(), **SETTINGS, store=lw.Store(copy, existing="resume"))
+    assert result.messages == ("nothing was missing: 4 of 4 blocks were there and whole",) and not result.run_seconds
+
+
+@pytest.mark.parametrize("to", ["netcdf", "parquet"])
+def test_what_is_damaged_is_not_exported(copy, tmp_path, to):
+    """What is missing would be exported as NaN."""
+    out = tmp_path / "run.out"
+    (copy / "blocks" / "000000256.json").unlink()
+    with pytest.raises(lw.SceneError, match=r"1 blocks are not marked as finished; `lgvi-warp resume .*` mends it"):
+        lw.export(copy, to, out)
+    lw.resume(copy)
+    (copy / "velocity" / "c.0.2.0").unlink()
+    with pytest.raises(lw.SceneError, match=r"velocity/c.0.2.0 is missing; `lgvi-warp resume"):
+        lw.export(copy, to, out)
+    with pytest.raises(lw.SceneError, match=r"is a folder; give the name of a file"):
+        lw.export(copy, to, tmp_path)
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["run.zarr"]
+
+
+@pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
+@pytest.mark.parametrize("to", ["netcdf", "parquet"])
+def test_a_full_disk_is_told_by_an_export(whole, tmp_path, to, capsys):
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, before[1]))
+    try:
+        assert cli.main(["export", str(whole), "--to", to, "--out", str(tmp_path / "run.out")]) == 1
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    said = capsys.readouterr().err
+    assert said.startswith(f"lgvi-warp: {tmp_path / 'run.out'}: ") and said.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_damaged_marker_runs_its_block_again(copy, whole):
     flip(copy / "blocks" / "000000256.json")
     assert resuming.state(copy)["finished"] == 3
@@ -255,11 +314,42 @@ def test_parts_of_a_run_are_merged(tmp_path, whole):
     assert differing(whole, tmp_path / "some" / "run.zarr") == []
     with pytest.raises(lw.SceneError, match="holds a run already"):
         lw.merge([tmp_path / "a"], tmp_path / "all")
+    # Nor is what comes of a complete run that has lost a block.
+    (folder.path / "blocks" / "000000256.json").unlink()
+    lost = lw.merge([folder.path], tmp_path / "lost")
+    assert not lost.complete and lw.resume(lost.path).members == MEMBERS and differing(whole, lost.path) == []
+
+
+def test_a_store_in_use_is_not_replaced_by_a_merge(copy, tmp_path):
+    with store.held(copy), pytest.raises(lw.SceneError, match="another run is writing"):
+        lw.merge([copy], tmp_path, overwrite=True)
+    assert lw.merge([copy], tmp_path, overwrite=True).complete
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["run.zarr"]
+
+
+def test_parts_that_may_only_be_read_are_merged(copy, whole, tmp_path):
+    """What comes of them may be written: modes are not copied."""
+    for one in copy.rglob("*"):
+        one.chmod(0o555 if one.is_dir() else 0o444)
+    made = lw.merge([copy], tmp_path / "all").path
+    assert differing(whole, made) == []
+    assert all(one.stat().st_mode & 0o200 for one in made.rglob("*"))
+    for one in copy.rglob("*"):
+        one.chmod(0o755)
+
+
+def test_a_part_that_is_damaged_lends_no_times(tmp_path, whole):
+    for name, only in (("a", range(0, 2)), ("b", range(2, 4))):
+        lw.solve(fleet(), **SETTINGS, store=tmp_path / name / "run.zarr", only=only)
+    (tmp_path / "a" / "run.zarr" / "time" / "c.0").unlink()
+    assert differing(whole, lw.merge([tmp_path / "a", tmp_path / "b"], tmp_path / "all").path) == []
+    with pytest.raises(lw.SceneError, match=r"time/c.0 is missing"):
+        lw.merge([tmp_path / "a"], tmp_path / "none")
 
 
 def test_only_parts_of_one_run_are_merged(tmp_path, whole):
     lw.solve(fleet(), **{**SETTINGS, "t1": 2.0}, store=tmp_path / "run.zarr", only=range(0, 1))
-    with pytest.raises(lw.SceneError, match="steps is 200 in the store and 300 here"):
+    with pytest.raises(lw.SceneError, match=r"steps is 200 in .*run.zarr and 300 in .*: these are parts of different"):
         lw.merge([whole, tmp_path], tmp_path / "all")
     flipped = shutil.copytree(whole, tmp_path / "flipped.zarr")
     flip(flipped / "position" / "c.0.1.0")
@@ -268,8 +358,12 @@ def test_only_parts_of_one_run_are_merged(tmp_path, whole):
 
 
 def test_blocks_beyond_the_run_are_refused(tmp_path):
-    with pytest.raises(lw.SceneError, match="blocks 0:9: are not within the 4"):
-        lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", only=range(0, 9))
+    for only in (range(4, 9), range(2, 2), range(-1, 2), range(0, 4, 2)):
+        with pytest.raises(lw.SceneError, match=f"blocks {only.start}:{only.stop}: are not within the 4"):
+            lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", only=only)
+    assert list(tmp_path.iterdir()) == []
+    # The last of equal parts may be shorter.
+    assert lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", only=range(3, 6)).members == 1003 - 768
     with pytest.raises(lw.SceneError, match="is for a run into a store"):
         lw.solve(fleet(), **SETTINGS, only=range(0, 1))
 
@@ -507,13 +601,18 @@ def test_parquet(whole, memory, tmp_path):
     assert table["realization"][at].as_py() == 700 and table["time"][at].as_py() == memory.time[11]
     assert table["position_2"][at].as_py() == memory.position[11, 700, 2]
     assert table["attitude_12"][at].as_py() == memory.attitude[11, 700, 1, 2]
+    assert table["vehicle.mass"][at].as_py() == memory.parameters["vehicle.mass"][700]
+    assert [table.schema.field(name).metadata for name in ("velocity_0", "vehicle.mass")] == [
+        {b"units": b"m s-1"},
+        {b"units": b"kg"},
+    ]
     with pytest.raises(lw.SceneError, match=r"to = 'csv'"):
         lw.export(whole, "csv")
 
 
 def test_what_is_no_run_is_named(tmp_path):
     for call in (lw.open_run, lw.resume, resuming.state):
-        with pytest.raises(lw.SceneError, match=r"holds 0 stores; give the folder of a run made with --store zarr"):
+        with pytest.raises(lw.SceneError, match=r"holds no store; give the folder of a run made with --store zarr"):
             call(tmp_path)
     with pytest.raises(lw.SceneError, match="is not there"):
         lw.open_run(tmp_path / "none")

@@ -50,6 +50,12 @@ def sync_file(beside: Path, target: Path) -> None:
         os.close(descriptor)
 
 
+def _begun(descriptor: int, target: Path) -> Future[None]:
+    """The sync of an open file, begun; waits where too many are on their way."""
+    _room.acquire()
+    return _syncs().submit(_sync_early, os.dup(descriptor), target)
+
+
 def _sync_early(descriptor: int, target: Path) -> None:
     try:
         with named(target):
@@ -92,16 +98,12 @@ class Files:
         view = memoryview(data).cast("B")
         crc = checksum(view)
         tail = crc.to_bytes(4, "little") if checked else b""
-        early = len(view) >= EARLY_BYTES
-        sync = None
         with named(target), beside.open("wb", buffering=0) as file:
             self._waiting.append((beside, target, None))
             write_all(file, view)
             write_all(file, memoryview(tail))
-            if early:
-                _room.acquire()
-                sync = _syncs().submit(_sync_early, os.dup(file.fileno()), target)
-        self._waiting[-1] = (beside, target, sync)
+            if len(view) >= EARLY_BYTES:
+                self._waiting[-1] = (beside, target, _begun(file.fileno(), target))
         self.sums[key] = [len(view) + len(tail), checksum(tail, crc)]
 
     def sync(self) -> None:

@@ -15,17 +15,11 @@ from lgvi_warp.model import shape_of_mass
 from lgvi_warp.packets import pack
 from lgvi_warp.plan import SEGMENT_SAMPLE_BYTES
 from lgvi_warp.solving import make_plan
-from tests.tools import TURN, one, scene_of
+from tests.tools import TURN, generated, one, scene_of
 
 
 def plan_of(scene, **named):
     return make_plan(one(scene), h=0.01, t1=1.0, **named)
-
-
-def generated(plan, folder):
-    """The C++ that Warp makes of the plan's kernel."""
-    wp.compile_aot_module(plan.advance.kernel.module, device="cpu", module_dir=str(folder))
-    return next(folder.glob("*.cpp")).read_text()
 
 
 def test_an_absent_term_is_no_code(tmp_path):

@@ -1,5 +1,6 @@
 """Blocks in threads, processes and Dask workers: the same bytes from each, also where a worker is killed on the way."""
 
+import ast
 import os
 import queue
 import signal
@@ -216,6 +217,18 @@ def test_an_executor_of_your_own(memory):
                 yield block, work(block)
 
     assert same(lw.solve(fleet(), **SETTINGS, executor=Backwards()), memory)
+
+
+def test_threads_ask_numpy_to_read_no_types(memory, monkeypatch):
+    """Python before 3.11.8 fails now and then to parse in several threads at once (python/cpython#106905)."""
+
+    def parse(text, parse=ast.literal_eval):
+        if threading.current_thread() is not threading.main_thread():
+            raise SystemError("AST constructor recursion depth mismatch")
+        return parse(text)
+
+    monkeypatch.setattr(ast, "literal_eval", parse)
+    assert same(lw.solve(fleet(), **SETTINGS, threads=2), memory)
 
 
 def test_unknown_executors_are_refused(monkeypatch):

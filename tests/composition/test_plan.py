@@ -69,6 +69,17 @@ def test_a_second_solve_builds_no_kernel():
     assert make_advance.cache_info().misses == before
 
 
+@pytest.mark.parametrize("names", [("su4(psi_s)", "kl6(psi_s)", "su8_15(psi_s)"), ("bm4(psi_x)", "bm6(psi_x)")])
+def test_compositions_of_a_method_share_its_kernel(names):
+    """Their coefficients are numbers that the kernel gets, unless a law asks for the time within a step."""
+    plain, held = scene_of(net=1.0), lw.Wrench(force=[1.0, 0.0, 0.0])
+    schedule = lw.terms.WrenchSchedule(times=(0.0, 1.0), force=((0.0,) * 3, (1.0,) * 3), torque=((0.0,) * 3,) * 2)
+    for terms, kernels in (([], 1), ([held], 1), ([schedule], len(names))):
+        scene = lw.Scene(plain.vehicle, plain.environment, terms)
+        plans = [make_plan(one(scene), name, h=0.01, t1=1.0) for name in names]
+        assert len({plan.kernel_hash for plan in plans}) == kernels
+
+
 def test_varying_a_parameter_compiles_nothing_else(scene):
     shared = make_plan(lw.Ensemble(scene, 16), h=0.01, t1=1.0)
     varied = make_plan(lw.Ensemble(scene, 16, vary={"vehicle.mass": lw.Normal(relative=0.01)}), h=0.01, t1=1.0)

@@ -172,8 +172,15 @@ def test_exact_drag_has_no_limit_and_explicit_drag_has(scene):
     assert np.all(resolved[:, :-1]) and not np.any(resolved[:, -1])
     assert one.judged == "dissipative" and np.all(one.classes["psi_s"][resolved] <= Cell.BOUNDED)
     assert np.all(one.classes["psi_s"][~resolved] == Cell.FLAGGED) and np.all(one.statuses["psi_s"] == lw.Status.OK)
-    assert np.all(one.classes["rk4"][drag > 2.785 * 1.1] == Cell.FAILED)
-    assert np.all(one.classes["rk4"][(drag < 2.0) & resolved] <= Cell.BOUNDED)
+    # Beyond its limit every member of rk4 gets a status, and is frozen before or after its energy passed the bound. Short of
+    # it none does, though near it the warning that its matrices leave the rotations flags some cells.
+    beyond, short = one.statuses["rk4"][drag > 2.785 * 1.1], one.statuses["rk4"][drag < 2.0]
+    assert (
+        np.all(beyond != lw.Status.OK)
+        and np.all(short == lw.Status.OK)
+        and np.all(one.energies["rk4"][drag < 2.0] <= 1.0)
+    )
+    assert np.all(one.classes["rk4"][drag > 2.785 * 1.1] >= Cell.FLAGGED)
     assert np.allclose(one.ratios["rk4"]["drag"] * 2.785, drag, rtol=1e-3)
     refused = one.statuses["kl8(psi_x)"] == 255
     # The longest stage that goes backward is .6055 of a step, and is to have a drag number of .5 at most.

@@ -19,7 +19,7 @@ from lgvi_warp.executors.threads import Threads
 from lgvi_warp.running import Stored
 from lgvi_warp.solving import make_plan, messages, provenance
 from tests.conftest import ROOT
-from tests.stores import MEMBERS, SETTINGS, differing, fleet, tree
+from tests.stores import MEMBERS, SETTINGS, differing, fleet, markers, tree
 from tests.toy_keeper import DepthSum
 
 FIELDS = ("position", "attitude", "velocity", "angular_velocity")
@@ -193,23 +193,29 @@ def flip(path):
     path.write_bytes(data)
 
 
+WORDS = {flip: "has changed", tear: "is torn", remove: "is missing"}
+# Samples, numbers of members (each in all three ways) and what describes them.
 DAMAGED = (
-    ("position/c.0.2.0", flip, "has changed"),
-    ("attitude/c.0.0.0.0", tear, "is torn"),
-    ("vehicle.mass/c.3", remove, "is missing"),
-    ("status/c.1", flip, "has changed"),
-    ("position/zarr.json", flip, "has changed"),
-    ("created.json", flip, "is damaged"),
+    *((name, harm) for name in ("position/c.0.2.0", "status/c.1", "vehicle.mass/c.3") for harm in WORDS),
+    ("attitude/c.0.0.0.0", tear),
+    ("position/zarr.json", flip),
+    ("created.json", flip),
 )
+BLOCK_OF = {"position/c.0.2.0": 512, "status/c.1": 256, "vehicle.mass/c.3": 768, "attitude/c.0.0.0.0": 0}
 
 
-@pytest.mark.parametrize(("name", "harm", "word"), DAMAGED, ids=[f"{h.__name__} {n}" for n, h, _ in DAMAGED])
-def test_damage_is_seen_and_mended(copy, whole, name, harm, word, capsys):
+@pytest.mark.parametrize(("name", "harm"), DAMAGED, ids=[f"{h.__name__} {n}" for n, h in DAMAGED])
+def test_damage_is_seen_and_its_block_alone_runs_again(copy, whole, name, harm, capsys):
     harm(copy / name)
+    word = "is damaged" if name == "created.json" else WORDS[harm]
     assert cli.main(["info", str(copy)]) == 1
     assert f"damage      {name} {word}" in capsys.readouterr().out
+    before = markers(copy)
     lw.resume(copy)
     assert differing(whole, copy) == [] and cli.main(["info", str(copy)]) == 0
+    after = markers(copy)
+    again = [int(one.removesuffix(".json")) for one in after if after[one] != before[one]]
+    assert again == ([BLOCK_OF[name]] if name in BLOCK_OF else [])
 
 
 def test_damaged_times_are_mended_by_the_same_run(copy, whole):

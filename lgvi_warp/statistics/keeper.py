@@ -52,10 +52,11 @@ class Gathered:
         for statistic, tree in zip(self._statistics, self._trees, strict=True):
             if chosen is None or statistic is chosen:
                 with np.errstate(invalid="ignore", over="ignore"):
-                    found += self._said(statistic, tree.parts())
+                    found += self.said(statistic, tree.parts())
         return found
 
-    def _said(self, statistic: Statistic, parts: Sequence[Part]) -> list[Estimate]:
+    def said(self, statistic: Statistic, parts: Sequence[Part]) -> list[Estimate]:
+        """What one statistic says of the parts of a tree."""
         if self._replicates > 1:
             return statistic.estimates_of_replicates(parts, self.time, self._replicates)
         return statistic.estimates(parts, self.time)

@@ -23,6 +23,8 @@ class Sampling:
     """How the unit cube is filled. Raises SceneError naming every fault."""
 
     kind: ClassVar[str] = ""
+    # Whether the first so many of the members that it has may be taken.
+    fewer: ClassVar[bool] = False
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
         """Numbers in (0, 1) by key, each (n, size), of the members (n,) by index."""
@@ -32,7 +34,7 @@ class Sampling:
         """Laws that the sampling itself brings, by name."""
         return {}
 
-    def columns(self) -> dict[str, np.ndarray]:
+    def own_values(self) -> dict[str, np.ndarray]:
         """Values of every member that the sampling itself brings, by name."""
         return {}
 
@@ -51,7 +53,10 @@ class Sampling:
     def check(self, faults: Faults, space: Space, members: int) -> None:
         """Note what is wrong with a number of members or with what varies."""
         own, group = self.own_members(space), self.group_size(space)
-        if own is not None and members != own:
+        if own is not None and self.fewer and members > own:
+            what = f"are more than the {own} of the {self.kind}"
+            faults.add("members", members, what, f"give {own} or less, or leave members out")
+        elif own is not None and not self.fewer and members != own:
             faults.add("members", members, f"is not the {own} of the {self.kind}", f"give {own}, or leave members out")
         elif members % group:
             low = members // group * group

@@ -76,6 +76,7 @@ class Morris(Sampling):
         if isinstance(levels, bool) or not isinstance(levels, int | np.integer) or levels < 4 or levels % 2:
             faults.add("levels", levels, "is not an even number from 4", "give 4, 6, 8 ...")
         faults.raise_if_any()
+        object.__setattr__(self, "levels", int(levels))
 
     def group_size(self, space: Space) -> int:
         """d + 1."""
@@ -97,7 +98,7 @@ class Morris(Sampling):
         """SALib's numbers (n, dimensions): multiples of 1 / (levels - 1) from 0 to 1."""
         paths = int(members.max()) // self.group_size(space) + 1
         # A longer design begins with the shorter one; few lengths, for the cache.
-        return _morris(space, int(self.levels), 1 << (paths - 1).bit_length())[members]
+        return _morris(space, self.levels, 1 << (paths - 1).bit_length())[members]
 
 
 @functools.lru_cache(maxsize=8)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import functools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
@@ -47,19 +47,18 @@ class Grid(Sampling):
         """A choice among the values of each name that has them."""
         return {name: Choice(axis) for name, axis in self.axes.items() if not isinstance(axis, int | np.integer)}
 
-    def _radices(self, space: Space) -> tuple[Space, np.ndarray]:
+    def _radices(self, space: Space) -> tuple[Space, list[int]]:
         """The cube's part that is a grid, and the levels of each of its columns."""
         inner = space.of(self.axes)
         numbers = []
         for key, size in zip(inner.keys, inner.sizes, strict=True):
             axis = self.axes[key]
             numbers += [int(axis) if isinstance(axis, int | np.integer) else len(axis)] * size
-        return inner, np.array(numbers, dtype=np.int64)
+        return inner, numbers
 
     def own_members(self, space: Space) -> int:
         """Of all combinations."""
-        numbers = [int(number) for number in self._radices(space)[1]]
-        return functools.reduce(lambda a, b: a * b, numbers, 1)
+        return math.prod(self._radices(space)[1])
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
         """Every axis must vary something."""
@@ -73,7 +72,8 @@ class Grid(Sampling):
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
         """The member's index as a number with these radices."""
-        inner, radices = self._radices(space)
+        inner, numbers = self._radices(space)
+        radices = np.array(numbers, dtype=np.int64)
         places = np.ones(len(radices), dtype=np.int64)
         places[:-1] = np.cumprod(radices[:0:-1])[::-1]
         digits = members[:, None] // places % radices

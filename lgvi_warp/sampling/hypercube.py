@@ -34,10 +34,12 @@ class LatinHypercube(Replicated):
         if isinstance(group, bool) or not isinstance(group, int | np.integer) or not 2 <= group <= LARGEST_GROUP:
             faults.add("group", group, f"is not a whole number from 2 to {LARGEST_GROUP}",
                        "give how many members make a hypercube: group = 256")  # fmt: skip
+        else:
+            object.__setattr__(self, "group", int(group))
 
     def group_size(self, space: Space) -> int:
         """A hypercube for each replicate."""
-        return int(self.group) * self.replicates
+        return self.group * self.replicates
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
         """From the hypercube of each member's group; names by themselves, so that others do not change them."""
@@ -48,7 +50,7 @@ class LatinHypercube(Replicated):
             found[key] = np.empty((len(members), size))
             for g in np.unique(group):
                 mine = group == g
-                cubes = _hypercubes(space.seed, key, int(g) * R, R, int(self.group), size)
+                cubes = _hypercubes(space.seed, key, int(g) * R, R, self.group, size)
                 found[key][mine] = cubes[place[mine]]
         return found
 

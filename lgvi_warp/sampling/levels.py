@@ -16,11 +16,13 @@ from lgvi_warp.variations import Space
 class Levels(Sampling):
     """A design of your own: points (n, dimensions) in the open unit cube, whose columns are in the order of the names.
 
-    `ensemble.space` says which column is what. The number of members is that of the points. Raises SceneError.
+    `ensemble.space` says which column is what. The number of members is that of the points, or less: the first ones.
+    Raises SceneError.
     """
 
     points: Any = None
     kind: ClassVar[str] = "levels"
+    fewer: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         faults = Faults("ensemble.sampling.levels.")

@@ -10,11 +10,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.distributions import seed_words
-from lgvi_warp.errors import Faults
 from lgvi_warp.sampling.base import MOST_REPLICATES, Drawn, Replicated, inside
 from lgvi_warp.variations import Space
 
-# Of a Sobol sequence: a point is at the middle of one of 2^32 parts of each side, so that no level is 0 or 1.
+# Of a Sobol sequence: a point is at the middle of one of 2^32 parts of each side, so that no level is 0 or 1. It has as
+# many points, more than an ensemble has members.
 SOBOL_BITS = 32
 
 
@@ -23,7 +23,7 @@ class Sobol(Replicated):
     """A scrambled Sobol sequence (linear matrix scramble and digital shift, scipy.stats.qmc.Sobol): member i is point i.
 
     Members may be added: powers of two are balanced. What varies is part of the design: another name, another sequence.
-    At most 2^32 points. replicates: so many sequences, scrambled independently, a member of each in turn.
+    replicates: so many sequences, scrambled independently, a member of each in turn.
     """
 
     kind: ClassVar[str] = "sobol"
@@ -34,12 +34,6 @@ class Sobol(Replicated):
         for replicate, own, points in self.dealt(members):
             found[own] = sobol_points(space.seed, self.name(replicate), space.dimensions, points)
         return space.split(found)
-
-    def check(self, faults: Faults, space: Space, members: int) -> None:
-        """There are 2^32 points."""
-        super().check(faults, space, members)
-        if members > self.replicates * 2**SOBOL_BITS:
-            faults.add("members", members, f"are more than 2^{SOBOL_BITS} points", "use random sampling")
 
 
 def sobol_points(seed: int, name: str, dimensions: int, indices: np.ndarray, scramble: bool = True) -> np.ndarray:

@@ -22,6 +22,7 @@ from lgvi_warp.executors.threads import Threads
 from lgvi_warp.keepers import Samples
 from lgvi_warp.observation import Observation, Observing, observe
 from lgvi_warp.plan import SEGMENT_SAMPLE_BYTES, Plan
+from lgvi_warp.recipe import of_store
 from lgvi_warp.saveat import SaveAt, TimeGrid
 from lgvi_warp.scene import Scene
 from lgvi_warp.store import Store, create
@@ -200,7 +201,8 @@ def writing(plan: Plan, store: Store, folder: Path, threads: int) -> float:
     runs = blocks(plan.ensemble.members)
     with tempfile.TemporaryDirectory(dir=folder) as name:
         start = time.perf_counter()
-        create(replace(store, path=Path(name) / "run.zarr"), plan, provenance(plan), messages(plan))
+        told = of_store(provenance(plan), plan.ensemble)
+        create(replace(store, path=Path(name) / "run.zarr"), plan, told, messages(plan))
         begin = time.perf_counter() - start
         start = time.perf_counter()
         for i in range(SYNCS):

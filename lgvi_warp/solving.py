@@ -20,6 +20,7 @@ from lgvi_warp.keepers import Outcomes, Samples
 from lgvi_warp.method import Method
 from lgvi_warp.observation import Observation, Observing, observe
 from lgvi_warp.plan import Plan
+from lgvi_warp.recipe import of_store
 from lgvi_warp.result import Drawn, Result
 from lgvi_warp.running import Progress, Stored, run_blocks
 from lgvi_warp.saveat import FIELDS, SaveAt, time_grid
@@ -277,7 +278,7 @@ def run_stored(
     start = time.perf_counter()
     observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
     into = settled(store, plan, observed, fields)
-    told = provenance(plan, observed, fields)
+    told = of_store(provenance(plan, observed, fields), plan.ensemble)
     folder = Stored(plan, into, told, messages(plan), observing.keepers, only, observing.enough).run(executor, progress)
     runs = blocks(plan.ensemble.members)
     members = None if only is None else slice(runs[only[0]].first, runs[only[-1]].stop)

@@ -16,7 +16,7 @@ from lgvi_warp import machine, notation, variations
 from lgvi_warp import scene as scenes
 from lgvi_warp import vehicle as vehicles
 from lgvi_warp.errors import Faults, closest, shown
-from lgvi_warp.sampling import Sampling, Table
+from lgvi_warp.sampling import Sampling
 from lgvi_warp.scene import Scene
 from lgvi_warp.variations import MATRICES, Space, Target, Variation
 
@@ -361,19 +361,14 @@ class Ensemble:
         return self.sampling.replicates_of_members() if self._places is None and not self._explicit else 1
 
     def explicit(self) -> dict[str, np.ndarray]:
-        """What was given as arrays, by name: states and parameters, or columns of a table, of the whole, (members of the
-        whole, ...), and "indices".
+        """What was given as arrays, by name: states and parameters of the whole, (members of the whole, ...), or what its
+        sampling has of them, and "indices".
 
         Empty for an ensemble that is drawn, with `indices` of its own alone if they were set.
         """
         own = {} if self._indices is None else {"indices": np.asarray(self._indices, dtype=np.int64)}
-        return dict(self._explicit) | self._table() | own
-
-    def _table(self) -> dict[str, np.ndarray]:
-        """Columns of a table that was given as arrays."""
-        if not isinstance(self.sampling, Table) or self.sampling.file is not None:
-            return {}
-        return {name: column[: self._whole] for name, column in self.sampling.own_values().items()}
+        sampled = {name: values[: self._whole] for name, values in self.sampling.arrays().items()}
+        return dict(self._explicit) | sampled | own
 
     def to_dict(self) -> dict[str, Any]:
         """members, seed, vary, sampling and indices as in a scene file, and the names that were given as arrays."""

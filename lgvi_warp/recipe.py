@@ -50,13 +50,13 @@ ARRAYS = "arrays_sha256"
 
 
 def of_store(provenance: Mapping[str, Any], ensemble: Ensemble) -> dict[str, Any]:
-    """Provenance as a store keeps it: of arrays that were given their checksum, and of a table no values but the names."""
-    given = ensemble.explicit()
+    """Provenance as a store keeps it: of what was given as arrays the checksum alone, and of a table the names."""
+    given, sampling = ensemble.explicit(), ensemble.sampling
     if not given:
         return dict(provenance)
     told = dict(provenance["ensemble"])
-    if columns := sorted(given.keys() - {"indices", *told.get("explicit", ())}):
-        told["sampling"] = {"table": {"columns": columns}}
+    if arrays := sampling.arrays():
+        told["sampling"] = {sampling.kind: {"columns": sorted(arrays)} if sampling.kind == "table" else {}}
     return {**provenance, "ensemble": told | {ARRAYS: _checksum(given)}}
 
 
@@ -86,7 +86,9 @@ def ensemble_of(
         if "indices" in settings:
             ensemble = ensemble.subset(settings["indices"])
     else:
-        settings |= {"sampling": {"table": {"values": explicit}}} if explicit else {}
+        if explicit:
+            (kind,) = settings["sampling"]
+            settings["sampling"] = {kind: {"values": explicit} if kind == "table" else explicit}
         ensemble = Ensemble.from_scene(Scene.from_dict({**scene, "ensemble": settings}))
         ensemble.scene = own
     if noise is not None:

@@ -38,6 +38,10 @@ class Sampling:
         """Values of every member that the sampling itself brings, by name."""
         return {}
 
+    def arrays(self) -> dict[str, np.ndarray]:
+        """What it was given as arrays, by name, a row for each member: a store keeps them as such."""
+        return {}
+
     def own_members(self, space: Space) -> int | None:
         """How many members it has, if that follows from itself."""
         return None

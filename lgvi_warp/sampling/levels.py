@@ -34,6 +34,10 @@ class Levels(Sampling):
         faults.raise_if_any()
         object.__setattr__(self, "points", array)
 
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The points."""
+        return {"points": self.points}
+
     def own_members(self, space: Space) -> int:
         """Of the points."""
         return len(self.points)

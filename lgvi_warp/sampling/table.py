@@ -13,7 +13,7 @@ import numpy as np
 
 from lgvi_warp.errors import Faults, closest
 from lgvi_warp.sampling.base import Drawn, Sampling
-from lgvi_warp.sampling.csv_text import columns_of
+from lgvi_warp.sampling.csv_file import columns_of
 from lgvi_warp.sampling.random import Random
 from lgvi_warp.variations import Space
 
@@ -44,7 +44,8 @@ class Table(Sampling):
             object.__setattr__(self, "values", self.file)
             object.__setattr__(self, "file", None)
         if (self.file is None) == (self.values is None):
-            faults.add("file", self.file, "is given beside values, or neither is", "give one of file and values")
+            what = "has no values beside it" if self.file is None else "is given beside values"
+            faults.add("file", self.file, what, "give one of file and values")
         self._check_options(faults)
         faults.raise_if_any()
         read = self._from_file(faults) if self.file is not None else self._from_values(faults)
@@ -81,16 +82,14 @@ class Table(Sampling):
     def _from_values(self, faults: Faults) -> dict[str, np.ndarray]:
         read: dict[str, np.ndarray] = {}
         given = _columns_by_name(self.values)
-        if given is None:
+        if not given:
             remedy = 'give a file, {"vehicle.mass": array, ...} or a DataFrame with such names'
             faults.add("values", self.values, "has no names of columns", remedy)
             return read
         object.__setattr__(self, "values", given)
         for name in self._chosen(faults, list(given)):
-            array = faults.finite(f'"{name}"', given[name])
-            if array is not None and array.ndim == 0:
-                faults.add(f'"{name}"', given[name], "is no column", "give one value for each member")
-            elif array is not None:
+            array = _column(faults, f'"{name}"', given[name])
+            if array is not None:
                 read[name] = array
         return read
 
@@ -99,12 +98,8 @@ class Table(Sampling):
         path = os.fspath(self.file)
         try:
             content = Path(path).read_bytes()
-            text = content.decode("utf-8-sig")
         except OSError as error:
             faults.add("file", path, f"cannot be read ({error.strerror})", "give a CSV file")
-            return {}
-        except UnicodeDecodeError:
-            faults.add("file", path, "is no text in UTF-8", "save it as CSV in UTF-8")
             return {}
         found = hashlib.sha256(content).hexdigest()
         if self.sha256 not in (None, found):
@@ -112,11 +107,19 @@ class Table(Sampling):
             faults.add("sha256", self.sha256, what, "leave sha256 out to take it")
             return {}
         object.__setattr__(self, "sha256", found)
-        return columns_of(faults, path, text, self._chosen)
+        try:
+            return columns_of(faults, path, content, self._chosen)
+        except UnicodeDecodeError:
+            faults.add("file", path, "is no text in UTF-8", "save it as CSV in UTF-8")
+            return {}
 
     def own_values(self) -> dict[str, np.ndarray]:
         """As read."""
         return dict(self._own)  # type: ignore[attr-defined]
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Columns that no file has."""
+        return {} if self.file is not None else self.own_values()
 
     def own_members(self, space: Space) -> int:
         """Lines."""
@@ -134,11 +137,22 @@ class Table(Sampling):
         return {self.kind: {"file": os.path.abspath(self.file), "sha256": self.sha256, **chosen}}
 
 
-def _columns_by_name(values: Any) -> dict[str, Any] | None:
-    """Columns of a mapping, or of a table such as pandas.DataFrame; None if they have no names."""
-    if isinstance(values, Mapping):
-        return dict(values)
-    names = getattr(values, "columns", None)
+def _columns_by_name(values: Any) -> dict[str, Any]:
+    """Columns of a mapping, or of a table such as pandas.DataFrame; none if they have no names."""
+    names = values if isinstance(values, Mapping) else getattr(values, "columns", None)
     if not isinstance(names, Iterable) or not all(isinstance(name, str) for name in names):
+        return {}
+    return {name: values[name] if isinstance(values, Mapping) else np.asarray(values[name]) for name in names}
+
+
+def _column(faults: Faults, key: str, given: Any) -> np.ndarray | None:
+    """A column of finite numbers; None after noting a fault."""
+    if isinstance(given, np.ndarray) and given.dtype.kind == "f" and given.ndim and not np.isfinite(given).all():
+        row = int(np.argmin(np.isfinite(given.reshape(len(given), -1)).all(axis=1)))
+        faults.add(key, given[row], f"is not finite, of member {row}", "give a number, or drop that member")
         return None
-    return {name: np.asarray(values[name]) for name in names}
+    array = faults.finite(key, given)
+    if array is not None and array.ndim == 0:
+        faults.add(key, given, "is no column", "give one value for each member")
+        return None
+    return array

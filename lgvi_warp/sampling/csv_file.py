@@ -1,4 +1,4 @@
-"""Numbers by column from the text of a CSV file, with the line and the column of each that is none."""
+"""Numbers by column from what a CSV file holds, with the line and the column of each that is none."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ MOST_TOLD = 8
 Choose = Callable[[Faults, Sequence[str]], list[str]]
 
 
-def columns_of(faults: Faults, path: str, text: str, choose: Choose) -> dict[str, np.ndarray]:
+def columns_of(faults: Faults, path: str, content: bytes, choose: Choose) -> dict[str, np.ndarray]:
     """Columns by name: names in the first line that is not empty and no comment (#), then a line of numbers each.
 
     Cells are parted by commas, semicolons or tabs, as the first line has it. Notes every fault, and gives nothing if there
-    is one.
+    is one. Raises UnicodeDecodeError for what is not in UTF-8.
     """
-    head = next((line for line in _lines(text) if line.strip()), "")
+    head = next((line for line in _lines(content) if line.strip()), "")
     delimiter = next((one for one in "\t;" if one in head), ",")
-    rows = csv.reader(_lines(text), delimiter=delimiter, skipinitialspace=True)
+    rows = csv.reader(_lines(content), delimiter=delimiter, skipinitialspace=True)
     try:
         names = [name.strip() for name in next((row for row in rows if row), [])]
         _check_names(faults, path, rows.line_num, names, delimiter)
@@ -40,10 +40,10 @@ def columns_of(faults: Faults, path: str, text: str, choose: Choose) -> dict[str
     return {} if faults else dict(zip(chosen, np.ascontiguousarray(numbers.T), strict=True))
 
 
-def _lines(text: str) -> Iterator[str]:
+def _lines(content: bytes) -> Iterator[str]:
     """Every line, so that they are counted as the file has them; of comments and empty ones the end alone."""
-    for line in io.StringIO(text, newline=None):
-        yield "\n" if not line.strip() or line.lstrip().startswith("#") else line
+    for line in io.TextIOWrapper(io.BytesIO(content), "utf-8-sig"):
+        yield line if line.lstrip()[:1] not in ("", "#") else "\n"
 
 
 def _check_names(faults: Faults, path: str, line: int, names: Sequence[str], delimiter: str) -> None:

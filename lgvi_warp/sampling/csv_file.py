@@ -73,7 +73,7 @@ def _check_chosen(faults: Faults, path: str, line: int, names: Sequence[str], ch
 def _numbers(faults: Faults, path: str, rows: Any, names: Sequence[str], chosen: Sequence[str]) -> np.ndarray:
     """(lines, chosen) numbers of the lines that follow."""
     places = [names.index(name) for name in chosen]
-    found, wrong = array("d"), list[str]()
+    found, wrong = array("d"), list[tuple[str, str]]()
     for row in rows:
         if not row:
             continue
@@ -86,8 +86,8 @@ def _numbers(faults: Faults, path: str, rows: Any, names: Sequence[str], chosen:
         if not cells or not math.isfinite(sum(numbers)):
             wrong += _told(rows.line_num, row, names, chosen, cells)
         found.extend(numbers)
-    for text in wrong[:MOST_TOLD]:
-        faults.add("file", path, text, "mend that line; numbers have a point, 120.5")
+    for what, remedy in wrong[:MOST_TOLD]:
+        faults.add("file", path, what, remedy)
     if len(wrong) > MOST_TOLD:
         faults.add("file", path, f"has {len(wrong) - MOST_TOLD} more such faults", "mend them too")
     if not found and not wrong:
@@ -97,10 +97,10 @@ def _numbers(faults: Faults, path: str, rows: Any, names: Sequence[str], chosen:
 
 def _told(
     line: int, row: Sequence[str], names: Sequence[str], chosen: Sequence[str], cells: Sequence[str]
-) -> list[str]:
-    """What is wrong with a line."""
+) -> list[tuple[str, str]]:
+    """What is wrong with a line, and the remedy."""
     if len(row) != len(names):
-        return [f"has {len(names)} names and {len(row)} cells in line {line}"]
+        return [(f"has {len(names)} names and {len(row)} cells in line {line}", "give a cell for each name")]
     told = []
     for name, cell in zip(chosen, cells, strict=True):
         number = _number(cell)
@@ -110,7 +110,8 @@ def _told(
             what = f"{cell.strip()}, which is not finite,"
         else:
             continue
-        told.append(f'has {what} in line {line}, column "{name}"')
+        remedy = f'write a number with a point, 120.5, or leave the column out: ignore = ["{name}"]'
+        told.append((f'has {what} in line {line}, column "{name}"', remedy))
     return told
 
 

@@ -369,8 +369,8 @@ def test_columns_that_no_scene_has_are_left_out(scene, tmp_path):
     frame = pandas.DataFrame({"id": ["a", "b"], "vehicle.mass": [120, 121], "start.position[2]": [7.0, 8.25]})
     path = tmp_path / "members.csv"
     frame.to_csv(path)
-    found = faults(lw.Ensemble, scene, sampling=lw.Table(path, columns=["vehicle.mass", "id"]))
-    assert len(found) == 2 and all('column "id"' in fault for fault in found)
+    found = faults(lw.Table, path, columns=["vehicle.mass", "id"])
+    assert len(found) == 2 and all('leave the column out: ignore = ["id"]' in fault for fault in found)
     tables = [
         lw.Table(path, ignore=["", "id"]),
         lw.Table(path, columns=("start.position[2]", "vehicle.mass")),
@@ -519,7 +519,7 @@ def test_a_scene_file_names_its_sampling(tmp_path):
         ({"table": {"values": {}}}, None, ["has no names of columns"]),
         ({"table": {"values": {3: [1.0]}}}, None, ["has no names of columns"]),
         ({"table": {"values": {"environment.gravity": np.array([9.8, np.nan])}}}, None, ["nan", "of member 1"]),
-        ({"levels": {"points": np.full((2, 3), 0.5)}}, 3, ["more than the 2 of the levels"]),
+        ({"levels": {"points": np.full((2, 16), 0.5)}}, 3, ["more than the 2 of the levels"]),
         ({"levels": {"points": [[0.5, 1.0]]}}, None, ["leaves the open unit cube"]),
         ({"levels": {"points": [[0.5, 0.1]]}}, None, ["has 2 columns"]),
     ],
@@ -545,7 +545,7 @@ BAD_FILES = {
     "120,121\n1,2\n": ["numbers where the names should be (line 1)"],
     "\nvehicle.inertia[0,0],vehicle.mass\n5,120\n": ["'vehicle.inertia[0' (line 2); quote a name"],
     ",vehicle.mass\n0,120\n": ['without a name, number 1|ignore = [""]'],
-    "x;y\n120,5;7\n": ["'120,5', which is no number|numbers have a point"],
+    "x;y\n120,5;7\n": ["'120,5', which is no number|with a point"],
     'x\n"120\n121\n': ["which is no number, in line 3"],
     "x\n" + "?\n" * 20: [*(f"in line {i}," for i in range(2, 10)), "12 more such faults"],
     "x\n" + "1" * 200_000: ["cannot be read|line 2"],

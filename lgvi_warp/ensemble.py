@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from lgvi_warp import machine, variations
+from lgvi_warp import machine, notation, variations
 from lgvi_warp import scene as scenes
 from lgvi_warp import vehicle as vehicles
 from lgvi_warp.errors import Faults, closest, shown
@@ -21,6 +21,8 @@ from lgvi_warp.scene import Scene
 from lgvi_warp.variations import MATRICES, Space, Target, Variation
 
 STATES = ("position", "attitude", "velocity", "angular_velocity")
+# Of one ensemble, whatever its sampling: a kernel keys a member's noise by its index in a signed word of 32 bits.
+MOST_MEMBERS = 2**31
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +132,7 @@ class Ensemble:
         faults.keys("", parameters or {}, base)
         faults.raise_if_any()
         R = explicit["start.attitude"]
-        bad = np.isfinite(R).all(axis=(1, 2)) & ~scenes.rotations(R)
+        bad = np.isfinite(R).all(axis=(1, 2)) & ~notation.rotations(R)
         if bad.any():
             what = f"is not a rotation to 1e-9 ({bad.sum()} of {n} members)"
             faults.add(f"attitude of member {bad.argmax()}", R[bad.argmax()], what, "give R^T R = I, det R = 1")
@@ -165,7 +167,7 @@ class Ensemble:
     def _described(self) -> list[Variation]:
         """What varies, by law; notes every name and law that does not fit the scene."""
         faults = Faults("ensemble.vary.")
-        columns = self.sampling.columns()
+        columns = self.sampling.own_values()
         self._turn_by_matrix(faults, columns)
         known = {**self._base, **({} if self._explicit else self._start)}
         laws = {**self.sampling.laws(), **self.vary}
@@ -181,12 +183,16 @@ class Ensemble:
             (target, *more) = variations.targets(key)
             if more:
                 tables.add(f'"{key}"', "...", "names several numbers", "give each a column of its own")
-            elif variations.known_target(tables, key, "...", target, known):
+            elif variations.known_target(tables, key, "...", target, known, f'; or leave it out: ignore = ["{key}"]'):
                 named.append((key, (target,)))
                 shape = (len(column), *target.of(known[target.name]).shape)
                 name = target.name if target.index is None else key
                 self._columns.append((target, _explicit_parameter(tables, name, column, shape)))
-                if target.name == variations.ATTITUDE and column.shape == shape and not scenes.rotations(column).all():
+                if (
+                    target.name == variations.ATTITUDE
+                    and column.shape == shape
+                    and not notation.rotations(column).all()
+                ):
                     tables.add(
                         f'"{key}"', "...", "holds a matrix that is no rotation to 1e-9", "give R^T R = I, det R = 1"
                     )
@@ -214,10 +220,16 @@ class Ensemble:
         """How many members there are; refuses a number that the sampling cannot have."""
         faults = Faults("ensemble.")
         own, group = self.sampling.own_members(self.space), self.sampling.group_size(self.space)
-        members = settings.members or own or group
-        self.sampling.check(faults, self.space, int(members))
+        members = int(settings.members or own or group)
+        if members > MOST_MEMBERS:
+            key, remedy = "members", f"give {MOST_MEMBERS} or less"
+            if not settings.members:
+                key, remedy = f"sampling.{self.sampling.kind}", "give fewer values, of fewer names"
+            faults.add(key, members, f"are more members than {MOST_MEMBERS}, which an ensemble may have", remedy)
+        else:
+            self.sampling.check(faults, self.space, members)
         faults.raise_if_any()
-        return int(members)
+        return members
 
     @property
     def indices(self) -> np.ndarray:
@@ -229,6 +241,10 @@ class Ensemble:
     @indices.setter
     def indices(self, indices: np.ndarray) -> None:
         self._indices = indices
+
+    def indices_of(self, first: int, stop: int) -> np.ndarray:
+        """The same of the members first to stop alone."""
+        return np.arange(first, stop) if self._indices is self._places is None else self.indices[first:stop]
 
     def _check_physical(self) -> None:
         """Refuse members that are unphysical: all are looked at, so many at a time that memory stays small."""
@@ -313,8 +329,7 @@ class Ensemble:
         else:
             nu = start["velocity"]
         position, nu, Om = (np.broadcast_to(x, (m, 3)) for x in (start["position"], nu, start["angular_velocity"]))
-        indices = np.arange(first, stop) if self._indices is self._places is None else self.indices[first:stop]
-        return Members(values, position, R, nu, Om, indices, self.seed)
+        return Members(values, position, R, nu, Om, self.indices_of(first, stop), self.seed)
 
     def varied(self) -> list[str]:
         """Names of the parameters that have a number for each member."""
@@ -346,12 +361,14 @@ class Ensemble:
         return self.sampling.replicates_of_members() if self._places is None and not self._explicit else 1
 
     def explicit(self) -> dict[str, np.ndarray]:
-        """What was given as arrays, by name: states and parameters of the whole, (members of the whole, ...), and "indices".
+        """What was given as arrays, by name: states and parameters of the whole, (members of the whole, ...), or what its
+        sampling has of them, and "indices".
 
         Empty for an ensemble that is drawn, with `indices` of its own alone if they were set.
         """
         own = {} if self._indices is None else {"indices": np.asarray(self._indices, dtype=np.int64)}
-        return dict(self._explicit) | own
+        sampled = {name: values[: self._whole] for name, values in self.sampling.arrays().items()}
+        return dict(self._explicit) | sampled | own
 
     def to_dict(self) -> dict[str, Any]:
         """members, seed, vary, sampling and indices as in a scene file, and the names that were given as arrays."""

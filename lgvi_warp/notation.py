@@ -10,6 +10,8 @@ import numpy as np
 
 # A matrix whose off-diagonal elements are below this fraction of its largest is diagonal as given.
 DIAGONAL = 1e-14
+# How far from orthogonal an attitude may be: the round-off of printing one with ten digits, and no more.
+ORTHOGONAL = 1e-9
 
 
 def to_momenta(M: np.ndarray, J: np.ndarray, nu: np.ndarray, Om: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -32,6 +34,13 @@ def principal_axes(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         d[turned], Q[turned] = np.linalg.eigh(J[turned])
         Q[turned, :, 2] *= np.sign(np.linalg.det(Q[turned]))[:, None]
     return Q, d
+
+
+def rotations(R: np.ndarray) -> np.ndarray:
+    """Which matrices of R (..., 3, 3) are rotations to ORTHOGONAL; False where a number is not finite."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        close = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2)) <= ORTHOGONAL
+        return np.asarray(close & (np.linalg.det(R) > 0.0))
 
 
 def rotate_into(Q: np.ndarray, vectors: np.ndarray) -> np.ndarray:

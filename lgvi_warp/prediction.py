@@ -23,6 +23,7 @@ from lgvi_warp.keepers import Samples
 from lgvi_warp.kept import group_of
 from lgvi_warp.observation import Observation, Observing, observe
 from lgvi_warp.plan import SEGMENT_SAMPLE_BYTES, Plan
+from lgvi_warp.recipe import of_store
 from lgvi_warp.saveat import SaveAt, TimeGrid
 from lgvi_warp.scene import Scene
 from lgvi_warp.statistics.sizes import Sizes, sizes
@@ -264,7 +265,8 @@ def writing(runs: Sequence[Sized], folder: Path, threads: int) -> tuple[float, i
         for one in runs:
             assert one.store is not None
             place = path / one.store.folder.relative_to(one.store.whole)
-            create(replace(one.store, path=place), one.plan, provenance(one.plan), messages(one.plan))
+            told = of_store(provenance(one.plan), one.plan.ensemble)
+            create(replace(one.store, path=place), one.plan, told, messages(one.plan))
         Folder(path).finish()
         begin = time.perf_counter() - start
         metadata = sum(one.stat().st_size for one in path.rglob("*") if one.is_file())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
@@ -44,6 +45,30 @@ def plan_of(made: Mapping[str, Any], ensemble: Ensemble, sample_steps: np.ndarra
     return Plan(ensemble, method, grid, fields, *settings)
 
 
+# In a store's provenance of an ensemble: the SHA-256 of what was given as arrays, which lies in its group "explicit".
+ARRAYS = "arrays_sha256"
+
+
+def of_store(provenance: Mapping[str, Any], ensemble: Ensemble) -> dict[str, Any]:
+    """Provenance as a store keeps it: of what was given as arrays the checksum alone, and of a table the names."""
+    given, sampling = ensemble.explicit(), ensemble.sampling
+    if not given:
+        return dict(provenance)
+    told = dict(provenance["ensemble"])
+    if arrays := sampling.arrays():
+        told["sampling"] = {sampling.kind: {"columns": sorted(arrays)} if sampling.kind == "table" else {}}
+    return {**provenance, "ensemble": told | {ARRAYS: _checksum(given)}}
+
+
+def _checksum(arrays: Mapping[str, np.ndarray]) -> str:
+    """SHA-256 of names, shapes and bytes."""
+    found = hashlib.sha256()
+    for name, values in sorted(arrays.items()):
+        found.update(f"{name} {values.shape} {values.dtype.str}\n".encode())
+        found.update(np.ascontiguousarray(values).data)
+    return found.hexdigest()
+
+
 def ensemble_of(
     scene: Mapping[str, Any],
     settings: Mapping[str, Any],
@@ -52,7 +77,8 @@ def ensemble_of(
 ) -> Ensemble:
     """The ensemble that provenance tells of; explicit: its arrays; noise: `indices` where they were set. Raises SceneError."""
     own = Scene.from_dict(scene)
-    if explicit:
+    settings = {key: value for key, value in settings.items() if key != ARRAYS}
+    if "explicit" in settings:
         states = {name: explicit[f"start.{name}"] for name in STATES}
         parameters = {name: value for name, value in explicit.items() if not name.startswith("start.")}
         ensemble = Ensemble.from_states(own, **states, parameters=parameters)
@@ -60,7 +86,10 @@ def ensemble_of(
         if "indices" in settings:
             ensemble = ensemble.subset(settings["indices"])
     else:
-        ensemble = Ensemble.from_scene(Scene.from_dict({**scene, "ensemble": dict(settings)}))
+        if explicit:
+            (kind,) = settings["sampling"]
+            settings["sampling"] = {kind: {"values": explicit} if kind == "table" else explicit}
+        ensemble = Ensemble.from_scene(Scene.from_dict({**scene, "ensemble": settings}))
         ensemble.scene = own
     if noise is not None:
         ensemble.indices = noise

@@ -17,7 +17,7 @@ from lgvi_warp.errors import MembersFailed, SceneError
 from lgvi_warp.executors import Executor, executor_of
 from lgvi_warp.kept import KeptRun, keep_of, members_kept
 from lgvi_warp.observation import Observing, observation_of
-from lgvi_warp.recipe import refuse_another, same_run
+from lgvi_warp.recipe import of_store, refuse_another, same_run
 from lgvi_warp.result import Result
 from lgvi_warp.running import Stored
 from lgvi_warp.scene import Scene
@@ -53,7 +53,7 @@ def resume(
     told = folder.provenance.get("observed")
     observed = observation_of(told, statistics)
     observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
-    now = provenance(plan) | ({} if told is None else {"observed": told})
+    now = of_store(provenance(plan), plan.ensemble) | ({} if told is None else {"observed": told})
     messages = refuse_another(folder.path, folder.provenance, now, force)
     runner = executor_of(executor, threads, scheduler)
     # What the store says stays as it was when it was made, on whatever machine the run goes on.

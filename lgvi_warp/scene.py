@@ -33,10 +33,6 @@ SHAPES = {
 }
 UNITS = {"position": "m", "rotation_vector": "rad", "euler_deg": "deg", "velocity": "m/s", "velocity_inertial": "m/s",
          "angular_velocity": "rad/s"}  # fmt: skip
-# How far from orthogonal an attitude may be: the round-off of printing one with ten digits, and no more.
-ORTHOGONAL = 1e-9
-# Members of one ensemble: their states alone are 14 GB.
-MOST_MEMBERS = 100_000_000
 
 
 @dataclass(frozen=True)
@@ -92,7 +88,7 @@ class Start:
 
     def _check_attitude(self, faults: Faults) -> None:
         R, q = self.attitude, self.quaternion_wxyz
-        if R is not None and not rotations(R):
+        if R is not None and not notation.rotations(R):
             faults.add(
                 "attitude",
                 R,
@@ -114,13 +110,6 @@ class Start:
     def to_dict(self) -> dict[str, Any]:
         """As in a scene file: what was given."""
         return {name: getattr(self, name).tolist() for name in SHAPES if getattr(self, name) is not None}
-
-
-def rotations(R: np.ndarray) -> np.ndarray:
-    """Which matrices of R (..., 3, 3) are rotations to ORTHOGONAL; False where a number is not finite."""
-    with np.errstate(invalid="ignore", over="ignore"):
-        close = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2)) <= ORTHOGONAL
-        return np.asarray(close & (np.linalg.det(R) > 0.0))
 
 
 def resolve_attitude(values: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -244,10 +233,6 @@ class EnsembleSettings:
                 continue
             if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
                 faults.add(name, value, f"is not a whole number from {least}", f"give {least} or more")
-            elif name == "members" and value > MOST_MEMBERS:
-                faults.add(
-                    name, value, f"is above {MOST_MEMBERS}", "give less; run the rest as ensembles with other seeds"
-                )
         if self.indices is not None and not _whole_numbers(self.indices):
             faults.add("indices", self.indices, "is no list of whole numbers from 0", "give members: indices = [17]")
         if isinstance(self.vary, Mapping):

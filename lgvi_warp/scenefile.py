@@ -153,8 +153,7 @@ def _check_ensemble(settings: EnsembleSettings, scene: Scene | None, parameters:
         try:
             Ensemble.of(scene, settings)
         except MemoryError:
-            remedy = "give less, and run the rest with other seeds"
-            raise SceneError([f"ensemble.members = {settings.members}: do not fit into memory; {remedy}"]) from None
+            raise SceneError([f"ensemble.members = {settings.members}: do not fit into memory; give less"]) from None
 
 
 def _build(faults: Faults, name: str, kind: Callable[..., Any], table: Mapping[str, Any]) -> Any:

@@ -21,6 +21,7 @@ from lgvi_warp.kept import KeptRun
 from lgvi_warp.method import Method
 from lgvi_warp.observation import Observation, Observing, observe
 from lgvi_warp.plan import Plan
+from lgvi_warp.recipe import of_store
 from lgvi_warp.result import Drawn, Result
 from lgvi_warp.running import Progress, Stored, run_blocks
 from lgvi_warp.saveat import FIELDS, SaveAt, time_grid
@@ -280,7 +281,7 @@ def run_stored(
     into = settled(store, plan, observed, fields)
     asked = plan.fields if fields is None else fields
     kept = tuple(name for name in asked if store.fields is None or name in store.fields)
-    told = provenance(plan, observed, kept)
+    told = of_store(provenance(plan, observed, kept), plan.ensemble)
     folder = Stored(
         plan, into, told, messages(plan), observing.keepers, only, observing.enough, KeptRun(observed, kept)
     ).run(executor, progress)

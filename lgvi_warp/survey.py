@@ -105,7 +105,7 @@ def survey(ensemble: Ensemble, method: Method, h: float) -> Survey:
 def _look(ensemble: Ensemble, method: Method, h: float, first: int, stop: int) -> Survey:
     p = ensemble.parameters(first, stop)
     frame, U, left = frame_of(method, p)
-    setting = Setting(p, frame, ensemble.indices[first:stop], ensemble.seed, h, frame.aligned)
+    setting = Setting(p, frame, ensemble.indices_of(first, stop), ensemble.seed, h, frame.aligned)
     implied = {t.key for t in terms.IMPLIED if any(np.any(v) for v in t.packed({}, setting).values.values())}
     own = {term.key: (term, ensemble.own(term, p)) for term in ensemble.scene.terms}
     return Survey(

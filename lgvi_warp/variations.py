@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp import notation
 from lgvi_warp import vehicle as vehicles
 from lgvi_warp.distributions import Distribution, varies_nothing
 from lgvi_warp.errors import Faults, closest
@@ -177,13 +178,15 @@ def put(values: dict[str, np.ndarray], target: Target, drawn: np.ndarray) -> Non
     values[target.name] = whole
 
 
-def known_target(faults: Faults, key: str, law: Any, target: Target, known: Mapping[str, np.ndarray]) -> bool:
-    """Whether the scene has a target; notes what is wrong with it if not."""
+def known_target(
+    faults: Faults, key: str, law: Any, target: Target, known: Mapping[str, np.ndarray], also: str = ""
+) -> bool:
+    """Whether the scene has a target; notes what is wrong with it if not. also: another remedy for a name it has not."""
     if target.name not in known:
         others = [name for name in known if name.split(".")[0] == target.name.split(".")[0]]
         start = target.name.startswith("start.")
         hint = f"the scene gives {', '.join(others)}" if start and others else closest(target.name, known)
-        faults.add(f'"{key}"', law, "does not name what the scene has", hint)
+        faults.add(f'"{key}"', law, "does not name what the scene has", hint + also)
         return False
     shape = known[target.name].shape
     if target.index is not None:
@@ -199,7 +202,9 @@ def known_target(faults: Faults, key: str, law: Any, target: Target, known: Mapp
     return True
 
 
-ROTATIONS = "give lw.RotationNormal or lw.UniformRotation, or give rotation_vector or euler_deg and vary it"
+ROTATIONS = (
+    "give lw.RotationNormal, lw.UniformRotation or a Choice of matrices; or vary rotation_vector or euler_deg instead"
+)
 
 
 def variation(faults: Faults, key: str, law: Any, known: Mapping[str, np.ndarray]) -> Variation | None:
@@ -223,11 +228,13 @@ def _misfit(found: Variation) -> tuple[str, str] | None:
     """(what is wrong, the remedy) with a law and its targets; None if they fit."""
     law, named = found.law, found.targets
     turns = isinstance(law, RotationNormal | UniformRotation)
+    chosen = law.kind == "choice" and law.joint
     if len(named) > 1 and law.kind != "correlated_normal":
         return "draws one quantity, several are named", "give lw.CorrelatedNormal, or a law to each"
-    if turns != (named[0].name == ATTITUDE):
-        return ("is a law of attitudes", f'vary "{ATTITUDE}"') if turns else ("cannot vary by entry", ROTATIONS)
-    if any(target.name == ATTITUDE for target in named) and not turns:
+    attitude = any(target.name == ATTITUDE for target in named)
+    if turns and not attitude:
+        return "is a law of attitudes", f'vary "{ATTITUDE}"'
+    if attitude and not (turns or chosen):
         return "cannot vary by entry", ROTATIONS
     if isinstance(law, PositiveDefinite):
         if named[0].name not in MATRICES or named[0].index is not None:
@@ -239,11 +246,20 @@ def _misfit(found: Variation) -> tuple[str, str] | None:
         return f"is relative to the scene's value, 0, so that its {width} varies nothing", "give an absolute spread"
     if wrong is None and isinstance(law, PositiveDefinite):
         wrong = law.unusable(found.wholes[0])
-    if wrong is None and law.kind == "choice" and law.joint and named[0].name in MATRICES and named[0].index is None:
-        values = np.asarray(law.values)
-        if np.any(np.abs(values - np.swapaxes(values, 1, 2)) > 1e-9 * np.abs(values).max()):
-            wrong = "holds a matrix that is not symmetric", "give symmetric matrices"
+    if wrong is None and chosen:
+        wrong = _no_such_matrices(named[0], np.asarray(law.values, dtype=np.float64))
     return wrong
+
+
+def _no_such_matrices(target: Target, values: np.ndarray) -> tuple[str, str] | None:
+    """(what is wrong, the remedy) with values (k, d, d) of a quantity that is a symmetric matrix or a rotation."""
+    if target.name == ATTITUDE and not notation.rotations(values).all():
+        which = int(np.argmin(notation.rotations(values)))
+        return f"holds a matrix that is no rotation to 1e-9 (number {which + 1})", "give R^T R = I, det R = 1"
+    if target.name not in MATRICES or target.index is not None:
+        return None
+    skew = np.abs(values - np.swapaxes(values, 1, 2)).max() > 1e-9 * np.abs(values).max()
+    return ("holds a matrix that is not symmetric", "give symmetric matrices") if skew else None
 
 
 def clashes(faults: Faults, named: Iterable[tuple[str, tuple[Target, ...]]]) -> None:

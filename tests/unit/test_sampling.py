@@ -12,6 +12,7 @@ from scipy.stats import qmc
 
 import lgvi_warp as lw
 from lgvi_warp import sampling
+from lgvi_warp.ensemble import MOST_MEMBERS
 from lgvi_warp.variations import Space, targets
 from tests.unit.test_ensemble import assert_same, faults
 
@@ -91,6 +92,35 @@ def test_lines_may_be_added(scene, kind):
 def test_far_members(content):
     far = 10**8 + 3
     np.testing.assert_array_equal(cube(content, np.arange(far, far + 50))[[7, 30]], cube(content, [far + 7, far + 30]))
+
+
+@pytest.mark.parametrize("content", ["random", pytest.param("sobol", marks=pytest.mark.slow), *SEQUENCES[2:]], ids=str)
+def test_the_last_members_there_can_be(scene, content):
+    """The first words of Sobol's basis for the last points take 2^31 steps of scipy's."""
+    vary = {"start.position": lw.Normal(std=1.0)}
+    n = MOST_MEMBERS - (MOST_MEMBERS % 40 if isinstance(content, dict) else 0)
+    fleet = lw.Ensemble(scene, n, 3, vary, content)
+    last = fleet.select(n - 50, n)
+    assert_same(fleet.member(n - 1).select(0, 1), last, [49])
+    assert last.indices[-1] == n - 1 and len(np.unique(last.position[:, 0])) == 50
+    # As the kernels have the index, which keys a member's noise.
+    assert last.indices.astype(np.int32)[-1] == n - 1
+
+
+def test_no_sampling_has_more_members_than_there_can_be(scene):
+    for content in ("random", "sobol", {"sobol": {"replicates": 64}}, "halton"):
+        (fault,) = faults(lw.Ensemble, scene, MOST_MEMBERS + 64, 0, None, content)
+        assert "ensemble.members = 2147483712: are more members than 2147483648" in fault and "or less" in fault
+    uniform = lw.Uniform(low=0.0, high=1.0)
+    names = ("start.position", "start.angular_velocity")
+    grid = {"grid": dict.fromkeys(names, 3000)}
+    content = scene.to_dict() | {"ensemble": {"vary": dict.fromkeys(names, uniform.to_dict()), "sampling": grid}}
+    (fault,) = faults(lw.Scene.from_dict, content)
+    assert f"ensemble.sampling.grid = {3000**6}: are more members" in fault and "fewer values" in fault
+    # Beyond whole numbers of 64 bits.
+    assert "more members" in faults(lw.Ensemble, scene, None, 0, {names[0]: uniform}, lw.Grid({names[0]: 10**30}))[0]
+    fleet = lw.Ensemble(scene, None, 0, {names[0]: uniform}, lw.Grid({names[0]: 2**10}))
+    assert fleet.members == 2**30 and len(fleet.select(2**30 - 3, 2**30).position) == 3
 
 
 @pytest.mark.parametrize("content", [*SEQUENCES, *REPLICATED], ids=str)
@@ -204,6 +234,25 @@ def test_replicates_are_told_and_read(scene, content):
     assert lw.Sobol(replicates=1).to_dict() == "sobol"
 
 
+def test_whole_numbers_of_numpy(scene):
+    """They are as good as Python's, in provenance as well."""
+    import json
+
+    pairs = [
+        (lw.LatinHypercube(np.int64(10), replicates=np.int32(2)), lw.LatinHypercube(10, replicates=2)),
+        (lw.Sobol(replicates=np.uint8(4)), lw.Sobol(replicates=4)),
+        (lw.Halton(replicates=np.int16(4)), lw.Halton(replicates=4)),
+        (lw.Morris(np.int64(6)), lw.Morris(6)),
+        (lw.Grid({"vehicle.buoyancy": np.int64(4)}), lw.Grid({"vehicle.buoyancy": 4})),
+    ]
+    vary = {"vehicle.buoyancy": lw.Uniform(half_width=1.0), "start.position[2]": lw.Normal(std=1.0)}
+    for ours, theirs in pairs:
+        n = {"grid": 4, "morris": 60}.get(ours.kind, 80)
+        fleets = [lw.Ensemble(scene, kind(n), kind(3), vary, one) for kind, one in ((np.int64, ours), (int, theirs))]
+        assert json.dumps(fleets[0].to_dict()) == json.dumps(fleets[1].to_dict())
+        assert_same(fleets[0].select(0, n), fleets[1].select(0, n), slice(0, n))
+
+
 @pytest.mark.parametrize("second_order", [True, False])
 def test_saltellis_design_is_that_of_salib(second_order):
     from SALib.sample import sobol
@@ -299,6 +348,76 @@ def test_a_table_of_a_file(scene, tmp_path):
     assert "has changed" in faults(lw.Scene.from_dict, content)[0]
 
 
+PLAIN = "vehicle.mass,start.position[2]\n120.5,7\n121,8.25\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        PLAIN,
+        PLAIN.replace(",", ";"),
+        PLAIN.replace(",", "\t"),
+        PLAIN.replace(",", "  ,  "),
+        PLAIN.replace("\n", "\r\n"),
+        "\ufeff" + PLAIN,
+        "# made by hand\n\n" + PLAIN.replace("121", "\n  # heavier\n121"),
+        '"vehicle.mass","start.position[2]"\n"120.5","7"\n"121","8.25"\n',
+        PLAIN.replace("121", "1.21e2").rstrip(),
+    ],
+    ids=["commas", "semicolons", "tabs", "spaces", "crlf", "bom", "comments", "quotes", "last line"],
+)
+def test_files_as_programs_write_them(tmp_path, text):
+    (tmp_path / "members.csv").write_bytes(text.encode())
+    found = lw.Table(tmp_path / "members.csv").own_values()
+    np.testing.assert_array_equal(found["vehicle.mass"], [120.5, 121.0])
+    np.testing.assert_array_equal(found["start.position[2]"], [7.0, 8.25])
+
+
+def test_numbers_of_a_file_have_all_their_digits(tmp_path):
+    rng = np.random.default_rng(3)
+    numbers = rng.standard_normal((50, 2)) * 10.0 ** rng.integers(-300, 300, (50, 2))
+    numbers[0] = np.finfo(float).max, np.finfo(float).max  # whose sum is not finite
+    np.savetxt(tmp_path / "a.csv", numbers, fmt="%.17g", delimiter=",", header="x,y", comments="")
+    found = lw.Table(tmp_path / "a.csv").own_values()
+    np.testing.assert_array_equal(np.stack([found["x"], found["y"]], axis=1), numbers)
+
+
+def test_columns_that_no_scene_has_are_left_out(scene, tmp_path):
+    import pandas
+
+    frame = pandas.DataFrame({"id": ["a", "b"], "vehicle.mass": [120, 121], "start.position[2]": [7.0, 8.25]})
+    path = tmp_path / "members.csv"
+    frame.to_csv(path)
+    found = faults(lw.Table, path, columns=["vehicle.mass", "id"])
+    assert len(found) == 2 and all('leave the column out: ignore = ["id"]' in fault for fault in found)
+    tables = [
+        lw.Table(path, ignore=["", "id"]),
+        lw.Table(path, columns=("start.position[2]", "vehicle.mass")),
+        lw.Table(frame, ignore=["id"]),
+        lw.Table(values=frame, columns=["vehicle.mass", "start.position[2]"]),
+    ]
+    for table in tables:
+        assert sorted(table.own_values()) == ["start.position[2]", "vehicle.mass"]
+        fleet = lw.Ensemble(scene, sampling=table)
+        np.testing.assert_array_equal(fleet.parameters(0, 2)["vehicle.mass"], [120.0, 121.0])
+        again = lw.Scene.from_dict(scene.to_dict() | {"ensemble": fleet.to_dict()})
+        assert_same(lw.Ensemble.from_scene(again).select(0, 2), fleet.select(0, 2), [0, 1])
+
+
+@pytest.mark.parametrize("kind", ["table", "levels"])
+def test_the_first_lines_alone(scene, kind):
+    lines = np.random.default_rng(4).uniform(0.1, 0.9, (30, 1))
+    vary = {"start.position[2]": lw.Normal(std=1.0)}
+    design = lw.Levels(lines) if kind == "levels" else lw.Table({"vehicle.mass": 120.0 + lines[:, 0]})
+    whole, part = (lw.Ensemble(scene, members, 3, vary, design) for members in (None, 20))
+    assert (whole.members, part.members) == (30, 20)
+    assert_same(part.select(0, 20), whole.select(0, 30), slice(0, 20))
+    assert_same(part.subset([17, 4]).select(0, 2), whole.select(0, 30), [17, 4])
+    again = lw.Ensemble.from_scene(lw.Scene.from_dict(scene.to_dict() | {"ensemble": part.to_dict()}))
+    assert again.members == 20
+    assert_same(again.select(0, 20), whole.select(0, 30), slice(0, 20))
+
+
 def test_a_design_of_ones_own(scene):
     u = np.random.default_rng(1).random((20, 2))
     vary = {"vehicle.mass": lw.Uniform(low=100.0, high=110.0), "environment.gravity": lw.Uniform(low=9.0, high=10.0)}
@@ -377,6 +496,17 @@ def test_a_scene_file_names_its_sampling(tmp_path):
         ({"latin_hypercube": {"group": 16, "replicates": 4}}, 80, ["groups of 64", "64 or 128"]),
         ("latin_hypercube", 8, ["group = 0", "256"]),
         ({"latin_hypercube": {"group": 2.5}}, 8, ["group = 2.5"]),
+        ({"latin_hypercube": {"group": -16}}, 8, ["group = -16"]),
+        ({"latin_hypercube": {"group": True}}, 8, ["group = True"]),
+        ({"latin_hypercube": {"group": np.True_}}, 8, ["group = True"]),
+        ({"sobol": {"replicates": 0}}, 8, ["replicates = 0"]),
+        ({"sobol": {"replicates": -8}}, 8, ["replicates = -8"]),
+        ({"halton": {"replicates": np.True_}}, 8, ["replicates = True"]),
+        ({"halton": {"replicates": 8.0}}, 8, ["replicates = 8.0"]),
+        ({"morris": {"levels": -4}}, 7, ["levels = -4"]),
+        ({"morris": {"levels": True}}, 7, ["levels = True"]),
+        ({"grid": {"vehicle.mass": -3}}, None, ["whole number from 1"]),
+        ({"grid": {"vehicle.mass": True}}, None, ["not numeric"]),
         ({"latin_hypercube": {"group": 30}}, 80, ["no whole number of groups of 30", "60 or 90"]),
         ("saltelli", 13, ["groups of 14", "give 14"]),
         ({"saltelli": {"second_order": 1}}, 14, ["second_order = 1"]),
@@ -395,7 +525,20 @@ def test_a_scene_file_names_its_sampling(tmp_path):
         ({"table": {"values": {"environment.gravity": [9.8], "environment.gravty": [1.0]}}}, None, ["did you mean"]),
         ({"table": {"values": {"vehicle.mass": [9.8]}}}, None, ["varied by", "keep one"]),
         ({"table": {"values": {"vehicle.center_of_buoyancy": [9.8]}}}, None, ["shape (1,)", "(1, 3)"]),
-        ({"table": {"values": {"environment.gravity": [9.8, 9.9]}}}, 5, ["is not the 2 of the table"]),
+        ({"table": {"values": {"environment.gravity": [9.8, 9.9]}}}, 5, ["more than the 2 of the table", "2 or less"]),
+        ({"table": {"values": {"id": [1.0], "environment.gravity": [9.8]}}}, None, ['leave it out: ignore = ["id"]']),
+        ({"table": {"values": {"environment.gravity": [9.8]}, "columns": ["gravity"]}}, None,
+         ["columns = 'gravity'", "did you mean 'environment.gravity'?"]),
+        ({"table": {"values": {"environment.gravity": [9.8]}, "ignore": ["id"]}}, None, ["ignore = 'id'", "no column"]),
+        ({"table": {"values": {"environment.gravity": [9.8]}, "ignore": "id"}}, None, ["is no list of names"]),
+        ({"table": {"values": {"environment.gravity": [9.8]}, "ignore": ["environment.gravity"]}}, None,
+         ["leaves no column"]),
+        ({"table": {"values": {"id": [9.8]}, "columns": ["id"], "ignore": ["id"]}}, None, ["keep one of them"]),
+        ({"table": {"values": np.eye(3)}}, None, ["has no names of columns", "DataFrame"]),
+        ({"table": {"values": {}}}, None, ["has no names of columns"]),
+        ({"table": {"values": {3: [1.0]}}}, None, ["has no names of columns"]),
+        ({"table": {"values": {"environment.gravity": np.array([9.8, np.nan])}}}, None, ["nan", "of member 1"]),
+        ({"levels": {"points": np.full((2, 16), 0.5)}}, 3, ["more than the 2 of the levels"]),
         ({"levels": {"points": [[0.5, 1.0]]}}, None, ["leaves the open unit cube"]),
         ({"levels": {"points": [[0.5, 0.1]]}}, None, ["has 2 columns"]),
     ],
@@ -406,15 +549,46 @@ def test_bad_samplings(scene, content, members, texts):
     assert all(text in fault for text in texts), fault
 
 
-def test_bad_files(scene, tmp_path):
+# Text of a file -> of each fault what it must say, with | between.
+BAD_FILES = {
+    "": ["is empty"],
+    "# vehicle.mass\n\n": ["is empty"],
+    "vehicle.mass\n": ["names and no members"],
+    "vehicle.mass\nheavy\n": ['\'heavy\', which is no number, in line 2, column "vehicle.mass"'],
+    "vehicle.mass\n1,2\n": ["1 names and 2 cells in line 2"],
+    "a,b\n1,2\n3\n": ["2 names and 1 cells in line 3"],
+    "vehicle.mass,vehicle.mass\n1,2\n": ["twice, 'vehicle.mass' (line 1)"],
+    "# a\n\nx,y\n1,2\n\n# b\nnan,3\n1,\n": ['nan, which is not finite, in line 7, column "x"',
+                                          'no number in line 8, column "y"'],
+    "x,y\n1e400,-inf\n": ['1e400, which is not finite, in line 2, column "x"', '-inf|column "y"'],
+    "120,121\n1,2\n": ["numbers where the names should be (line 1)"],
+    "\nvehicle.inertia[0,0],vehicle.mass\n5,120\n": ["'vehicle.inertia[0' (line 2); quote a name"],
+    ",vehicle.mass\n0,120\n": ['without a name, number 1|ignore = [""]'],
+    "x;y\n120,5;7\n": ["'120,5', which is no number|with a point"],
+    'x\n"120\n121\n': ["which is no number, in line 3"],
+    "x\n" + "?\n" * 20: [*(f"in line {i}," for i in range(2, 10)), "12 more such faults"],
+    "x\n" + "1" * 200_000: ["cannot be read|line 2"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", BAD_FILES, ids=range(len(BAD_FILES)))
+def test_bad_files(tmp_path, text):
     path = tmp_path / "members.csv"
-    for text, expected in (
-        ("", "cannot be read"), ("vehicle.mass\n", "lengths"), ("vehicle.mass\nheavy\n", "cannot be read"),
-        ("vehicle.mass\n1,2\n", "1 names for 2 columns"), ("vehicle.mass,vehicle.mass\n1,2\n", "twice"),
-        ("vehicle.mass\n120\nnan\n", "line 3"),
-    ):  # fmt: skip
-        path.write_text(text)
-        assert any(expected in fault for fault in faults(lw.Table, str(path))), text
+    path.write_text(text)
+    found = faults(lw.Table, str(path))
+    assert len(found) == len(BAD_FILES[text]), found
+    for fault, expected in zip(found, BAD_FILES[text], strict=True):
+        assert all(words in fault for words in expected.split("|")), fault
+
+
+def test_files_that_are_none(scene, tmp_path):
+    path = tmp_path / "members.csv"
+    assert "No such file" in faults(lw.Table, path)[0]
+    path.write_bytes(b"x\n120\xb0\n")
+    assert "no text in UTF-8" in faults(lw.Table, path)[0]
+    path.write_text("vehicle.mass [kg],vehicle.buoyancy\n120,1000\n")
+    (fault,) = faults(lw.Ensemble, scene, sampling=lw.Table(path))
+    assert '"vehicle.mass [kg]"' in fault and "did you mean 'vehicle.mass'?" in fault
 
 
 def test_bad_names_and_laws_come_in_one_message(scene):
@@ -453,6 +627,34 @@ def test_whole_matrices_of_a_grid(scene):
     fleet = lw.Ensemble(scene, sampling=lw.Grid({"vehicle.inertia": [J, 1.1 * J]}))
     np.testing.assert_array_equal(fleet.parameters(0, 2)["vehicle.inertia"], [J, 1.1 * J])
     assert "not symmetric" in faults(lw.Ensemble, scene, sampling=lw.Grid({"vehicle.inertia": [J, skew]}))[0]
+
+
+def test_attitudes_of_a_list(scene):
+    """Chosen from a grid, a law and a table alike; the scene's own is a rotation vector."""
+    R = stats.special_ortho_group(3, seed=1).rvs(4)
+    grid = lw.Ensemble(scene, sampling=lw.Grid({"start.attitude": R, "vehicle.mass": [120.0, 121.0]}))
+    m = grid.select(0, 8)
+    np.testing.assert_array_equal(m.attitude, np.repeat(R, 2, axis=0))
+    np.testing.assert_array_equal(m.parameters["vehicle.mass"], [120.0, 121.0] * 4)
+    assert_same(grid.member(5).select(0, 1), m, [5])
+    law = lw.Choice(R, weights=[1, 1, 1, 0])
+    drawn = lw.Ensemble(scene, 100, 0, {"start.attitude": law})
+    which = np.abs(drawn.select(0, 100).attitude[:, None] - R).max(axis=(2, 3)).argmin(axis=1)
+    np.testing.assert_array_equal(drawn.select(0, 100).attitude, R[which])
+    assert set(which) == {0, 1, 2}
+    for fleet in (grid, drawn):
+        again = lw.Scene.from_dict(scene.to_dict() | {"ensemble": fleet.to_dict()})
+        assert_same(lw.Ensemble.from_scene(again).select(0, 8), fleet.select(0, 8), slice(0, 8))
+
+
+def test_attitudes_that_are_no_rotations(scene):
+    R = stats.special_ortho_group(3, seed=1).rvs(4)
+    R[2, 0] *= -1.0
+    for sampling_, vary in ((lw.Grid({"start.attitude": R}), None), ("random", {"start.attitude": lw.Choice(R)})):
+        (fault,) = faults(lw.Ensemble, scene, None, 0, vary, sampling_)
+        assert 'vary."start.attitude"' in fault and "no rotation to 1e-9 (number 3)" in fault
+    assert "by entry" in faults(lw.Ensemble, scene, 4, 0, {"start.attitude": lw.Choice([0.0, 1.0])})[0]
+    assert "shape (2, 2)" in faults(lw.Ensemble, scene, 4, 0, {"start.attitude": lw.Choice([np.eye(2)])})[0]
 
 
 def test_the_attitude_varies_in_one_way_only(scene):

@@ -1,0 +1,158 @@
+"""Members' own values, from a file or from arrays."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.errors import Faults, closest
+from lgvi_warp.sampling.base import Drawn, Sampling
+from lgvi_warp.sampling.csv_file import columns_of
+from lgvi_warp.sampling.random import Random
+from lgvi_warp.variations import Space
+
+
+@dataclass(frozen=True, eq=False)
+class Table(Sampling):
+    """Members' own values: from a CSV file whose first line names the columns, or from arrays by name.
+
+    file: its columns are numbers of the scene or entries of them, "vehicle.mass", "start.position[2]" (quote a name with a
+    comma in it), parted by commas, semicolons or tabs; empty lines and those that begin with # are passed over. values:
+    name -> (n,) or (n, *shape), or a pandas DataFrame. columns: those to take; ignore: those to leave out, such as an id.
+    sha256: of the file as it must be, written by `to_dict`. Names of `vary` that the table does not have are drawn at
+    random. The number of members is that of the lines, or less: the first ones; lines may be added.
+    Raises SceneError naming every fault.
+    """
+
+    file: str | os.PathLike[str] | None = None
+    values: Mapping[str, Any] | None = None
+    sha256: str | None = None
+    columns: Sequence[str] | None = None
+    ignore: Sequence[str] | None = None
+    kind: ClassVar[str] = "table"
+    fewer: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        faults = Faults("ensemble.sampling.table.")
+        if self.values is None and not isinstance(self.file, str | os.PathLike | None):  # Table({...})
+            object.__setattr__(self, "values", self.file)
+            object.__setattr__(self, "file", None)
+        if (self.file is None) == (self.values is None):
+            what = "has no values beside it" if self.file is None else "is given beside values"
+            faults.add("file", self.file, what, "give one of file and values")
+        self._check_options(faults)
+        faults.raise_if_any()
+        read = self._from_file(faults) if self.file is not None else self._from_values(faults)
+        lengths = {len(column) for column in read.values()}
+        if not faults and (len(lengths) != 1 or 0 in lengths):
+            faults.add("values", sorted(lengths), "are the columns' lengths", "give columns of one length, 1 or more")
+        faults.raise_if_any()
+        object.__setattr__(self, "_own", read)
+
+    def _check_options(self, faults: Faults) -> None:
+        for name in ("columns", "ignore"):
+            given = getattr(self, name)
+            if given is None:
+                continue
+            if not isinstance(given, list | tuple) or not given or not all(isinstance(one, str) for one in given):
+                faults.add(name, given, "is no list of names", f'write {name} = ["vehicle.mass"]')
+            else:
+                object.__setattr__(self, name, list(given))
+        if self.columns is not None and self.ignore is not None:
+            faults.add("ignore", self.ignore, "is given beside columns", "keep one of them")
+
+    def _chosen(self, faults: Faults, names: Sequence[str]) -> list[str]:
+        """Which of the columns there are to take."""
+        for option in ("columns", "ignore"):
+            for name in getattr(self, option) or ():
+                if name not in names:
+                    faults.add(option, name, "is no column of the table", closest(name, names))
+        wanted, unwanted = self.columns or names, self.ignore or ()
+        chosen = [name for name in names if name in wanted and name not in unwanted]
+        if not chosen and not faults:
+            faults.add("ignore", self.ignore, "leaves no column", "keep one or more")
+        return chosen
+
+    def _from_values(self, faults: Faults) -> dict[str, np.ndarray]:
+        read: dict[str, np.ndarray] = {}
+        given = _columns_by_name(self.values)
+        if not given:
+            remedy = 'give a file, {"vehicle.mass": array, ...} or a DataFrame with such names'
+            faults.add("values", self.values, "has no names of columns", remedy)
+            return read
+        object.__setattr__(self, "values", given)
+        for name in self._chosen(faults, list(given)):
+            array = _column(faults, f'"{name}"', given[name])
+            if array is not None:
+                read[name] = array
+        return read
+
+    def _from_file(self, faults: Faults) -> dict[str, np.ndarray]:
+        assert self.file is not None
+        path = os.fspath(self.file)
+        try:
+            content = Path(path).read_bytes()
+        except OSError as error:
+            faults.add("file", path, f"cannot be read ({error.strerror})", "give a CSV file")
+            return {}
+        found = hashlib.sha256(content).hexdigest()
+        if self.sha256 not in (None, found):
+            what = f"is not that of {path}, which has changed"
+            faults.add("sha256", self.sha256, what, "leave sha256 out to take it")
+            return {}
+        object.__setattr__(self, "sha256", found)
+        try:
+            return columns_of(faults, path, content, self._chosen)
+        except UnicodeDecodeError:
+            faults.add("file", path, "is no text in UTF-8", "save it as CSV in UTF-8")
+            return {}
+
+    def own_values(self) -> dict[str, np.ndarray]:
+        """As read."""
+        return dict(self._own)  # type: ignore[attr-defined]
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Columns that no file has."""
+        return {} if self.file is not None else self.own_values()
+
+    def own_members(self, space: Space) -> int:
+        """Lines."""
+        return len(next(iter(self.own_values().values())))
+
+    def draw(self, space: Space, members: np.ndarray) -> Drawn:
+        """At random, of what the table does not have."""
+        return Random().draw(space, members)
+
+    def to_dict(self) -> Any:
+        """As in a scene file."""
+        if self.file is None:
+            return {self.kind: {"values": {name: column.tolist() for name, column in self.own_values().items()}}}
+        chosen = {name: getattr(self, name) for name in ("columns", "ignore") if getattr(self, name) is not None}
+        return {self.kind: {"file": os.path.abspath(self.file), "sha256": self.sha256, **chosen}}
+
+
+def _columns_by_name(values: Any) -> dict[str, Any]:
+    """Columns of a mapping, or of a table such as pandas.DataFrame; none if they have no names."""
+    names = values if isinstance(values, Mapping) else getattr(values, "columns", None)
+    if not isinstance(names, Iterable) or not all(isinstance(name, str) for name in names):
+        return {}
+    return {name: values[name] if isinstance(values, Mapping) else np.asarray(values[name]) for name in names}
+
+
+def _column(faults: Faults, key: str, given: Any) -> np.ndarray | None:
+    """A column of finite numbers; None after noting a fault."""
+    if isinstance(given, np.ndarray) and given.dtype.kind == "f" and given.ndim and not np.isfinite(given).all():
+        row = int(np.argmin(np.isfinite(given.reshape(len(given), -1)).all(axis=1)))
+        faults.add(key, given[row], f"is not finite, of member {row}", "give a number, or drop that member")
+        return None
+    array = faults.finite(key, given)
+    if array is not None and array.ndim == 0:
+        faults.add(key, given, "is no column", "give one value for each member")
+        return None
+    return array

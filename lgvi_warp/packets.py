@@ -50,6 +50,16 @@ def pack(values: np.ndarray, width: int) -> np.ndarray:
     return np.ascontiguousarray(filled.reshape(packets, width, d).transpose(0, 2, 1))
 
 
+def structs(values: np.ndarray, kind: Any) -> wp.array:
+    """An array of Warp's structs from one of NumPy's.
+
+    One thread at a time: Warp has NumPy read the layout, NumPy asks `ast`, and in Python 3.11 two threads in `ast` at once
+    now and then raise SystemError (CPython issue 106905), which comes out as another layout.
+    """
+    with build_lock:
+        return wp.array(values, dtype=kind, device="cpu")
+
+
 def _set_vector(target: np.ndarray, values: np.ndarray) -> None:
     """Fill a Lane3 field of a structured array from packed rows (packets, 3, width)."""
     for i, axis in enumerate("xyz"):
@@ -78,9 +88,9 @@ class Packets:
             members.parameters, self.frame, members.indices, members.seed, plan.grid.h, plan.model.aligned
         )
         params, table, memory = self._laws(setting)
-        self.inertia = wp.array(self._inertia(), dtype=Inertia, device="cpu")
-        self.params = wp.array(params, dtype=Params, device="cpu")
-        self.events = wp.array(self._events(setting), dtype=Events, device="cpu")
+        self.inertia = structs(self._inertia(), Inertia)
+        self.params = structs(params, Params)
+        self.events = structs(self._events(setting), Events)
         self.table = _rows(table, Lane)
         self.memory = _rows(memory, Lane)
         state = self._state()
@@ -100,7 +110,7 @@ class Packets:
         plan, monitor = self.plan, self.plan.advance.Monitor()
         Lane, Ints = plan.advance.Lane, int_lane(plan.spec.width)
         if plan.spec.looks:
-            monitor.limits = wp.array(self._limits(), dtype=plan.advance.Limits, device="cpu")
+            monitor.limits = structs(self._limits(), plan.advance.Limits)
             for name, kind in (("warned", Ints), ("warned_step", Ints), ("warned_size", Lane)):
                 setattr(monitor, name, wp.zeros(self.count, dtype=kind, device="cpu"))
         if plan.spec.energy:

@@ -13,7 +13,7 @@ from typing import Any
 from lgvi_warp.blocks import Block, Keeper, PartKeeper, Work, blocks, in_order
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.executors import Executor
-from lgvi_warp.plan import Plan
+from lgvi_warp.plan import Plan, build_lock
 from lgvi_warp.recipe import refuse_another
 from lgvi_warp.store import Folder, Sink, Store, check, create, held, names_of, skeleton
 from lgvi_warp.store_layout import columns
@@ -72,7 +72,9 @@ def _in_turn(
         for block in runs:
             if block.first not in wanted:
                 assert work.sink is not None
-                yield block, work.sink.parts(block, work.keepers) or ()
+                with build_lock:  # NumPy reads the heads of files with `ast`, see packets.structs
+                    parts = work.sink.parts(block, work.keepers) or ()
+                yield block, parts
                 continue
             if fresh is None:
                 work.plan.compile()

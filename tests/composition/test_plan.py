@@ -1,6 +1,9 @@
 """Only what a scene has is compiled; a second solve builds nothing; memory follows the samples kept."""
 
 import dataclasses
+import gc
+import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -11,7 +14,7 @@ from lgvi_kernels.advance import make_advance
 from lgvi_kernels.terms import restoring, weight
 from lgvi_warp.blocks import blocks
 from lgvi_warp.method import Method
-from lgvi_warp.packets import pack
+from lgvi_warp.packets import pack, structs
 from lgvi_warp.plan import SEGMENT_SAMPLE_BYTES
 from lgvi_warp.solving import make_plan
 from lgvi_warp.survey import shape_of_mass
@@ -208,3 +211,37 @@ def test_a_member_that_spins_up_is_told():
                        [lw.Wrench(torque=(1.5, 3.0, 4.0))])  # fmt: skip
     result = lw.solve(resting, lw.Method("psi_s", iterations="auto"), h=0.1, t1=5.0)
     assert result.status.counts() == {"not_converged": 1} and 0.0 < result.failure_time[0] < 5.0
+
+
+class Garbage:
+    """Rubbish that runs Python when it is collected, which lets another thread in, anywhere."""
+
+    def __init__(self):
+        self.itself = self
+
+    def __del__(self):
+        for _ in range(50):
+            pass
+
+
+@pytest.mark.slow
+def test_threads_make_kernel_arguments_one_at_a_time(scene):
+    """Without their lock about one in 2,500 failed on Python 3.11.7: "Invalid source data type for array of structs"."""
+    plan = make_plan(lw.Ensemble(scene, 8), h=0.01, t1=0.1)
+    plan.compile()
+    values = np.zeros(2, plan.dtypes[0])
+
+    def some(i):
+        for _ in range(3000):
+            Garbage(), Garbage(), Garbage()
+            structs(values, plan.advance.Inertia)
+
+    before, interval = gc.get_threshold(), sys.getswitchinterval()
+    gc.set_threshold(5)
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(8) as pool:
+            list(pool.map(some, range(8)))
+    finally:
+        gc.set_threshold(*before)
+        sys.setswitchinterval(interval)

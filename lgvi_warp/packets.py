@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import dataclass
 from typing import Any
 
@@ -50,16 +51,6 @@ def pack(values: np.ndarray, width: int) -> np.ndarray:
     return np.ascontiguousarray(filled.reshape(packets, width, d).transpose(0, 2, 1))
 
 
-def structs(values: np.ndarray, kind: Any) -> wp.array:
-    """An array of Warp's structs from one of NumPy's.
-
-    One thread at a time: Warp has NumPy read the layout, NumPy asks `ast`, and in Python 3.11 two threads in `ast` at once
-    now and then raise SystemError (CPython issue 106905), which comes out as another layout.
-    """
-    with build_lock:
-        return wp.array(values, dtype=kind, device="cpu")
-
-
 def _set_vector(target: np.ndarray, values: np.ndarray) -> None:
     """Fill a Lane3 field of a structured array from packed rows (packets, 3, width)."""
     for i, axis in enumerate("xyz"):
@@ -88,9 +79,9 @@ class Packets:
             members.parameters, self.frame, members.indices, members.seed, plan.grid.h, plan.model.aligned
         )
         params, table, memory = self._laws(setting)
-        self.inertia = structs(self._inertia(), Inertia)
-        self.params = structs(params, Params)
-        self.events = structs(self._events(setting), Events)
+        self.inertia = _structs(self._inertia(), Inertia)
+        self.params = _structs(params, Params)
+        self.events = _structs(self._events(setting), Events)
         self.table = _rows(table, Lane)
         self.memory = _rows(memory, Lane)
         state = self._state()
@@ -110,7 +101,7 @@ class Packets:
         plan, monitor = self.plan, self.plan.advance.Monitor()
         Lane, Ints = plan.advance.Lane, int_lane(plan.spec.width)
         if plan.spec.looks:
-            monitor.limits = structs(self._limits(), plan.advance.Limits)
+            monitor.limits = _structs(self._limits(), plan.advance.Limits)
             for name, kind in (("warned", Ints), ("warned_step", Ints), ("warned_size", Lane)):
                 setattr(monitor, name, wp.zeros(self.count, dtype=kind, device="cpu"))
         if plan.spec.energy:
@@ -375,6 +366,18 @@ def _leaves(fields: dict[str, Any]) -> list[np.ndarray]:
 def _rows(values: np.ndarray, Lane: Any) -> Any:
     """A Warp array of lanes, two-dimensional, from (entries, rows, width)."""
     return wp.array(values, dtype=Lane, shape=values.shape[:2], device="cpu")
+
+
+def _structs(values: np.ndarray, struct: Any) -> Any:
+    """A Warp array of structs from a structured array (n,) of the plan's type.
+
+    Not by wp.array(values), which lets NumPy read the struct's type from text: in several threads that fails now and then
+    (Python before 3.11.8 and 3.12.2, python/cpython#106905), and the run with it.
+    """
+    array = wp.empty(len(values), dtype=struct, device="cpu")
+    assert values.flags.c_contiguous and values.itemsize == ctypes.sizeof(struct.ctype)
+    ctypes.memmove(array.ptr, values.ctypes.data, values.nbytes)
+    return array
 
 
 def _side_by_side(parts: list[np.ndarray]) -> np.ndarray:

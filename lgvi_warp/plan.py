@@ -44,14 +44,16 @@ build_lock = threading.Lock()
 
 
 @contextlib.contextmanager
-def _one_at_a_time() -> Iterator[None]:
-    """Let one process compile while others wait for what it puts into Warp's cache.
+def _one_at_a_time(kernel: str) -> Iterator[None]:
+    """Let one process compile a kernel while others that want the same one wait for what it puts into Warp's cache.
 
-    Without it each would compile the same kernel: that is safe, since Warp renames finished folders into their places, but
-    slow.
+    kernel: its hash. Without this each would compile it: that is safe, since Warp renames finished folders into their
+    places, but slow. Other kernels wait for nothing, unless the first two digits of their hashes are the same: so there are
+    at most 256 files to lock.
     """
-    path = Path(wp.config.kernel_cache_dir) / "lgvi_warp.lock"
+    path = Path(wp.config.kernel_cache_dir) / "lgvi_warp_locks" / kernel[:2]
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.touch()
     except OSError:  # a cache that is only read
         yield
@@ -195,7 +197,7 @@ class Plan:
             composed=len(self.method.stages) > 1,
             paired=self.method.halved or (self.method.two_part and not model.lead),
             gauss=gauss(self.method.gauss) if self.method.gauss else (),
-            lead_time=self.lengths[1][-1],
+            lead_time=self.lengths[1][-1] if model.timed else 0.0,
             explicit=self._explicit(),
             compensated=self.dtype == "float32_compensated",
             looks=limits.watched(self) if self.checks == "all" else (),
@@ -248,7 +250,7 @@ class Plan:
         """Load the kernel, compiling it if Warp's cache has none. Returns the seconds it took."""
         start = time.perf_counter()
         warp_setup.start()
-        with build_lock, self._laws_compile(), _one_at_a_time():
+        with build_lock, self._laws_compile(), _one_at_a_time(self.kernel_hash):
             wp.load_module(self.advance.kernel.module, device="cpu")
         _ = self.dtypes, self.times  # made here, before threads ask for them
         return time.perf_counter() - start

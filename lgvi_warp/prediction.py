@@ -26,7 +26,7 @@ from lgvi_warp.plan import SEGMENT_SAMPLE_BYTES, Plan
 from lgvi_warp.saveat import SaveAt, TimeGrid
 from lgvi_warp.scene import Scene
 from lgvi_warp.statistics.sizes import Sizes, sizes
-from lgvi_warp.store import Folder, Store, create, marker, name_of
+from lgvi_warp.store import Folder, Sink, Store, create, marker
 from lgvi_warp.store_layout import columns, size
 
 # A trial's time [s]; bytes, and small files, written to learn how fast a disk is.
@@ -207,7 +207,7 @@ class Sized:
         assert self.store is not None
         block, k = blocks(self.plan.ensemble.members)[0], len(self.plan.grid.times)
         keys = {key: one.bytes for one in columns(self.plan, self.store) for key in one.keys(block, k)}
-        keys |= {f"parts/{name_of(block)}.npz": self.statistics.file} if self.statistics.file else {}
+        keys |= {Sink.parts_key(block): self.statistics.file} if self.statistics.file else {}
         return {key: [count, 2**32 - 1] for key, count in keys.items()}
 
     @property
@@ -222,7 +222,7 @@ class Sized:
     def working(self, threads: int) -> int:
         """Bytes of the blocks at work."""
         plan, runs = self.plan, blocks(self.plan.ensemble.members)
-        count = min(len(runs), threads * (2 if self.store and threads > 1 else 1))
+        count = min(len(runs), threads)
         row = sum(plan.spec.sample_fields.values()) * np.dtype(machine.DTYPES[plan.dtype]).itemsize
         segment = min(SEGMENT_SAMPLE_BYTES, row * runs[0].count * len(plan.grid.times))
         # A segment's samples: the kernel's, the members' in order, and turned or moved copies. Parts: their rows, and
@@ -271,10 +271,9 @@ def writing(runs: Sequence[Sized], folder: Path, threads: int) -> tuple[float, i
         start = time.perf_counter()
         for i in range(SYNCS):
             durable.write_whole(Path(name) / f"{i}", b"0")
-        # Its chunks, then its marker; several blocks wait at a time.
-        count = sum(len(blocks(one.plan.ensemble.members)) for one in runs)
-        wait = 2.0 * (time.perf_counter() - start) / SYNCS / min(2 * threads, count)
-    return begin + sum(one.disk for one in runs) / disk_speed(folder, threads) + wait * count, metadata
+        # The files of a run's last blocks, then their markers.
+        wait = 2.0 * (time.perf_counter() - start) / SYNCS * len(runs)
+    return begin + sum(one.disk for one in runs) / disk_speed(folder, threads) + wait, metadata
 
 
 def disk_speed(folder: Path, threads: int) -> float:

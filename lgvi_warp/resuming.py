@@ -11,6 +11,7 @@ from typing import Any
 
 from lgvi_warp import durable
 from lgvi_warp.blocks import Block, Keeper
+from lgvi_warp.commits import Commits
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import MembersFailed, SceneError
 from lgvi_warp.executors import Executor, executor_of
@@ -98,8 +99,9 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
     _copy_frame(base.path, beside)
     made = Folder(beside)
     made.reopen()
-    for block in first.runs:
-        _copy_block(parts, block, beside)
+    with Commits() as commits:
+        for block in first.runs:
+            _copy_block(parts, block, beside, commits)
     whole = not made.unfinished()
     again = whole and len(members_kept(keep_of(made.provenance), made)) > 0
     if whole and not again:
@@ -143,7 +145,7 @@ def _copy_frame(root: Path, target: Path) -> None:
     files.finish()
 
 
-def _copy_block(parts: Sequence[Folder], block: Block, target: Path) -> None:
+def _copy_block(parts: Sequence[Folder], block: Block, target: Path, commits: Commits) -> None:
     """A block from the first of the stores that has it whole. Raises SceneError where each has it damaged."""
     damage = []
     for part in parts:
@@ -157,15 +159,13 @@ def _copy_block(parts: Sequence[Folder], block: Block, target: Path) -> None:
                 data = (part.path / key).read_bytes()
             except FileNotFoundError:
                 data = b""
-            (target / key).parent.mkdir(parents=True, exist_ok=True)
             files.write(key, data)
             if files.sums[key][1] != crc:
                 damage.append(f"{part.path / key}: is torn, missing or changed; `lgvi-warp resume {part.path}` first")
                 files.drop()
                 break
         else:
-            files.finish()
-            durable.write_whole(target / "blocks" / sink.marker(block).name, sink.marker(block).read_bytes())
+            commits.add(files, target / "blocks" / sink.marker(block).name, sink.marker(block).read_bytes())
             return
     if damage:
         raise SceneError(damage)

@@ -13,7 +13,7 @@ from typing import Any
 from lgvi_warp.blocks import Block, Keeper, PartKeeper, Work, blocks, in_order
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.executors import Executor
-from lgvi_warp.plan import Plan, build_lock
+from lgvi_warp.plan import Plan
 from lgvi_warp.recipe import refuse_another
 from lgvi_warp.store import Folder, Sink, Store, check, create, held, names_of, skeleton
 from lgvi_warp.store_layout import columns
@@ -72,9 +72,7 @@ def _in_turn(
         for block in runs:
             if block.first not in wanted:
                 assert work.sink is not None
-                with build_lock:  # NumPy reads the heads of files with `ast`, see packets.structs
-                    parts = work.sink.parts(block, work.keepers) or ()
-                yield block, parts
+                yield block, work.sink.parts(block, work.keepers) or ()
                 continue
             if fresh is None:
                 work.plan.compile()
@@ -112,7 +110,8 @@ class Stored:
             self._mend()
             left = self._left(sink)
             try:
-                members = self._blocks(sink, left, executor, progress)
+                with sink.commits:
+                    members = self._blocks(sink, left, executor, progress)
             except OSError as error:
                 raise explained(error, self.store.whole) from error
             finally:
@@ -211,7 +210,7 @@ def check_keepers(keepers: Sequence[Keeper]) -> None:
             faults.add(type(keeper).__name__, keeper, "cannot be stored", "give it name, to_arrays and from_arrays")
     names = names_of(keepers)
     for name in sorted({name for name in names if names.count(name) > 1 or "/" in name}):
-        faults.add("name", name, "is no file name of its own", "give each keeper another name, without /")
+        faults.add("name", name, "is no name of its own", "give each keeper another name, without /")
     faults.raise_if_any()
 
 

@@ -2,7 +2,7 @@
 
     run.zarr/zarr.json            attributes: provenance, recipe, messages, complete
     run.zarr/position/c.0.3.0     chunk: times 0, block 3 (see store_layout)
-    run.zarr/parts/000000768/     what keepers closed the block with, one .npz each
+    run.zarr/parts/000000768.npy  what keepers closed the block with
     run.zarr/blocks/000000768.json   the block that begins with member 768 is finished: its files, sizes, checksums
     run.zarr/kept/                a group like the run's own, of members that were run again for their samples (see kept)
 
@@ -27,6 +27,7 @@ import numpy as np
 
 from lgvi_warp import durable, machine
 from lgvi_warp.blocks import Block, Keeper, PartKeeper, blocks
+from lgvi_warp.commits import Commits
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.recipe import ensemble_of, plan_of, recipe
 from lgvi_warp.saveat import FIELDS
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
     from lgvi_warp.ensemble import Ensemble
     from lgvi_warp.plan import Plan
 
-FORMAT = 1
+FORMAT = 2
 # Few enough bytes a chunk for its memory, enough that files and their syncs cost little.
 CHUNK_BYTES = 10_000_000
 EXISTING = ("refuse", "resume", "overwrite")
@@ -131,6 +132,7 @@ class Sink:
     root: Path
     columns: tuple[Column, ...]
     room: Room = field(default_factory=Room, compare=False)
+    commits: Commits = field(default_factory=Commits, compare=False)
 
     def open(self, plan: Plan, block: Block, members: Any) -> BlockWriter:
         """A writer of the block's chunks."""
@@ -140,16 +142,15 @@ class Sink:
         """The block is in its place already."""
 
     def finish(self, block: Block, files: durable.Files, keepers: Sequence[Keeper], parts: Sequence[Any]) -> None:
-        """Make a block durable, with the parts of keepers, and mark it."""
-        for keeper, part in zip(keepers, parts, strict=True):
-            assert isinstance(keeper, PartKeeper)
-            key = f"parts/{name_of(block)}/{keeper.name}.npz"
-            (self.root / key).parent.mkdir(exist_ok=True)
-            files.write(key, packed(*keeper.to_arrays(part)))
-        files.finish()
-        if parts:
-            durable.sync_folder(self.root / "parts")
-        durable.write_whole(self.marker(block), marker(files.sums))
+        """Hand a block over to be made durable, with the parts of keepers, and marked. Raises OSError."""
+        if keepers:
+            files.write(self.parts_key(block), packed(keepers, parts))
+        self.commits.add(files, self.marker(block), marker(files.sums))
+
+    @staticmethod
+    def parts_key(block: Block) -> str:
+        """The file of what keepers closed a block with, below the root."""
+        return f"parts/{name_of(block)}.npy"
 
     def marker(self, block: Block) -> Path:
         """The file that says that a block is finished."""
@@ -159,12 +160,7 @@ class Sink:
         """The parts of a finished block; None if it is not finished."""
         if read_marker(self.marker(block)) is None:
             return None
-        found = []
-        for keeper in keepers:
-            assert isinstance(keeper, PartKeeper)
-            path = self.root / "parts" / name_of(block) / f"{keeper.name}.npz"
-            found.append(keeper.from_arrays(*unpacked(path.read_bytes())))
-        return tuple(found)
+        return unpacked(keepers, self.root / self.parts_key(block)) if keepers else ()
 
     def faults(self, block: Block, samples: int, keepers: Sequence[Keeper]) -> list[str]:
         """What is wrong with a finished block's files; "is not finished" alone for one that is not."""
@@ -172,7 +168,7 @@ class Sink:
         if sums is None:
             return ["is not finished"]
         wanted = [key for column in self.columns for key in column.keys(block, samples)]
-        wanted += [f"parts/{name_of(block)}/{keeper.name}.npz" for keeper in keepers if isinstance(keeper, PartKeeper)]
+        wanted += [self.parts_key(block)] if keepers else []
         found = [(key, "is not in the marker") for key in wanted if key not in sums]
         found += [(key, text) for key, one in sums.items() if (text := durable.fault(self.root, key, *one))]
         return [f"{key} {text}" for key, text in found]
@@ -185,27 +181,35 @@ class Sink:
             for column in self.columns:
                 for key in column.keys(block, samples):
                     (self.root / key).unlink(missing_ok=True)
-            shutil.rmtree(self.root / "parts" / name_of(block), ignore_errors=True)
+            (self.root / self.parts_key(block)).unlink(missing_ok=True)
 
     def remove_unfinished(self) -> None:
         """Remove what killed writers left."""
-        parts = self.root / "parts"
-        own = [self.root / column.name for column in self.columns]
-        durable.remove_unfinished([self.root, self.root / "blocks", *own, *(parts.iterdir() if parts.is_dir() else ())])
+        names = ("blocks", "parts", *(column.name for column in self.columns))
+        durable.remove_unfinished([self.root, *(self.root / name for name in names)])
 
 
-def packed(arrays: Mapping[str, np.ndarray], content: Any) -> bytes:
-    """Arrays and what JSON holds as the bytes of an .npz file, always the same."""
+def packed(keepers: Sequence[Keeper], parts: Sequence[Any]) -> bytes:
+    """What keepers closed a block with, always the same bytes: a JSON text, then the arrays, each as in an .npy file."""
+    told: list[tuple[str, list[str], Any]] = []
+    arrays: list[np.ndarray] = []
+    for keeper, part in zip(keepers, parts, strict=True):
+        assert isinstance(keeper, PartKeeper)
+        own, content = keeper.to_arrays(part)
+        told.append((keeper.name, list(own), content))
+        arrays += own.values()
     buffer = io.BytesIO()
-    np.savez(buffer, json=np.array(json.dumps(content, sort_keys=True)), **{f"array.{k}": v for k, v in arrays.items()})  # type: ignore[arg-type]
+    for values in (np.array(json.dumps(told, sort_keys=True)), *arrays):
+        np.save(buffer, values, allow_pickle=False)
     return buffer.getvalue()
 
 
-def unpacked(data: bytes) -> tuple[dict[str, np.ndarray], Any]:
-    """What was packed."""
-    with np.load(io.BytesIO(data), allow_pickle=False) as file:
-        arrays = {name.removeprefix("array."): file[name] for name in file.files if name != "json"}
-        return arrays, json.loads(str(file["json"]))
+def unpacked(keepers: Sequence[Keeper], path: Path) -> tuple[Any, ...]:
+    """The parts of these keepers, of all that were packed."""
+    with path.open("rb") as file:
+        told = json.loads(str(np.load(file)))
+        found = {name: ({one: np.load(file) for one in arrays}, content) for name, arrays, content in told}
+    return tuple(keeper.from_arrays(*found[keeper.name]) for keeper in keepers if isinstance(keeper, PartKeeper))
 
 
 def marker(sums: Mapping[str, list[int]]) -> bytes:
@@ -390,6 +394,7 @@ def skeleton(
 ) -> None:
     """Groups and arrays without their blocks, on the disk."""
     import zarr
+    from zarr.storage import MemoryStore
 
     shared = {
         name: values.tolist()
@@ -398,7 +403,10 @@ def skeleton(
     }
     made = recipe(plan) | {"store": store.layout(), "keepers": names_of(keepers)}
     texts = [json.dumps(one) for one in (provenance, made, list(messages), shared)]
-    group = zarr.create_group(root, zarr_format=3, attributes=_attributes(texts, provenance))
+    # zarr writes into memory and `files` onto the disk, side by side: one by one the files would take several times as long.
+    inside: dict[str, Any] = {}
+    own = MemoryStore(inside)
+    group = zarr.create_group(own, zarr_format=3, attributes=_attributes(texts, provenance))
     k, n = len(plan.grid.times), plan.ensemble.members
     whole_array(
         group, "time", plan.grid.times, ("time",), {"units": "s", "long_name": "time since the start", "axis": "T"}
@@ -411,10 +419,15 @@ def skeleton(
     with warnings.catch_warnings():
         # Consolidated metadata is what lets xarray open the store in one read; zarr remarks that version 3 has no rule for it.
         warnings.simplefilter("ignore")
-        zarr.consolidate_metadata(root, zarr_format=3)
-    for name in ("blocks", "parts"):
-        (root / name).mkdir()
-    _sync(root)
+        zarr.consolidate_metadata(own, zarr_format=3)
+    for folder in {os.path.dirname(key) for key in inside} | {"blocks", "parts"}:
+        (root / folder).mkdir(parents=True, exist_ok=True)
+    files = durable.Files(root)
+    for key in sorted(inside):
+        files.write(key, inside.pop(key).as_numpy_array())
+    # The root's metadata will change: it has a checksum of its own.
+    files.write(CREATED, marker({key: one for key, one in files.sums.items() if key != ROOT}))
+    files.finish()
 
 
 def _attributes(texts: Sequence[str], provenance: Mapping[str, Any]) -> dict[str, Any]:
@@ -450,22 +463,6 @@ def whole_array(group: Any, name: str, values: np.ndarray, dims: tuple[str, ...]
     fill = np.nan if values.dtype.kind == "f" else 0
     dtype = values.dtype.newbyteorder("<").str
     _array(group, name, values.shape, values.shape, dtype, fill, dims, attributes)[:] = values
-
-
-def _sync(root: Path) -> None:
-    """Note every file but the root's metadata with its checksum, and sync all."""
-    sums = {}
-    for folder, _, files in os.walk(root):
-        for name in files:
-            path = Path(folder) / name
-            data = path.read_bytes()
-            if path != root / ROOT:
-                sums[path.relative_to(root).as_posix()] = [len(data), durable.checksum(data)]
-            descriptor = os.open(path, os.O_RDONLY)
-            os.fsync(descriptor)
-            os.close(descriptor)
-        durable.sync_folder(Path(folder))
-    durable.write_whole(root / CREATED, marker(sums))
 
 
 def check(

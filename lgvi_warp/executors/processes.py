@@ -1,4 +1,5 @@
-"""Blocks in processes of one machine, each started afresh (spawn). A process that dies costs the block it was at."""
+"""Blocks in processes of one machine, each started afresh (spawn). When one dies, Python ends all of them: it costs the
+blocks that these were at."""
 
 from __future__ import annotations
 

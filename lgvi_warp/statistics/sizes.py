@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import tracemalloc
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.keeper import Gathered
 from lgvi_warp.statistics.order import SORTED_AT_ONCE
 from lgvi_warp.statistics.tree import Part
+from lgvi_warp.store import packed
 
 if TYPE_CHECKING:
     from lgvi_warp.plan import Plan
@@ -70,8 +70,7 @@ def _of_times(plan: Plan, statistics: Sequence[Statistic], count: int) -> Sizes:
     gathers = keeper.open(plan, block, members)
     _, taking = _peak(lambda: gathers.take(when, Fields(start, plan, when, outcome)))
     part = gathers.close(outcome())
-    file = io.BytesIO()
-    np.savez(file, **keeper.to_arrays(part)[0])  # type: ignore[arg-type]
+    file = len(packed([keeper], [part]))
     joined, reading, estimates = 0, 0, 0
     with np.errstate(all="ignore"):
         for statistic, one in zip(statistics, part, strict=True):
@@ -79,7 +78,7 @@ def _of_times(plan: Plan, statistics: Sequence[Statistic], count: int) -> Sizes:
             read, more = _peak(lambda: keeper.said(statistic, tree))  # noqa: B023
             joined, reading = joined + sum(map(_bytes, tree)), max(reading, more)
             estimates += sum(_bytes(one.arrays) for one in read)
-    return Sizes(file.tell(), sum(map(_bytes, part)), joined, estimates, taking, reading)
+    return Sizes(file, sum(map(_bytes, part)), joined, estimates, taking, reading)
 
 
 def _fullest(statistic: Statistic, part: Part, count: int) -> list[Part]:

@@ -1,9 +1,6 @@
 """Only what a scene has is compiled; a second solve builds nothing; memory follows the samples kept."""
 
 import dataclasses
-import gc
-import sys
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -14,21 +11,15 @@ from lgvi_kernels.advance import make_advance
 from lgvi_kernels.terms import restoring, weight
 from lgvi_warp.blocks import blocks
 from lgvi_warp.method import Method
-from lgvi_warp.packets import pack, structs
+from lgvi_warp.packets import pack
 from lgvi_warp.plan import SEGMENT_SAMPLE_BYTES
 from lgvi_warp.solving import make_plan
 from lgvi_warp.survey import shape_of_mass
-from tests.tools import TURN, one, scene_of
+from tests.tools import TURN, generated, one, scene_of
 
 
 def plan_of(scene, **named):
     return make_plan(one(scene), h=0.01, t1=1.0, **named)
-
-
-def generated(plan, folder):
-    """The C++ that Warp makes of the plan's kernel."""
-    wp.compile_aot_module(plan.advance.kernel.module, device="cpu", module_dir=str(folder))
-    return next(folder.glob("*.cpp")).read_text()
 
 
 def test_an_absent_term_is_no_code(tmp_path):
@@ -76,6 +67,17 @@ def test_a_second_solve_builds_no_kernel():
     before = make_advance.cache_info().misses
     lw.solve(one(scene_of((1.0, 2.0, 4.0), net=3.0), nu=[1.0, 0.0, 0.0]), h=0.02, t1=0.2)
     assert make_advance.cache_info().misses == before
+
+
+@pytest.mark.parametrize("names", [("su4(psi_s)", "kl6(psi_s)", "su8_15(psi_s)"), ("bm4(psi_x)", "bm6(psi_x)")])
+def test_compositions_of_a_method_share_its_kernel(names):
+    """Their coefficients are numbers that the kernel gets, unless a law asks for the time within a step."""
+    plain, held = scene_of(net=1.0), lw.Wrench(force=[1.0, 0.0, 0.0])
+    schedule = lw.terms.WrenchSchedule(times=(0.0, 1.0), force=((0.0,) * 3, (1.0,) * 3), torque=((0.0,) * 3,) * 2)
+    for terms, kernels in (([], 1), ([held], 1), ([schedule], len(names))):
+        scene = lw.Scene(plain.vehicle, plain.environment, terms)
+        plans = [make_plan(one(scene), name, h=0.01, t1=1.0) for name in names]
+        assert len({plan.kernel_hash for plan in plans}) == kernels
 
 
 def test_varying_a_parameter_compiles_nothing_else(scene):
@@ -211,37 +213,3 @@ def test_a_member_that_spins_up_is_told():
                        [lw.Wrench(torque=(1.5, 3.0, 4.0))])  # fmt: skip
     result = lw.solve(resting, lw.Method("psi_s", iterations="auto"), h=0.1, t1=5.0)
     assert result.status.counts() == {"not_converged": 1} and 0.0 < result.failure_time[0] < 5.0
-
-
-class Garbage:
-    """Rubbish that runs Python when it is collected, which lets another thread in, anywhere."""
-
-    def __init__(self):
-        self.itself = self
-
-    def __del__(self):
-        for _ in range(50):
-            pass
-
-
-@pytest.mark.slow
-def test_threads_make_kernel_arguments_one_at_a_time(scene):
-    """Without their lock about one in 2,500 failed on Python 3.11.7: "Invalid source data type for array of structs"."""
-    plan = make_plan(lw.Ensemble(scene, 8), h=0.01, t1=0.1)
-    plan.compile()
-    values = np.zeros(2, plan.dtypes[0])
-
-    def some(i):
-        for _ in range(3000):
-            Garbage(), Garbage(), Garbage()
-            structs(values, plan.advance.Inertia)
-
-    before, interval = gc.get_threshold(), sys.getswitchinterval()
-    gc.set_threshold(5)
-    sys.setswitchinterval(1e-6)
-    try:
-        with ThreadPoolExecutor(8) as pool:
-            list(pool.map(some, range(8)))
-    finally:
-        gc.set_threshold(*before)
-        sys.setswitchinterval(interval)

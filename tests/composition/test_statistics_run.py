@@ -14,6 +14,7 @@ from lgvi_warp import cli, observation, scenefile
 from lgvi_warp.blocks import Block, blocks
 from lgvi_warp.saveat import FIELDS
 from lgvi_warp.solving import make_plan
+from lgvi_warp.statistics import TYPES
 from lgvi_warp.statistics.keeper import Gathered
 from tests.conftest import ROOT
 from tests.tools import one, random_states, scene_of
@@ -22,7 +23,7 @@ EVERY = [
     lw.Mean("position"), lw.Covariance(["position", "speed"]), lw.Quantiles("depth", (0.05, 0.5, 0.95), size=64),
     lw.Extremes("velocity"), lw.Histogram("depth", bins=10, limits=(-3.0, 3.0)), lw.Exceedance("depth", above=0.5),
     lw.FirstPassage("depth", above=1.0), lw.CircularMean("euler[2]"), lw.MeanAttitude(), lw.Mean("energy"),
-    lw.PathMaximum("speed", then=[lw.Mean(), lw.Quantiles(levels=(0.5, 0.99), size=64)]),
+    lw.PathMaximum("speed", then=[lw.Mean(), lw.Quantiles(levels=(0.5, 0.99), size=64)]), lw.PathMinimum("depth"),
 ]  # fmt: skip
 
 
@@ -108,12 +109,29 @@ def test_euler_angles_are_fossens():
     np.testing.assert_allclose(found["minimum"][0], np.deg2rad(angles.min(axis=0)), atol=1e-14)
 
 
+def test_every_statistic_is_among_them():
+    assert {one.type for one in EVERY} == set(TYPES)
+
+
 @pytest.mark.parametrize("threads", [1, 2, 3])
 def test_threads_change_no_bit(fleet, whole, threads):
     alone = lw.solve(fleet, **SETTINGS, statistics=EVERY, keep="none", threads=threads)
     assert same(alone.statistics, whole.statistics) and alone.samples == {} and alone.members == 1003
     with pytest.raises(AttributeError, match="keep='all'"):
         _ = alone.position
+
+
+@pytest.mark.parametrize("order", [(3, 2, 1, 0), (2, 0, 3, 1)])
+def test_the_order_in_which_blocks_finish_changes_no_bit(fleet, whole, order):
+    """What threads do by chance, done on purpose."""
+
+    class Ordered:
+        def run(self, work, blocks, advanced):
+            for i in order:
+                yield blocks[i], work(blocks[i])
+
+    found = lw.solve(fleet, **SETTINGS, statistics=EVERY, keep="none", executor=Ordered())
+    assert same(found.statistics, whole.statistics)
 
 
 def test_segments_change_no_bit(fleet, whole, monkeypatch):
@@ -294,9 +312,27 @@ def test_a_linear_gaussian_case_has_its_exact_moments():
     }
     for name, truth in truths.items():
         assert np.all((found[name].lower[-1] <= truth) & (truth <= found[name].upper[-1])), name
-    # And the intervals are narrow: 4.2 standard errors of 20,000 members are 3 % of a standard deviation.
-    half = found["mean position, velocity"].half_width[-1]
-    np.testing.assert_allclose(half, ndtri(0.5 + 0.5 * share) * np.sqrt(np.diag(exact) / n), rtol=0.05)
+    # And the intervals are no wider than they have to be: 4.2 standard errors of the estimate, of 20,000 members.
+    z = ndtri(0.5 + 0.5 * share)
+    half = {name: found[name].half_width[-1] for name in truths}
+    variance = np.diag(exact)
+    np.testing.assert_allclose(half["mean position, velocity"], z * np.sqrt(variance / n), rtol=0.05)
+    # Of fourth moments, which of normal numbers are known to sqrt(14 / n) / 2 = 1.3 %.
+    errors = np.sqrt((np.outer(variance, variance) + exact**2) / n)
+    np.testing.assert_allclose(half["covariance position, velocity"], z * errors, rtol=5.0 * 0.5 * np.sqrt(14.0 / n))
+    p = truths["exceedance position above (2.0, -2.5, 9.0)"]
+    np.testing.assert_allclose(
+        half["exceedance position above (2.0, -2.5, 9.0)"], z * np.sqrt(p * (1 - p) / n), rtol=0.05
+    )
+    # Of order statistics: so many members lie between the two, which varies by the root of it; the sketch's error adds.
+    q = np.array(levels)[:, None]
+    ranks = z * np.sqrt(q * (1 - q) / n)
+    ideal = ranks * np.sqrt(bb) * np.sqrt(2.0 * np.pi) * np.exp(0.5 * ndtri(q) ** 2)
+    spread, wider = 5.0 / np.sqrt(2.0 * ranks * n), 1.0 + found["quantiles position"]["rank_error"][-1] / ranks
+    assert np.all(
+        (half["quantiles position"] / ideal > 1.0 - spread)
+        & (half["quantiles position"] / ideal < wider * (1.0 + spread))
+    )
 
 
 def falling(n=20_000):

@@ -19,7 +19,7 @@ from lgvi_warp.executors.threads import Threads
 from lgvi_warp.running import Stored
 from lgvi_warp.solving import make_plan, messages, provenance
 from tests.conftest import ROOT
-from tests.stores import MEMBERS, SETTINGS, differing, fleet, tree
+from tests.stores import MEMBERS, SETTINGS, differing, fleet, markers, tree
 from tests.toy_keeper import DepthSum
 
 FIELDS = ("position", "attitude", "velocity", "angular_velocity")
@@ -193,23 +193,29 @@ def flip(path):
     path.write_bytes(data)
 
 
+WORDS = {flip: "has changed", tear: "is torn", remove: "is missing"}
+# Samples, numbers of members (each in all three ways) and what describes them.
 DAMAGED = (
-    ("position/c.0.2.0", flip, "has changed"),
-    ("attitude/c.0.0.0.0", tear, "is torn"),
-    ("vehicle.mass/c.3", remove, "is missing"),
-    ("status/c.1", flip, "has changed"),
-    ("position/zarr.json", flip, "has changed"),
-    ("created.json", flip, "is damaged"),
+    *((name, harm) for name in ("position/c.0.2.0", "status/c.1", "vehicle.mass/c.3") for harm in WORDS),
+    ("attitude/c.0.0.0.0", tear),
+    ("position/zarr.json", flip),
+    ("created.json", flip),
 )
+BLOCK_OF = {"position/c.0.2.0": 512, "status/c.1": 256, "vehicle.mass/c.3": 768, "attitude/c.0.0.0.0": 0}
 
 
-@pytest.mark.parametrize(("name", "harm", "word"), DAMAGED, ids=[f"{h.__name__} {n}" for n, h, _ in DAMAGED])
-def test_damage_is_seen_and_mended(copy, whole, name, harm, word, capsys):
+@pytest.mark.parametrize(("name", "harm"), DAMAGED, ids=[f"{h.__name__} {n}" for n, h in DAMAGED])
+def test_damage_is_seen_and_its_block_alone_runs_again(copy, whole, name, harm, capsys):
     harm(copy / name)
+    word = "is damaged" if name == "created.json" else WORDS[harm]
     assert cli.main(["info", str(copy)]) == 1
     assert f"damage      {name} {word}" in capsys.readouterr().out
+    before = markers(copy)
     lw.resume(copy)
     assert differing(whole, copy) == [] and cli.main(["info", str(copy)]) == 0
+    after = markers(copy)
+    again = [int(one.removesuffix(".json")) for one in after if after[one] != before[one]]
+    assert again == ([BLOCK_OF[name]] if name in BLOCK_OF else [])
 
 
 def test_damaged_times_are_mended_by_the_same_run(copy, whole):
@@ -434,6 +440,38 @@ def test_a_full_disk_keeps_what_is_finished(tmp_path, whole, monkeypatch, capsys
     assert differing(whole, path) == []
 
 
+def test_a_disk_that_is_full_when_a_block_was_written_already(tmp_path, whole, monkeypatch):
+    """Some systems find out when they sync: the run ends, and all other blocks that were written are there."""
+
+    def limited(beside, target, sync=durable.sync_file):
+        if target.name == "000000256.json":
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        sync(beside, target)
+
+    monkeypatch.setattr(durable, "sync_file", limited)
+    path = tmp_path / "run.zarr"
+    with pytest.raises(OSError, match=r"No space left on device: the blocks that were finished are kept"):
+        lw.solve(fleet(), **SETTINGS, store=path, threads=1)
+    assert resuming.state(path)["damage"] == [] and 1 <= resuming.state(path)["finished"] <= 3
+    assert not list(path.rglob(f"*{durable.UNFINISHED}")) and not resuming.state(path)["complete"]
+    monkeypatch.undo()
+    lw.resume(path)
+    assert differing(whole, path) == []
+
+
+def test_an_interrupted_run_keeps_the_blocks_that_were_written(tmp_path, whole):
+    def interrupted(fraction):
+        if fraction > 0.8:
+            raise KeyboardInterrupt
+
+    path = tmp_path / "run.zarr"
+    with pytest.raises(KeyboardInterrupt):
+        lw.solve(fleet(), **SETTINGS, store=path, threads=1, progress=interrupted)
+    assert resuming.state(path)["finished"] == 3 and not list(path.rglob(f"*{durable.UNFINISHED}"))
+    lw.resume(path)
+    assert differing(whole, path) == []
+
+
 def test_a_file_that_may_not_grow_is_told_as_a_full_disk(tmp_path, capsys):
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     arguments = ["run", str(ROOT / "examples" / "paper.toml"), "--members", "500", "--set", "run.save_every=0.1",
@@ -520,11 +558,24 @@ def test_parts_of_keepers_lie_in_the_store(tmp_path, memory):
     assert differing(tmp_path / "a.zarr", tmp_path / "b.zarr") == []
     with pytest.raises(lw.SceneError, match=r"stores \['depth sum'\], not \[\]"):
         lw.resume(tmp_path / "b.zarr")
-    path = tmp_path / "b.zarr" / "parts" / "000000512" / "depth sum.npz"
+    path = tmp_path / "b.zarr" / "parts" / "000000512.npy"
     flip(path)
-    assert any("depth sum.npz has changed" in text for text in resuming.state(tmp_path / "b.zarr")["damage"])
+    assert any("000000512.npy has changed" in text for text in resuming.state(tmp_path / "b.zarr")["damage"])
     assert run("b.zarr", existing="resume").sums.tobytes() == one.sums.tobytes()
     assert differing(tmp_path / "a.zarr", tmp_path / "b.zarr") == []
+
+
+def test_parts_of_several_keepers_lie_in_one_file(tmp_path):
+    plan = make_plan(fleet(10), **SETTINGS)
+    several = DepthSum(plan), DepthSum(plan), DepthSum(plan)
+    given = np.arange(4.0), np.zeros(0), np.array([-0.0, np.nan])
+    for keeper, name in zip(several, ("second", "a third", "first"), strict=True):
+        keeper.name = name
+    path = tmp_path / "000000000.npy"
+    path.write_bytes(store.packed(several, given))
+    found = store.unpacked(several[::-1], path)
+    assert [one.tobytes() for one in found] == [one.tobytes() for one in given[::-1]]
+    assert [one.tobytes() for one in store.unpacked(several[1:2], path)] == [b""]
 
 
 def test_keepers_that_cannot_be_stored_are_refused(tmp_path):

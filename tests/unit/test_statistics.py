@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.statistics import Estimate, intervals, sketch
+from lgvi_warp.statistics import TYPES, Estimate, intervals, sketch
 from lgvi_warp.statistics.tree import Tree
 from lgvi_warp.statistics.until import watch
 from lgvi_warp.statistics.values import Values, dealt
@@ -568,13 +568,37 @@ def test_the_sketchs_error_is_as_often_up_as_down():
     assert abs(error.mean()) < 5.0 * proven / np.sqrt(streams)
 
 
-@pytest.mark.parametrize("kind", [lw.Mean, lw.Covariance, lw.Extremes, lw.Quantiles, lw.CircularMean])
+OF_EVERY_KIND = {
+    "mean": lambda x: lw.Mean(x),
+    "covariance": lambda x: lw.Covariance(x),
+    "extremes": lambda x: lw.Extremes(x),
+    "quantiles": lambda x: lw.Quantiles(x, size=64),
+    "histogram": lambda x: lw.Histogram(x, bins=30, limits=(-10.0, 1010.0)),
+    "exceedance": lambda x: lw.Exceedance(x, above=(1000.0, 0.0, -5.0)),
+    "first_passage": lambda x: lw.FirstPassage(scalar(), above=1002.0),
+    "circular_mean": lambda x: lw.CircularMean(x),
+    "mean_attitude": lambda x: lw.MeanAttitude(),
+    "path_maximum": lambda x: lw.PathMaximum(x, [lw.Mean(), lw.Quantiles(size=64)]),
+    "path_minimum": lambda x: lw.PathMinimum(x, [lw.Covariance(), lw.Extremes()]),
+}
+
+
+@pytest.mark.parametrize("kind", TYPES)
 def test_blocks_in_any_order_give_the_same_bits(kind, values):
     x, good = values
-    order = np.random.default_rng(16).permutation(6)
-    statistic = kind(scalar(3), size=64) if kind is lw.Quantiles else kind(scalar(3))
-    first, second = (statistic.whole(trees(statistic, x, good=good, order=o).parts()) for o in (None, order))
-    assert all(first[key].tobytes() == second[key].tobytes() for key in first)
+    x = {
+        "first_passage": x[..., :1],
+        "mean_attitude": rotations(x - x.mean(axis=1, keepdims=True)).reshape(4, 1500, 9),
+    }.get(kind, x)
+    statistic = OF_EVERY_KIND[kind](scalar(3))
+    times = np.arange(4.0)
+    first = statistic.estimates(trees(statistic, x, good=good).parts(), times)
+    for seed in range(3):
+        order = np.random.default_rng(16 + seed).permutation(6)
+        again = statistic.estimates(trees(statistic, x, good=good, order=order).parts(), times)
+        for one, other in zip(first, again, strict=True):
+            assert one.arrays.keys() == other.arrays.keys() and len(one.arrays) > 1
+            assert all(one[key].tobytes() == other[key].tobytes() for key in one.arrays)
 
 
 def test_coins_are_fair_and_fixed():

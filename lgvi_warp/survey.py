@@ -97,7 +97,9 @@ def survey(ensemble: Ensemble, method: Method, h: float) -> Survey:
     """Look at all members; at one alone where no number of the vehicle, the water or the laws varies."""
 
     def look(first: int, stop: int) -> Survey:
-        return _look(ensemble, method, h, first, stop)
+        # A member too large for its arithmetic gets its status, or its fault, elsewhere; NumPy need not remark.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return _look(ensemble, method, h, first, stop)
 
     return functools.reduce(Survey.joined, over_members(look, ensemble.members if ensemble.varied() else 1))
 

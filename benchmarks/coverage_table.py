@@ -18,6 +18,7 @@ from scipy.special import ive, ndtr, ndtri
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import lgvi_warp as lw
+from lgvi_warp.notation import matrix_from_rotation_vector
 from lgvi_warp.sampling import sampling_of
 from lgvi_warp.statistics.tree import Tree
 from lgvi_warp.statistics.until import Watch
@@ -25,6 +26,8 @@ from lgvi_warp.statistics.values import Values, dealt
 from lgvi_warp.variations import Space
 
 BLOCK = 256
+# Members of the first table's intervals.
+FEW = (2, 5, 10, 30, 100, 1000)
 # Of the designs with replicates: members, and the weights of four normal numbers, those of another sum backwards.
 MEMBERS = 1024
 A = np.sqrt([0.49, 0.25, 0.16, 0.1])
@@ -46,7 +49,7 @@ def parts(statistic, blocks, replicates=1):
     """The tree after each block of values (repetitions, members, d): repetitions stand where times do."""
     tree = Tree(statistic.join)
     for i, x in enumerate(blocks):
-        gathers = statistic.open(len(x), x.shape[1])
+        gathers = statistic.open(np.arange(float(len(x))), x.shape[1])
         given = np.ascontiguousarray(np.moveaxis(x, 2, 1)), None, i * BLOCK, i, BLOCK
         gathers.take(Values(*given) if replicates == 1 else dealt(*given, replicates), slice(0, len(x)))
         tree.add(i, gathers.close())
@@ -71,6 +74,38 @@ def held(found, truth, value=""):
     return float(np.mean((found[f"{value}lower"] <= truth) & (truth <= found[f"{value}upper"])))
 
 
+def held_on_circle(found, truth):
+    away = np.abs((found.value - truth + np.pi) % (2.0 * np.pi) - np.pi)
+    return float(np.mean(away <= found.half_width))
+
+
+def passages(repetitions, members, loss):
+    """(repetitions, 7): which intervals of a first passage hold. Exponential of 5, seen at 7 times; losses of another mean."""
+    rng, times, good = np.random.default_rng(3), np.arange(8.0), []
+    for _ in range(repetitions):
+        passage, lost = rng.exponential(5.0, members), rng.exponential(loss, members)
+        statistic = lw.FirstPassage(quantity(), above=0.5)
+        gathers = statistic.open(times, members)
+        x = (passage <= times[:, None]).astype(float)[:, None]
+        gathers.take(Values(x, lost > times[:, None]), slice(0, len(times)))
+        found, truth = statistic.estimates([gathers.close()], times)[0], -np.expm1(-times / 5.0)
+        good.append(((found.lower <= truth) & (truth <= found.upper))[1:])
+    return np.array(good)
+
+
+def attitudes(repetitions, members, at_once=500):
+    """Part of the intervals of a mean attitude's turns about three axes that hold."""
+    rng, good = np.random.default_rng(4), []
+    for first in range(0, repetitions, at_once):
+        shape = (min(at_once, repetitions - first), members, 3)
+        R = matrix_from_rotation_vector(rng.normal(size=shape) * [0.2, 0.5, 0.3])
+        found = last(lw.MeanAttitude(), R.reshape(*shape[:2], 9))
+        X = found.value
+        turn = 0.5 * np.stack([X[:, 2, 1] - X[:, 1, 2], X[:, 0, 2] - X[:, 2, 0], X[:, 1, 0] - X[:, 0, 1]], axis=1)
+        good.append(np.abs(turn) <= found["rotation_half_width"])
+    return float(np.mean(np.concatenate(good)))
+
+
 def kinds(repetitions, members):
     """Name -> part of the intervals that hold, of 95 %."""
     rng = np.random.default_rng(1)
@@ -79,10 +114,12 @@ def kinds(repetitions, members):
     x, heavy = quantity(), np.exp(a)
     levels = (0.1, 0.5, 0.9)
     cov = last(lw.Covariance(quantity(2)), np.concatenate([a, b], axis=2))
+    inside = (cov.lower <= (truth := np.array([[1.0, 0.6], [0.6, 1.0]]))) & (truth <= cov.upper)
     yield "mean, normal", held(last(lw.Mean(x), a), 0.0)
     yield "mean, lognormal", held(last(lw.Mean(x), heavy), np.exp(0.5))
-    yield "covariance, normal", held(cov, np.array([[1.0, 0.6], [0.6, 1.0]]))
-    yield "covariance, lognormal", held(last(lw.Covariance(x), heavy), (np.e - 1.0) * np.e)
+    yield "variance, normal", float(inside[:, [0, 1], [0, 1]].mean())
+    yield "covariance, normal, correlated by 0.6", float(inside[:, 0, 1].mean())
+    yield "variance, lognormal", held(last(lw.Covariance(x), heavy), (np.e - 1.0) * np.e)
     yield "quantiles 0.1, 0.5, 0.9", held(last(lw.Quantiles(x, levels), a), ndtri(np.array(levels))[:, None])
     yield (
         "the same from a sketch of 64",
@@ -91,8 +128,11 @@ def kinds(repetitions, members):
     yield "probability of 0.16", held(last(lw.Exceedance(x, above=1.0), a), ndtr(-1.0))
     yield "probability of 0.01", held(last(lw.Exceedance(x, above=2.3263), a), ndtr(-2.3263))
     circle = last(lw.CircularMean(x), rng.vonmises(1.0, 2.0, size=a.shape))
-    yield "circular mean", held(circle, 1.0)
+    yield "circular mean", held_on_circle(circle, 1.0)
     yield "resultant length", held(circle, ive(1, 2.0) / ive(0, 2.0), "resultant_length_")
+    yield "mean attitude", attitudes(repetitions, members)
+    yield "first passage, half lost by the end", float(passages(repetitions, members, 10.0).mean())
+    yield "first passage at the end, 97 % lost by then", float(passages(repetitions, members, 2.0)[:, -1].mean())
 
 
 def stopped(repetitions, until, blocks, truth, replicates=1):
@@ -186,9 +226,10 @@ def main():
     arguments.add_argument("--repetitions", type=int, default=10_000)
     chosen = arguments.parse_args()
     n = chosen.repetitions
-    print(f"| {n:,} intervals of 95 %, each of 1,000 members | hold |\n|---|---|")
-    for name, part in kinds(n, 1000):
-        print(f"| {name} | {part:.1%} |", flush=True)
+    print(f"| part that holds of {n:,} intervals of 95 %, of members: | {' | '.join(f'{one:,}' for one in FEW)} |")
+    print("|---|" + "---|" * len(FEW))
+    for row in zip(*(kinds(n, members) for members in FEW), strict=True):
+        print(f"| {row[0][0]} | " + " | ".join(f"{part:.1%}" for _, part in row) + " |", flush=True)
     print("\n| stopped: mean of | first look at | half width as of | holds | members taken |\n|---|---|---|---|---|")
     for law, least, wanted, part, taken in stops(n):
         print(f"| {law} | {least} | {wanted} | {part:.1%} | {taken:.0f} |", flush=True)

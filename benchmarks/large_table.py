@@ -40,7 +40,8 @@ four ways fits:
     lgvi-warp plan examples/paper.toml --members 1000000 --store zarr --out runs/large
 
 runs one block a thread for about a second and says what the whole run will take: time, memory, disk, blocks. It writes
-nothing but a probe of the disk. In Python: `print(lw.predict(fleet, t1=10.0, store="runs/large/run.zarr"))`. A run
+nothing but a probe of the disk. In Python: `print(lw.predict(fleet, t1=10.0, store="runs/large/run.zarr"))`. Statistics
+and members of `keep=[3, 17]` are counted; how many members fail is not known, so those of `keep="failed"` are not. A run
 whose members stop early, or whose method chooses its steps, may cost less or more than its first steps tell.
 
 ## The run
@@ -68,9 +69,14 @@ block gave to them; `keep="none"` leaves the samples out, so that status, warnin
 member are all that is there beside. `lw.open_run` joins the blocks' parts again, and `resume` takes the statistics, `keep`
 and `until` of the run from the store. A run that `until` ends early is complete with fewer members, and so it is after a
 crash: at the same block, with the same bytes. Statistics of functions of your own are not in the file:
-`lw.resume(path, statistics=[...])` and `lw.open_run(path, statistics=[...])` take them again. The samples of members that
-`keep="failed"` or `keep=[3, 17]` asks for are run again when the run ends and are in memory only (`result.kept`), not in
-the store. A run in parts (`--blocks`) cannot have `until`.
+`lw.resume(path, statistics=[...])` and `lw.open_run(path, statistics=[...])` take them again. A run in parts (`--blocks`)
+cannot have `until`.
+
+**Members to look at.** Those that `keep="failed"` or `keep=[3, 17]` asks for are run again when all blocks are there, by the
+same executor and to the same bits, into the group `kept` of the store; the run is complete after that. Its blocks have
+checksums and markers of their own: `info` tells what is damaged, `resume` goes on with it. `lw.open_run(...).kept` reads it,
+and so does `xarray.open_zarr("runs/large/run.zarr", group="kept")`, whose coordinate `member` is the index in the run. Of a
+method that chooses its steps, members of the same packet lie there as well, told apart by `chosen`.
 
 ## After a crash: `lgvi-warp resume`
 
@@ -84,6 +90,9 @@ is). On another type of machine or with other versions of lgvi_warp, Warp, NumPy
 may differ, so `resume` refuses and says what differs; `--force` goes on nevertheless. Laws of your own are not in the
 file: `lw.resume("runs/large", fleet)` takes the ensemble that has them.
 
+The exit codes of all commands: 0 done; 1 members, files or the disk failed, or `info` or `merge` found a run that is not
+whole; 2 refused, with the reason and the remedy; 130 interrupted from the keyboard (a store keeps its finished blocks).
+
 ## Reading it
 
     result = lw.open_run("runs/large")               # samples are read when you ask for them
@@ -92,10 +101,18 @@ file: `lw.resume("runs/large", fleet)` takes the ensemble that has them.
     xarray.open_zarr("runs/large/run.zarr")
 
 The store is plain zarr v3: raw little-endian numbers with a CRC-32C a chunk, CF-1.11 attributes, scene, seed, versions
-and machine in its attributes. There is no time of day in it: the same run leaves the same bytes. `lgvi-warp export
-runs/large --to netcdf` (or `parquet`) writes one file for other programs (extra `export`). A *missing* chunk of a zarr
-array silently reads as NaN: `open_run` refuses a run that is not complete, and `lgvi-warp info` finds chunks that were
-lost later.
+and machine in its attributes. There is no time of day in it: the same run leaves the same bytes. A *missing* chunk of a
+zarr array silently reads as NaN: `open_run` refuses a run that is not complete, and `lgvi-warp info` finds chunks that
+were lost later.
+
+    lgvi-warp export runs/large --to netcdf          # xarray.open_dataset("runs/large/run.nc")
+    lgvi-warp export runs/large --to parquet         # pandas.read_parquet("runs/large/run.parquet")
+
+write one file for other programs (extra `export`), of a run that is complete and whole: every file is checked first.
+NetCDF has all arrays with their CF attributes, kept members in the group `kept` and statistics in `statistics`. Parquet has
+a row for each member and time of the samples of all members, else of those that were kept, else a row for each member; its
+columns are each component of the samples and of what varies, status and failure time, and their units are in the table's
+metadata (`attrs["units"]` in pandas).
 
 ## More machines
 
@@ -113,7 +130,8 @@ lost later.
 
       lgvi-warp merge part_* --out whole
 
-  `lgvi-warp plan` says how many blocks there are.
+  `lgvi-warp plan` says how many blocks there are; the last task may ask for more of them. `merge` also runs the members
+  that the run keeps, once all blocks are there.
 * Each kernel is compiled once: processes that want the same one wait for the first to put it into Warp's cache.
   `WARP_CACHE_PATH` says where that is; give machines that share a home directory one each if their processors differ.
 * Laws of your own must be importable where the workers are: what cannot be sent is refused with the reason.

@@ -103,7 +103,7 @@ class PartKeeper(Keeper, Protocol):
 
     @property
     def name(self) -> str:
-        """What its file is called by: unlike that of any other keeper of the run."""
+        """What its parts are called by: unlike those of any other keeper of the run."""
 
     def to_arrays(self, part: Any) -> tuple[dict[str, np.ndarray], Any]:
         """A part as arrays by name, and what JSON holds."""
@@ -117,7 +117,9 @@ class Work:
     """What executors do to each block: advance it, and put it into the store if there is one. Can be pickled.
 
     sink: the store. Called with a block, it returns what each keeper closed with, or None if it was halted; a block that
-    the store has is not run again. advanced: called with the vehicle-steps made of this block so far.
+    the store has is not run again. A copy in another process returns when its block is durable; in the run's own process
+    the run waits at its end for the blocks that are not durable yet.
+    advanced: called with the vehicle-steps made of this block so far.
     """
 
     plan: Plan

@@ -7,14 +7,19 @@ import errno
 import functools
 import os
 import socket
-from collections.abc import Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+import threading
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 UNFINISHED = ".part"
+# A file at least so large goes to the disk as soon as it is written: the disk has work while others are made.
+EARLY_BYTES = 200_000
+# Syncs side by side, and large files that may wait for theirs: enough for any disk, few enough for the system's memory.
+SYNCS, MOST_WAITING = 16, 32
 
 
 def checksum(data: Any, before: int = 0) -> int:
@@ -29,17 +34,34 @@ def checksum(data: Any, before: int = 0) -> int:
 @functools.cache
 def _syncs() -> ThreadPoolExecutor:
     """Threads that wait for the disk."""
-    return ThreadPoolExecutor(16, thread_name_prefix="lgvi_warp_sync")
+    return ThreadPoolExecutor(SYNCS, thread_name_prefix="lgvi_warp_sync")
 
 
-def sync_file(names: tuple[Path, Path]) -> None:
+_room = threading.BoundedSemaphore(MOST_WAITING)
+
+
+def sync_file(beside: Path, target: Path) -> None:
     """Wait until a file is on the disk: where it lies, and what it will be called."""
-    beside, target = names
     descriptor = os.open(beside, os.O_RDONLY)
     try:
         with named(target):
             os.fsync(descriptor)
     finally:
+        os.close(descriptor)
+
+
+def _begun(descriptor: int, target: Path) -> Future[None]:
+    """The sync of an open file, begun; waits where too many are on their way."""
+    _room.acquire()
+    return _syncs().submit(_sync_early, os.dup(descriptor), target)
+
+
+def _sync_early(descriptor: int, target: Path) -> None:
+    try:
+        with named(target):
+            os.fsync(descriptor)
+    finally:
+        _room.release()
         os.close(descriptor)
 
 
@@ -60,37 +82,79 @@ class Files:
     """
 
     def __init__(self, root: Path):
-        self._root, self._waiting = root, list[tuple[Path, Path]]()
+        self._root = root
+        # Where each lies, what it will be called, and its sync if that has begun.
+        self._waiting: list[tuple[Path, Path, Future[None] | None]] = []
         self._mark = f".{socket.gethostname()}-{os.getpid()}{UNFINISHED}"
         self.sums: dict[str, list[int]] = {}
 
     def write(self, key: str, data: Any, *, checked: bool = False) -> None:
-        """Write a file below the root, and note its size and checksum; checked: with the data's own checksum at its end."""
+        """Write a file below the root, and note its size and checksum; checked: with the data's own checksum at its end.
+
+        Waits where many large files have not reached the disk yet.
+        """
         target = self._root / key
         beside = target.with_name(target.name + self._mark)
-        self._waiting.append((beside, target))
         view = memoryview(data).cast("B")
         crc = checksum(view)
         tail = crc.to_bytes(4, "little") if checked else b""
         with named(target), beside.open("wb", buffering=0) as file:
+            self._waiting.append((beside, target, None))
             write_all(file, view)
             write_all(file, memoryview(tail))
+            if len(view) >= EARLY_BYTES:
+                self._waiting[-1] = (beside, target, _begun(file.fileno(), target))
         self.sums[key] = [len(view) + len(tail), checksum(tail, crc)]
+
+    def sync(self) -> None:
+        """Begin to sync what is not on its way yet."""
+        self._waiting = [
+            (beside, target, sync or _syncs().submit(sync_file, beside, target))
+            for beside, target, sync in self._waiting
+        ]
+
+    def place(self) -> set[Path]:
+        """Wait for the syncs and put the files in their places. Returns their folders, which are not synced."""
+        for _, _, sync in self._waiting:
+            assert sync is not None
+            sync.result()
+        for beside, target, _ in self._waiting:
+            beside.replace(target)
+        folders = {target.parent for _, target, _ in self._waiting}
+        self._waiting.clear()
+        return folders
 
     def finish(self) -> None:
         """Sync the files, put them in their places, and sync their folders."""
-        # Syncs that run side by side share the file system's commits.
-        list(_syncs().map(sync_file, self._waiting))
-        for beside, target in self._waiting:
-            beside.replace(target)
-        list(_syncs().map(sync_folder, sorted({target.parent for _, target in self._waiting})))
-        self._waiting.clear()
+        (error,) = finish_together([self])
+        if error is not None:
+            raise error
 
     def drop(self) -> None:
         """Take back what is not finished."""
-        for beside, _ in self._waiting:
+        for beside, _, _ in self._waiting:
             beside.unlink(missing_ok=True)
         self._waiting.clear()
+
+
+def finish_together(several: Sequence[Files]) -> list[OSError | None]:
+    """Finish all of them, each folder synced once. Returns what went wrong with each, which is not in its place then."""
+    # Syncs that run side by side share the file system's commits.
+    for one in several:
+        one.sync()
+    errors: list[OSError | None] = []
+    folders = set[Path]()
+    for one in several:
+        try:
+            folders |= one.place()
+            errors.append(None)
+        except OSError as error:
+            errors.append(error)
+    try:
+        list(_syncs().map(sync_folder, sorted(folders)))
+    except OSError as error:
+        return [found or error for found in errors]
+    return errors
 
 
 def write_all(file: Any, view: memoryview) -> None:

@@ -65,8 +65,7 @@ class Observation:
     def again(self, status: np.ndarray) -> np.ndarray:
         """Indices of the members to be run again for their samples, of those whose status is given."""
         if isinstance(self.keep, str):
-            failed = (status != 0) & (status < Status.SURFACE)
-            return np.flatnonzero(failed) if self.keep == "failed" else np.empty(0, np.int64)
+            return np.flatnonzero(_failed(status)) if self.keep == "failed" else np.empty(0, np.int64)
         return np.array([i for i in self.keep if i < len(status)], dtype=np.int64)
 
     def to_dict(self) -> dict[str, Any]:
@@ -135,10 +134,10 @@ class Observing:
     def _watched(self) -> list[Estimate]:
         return self._gathered.estimates(self._watch.statistic) if self._gathered and self._watch else []
 
-    def read(self, ensemble: Mapping[str, Any], members: int) -> tuple[Estimates, tuple[str, ...]]:
-        """(statistics, what the user should know of them) of a run of so many members; ensemble: its provenance."""
-        estimates = self._gathered.result() if self._gathered else Estimates()
-        said = notes(estimates, ensemble, members)
+    def read(self, ensemble: Mapping[str, Any], status: np.ndarray) -> tuple[Estimates, tuple[str, ...]]:
+        """(statistics, what the user should know of them); ensemble: its provenance; status: of the members that ran."""
+        estimates, members = self._gathered.result() if self._gathered else Estimates(), len(status)
+        said = notes(estimates, ensemble, status)
         return estimates, said + ((self._watch.report(members, self._watched()),) if self._watch else ())
 
 
@@ -167,18 +166,13 @@ def observe(plan_members: int, settings: Any, given: Any, keep: Any, until: Any)
     return Observation(found, chosen, stop)
 
 
-def notes(estimates: Mapping[str, Estimate], ensemble: Mapping[str, Any], members: int) -> tuple[str, ...]:
-    """What a user should know of his statistics; ensemble: its provenance."""
-    found: tuple[str, ...] = ()
+def notes(estimates: Mapping[str, Estimate], ensemble: Mapping[str, Any], status: np.ndarray) -> tuple[str, ...]:
+    """What a user should know of his statistics; ensemble: its provenance; status: of the members that ran."""
     if not estimates:
-        return found
-    counts = [one.count for one in estimates.values() if one.settings["type"] != "first_passage"]
-    fewest = min((int(count.min()) for count in counts), default=members)
+        return ()
+    members, found = len(status), _left_out(estimates, status)
     sampling, R = ensemble.get("sampling", "random"), replicates_of(ensemble)
     kind = sampling if isinstance(sampling, str) else next(iter(sampling))
-    if fewest < members:
-        text = f"statistics leave members out from their failure on: {fewest} of {members} count where fewest do"
-        found += (f"{text} (count of each statistic)",)
     if R > 1:
         points = members // R
         if kind == "sobol" and points & (points - 1):
@@ -192,3 +186,26 @@ def notes(estimates: Mapping[str, Estimate], ensemble: Mapping[str, Any], member
         text = f"intervals are those of independent members, which a {kind} does not give"
         found += (f"{text}: do not rely on them",)
     return found
+
+
+def _left_out(estimates: Mapping[str, Estimate], status: np.ndarray) -> tuple[str, ...]:
+    """That some members do not count, and why; first passages tell of theirs as lost."""
+    members = len(status)
+    count = {one: int(one.count.min()) for one in estimates.values() if one.settings["type"] != "first_passage"}
+    fewer = [one for one, number in count.items() if number < members]
+    if not fewer:
+        return ()
+    failed, ended = int(_failed(status).sum()), int((status >= Status.SURFACE).sum())
+    out = {one: ended if one.settings.get("stopped") == "left_out" else 0 for one in fewer}
+    why = [f"{failed} members from their failure on"] if failed else []
+    if any(out.values()):
+        why += [f'{ended} members from the event on that stopped them (stopped = "left_out")']
+    if any(count[one] < members - failed - out[one] for one in fewer):
+        why += ["members where a number of theirs is not finite"]
+    text = f"statistics leave out {', and '.join(why)}: {min(count.values())} of {members} count where fewest do"
+    return (f"{text} (count of each statistic)",)
+
+
+def _failed(status: np.ndarray) -> np.ndarray:
+    """Which members failed: an event's end is no failure."""
+    return np.asarray((status != 0) & (status < Status.SURFACE))

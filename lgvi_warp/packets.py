@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import dataclass
 from typing import Any
 
@@ -78,9 +79,9 @@ class Packets:
             members.parameters, self.frame, members.indices, members.seed, plan.grid.h, plan.model.aligned
         )
         params, table, memory = self._laws(setting)
-        self.inertia = wp.array(self._inertia(), dtype=Inertia, device="cpu")
-        self.params = wp.array(params, dtype=Params, device="cpu")
-        self.events = wp.array(self._events(setting), dtype=Events, device="cpu")
+        self.inertia = _structs(self._inertia(), Inertia)
+        self.params = _structs(params, Params)
+        self.events = _structs(self._events(setting), Events)
         self.table = _rows(table, Lane)
         self.memory = _rows(memory, Lane)
         state = self._state()
@@ -100,7 +101,7 @@ class Packets:
         plan, monitor = self.plan, self.plan.advance.Monitor()
         Lane, Ints = plan.advance.Lane, int_lane(plan.spec.width)
         if plan.spec.looks:
-            monitor.limits = wp.array(self._limits(), dtype=plan.advance.Limits, device="cpu")
+            monitor.limits = _structs(self._limits(), plan.advance.Limits)
             for name, kind in (("warned", Ints), ("warned_step", Ints), ("warned_size", Lane)):
                 setattr(monitor, name, wp.zeros(self.count, dtype=kind, device="cpu"))
         if plan.spec.energy:
@@ -365,6 +366,18 @@ def _leaves(fields: dict[str, Any]) -> list[np.ndarray]:
 def _rows(values: np.ndarray, Lane: Any) -> Any:
     """A Warp array of lanes, two-dimensional, from (entries, rows, width)."""
     return wp.array(values, dtype=Lane, shape=values.shape[:2], device="cpu")
+
+
+def _structs(values: np.ndarray, struct: Any) -> Any:
+    """A Warp array of structs from a structured array (n,) of the plan's type.
+
+    Not by wp.array(values), which lets NumPy read the struct's type from text: in several threads that fails now and then
+    (Python before 3.11.8 and 3.12.2, python/cpython#106905), and the run with it.
+    """
+    array = wp.empty(len(values), dtype=struct, device="cpu")
+    assert values.flags.c_contiguous and values.itemsize == ctypes.sizeof(struct.ctype)
+    ctypes.memmove(array.ptr, values.ctypes.data, values.nbytes)
+    return array
 
 
 def _side_by_side(parts: list[np.ndarray]) -> np.ndarray:

@@ -44,14 +44,16 @@ build_lock = threading.Lock()
 
 
 @contextlib.contextmanager
-def _one_at_a_time() -> Iterator[None]:
-    """Let one process compile while others wait for what it puts into Warp's cache.
+def _one_at_a_time(kernel: str) -> Iterator[None]:
+    """Let one process compile a kernel while others that want the same one wait for what it puts into Warp's cache.
 
-    Without it each would compile the same kernel: that is safe, since Warp renames finished folders into their places, but
-    slow.
+    kernel: its hash. Without this each would compile it: that is safe, since Warp renames finished folders into their
+    places, but slow. Other kernels wait for nothing, unless the first two digits of their hashes are the same: so there are
+    at most 256 files to lock.
     """
-    path = Path(wp.config.kernel_cache_dir) / "lgvi_warp.lock"
+    path = Path(wp.config.kernel_cache_dir) / "lgvi_warp_locks" / kernel[:2]
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.touch()
     except OSError:  # a cache that is only read
         yield
@@ -79,6 +81,10 @@ class Plan:
     model: Model = field(init=False)
     spec: Spec = field(init=False)
     advance: Advance = field(init=False)
+    # The plan that it is a part of, its members and fields.
+    _whole: tuple[Plan, Sequence[int], Sequence[str]] | None = field(
+        default=None, init=False, compare=False, repr=False
+    )
 
     def __post_init__(self) -> None:
         faults = Faults()
@@ -135,6 +141,14 @@ class Plan:
                 faults.add("on_failure", "substep", f"{term.key} {why}", 'use on_failure="freeze", or a shorter step')
         faults.raise_if_any()
 
+    def with_neighbours(self, indices: np.ndarray) -> np.ndarray:
+        """(m,), these members, and where packets choose their steps the others of their packets: their bits hang on them."""
+        if not self.method.adaptive:
+            return indices
+        width = self.spec.width
+        found = np.unique(indices // width)[:, None] * width + np.arange(width)
+        return found[found < self.ensemble.members]
+
     def part(self, indices: Sequence[int], fields: Sequence[str]) -> Plan:
         """The plan for these members alone, whose samples have these fields; all that was chosen for the whole stays.
 
@@ -146,6 +160,7 @@ class Plan:
         object.__setattr__(part, "ensemble", self.ensemble.subset(indices))
         object.__setattr__(part, "fields", tuple(name for name in SAMPLE_FIELDS if name in fields))
         part._choose_kernel()
+        object.__setattr__(part, "_whole", (self, indices, fields))
         return part
 
     def _sampled(self) -> tuple[str, ...]:
@@ -182,7 +197,7 @@ class Plan:
             composed=len(self.method.stages) > 1,
             paired=self.method.halved or (self.method.two_part and not model.lead),
             gauss=gauss(self.method.gauss) if self.method.gauss else (),
-            lead_time=self.lengths[1][-1],
+            lead_time=self.lengths[1][-1] if model.timed else 0.0,
             explicit=self._explicit(),
             compensated=self.dtype == "float32_compensated",
             looks=limits.watched(self) if self.checks == "all" else (),
@@ -220,6 +235,9 @@ class Plan:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Made again from its settings: kernels cannot be sent, and are found in Warp's cache."""
+        if self._whole:
+            # Of its members alone another kernel may be enough.
+            return Plan.part, self._whole
         own = (self.ensemble, self.method, self.grid, self.fields, self.dtype, self.width, self.checks, self.on_failure)
         return Plan, own
 
@@ -232,7 +250,7 @@ class Plan:
         """Load the kernel, compiling it if Warp's cache has none. Returns the seconds it took."""
         start = time.perf_counter()
         warp_setup.start()
-        with build_lock, self._laws_compile(), _one_at_a_time():
+        with build_lock, self._laws_compile(), _one_at_a_time(self.kernel_hash):
             wp.load_module(self.advance.kernel.module, device="cpu")
         _ = self.dtypes, self.times  # made here, before threads ask for them
         return time.perf_counter() - start

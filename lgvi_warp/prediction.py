@@ -20,12 +20,14 @@ from lgvi_warp.blocks import SHAPES, Block, Keeper, Work, blocks
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.executors.threads import Threads
 from lgvi_warp.keepers import Samples
+from lgvi_warp.kept import group_of
 from lgvi_warp.observation import Observation, Observing, observe
 from lgvi_warp.plan import SEGMENT_SAMPLE_BYTES, Plan
 from lgvi_warp.recipe import of_store
 from lgvi_warp.saveat import SaveAt, TimeGrid
 from lgvi_warp.scene import Scene
-from lgvi_warp.store import Store, create
+from lgvi_warp.statistics.sizes import Sizes, sizes
+from lgvi_warp.store import Folder, Sink, Store, create, marker
 from lgvi_warp.store_layout import columns, size
 
 # A trial's time [s]; bytes, and small files, written to learn how fast a disk is.
@@ -92,10 +94,10 @@ def predict(
     """What lw.solve(fleet, **settings) will take, from a trial of about a second on so many threads.
 
     settings: those of solve that decide the plan and what is kept (method, h, t1, save, dtype, width, checks, statistics,
-    keep, until: the whole ensemble is predicted). store: as for solve; the disk is that of its folder. What statistics
-    keep of each block counts for time, not for memory and disk; members that are run again for their samples do not.
-    A run whose cost changes on the way (events, steps that are chosen) costs something else.
-    Raises SceneError.
+    keep, until: the whole ensemble is predicted). store: as for solve; the disk is that of its folder. Statistics count
+    for time, memory and disk, and so do members of keep=[...], which are run again for their samples; those of
+    keep="failed" do not: how many will fail is not known. A run whose cost changes on the way (events, steps that are
+    chosen) costs something else. Raises SceneError.
     """
     from lgvi_warp.solving import make_plan, settled
 
@@ -104,15 +106,17 @@ def predict(
     observed = observe(ensemble.members, ensemble.scene.run, *asked)
     fields = (settings.get("save") or SaveAt()).fields
     plan = make_plan(ensemble, **settings, fields=observed.fields)
-    kept = fields if observed.samples else ()
     compile_seconds = plan.compile()
     count = threads or machine.thread_count()
     set_up, step = costs(plan, count, observed)
-    into = store if isinstance(store, Store) or store is None else Store(store)
-    into = settled(into, plan, observed, fields) if into else None
-    disk = size(plan, into) if into else _result_bytes(plan, kept)
+    asked_store = store if isinstance(store, Store) or store is None else Store(store)
+    into = settled(asked_store, plan, observed, fields) if asked_store else None
     place = _existing(into.folder) if into else Path.cwd()
+    runs = [Sized(plan, into, fields if observed.samples else (), sizes(plan, observed.watch(plan.grid.times)[0]))]
+    runs += again(plan, observed, asked_store, fields)
+    write, metadata = writing(runs, place, count) if into else (0.0, 0)
     n, steps = ensemble.members, plan.grid.steps
+    more = sum(one.plan.ensemble.members for one in runs) / n
     return Prediction(
         members=n,
         steps=steps,
@@ -120,10 +124,10 @@ def predict(
         threads=count,
         compile=compile_seconds,
         set_up=set_up,
-        advance=step * steps,
-        write=writing(plan, into, place, count) if into else 0.0,
-        memory=_resident() + memory(plan, count, into, kept),
-        disk=disk,
+        advance=step * steps * more,
+        write=write,
+        memory=_resident() + memory(runs, count),
+        disk=metadata + sum(one.disk for one in runs),
         free_memory=machine.memory_bytes(),
         free_disk=shutil.disk_usage(place).free,
     )
@@ -171,45 +175,107 @@ def _result_bytes(plan: Plan, fields: Sequence[str] | None = None) -> int:
     """Of a result in memory, and about those of its file; fields: of its samples, by default all of the plan."""
     k, n = len(plan.grid.times), plan.ensemble.members
     real = np.dtype(machine.DTYPES[plan.dtype]).itemsize
-    sizes = {name: int(np.prod(SHAPES[name])) * real for name in (plan.fields if fields is None else fields)}
-    if plan.spec.compensated and "position" in sizes:
-        sizes["position"] = 24
+    rows = {name: int(np.prod(SHAPES[name])) * real for name in (plan.fields if fields is None else fields)}
+    if plan.spec.compensated and "position" in rows:
+        rows["position"] = 24
     one = plan.ensemble.parameters(0, 1)
     varied = sum(one[name].nbytes for name in plan.ensemble.varied())
-    return n * (k * sum(sizes.values()) + varied + sum(np.dtype(f.dtype).itemsize for f in member_fields.present(plan)))
+    return n * (k * sum(rows.values()) + varied + sum(np.dtype(f.dtype).itemsize for f in member_fields.present(plan)))
 
 
-def memory(plan: Plan, threads: int, store: Store | None, fields: Sequence[str] | None = None) -> int:
-    """Bytes that a run adds to the process: its result or its chunks, and what the blocks at work hold."""
-    runs = blocks(plan.ensemble.members)
-    count, n = runs[0].count, plan.ensemble.members
-    working = min(len(runs), threads * (2 if store and threads > 1 else 1))
-    row = sum(plan.spec.sample_fields.values()) * np.dtype(machine.DTYPES[plan.dtype]).itemsize
-    segment = min(SEGMENT_SAMPLE_BYTES, row * count * len(plan.grid.times))
-    # A segment's samples: the kernel's, the members' in order, and turned or moved copies.
-    each = 3 * segment
+NO_STATISTICS = Sizes()
+
+
+@dataclass(frozen=True)
+class Sized:
+    """A run whose bytes are told: its plan, store (None: in memory), fields of its samples, and its statistics."""
+
+    plan: Plan
+    store: Store | None = None
+    fields: Sequence[str] | None = None
+    statistics: Sizes = NO_STATISTICS
+
+    @property
+    def disk(self) -> int:
+        """Bytes of its files but for a store's metadata; in memory, about those of its result's file."""
+        if self.store is None:
+            return _result_bytes(self.plan, self.fields) + self.statistics.estimates
+        each = self.statistics.file + len(marker(self._sums()))
+        return size(self.plan, self.store) + each * len(blocks(self.plan.ensemble.members))
+
+    def _sums(self) -> dict[str, list[int]]:
+        """What a block's marker lists."""
+        assert self.store is not None
+        block, k = blocks(self.plan.ensemble.members)[0], len(self.plan.grid.times)
+        keys = {key: one.bytes for one in columns(self.plan, self.store) for key in one.keys(block, k)}
+        keys |= {Sink.parts_key(block): self.statistics.file} if self.statistics.file else {}
+        return {key: [count, 2**32 - 1] for key, count in keys.items()}
+
+    @property
+    def held(self) -> int:
+        """Bytes that it holds at its end: its result, or what a store leaves of it in memory."""
+        held = self.statistics.joined + self.statistics.estimates
+        if self.store is None:
+            return held + _result_bytes(self.plan, self.fields)
+        each = sum(np.dtype(one.dtype).itemsize for one in member_fields.present(self.plan))
+        return held + each * self.plan.ensemble.members
+
+    def working(self, threads: int) -> int:
+        """Bytes of the blocks at work."""
+        plan, runs = self.plan, blocks(self.plan.ensemble.members)
+        count = min(len(runs), threads)
+        row = sum(plan.spec.sample_fields.values()) * np.dtype(machine.DTYPES[plan.dtype]).itemsize
+        segment = min(SEGMENT_SAMPLE_BYTES, row * runs[0].count * len(plan.grid.times))
+        # A segment's samples: the kernel's, the members' in order, and turned or moved copies. Parts: their rows, and
+        # all together.
+        each = 3 * segment + 2 * self.statistics.part + self.statistics.taking
+        if self.store:
+            each += self.statistics.file + sum(one.bytes for one in columns(plan, self.store))
+        return count * each
+
+
+def memory(runs: Sequence[Sized], threads: int) -> int:
+    """Bytes that a run and those after it add to the process, at most."""
+    peaks = [
+        sum(one.held for one in runs[: i + 1]) + max(run.working(threads), run.statistics.reading)
+        for i, run in enumerate(runs)
+    ]
+    return max(peaks)
+
+
+def again(plan: Plan, observed: Observation, store: Store | None, fields: Sequence[str]) -> list[Sized]:
+    """The run of the members that are kept after all, where their indices are known."""
+    if isinstance(observed.keep, str):
+        return []
+    wanted = observed.again(np.zeros(plan.ensemble.members, np.uint8))
     if store is None:
-        return _result_bytes(plan, fields) + working * each
-    each += sum(one.bytes for one in columns(plan, store))
-    return working * each + n * sum(np.dtype(one.dtype).itemsize for one in member_fields.present(plan))
+        return [Sized(plan.part(plan.with_neighbours(wanted).tolist(), fields))]
+    group = group_of(store, plan, wanted)
+    own = tuple(name for name in fields if store.fields is None or name in store.fields)
+    return [Sized(plan.part(group.members.tolist(), own), group)]
 
 
-def writing(plan: Plan, store: Store, folder: Path, threads: int) -> float:
-    """Seconds that a store's disk takes: its metadata, its bytes, and for each block the wait until they are safe."""
+def writing(runs: Sequence[Sized], folder: Path, threads: int) -> tuple[float, int]:
+    """(seconds, bytes): what the disk takes for metadata, chunks and the wait until blocks are safe; bytes of metadata."""
     from lgvi_warp.solving import messages, provenance
 
-    runs = blocks(plan.ensemble.members)
     with tempfile.TemporaryDirectory(dir=folder) as name:
+        path = Path(name) / "run.zarr"
         start = time.perf_counter()
-        told = of_store(provenance(plan), plan.ensemble)
-        create(replace(store, path=Path(name) / "run.zarr"), plan, told, messages(plan))
+        for one in runs:
+            assert one.store is not None
+            place = path / one.store.folder.relative_to(one.store.whole)
+            told = of_store(provenance(one.plan), one.plan.ensemble)
+            create(replace(one.store, path=place), one.plan, told, messages(one.plan))
+        Folder(path).finish()
         begin = time.perf_counter() - start
+        metadata = sum(one.stat().st_size for one in path.rglob("*") if one.is_file())
         start = time.perf_counter()
         for i in range(SYNCS):
             durable.write_whole(Path(name) / f"{i}", b"0")
-        # Its chunks, then its marker; several blocks wait at a time.
-        wait = 2.0 * (time.perf_counter() - start) / SYNCS / min(2 * threads, len(runs))
-    return begin + size(plan, store) / disk_speed(folder, threads) + wait * len(runs)
+        # The files of a run's last blocks, then their markers.
+        wait = 2.0 * (time.perf_counter() - start) / SYNCS * len(runs)
+    return begin + sum(one.disk for one in runs) / disk_speed(folder, threads) + wait, metadata
 
 
 def disk_speed(folder: Path, threads: int) -> float:

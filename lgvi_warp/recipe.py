@@ -96,10 +96,15 @@ def ensemble_of(
     return ensemble
 
 
-def same_run(stored: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
-    """What differs between two provenances that the bits depend on, one text each: key, value there, value here."""
+def same_run(
+    stored: Mapping[str, Any], now: Mapping[str, Any], name: str = "the store", other: str | None = None
+) -> list[str]:
+    """What differs between two provenances that the bits depend on, one text each: key, value there, value here.
+
+    name, other: what the two are called; no other is this run.
+    """
     return [
-        f"{key} is {there!r} in the store and {here!r} here"
+        f"{key} is {there!r} in {name} and {here!r} {f'in {other}' if other else 'here'}"
         for key, there, here in differences(_comparable(stored), _comparable(now))
     ]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 from collections.abc import Callable, Sequence
@@ -10,15 +11,17 @@ from typing import Any
 
 from lgvi_warp import durable
 from lgvi_warp.blocks import Block, Keeper
+from lgvi_warp.commits import Commits
 from lgvi_warp.ensemble import Ensemble
-from lgvi_warp.errors import SceneError
+from lgvi_warp.errors import MembersFailed, SceneError
 from lgvi_warp.executors import Executor, executor_of
+from lgvi_warp.kept import KeptRun, keep_of, members_kept
 from lgvi_warp.observation import Observing, observation_of
-from lgvi_warp.recipe import of_store, refuse_another
+from lgvi_warp.recipe import of_store, refuse_another, same_run
 from lgvi_warp.result import Result
 from lgvi_warp.running import Stored
 from lgvi_warp.scene import Scene
-from lgvi_warp.store import CREATED, ROOT, Folder, Sink, Store, check, read_marker
+from lgvi_warp.store import CREATED, KEPT, ROOT, Folder, Sink, Store, check, held, name_of, read_marker
 from lgvi_warp.store_layout import columns
 from lgvi_warp.stored import folder_of, result_of
 
@@ -42,7 +45,7 @@ def resume(
     versions, where the bits may differ. keepers: those that the run had. statistics: those that it had, needed where they
     are of functions. Raises SceneError, OSError, or MembersFailed as the run was asked to.
     """
-    from lgvi_warp.solving import finished, provenance
+    from lgvi_warp.solving import finished, provenance, went_on
 
     folder = Folder(folder_of(path))
     given = Ensemble.from_scene(fleet) if isinstance(fleet, Scene) else fleet
@@ -56,11 +59,11 @@ def resume(
     # What the store says stays as it was when it was made, on whatever machine the run goes on.
     run = Stored(
         plan, store_of(folder, force), folder.provenance, folder.messages, (*keepers, *observing.keepers), None,
-        observing.enough,
+        observing.enough, KeptRun(observed, tuple((told or {}).get("fields", ()))),
     )  # fmt: skip
-    result = result_of(
-        run.run(runner, progress), None, folder.messages + messages, plan.ensemble.scene.terms, observing
-    )
+    made = run.run(runner, progress)
+    told_now = messages + went_on(made)
+    result = result_of(made, None, folder.messages + told_now, plan.ensemble.scene.terms, observing)
     return finished(result, plan, observed, (told or {}).get("fields", ()), threads)
 
 
@@ -74,40 +77,75 @@ def store_of(folder: Folder, force: bool = False) -> Store:
 def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], overwrite: bool = False) -> Folder:
     """Put the blocks of several stores of one run (`run --blocks`) into a new one. Returns it, complete or not.
 
-    Every file is compared with its checksum on the way. Raises SceneError where they are not of one run, OSError.
+    Every file is compared with its checksum on the way. Members that the run keeps (keep="failed" or indices) are run
+    again here when all blocks are there, as `resume` does; a run that only its own ensemble can resume is not complete
+    before that. Raises SceneError where they are not of one run, OSError.
     """
     parts = [Folder(folder_of(path)) for path in paths]
     first = parts[0]
     for other in parts[1:]:
-        refuse_another(other.path, other.provenance, first.provenance, force=False)
-        if other.recipe != first.recipe:
-            raise SceneError([f"{other.path}: is of another run than {first.path}; merge parts of one run"])
+        found = same_run(other.provenance, first.provenance, str(other.path), str(first.path))
+        if found or other.recipe != first.recipe:
+            found = found or ["another recipe"]
+            raise SceneError(f"{text}: these are parts of different runs; merge parts of one run" for text in found)
     target = Path(out)
     target = target if target.suffix == ".zarr" else target / first.path.name
     if target.exists() and not overwrite:
         raise SceneError([f"{target}: holds a run already; give --overwrite, or another folder"])
+    _not_in_use(target)
     beside = target.with_name(target.name + ".new")
     shutil.rmtree(beside, ignore_errors=True)
-    shutil.copytree(first.path, beside, ignore=lambda folder, names: _of_blocks(first.path, folder, names))
+    base = _undamaged(parts)
+    _copy_frame(base.path, beside)
     made = Folder(beside)
-    for block in first.runs:
-        _copy_block(parts, block, beside)
-    if not made.unfinished():
+    made.reopen()
+    with Commits() as commits:
+        for block in first.runs:
+            _copy_block(parts, block, beside, commits)
+    whole = not made.unfinished()
+    again = whole and len(members_kept(keep_of(made.provenance), made)) > 0
+    if whole and not again:
         made.finish()
+    _not_in_use(target)
     shutil.rmtree(target, ignore_errors=True)
     beside.replace(target)
     durable.sync_folder(target.parent)
+    if again:
+        # Another machine, or laws of a user's own: then it waits for lw.resume.
+        with contextlib.suppress(SceneError, MembersFailed):
+            resume(target)
     return Folder(target)
 
 
-def _of_blocks(root: Path, folder: str, names: Sequence[str]) -> set[str]:
-    """Names in a folder that are not in the list of what was made with the store."""
-    made = {*(read_marker(root / CREATED) or {}), ROOT, CREATED}
-    inside = Path(folder).relative_to(root)
-    return {name for name in names if (Path(folder) / name).is_file() and (inside / name).as_posix() not in made}
+def _not_in_use(target: Path) -> None:
+    """Refuse to replace a store that another run is writing into. Raises SceneError."""
+    if target.exists():
+        with held(target):
+            pass
 
 
-def _copy_block(parts: Sequence[Folder], block: Block, target: Path) -> None:
+def _undamaged(parts: Sequence[Folder]) -> Folder:
+    """The first of them that is whole but for its blocks. Raises SceneError where none is."""
+    damage = []
+    for part in parts:
+        if not (found := part.damage()):
+            return part
+        damage += [f"{part.path}: {text}; `lgvi-warp resume {part.path}` first" for text in found]
+    raise SceneError(damage)
+
+
+def _copy_frame(root: Path, target: Path) -> None:
+    """All of a store that belongs to no block: what was made with it."""
+    files = durable.Files(target)
+    for name in ("blocks", "parts"):
+        (target / name).mkdir(parents=True)
+    for key in (*(read_marker(root / CREATED) or {}), CREATED, ROOT):
+        (target / key).parent.mkdir(parents=True, exist_ok=True)
+        files.write(key, (root / key).read_bytes())
+    files.finish()
+
+
+def _copy_block(parts: Sequence[Folder], block: Block, target: Path, commits: Commits) -> None:
     """A block from the first of the stores that has it whole. Raises SceneError where each has it damaged."""
     damage = []
     for part in parts:
@@ -121,22 +159,20 @@ def _copy_block(parts: Sequence[Folder], block: Block, target: Path) -> None:
                 data = (part.path / key).read_bytes()
             except FileNotFoundError:
                 data = b""
-            (target / key).parent.mkdir(parents=True, exist_ok=True)
             files.write(key, data)
             if files.sums[key][1] != crc:
                 damage.append(f"{part.path / key}: is torn, missing or changed; `lgvi-warp resume {part.path}` first")
                 files.drop()
                 break
         else:
-            files.finish()
-            durable.write_whole(target / "blocks" / sink.marker(block).name, sink.marker(block).read_bytes())
+            commits.add(files, target / "blocks" / sink.marker(block).name, sink.marker(block).read_bytes())
             return
     if damage:
         raise SceneError(damage)
 
 
 def state(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """What a store holds: members, samples, blocks finished and in all, complete, bytes, and its damage as texts.
+    """What a store holds: members, samples, blocks finished and in all, members kept, complete, bytes, damage as texts.
 
     Every file is read. Raises SceneError where there is no run.
     """
@@ -153,6 +189,8 @@ def state(path: str | os.PathLike[str]) -> dict[str, Any]:
         if faults != ["is not finished"]:
             finished += not faults
             damage += faults
+    kept, faults = kept_state(folder, sound=not damage and finished == len(runs))
+    damage += faults
     return {
         "path": folder.path,
         "members": folder.members,
@@ -161,8 +199,27 @@ def state(path: str | os.PathLike[str]) -> dict[str, Any]:
         "keepers": list(folder.recipe["keepers"]),
         "blocks": len(runs),
         "finished": finished,
+        "kept": kept,
         "complete": folder.complete and finished == len(runs) and not damage,
         "bytes": sum(path.stat().st_size for path in folder.path.rglob("*") if path.is_file()),
         "damage": damage,
         "provenance": folder.provenance,
     }
+
+
+def kept_state(folder: Folder, sound: bool) -> tuple[int, list[str]]:
+    """(members kept, what is wrong with their files); sound: nothing is wrong with those of the run."""
+    path = folder.path / KEPT
+    wanted = len(members_kept(keep_of(folder.provenance), folder)) if folder.complete and sound else 0
+    if not path.exists():
+        return wanted, [f"{KEPT} is missing"] if wanted else []
+    try:
+        group = Folder(path)
+    except SceneError:
+        return wanted, [f"{KEPT}/{ROOT} is damaged"] if folder.complete else []
+    damage = group.damage()
+    for block, faults in check(Sink(path, ()), group.runs, 0):
+        if faults == ["is not finished"]:
+            faults = [f"blocks/{name_of(block)}.json is missing or damaged"] if folder.complete else []
+        damage += faults
+    return wanted, [f"{KEPT}/{text}" for text in damage]

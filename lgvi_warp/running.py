@@ -85,7 +85,9 @@ class Stored:
     """A run into a store, begun or gone on with.
 
     keepers: what else is kept of it, beside the store: their parts lie in it. only: indices of the blocks to run, default
-    all; the run is complete when every block is there, or as many as `enough` (see run_blocks) asks for.
+    all; the run is complete when every block is there, or as many as `enough` (see run_blocks) asks for, and `last` has
+    done what there is to do then: called with this run, its members, the executor and the progress, it says how many
+    blocks it ran.
     """
 
     plan: Plan
@@ -95,6 +97,7 @@ class Stored:
     keepers: tuple[Keeper, ...] = ()
     only: range | None = None
     enough: Callable[[int], bool] = lambda members: False
+    last: Callable[[Stored, int, Executor, Callable[[float], None] | None], int] = lambda *_: 0
 
     def run(self, executor: Executor, progress: Callable[[float], None] | None = None) -> Folder:
         """Run what is missing. Raises SceneError for what is refused, OSError where the disk takes no more."""
@@ -107,17 +110,21 @@ class Stored:
             self._mend()
             left = self._left(sink)
             try:
-                members = self._blocks(sink, left, executor, progress)
+                with sink.commits:
+                    members = self._blocks(sink, left, executor, progress)
             except OSError as error:
-                raise explained(error, path) from error
+                raise explained(error, self.store.whole) from error
             finally:
                 sink.remove_unfinished()
             folder = Folder(path)
+            folder.ran = sum(block.first < members for block in left)
+            folder.found = sum(block.first < members for block in self._runs()) - folder.ran
             beyond = [] if self.only else [block for block in self._runs() if block.first >= members]
             if beyond:
                 # Blocks that were ahead of the last one depend on the number of threads: the store holds none of them.
                 sink.remove(beyond, len(self.plan.grid.times))
             if beyond or not folder.unfinished():
+                folder.ran_kept = self.last(self, members if beyond else self.plan.ensemble.members, executor, progress)
                 folder.finish(members if beyond else None)
         return folder
 
@@ -151,11 +158,13 @@ class Stored:
             else:
                 create(store, self.plan, self.provenance, self.messages, self.keepers)
         except OSError as error:
-            raise explained(error, path) from error
+            raise explained(error, self.store.whole) from error
 
     def _mend(self) -> None:
         """Write anew what is damaged of the files that belong to no block."""
         path = self.store.folder
+        for name in ("blocks", "parts"):
+            (path / name).mkdir(exist_ok=True)
         if not Folder(path).damage():
             return
         import shutil
@@ -201,7 +210,7 @@ def check_keepers(keepers: Sequence[Keeper]) -> None:
             faults.add(type(keeper).__name__, keeper, "cannot be stored", "give it name, to_arrays and from_arrays")
     names = names_of(keepers)
     for name in sorted({name for name in names if names.count(name) > 1 or "/" in name}):
-        faults.add("name", name, "is no file name of its own", "give each keeper another name, without /")
+        faults.add("name", name, "is no name of its own", "give each keeper another name, without /")
     faults.raise_if_any()
 
 

@@ -23,7 +23,8 @@ def load(path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = Non
     try:
         text = Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError, TypeError) as error:
-        raise SceneError([f"scene file {path}: {error}; give the path of a TOML file"]) from None
+        what = getattr(error, "strerror", None) or error
+        raise SceneError([f"scene file {path}: {what}; give the path of a TOML file"]) from None
     return loads(text, overrides, os.fspath(path), Path(path).parent)
 
 

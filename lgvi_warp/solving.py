@@ -17,6 +17,7 @@ from lgvi_warp.errors import Faults, MembersFailed, SceneError, shown
 from lgvi_warp.executors import Executor, executor_of
 from lgvi_warp.executors.threads import Threads
 from lgvi_warp.keepers import Outcomes, Samples
+from lgvi_warp.kept import KeptRun
 from lgvi_warp.method import Method
 from lgvi_warp.observation import Observation, Observing, observe
 from lgvi_warp.plan import Plan
@@ -26,7 +27,7 @@ from lgvi_warp.running import Progress, Stored, run_blocks
 from lgvi_warp.saveat import FIELDS, SaveAt, time_grid
 from lgvi_warp.scene import Scene
 from lgvi_warp.status import Status, failure_text
-from lgvi_warp.store import Store
+from lgvi_warp.store import Folder, Store
 from lgvi_warp.stored import result_of
 
 
@@ -72,8 +73,8 @@ def solve(
     the scene says (statistics=() likewise gathers none).
     store: a folder "runs/x/run.zarr", or a Store with more settings: samples go there block by block and not into memory,
     and a run that was stopped goes on with lw.resume. executor: "threads", "processes" or "dask", or an object that runs
-    blocks; scheduler: the address of Dask's. only: with a store, the blocks to run, range(0, 100), for a run in parts:
-    the result then is of their members.
+    blocks; scheduler: the address of Dask's. only: with a store, the blocks to run, range(0, 100), for a run in parts
+    (the last may ask for more than there are): the result then is of their members.
 
     Raises SceneError naming every fault of the arguments, MembersFailed as asked. Prints nothing. The same inputs give the
     same bits for any number of threads, on one type of machine.
@@ -101,7 +102,7 @@ def solve(
     asked, count = (save or SaveAt()).fields, threads or machine.thread_count()
     if store is None:
         return finished(run_plan(plan, count, progress, observed, asked, runner), plan, observed, asked, count)
-    check_blocks(only, plan)
+    only = blocks_there(only, plan)
     into = store if isinstance(store, Store) else Store(store)
     result = run_stored(plan, into, runner, progress, only, observed, asked)
     return result if only is not None else finished(result, plan, observed, asked, count)
@@ -110,22 +111,27 @@ def solve(
 def finished(
     result: Result, plan: Plan, observed: Observation, fields: Sequence[str], threads: int | None = None
 ) -> Result:
-    """The result with the samples of members that are wanted after all. Raises MembersFailed as the plan says."""
-    indices, kept = again(plan, observed, result.status, fields, threads or machine.thread_count())
-    result = replace(result, kept=kept, kept_members=indices)
+    """The result with the samples of members that are wanted after all, which a store has. Raises MembersFailed."""
+    if result.store is None:
+        indices, kept = again(plan, observed, result.status, fields, threads or machine.thread_count())
+        result = replace(result, kept=kept, kept_members=indices)
     failed = failure_text(result) if plan.on_failure == "raise" else ""
     if failed:
         raise MembersFailed(failed, result)
     return result
 
 
-def check_blocks(only: range | None, plan: Plan) -> None:
-    """The blocks of a run in parts must be there. Raises SceneError."""
+def blocks_there(only: range | None, plan: Plan) -> range | None:
+    """The blocks of a run in parts that it has: the last part may ask for more. Raises SceneError where it has none."""
     count = len(blocks(plan.ensemble.members))
-    if only is not None and not (only.step == 1 and len(only) and only[0] >= 0 and only[-1] < count):
+    if only is None:
+        return None
+    there = range(only.start, min(only.stop, count))
+    if only.step != 1 or only.start < 0 or not there:
         raise SceneError(
             [f"blocks {only.start}:{only.stop}: are not within the {count} of this run; give 0:{count} or less"]
         )
+    return there
 
 
 def make_plan(
@@ -223,9 +229,9 @@ def run_plan(
         progress(1.0)
     run_seconds = time.perf_counter() - start
     told = provenance(plan, observed, fields)
-    estimates, said = observing.read(told["ensemble"], n)
     parameters = Drawn(plan.ensemble, n)
     of_members = {name: values[:n] for name, values in member_fields.of(plan, outcomes).items()}
+    estimates, said = observing.read(told["ensemble"], of_members["status"])
     found = samples.fields if samples and samples.fields else {}
     return Result(
         time=plan.grid.times,
@@ -250,12 +256,7 @@ def again(
     indices = observed.again(status)
     if not len(indices):
         return indices, None
-    chosen = indices
-    if plan.method.adaptive:
-        # A packet chooses its steps: its members stay together.
-        width = plan.spec.width
-        chosen = np.unique(indices // width)[:, None] * width + np.arange(width)
-        chosen = chosen[chosen < plan.ensemble.members]
+    chosen = plan.with_neighbours(indices)
     result = run_plan(plan.part([int(i) for i in chosen], fields), threads)
     return indices, result if len(chosen) == len(indices) else result.part(np.searchsorted(chosen, indices))
 
@@ -278,12 +279,30 @@ def run_stored(
     start = time.perf_counter()
     observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
     into = settled(store, plan, observed, fields)
-    told = of_store(provenance(plan, observed, fields), plan.ensemble)
-    folder = Stored(plan, into, told, messages(plan), observing.keepers, only, observing.enough).run(executor, progress)
+    asked = plan.fields if fields is None else fields
+    kept = tuple(name for name in asked if store.fields is None or name in store.fields)
+    told = of_store(provenance(plan, observed, kept), plan.ensemble)
+    folder = Stored(
+        plan, into, told, messages(plan), observing.keepers, only, observing.enough, KeptRun(observed, kept)
+    ).run(executor, progress)
     runs = blocks(plan.ensemble.members)
     members = None if only is None else slice(runs[only[0]].first, runs[only[-1]].stop)
-    result = result_of(folder, members, messages(plan), plan.ensemble.scene.terms, observing)
+    there = went_on(folder)
+    result = result_of(folder, members, messages(plan) + there, plan.ensemble.scene.terms, observing)
+    if there:
+        return result  # what was measured is not the whole run
     return replace(result, compile_seconds=compile_seconds, run_seconds=time.perf_counter() - start)
+
+
+def went_on(folder: Folder) -> tuple[str, ...]:
+    """What the user should know of a run of which some blocks were there already."""
+    found, ran, ran_kept = folder.found, folder.ran, folder.ran_kept
+    if not found:
+        return ()
+    if not ran and not ran_kept:
+        return (f"nothing was missing: {found} of {found} blocks were there and whole",)
+    kept = f", and {ran_kept} of kept members" if ran_kept else ""
+    return (f"went on: {found} of {found + ran} blocks were there and whole, {ran} ran{kept}",)
 
 
 def settled(store: Store, plan: Plan, observed: Observation, fields: Sequence[str] | None) -> Store:
@@ -326,5 +345,7 @@ def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence
         "machine": machine.describe(),
     }
     if observed is not None and observed != Observation():
-        content["observed"] = observed.to_dict() | ({} if observed.samples else {"fields": list(fields or plan.fields)})
+        content["observed"] = observed.to_dict() | (
+            {} if observed.samples else {"fields": list(plan.fields if fields is None else fields)}
+        )
     return content

@@ -2,8 +2,9 @@
 
     run.zarr/zarr.json            attributes: provenance, recipe, messages, complete
     run.zarr/position/c.0.3.0     chunk: times 0, block 3 (see store_layout)
-    run.zarr/parts/000000768/     what keepers closed the block with, one .npz each
+    run.zarr/parts/000000768.npy  what keepers closed the block with
     run.zarr/blocks/000000768.json   the block that begins with member 768 is finished: its files, sizes, checksums
+    run.zarr/kept/                a group like the run's own, of members that were run again for their samples (see kept)
 
 Nothing in it tells the time of day: the same run leaves the same bytes.
 """
@@ -26,6 +27,7 @@ import numpy as np
 
 from lgvi_warp import durable, machine
 from lgvi_warp.blocks import Block, Keeper, PartKeeper, blocks
+from lgvi_warp.commits import Commits
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.recipe import ensemble_of, plan_of, recipe
 from lgvi_warp.saveat import FIELDS
@@ -36,11 +38,11 @@ if TYPE_CHECKING:
     from lgvi_warp.ensemble import Ensemble
     from lgvi_warp.plan import Plan
 
-FORMAT = 1
+FORMAT = 2
 # Few enough bytes a chunk for its memory, enough that files and their syncs cost little.
 CHUNK_BYTES = 10_000_000
 EXISTING = ("refuse", "resume", "overwrite")
-ROOT, CREATED = "zarr.json", "created.json"
+ROOT, CREATED, KEPT = "zarr.json", "created.json", "kept"
 # Room that is left on a disk: markers, metadata, folders.
 SPARE_BYTES = 20_000_000
 
@@ -65,7 +67,7 @@ class Store:
 
     def __post_init__(self) -> None:
         faults = Faults("store.")
-        if not isinstance(self.path, str | os.PathLike) or Path(self.path).suffix != ".zarr":
+        if not isinstance(self.path, str | os.PathLike) or self.whole.suffix != ".zarr":
             faults.add("path", self.path, "is no folder of a store", 'end its name in .zarr: "runs/x/run.zarr"')
         if self.dtype is not None:
             faults.choice("dtype", self.dtype, ("float32", "float64"))
@@ -85,6 +87,27 @@ class Store:
     def folder(self) -> Path:
         """Its path."""
         return Path(self.path)
+
+    @property
+    def along(self) -> str:
+        """What its arrays call the dimension of members."""
+        return MEMBER
+
+    @property
+    def whole(self) -> Path:
+        """The folder of the whole run."""
+        return self.folder
+
+    def write_given(self, group: Any, plan: Plan) -> None:
+        """States and parameters that were given as arrays: nothing else tells them."""
+        given, units = plan.ensemble.explicit(), parameter_units(plan.ensemble.scene)
+        explicit = group.create_group("explicit")
+        for name, values in given.items():
+            dims = (
+                f"{MEMBER}_given" if name != "indices" else MEMBER,
+                *(f"{name}_{i}" for i in range(values.ndim - 1)),
+            )
+            whole_array(explicit, name, values, dims, {"units": units.get(name, "1")})
 
 
 def needed() -> None:
@@ -109,6 +132,7 @@ class Sink:
     root: Path
     columns: tuple[Column, ...]
     room: Room = field(default_factory=Room, compare=False)
+    commits: Commits = field(default_factory=Commits, compare=False)
 
     def open(self, plan: Plan, block: Block, members: Any) -> BlockWriter:
         """A writer of the block's chunks."""
@@ -118,16 +142,15 @@ class Sink:
         """The block is in its place already."""
 
     def finish(self, block: Block, files: durable.Files, keepers: Sequence[Keeper], parts: Sequence[Any]) -> None:
-        """Make a block durable, with the parts of keepers, and mark it."""
-        for keeper, part in zip(keepers, parts, strict=True):
-            assert isinstance(keeper, PartKeeper)
-            key = f"parts/{name_of(block)}/{keeper.name}.npz"
-            (self.root / key).parent.mkdir(exist_ok=True)
-            files.write(key, packed(*keeper.to_arrays(part)))
-        files.finish()
-        if parts:
-            durable.sync_folder(self.root / "parts")
-        durable.write_whole(self.marker(block), marker(files.sums))
+        """Hand a block over to be made durable, with the parts of keepers, and marked. Raises OSError."""
+        if keepers:
+            files.write(self.parts_key(block), packed(keepers, parts))
+        self.commits.add(files, self.marker(block), marker(files.sums))
+
+    @staticmethod
+    def parts_key(block: Block) -> str:
+        """The file of what keepers closed a block with, below the root."""
+        return f"parts/{name_of(block)}.npy"
 
     def marker(self, block: Block) -> Path:
         """The file that says that a block is finished."""
@@ -137,12 +160,7 @@ class Sink:
         """The parts of a finished block; None if it is not finished."""
         if read_marker(self.marker(block)) is None:
             return None
-        found = []
-        for keeper in keepers:
-            assert isinstance(keeper, PartKeeper)
-            path = self.root / "parts" / name_of(block) / f"{keeper.name}.npz"
-            found.append(keeper.from_arrays(*unpacked(path.read_bytes())))
-        return tuple(found)
+        return unpacked(keepers, self.root / self.parts_key(block)) if keepers else ()
 
     def faults(self, block: Block, samples: int, keepers: Sequence[Keeper]) -> list[str]:
         """What is wrong with a finished block's files; "is not finished" alone for one that is not."""
@@ -150,7 +168,7 @@ class Sink:
         if sums is None:
             return ["is not finished"]
         wanted = [key for column in self.columns for key in column.keys(block, samples)]
-        wanted += [f"parts/{name_of(block)}/{keeper.name}.npz" for keeper in keepers if isinstance(keeper, PartKeeper)]
+        wanted += [self.parts_key(block)] if keepers else []
         found = [(key, "is not in the marker") for key in wanted if key not in sums]
         found += [(key, text) for key, one in sums.items() if (text := durable.fault(self.root, key, *one))]
         return [f"{key} {text}" for key, text in found]
@@ -163,27 +181,35 @@ class Sink:
             for column in self.columns:
                 for key in column.keys(block, samples):
                     (self.root / key).unlink(missing_ok=True)
-            shutil.rmtree(self.root / "parts" / name_of(block), ignore_errors=True)
+            (self.root / self.parts_key(block)).unlink(missing_ok=True)
 
     def remove_unfinished(self) -> None:
         """Remove what killed writers left."""
-        parts = self.root / "parts"
-        own = [self.root / column.name for column in self.columns]
-        durable.remove_unfinished([self.root, self.root / "blocks", *own, *(parts.iterdir() if parts.is_dir() else ())])
+        names = ("blocks", "parts", *(column.name for column in self.columns))
+        durable.remove_unfinished([self.root, *(self.root / name for name in names)])
 
 
-def packed(arrays: Mapping[str, np.ndarray], content: Any) -> bytes:
-    """Arrays and what JSON holds as the bytes of an .npz file, always the same."""
+def packed(keepers: Sequence[Keeper], parts: Sequence[Any]) -> bytes:
+    """What keepers closed a block with, always the same bytes: a JSON text, then the arrays, each as in an .npy file."""
+    told: list[tuple[str, list[str], Any]] = []
+    arrays: list[np.ndarray] = []
+    for keeper, part in zip(keepers, parts, strict=True):
+        assert isinstance(keeper, PartKeeper)
+        own, content = keeper.to_arrays(part)
+        told.append((keeper.name, list(own), content))
+        arrays += own.values()
     buffer = io.BytesIO()
-    np.savez(buffer, json=np.array(json.dumps(content, sort_keys=True)), **{f"array.{k}": v for k, v in arrays.items()})  # type: ignore[arg-type]
+    for values in (np.array(json.dumps(told, sort_keys=True)), *arrays):
+        np.save(buffer, values, allow_pickle=False)
     return buffer.getvalue()
 
 
-def unpacked(data: bytes) -> tuple[dict[str, np.ndarray], Any]:
-    """What was packed."""
-    with np.load(io.BytesIO(data), allow_pickle=False) as file:
-        arrays = {name.removeprefix("array."): file[name] for name in file.files if name != "json"}
-        return arrays, json.loads(str(file["json"]))
+def unpacked(keepers: Sequence[Keeper], path: Path) -> tuple[Any, ...]:
+    """The parts of these keepers, of all that were packed."""
+    with path.open("rb") as file:
+        told = json.loads(str(np.load(file)))
+        found = {name: ({one: np.load(file) for one in arrays}, content) for name, arrays, content in told}
+    return tuple(keeper.from_arrays(*found[keeper.name]) for keeper in keepers if isinstance(keeper, PartKeeper))
 
 
 def marker(sums: Mapping[str, list[int]]) -> bytes:
@@ -224,6 +250,8 @@ class Folder:
             )
         self.provenance, self.recipe, messages, self.shared = (json.loads(text) for text in texts)
         self.messages: tuple[str, ...] = tuple(messages)
+        # What this process did: blocks that it found whole, those that it ran, and those of kept members that it ran.
+        self.found, self.ran, self.ran_kept = 0, 0, 0
 
     @property
     def complete(self) -> bool:
@@ -254,9 +282,13 @@ class Folder:
     def plan(self, ensemble: Ensemble | None = None) -> Plan:
         """The run's plan, made again; ensemble: where a scene file cannot tell it (laws of your own). Raises SceneError."""
         try:
+            # A chunk that is missing reads as NaN or 0.
+            lost = [text for text in self.damage() if text.startswith(("time/", "step/", "explicit/"))]
             group = self.group()
             steps, times = group["step"][:].astype(np.int64), group["time"][:]
             given = {name: np.asarray(array[:]) for name, array in group["explicit"].arrays()}
+            if lost or not np.isfinite(times).all():
+                raise ValueError("times are missing")
         except (ValueError, OSError, KeyError) as error:
             remedy = "run the same scene again with --store zarr --resume, which mends it"
             raise SceneError([f"{self.path}: {'; '.join(self.damage()) or error}; {remedy}"]) from error
@@ -275,11 +307,32 @@ class Folder:
     def finish(self, members: int | None = None) -> None:
         """Say that the run is complete; members: with so many, where it ended before the last of the ensemble."""
         if not self.complete:
-            content = json.loads((self.path / ROOT).read_bytes())
-            said = {"complete": True} | ({} if members is None else {"members": members})
-            content["attributes"] |= said
-            durable.write_whole(self.path / ROOT, json.dumps(content, indent=2).encode())
-            self.attributes |= said
+            self._say({"complete": True} | ({} if members is None else {"members": members}), below(self.path / KEPT))
+
+    def reopen(self) -> None:
+        """Say that the run is not complete."""
+        if self.complete:
+            self._say({"complete": False}, {})
+
+    def _say(self, said: dict[str, Any], kept: dict[str, Any]) -> None:
+        """Write attributes of the run, and what lies in the group of its kept members."""
+        content = json.loads((self.path / ROOT).read_bytes())
+        content["attributes"] |= said
+        arrays = content["consolidated_metadata"]["metadata"]
+        own = {name: one for name, one in arrays.items() if name.partition("/")[0] != KEPT}
+        content["consolidated_metadata"]["metadata"] = own | kept
+        durable.write_whole(self.path / ROOT, json.dumps(content, indent=2).encode())
+        self.attributes |= said
+
+
+def below(path: Path) -> dict[str, Any]:
+    """Metadata of a group and its arrays, as that of the group it lies in has them; none of one that is not there."""
+    if not path.exists():
+        return {}
+    own = json.loads((path / ROOT).read_bytes())
+    arrays = own["consolidated_metadata"]["metadata"]
+    own["consolidated_metadata"] = {**own["consolidated_metadata"], "metadata": {}}
+    return {path.name: own} | {f"{path.name}/{name}": one for name, one in arrays.items()}
 
 
 def checksum_of(texts: Sequence[str]) -> int:
@@ -341,6 +394,7 @@ def skeleton(
 ) -> None:
     """Groups and arrays without their blocks, on the disk."""
     import zarr
+    from zarr.storage import MemoryStore
 
     shared = {
         name: values.tolist()
@@ -349,21 +403,31 @@ def skeleton(
     }
     made = recipe(plan) | {"store": store.layout(), "keepers": names_of(keepers)}
     texts = [json.dumps(one) for one in (provenance, made, list(messages), shared)]
-    group = zarr.create_group(root, zarr_format=3, attributes=_attributes(texts, provenance))
+    # zarr writes into memory and `files` onto the disk, side by side: one by one the files would take several times as long.
+    inside: dict[str, Any] = {}
+    own = MemoryStore(inside)
+    group = zarr.create_group(own, zarr_format=3, attributes=_attributes(texts, provenance))
     k, n = len(plan.grid.times), plan.ensemble.members
-    _whole(group, "time", plan.grid.times, ("time",), {"units": "s", "long_name": "time since the start", "axis": "T"})
-    _whole(group, "step", plan.grid.sample_steps, ("time",), {"units": "1", "long_name": "steps made until then"})
+    whole_array(
+        group, "time", plan.grid.times, ("time",), {"units": "s", "long_name": "time since the start", "axis": "T"}
+    )
+    whole_array(group, "step", plan.grid.sample_steps, ("time",), {"units": "1", "long_name": "steps made until then"})
     for column in columns(plan, store):
         _array(group, column.name, column.shape(k, n), column.chunk, column.dtype, column.fill, column.dims,
                column.attributes)  # fmt: skip
-    _explicit(group.create_group("explicit"), plan)
+    store.write_given(group, plan)
     with warnings.catch_warnings():
         # Consolidated metadata is what lets xarray open the store in one read; zarr remarks that version 3 has no rule for it.
         warnings.simplefilter("ignore")
-        zarr.consolidate_metadata(root, zarr_format=3)
-    for name in ("blocks", "parts"):
-        (root / name).mkdir()
-    _sync(root)
+        zarr.consolidate_metadata(own, zarr_format=3)
+    for folder in {os.path.dirname(key) for key in inside} | {"blocks", "parts"}:
+        (root / folder).mkdir(parents=True, exist_ok=True)
+    files = durable.Files(root)
+    for key in sorted(inside):
+        files.write(key, inside.pop(key).as_numpy_array())
+    # The root's metadata will change: it has a checksum of its own.
+    files.write(CREATED, marker({key: one for key, one in files.sums.items() if key != ROOT}))
+    files.finish()
 
 
 def _attributes(texts: Sequence[str], provenance: Mapping[str, Any]) -> dict[str, Any]:
@@ -393,36 +457,12 @@ def _array(group: Any, name: str, shape: Any, chunks: Any, dtype: str, fill: Any
     )  # fmt: skip
 
 
-def _whole(group: Any, name: str, values: np.ndarray, dims: tuple[str, ...], attributes: dict[str, Any]) -> None:
+def whole_array(group: Any, name: str, values: np.ndarray, dims: tuple[str, ...], attributes: dict[str, Any]) -> None:
     """A small array, written at once."""
     values = np.ascontiguousarray(values)
     fill = np.nan if values.dtype.kind == "f" else 0
     dtype = values.dtype.newbyteorder("<").str
     _array(group, name, values.shape, values.shape, dtype, fill, dims, attributes)[:] = values
-
-
-def _explicit(group: Any, plan: Plan) -> None:
-    """States and parameters that were given as arrays: nothing else tells them."""
-    given, units = plan.ensemble.explicit(), parameter_units(plan.ensemble.scene)
-    for name, values in given.items():
-        dims = (f"{MEMBER}_given" if name != "indices" else MEMBER, *(f"{name}_{i}" for i in range(values.ndim - 1)))
-        _whole(group, name, values, dims, {"units": units.get(name, "1")})
-
-
-def _sync(root: Path) -> None:
-    """Note every file but the root's metadata with its checksum, and sync all."""
-    sums = {}
-    for folder, _, files in os.walk(root):
-        for name in files:
-            path = Path(folder) / name
-            data = path.read_bytes()
-            if path != root / ROOT:
-                sums[path.relative_to(root).as_posix()] = [len(data), durable.checksum(data)]
-            descriptor = os.open(path, os.O_RDONLY)
-            os.fsync(descriptor)
-            os.close(descriptor)
-        durable.sync_folder(Path(folder))
-    durable.write_whole(root / CREATED, marker(sums))
 
 
 def check(

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from lgvi_warp.plan import Plan
     from lgvi_warp.store import Store
 
-MEMBER = "realization"
+# The dimension of members, and that of members that are kept after all: their coordinate is their index in the run.
+MEMBER, KEPT_MEMBER = "realization", "member"
 # The last dimensions of an array, by their sizes; others are named after the array.
 TAILS = {(): (), (3,): ("component",), (3, 3): ("row", "column")}
 
@@ -25,7 +26,8 @@ TAILS = {(): (), (3,): ("component",), (3, 3): ("row", "column")}
 class Column:
     """One array of the store: (k, n, *tail), or (n, *tail) without times.
 
-    length: members in a chunk, those of a block; times: samples in a chunk, 0 without times.
+    length: members in a chunk, those of a block; times: samples in a chunk, 0 without times. along: the name of the
+    members' dimension.
     """
 
     name: str
@@ -34,6 +36,7 @@ class Column:
     length: int
     times: int
     attributes: dict[str, Any]
+    along: str = MEMBER
 
     @property
     def chunk(self) -> tuple[int, ...]:
@@ -44,7 +47,7 @@ class Column:
     def dims(self) -> tuple[str, ...]:
         """Names of the dimensions."""
         own = tuple(f"{self.name}_{i}" for i in range(len(self.tail)))
-        return (*(("time",) if self.times else ()), MEMBER, *TAILS.get(self.tail, own))
+        return (*(("time",) if self.times else ()), self.along, *TAILS.get(self.tail, own))
 
     @property
     def fill(self) -> float | int:
@@ -73,12 +76,13 @@ class Column:
 def columns(plan: Plan, store: Store) -> tuple[Column, ...]:
     """The arrays that a run of this plan fills, block by block, with the store's dtype, fields and size of chunks."""
     length = blocks(plan.ensemble.members)[0].count
-    return (
+    found = (
         *_samples(plan, length, store),
         Column(MEMBER, (), "<i8", length, 0, {"standard_name": "realization", "long_name": "member of the ensemble"}),
         *(Column(one.name, (), one.dtype, length, 0, one.attributes) for one in member_fields.present(plan)),
         *_parameters(plan, length),
     )
+    return tuple(dataclasses.replace(one, along=store.along) for one in found)
 
 
 def _samples(plan: Plan, length: int, store: Store) -> list[Column]:

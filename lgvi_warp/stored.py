@@ -10,11 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp import durable
 from lgvi_warp.errors import SceneError
+from lgvi_warp.kept import keep_of, members_kept
 from lgvi_warp.observation import Observation, Observing, observation_of, replicates_of
 from lgvi_warp.result import UNITS, Result
 from lgvi_warp.statistics.estimate import Estimates
-from lgvi_warp.store import Folder, Sink
+from lgvi_warp.store import KEPT, Folder, Sink, name_of, read_marker
+from lgvi_warp.store_layout import KEPT_MEMBER, MEMBER
 from lgvi_warp.terms import Term, from_list
 
 if TYPE_CHECKING:
@@ -57,11 +60,15 @@ def folder_of(path: str | os.PathLike[str]) -> Path:
     if given.suffix == ".zarr":
         return given
     found = sorted(given.glob("*.zarr")) if given.is_dir() else []
-    if len(found) != 1:
-        what = f"holds {len(found)} stores" if given.exists() else "is not there"
-        remedy = "give the folder of a run made with --store zarr" if not found else f"name one: {found[0]}"
-        raise SceneError([f"{given}: {what}; {remedy}"])
-    return found[0]
+    if len(found) == 1:
+        return found[0]
+    what = "is not there" if not given.exists() else "is a file" if given.is_file() else "holds no store"
+    if found:
+        what = f"holds {len(found)} stores"
+    remedy = (
+        f"name one: {', '.join(map(str, found[:5]))}" if found else "give the folder of a run made with --store zarr"
+    )
+    raise SceneError([f"{given}: {what}; {remedy}"])
 
 
 def open_run(
@@ -74,15 +81,16 @@ def open_run(
 
     members: only these, (m,) indices or a slice. `result.dataset` is a view of all of it by xarray, read piece by piece.
     incomplete: also a run that has not ended; what its blocks have not reached reads as NaN and status 0.
-    result.statistics are those of a complete run's members, all of them; statistics: the run's own, needed for those of
-    functions, which a store does not hold. Raises SceneError where there is no run, or it is not complete, IndexError for
-    members that it has not.
+    result.statistics and result.kept are those of a complete run's members, all of them; statistics: the run's own, needed
+    for those of functions, which a store does not hold. Raises SceneError where there is no run, or it is not complete,
+    IndexError for members that it has not.
     """
     folder = Folder(folder_of(path))
     messages = folder.messages
     if not folder.complete:
         left = len(folder.unfinished())
-        text = f"{folder.path}: is not complete: {left} blocks are missing"
+        missing = f"{left} blocks are missing" if left else "the members that it keeps have not been run again yet"
+        text = f"{folder.path}: is not complete: {missing}"
         if not incomplete:
             raise SceneError([f"{text}; go on with `lgvi-warp resume {folder.path.parent}`, or give incomplete=True"])
         return result_of(folder, members, (*messages, text))
@@ -92,15 +100,38 @@ def open_run(
     return result_of(folder, None, messages, observing=gathered(folder, observation_of(told, statistics)))
 
 
+def times_of(folder: Folder) -> np.ndarray:
+    """(k,) [s], of the samples. Raises SceneError where they are lost."""
+    try:
+        time = np.asarray(folder.group()["time"][:])
+        if np.isfinite(time).all():
+            return time
+    except (ValueError, KeyError):
+        pass
+    remedy = "run the same scene again with --store zarr --resume, which mends it"
+    raise SceneError([f"{folder.path}: {'; '.join(folder.damage()) or 'times are lost'}; {remedy}"])
+
+
 def gathered(folder: Folder, observed: Observation) -> Observing:
     """The statistics of a complete run, from the parts of its blocks."""
-    time, replicates = folder.group()["time"][:], replicates_of(folder.provenance["ensemble"])
-    observing = Observing(observed, time, int(folder.recipe["members"]), replicates)
+    replicates = replicates_of(folder.provenance["ensemble"])
+    observing = Observing(observed, times_of(folder), int(folder.recipe["members"]), replicates)
     sink = Sink(folder.path, ())
     for block in folder.runs:
+        _check_parts(folder, read_marker(sink.marker(block)), name_of(block))
         for keeper, part in zip(observing.keepers, sink.parts(block, observing.keepers) or (), strict=True):
             keeper.merge(block, part)
     return observing
+
+
+def _check_parts(folder: Folder, sums: Mapping[str, Sequence[int]] | None, name: str) -> None:
+    """A block's parts must be those that were written. Raises SceneError."""
+    keys = [key for key in sums or () if key.startswith("parts/")]
+    found = [f"{key} {text}" for key in keys if sums and (text := durable.fault(folder.path, key, *sums[key]))]
+    if sums is None:
+        found = [f"blocks/{name}.json is missing or damaged"]
+    if found:
+        raise SceneError(f"{folder.path}: {text}; `lgvi-warp resume {folder.path}` mends it" for text in found)
 
 
 def result_of(
@@ -111,7 +142,7 @@ def result_of(
     observing: Observing | None = None,
 ) -> Result:
     """The Result of a folder; terms: those of the scene, where its file does not tell them; observing: its statistics."""
-    group = folder.group()
+    group, time = folder.group(), times_of(folder)
     n, whole = folder.members, int(folder.recipe["members"])
     at = _places(members, n)
     arrays = {name: array for name, array in group.arrays()}
@@ -125,18 +156,44 @@ def result_of(
             provenance[name] = float(small[name].mean())
     if n < whole:
         provenance["members"] = n
-    estimates, said = observing.read(provenance["ensemble"], n) if observing else (Estimates(), ())
+    estimates, said = Estimates(), tuple[str, ...]()
+    if observing is not None:
+        estimates, said = observing.read(provenance["ensemble"], small["status"])
+    of_scene = tuple(from_list(provenance["scene"].get("terms", ())) if terms is None else terms)
+    indices, kept = kept_of(folder, of_scene) if members is None else (np.empty(0, np.int64), None)
     return Result(
-        time=group["time"][:],
+        time=time,
         samples=Arrays(group, fields, 1, at),
         **Result.per_member(small),
         parameters=Arrays(group, varied, 0, at, shared),
         messages=messages + said,
         provenance=provenance,
         statistics=estimates,
-        terms=tuple(from_list(provenance["scene"].get("terms", ())) if terms is None else terms),
+        terms=of_scene,
+        kept=kept,
+        kept_members=indices,
         store=folder.path,
     )
+
+
+def kept_of(folder: Folder, terms: Sequence[Term]) -> tuple[np.ndarray, Result | None]:
+    """(indices, samples) of the members that a complete run keeps after all. Raises SceneError where they are lost."""
+    wanted = members_kept(keep_of(folder.provenance), folder) if folder.complete else np.empty(0, np.int64)
+    if not len(wanted):
+        return wanted, None
+    path = folder.path / KEPT
+    if not path.exists():
+        raise SceneError([f"{path}: is missing; `lgvi-warp resume {folder.path}` makes it again"])
+    group = Folder(path)
+    found = result_of(group, _chosen_places(group.group()), group.messages, terms)
+    ensemble = found.provenance["ensemble"]
+    places = np.asarray(ensemble.get("indices", range(folder.members)))[wanted]
+    return wanted, replace(found, provenance=found.provenance | {"ensemble": ensemble | {"indices": places.tolist()}})
+
+
+def _chosen_places(group: Any) -> np.ndarray | None:
+    """Places of the kept members among those that were run with them; None where these are all."""
+    return np.flatnonzero(group["chosen"][:]) if "chosen" in group else None
 
 
 def _places(members: Any, n: int) -> slice | np.ndarray:
@@ -163,4 +220,8 @@ def dataset(path: Path) -> xarray.Dataset:
 
     chunks: Any = {} if importlib.util.find_spec("dask") else None
     whole = xarray.open_dataset(path, engine="zarr", chunks=chunks)
+    if KEPT_MEMBER in whole.dims:
+        whole = whole.swap_dims({KEPT_MEMBER: MEMBER})
+    if "chosen" in whole:
+        whole = whole.isel(realization=np.flatnonzero(whole.chosen.values))
     return whole.isel(realization=slice(0, whole.attrs["members"])) if "members" in whole.attrs else whole

@@ -15,9 +15,13 @@ ROOT = Path(__file__).parent.parent
 SLOW = [line for line in (ROOT / "tests" / "slow.txt").read_text().splitlines() if line and not line.startswith("#")]
 
 
+COLLECTED = pytest.StashKey[list[str]]()
+
+
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
+def pytest_collection_modifyitems(config, items):
     """Mark as slow what slow.txt names."""
+    config.stash[COLLECTED] = [item.nodeid for item in items]
     left = tuple(line for line in SLOW if not line.startswith("!"))
     here = tuple(line[1:] for line in SLOW if line.startswith("!"))
     for item in items:

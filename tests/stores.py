@@ -1,5 +1,6 @@
 """What the tests of stores need: a small run, and whether two folders hold the same bytes."""
 
+import contextlib
 from pathlib import Path
 
 import lgvi_warp as lw
@@ -33,3 +34,12 @@ def differing(path, other):
     """Names of files that are not in both folders with the same bytes."""
     left, right = tree(path), tree(other)
     return sorted(name for name in left.keys() | right.keys() if left.get(name) != right.get(name))
+
+
+def markers(path):
+    """{marker of a finished block: when it was written}: another time is another file, of a block that ran again."""
+    found = {}
+    for one in (Path(path) / "blocks").glob("*.json"):
+        with contextlib.suppress(FileNotFoundError):
+            found[one.name] = one.stat().st_mtime_ns
+    return found

@@ -1,6 +1,11 @@
 """What several tests need: vehicles, one-scene ensembles, states of results and of the reference."""
 
+from pathlib import Path
+from unittest import mock
+
 import numpy as np
+import pytest
+import warp as wp
 
 import lgvi_warp as lw
 import lgvi_warp.notation
@@ -9,6 +14,19 @@ from lgvi_warp.reference.terms.restoring import Restoring
 from lgvi_warp.reference.terms.weight import Weight
 
 METHODS = ("phi", "phi_adjoint", "psi", "psi_s", "psi_1")
+SOLVERS = ("quartic", "cayley", "newton")
+
+
+def chosen(rows, kept):
+    """Parameters of a test: those that are kept in the short tests as they are, the others left to the long ones."""
+    return [row if kept(*row) else pytest.param(*row, marks=pytest.mark.slow) for row in rows]
+
+
+# The methods' sub-map D is the same code: psi_s has every solver in the short tests, the others one of them.
+PAIRS = chosen(
+    [(method, solver) for solver in SOLVERS for method in METHODS],
+    lambda method, solver: method == "psi_s" or solver == "quartic",
+)
 GRAVITY = 9.8
 
 # A turn of the body axes that is no symmetry of anything.
@@ -83,3 +101,11 @@ def difference(x, y):
 def slope(h, error):
     """Fitted order of convergence."""
     return np.polyfit(np.log(h), np.log(error), 1)[0]
+
+
+def generated(plan, folder):
+    """The C++ that Warp generates for a plan's kernel, which nothing compiles."""
+    with mock.patch("warp._src.build.build_cpu", lambda path, *_, **__: Path(path).touch()):
+        wp.compile_aot_module(plan.advance.kernel.module, device="cpu", module_dir=str(folder))
+    (path,) = Path(folder).glob("*.cpp")
+    return path.read_text()

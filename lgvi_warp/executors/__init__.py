@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import pickle
-from collections.abc import Callable, Generator, Sequence
+import signal
+from collections.abc import Callable, Generator, Iterator, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 from lgvi_warp import machine
@@ -30,7 +32,7 @@ def executor_of(given: Any, threads: int | None = None, scheduler: str | None = 
     """The executor that a name stands for, with so many threads (default: all cores), or the one given.
 
     scheduler: the address of a Dask scheduler; without one, "dask" starts a cluster on this machine.
-    Raises SceneError.
+    Raises SceneError, also where no scheduler answers.
     """
     faults = Faults()
     if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
@@ -50,10 +52,26 @@ def executor_of(given: Any, threads: int | None = None, scheduler: str | None = 
     if given == "dask":
         from lgvi_warp.executors.dask import Dask
 
-        return Dask(scheduler, count)
+        cluster = Dask(scheduler, count)
+        cluster.check()
+        return cluster
     from lgvi_warp.executors.threads import Threads
 
     return Threads(count)
+
+
+@contextlib.contextmanager
+def deaf() -> Iterator[None]:
+    """Processes that are started inside leave interrupts from the keyboard to this one, from their first moment on."""
+    try:
+        before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    except ValueError:  # not in the main thread, where no interrupt is heard
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before or signal.SIG_DFL)
 
 
 def sent(work: Work, name: str) -> bytes:

@@ -15,7 +15,7 @@ from typing import Any
 from lgvi_warp import machine
 from lgvi_warp.blocks import Block, Work
 from lgvi_warp.errors import SceneError
-from lgvi_warp.executors import MOST_DEATHS, Advanced, received, sent
+from lgvi_warp.executors import MOST_DEATHS, Advanced, deaf, received, sent
 
 # How often a worker tells how far it is [s].
 PERIOD = 0.2
@@ -60,6 +60,12 @@ class Dask:
                     with contextlib.suppress(OSError, TimeoutError):
                         client.run(_end, topic, on_error="ignore")
 
+    def check(self) -> None:
+        """See that the scheduler answers, before anything is written. Raises SceneError."""
+        if isinstance(self.scheduler, str):
+            with self._client():
+                pass
+
     @contextlib.contextmanager
     def _client(self) -> Iterator[Any]:
         try:
@@ -72,7 +78,7 @@ class Dask:
         if self.scheduler is not None:
             try:
                 client = distributed.Client(self.scheduler, timeout=TIMEOUT)
-            except (OSError, ValueError) as error:
+            except (OSError, ValueError, MemoryError) as error:  # memory: what answers is no scheduler
                 what = f"does not answer ({type(error).__name__}: {error})"
                 raise SceneError(
                     [f"scheduler = {self.scheduler!r}: {what}; give the address that dask scheduler prints"]
@@ -82,13 +88,13 @@ class Dask:
             return
         import logging
 
-        with (
-            distributed.LocalCluster(
+        with deaf():
+            cluster = distributed.LocalCluster(
                 n_workers=self.workers, threads_per_worker=1, processes=True, memory_limit=None, dashboard_address=None,
-                silence_logs=logging.CRITICAL,
-            ) as cluster,
-            distributed.Client(cluster) as client,
-        ):  # fmt: skip
+                # The scheduler's own pages: any free port, and of this machine alone.
+                scheduler_kwargs={"dashboard_address": "127.0.0.1:0"}, silence_logs=logging.CRITICAL,
+            )  # fmt: skip
+        with cluster, distributed.Client(cluster) as client:
             yield client
 
 

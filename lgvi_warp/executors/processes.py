@@ -1,4 +1,5 @@
-"""Blocks in processes of one machine, each started afresh (spawn). A process that dies costs the block it was at."""
+"""Blocks in processes of one machine, each started afresh (spawn). When one dies, Python ends all of them: it costs the
+blocks that these were at."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from lgvi_warp.blocks import Block, Work
-from lgvi_warp.executors import MOST_DEATHS, Advanced, received, sent
+from lgvi_warp.executors import MOST_DEATHS, Advanced, deaf, received, sent
 
 # How often progress is looked at [s].
 PERIOD = 0.2
@@ -54,8 +55,9 @@ class Processes:
         )
         waiting: dict[Future[Any], int] = {}
         try:
-            for i, block in left.items():
-                waiting[pool.submit(_work, i, block)] = i
+            with deaf():
+                for i, block in left.items():
+                    waiting[pool.submit(_work, i, block)] = i
             while waiting:
                 done, _ = wait(waiting, PERIOD, FIRST_COMPLETED)
                 for i in waiting.values():

@@ -30,13 +30,11 @@ class Threads:
         def one(block: Block) -> Any:
             return work(block, stop.is_set, functools.partial(advanced, block))
 
-        # With a store a block waits for the disk at its end: another computes meanwhile.
-        count = self.threads if work.sink is None or self.threads == 1 else 2 * self.threads
-        if count == 1:
+        if self.threads == 1:
             for block in blocks:
                 yield block, one(block)
             return
-        with ThreadPoolExecutor(count, thread_name_prefix="lgvi_warp") as pool:
+        with ThreadPoolExecutor(self.threads, thread_name_prefix="lgvi_warp") as pool:
             futures = {pool.submit(one, block): block for block in blocks}
             try:
                 for future in as_completed(futures):

@@ -45,8 +45,8 @@ def log_rerun(result: Result, path: str | os.PathLike[str]) -> Path:
     shown = np.flatnonzero(finite)
     shown = shown[np.unique(np.linspace(0, len(shown) - 1, min(MOST_BODIES, len(shown))).astype(int))]
     position = result.position[:, shown].astype(np.float32)
-    recording.save(part, default_blueprint=_blueprint(result.time, position))
     try:
+        recording.save(part, default_blueprint=_blueprint(result.time, position))
         _world(recording, rr, result, shown, position)
         _curves(recording, rr, result)
         text = "```json\n" + json.dumps(result.provenance, indent=2) + "\n```"
@@ -55,8 +55,9 @@ def log_rerun(result: Result, path: str | os.PathLike[str]) -> Path:
         recording.disconnect()
         part.replace(target)
     except RuntimeError as error:
-        # rerun's word for a writer that could not go on; it says why on stderr.
-        raise OSError(f"the recording could not be written ({error}); is the disk full?") from error
+        # rerun's word for a writer that could not begin, or not go on; it says why on stderr.
+        text = f"the recording could not be written ({error}); is the disk full, or the folder read-only?"
+        raise OSError(text) from error
     finally:
         part.unlink(missing_ok=True)
     return target

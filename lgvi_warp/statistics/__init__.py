@@ -13,14 +13,14 @@ from lgvi_warp.statistics.counts import Exceedance, FirstPassage, Histogram
 from lgvi_warp.statistics.estimate import Estimate, Estimates
 from lgvi_warp.statistics.moments import Covariance, Mean
 from lgvi_warp.statistics.order import Extremes, Quantiles
-from lgvi_warp.statistics.path import PathMaximum, PathMinimum
+from lgvi_warp.statistics.path import PathMaximum, PathMean, PathMinimum, PathRange, PathRms, PathTime
 from lgvi_warp.statistics.quantity import Quantity
 
 TYPES: dict[str, type[Statistic]] = {
     kind.type: kind
     for kind in (
         Mean, Covariance, Extremes, Quantiles, Histogram, Exceedance, FirstPassage, CircularMean, MeanAttitude, PathMaximum,
-        PathMinimum,
+        PathMinimum, PathRange, PathMean, PathRms, PathTime,
     )
 }  # fmt: skip
 
@@ -85,7 +85,11 @@ __all__ = [
     "Mean",
     "MeanAttitude",
     "PathMaximum",
+    "PathMean",
     "PathMinimum",
+    "PathRange",
+    "PathRms",
+    "PathTime",
     "Quantiles",
     "Quantity",
     "Statistic",

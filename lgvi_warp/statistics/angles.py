@@ -23,7 +23,8 @@ class CircularMean(Statistic):
 
     resultant_length is 1 where all are equal and 0 where they spread over the circle, and has an interval too:
     resultant_length_lower, _upper. circular_deviation [rad]: sqrt(-2 log of it). Intervals: normal theory (delta method
-    from the covariance of cosine and sine); the whole circle where the resultant is not clear of 0.
+    from the covariance of cosine and sine); the whole circle where the resultant is not clear of 0. Of the length that of
+    the logarithm of 1 less it, as of a variance (see Covariance): 0 to 1 of two members.
     """
 
     type: ClassVar[str] = "circular_mean"
@@ -62,19 +63,28 @@ class CircularMean(Statistic):
         across = np.sqrt(np.maximum(v * v * cc - 2.0 * u * v * cs + u * u * ss, 0.0))
         along = np.sqrt(np.maximum(u * u * cc + 2.0 * u * v * cs + v * v * ss, 0.0))
         arrays = {"value": np.arctan2(S, C), "resultant_length": length}
-        arrays |= self._ends(arrays["value"], length, across, along, intervals.student(n, self.confidence))
+        # The angles' spread about their own mean, as of a variance: 1 - cos of small angles is half their square.
+        least, some = np.maximum(n - 1, 1), np.maximum(n, 1)
+        wide = np.sqrt(along**2 + 3.0 * length * (1.0 - length) ** 2 / (some * least)) * (some / least)
+        factors = (intervals.student(one, self.confidence) for one in (n, n - 1))
+        arrays |= self._ends(arrays["value"], length, (across, along, wide), *factors)
         arrays |= {"circular_deviation": np.sqrt(-2.0 * np.log(np.clip(length, 1e-300, 1.0))), "count": count}
         return estimate(self, "delta method on the circle", component_dims(*list(arrays)[:-1]), arrays, time)
 
     @staticmethod
     def _ends(
-        value: np.ndarray, length: np.ndarray, across: np.ndarray, along: np.ndarray, factor: np.ndarray
+        value: np.ndarray,
+        length: np.ndarray,
+        errors: tuple[np.ndarray, np.ndarray, np.ndarray],
+        factor: np.ndarray,
+        factor_of_length: np.ndarray,
     ) -> dict[str, np.ndarray]:
-        """Intervals from the standard errors of the mean of (cosine, sine) across and along its direction."""
+        """Intervals from the errors of the mean of (cosine, sine), across and along its direction, and of its length."""
+        across, along, wide = errors
         error = across / np.where(length > 0.0, length, 1.0)
         clear = np.isfinite(factor) & (np.where(np.isfinite(factor), factor, 0.0) * np.maximum(across, along) < length)
         half = np.where(clear, np.minimum(np.where(clear, factor, 0.0) * error, np.pi), np.pi)
-        low, high = intervals.about(length, along, factor)
+        high, low = (1.0 - end for end in intervals.of_logarithm(1.0 - length, wide, factor_of_length))
         found = {"lower": value - half, "upper": value + half, "standard_error": error}
         return found | {"resultant_length_lower": np.fmax(low, 0.0), "resultant_length_upper": np.fmin(high, 1.0)}
 
@@ -86,7 +96,7 @@ class CircularMean(Statistic):
             intervals.of_replicates(length * part, self.confidence)[0] for part in (np.sin(turned), np.cos(turned))
         )
         factor = intervals.student(np.array(len(each)), self.confidence)
-        found = self._ends(whole.value, whole["resultant_length"], across, along, factor)
+        found = self._ends(whole.value, whole["resultant_length"], (across, along, along), factor, factor)
         return whole.with_interval(f"delta method on the circle, Student's t of {len(each)} replicates", found)
 
 

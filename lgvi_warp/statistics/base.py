@@ -103,8 +103,8 @@ class Statistic:
         """The statistics that its estimates are of: itself, or those of what it makes of each member's path."""
         return (self,)
 
-    def open(self, times: int, count: int) -> Any:
-        """What gathers a block of `count` members over all sample times."""
+    def open(self, time: np.ndarray, count: int) -> Any:
+        """What gathers a block of `count` members over all sample times (k,) [s]."""
         return Rows(self)
 
     def rows(self, values: Values) -> Part:

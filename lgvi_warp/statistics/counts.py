@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,6 +14,7 @@ from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.base import Statistic, together
 from lgvi_warp.statistics.estimate import Estimate, along
 from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate
+from lgvi_warp.statistics.naming import spelled
 from lgvi_warp.statistics.tree import Part
 from lgvi_warp.statistics.values import Values
 
@@ -61,10 +63,11 @@ class Histogram(Counted):
             return
         if self.edges is None:
             limits, bins = faults.finite("limits", self.limits, (2,)), self.bins
-            if isinstance(bins, bool) or not isinstance(bins, int) or bins < 1:
+            if isinstance(bins, bool) or not isinstance(bins, Integral) or bins < 1:
                 faults.add("bins", bins, "is no whole number above 0", "give 50")
                 return
-            edges = None if limits is None else np.linspace(limits[0], limits[1], bins + 1)
+            object.__setattr__(self, "bins", int(bins))
+            edges = None if limits is None else np.linspace(limits[0], limits[1], int(bins) + 1)
         else:
             edges = faults.finite("edges", self.edges)
         if edges is not None and (edges.ndim != 1 or len(edges) < 2 or np.any(np.diff(edges) <= 0.0)):
@@ -99,52 +102,68 @@ class Histogram(Counted):
         arrays = {"value": value, "lower": lower, "upper": upper, "counts": inside}
         dims = along(arrays, "time", "component", "bin")
         arrays |= {"below": counts[..., 0], "above": counts[..., -1]}
-        dims |= {"below": ("time", "component"), "above": ("time", "component"), "count": ("time",)}
-        bins = {"bin": 0.5 * (edges[1:] + edges[:-1])}
-        found = estimate(self, "Wilson", dims, arrays | {"count": count}, time, bins, "1")
-        found.coordinates["edge"] = edges
-        return found
+        dims |= {"below": ("time", "component"), "above": ("time", "component"), "count": ("time",), "edge": ("edge",)}
+        bins = {"bin": 0.5 * (edges[1:] + edges[:-1]), "edge": edges}
+        return estimate(self, "Wilson", dims, arrays | {"count": count}, time, bins, "1")
 
 
 @dataclass(frozen=True, eq=False)
 class Condition(Statistic):
-    """A quantity above or below a number; with neither, where it is not 0: a function may say true or false."""
+    """A quantity above or below a number, or with both between them, above < x < below; with neither, where it is not 0: a
+    function may say true or false."""
 
     above: Any = None
     below: Any = None
 
     def check(self, faults: Faults) -> None:
-        """One number at most."""
-        if self.above is not None and self.below is not None:
-            faults.add("above and below", (self.above, self.below), "are both given", "keep one of them")
+        """Numbers that leave something between them."""
+        super().check(faults)
+        found = getattr(self, "_quantity", None)
+        fits, limits = (1,) if found is None else (1, found.size), list[np.ndarray]()
         for name in ("above", "below"):
             if getattr(self, name) is not None:
                 limit = faults.finite(name, getattr(self, name))
-                found = getattr(self, "_quantity", None)
-                fits = (1,) if found is None else (1, found.size)
                 if limit is not None and (limit.ndim > 1 or limit.size not in fits):
                     faults.add(name, getattr(self, name), "is no number", "give one number, or one for each component")
+                elif limit is not None:
+                    limits.append(limit)
+        if len(limits) == 2 and not np.all(limits[0] < limits[1]):
+            both = self.above, self.below
+            faults.add("above and below", both, "leave nothing between them", "give above < below, or one of them")
 
     @property
     def key(self) -> str:
-        """What the result calls it: "exceedance depth above 50.0"."""
-        limits = [f" {word} {getattr(self, word)}" for word in ("above", "below") if getattr(self, word) is not None]
-        return self.name or f"{self.type} {self.quantity.name}{''.join(limits)}"
+        """What the result calls it: "exceedance depth above 50", "exceedance depth above 1 below 2"."""
+        return self.name or f"{self.type} {self.quantity.name}{self.limits_text}"
+
+    @property
+    def limits_text(self) -> str:
+        """What comes after the quantity: " above 50"."""
+        given = ((word, getattr(self, word)) for word in ("above", "below"))
+        return "".join(f" {word} {spelled(limit)}" for word, limit in given if limit is not None)
+
+    def limits(self, d: int) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """above and below as (d, 1), for each of d components; None where there is none."""
+        given = (None if one is None else np.asarray(one, np.float64) for one in (self.above, self.below))
+        above, below = (None if one is None else np.broadcast_to(one.reshape(-1, 1), (d, 1)) for one in given)
+        return above, below
 
     def holds(self, values: Values) -> np.ndarray:
         """(k, d, n): for which members that count it holds."""
-        limit = self.above if self.above is not None else self.below
-        if limit is None:
-            found = values.x != 0.0
+        above, below = self.limits(values.x.shape[1])
+        if below is None:
+            found = values.x != 0.0 if above is None else values.x > above
         else:
-            level = np.broadcast_to(np.asarray(limit, dtype=np.float64).reshape(-1, 1), (values.x.shape[1], 1))
-            found = values.x > level if self.above is not None else values.x < level
+            found = values.x < below if above is None else (values.x > above) & (values.x < below)
         return found if values.good is None else found & values.good[:, None]
 
 
 @dataclass(frozen=True, eq=False)
 class Exceedance(Condition, Counted):
-    """Probability that a quantity is above (or below) a number at each sample time: value (k, d). Interval: Wilson's."""
+    """Probability that a quantity is above (or below) a number at each sample time: value (k, d). Interval: Wilson's.
+
+    above, below: one number, or one for each component; with both, that it lies between them.
+    """
 
     type: ClassVar[str] = "exceedance"
 
@@ -202,11 +221,14 @@ class _Passages:
 
     def _place(self, x: np.ndarray, when: slice, now: np.ndarray) -> None:
         """In which part of the time since the sample before these members passed: linear between the two."""
-        limit = self._statistic.limit
-        if self._before is None or limit is None:
+        above, below = self._statistic.limits(1)
+        if self._before is None or (above is None and below is None):
             return
         at = self._passed[now] - when.start
         before = np.where(at > 0, x[at - 1, now], self._before[now])
+        # Into a band over the end that is nearer.
+        limit = below if above is None else above if below is None else np.where(before <= above, above, below)
+        limit = np.asarray(limit).ravel()
         share = (limit - before) / (x[at, now] - before)
         self._piece[now] = np.clip(np.floor(share * PIECES), 0, PIECES - 1)
 
@@ -222,16 +244,18 @@ class _Passages:
 
 @dataclass(frozen=True, eq=False)
 class FirstPassage(Condition, Counted):
-    """Time until a quantity is first above (or below) a number, as its samples tell.
+    """Time until a quantity is first above (or below) a number, or with both between them, as its samples tell.
 
     value (k,): probability to have passed by each time, Kaplan & Meier's estimate: a member that fails before it passes
-    counts until its last good sample. survival is 1 - value. Interval: Wilson's with the number of members that has
-    Greenwood's variance. passed, lost (k,): members that pass at a time, and that failed before it without having
-    passed; count (k,): members at risk of passing at each time; censored: those that were good to the end and did not
-    pass. passage_time (levels,) [s]: the time by which that fraction has passed, infinite if it never has, with
-    passage_time_lower, _upper from the interval of value. A member passes between the sample before and the one that sees
-    it, where the line between the two does; of a quantity without a number, that is true or false, at the sample that sees
-    it. A passage that comes and goes between two samples is not seen (an event of the scene sees every step).
+    counts until its last good sample; NaN where no member is known at any time. survival is 1 - value. Interval: Wilson's
+    with the number of members whose fraction has the variance of a beta product (Fay, Brittain & Proschan 2013), which
+    knows how few are at risk; up to 1 where none is. passed, lost (k,): members that pass at a time, and that failed
+    before it without having passed; count (k,): members at risk of passing at each time; censored: those that were good
+    to the end and did not pass. passage_time (levels,) [s]: the time by which that fraction has passed, infinite if it
+    never has, with passage_time_lower, _upper from the interval of value. A member passes between the sample before and
+    the one that sees it, where the line between the two does; of a quantity without a number, that is true or false, at
+    the sample that sees it. A passage that comes and goes between two samples is not seen (an event of the scene sees
+    every step).
     """
 
     type: ClassVar[str] = "first_passage"
@@ -247,20 +271,14 @@ class FirstPassage(Condition, Counted):
         if self.of is not None and getattr(self, "_quantity", None) is not None and self.quantity.size != 1:
             faults.add("of", self.of, f"has {self.quantity.size} components", f"give one: {self.quantity.labels[0]!r}")
 
-    def open(self, times: int, count: int) -> _Passages:
+    def open(self, time: np.ndarray, count: int) -> _Passages:
         """What follows the members of a block."""
-        return _Passages(self, times, count)
-
-    @property
-    def limit(self) -> float | None:
-        """The number to be passed, if there is one."""
-        limit = self.above if self.above is not None else self.below
-        return None if limit is None else float(np.asarray(limit, dtype=np.float64).reshape(()))
+        return _Passages(self, len(time), count)
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Kaplan & Meier 1958, Greenwood 1926."""
+        """Kaplan & Meier 1958."""
         curve = _Curve(part)
-        lower, upper = intervals.wilson(curve.value, curve.members, self.confidence)
+        lower, upper = curve.ends(*intervals.wilson(curve.value, curve.members, self.confidence))
         passed, lost = curve.passed.sum(axis=1), part["lost"][0]
         arrays = {"value": curve.value[:, -1], "lower": lower[:, -1], "upper": upper[:, -1]}
         arrays |= {"survival": curve.survival[:, -1], "passed": passed, "lost": lost[:-1], "count": curve.risk}
@@ -268,7 +286,7 @@ class FirstPassage(Condition, Counted):
         arrays |= {"censored": lost[-1]}
         dims["censored"] = ()
         levels = {"level": np.asarray(self.levels, dtype=np.float64)}
-        text = "Wilson with Greenwood's variance"
+        text = "Wilson with the variance of the beta product"
         arrays |= (times := self._times(curve.value, lower, upper, time))
         return estimate(self, text, dims | along(times, "level"), arrays, time, levels, "1", labels=())
 
@@ -278,7 +296,7 @@ class FirstPassage(Condition, Counted):
         everything = self.whole(together(each))
         curve = _Curve(everything)
         curves = np.stack([_Curve(self.whole(own)).value for own in each])
-        ends = intervals.probability_of_replicates(curve.value, curves, curve.members, self.confidence)
+        ends = curve.ends(*intervals.probability_of_replicates(curve.value, curves, curve.members, self.confidence))
         found = {name: end[:, -1] for name, end in zip(("lower", "upper"), ends, strict=True)}
         found |= self._times(curve.value, *ends, time)
         return [self.read(everything, time).with_interval(by_replicates(replicates), found)]
@@ -294,11 +312,13 @@ class FirstPassage(Condition, Counted):
 
     def _reached(self, curve: np.ndarray, level: float, time: np.ndarray) -> float:
         """The time at which a rising curve reaches a level: linear within a piece, or a sample time if there is no line."""
+        if np.isnan(curve).all():
+            return np.nan
         there = np.flatnonzero(curve.ravel() >= level)
         if not len(there):
             return np.inf
         i, piece = divmod(int(there[0]), PIECES)
-        if i == 0 or self.limit is None:
+        if i == 0 or (self.above is None and self.below is None):
             return float(time[i])
         low, high = curve.ravel()[there[0] - 1], curve[i, piece]
         return float(time[i - 1] + (time[i] - time[i - 1]) * (piece + (level - low) / (high - low)) / PIECES)
@@ -307,9 +327,9 @@ class FirstPassage(Condition, Counted):
 class _Curve:
     """Kaplan & Meier's curve at the end of each piece of the times before samples: survival, and value 1 less it, (k, pieces).
 
-    passed (k, pieces): members that pass in a piece; risk (k,): members at risk of passing at each sample time; members
-    (k, pieces): of independent ones, as many would have Greenwood's variance. A member that is lost is known up to the
-    last sample before, and at risk in no piece after it.
+    passed (k, pieces): members that pass in a piece; risk (k,): members at risk of passing at each sample time; left (k,
+    pieces): those that still are at a piece's end. A member that is lost is known up to the last sample before, and at risk
+    in no piece after it. members (k, pieces): of independent ones, as many would be as sure.
     """
 
     def __init__(self, part: Part):
@@ -317,15 +337,37 @@ class _Curve:
         at = self.passed.sum(axis=1)
         total = int(part["passed"][0].sum())
         self.risk = total - np.cumsum(lost) - (np.cumsum(at) - at)
-        n = np.maximum(self.risk, 1)[:, None]
+        n = self.risk[:, None]
         so_far = np.cumsum(self.passed, axis=1)
-        step, left = 1.0 - so_far / n, np.maximum(n - so_far, 1)
-        whole = np.cumprod(step[:, -1])
-        survival = self.survival = np.concatenate([[1.0], whole[:-1]])[:, None] * step
-        terms = so_far / (n * left)
-        sums = np.cumsum(terms[:, -1])
-        greenwood = (np.concatenate([[0.0], sums[:-1]])[:, None] + terms) * survival**2
-        some = (greenwood > 0.0) & (survival > 0.0)
-        self.value = 1.0 - survival
-        known = self.risk[:, None] + (np.cumsum(at) - at)[:, None] + so_far
-        self.members = np.where(some, survival * self.value / np.where(some, greenwood, 1.0), known)
+        self.left = n - so_far
+        survival = _so_far(1.0 - so_far / np.maximum(n, 1), np.multiply)
+        self.survival = survival if self.risk[0] else np.full_like(survival, np.nan)
+        self.value = 1.0 - self.survival
+        self.members = self._members(n, self.left)
+
+    @staticmethod
+    def _members(n: np.ndarray, left: np.ndarray) -> np.ndarray:
+        """Members whose fraction has the variance of a product of beta numbers, one for each time with n at risk.
+
+        After m of n passed a survival lies between products of Beta(n - m + 1, m), of all times, without and with a last
+        Beta(left, 1), as it does between Clopper & Pearson's limits (Fay, Brittain & Proschan 2013, Biostatistics 14).
+        Between the two is a last Beta(left + 1/2, 1/2), with which the product is Jeffreys' Beta(n - m + 1/2, m + 1/2)
+        where none is lost: then these are all members. Where few are at risk Greenwood's variance is far too small.
+        """
+        mean = _so_far(np.log1p((left - n) / (n + 1.0)), np.add) + np.log1p(-0.5 / (left + 1.0))
+        # log(1 + variance / mean^2) of a Beta(a, b) is log(1 + b / (a (a + b + 1))).
+        spread = _so_far(np.log1p((n - left) / ((left + 1.0) * (n + 2.0))), np.add)
+        spread = spread + np.log1p(0.5 / ((left + 0.5) * (left + 2.0)))
+        # Of a Beta(a, b) mean (1 - mean) / variance is a + b + 1: here two more than the members.
+        return np.asarray(np.maximum(-np.expm1(mean) / (np.exp(mean) * np.expm1(spread)) - 2.0, 0.0))
+
+    def ends(self, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """An interval: who is lost last may pass at once, and so may all where none is known."""
+        nobody = not self.risk[0]
+        return np.where(nobody, 0.0, lower), np.where(nobody | (self.left <= 0), 1.0, upper)
+
+
+def _so_far(steps: np.ndarray, join: np.ufunc) -> np.ndarray:
+    """Of steps within each time (k, pieces), from the start: whole times joined, and the last one so far."""
+    whole = join.accumulate(np.concatenate([[join.identity], steps[:-1, -1]]))
+    return np.asarray(join(whole[:, None], steps))

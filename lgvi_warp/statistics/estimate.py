@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import functools
 import json
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from lgvi_warp.statistics.naming import canonical, free
 
 if TYPE_CHECKING:
     import xarray
@@ -99,12 +100,15 @@ class Estimate:
 
 
 class Estimates(Mapping[str, Estimate]):
-    """A run's statistics, by name, in the order that they were asked for."""
+    """A run's statistics, by name, in the order that they were asked for; "above 10.0" in a name is "above 10"."""
 
     def __init__(self, estimates: Sequence[Estimate] = ()):
         self._found = {one.name: one for one in estimates}
+        self._spelled = {canonical(name): name for name in self._found}
 
     def __getitem__(self, name: str) -> Estimate:
+        if name not in self._found and isinstance(name, str):
+            name = self._spelled.get(canonical(name), name)
         return self._found[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -115,18 +119,19 @@ class Estimates(Mapping[str, Estimate]):
 
     @functools.cached_property
     def dataset(self) -> xarray.Dataset:
-        """All as one xarray Dataset: "mean position" is the variable mean_position, its interval mean_position_lower."""
+        """All as one xarray Dataset: "mean position" is the variable mean_position, its interval mean_position_lower.
+
+        -0.5 in a name is minus_0_5; of names that make the same word the later ones end on _2, _3.
+        """
         import xarray as xr
 
-        whole = []
+        whole, taken = [], {"time"}
         for one in self.values():
-            word = re.sub(r"\W+", "_", one.name).strip("_")
             single = one.dataset
-            renamed = {name: word if name == "value" else f"{word}_{name}" for name in single.data_vars}
-            own = {d: f"{d}_of_{word}" for d in single.dims if d != "time" or len(one.time) == 1}
+            word = free(one.name, lambda word, single=single: _renamed(single, word).values(), taken)  # type: ignore[misc]
             for name in single.data_vars:
                 single[name].attrs |= {"long_name": f"{name} of {one.name}", "interval": one.interval}
-            whole.append(single.rename(renamed | own).drop_attrs(deep=False))
+            whole.append(single.rename(_renamed(single, word)).drop_attrs(deep=False))
         return xr.merge(whole, join="exact", compat="equals")
 
     def to_arrays(self) -> tuple[dict[str, np.ndarray], str]:
@@ -152,3 +157,9 @@ class Estimates(Mapping[str, Estimate]):
             values = {name: values for name, values in own.items() if not name.startswith(head)}
             found.append(Estimate(**words, arrays=values, coordinates=coordinates))
         return cls(found)
+
+
+def _renamed(single: xarray.Dataset, word: str) -> dict[Hashable, str]:
+    """Of one estimate's dataset, what all of its variables and dimensions are called among others'."""
+    names = {name: word if name == "value" else f"{word}_{name}" for name in single.data_vars}
+    return names | {d: f"{d}_of_{word}" for d, n in single.sizes.items() if d != "time" or n == 1}

@@ -23,6 +23,15 @@ def about(value: np.ndarray, standard_error: np.ndarray, factor: np.ndarray) -> 
     return value - half, value + half
 
 
+def of_logarithm(value: np.ndarray, standard_error: np.ndarray, factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of what is above 0: value times exp(-+ factor standard errors of its logarithm); 0 to infinity where one is infinite."""
+    open_ = (np.isinf(factor) | np.isinf(standard_error)) & ~np.isnan(value)
+    some = (value > 0.0) & ~open_
+    with np.errstate(over="ignore", invalid="ignore"):
+        ratio = np.exp(np.where(some, factor * standard_error / np.where(some, value, 1.0), 0.0))
+        return np.where(open_, 0.0, value / ratio), np.where(open_, np.inf, value * ratio)
+
+
 def wilson(
     probability: np.ndarray, count: np.ndarray, confidence: float, factor: float | np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:

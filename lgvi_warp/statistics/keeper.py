@@ -37,7 +37,7 @@ class Gathered:
     def open(self, plan: Plan, block: Block, members: Members) -> _BlockStatistics:
         """What gathers those of one block."""
         place = (block.first, block.first // self._size, self._size)
-        return _BlockStatistics(self._statistics, members, place, len(self.time), self._replicates)
+        return _BlockStatistics(self._statistics, members, place, self.time, self._replicates)
 
     def merge(self, block: Block, part: list[Part]) -> None:
         """Take in a block's part: of each statistic, named arrays."""
@@ -52,10 +52,11 @@ class Gathered:
         for statistic, tree in zip(self._statistics, self._trees, strict=True):
             if chosen is None or statistic is chosen:
                 with np.errstate(invalid="ignore", over="ignore"):
-                    found += self._said(statistic, tree.parts())
+                    found += self.said(statistic, tree.parts())
         return found
 
-    def _said(self, statistic: Statistic, parts: Sequence[Part]) -> list[Estimate]:
+    def said(self, statistic: Statistic, parts: Sequence[Part]) -> list[Estimate]:
+        """What one statistic says of the parts of a tree."""
         if self._replicates > 1:
             return statistic.estimates_of_replicates(parts, self.time, self._replicates)
         return statistic.estimates(parts, self.time)
@@ -86,12 +87,12 @@ class _BlockStatistics:
         statistics: Sequence[Statistic],
         members: Members,
         place: tuple[int, int, int],
-        times: int,
+        time: np.ndarray,
         replicates: int,
     ):
         self._statistics, self._members, self._place = statistics, members, place
         self._replicates = replicates
-        self._open = [one.open(times, members.count) for one in statistics]
+        self._open = [one.open(time, members.count) for one in statistics]
 
     def take(self, when: slice, samples: Fields) -> None:
         """Hand each statistic the values of its quantity; statistics of the same quantity share them."""

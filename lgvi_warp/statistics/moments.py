@@ -112,9 +112,10 @@ class Mean(Statistic):
 class Covariance(Statistic):
     """Covariance matrix over members, within a quantity or across several: value (k, d, d), divided by n - 1; correlation.
 
-    of=("position", "speed") takes four components together. Interval: normal theory with the standard error that the
+    of=("position", "speed") takes four components together. Interval: Student's t (n - 2) with the standard error that the
     members' own fourth moments give (delta method), which needs no normal members; of a variance's logarithm, which is
-    nearer to normal.
+    nearer to normal. Fourth moments of few members come out small: what normal members' would lack is added, a part of
+    order 1 / n (Bonett 2006 for variances). Two members say nothing of a spread: the interval is infinite.
     """
 
     type: ClassVar[str] = "covariance"
@@ -131,14 +132,16 @@ class Covariance(Statistic):
         return joined(left, right)
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """s_ij -+ t sqrt((E[x_i^2 x_j^2] - E[x_i x_j]^2) / (n - 1))."""
+        """s_ij -+ t sqrt((E[x_i^2 x_j^2] - E[x_i x_j]^2 + (E[x_i^2] E[x_j^2] + 2 E[x_i x_j]^2) / n) / (n - 1)) n / (n - 1)."""
         count = part["count"]
         n = count[:, None, None]
         value = empty_as_nan(part["m11"] / np.maximum(n - 1, 1), count, 2)
         some = np.maximum(n, 1)
-        spread = np.maximum(part["m22"] / some - (part["m11"] / some) ** 2, 0.0)
-        error = empty_as_nan(np.sqrt(spread / np.maximum(n - 1, 1)), count, 2)
-        lower, upper = self._ends(value, error, intervals.student(n, self.confidence))
+        m11, least = part["m11"] / some, np.maximum(n - 1, 1)
+        squares = np.einsum("kii->ki", m11)
+        spread = np.maximum(part["m22"] / some - m11**2, 0.0) + (outer(squares, squares) + 2.0 * m11**2) / some
+        error = empty_as_nan(np.sqrt(spread / least) * (some / least), count, 2)
+        lower, upper = self._ends(value, error, intervals.student(n - 1, self.confidence))
         deviation = np.sqrt(np.einsum("kii->ki", value))
         scale = outer(deviation, deviation)
         correlation = value / np.where(scale > 0.0, scale, np.inf)
@@ -154,11 +157,11 @@ class Covariance(Statistic):
 
     @staticmethod
     def _ends(value: np.ndarray, error: np.ndarray, factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """value -+ factor standard errors; of a variance s^2 exp(-+ that over s^2)."""
-        lower, upper = intervals.about(value, error, factor)
-        diagonal = np.eye(value.shape[-1], dtype=bool) & (value > 0.0) & np.isfinite(upper)
-        ratio = np.exp(np.where(diagonal, upper - value, 0.0) / np.where(diagonal, value, 1.0))
-        return np.where(diagonal, value / ratio, lower), np.where(diagonal, value * ratio, upper)
+        """value -+ factor standard errors; of a variance s^2 exp(-+ that over s^2), from 0 where there is no end."""
+        diagonal = np.eye(value.shape[-1], dtype=bool)
+        both = zip(intervals.of_logarithm(value, error, factor), intervals.about(value, error, factor), strict=True)
+        lower, upper = (np.where(diagonal, variance, other) for variance, other in both)
+        return lower, upper
 
     def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
         """The same with the standard errors of the replicates' estimates."""

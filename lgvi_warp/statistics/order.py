@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from numbers import Integral
 from typing import Any, ClassVar
 
 import numpy as np
@@ -72,8 +73,9 @@ class Extremes(Statistic):
 class Quantiles(Statistic):
     """Quantiles over members: value (k, levels, d). Exact up to `size` members; then from a sketch with a proven bound.
 
-    levels: between 0 and 1. size: numbers that each level of the sketch keeps, a power of two. rank_error (k,): proven
-    bound on the rank's error as a fraction of the members; what is to be expected is several times smaller.
+    levels: between 0 and 1. size: numbers that each level of the sketch keeps, a power of two; below 256 no block is
+    exact, however few its members. rank_error (k,): proven bound on the rank's error as a fraction of the members; what is
+    to be expected is several times smaller.
     Interval: from the ranks of sorted values (binomial, no assumption on the distribution), widened by the sketch's
     standard error; infinite where too few members lie beyond the level. Each replicate has a sketch of its own.
     """
@@ -92,8 +94,10 @@ class Quantiles(Statistic):
                 faults.add("levels", self.levels, "are no numbers between 0 and 1", "give (0.05, 0.5, 0.95)")
             object.__setattr__(self, "levels", tuple(np.unique(levels).tolist()))
         n = self.size
-        if isinstance(n, bool) or not isinstance(n, int) or n < 64 or n & (n - 1):
+        if isinstance(n, bool) or not isinstance(n, Integral) or n < 64 or int(n) & (int(n) - 1):
             faults.add("size", n, "is no power of two from 64", "give 2048")
+        else:
+            object.__setattr__(self, "size", int(n))
 
     def rows(self, values: Values) -> Part:
         """The block's values, sorted; every other one, and so on, down to `size`."""

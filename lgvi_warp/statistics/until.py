@@ -6,6 +6,7 @@ import itertools
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from lgvi_warp.errors import Faults, SceneError, closest
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.estimate import Estimate
 from lgvi_warp.statistics.moments import Covariance, Mean
+from lgvi_warp.statistics.naming import canonical
 from lgvi_warp.statistics.order import Quantiles
 from lgvi_warp.statistics.quantity import KNOWN
 
@@ -49,9 +51,10 @@ class Until:
         faults.positive("half_width", self.half_width, "in the unit of the statistic")
         if self.at is not None and self.at != "all":
             faults.number("at", self.at, "s", least=0.0)
-        if isinstance(self.members, bool) or not isinstance(self.members, int) or self.members < 2:
+        if isinstance(self.members, bool) or not isinstance(self.members, Integral) or self.members < 2:
             faults.add("members", self.members, "is no whole number from 2", "give 1024")
         faults.raise_if_any()
+        object.__setattr__(self, "members", int(self.members))
 
     def to_dict(self) -> dict[str, Any]:
         """As in a scene file."""
@@ -137,7 +140,10 @@ def watch(until: Until, statistics: Sequence[Statistic], times: np.ndarray) -> W
         if not len(rows):
             faults.add("at", until.at, "is no sample time", "give a time at which samples are kept, or leave it out")
     known = _named(statistics)
-    found = known.get(until.statistic) or _mean(until.statistic)
+    found = known.get(until.statistic)
+    if found is None and isinstance(until.statistic, str):
+        alike = (one for name, one in known.items() if canonical(name) == canonical(until.statistic))
+        found = next(alike, None) or _mean(until.statistic)
     if found is None:
         hint = closest(until.statistic, known or KNOWN)
         if known and not hint.startswith("did you mean"):  # of all names, those of whole statistics say enough
@@ -168,8 +174,11 @@ def _entries(one: Statistic) -> dict[str, dict[str, int]]:
     """The names of one statistic, of its components, of their levels, and of the entries of a covariance."""
     found: dict[str, dict[str, int]] = {one.key: {}}
     for i, label in enumerate(one.quantity.labels):
-        index = label[label.find("[") :] if "[" in label else f"[{i}]"
-        found[f"{one.key}{index}"] = found[f"{one.type} {label}"] = {"component": i, "component_2": i}
+        index = re.search(r"\[[^\]]*\]", label)
+        found[f"{one.key}{index[0] if index else f'[{i}]'}"] = found[f"{one.type} {label}"] = {
+            "component": i,
+            "component_2": i,
+        }
     if isinstance(one, Quantiles):
         for name, entry in list(found.items()):
             for j, level in enumerate(one.levels):

@@ -4,14 +4,13 @@ import re
 
 import numpy as np
 import pytest
-import warp as wp
 
 import lgvi_warp as lw
 from lgvi_warp import terms
 from lgvi_warp.solving import make_plan
 from tests.laws import CASES
 from tests.parity.test_terms import STATE, VEHICLE, scene_of
-from tests.tools import one
+from tests.tools import generated, one
 
 # What the generated source holds if a scene has this term, and only then.
 MARKS = {
@@ -37,9 +36,7 @@ BARE = lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 20.0 * 9.8)
 def source(scene, folder, method="psi_s", dtype="float64", **settings):
     """The C++ that Warp generates for a scene."""
     plan = make_plan(one(scene, **STATE), method, h=0.01, t1=0.1, dtype=dtype, **settings)
-    wp.compile_aot_module(plan.advance.kernel.module, device="cpu", module_dir=str(folder))
-    (path,) = folder.glob("*.cpp")
-    return path.read_text()
+    return generated(plan, folder)
 
 
 def laws_in(text):

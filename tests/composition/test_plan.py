@@ -15,17 +15,11 @@ from lgvi_warp.packets import pack
 from lgvi_warp.plan import SEGMENT_SAMPLE_BYTES
 from lgvi_warp.solving import make_plan
 from lgvi_warp.survey import shape_of_mass
-from tests.tools import TURN, one, scene_of
+from tests.tools import TURN, generated, one, scene_of
 
 
 def plan_of(scene, **named):
     return make_plan(one(scene), h=0.01, t1=1.0, **named)
-
-
-def generated(plan, folder):
-    """The C++ that Warp makes of the plan's kernel."""
-    wp.compile_aot_module(plan.advance.kernel.module, device="cpu", module_dir=str(folder))
-    return next(folder.glob("*.cpp")).read_text()
 
 
 def test_an_absent_term_is_no_code(tmp_path):
@@ -73,6 +67,17 @@ def test_a_second_solve_builds_no_kernel():
     before = make_advance.cache_info().misses
     lw.solve(one(scene_of((1.0, 2.0, 4.0), net=3.0), nu=[1.0, 0.0, 0.0]), h=0.02, t1=0.2)
     assert make_advance.cache_info().misses == before
+
+
+@pytest.mark.parametrize("names", [("su4(psi_s)", "kl6(psi_s)", "su8_15(psi_s)"), ("bm4(psi_x)", "bm6(psi_x)")])
+def test_compositions_of_a_method_share_its_kernel(names):
+    """Their coefficients are numbers that the kernel gets, unless a law asks for the time within a step."""
+    plain, held = scene_of(net=1.0), lw.Wrench(force=[1.0, 0.0, 0.0])
+    schedule = lw.terms.WrenchSchedule(times=(0.0, 1.0), force=((0.0,) * 3, (1.0,) * 3), torque=((0.0,) * 3,) * 2)
+    for terms, kernels in (([], 1), ([held], 1), ([schedule], len(names))):
+        scene = lw.Scene(plain.vehicle, plain.environment, terms)
+        plans = [make_plan(one(scene), name, h=0.01, t1=1.0) for name in names]
+        assert len({plan.kernel_hash for plan in plans}) == kernels
 
 
 def test_varying_a_parameter_compiles_nothing_else(scene):

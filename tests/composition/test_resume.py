@@ -96,11 +96,16 @@ def killed_after(path, blocks, delay, members):
 
 
 def test_three_kills(short, tmp_path):
-    dice = random.Random(3)
-    for blocks in (1, 3, 5):
-        assert killed_after(tmp_path / "run.zarr", blocks, dice.uniform(0.0, 0.02), 2048)
-        assert 0 < finished(tmp_path / "run.zarr") < 8
-        goes_on(tmp_path / "run.zarr", short[0])
+    path, dice = tmp_path / "run.zarr", random.Random(3)
+    for blocks in (1, 2, 4):
+        # Blocks are marked in groups: on a busy machine the last of them may be marked before the kill arrives.
+        for _ in range(5):
+            hit = killed_after(path, blocks, dice.uniform(0.0, 0.02), 2048)
+            if in_middle := hit and 0 < finished(path) < 8:
+                break
+            shutil.rmtree(path)
+        assert in_middle
+        goes_on(path, short[0])
 
 
 @pytest.mark.slow
@@ -124,9 +129,9 @@ def test_twenty_kills_at_random_moments(whole, tmp_path):
 
 @pytest.mark.slow
 def test_killed_again_and_again(whole, tmp_path):
-    """Each attempt is killed after three more blocks; the run still ends, with the same bytes."""
+    """Each attempt is killed after two more blocks or a few more; the run still ends, with the same bytes."""
     here, kills = tmp_path / "run.zarr", 0
-    while killed_after(here, finished(here) + 3, 0.0, 4096):
+    while killed_after(here, finished(here) + 2, 0.0, 4096):
         kills += 1
         assert kills < 10
     assert kills >= 3 and differing(whole[0], here) == []

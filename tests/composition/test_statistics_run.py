@@ -14,6 +14,7 @@ from lgvi_warp import cli, observation, scenefile
 from lgvi_warp.blocks import Block, blocks
 from lgvi_warp.saveat import FIELDS
 from lgvi_warp.solving import make_plan
+from lgvi_warp.statistics import TYPES
 from lgvi_warp.statistics.keeper import Gathered
 from tests.conftest import ROOT
 from tests.tools import one, random_states, scene_of
@@ -23,6 +24,9 @@ EVERY = [
     lw.Extremes("velocity"), lw.Histogram("depth", bins=10, limits=(-3.0, 3.0)), lw.Exceedance("depth", above=0.5),
     lw.FirstPassage("depth", above=1.0), lw.CircularMean("euler[2]"), lw.MeanAttitude(), lw.Mean("energy"),
     lw.PathMaximum("speed", then=[lw.Mean(), lw.Quantiles(levels=(0.5, 0.99), size=64)]),
+    lw.PathMinimum("depth"), lw.PathMean("depth", then=[lw.Mean(), lw.Extremes()]), lw.PathRms("speed"),
+    lw.PathRange("position"),
+    lw.PathTime("depth", above=-0.5, below=0.5), lw.PathTime("depth", above=0.25, then=[lw.Exceedance(above=0.3)]),
 ]  # fmt: skip
 
 
@@ -68,6 +72,30 @@ def test_statistics_are_those_of_the_samples(whole):
     np.testing.assert_allclose(ranks, (0.05, 0.5, 0.95), atol=s["quantiles depth"]["rank_error"][-1] + 1 / 1003)
 
 
+def test_statistics_of_paths_are_those_of_the_samples(whole):
+    s, t, depth = whole.statistics, whole.time, whole.position[..., 2]
+    speed = np.linalg.norm(whole.velocity, axis=-1)
+    average = np.trapezoid(depth, t, axis=0) / t[-1]
+    assert s["mean path_mean depth"].value[0, 0] == pytest.approx(average.mean(), rel=1e-12)
+    assert s["extremes path_mean depth"]["maximum"][0, 0] == pytest.approx(average.max(), rel=1e-14)
+    rms = np.sqrt(np.trapezoid(speed**2, t, axis=0) / t[-1])
+    assert s["mean path_rms speed"].value[0, 0] == pytest.approx(rms.mean(), rel=1e-12)
+    np.testing.assert_allclose(
+        s["mean path_range position"].value[0], np.ptp(whole.position, axis=0).mean(axis=0), rtol=1e-12
+    )
+    # By 20,000 points of each line, of which one or two crossings miss one each.
+    share = ((np.arange(20_000) + 0.5) / 20_000)[:, None]
+    inside, over = np.zeros(1003), np.zeros(1003)
+    for dt, a, b in zip(np.diff(t), depth[:-1], depth[1:], strict=True):
+        line = a + share * (b - a)
+        inside += dt * (np.abs(line) < 0.5).mean(axis=0)
+        over += dt * (line > 0.25).mean(axis=0)
+    found = s["mean path_time depth above -0.5 below 0.5"]
+    assert found.value[0, 0] == pytest.approx(inside.mean(), abs=1e-4) and found.unit == "s"
+    assert s["exceedance path_time depth above 0.25 above 0.3"].value[0, 0] == (over > 0.3).mean()
+    assert found.time.tolist() == [t[-1]] and found.count.tolist() == [1003]
+
+
 def test_quantities_are_those_of_the_result(fleet, whole):
     inertial = np.einsum("knij,knj->kni", whole.attitude, whole.velocity)
     names = ("velocity_inertial", "attitude", "angular_velocity", "speed")
@@ -108,12 +136,29 @@ def test_euler_angles_are_fossens():
     np.testing.assert_allclose(found["minimum"][0], np.deg2rad(angles.min(axis=0)), atol=1e-14)
 
 
+def test_every_statistic_is_among_them():
+    assert {one.type for one in EVERY} == set(TYPES)
+
+
 @pytest.mark.parametrize("threads", [1, 2, 3])
 def test_threads_change_no_bit(fleet, whole, threads):
     alone = lw.solve(fleet, **SETTINGS, statistics=EVERY, keep="none", threads=threads)
     assert same(alone.statistics, whole.statistics) and alone.samples == {} and alone.members == 1003
     with pytest.raises(AttributeError, match="keep='all'"):
         _ = alone.position
+
+
+@pytest.mark.parametrize("order", [(3, 2, 1, 0), (2, 0, 3, 1)])
+def test_the_order_in_which_blocks_finish_changes_no_bit(fleet, whole, order):
+    """What threads do by chance, done on purpose."""
+
+    class Ordered:
+        def run(self, work, blocks, advanced):
+            for i in order:
+                yield blocks[i], work(blocks[i])
+
+    found = lw.solve(fleet, **SETTINGS, statistics=EVERY, keep="none", executor=Ordered())
+    assert same(found.statistics, whole.statistics)
 
 
 def test_segments_change_no_bit(fleet, whole, monkeypatch):
@@ -160,7 +205,7 @@ def test_intervals_of_dependent_members_are_said_to_be(scene, whole, sampling, w
     sampled = lw.Ensemble(
         scene, 16, 1, {"start.position[0]": lw.Normal(std=1.0), "vehicle.mass": lw.Normal(std=1.0)}, sampling
     )
-    (text,) = observation.notes(whole.statistics, sampled.to_dict(), 1003) or ("",)
+    (text,) = observation.notes(whole.statistics, sampled.to_dict(), np.zeros(1003, np.uint8)) or ("",)
     assert words in text and bool(text) == bool(words)
 
 
@@ -236,8 +281,43 @@ def test_members_that_fail_are_left_out_from_then_on(spinning):
     np.testing.assert_array_equal(lean.kept.failure_time, r.failure_time[failed])
 
 
-def test_members_that_stop_are_held_or_left_out():
-    n = 300
+def test_paths_of_members_that_fail_are_left_out(spinning):
+    settings = {"h": 0.1, "t1": 4.0, "save": lw.SaveAt(every=0.5)}
+    kinds = (lw.PathMean, lw.PathRms, lw.PathRange, lw.PathTime)
+    r = lw.solve(spinning, **settings, statistics=[kind("depth") for kind in kinds])
+    whole, depth = r.status == 0, r.position[..., 2]
+    assert 0 < whole.sum() < 600
+    truths = [depth.mean(axis=0), depth.mean(axis=0), 0.0 * depth[0], 4.0 * (depth[0] != 0.0)]  # none moves
+    for kind, truth in zip(kinds, truths, strict=True):
+        found = r.statistics[f"mean {kind.type} depth"]
+        assert found.count.tolist() == [whole.sum()]
+        assert found.value[0, 0] == pytest.approx(truth[whole].mean(), rel=1e-12)
+
+
+def test_what_is_left_out_is_said_with_its_reason(spinning):
+    settings = {"h": 0.1, "t1": 1.0}
+    none = lw.Quantity("none", lambda s, m: np.where(s["position"][..., 2] < 50.0, np.nan, 1.0), "1", ("position",))
+    r = lw.solve(spinning, **settings, statistics=[lw.Mean("depth")])
+    failed = int(((r.status != 0) & (r.status < lw.Status.SURFACE)).sum())
+    (said,) = (text for text in r.messages if "leave out" in text)
+    assert f"leave out {failed} members from their failure on: {600 - failed} of 600 count" in said
+    both = lw.solve(spinning, **settings, statistics=[lw.Mean("depth"), lw.Mean(none)])
+    (said,) = (text for text in both.messages if "leave out" in text)
+    assert f"{failed} members from their failure on, and members where a number of theirs is not finite: " in said
+    left_out = 'members from the event on that stopped them (stopped = "left_out")'
+    for kind, words in (
+        (lw.Mean("depth"), None), (lw.Mean(none), "leave out members where a number of theirs is not finite: 0 of 300"),
+        (lw.Mean("depth", stopped="left_out"), left_out), (lw.PathMean("depth", stopped="left_out"), left_out),
+    ):  # fmt: skip
+        r = lw.solve(grounding(), h=0.1, t1=2.0, save=lw.SaveAt(every=0.5), statistics=[kind])
+        said = [text for text in r.messages if "leave out" in text]
+        assert (words is None and not said) or words in said[0], (kind, said)
+        if words is left_out:
+            assert f"leave out {(r.status == lw.Status.FLOOR).sum()} members" in said[0] and "finite" not in said[0]
+
+
+def grounding(n=300):
+    """Members that sink, some of them to the sea floor."""
     scene = lw.Scene(
         lw.Vehicle(10.0, (1.0, 2.0, 2.5), (20.0, 20.0, 20.0), 50.0),
         lw.Environment(gravity=9.8),
@@ -246,7 +326,12 @@ def test_members_that_stop_are_held_or_left_out():
     b = np.zeros((n, 3))
     b[:, 2] = np.linspace(-3.0, 0.9, n)
     still = (np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3)))
-    fleet = lw.Ensemble.from_states(scene, b, *still)
+    return lw.Ensemble.from_states(scene, b, *still)
+
+
+def test_members_that_stop_are_held_or_left_out():
+    n = 300
+    fleet = grounding(n)
     ask = [lw.Mean("depth", name="held"), lw.Mean("depth", stopped="left_out", name="left out")]
     r = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=0.5), statistics=ask)
     stopped = (r.status == lw.Status.FLOOR)[None] & (r.time[:, None] > r.failure_time)
@@ -290,13 +375,29 @@ def test_a_linear_gaussian_case_has_its_exact_moments():
         "mean position, velocity": mean,
         "covariance position, velocity": exact,
         "quantiles position": mean[:3] + np.sqrt(bb) * ndtri(np.array(levels))[:, None],
-        "exceedance position above (2.0, -2.5, 9.0)": ndtr((mean[:3] - [2.0, -2.5, 9.0]) / np.sqrt(bb)),
+        "exceedance position above (2, -2.5, 9)": ndtr((mean[:3] - [2.0, -2.5, 9.0]) / np.sqrt(bb)),
     }
     for name, truth in truths.items():
         assert np.all((found[name].lower[-1] <= truth) & (truth <= found[name].upper[-1])), name
-    # And the intervals are narrow: 4.2 standard errors of 20,000 members are 3 % of a standard deviation.
-    half = found["mean position, velocity"].half_width[-1]
-    np.testing.assert_allclose(half, ndtri(0.5 + 0.5 * share) * np.sqrt(np.diag(exact) / n), rtol=0.05)
+    # And the intervals are no wider than they have to be: 4.2 standard errors of the estimate, of 20,000 members.
+    z = ndtri(0.5 + 0.5 * share)
+    half = {name: found[name].half_width[-1] for name in truths}
+    variance = np.diag(exact)
+    np.testing.assert_allclose(half["mean position, velocity"], z * np.sqrt(variance / n), rtol=0.05)
+    # Of fourth moments, which of normal numbers are known to sqrt(14 / n) / 2 = 1.3 %.
+    errors = np.sqrt((np.outer(variance, variance) + exact**2) / n)
+    np.testing.assert_allclose(half["covariance position, velocity"], z * errors, rtol=5.0 * 0.5 * np.sqrt(14.0 / n))
+    p = truths["exceedance position above (2, -2.5, 9)"]
+    np.testing.assert_allclose(half["exceedance position above (2, -2.5, 9)"], z * np.sqrt(p * (1 - p) / n), rtol=0.05)
+    # Of order statistics: so many members lie between the two, which varies by the root of it; the sketch's error adds.
+    q = np.array(levels)[:, None]
+    ranks = z * np.sqrt(q * (1 - q) / n)
+    ideal = ranks * np.sqrt(bb) * np.sqrt(2.0 * np.pi) * np.exp(0.5 * ndtri(q) ** 2)
+    spread, wider = 5.0 / np.sqrt(2.0 * ranks * n), 1.0 + found["quantiles position"]["rank_error"][-1] / ranks
+    assert np.all(
+        (half["quantiles position"] / ideal > 1.0 - spread)
+        & (half["quantiles position"] / ideal < wider * (1.0 + spread))
+    )
 
 
 def falling(n=20_000):
@@ -320,6 +421,12 @@ def test_a_run_stops_when_it_knows_enough(threads):
     assert r.parameters["vehicle.mass"].shape == (1,) and len(r.failure_time) == r.members
 
 
+def test_a_run_stops_when_it_knows_enough_of_paths():
+    ask = {"h": 0.1, "t1": 1.0, "keep": "none", "statistics": [lw.PathTime("depth", above=10)]}
+    r = lw.solve(falling(), **ask, until=lw.Until("mean path_time depth above 10.0", 0.02))
+    assert r.members < 20_000 and r.statistics["mean path_time depth above 10"].half_width[0, 0] <= 0.02
+
+
 def test_a_run_says_when_it_does_not_know_enough():
     r = lw.solve(falling(2000), h=0.1, t1=1.0, keep="none", until=lw.Until("mean depth", 1e-9))
     assert r.members == 2000 and any("not reached with 2000" in message for message in r.messages)
@@ -334,7 +441,7 @@ def test_a_run_says_when_it_does_not_know_enough():
 REPLICATED = [
     lw.Mean("position"), lw.Quantiles("depth", (0.05, 0.5, 0.95), size=64), lw.Extremes("depth"), lw.MeanAttitude(),
     lw.Exceedance("depth", above=12.0), lw.FirstPassage("depth", above=12.0), lw.CircularMean("euler"),
-    lw.PathMaximum("speed", then=[lw.Mean(), lw.Quantiles(levels=(0.5,), size=64)]),
+    lw.PathMaximum("speed", then=[lw.Mean(), lw.Quantiles(levels=(0.5,), size=64)]), lw.PathMean("depth"),
 ]  # fmt: skip
 STARTS = {
     "start.position": lw.Normal(std=0.1),
@@ -378,6 +485,9 @@ def test_values_of_replicates_are_those_of_the_samples(designed):
     deepest = found["extremes depth"]
     np.testing.assert_array_equal(deepest["maximum_member"][:, 0], b[..., 2].argmax(axis=1))
     np.testing.assert_array_equal(deepest["maximum"][:, 0], b[..., 2].max(axis=1))
+    average = np.trapezoid(b[..., 2], r.time, axis=0) / r.time[-1]
+    path = found["mean path_mean depth"]
+    assert path.value[0, 0] == pytest.approx(average.mean(), rel=1e-13) and "16 replicates" in path.interval
     passed = (b[..., 2] > 12.0).any(axis=0).mean()
     assert found["first_passage depth above 12.0"].value[-1] == pytest.approx(passed, rel=1e-12)
 
@@ -503,6 +613,11 @@ levels = [0.05, 0.5, 0.95]
 type = "path_maximum"
 of = "speed"
 then = [{ type = "mean" }, { type = "exceedance", above = 1.0 }]
+[[run.statistics]]
+type = "path_time"
+of = "depth"
+above = 10
+below = 12.0
 [run.until]
 statistic = "mean position[2]"
 half_width = 1.0
@@ -518,7 +633,7 @@ def path(tmp_path):
 
 def test_scene_files(path):
     scene = lw.Scene.load(path)
-    assert [one.type for one in scene.run.statistics] == ["mean", "quantiles", "path_maximum"]
+    assert [one.type for one in scene.run.statistics] == ["mean", "quantiles", "path_maximum", "path_time"]
     assert scene.run.keep == "none" and scene.run.until == lw.Until("mean position[2]", 1.0)
     content = scene.to_dict()
     assert scenefile.from_dict(content).to_dict() == content
@@ -561,6 +676,7 @@ def test_the_command_prints_and_draws_them(path, tmp_path, capsys):
         "mean position[2]",
         "quantiles depth 0.95",
         "mean path_maximum speed",
+        "mean path_time depth above 10 below 12",
         "reached with 1024 members",
         "1,024 members",
     ):

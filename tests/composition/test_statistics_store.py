@@ -13,10 +13,11 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp import cli
 from lgvi_warp.observation import observation_of, observe
+from lgvi_warp.resuming import state
 from lgvi_warp.solving import make_plan, messages, provenance
 from lgvi_warp.store import Folder, create
 from tests.conftest import ROOT
-from tests.stores import SETTINGS, STATISTICS, UNTIL, bits, differing, fleet, tree
+from tests.stores import SETTINGS, STATISTICS, UNTIL, bits, differing, fleet, markers, tree
 
 
 @pytest.fixture(scope="module")
@@ -35,12 +36,50 @@ def whole(tmp_path_factory):
 def test_a_store_without_samples_has_statistics_and_arrays_of_members(whole, memory):
     stored = lw.open_run(whole)
     assert bits(stored) == bits(memory) and len(stored.samples) == 0
-    assert not (whole / "position").exists() and len(list((whole / "parts").rglob("statistics.npz"))) == 4
+    assert not (whole / "position").exists() and len(list((whole / "parts").glob("*.npy"))) == 4
     np.testing.assert_array_equal(stored.parameters["vehicle.mass"], memory.parameters["vehicle.mass"])
     for name in ("status", "failure_time", "warnings", "warning_time", "warning_value", "substeps"):
         np.testing.assert_array_equal(getattr(stored, name), getattr(memory, name))
     assert stored.provenance["observed"] == memory.provenance["observed"] and stored.messages == memory.messages
     assert "mean_position" in stored.statistics.dataset and "position" not in stored.dataset
+
+
+@pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
+def test_it_is_exported_with_its_statistics(whole, memory, tmp_path):
+    import pyarrow.parquet as pq
+    import xarray
+
+    with xarray.open_dataset(lw.export(whole, "netcdf", tmp_path / "run.nc"), group="statistics") as found:
+        np.testing.assert_array_equal(found.mean_position.values, memory.statistics["mean position"].value)
+    table = pq.read_table(lw.export(whole, "parquet", tmp_path / "run.parquet"))
+    assert table.column_names == ["realization", "vehicle.mass", "status", "failure_time"] and table.num_rows == 1003
+
+
+def test_statistics_of_damaged_parts_are_refused(whole, tmp_path):
+    path = shutil.copytree(whole, tmp_path / "run.zarr")
+    part = path / "parts" / "000000256.npy"
+    data = bytearray(part.read_bytes())
+    data[len(data) // 2] ^= 1
+    part.write_bytes(data)
+    with pytest.raises(lw.SceneError, match=r"parts/000000256.* has changed; `lgvi-warp resume .*` mends it"):
+        lw.open_run(path)
+    (path / "blocks" / "000000256.json").unlink()
+    with pytest.raises(lw.SceneError, match=r"blocks/000000256.json is missing or damaged; `lgvi-warp resume"):
+        lw.open_run(path)
+
+
+@pytest.mark.parametrize("harm", ["flip", "tear", "remove"])
+def test_a_damaged_part_is_seen_and_its_block_alone_runs_again(harm, whole, memory, tmp_path):
+    path = shutil.copytree(whole, tmp_path / "run.zarr")
+    part = path / "parts/000000512.npy"
+    data = bytearray(part.read_bytes())
+    data[len(data) // 2] ^= 1
+    {"flip": lambda: part.write_bytes(data), "tear": lambda: part.write_bytes(data[:-7]), "remove": part.unlink}[harm]()
+    assert any("parts/000000512.npy" in text for text in state(path)["damage"])
+    before = markers(path)
+    assert bits(lw.resume(path)) == bits(memory) and differing(whole, path) == []
+    after = markers(path)
+    assert [name for name in after if after[name] != before[name]] == ["000000512.json"]
 
 
 def test_samples_and_statistics_together(memory, tmp_path):

@@ -8,7 +8,7 @@ from lgvi_warp.method import PROGRAMS
 from lgvi_warp.reference import advance as twin
 from lgvi_warp.reference import rotation
 from lgvi_warp.status import Status
-from tests.tools import METHODS, body_of, one, random_states, scene_of, to_state
+from tests.tools import METHODS, PAIRS, body_of, one, random_states, scene_of, to_state
 
 SOLVES_HALF = ("psi", "psi_s")
 
@@ -18,8 +18,7 @@ def scene():
     return scene_of((2.0, 3.0, 4.0), (1.0, 2.0, 2.5), net=-0.1)
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("solver", ["quartic", "cayley", "newton"])
+@pytest.mark.parametrize(("method", "solver"), PAIRS)
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_step_too_large(scene, method, solver, axis):
     # On a principal axis equation (24) is solvable up to |J^-1 a| = 1: h Om = 1, or 2 for the methods of two half steps.

@@ -19,7 +19,7 @@ from lgvi_warp.executors.threads import Threads
 from lgvi_warp.running import Stored
 from lgvi_warp.solving import make_plan, messages, provenance
 from tests.conftest import ROOT
-from tests.stores import MEMBERS, SETTINGS, differing, fleet, tree
+from tests.stores import MEMBERS, SETTINGS, differing, fleet, markers, tree
 from tests.toy_keeper import DepthSum
 
 FIELDS = ("position", "attitude", "velocity", "angular_velocity")
@@ -193,23 +193,29 @@ def flip(path):
     path.write_bytes(data)
 
 
+WORDS = {flip: "has changed", tear: "is torn", remove: "is missing"}
+# Samples, numbers of members (each in all three ways) and what describes them.
 DAMAGED = (
-    ("position/c.0.2.0", flip, "has changed"),
-    ("attitude/c.0.0.0.0", tear, "is torn"),
-    ("vehicle.mass/c.3", remove, "is missing"),
-    ("status/c.1", flip, "has changed"),
-    ("position/zarr.json", flip, "has changed"),
-    ("created.json", flip, "is damaged"),
+    *((name, harm) for name in ("position/c.0.2.0", "status/c.1", "vehicle.mass/c.3") for harm in WORDS),
+    ("attitude/c.0.0.0.0", tear),
+    ("position/zarr.json", flip),
+    ("created.json", flip),
 )
+BLOCK_OF = {"position/c.0.2.0": 512, "status/c.1": 256, "vehicle.mass/c.3": 768, "attitude/c.0.0.0.0": 0}
 
 
-@pytest.mark.parametrize(("name", "harm", "word"), DAMAGED, ids=[f"{h.__name__} {n}" for n, h, _ in DAMAGED])
-def test_damage_is_seen_and_mended(copy, whole, name, harm, word, capsys):
+@pytest.mark.parametrize(("name", "harm"), DAMAGED, ids=[f"{h.__name__} {n}" for n, h in DAMAGED])
+def test_damage_is_seen_and_its_block_alone_runs_again(copy, whole, name, harm, capsys):
     harm(copy / name)
+    word = "is damaged" if name == "created.json" else WORDS[harm]
     assert cli.main(["info", str(copy)]) == 1
     assert f"damage      {name} {word}" in capsys.readouterr().out
+    before = markers(copy)
     lw.resume(copy)
     assert differing(whole, copy) == [] and cli.main(["info", str(copy)]) == 0
+    after = markers(copy)
+    again = [int(one.removesuffix(".json")) for one in after if after[one] != before[one]]
+    assert again == ([BLOCK_OF[name]] if name in BLOCK_OF else [])
 
 
 def test_damaged_times_are_mended_by_the_same_run(copy, whole):
@@ -218,6 +224,65 @@ def test_damaged_times_are_mended_by_the_same_run(copy, whole):
         lw.resume(copy)
     lw.solve(fleet(), **SETTINGS, store=lw.Store(copy, existing="resume"))
     assert differing(whole, copy) == []
+
+
+def test_lost_times_are_not_taken_for_nan(copy, whole):
+    """A missing chunk reads as NaN: a run that went on with that would write it down as right."""
+    for name in ("time/c.0", "step/c.0"):
+        (copy / name).unlink()
+        before = tree(copy)
+        with pytest.raises(lw.SceneError, match=f"{name} is missing; run the same scene again"):
+            lw.resume(copy)
+        assert tree(copy) == before
+        if name.startswith("time"):
+            with pytest.raises(lw.SceneError, match=r"time/c.0 is missing"):
+                lw.open_run(copy)
+        lw.solve(fleet(), **SETTINGS, store=lw.Store(copy, existing="resume"))
+        assert differing(whole, copy) == []
+
+
+def test_lost_folders_are_made_again(copy, whole):
+    for name in ("blocks", "parts", "position"):
+        shutil.rmtree(copy / name)
+    lw.resume(copy)
+    assert differing(whole, copy) == []
+
+
+def test_what_was_there_is_told(copy):
+    (copy / "blocks" / "000000256.json").unlink()
+    assert "went on: 3 of 4 blocks were there and whole, 1 ran" in lw.resume(copy).messages
+    result = lw.solve(fleet(), **SETTINGS, store=lw.Store(copy, existing="resume"))
+    assert result.messages == ("nothing was missing: 4 of 4 blocks were there and whole",) and not result.run_seconds
+
+
+@pytest.mark.parametrize("to", ["netcdf", "parquet"])
+def test_what_is_damaged_is_not_exported(copy, tmp_path, to):
+    """What is missing would be exported as NaN."""
+    out = tmp_path / "run.out"
+    (copy / "blocks" / "000000256.json").unlink()
+    with pytest.raises(lw.SceneError, match=r"1 blocks are not marked as finished; `lgvi-warp resume .*` mends it"):
+        lw.export(copy, to, out)
+    lw.resume(copy)
+    (copy / "velocity" / "c.0.2.0").unlink()
+    with pytest.raises(lw.SceneError, match=r"velocity/c.0.2.0 is missing; `lgvi-warp resume"):
+        lw.export(copy, to, out)
+    with pytest.raises(lw.SceneError, match=r"is a folder; give the name of a file"):
+        lw.export(copy, to, tmp_path)
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["run.zarr"]
+
+
+@pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
+@pytest.mark.parametrize("to", ["netcdf", "parquet"])
+def test_a_full_disk_is_told_by_an_export(whole, tmp_path, to, capsys):
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, before[1]))
+    try:
+        assert cli.main(["export", str(whole), "--to", to, "--out", str(tmp_path / "run.out")]) == 1
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    said = capsys.readouterr().err
+    assert said.startswith(f"lgvi-warp: {tmp_path / 'run.out'}: ") and said.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_damaged_marker_runs_its_block_again(copy, whole):
@@ -255,11 +320,42 @@ def test_parts_of_a_run_are_merged(tmp_path, whole):
     assert differing(whole, tmp_path / "some" / "run.zarr") == []
     with pytest.raises(lw.SceneError, match="holds a run already"):
         lw.merge([tmp_path / "a"], tmp_path / "all")
+    # Nor is what comes of a complete run that has lost a block.
+    (folder.path / "blocks" / "000000256.json").unlink()
+    lost = lw.merge([folder.path], tmp_path / "lost")
+    assert not lost.complete and lw.resume(lost.path).members == MEMBERS and differing(whole, lost.path) == []
+
+
+def test_a_store_in_use_is_not_replaced_by_a_merge(copy, tmp_path):
+    with store.held(copy), pytest.raises(lw.SceneError, match="another run is writing"):
+        lw.merge([copy], tmp_path, overwrite=True)
+    assert lw.merge([copy], tmp_path, overwrite=True).complete
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["run.zarr"]
+
+
+def test_parts_that_may_only_be_read_are_merged(copy, whole, tmp_path):
+    """What comes of them may be written: modes are not copied."""
+    for one in copy.rglob("*"):
+        one.chmod(0o555 if one.is_dir() else 0o444)
+    made = lw.merge([copy], tmp_path / "all").path
+    assert differing(whole, made) == []
+    assert all(one.stat().st_mode & 0o200 for one in made.rglob("*"))
+    for one in copy.rglob("*"):
+        one.chmod(0o755)
+
+
+def test_a_part_that_is_damaged_lends_no_times(tmp_path, whole):
+    for name, only in (("a", range(0, 2)), ("b", range(2, 4))):
+        lw.solve(fleet(), **SETTINGS, store=tmp_path / name / "run.zarr", only=only)
+    (tmp_path / "a" / "run.zarr" / "time" / "c.0").unlink()
+    assert differing(whole, lw.merge([tmp_path / "a", tmp_path / "b"], tmp_path / "all").path) == []
+    with pytest.raises(lw.SceneError, match=r"time/c.0 is missing"):
+        lw.merge([tmp_path / "a"], tmp_path / "none")
 
 
 def test_only_parts_of_one_run_are_merged(tmp_path, whole):
     lw.solve(fleet(), **{**SETTINGS, "t1": 2.0}, store=tmp_path / "run.zarr", only=range(0, 1))
-    with pytest.raises(lw.SceneError, match="steps is 200 in the store and 300 here"):
+    with pytest.raises(lw.SceneError, match=r"steps is 200 in .*run.zarr and 300 in .*: these are parts of different"):
         lw.merge([whole, tmp_path], tmp_path / "all")
     flipped = shutil.copytree(whole, tmp_path / "flipped.zarr")
     flip(flipped / "position" / "c.0.1.0")
@@ -268,8 +364,12 @@ def test_only_parts_of_one_run_are_merged(tmp_path, whole):
 
 
 def test_blocks_beyond_the_run_are_refused(tmp_path):
-    with pytest.raises(lw.SceneError, match="blocks 0:9: are not within the 4"):
-        lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", only=range(0, 9))
+    for only in (range(4, 9), range(2, 2), range(-1, 2), range(0, 4, 2)):
+        with pytest.raises(lw.SceneError, match=f"blocks {only.start}:{only.stop}: are not within the 4"):
+            lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", only=only)
+    assert list(tmp_path.iterdir()) == []
+    # The last of equal parts may be shorter.
+    assert lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", only=range(3, 6)).members == 1003 - 768
     with pytest.raises(lw.SceneError, match="is for a run into a store"):
         lw.solve(fleet(), **SETTINGS, only=range(0, 1))
 
@@ -388,6 +488,38 @@ def test_a_full_disk_keeps_what_is_finished(tmp_path, whole, monkeypatch, capsys
     assert differing(whole, path) == []
 
 
+def test_a_disk_that_is_full_when_a_block_was_written_already(tmp_path, whole, monkeypatch):
+    """Some systems find out when they sync: the run ends, and all other blocks that were written are there."""
+
+    def limited(beside, target, sync=durable.sync_file):
+        if target.name == "000000256.json":
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        sync(beside, target)
+
+    monkeypatch.setattr(durable, "sync_file", limited)
+    path = tmp_path / "run.zarr"
+    with pytest.raises(OSError, match=r"No space left on device: the blocks that were finished are kept"):
+        lw.solve(fleet(), **SETTINGS, store=path, threads=1)
+    assert resuming.state(path)["damage"] == [] and 1 <= resuming.state(path)["finished"] <= 3
+    assert not list(path.rglob(f"*{durable.UNFINISHED}")) and not resuming.state(path)["complete"]
+    monkeypatch.undo()
+    lw.resume(path)
+    assert differing(whole, path) == []
+
+
+def test_an_interrupted_run_keeps_the_blocks_that_were_written(tmp_path, whole):
+    def interrupted(fraction):
+        if fraction > 0.8:
+            raise KeyboardInterrupt
+
+    path = tmp_path / "run.zarr"
+    with pytest.raises(KeyboardInterrupt):
+        lw.solve(fleet(), **SETTINGS, store=path, threads=1, progress=interrupted)
+    assert resuming.state(path)["finished"] == 3 and not list(path.rglob(f"*{durable.UNFINISHED}"))
+    lw.resume(path)
+    assert differing(whole, path) == []
+
+
 def test_a_file_that_may_not_grow_is_told_as_a_full_disk(tmp_path, capsys):
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     arguments = ["run", str(ROOT / "examples" / "paper.toml"), "--members", "500", "--set", "run.save_every=0.1",
@@ -474,11 +606,24 @@ def test_parts_of_keepers_lie_in_the_store(tmp_path, memory):
     assert differing(tmp_path / "a.zarr", tmp_path / "b.zarr") == []
     with pytest.raises(lw.SceneError, match=r"stores \['depth sum'\], not \[\]"):
         lw.resume(tmp_path / "b.zarr")
-    path = tmp_path / "b.zarr" / "parts" / "000000512" / "depth sum.npz"
+    path = tmp_path / "b.zarr" / "parts" / "000000512.npy"
     flip(path)
-    assert any("depth sum.npz has changed" in text for text in resuming.state(tmp_path / "b.zarr")["damage"])
+    assert any("000000512.npy has changed" in text for text in resuming.state(tmp_path / "b.zarr")["damage"])
     assert run("b.zarr", existing="resume").sums.tobytes() == one.sums.tobytes()
     assert differing(tmp_path / "a.zarr", tmp_path / "b.zarr") == []
+
+
+def test_parts_of_several_keepers_lie_in_one_file(tmp_path):
+    plan = make_plan(fleet(10), **SETTINGS)
+    several = DepthSum(plan), DepthSum(plan), DepthSum(plan)
+    given = np.arange(4.0), np.zeros(0), np.array([-0.0, np.nan])
+    for keeper, name in zip(several, ("second", "a third", "first"), strict=True):
+        keeper.name = name
+    path = tmp_path / "000000000.npy"
+    path.write_bytes(store.packed(several, given))
+    found = store.unpacked(several[::-1], path)
+    assert [one.tobytes() for one in found] == [one.tobytes() for one in given[::-1]]
+    assert [one.tobytes() for one in store.unpacked(several[1:2], path)] == [b""]
 
 
 def test_keepers_that_cannot_be_stored_are_refused(tmp_path):
@@ -510,13 +655,18 @@ def test_parquet(whole, memory, tmp_path):
     assert table["realization"][at].as_py() == 700 and table["time"][at].as_py() == memory.time[11]
     assert table["position_2"][at].as_py() == memory.position[11, 700, 2]
     assert table["attitude_12"][at].as_py() == memory.attitude[11, 700, 1, 2]
+    assert table["vehicle.mass"][at].as_py() == memory.parameters["vehicle.mass"][700]
+    assert [table.schema.field(name).metadata for name in ("velocity_0", "vehicle.mass")] == [
+        {b"units": b"m s-1"},
+        {b"units": b"kg"},
+    ]
     with pytest.raises(lw.SceneError, match=r"to = 'csv'"):
         lw.export(whole, "csv")
 
 
 def test_what_is_no_run_is_named(tmp_path):
     for call in (lw.open_run, lw.resume, resuming.state):
-        with pytest.raises(lw.SceneError, match=r"holds 0 stores; give the folder of a run made with --store zarr"):
+        with pytest.raises(lw.SceneError, match=r"holds no store; give the folder of a run made with --store zarr"):
             call(tmp_path)
     with pytest.raises(lw.SceneError, match="is not there"):
         lw.open_run(tmp_path / "none")

@@ -79,6 +79,32 @@ def test_indices_of_ishigamis_function(found):
     assert_close(found.first[1], found.first_confidence[1], [0.0, 1.0, 0.0])
 
 
+# Of Sobol's g, by factor; the vehicle's start has a factor for each.
+WEIGHTS = np.array([0.0, 1.0, 4.5, 9.0, 99.0])
+UNIT = {
+    name: lw.Uniform(low=0.0, high=1.0)
+    for name in (*(f"start.angular_velocity[{i}]" for i in range(2)), *(f"start.position[{i}]" for i in range(3)))
+}
+
+
+def sobols_g(result):
+    """Product of (|4 x_i - 2| + a_i) / (1 + a_i), Saltelli & Sobol (1995), of the start's rates and position."""
+    x = np.concatenate([result.angular_velocity[0, :, :2], result.position[0]], axis=1)
+    return np.prod((np.abs(4.0 * x - 2.0) + WEIGHTS) / (1.0 + WEIGHTS), axis=1)
+
+
+def test_indices_of_sobols_g(scene):
+    found = uq.sobol(scene, sobols_g, samples=2048, vary=UNIT, seed=5, second_order=False, **RUN)
+    assert found.factors == tuple(UNIT) and found.members == 2048 * 7
+    # V_i = 1 / 3 / (1 + a_i)^2 are the variances of its factors, whose means are 1.
+    V = 1.0 / 3.0 / (1.0 + WEIGHTS) ** 2
+    whole = np.prod(1.0 + V) - 1.0
+    assert_close(found.first[0], found.first_confidence[0], V / whole)
+    assert_close(found.total[0], found.total_confidence[0], V * np.prod(1.0 + V) / (1.0 + V) / whole)
+    assert found.first_confidence[0].max() < 0.1 and found.total_confidence[0].max() < 0.1
+    assert abs(found.std[0] ** 2 / whole - 1.0) < 0.02
+
+
 def test_the_table_and_its_files(found, tmp_path):
     text = str(found)
     assert all(word in text for word in ("ishigami", "start.position[1]", "2048 samples", "16384 members", "0 failed"))
@@ -223,14 +249,36 @@ def test_noise_that_acts_alike_belongs_to_no_factor(sinking):
     assert alone.total[0, 0] > 1e-6 and alike.total[0, 0] < 1e-20
 
 
-@pytest.mark.parametrize("sampling", ["sobol", "halton", {"latin_hypercube": {"group": 20}}, "saltelli"], ids=str)
+NOISE = lw.WrenchNoise(force=(1.0, 1.0, 1.0), torque=(0.0, 0.0, 0.0))
+HEAVIER = {"vehicle.mass": np.linspace(123.0, 125.0, 40)}
+LINES = np.random.default_rng(0).uniform(0.01, 0.99, (40, 3))
+
+
+@pytest.mark.parametrize(
+    "sampling",
+    ["random", "sobol", "halton", {"latin_hypercube": {"group": 20}}, "saltelli", "morris",
+     lw.Grid({"vehicle.buoyancy": 8, "vehicle.mass": 5}), lw.Table(values=HEAVIER), lw.Levels(LINES)],
+    ids=lambda one: str(one)[:20],
+)  # fmt: skip
 def test_a_member_runs_again_alone_with_its_bits(sinking, sampling):
-    noisy = dataclasses.replace(sinking, terms=[lw.WrenchNoise(force=(1.0, 1.0, 1.0), torque=(0.0, 0.0, 0.0))])
-    fleet = lw.Ensemble(noisy, 40, 3, LAWS, sampling)
+    noisy = dataclasses.replace(sinking, terms=[NOISE])
+    laws = {name: law for name, law in LAWS.items() if not (isinstance(sampling, lw.Table) and name in HEAVIER)}
+    fleet = lw.Ensemble(noisy, 40, 3, laws, sampling)
     whole = lw.solve(fleet, **SINK).position
-    np.testing.assert_array_equal(lw.solve(fleet.member(33), **SINK).position, whole[:, 33:34])
+    assert len(np.unique(whole[-1, :, 2])) == 40
+    for i in (0, 33, 39):
+        np.testing.assert_array_equal(lw.solve(fleet.member(i), **SINK).position, whole[:, [i]])
     back = lw.Scene.from_dict(noisy.to_dict() | {"ensemble": fleet.subset([7, 2]).to_dict()})
     np.testing.assert_array_equal(lw.solve(back, **SINK).position, whole[:, [7, 2]])
+
+
+@pytest.mark.parametrize(
+    "sampling", ["random", "sobol", "halton", {"latin_hypercube": {"group": 20}}, "saltelli", "morris"], ids=str
+)
+def test_members_that_are_added_leave_the_others_bits(sinking, sampling):
+    """Noise included, and although they run in two blocks then."""
+    few, many = (lw.Ensemble(dataclasses.replace(sinking, terms=[NOISE]), n, 3, LAWS, sampling) for n in (40, 400))
+    np.testing.assert_array_equal(lw.solve(many, **SINK).position[:, :40], lw.solve(few, **SINK).position)
 
 
 # Members that fail --------------------------------------------------------------------------------------------------------

@@ -1,14 +1,19 @@
 """The command: what it writes, what it says, and how it refuses."""
 
+import io
 import json
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
+from lgvi_warp.cli import command, settings
+from lgvi_warp.cli.progress import shown
+from lgvi_warp.cli.runs import all_failed
 from tests.conftest import ROOT
 
 PAPER = str(ROOT / "examples" / "paper.toml")
@@ -153,7 +158,7 @@ def test_a_run_in_parts(tmp_path, capsys):
     assert cli.main(["info", parts[0]]) == 1
     assert "1 of 3 finished; not complete: lgvi-warp resume" in capsys.readouterr().out
     assert cli.main(["merge", *parts[:2], "--out", str(tmp_path / "some")]) == 1
-    assert "1 blocks are in none of the folders" in capsys.readouterr().err
+    assert "1 of 3 blocks are in none of the folders" in capsys.readouterr().err
     assert cli.main(["merge", *parts, "--out", str(tmp_path / "all")]) == 0
     assert "complete" in capsys.readouterr().out
 
@@ -177,14 +182,101 @@ def test_bad_arguments_of_stores_are_refused(arguments, words, tmp_path, capsys)
 
 
 def test_progress_tells_the_time_left():
-    import io
-
     stream = io.StringIO()
     progress = cli.Progress(stream)
     progress._interval = 0.0
     progress(0.25)
     progress.close()
     assert stream.getvalue().startswith(" 25.0%, ") and "s left" in stream.getvalue()
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_the_progress_line_is_clean_whatever_happens(monkeypatch):
+    """Also before the first step: processes start with nothing done for a while."""
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    with pytest.raises(KeyboardInterrupt), shown(False) as progress:
+        progress._interval = 0.0
+        progress(0.0)
+        progress(0.5)
+        raise KeyboardInterrupt
+    first, second, blank, rest = stream.getvalue().removeprefix("\r").split("\r")
+    assert first.strip() == "0.0%" and second.startswith(" 50.0%, ") and not blank.strip() and not rest
+    assert len(blank) >= max(len(first), len(second))
+    with shown(True) as progress:
+        assert progress is None
+
+
+def test_numbers_may_be_written_as_people_write_them():
+    chosen = cli.parser().parse_args(["run", PAPER, "--members", "1e6", "--seed", "7", "--keep", "3,17"])
+    assert cli.overrides(chosen) == {"run.keep": "[3,17]", "ensemble.members": "1000000", "ensemble.seed": "7"}
+    for text in ("1.5", "many", "nan"):
+        chosen = cli.parser().parse_args(["run", PAPER, "--members", text, "--keep", "failed"])
+        assert cli.overrides(chosen) == {"run.keep": "failed", "ensemble.members": text}
+
+
+def test_members_that_an_event_stopped_have_not_failed():
+    for status, failed in (([16, 17], False), ([1, 0], False), ([1, 16], False), ([1, 3], True)):
+        assert all_failed(SimpleNamespace(status=np.array(status))) == failed
+
+
+def test_a_file_where_a_folder_should_be_is_named(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    for verb in ("run", "stability", "sensitivity", "tradeoff"):
+        assert cli.main([verb, PAPER, "--out", str(tmp_path / "file")]) == 2
+        assert f"--out {tmp_path / 'file'}: is a file; give a folder" in capsys.readouterr().err
+    for verb in (["info"], ["resume"], ["export", "--to", "netcdf"]):
+        assert cli.main([*verb, str(tmp_path / "file")]) == 2
+        assert "file: is a file; give the folder of a run made with --store zarr" in capsys.readouterr().err
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_the_run(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(settings.os, "access", lambda path, mode: False)
+    monkeypatch.setattr(lw.Scene, "load", lambda *_: None)
+    for verb in ("run", "tradeoff"):
+        assert cli.main([verb, PAPER, "--out", str(tmp_path)]) == 1
+        text = f"lgvi-warp: {tmp_path}: Permission denied: choose a folder that can be written\n"
+        assert capsys.readouterr().err == text
+
+
+def test_a_recording_that_cannot_be_begun_is_told(finished, tmp_path):
+    result = lw.Result.load(finished[0] / "result.npz")
+    with pytest.raises(OSError, match=r"could not be written .*; is the disk full, or the folder read-only"):
+        lw.log_rerun(result, tmp_path / "none" / "fleet.rrd")
+
+
+def test_what_an_interrupt_leaves_is_said(tmp_path, monkeypatch, capsys):
+    def interrupted(chosen):
+        raise KeyboardInterrupt
+
+    for verb in ("run", "resume", "info"):
+        monkeypatch.setitem(command.VERBS, verb, interrupted)
+    run = ["run", PAPER, "--store", "zarr", "--out", str(tmp_path)]
+    cases = [(run, "nothing was written"), (["info"], "nothing was to be written")]
+    (tmp_path / "there" / "run.zarr").mkdir(parents=True)
+    kept = f"finished blocks are kept: go on with lgvi-warp resume {tmp_path / 'there'}"
+    cases += [([*run[:-1], str(tmp_path / "there")], kept), (["resume", str(tmp_path / "there")], kept)]
+    for arguments, text in cases:
+        assert cli.main(arguments) == 130
+        assert capsys.readouterr().err == f"lgvi-warp: interrupted; {text}\n"
+
+
+def test_an_error_of_the_system_without_a_file_is_said(monkeypatch, capsys):
+    def full(chosen):
+        raise OSError("no room")
+
+    monkeypatch.setitem(command.VERBS, "info", full)
+    assert cli.main(["info"]) == 1 and capsys.readouterr().err == "lgvi-warp: no room\n"
+
+
+def test_exit_codes_are_told(capsys):
+    with pytest.raises(SystemExit):
+        cli.main(["--help"])
+    assert "exit codes: 0 done; 1 members, files or the disk failed" in capsys.readouterr().out
 
 
 def test_info(capsys):

@@ -69,6 +69,25 @@ def test_blocks_subsets_and_longer_ensembles_have_the_same_members(scene, conten
     assert_same(longer.select(0, n), whole, slice(0, n))
 
 
+@pytest.mark.parametrize("kind", [lw.Table, lw.Levels])
+def test_lines_may_be_added(scene, kind):
+    """Members of the lines that were there stay as they are, and so do the numbers drawn beside a table."""
+    lines = np.random.default_rng(2).uniform(0.1, 0.9, (50, 2))
+    vary = {"vehicle.buoyancy": lw.Uniform(half_width=1.0), "start.position[2]": lw.Normal(std=1.0)}
+
+    def of(rows):
+        if kind is lw.Levels:
+            return lw.Ensemble(scene, None, 3, vary, lw.Levels(rows))
+        return lw.Ensemble(
+            scene, None, 3, vary, lw.Table({"vehicle.mass": rows[:, 0], "start.position[0]": rows[:, 1]})
+        )
+
+    fewer, more = of(lines[:20]), of(lines)
+    assert_same(more.select(0, 20), fewer.select(0, 20), slice(0, 20))
+    assert_same(more.member(17).select(0, 1), fewer.select(0, 20), [17])
+    assert len(np.unique(more.select(0, 50).position[:, 2])) == 50
+
+
 @pytest.mark.parametrize("content", [*SEQUENCES, *REPLICATED], ids=str)
 def test_far_members(content):
     far = 10**8 + 3

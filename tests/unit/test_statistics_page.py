@@ -20,7 +20,7 @@ def snippets(language):
 @pytest.mark.parametrize("text", snippets("toml"))
 def test_toml(text, tmp_path):
     (tmp_path / "scene.toml").write_text((ROOT / "examples" / "paper.toml").read_text() + text)
-    assert len(lw.Scene.load(tmp_path / "scene.toml").run.statistics) == 3
+    assert len(lw.Scene.load(tmp_path / "scene.toml").run.statistics) == 4
 
 
 @pytest.mark.parametrize("text", snippets("python"))

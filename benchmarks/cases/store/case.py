@@ -1,19 +1,25 @@
-"""Bytes per second into a store, beside the same bytes in plain files of the same sizes, synced, in turn and by as many
-threads (two a core, as the executor has them with a store); a whole run into a store beside the same in memory; and
-statistics alone with a store beside without."""
+"""Bytes per second into a store, beside the same bytes in plain files of the same sizes, each synced; a whole run into a
+store beside the same in memory; and statistics alone with a store beside without.
+
+Both of a pair run in turn, in an order that changes; ratios are the median of the pairs', seconds and MB/s the best of each.
+The store writes with as many threads as a run has, one a core, until every block is durable; plain files with two a
+core, as each of them waits for the disk.
+"""
 
 import os
-import shutil
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from statistics import median
 
 import numpy as np
 
+from benchmarks.cases.statistics.case import statistics
 from lgvi_warp import machine, speed
 from lgvi_warp.blocks import Work, blocks
 from lgvi_warp.executors.threads import Threads
+from lgvi_warp.observation import Observation, Observing
 from lgvi_warp.packets import Outcome
 from lgvi_warp.running import Progress, Stored, run_blocks
 from lgvi_warp.saveat import SaveAt
@@ -30,9 +36,41 @@ def came_through(count):
     return Outcome(np.zeros(count, np.uint8), long, none, chosen, bits, long, none, long)
 
 
+def in_turn(calls, rounds):
+    """{name: results} of calls by name, each of them made once a round, in an order that changes."""
+    found = {name: [] for name in calls}
+    for i in range(rounds):
+        for name in list(calls) if i % 2 else reversed(calls):
+            found[name].append(calls[name]())
+    return found
+
+
+def ratio(several, others):
+    """Median of the ratios of what was measured in turn."""
+    return round(median(one / other for one, other in zip(several, others, strict=True)), 2)
+
+
+def sizes_of(folder):
+    """Bytes of each chunk."""
+    return [path.stat().st_size for path in folder.rglob("c.*")]
+
+
+def emptied(folder):
+    """Give a run's bytes back to the disk, and leave its files.
+
+    For about a minute ext4 passes by the number of every file that was removed, one at a time, whenever it makes a new one:
+    removed runs would slow down those after them.
+    """
+    for path in folder.rglob("*"):
+        if path.is_file():
+            os.truncate(path, 0)
+    # What the disk still does for this run is not to be the next one's time.
+    os.sync()
+
+
 def into_store(plan, folder, threads, samples):
-    """Seconds to put prepared samples into a new store, every block durable; and the bytes."""
-    chosen = Store(folder / "run.zarr", existing="overwrite")
+    """Seconds to put prepared samples into a new store, every block durable; and the sizes of its chunks."""
+    chosen = Store(tempfile.mkdtemp(dir=folder) + "/run.zarr")
     create(chosen, plan, provenance(plan), ())
     sink = Sink(chosen.folder, columns(plan, chosen))
     k, runs = len(plan.grid.times), blocks(plan.ensemble.members)
@@ -46,11 +84,10 @@ def into_store(plan, folder, threads, samples):
         sink.finish(block, writer.close(came_through(block.count)), (), ())
 
     start = time.perf_counter()
-    with ThreadPoolExecutor(threads) as pool:
+    with sink.commits, ThreadPoolExecutor(threads) as pool:
         list(pool.map(one, runs))
-    seconds = time.perf_counter() - start
-    sizes = [path.stat().st_size for path in chosen.folder.rglob("c.*")]
-    shutil.rmtree(chosen.folder)
+    seconds, sizes = time.perf_counter() - start, sizes_of(chosen.folder)
+    emptied(chosen.folder)
     return seconds, sizes
 
 
@@ -58,8 +95,7 @@ def into_files(folder, threads, sizes):
     """Seconds to write plain files of these sizes, each its own part of memory, and sync each."""
     ends = np.cumsum(sizes)
     data = np.arange(-(-int(ends[-1]) // 8)).view(np.uint8)
-    place = folder / "plain"
-    place.mkdir()
+    place = Path(tempfile.mkdtemp(dir=folder))
 
     def one(numbered):
         i, size = numbered
@@ -74,23 +110,24 @@ def into_files(folder, threads, sizes):
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(one, enumerate(sizes)))
     seconds = time.perf_counter() - start
-    shutil.rmtree(place)
+    emptied(place)
     return seconds
 
 
 def sink_record(folder, quick, members, times):
     """How fast the store takes what is ready."""
-    threads = 2 * machine.thread_count()
+    threads = machine.thread_count()
     plan = make_plan(speed.fleet(members), "psi_s", h=0.01, t1=0.1 * (times - 1), save=SaveAt(every=0.1))
     count = blocks(members)[0].count
     rng = np.random.default_rng(0)
     shapes = {"position": (3,), "attitude": (3, 3), "velocity": (3,), "angular_velocity": (3,)}
     samples = {name: rng.normal(size=(times, count, *shape)) for name, shape in shapes.items()}
-    pairs = []
-    for _ in range(2 if quick else 5):
-        seconds, sizes = into_store(plan, folder, threads, samples)
-        pairs.append((seconds, into_files(folder, threads, sizes)))
-    stored, plain = (min(column) for column in zip(*pairs, strict=True))
+    _, sizes = into_store(plan, folder, threads, samples)
+    calls = {
+        "store": lambda: into_store(plan, folder, threads, samples)[0],
+        "plain": lambda: into_files(folder, 2 * threads, sizes),
+    }
+    found = in_turn(calls, 2 if quick else 15)
     megabytes = sum(sizes) / 1e6
     return {
         "what": "samples that are ready",
@@ -98,9 +135,9 @@ def sink_record(folder, quick, members, times):
         "times": times,
         "MB": round(megabytes),
         "files": len(sizes),
-        "store_MB_s": round(megabytes / stored),
-        "disk_MB_s": round(megabytes / plain),
-        "part_of_disk": round(plain / stored, 2),
+        "store_MB_s": round(megabytes / min(found["store"])),
+        "disk_MB_s": round(megabytes / min(found["plain"])),
+        "part_of_disk": ratio(found["plain"], found["store"]),
     }
 
 
@@ -109,53 +146,70 @@ def run_record(folder, quick):
     members, threads = (8192, machine.thread_count()) if quick else (65536, machine.thread_count())
     plan = make_plan(speed.fleet(members), "psi_s", h=0.01, t1=10.0, save=SaveAt(every=0.1))
     plan.compile()
-    found = []
-    for _ in range(2 if quick else 3):
-        memory = run_plan(plan, threads).run_seconds
+
+    def stored():
         start = time.perf_counter()
-        chosen = Store(folder / "run.zarr", existing="overwrite")
+        chosen = Store(tempfile.mkdtemp(dir=folder) + "/run.zarr")
         Stored(plan, chosen, provenance(plan), messages(plan)).run(Threads(threads))
-        stored = time.perf_counter() - start
-        sizes = [path.stat().st_size for path in chosen.folder.rglob("c.*")]
-        shutil.rmtree(chosen.folder)
-        found.append((memory, stored, into_files(folder, threads, sizes)))
-    memory, stored, plain = (min(column) for column in zip(*found, strict=True))
+        seconds, sizes = time.perf_counter() - start, sizes_of(chosen.folder)
+        emptied(chosen.folder)
+        return seconds, sizes
+
+    _, sizes = stored()
+    calls = {
+        "memory": lambda: run_plan(plan, threads).run_seconds,
+        "store": lambda: stored()[0],
+        "plain": lambda: into_files(folder, 2 * threads, sizes),
+    }
+    found = in_turn(calls, 2 if quick else 7)
     return {
         "what": "a run",
         "members": members,
         "steps": plan.grid.steps,
         "MB": round(sum(sizes) / 1e6),
-        "memory_s": round(memory, 2),
-        "store_s": round(stored, 2),
-        "disk_s": round(plain, 2),
-        "over_memory_plus_disk": round(stored / (memory + plain), 2),
+        "memory_s": round(min(found["memory"]), 2),
+        "store_s": round(min(found["store"]), 2),
+        "disk_s": round(min(found["plain"]), 2),
+        "store_to_disk": ratio(found["store"], found["plain"]),
+        "store_to_memory": ratio(found["store"], found["memory"]),
     }
 
 
-def statistics_record(folder, quick):
-    """A keeper of sums alone: with a store that takes no samples, beside without a store."""
+def statistics_record(folder, quick, what, observed, keepers):
+    """Statistics alone: with a store that takes no samples, beside without a store.
+
+    keepers: what makes those of a plan, new ones for each run. The store's creation is told apart from the rest.
+    """
     members, threads = (8192, machine.thread_count()) if quick else (262_144, machine.thread_count())
-    plan = make_plan(speed.fleet(members), "psi_s", h=0.01, t1=10.0, save=SaveAt(every=1.0))
+    save = SaveAt(every=1.0)
+    plan = make_plan(speed.fleet(members), "psi_s", h=0.01, t1=10.0, save=save, fields=observed.fields)
     plan.compile()
-    found = []
-    for _ in range(2 if quick else 5):
+
+    def without():
         start = time.perf_counter()
-        made = Progress(1, None)
-        run_blocks(Work(plan, (DepthSum(plan),)), blocks(members), Threads(threads), made.at)
-        without = time.perf_counter() - start
-        start = time.perf_counter()
-        chosen = Store(folder / "run.zarr", fields=(), existing="overwrite")
-        Stored(plan, chosen, provenance(plan), messages(plan), (DepthSum(plan),)).run(Threads(threads))
-        found.append((without, time.perf_counter() - start))
-        shutil.rmtree(chosen.folder)
-    without, stored = (min(column) for column in zip(*found, strict=True))
+        run_blocks(Work(plan, keepers(plan)), blocks(members), Threads(threads), Progress(1, None).at)
+        return time.perf_counter() - start
+
+    def stored():
+        own, start = keepers(plan), time.perf_counter()
+        chosen = Store(tempfile.mkdtemp(dir=folder) + "/run.zarr", fields=(), existing="resume")
+        create(chosen, plan, provenance(plan), messages(plan), own)
+        there = time.perf_counter()
+        Stored(plan, chosen, provenance(plan), messages(plan), own).run(Threads(threads))
+        seconds = time.perf_counter() - there, there - start
+        emptied(chosen.folder)
+        return seconds
+
+    found = in_turn({"without": without, "store": stored}, 2 if quick else 11)
+    rest, creation = zip(*found["store"], strict=True)
     return {
-        "what": "statistics alone",
+        "what": f"statistics alone: {what}",
         "members": members,
         "steps": plan.grid.steps,
-        "without_s": round(without, 2),
-        "store_s": round(stored, 2),
-        "ratio": round(stored / without, 2),
+        "without_s": round(min(found["without"]), 3),
+        "store_s": round(min(rest), 3),
+        "creation_s": round(min(creation), 3),
+        "ratio": ratio(rest, found["without"]),
     }
 
 
@@ -166,4 +220,11 @@ def run(quick):
         if not quick:
             yield sink_record(folder, quick, 262_144, 11)
         yield run_record(folder, quick)
-        yield statistics_record(folder, quick)
+        yield statistics_record(folder, quick, "sum of depths", Observation(), lambda plan: (DepthSum(plan),))
+        chosen = Observation(statistics(), "none")
+        what = "mean, covariance, quantiles, extremes"
+
+        def gathered(plan):
+            return Observing(chosen, plan.grid.times, plan.ensemble.members).keepers
+
+        yield statistics_record(folder, quick, what, chosen, gathered)

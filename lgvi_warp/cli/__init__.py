@@ -1,0 +1,8 @@
+"""The command lgvi-warp."""
+
+from lgvi_warp.cli.arguments import parser
+from lgvi_warp.cli.command import entry, main
+from lgvi_warp.cli.progress import Progress
+from lgvi_warp.cli.settings import overrides
+
+__all__ = ["Progress", "entry", "main", "overrides", "parser"]

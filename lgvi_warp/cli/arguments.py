@@ -1,0 +1,215 @@
+"""The arguments of the command, verb by verb."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+OF = "position, attitude, velocity, angular_velocity or energy"
+
+
+EPILOG = """examples:
+  lgvi-warp run examples/paper.toml --out runs/paper
+  lgvi-warp run examples/paper.toml --members 20000 --dtype float32 --set vehicle.mass=120
+  lgvi-warp run examples/paper.toml --error 1e-3
+  lgvi-warp run examples/paper.toml --members 1000000 --store zarr --out runs/large
+  lgvi-warp resume runs/large
+  lgvi-warp tradeoff examples/paper.toml --out runs/tradeoff
+  lgvi-warp sensitivity examples/paper.toml --of "position[2]" --out runs/sensitivity
+  lgvi-warp stability examples/paper.toml --out runs/stability
+  lgvi-warp info
+
+exit codes: 0 done; 1 members, files or the disk failed, or info or merge found a run that is not whole; 2 refused: a scene,
+an argument, or what lies in a folder; 130 interrupted. Results go to stdout, progress and faults to stderr.
+"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command's arguments."""
+    top = argparse.ArgumentParser(
+        prog="lgvi-warp",
+        description="Simulate many underwater vehicles at once with a Lie group variational integrator.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
+    run = verbs.add_parser("run", help="run a scene's ensemble: result.npz, fleet.png, fleet.rrd and a summary")
+    _add_scene(run, "runs/NAME of the scene")
+    run.add_argument(
+        "--error",
+        metavar="E",
+        type=float,
+        help="choose the cheapest method, step and precision that keep this error, and check it after the run",
+    )
+    run.add_argument("--of", help=f"what --error is of (default: position [m]); {OF}")
+    run.add_argument("--method", help="psi_s, psi_1, psi, phi, phi_adjoint, or a composition such as kl6(psi_s)")
+    run.add_argument("--step", metavar="S", help="time step [s]")
+    run.add_argument("--dtype", help="float64, float32, or float32_compensated: sums of two float32")
+    run.add_argument("--solver", help="of equation (24): quartic, cayley, newton or moser_veselov")
+    run.add_argument(
+        "--iterations", metavar="N", help='of every solve: a number, or "auto" (default: to the tolerance)'
+    )
+    run.add_argument("--tolerance", metavar="T", help="relative residual above which a solve is not converged")
+    run.add_argument("--rtol", metavar="R", help="with --atol, rk5 and rk8 choose their steps for this relative error")
+    run.add_argument("--atol", metavar="A", help="and for this absolute one")
+    run.add_argument(
+        "--checks", help="none, safe (statuses, default) or all (warnings of what arises on the way as well)"
+    )
+    run.add_argument(
+        "--on-failure", help="freeze a member that fails (default), raise: exit code 1, or substep: divide its step"
+    )
+    _add_keep(run)
+    run.add_argument("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
+    _add_executor(run)
+    run.add_argument(
+        "--store",
+        choices=["npz", "zarr"],
+        default="npz",
+        help="result.npz when the run ends (default), or run.zarr block by block, which resume can go on with",
+    )
+    run.add_argument("--store-dtype", metavar="D", help="float32: store the samples of a float64 run so")
+    run.add_argument(
+        "--blocks",
+        metavar="A:B",
+        help="with --store zarr: run only these blocks, to be merged later (as many of them as there are)",
+    )
+    there = run.add_mutually_exclusive_group()
+    there.add_argument("--overwrite", action="store_true", help="replace a run.zarr that is there")
+    there.add_argument("--resume", action="store_true", help="go on with a run.zarr that is there, if it is this run")
+    _add_plan(verbs)
+    _add_store_verbs(verbs)
+    trade = verbs.add_parser(
+        "tradeoff", help="speed against accuracy of every method, step and precision: tradeoff.json, .csv and .png"
+    )
+    _add_scene(trade, "runs/NAME_tradeoff")
+    trade.add_argument("--methods", metavar="A,B", help="names, such as psi_s,kl8(psi_x) (default: all that fit)")
+    trade.add_argument("--of", default="position", help=f"what errors are of (default: position); {OF}")
+    trade.add_argument(
+        "--seconds",
+        metavar="S",
+        type=float,
+        default=45.0,
+        help="about how long to measure (default 45)",
+    )
+    _add_sensitivity(verbs)
+    _add_stability(verbs)
+    info = verbs.add_parser(
+        "info", help="what a run's folder holds; without one, the machine, versions, the core's peak"
+    )
+    info.add_argument("dir", metavar="DIR", type=Path, nargs="?", help="a store, or a folder with one")
+    info.set_defaults(scene=None)
+    bench = verbs.add_parser("bench", help="speed of the kernel on this machine, beside the core's peak")
+    bench.add_argument("--members", type=int, default=4096, help="vehicles (default 4096)")
+    bench.add_argument("--steps", type=int, default=1000, help="steps (default 1000)")
+    return top
+
+
+def _add_sensitivity(verbs: Any) -> None:
+    """lgvi-warp sensitivity and its arguments."""
+    verb = verbs.add_parser(
+        "sensitivity",
+        help="what of that which varies matters: Sobol indices or Morris screening; .txt, .csv, .json, .png",
+    )
+    verb.add_argument("scene", metavar="SCENE", help="scene file (TOML) with [ensemble.vary]")
+    verb.add_argument("--of", metavar="Q", action="append", help='quantity of interest: "position[2]" (the default), '
+                      '"norm(velocity)", "max(energy)" ...; may be given several times')  # fmt: skip
+    verb.add_argument("--out", metavar="DIR", type=Path, help="folder for the files (default: runs/NAME_sensitivity)")
+    verb.add_argument("--analysis", choices=("sobol", "morris"), default="sobol", help="default sobol")
+    verb.add_argument("--samples", metavar="N", type=int, help="groups of the design (default: sobol 256, morris 64)")
+    verb.add_argument(
+        "--first-order", action="store_true", help="sobol without pairs of factors: about half the members"
+    )
+    verb.add_argument("--failed", choices=("refuse", "drop"), default="refuse",
+                      help="what to do about groups with a failed member (default refuse)")  # fmt: skip
+    verb.add_argument("--method", help="integration method, as of run")
+    verb.add_argument("--step", metavar="S", help="time step [s]")
+    verb.add_argument("--dtype", help="float64, float32, or float32_compensated")
+    verb.add_argument("--duration", metavar="S", help="end of the run [s]")
+    verb.add_argument("--seed", metavar="N", help="seed of the design")
+    verb.add_argument("--threads", metavar="N", type=int, help="threads (default: all cores)")
+    verb.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="replace a key of the scene file")
+    verb.add_argument("--quiet", action="store_true", help="no progress and no table")
+
+
+def _add_stability(verbs: Any) -> None:
+    """The arguments of lgvi-warp stability."""
+    verb = verbs.add_parser(
+        "stability",
+        help="where methods are accurate, bounded, flagged or fail, over two parameters: .json, .csv and .png",
+    )
+    _add_scene(verb, "runs/NAME_stability", ensemble=False)
+    verb.add_argument(
+        "--grid",
+        choices=("omega", "mass", "drag", "all"),
+        help="step against angular velocity (default), added-mass ratio or drag number, or all three",
+    )
+    axis = "NAME or NAME=LOW:HIGH[:linear], such as"
+    verb.add_argument("--x", metavar="AXIS", help=f"instead of --grid: {axis} h=0.01:3")
+    verb.add_argument("--y", metavar="AXIS", help=f"instead of --grid: {axis} angular_velocity, vehicle.mass=50:500")
+    verb.add_argument("--methods", metavar="A,B", help="names, such as psi_s,kl8(psi_x) (default: psi,psi_s,psi_x,rk4)")
+    verb.add_argument("--points", metavar="N", type=int, default=24, help="cells along each axis (default 24)")
+    verb.add_argument("--error", metavar="E", type=float, default=1e-2, help="an accurate cell's bound (default 0.01)")
+    verb.add_argument("--of", default="attitude", help=f"what --error is of (default: attitude); {OF}")
+
+
+def _add_keep(verb: argparse.ArgumentParser) -> None:
+    """Whose samples are kept."""
+    kinds = "all (default), none, failed, or indices 3,17"
+    verb.add_argument("--keep", help=f"samples of members to keep: {kinds} (statistics are those of the scene)")
+
+
+def _add_executor(verb: argparse.ArgumentParser) -> None:
+    """Where blocks run."""
+    verb.add_argument("--threads", metavar="N", type=int, help="threads, processes or workers (default: all cores)")
+    verb.add_argument("--executor", default="threads", help="threads (default), processes or dask")
+    verb.add_argument("--scheduler", metavar="ADDRESS", help="of Dask; without one, a cluster on this machine")
+
+
+def _add_plan(verbs: Any) -> None:
+    """The verb plan."""
+    plan = verbs.add_parser(
+        "plan", help="time, memory and disk that a run would take, from a small one on this machine"
+    )
+    _add_scene(plan, "runs/NAME of the scene")
+    plan.add_argument("--method", help="as for run")
+    plan.add_argument("--step", metavar="S", help="time step [s]")
+    plan.add_argument("--dtype", help="as for run")
+    _add_keep(plan)
+    plan.add_argument("--threads", metavar="N", type=int, help="threads (default: all cores)")
+    plan.add_argument("--store", choices=["npz", "zarr"], default="npz", help="as for run")
+    plan.add_argument("--store-dtype", metavar="D", help="as for run")
+
+
+def _add_store_verbs(verbs: Any) -> None:
+    """The verbs that work on a store."""
+    resume = verbs.add_parser("resume", help="go on with a run that was stopped, and mend what is damaged of it")
+    resume.add_argument("dir", metavar="DIR", type=Path, help="a store, or a folder with one")
+    _add_executor(resume)
+    resume.add_argument("--force", action="store_true", help="even on another machine or with other versions")
+    resume.add_argument("--quiet", action="store_true", help="no progress and no summary")
+    merge = verbs.add_parser("merge", help="put runs of some blocks each (run --blocks) together")
+    merge.add_argument("dirs", metavar="DIR", type=Path, nargs="+", help="stores, or folders with one each")
+    merge.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the whole run")
+    merge.add_argument("--overwrite", action="store_true", help="replace a run.zarr that is there")
+    merge.add_argument("--quiet", action="store_true", help="no summary")
+    export = verbs.add_parser("export", help="write a run as one NetCDF or Parquet file")
+    export.add_argument("dir", metavar="DIR", type=Path, help="a store, or a folder with one")
+    export.add_argument("--to", required=True, help="netcdf or parquet")
+    export.add_argument(
+        "--out", metavar="FILE", type=Path, help="the file, replaced if it exists (default: beside the store)"
+    )
+
+
+def _add_scene(verb: argparse.ArgumentParser, folder: str, ensemble: bool = True) -> None:
+    """The arguments of a verb that runs a scene."""
+    verb.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
+    verb.add_argument(
+        "--out", metavar="DIR", type=Path, help=f"folder for the files, replaced if they exist (default: {folder})"
+    )
+    verb.add_argument("--duration", metavar="S", help="end of the run [s]")
+    if ensemble:
+        verb.add_argument("--members", metavar="N", help="number of vehicles")
+    verb.add_argument("--seed", metavar="N", help="seed of what varies")
+    verb.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="replace a key of the scene file")
+    verb.add_argument("--quiet", action="store_true", help="no progress and no summary")

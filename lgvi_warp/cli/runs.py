@@ -1,0 +1,137 @@
+"""The verbs run, plan and resume."""
+
+from __future__ import annotations
+
+import argparse
+import threading
+import time
+from typing import Any
+
+from lgvi_warp.cli.progress import shown
+from lgvi_warp.cli.report import report, told
+from lgvi_warp.cli.settings import block_range, folder, overrides, store_settings
+from lgvi_warp.errors import MembersFailed, SceneError
+
+
+def run(chosen: argparse.Namespace) -> int:
+    """lgvi-warp run."""
+    from lgvi_warp.scene import Scene
+
+    begun = time.perf_counter()
+    scene = Scene.load(chosen.scene, overrides(chosen))
+    store, only = store_settings(chosen), block_range(chosen)
+    out = folder(chosen)
+    warm = _import_in_background()
+    from lgvi_warp.solving import solve
+
+    suggested = suggestion(scene, chosen)
+    settings = suggested.settings if suggested else {}
+    failures = []
+    with shown(chosen.quiet) as progress:
+        try:
+            result = solve(
+                scene, threads=chosen.threads, width=chosen.width, progress=progress, store=store,
+                executor=chosen.executor, scheduler=chosen.scheduler, only=only, **settings,
+            )  # fmt: skip
+        except MembersFailed as error:
+            result, failures = error.result, [str(error)]
+    warm.join()
+    faults = report(result, out, chosen.quiet, begun) + failures
+    if suggested:
+        faults += check_error(scene, result, suggested, chosen.quiet)
+    return 1 if told(faults) or all_failed(result) else 0
+
+
+def all_failed(result: Any) -> bool:
+    """Whether no member got to its end, or to the event that ended it."""
+    from lgvi_warp.status import Status
+
+    return bool(((result.status != 0) & (result.status < Status.SURFACE)).all())
+
+
+def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:
+    """What --error asks for, said; None without it. Raises SceneError."""
+    if chosen.error is None:
+        if chosen.of is not None:
+            raise SceneError([f"--of {chosen.of}: says what --error is of, which is missing; add --error 1e-3"])
+        return None
+    if not (isinstance(scene.run.keep, str) and scene.run.keep == "all") or scene.run.until is not None:
+        raise SceneError(
+            [f'--error {chosen.error:g}: is checked on samples of all members; give run.keep="all", no run.until']
+        )
+    for name in ("step", "dtype"):
+        if getattr(chosen, name) is not None:
+            text = f"--{name} {getattr(chosen, name)}: is what --error chooses"
+            raise SceneError([f"{text}; leave out --{name} or --error"])
+    from lgvi_warp.suggestion import suggest
+
+    methods = [chosen.method] if chosen.method else None
+    of = chosen.of or "position"
+    with shown(chosen.quiet) as progress:
+        found = suggest(scene, chosen.error, of, methods=methods, threads=chosen.threads, progress=progress)
+    if not chosen.quiet:
+        print(found, flush=True)
+    return found
+
+
+def check_error(scene: Any, result: Any, suggested: Any, quiet: bool) -> list[str]:
+    """Say what error the run has, by some members at half its step; a fault where it is above what was asked."""
+    from lgvi_warp.ensemble import Ensemble
+    from lgvi_warp.suggestion import verified
+
+    found, members = verified(Ensemble.from_scene(scene), result, suggested)
+    text = (
+        f"error of {suggested.of} {found:.1e} {suggested.unit}, asked {suggested.error:g} ({members} members again at "
+    )
+    text += "half the step, those with the largest errors among them)"
+    if not found <= suggested.error:
+        return [f"{text}: missed; ask for a smaller one"]
+    if not quiet:
+        print(f"checked     {text}")
+    return []
+
+
+def _import_in_background() -> threading.Thread:
+    """Load the plotting libraries while the kernels run, which leave the interpreter free."""
+
+    def load() -> None:
+        import importlib
+
+        for name in ("matplotlib.figure", "matplotlib.backends.backend_agg", "rerun", "rerun.blueprint"):
+            try:
+                importlib.import_module(name)
+            except ImportError:
+                return  # whoever needs it says so, and how to get it
+
+    thread = threading.Thread(target=load, name="imports", daemon=True)
+    thread.start()
+    return thread
+
+
+def resume(chosen: argparse.Namespace) -> int:
+    """lgvi-warp resume."""
+    from lgvi_warp.resuming import resume as go_on
+
+    begun = time.perf_counter()
+    failures = []
+    with shown(chosen.quiet) as progress:
+        try:
+            result = go_on(
+                chosen.dir, executor=chosen.executor, threads=chosen.threads, scheduler=chosen.scheduler,
+                progress=progress, force=chosen.force,
+            )  # fmt: skip
+        except MembersFailed as error:
+            result, failures = error.result, [str(error)]
+    assert result.store is not None
+    faults = report(result, result.store.parent, chosen.quiet, begun) + failures
+    return 1 if told(faults) or all_failed(result) else 0
+
+
+def plan(chosen: argparse.Namespace) -> int:
+    """lgvi-warp plan."""
+    from lgvi_warp.prediction import predict
+    from lgvi_warp.scene import Scene
+
+    scene = Scene.load(chosen.scene, overrides(chosen))
+    print(predict(scene, threads=chosen.threads, store=store_settings(chosen)))
+    return 0

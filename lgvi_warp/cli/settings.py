@@ -1,0 +1,111 @@
+"""What the arguments ask of a scene and of a store."""
+
+from __future__ import annotations
+
+import argparse
+import errno
+import os
+from pathlib import Path
+from typing import Any
+
+from lgvi_warp.errors import SceneError
+
+# The store in a run's folder.
+RUN = "run.zarr"
+# Command-line option -> key of the scene file that it replaces.
+OPTIONS = {
+    "method": "run.method",
+    "step": "run.step",
+    "duration": "run.duration",
+    "dtype": "run.dtype",
+    "solver": "run.solver",
+    "iterations": "run.iterations",
+    "tolerance": "run.tolerance",
+    "rtol": "run.rtol",
+    "atol": "run.atol",
+    "checks": "run.checks",
+    "on_failure": "run.on_failure",
+    "keep": "run.keep",
+    "members": "ensemble.members",
+    "seed": "ensemble.seed",
+}
+
+
+def overrides(chosen: argparse.Namespace) -> dict[str, Any]:
+    """What the command line replaces of the scene file. Raises SceneError for a --set without a value."""
+    changes: dict[str, Any] = {}
+    for name, key in OPTIONS.items():
+        value = getattr(chosen, name, None)
+        if value is not None:
+            changes[key] = PLAIN.get(name, str)(value)
+    for text in chosen.set:
+        key, equals, value = text.partition("=")
+        if not equals:
+            raise SceneError([f"--set {text}: has no value; write --set vehicle.mass=120"])
+        changes[key.strip()] = value.strip()
+    return changes
+
+
+def whole(text: str) -> str:
+    """1e6 as 1000000: TOML knows no other whole numbers."""
+    try:
+        number = float(text)
+    except ValueError:
+        return text
+    return str(int(number)) if number.is_integer() else text
+
+
+def listed(text: str) -> str:
+    """Indices 3,17 as [3,17]."""
+    return f"[{text}]" if text.replace(",", "").replace(" ", "").isdigit() else text
+
+
+PLAIN = {"members": whole, "seed": whole, "keep": listed}
+
+
+def out_of(chosen: argparse.Namespace, suffix: str = "") -> Path:
+    """The folder for the files: --out, or one named after the scene."""
+    return chosen.out or Path("runs") / f"{Path(chosen.scene).stem}{suffix}"
+
+
+def folder(chosen: argparse.Namespace, suffix: str = "") -> Path:
+    """The folder for the files, made if it is not there. Raises SceneError where it is a file, OSError.
+
+    Before the run: what cannot be written afterwards is lost.
+    """
+    out = out_of(chosen, suffix)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise SceneError([f"--out {out}: is a file; give a folder"]) from None
+    if not os.access(out, os.W_OK | os.X_OK):
+        raise PermissionError(
+            errno.EACCES, f"{os.strerror(errno.EACCES)}: choose a folder that can be written", str(out)
+        )
+    return out
+
+
+def store_settings(chosen: argparse.Namespace) -> Any:
+    """The store that the arguments ask for, None without one. Raises SceneError."""
+    if chosen.store == "npz":
+        names = ("store_dtype", "blocks", "overwrite", "resume")
+        given = [f"--{name.replace('_', '-')}" for name in names if getattr(chosen, name, None)]
+        if given:
+            raise SceneError([f"{' and '.join(given)}: is for runs in a store; add --store zarr, or leave it out"])
+        return None
+    from lgvi_warp.store import Store
+
+    existing = next((name for name in ("overwrite", "resume") if getattr(chosen, name, False)), "refuse")
+    return Store(out_of(chosen) / RUN, chosen.store_dtype, existing=existing)
+
+
+def block_range(chosen: argparse.Namespace) -> range | None:
+    """The blocks of --blocks A:B. Raises SceneError."""
+    if chosen.blocks is None:
+        return None
+    first, colon, stop = chosen.blocks.partition(":")
+    if not (colon and first.isdigit() and stop.isdigit()):
+        raise SceneError(
+            [f"--blocks {chosen.blocks}: is no range of blocks; write --blocks 0:100 for the first hundred"]
+        )
+    return range(int(first), int(stop))

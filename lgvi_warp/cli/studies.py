@@ -1,0 +1,106 @@
+"""The verbs tradeoff, sensitivity and stability."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from lgvi_warp.cli.progress import part_of, shown
+from lgvi_warp.cli.report import told
+from lgvi_warp.cli.settings import folder, overrides
+from lgvi_warp.errors import SceneError
+
+
+def tradeoff(chosen: argparse.Namespace) -> int:
+    """lgvi-warp tradeoff."""
+    from lgvi_warp.scene import Scene
+
+    scene = Scene.load(chosen.scene, overrides(chosen))
+    out = folder(chosen, "_tradeoff")
+    methods = None if chosen.methods is None else [name.strip() for name in chosen.methods.split(",")]
+    from lgvi_warp.sinks.plots import plot_tradeoff
+    from lgvi_warp.tradeoffs import report_text
+    from lgvi_warp.tradeoffs import tradeoff as measure
+
+    with shown(chosen.quiet) as progress:
+        found = measure(scene, of=chosen.of, methods=methods, seconds=chosen.seconds, progress=progress)
+    files, faults = found.save(out), []
+    try:
+        files.append(plot_tradeoff(found, out / "tradeoff.png"))
+    except (ImportError, ValueError) as error:
+        faults.append(f"{out / 'tradeoff.png'} was not written: {error}")
+    if not chosen.quiet:
+        print(report_text(found))
+        print("\n".join(["", *(f"file        {path}" for path in files)]))
+    return 1 if told(faults) else 0
+
+
+def sensitivity(chosen: argparse.Namespace) -> int:
+    """lgvi-warp sensitivity."""
+    from lgvi_warp import uq
+    from lgvi_warp.scene import Scene
+    from lgvi_warp.sinks.sensitivity import plot_sensitivity
+
+    scene = Scene.load(chosen.scene, overrides(chosen))
+    out = folder(chosen, "_sensitivity")
+    of, asked = chosen.of or ["position[2]"], {} if chosen.samples is None else {"samples": chosen.samples}
+    try:
+        with shown(chosen.quiet) as progress:
+            settings: dict[str, Any] = {"failed": chosen.failed, "threads": chosen.threads, "progress": progress}
+            if chosen.analysis == "morris":
+                found: uq.Indices = uq.morris(scene, of, **asked, **settings)
+            else:
+                first = chosen.first_order
+                asked = {"samples": 256} | asked
+                found = uq.sobol(scene, of, second_order=not first, **asked, **settings)
+    except (uq.FailedMembers, ImportError) as error:
+        return len(told([str(error)]))
+    files, faults = found.save(out), []
+    try:
+        files.append(plot_sensitivity(found, out / "sensitivity.png"))
+    except (ImportError, ValueError) as error:
+        faults.append(f"{out / 'sensitivity.png'} was not written: {error}")
+    if not chosen.quiet:
+        print("\n".join([str(found), "", *(f"file        {path}" for path in files)]))
+    return 1 if told(faults) else 0
+
+
+def stability(chosen: argparse.Namespace) -> int:
+    """lgvi-warp stability."""
+    from lgvi_warp.scene import Scene
+
+    if chosen.grid is not None and (chosen.x is not None or chosen.y is not None):
+        raise SceneError(
+            [f"--grid {chosen.grid}: says the axes that --x and --y say; leave out --grid, or both of them"]
+        )
+    changes = overrides(chosen)
+    scene = Scene.load(chosen.scene, changes)
+    # Of the random directions: all that the scene's ensemble has to say here.
+    seed = scene.ensemble_settings.seed if scene.ensemble_settings else 0
+    out = folder(chosen, "_stability")
+    from lgvi_warp.sinks.plots import plot_stability
+    from lgvi_warp.stability import GRIDS, report_text, stability_map
+
+    maps = {"stability": (chosen.x or "h", chosen.y or "angular_velocity")}
+    if chosen.grid:
+        names = GRIDS if chosen.grid == "all" else (chosen.grid,)
+        maps = {f"stability_{name}": GRIDS[name] for name in names}
+    methods = None if chosen.methods is None else [name.strip() for name in chosen.methods.split(",")]
+    t1 = scene.run.duration if chosen.duration is not None else None
+    files, faults, texts = [], [], []
+    with shown(chosen.quiet) as progress:
+        for i, (name, (x, y)) in enumerate(maps.items()):
+            found = stability_map(
+                scene, x, y, methods, points=chosen.points, t1=t1, error=chosen.error, of=chosen.of, seed=seed,
+                progress=part_of(progress, i, len(maps)),
+            )  # fmt: skip
+            files += found.save(out, name)
+            texts.append(report_text(found))
+            try:
+                files.append(plot_stability(found, out / f"{name}.png"))
+            except (ImportError, ValueError) as error:
+                faults.append(f"{out / f'{name}.png'} was not written: {error}")
+    if not chosen.quiet:
+        print("\n\n".join(texts))
+        print("\n".join(["", *(f"file        {path}" for path in files)]))
+    return 1 if told(faults) else 0

@@ -21,8 +21,6 @@ from lgvi_warp.scene import Scene
 from lgvi_warp.variations import MATRICES, Space, Target, Variation
 
 STATES = ("position", "attitude", "velocity", "angular_velocity")
-# Of one ensemble, whatever its sampling: a kernel keys a member's noise by its index in a signed word of 32 bits.
-MOST_MEMBERS = 2**31
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,11 +219,9 @@ class Ensemble:
         faults = Faults("ensemble.")
         own, group = self.sampling.own_members(self.space), self.sampling.group_size(self.space)
         members = int(settings.members or own or group)
-        if members > MOST_MEMBERS:
-            key, remedy = "members", f"give {MOST_MEMBERS} or less"
-            if not settings.members:
-                key, remedy = f"sampling.{self.sampling.kind}", "give fewer values, of fewer names"
-            faults.add(key, members, f"are more members than {MOST_MEMBERS}, which an ensemble may have", remedy)
+        if members > scenes.MOST_MEMBERS:
+            what = f"are more members than the {scenes.MOST_MEMBERS} that there can be"
+            faults.add(f"sampling.{self.sampling.kind}", members, what, "give fewer values, of fewer names")
         else:
             self.sampling.check(faults, self.space, members)
         faults.raise_if_any()

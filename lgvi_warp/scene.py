@@ -33,6 +33,8 @@ SHAPES = {
 }
 UNITS = {"position": "m", "rotation_vector": "rad", "euler_deg": "deg", "velocity": "m/s", "velocity_inertial": "m/s",
          "angular_velocity": "rad/s"}  # fmt: skip
+# Of one ensemble, whatever its sampling: a kernel keys a member's noise by its index in a signed word of 32 bits.
+MOST_MEMBERS = 2**31
 
 
 @dataclass(frozen=True)
@@ -213,7 +215,7 @@ class RunSettings:
 
 @dataclass(frozen=True)
 class EnsembleSettings:
-    """The [ensemble] section: members, seed, what varies (name -> distribution), how it is sampled (sampling.py).
+    """The [ensemble] section: members, seed, what varies (name -> distribution), how it is sampled (sampling/).
 
     members: None for as many as the sampling has, or one. indices: which of them to run, all by default.
     Raises SceneError.
@@ -233,6 +235,9 @@ class EnsembleSettings:
                 continue
             if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
                 faults.add(name, value, f"is not a whole number from {least}", f"give {least} or more")
+            elif name == "members" and value > MOST_MEMBERS:
+                what = f"are more members than the {MOST_MEMBERS} that there can be"
+                faults.add(name, value, what, f"give {MOST_MEMBERS} or less")
         if self.indices is not None and not _whole_numbers(self.indices):
             faults.add("indices", self.indices, "is no list of whole numbers from 0", "give members: indices = [17]")
         if isinstance(self.vary, Mapping):

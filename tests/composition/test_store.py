@@ -383,6 +383,54 @@ def test_explicit_states_and_subsets_go_on_from_the_store_alone(tmp_path):
     assert list(lw.open_run(tmp_path / "a.zarr").dataset.realization.values[:2]) == [599, 598]
 
 
+RANDOM = np.random.default_rng(5).uniform(0.1, 0.9, (700, 4))
+# 600 members of each: given as arrays, of 700 rows.
+ARRAYS = {
+    "table": lambda u: lw.Table({"vehicle.mass": 123.0 + u[:, 0], "start.angular_velocity": u[:, 1:]}),
+    "levels": lambda u: lw.Levels(u),
+}
+
+
+@pytest.mark.parametrize("kind", ARRAYS)
+def test_values_given_as_arrays_lie_in_the_store_as_arrays(kind, tmp_path):
+    def members(u):
+        vary = fleet().vary if kind == "levels" else {"start.position": lw.Normal(std=1.0)}
+        return lw.Ensemble(fleet().scene, 600, 1, vary, ARRAYS[kind](u))
+
+    whole = lw.solve(members(RANDOM), **SETTINGS)
+    for ensemble, name in ((members(RANDOM), "a"), (members(RANDOM).subset(np.arange(599, 99, -1)), "c")):
+        stored = lw.solve(ensemble, **SETTINGS, store=tmp_path / f"{name}.zarr")
+        lw.solve(ensemble, **SETTINGS, store=tmp_path / f"{name}b.zarr", only=range(0, 1))
+        lw.resume(tmp_path / f"{name}b.zarr")
+        assert differing(tmp_path / f"{name}.zarr", tmp_path / f"{name}b.zarr") == []
+        assert resuming.state(tmp_path / f"{name}b.zarr")["complete"]
+        np.testing.assert_array_equal(stored.position, whole.position[:, ensemble.indices])
+    given = store.Folder(tmp_path / "a.zarr").group()["explicit"]
+    assert {name: array.shape[0] for name, array in given.arrays()} == dict.fromkeys(members(RANDOM).explicit(), 600)
+    # In memory provenance is the section of a scene file.
+    assert whole.provenance["ensemble"] == members(RANDOM).to_dict()
+    assert len((tmp_path / "a.zarr" / "zarr.json").read_bytes()) < 40_000
+    other = RANDOM.copy()
+    other[599, 0] += 0.01
+    again = lw.Store(tmp_path / "a.zarr", existing="resume")
+    with pytest.raises(lw.SceneError, match=r"ensemble\.arrays_sha256 .* is another run"):
+        lw.solve(members(other), **SETTINGS, store=again)
+    other[599:] = RANDOM[599:]
+    other[600:] = 0.5  # rows that no member has
+    np.testing.assert_array_equal(lw.solve(members(other), **SETTINGS, store=again).position, whole.position)
+
+
+def test_other_states_are_another_run(tmp_path):
+    scene, n = fleet().scene, 300
+    states = np.zeros((n, 3)), np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3)), np.full((n, 3), 0.1)
+    lw.solve(lw.Ensemble.from_states(scene, *states), **SETTINGS, store=tmp_path / "a.zarr", only=range(0, 1))
+    other = lw.Ensemble.from_states(scene, states[0] + 1.0, *states[1:])
+    with pytest.raises(lw.SceneError, match=r"ensemble\.arrays_sha256 .* is another run"):
+        lw.solve(other, **SETTINGS, store=lw.Store(tmp_path / "a.zarr", existing="resume"))
+    whole = lw.solve(lw.Ensemble.from_states(scene, *states), **SETTINGS)
+    np.testing.assert_array_equal(lw.resume(tmp_path / "a.zarr").position, whole.position)
+
+
 class Mine(lw.Wrench):
     """A law of a user, which no scene file knows."""
 

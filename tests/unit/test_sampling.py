@@ -12,7 +12,7 @@ from scipy.stats import qmc
 
 import lgvi_warp as lw
 from lgvi_warp import sampling
-from lgvi_warp.ensemble import MOST_MEMBERS
+from lgvi_warp.scene import MOST_MEMBERS
 from lgvi_warp.variations import Space, targets
 from tests.unit.test_ensemble import assert_same, faults
 
@@ -110,7 +110,7 @@ def test_the_last_members_there_can_be(scene, content):
 def test_no_sampling_has_more_members_than_there_can_be(scene):
     for content in ("random", "sobol", {"sobol": {"replicates": 64}}, "halton"):
         (fault,) = faults(lw.Ensemble, scene, MOST_MEMBERS + 64, 0, None, content)
-        assert "ensemble.members = 2147483712: are more members than 2147483648" in fault and "or less" in fault
+        assert "ensemble.members = 2147483712: are more members than the 2147483648" in fault and "or less" in fault
     uniform = lw.Uniform(low=0.0, high=1.0)
     names = ("start.position", "start.angular_velocity")
     grid = {"grid": dict.fromkeys(names, 3000)}

@@ -112,7 +112,7 @@ def test_bad_dtypes(bad):
 
 
 @pytest.mark.parametrize(
-    "key, bads", [("members", [0, -3, 1.5, 2.0, True, "4", 100_000_001]), ("seed", [-1, 0.5, False, "x", None])]
+    "key, bads", [("members", [0, -3, 1.5, 2.0, True, "4", 2**31 + 1]), ("seed", [-1, 0.5, False, "x", None])]
 )
 def test_bad_ensemble_settings(key, bads):
     for bad in bads:

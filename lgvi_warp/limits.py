@@ -45,7 +45,7 @@ MUNK: dict[str, float] = {
     "kl6(psi_s)": 2.71, "kl6(psi_x)": 3.03, "kl8(psi_s)": 3.35, "kl8(psi_x)": 3.98, "yo6(psi_s)": 2.48,
     "yo6(psi_x)": 2.56, "ss6_11(psi_s)": 3.08, "ss6_11(psi_x)": 3.16, "ss6_13(psi_s)": 4.47, "ss6_13(psi_x)": 4.60,
     "su8_15(psi_s)": 3.05, "su8_15(psi_x)": 3.03, "ss8_21(psi_s)": 6.08, "ss8_21(psi_x)": 6.06, "bm4(psi_s)": 5.42,
-    "bm4(psi_x)": 5.87, "bm6(psi_s)": 3.13, "bm6(psi_x)": 6.18,
+    "bm4(psi_x)": 5.87, "bm6(psi_s)": 3.13, "bm6(psi_x)": 5.61,
 }  # fmt: skip
 RESTORING: dict[str, float] = {
     "phi": 1.69, "phi_adjoint": 1.69, "psi": 1.95, "psi_s": 1.95, "psi_1": 1.95, "psi_x": 2.05, "psi_x8": 2.05,

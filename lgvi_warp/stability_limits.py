@@ -104,24 +104,23 @@ def drag_limit(name: str) -> float:
 
 @functools.cache
 def rotation_limit(name: str) -> float:
-    """Largest h |J^-1 pi|: of equation (24), where |J^-1 a| = 1; of rk*, where the numbers of R would grow.
+    """Largest h |J^-1 pi|: of equation (24), where |J^-1 a| = 1; of turns about axes, where half an angle is 1; of rk*, where
+    the numbers of R would grow.
 
-    Infinite for turns about axes and methods on the rotation group; NaN for gauss*.
+    Infinite for methods on the rotation group; NaN for gauss*.
     """
     method = Method(name)
     if method.tableau:
         return math.inf if name in ("cg3", "rkmk4") else oscillation_limit(name)
     if method.gauss:
         return math.nan
-    if method.turns:
-        return math.inf
     if method.two_part:
         # The modified rotation of a part ends at a quarter turn.
         first = method.program[0][0] == "A"
         return 0.5 * math.pi / max(abs(g) for g in method.stages[0 if first else 1 :: 2])
-    part = max(abs(c) for letter, c in method.program if letter in ("D", "W"))
+    part = max(abs(c) for letter, c in method.program if letter in ("D", "W", "R1"))
     longest = max(abs(g) for g in method.stages) * (2.0 if method.halved else 1.0)
-    return 1.0 / (part * longest)
+    return (2.0 if method.turns else 1.0) / (part * longest)
 
 
 LIMITS: dict[str, Callable[[str], float]] = {
@@ -131,7 +130,7 @@ LIMITS: dict[str, Callable[[str], float]] = {
     "drag": drag_limit,
 }
 TEXTS = {
-    "rotation": "|J^-1 a| = 1, or R grows (rk*)",
+    "rotation": "|J^-1 a| = 1, half a turn's angle = 1 (psi_x), or R grows (rk*)",
     "munk": "Munk oscillation, h w = limit",
     "restoring": "restoring oscillation, h w = limit",
     "drag": "drag number h (l + 2 q |v|) / I = limit",

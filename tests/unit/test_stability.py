@@ -170,7 +170,9 @@ def test_linear_theory():
 def test_composed_limits_are_of_their_longest_stage():
     g = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))
     assert math.isclose(rotation_limit("tj4(psi_s)"), 2.0 / abs(1.0 - 2.0 * g))
-    assert rotation_limit("psi_s") == 2.0 and rotation_limit("psi_1") == 1.0 and rotation_limit("psi_x") == math.inf
+    assert rotation_limit("psi_s") == 2.0 and rotation_limit("psi_1") == 1.0 and rotation_limit("rkmk4") == math.inf
+    assert rotation_limit("psi_x") == rotation_limit("psi_x8") == 4.0
+    assert math.isclose(rotation_limit("tj4(psi_x)"), 4.0 / abs(1.0 - 2.0 * g))
     # One step of the triple jump as the product of three leapfrogs, at the limit: a trace of 2.
     y = oscillation_limit("tj4(psi_s)")
     step = np.eye(2)

@@ -189,3 +189,12 @@ def coupled():
         "remus_100": lw.Scene(named.vehicle, named.environment, start=START),
         "general 6x6": lw.Scene(general, lw.Environment(gravity=GRAVITY), start=START),
     }
+
+
+def peak_memory():
+    """The largest resident memory of this process so far [bytes].
+
+    ru_maxrss would begin with what the process that started it had.
+    """
+    with open("/proc/self/status") as file:
+        return next(int(line.split()[1]) * 1024 for line in file if line.startswith("VmHWM"))

@@ -19,11 +19,12 @@ from lgvi_warp.solving import make_plan, run_plan
 
 ROOT = Path(__file__).resolve().parents[3]
 MEMORY = """
-import json, resource, sys
+import json, sys
 sys.path[:0] = [{root!r}, {root!r} + "/kernels"]
 from benchmarks.cases.statistics import case
+from benchmarks.scenes import peak_memory
 seconds, _ = case.runs({members}, {steps})["statistics"]()
-print(json.dumps({{"run_s": seconds, "peak_MiB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024}}))
+print(json.dumps({{"run_s": seconds, "peak_MiB": peak_memory() / 2**20}}))
 """
 
 

@@ -86,11 +86,11 @@ class Table(Sampling):
             remedy = 'give a file, {"vehicle.mass": array, ...} or a DataFrame with such names'
             faults.add("values", self.values, "has no names of columns", remedy)
             return read
-        object.__setattr__(self, "values", given)
         for name in self._chosen(faults, list(given)):
             array = _column(faults, f'"{name}"', given[name])
             if array is not None:
                 read[name] = array
+        object.__setattr__(self, "values", read)
         return read
 
     def _from_file(self, faults: Faults) -> dict[str, np.ndarray]:

@@ -178,7 +178,8 @@ def run_record(folder, quick):
 def statistics_record(folder, quick, what, observed, keepers):
     """Statistics alone: with a store that takes no samples, beside without a store.
 
-    keepers: what makes those of a plan, new ones for each run. The store's creation is told apart from the rest.
+    keepers: what makes those of a plan, new ones for each run. The store's creation is told apart from the rest; core_s is the
+    time of all cores together, which other work on the machine disturbs less.
     """
     members, threads = (8192, machine.thread_count()) if quick else (262_144, machine.thread_count())
     save = SaveAt(every=1.0)
@@ -186,30 +187,32 @@ def statistics_record(folder, quick, what, observed, keepers):
     plan.compile()
 
     def without():
-        start = time.perf_counter()
+        start, cores = time.perf_counter(), time.process_time()
         run_blocks(Work(plan, keepers(plan)), blocks(members), Threads(threads), Progress(1, None).at)
-        return time.perf_counter() - start
+        return time.perf_counter() - start, time.process_time() - cores
 
     def stored():
-        own, start = keepers(plan), time.perf_counter()
+        own, told, start = keepers(plan), (provenance(plan), messages(plan)), time.perf_counter()
         chosen = Store(tempfile.mkdtemp(dir=folder) + "/run.zarr", fields=(), existing="resume")
-        create(chosen, plan, provenance(plan), messages(plan), own)
-        there = time.perf_counter()
-        Stored(plan, chosen, provenance(plan), messages(plan), own).run(Threads(threads))
-        seconds = time.perf_counter() - there, there - start
+        create(chosen, plan, *told, own)
+        there, cores = time.perf_counter(), time.process_time()
+        Stored(plan, chosen, *told, own).run(Threads(threads))
+        seconds = time.perf_counter() - there, time.process_time() - cores, there - start
         emptied(chosen.folder)
         return seconds
 
     found = in_turn({"without": without, "store": stored}, 2 if quick else 11)
-    rest, creation = zip(*found["store"], strict=True)
+    alone, own_cores = zip(*found["without"], strict=True)
+    rest, cores, creation = zip(*found["store"], strict=True)
     return {
         "what": f"statistics alone: {what}",
         "members": members,
         "steps": plan.grid.steps,
-        "without_s": round(min(found["without"]), 3),
+        "without_s": round(min(alone), 3),
         "store_s": round(min(rest), 3),
         "creation_s": round(min(creation), 3),
-        "ratio": ratio(rest, found["without"]),
+        "ratio": ratio(rest, alone),
+        "core_s_ratio": ratio(cores, own_cores),
     }
 
 

@@ -121,16 +121,20 @@ def test_threads_change_no_bit(fleet, whole, threads):
         _ = alone.position
 
 
+class Ordered:
+    """Blocks that finish in another order: what threads do by chance, done on purpose."""
+
+    def __init__(self, order):
+        self.order = order
+
+    def run(self, work, blocks, advanced):
+        for i in self.order:
+            yield blocks[i], work(blocks[i])
+
+
 @pytest.mark.parametrize("order", [(3, 2, 1, 0), (2, 0, 3, 1)])
 def test_the_order_in_which_blocks_finish_changes_no_bit(fleet, whole, order):
-    """What threads do by chance, done on purpose."""
-
-    class Ordered:
-        def run(self, work, blocks, advanced):
-            for i in order:
-                yield blocks[i], work(blocks[i])
-
-    found = lw.solve(fleet, **SETTINGS, statistics=EVERY, keep="none", executor=Ordered())
+    found = lw.solve(fleet, **SETTINGS, statistics=EVERY, keep="none", executor=Ordered(order))
     assert same(found.statistics, whole.statistics)
 
 
@@ -352,6 +356,16 @@ def test_a_run_stops_when_it_knows_enough(threads):
     first = lw.solve(falling(), h=0.1, t1=1.0, statistics=[lw.Mean("position")], keep="none", until=until, threads=1)
     assert same(first.statistics, r.statistics) and first.members == r.members
     assert r.parameters["vehicle.mass"].shape == (1,) and len(r.failure_time) == r.members
+
+
+def test_a_run_stops_at_the_same_block_in_whatever_order_they_finish():
+    settings = dict(
+        h=0.1, t1=1.0, statistics=[lw.Mean("position")], keep="none", until=lw.Until("mean position[2]", 0.05)
+    )
+    one, other = (
+        lw.solve(falling(), **settings, **how) for how in ({"threads": 1}, {"executor": Ordered(range(39, -1, -1))})
+    )
+    assert one.members == other.members < 20_000 and same(one.statistics, other.statistics)
 
 
 def test_a_run_says_when_it_does_not_know_enough():

@@ -148,16 +148,20 @@ def test_threads_change_no_bit(fleet, whole, threads):
         _ = alone.position
 
 
+class Ordered:
+    """Blocks that finish in another order: what threads do by chance, done on purpose."""
+
+    def __init__(self, order):
+        self.order = order
+
+    def run(self, work, blocks, advanced):
+        for i in self.order:
+            yield blocks[i], work(blocks[i])
+
+
 @pytest.mark.parametrize("order", [(3, 2, 1, 0), (2, 0, 3, 1)])
 def test_the_order_in_which_blocks_finish_changes_no_bit(fleet, whole, order):
-    """What threads do by chance, done on purpose."""
-
-    class Ordered:
-        def run(self, work, blocks, advanced):
-            for i in order:
-                yield blocks[i], work(blocks[i])
-
-    found = lw.solve(fleet, **SETTINGS, statistics=EVERY, keep="none", executor=Ordered())
+    found = lw.solve(fleet, **SETTINGS, statistics=EVERY, keep="none", executor=Ordered(order))
     assert same(found.statistics, whole.statistics)
 
 
@@ -717,3 +721,17 @@ def test_memory_grows_with_neither_members_nor_steps():
     peak(few, 10)
     assert peak(many, 10) - peak(few, 10) < 120 * (many - few)
     assert peak(few, 100) - peak(few, 10) < 100_000
+
+
+def test_a_run_stops_at_the_same_block_in_whatever_order_they_finish():
+    settings = {
+        "h": 0.1,
+        "t1": 1.0,
+        "statistics": [lw.Mean("position")],
+        "keep": "none",
+        "until": lw.Until("mean position[2]", 0.05),
+    }
+    one, other = (
+        lw.solve(falling(), **settings, **how) for how in ({"threads": 1}, {"executor": Ordered(range(39, -1, -1))})
+    )
+    assert one.members == other.members < 20_000 and same(one.statistics, other.statistics)

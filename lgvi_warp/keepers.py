@@ -24,14 +24,10 @@ class _Unsent:
 
 
 class Outcomes(_Unsent):
-    """What became of every member: the fields of Outcome, of all n."""
+    """What became of every member: `all`, of all n."""
 
     def __init__(self, plan: Plan):
-        n = plan.ensemble.members
-        self.status, self.failed_step, self.failed_size = np.zeros(n, np.uint8), np.zeros(n, np.int64), np.zeros(n)
-        self.chosen = np.zeros((n, 2 if plan.method.adaptive else 0), np.int64)
-        self.warnings, self.warning_step = np.zeros(n, np.uint16), np.zeros(n, np.int64)
-        self.warning_value, self.substeps = np.zeros(n), np.zeros(n, np.int64)
+        self.all = Outcome.clear(plan.ensemble.members, 2 if plan.method.adaptive else 0)
 
     def open(self, plan: Plan, block: Block, members: Members) -> _BlockOutcome:
         """Nothing to prepare."""
@@ -44,7 +40,7 @@ class Outcomes(_Unsent):
             values = getattr(part, field.name)
             # Memory that nothing is written into is none: runs without faults have no outcomes to hold.
             if np.any(values):
-                getattr(self, field.name)[at] = values
+                getattr(self.all, field.name)[at] = values
 
 
 class _BlockOutcome:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar
@@ -172,8 +173,8 @@ class OwnLaw(Distribution):
         return np.asarray(quantiles_of(self.law)(u), dtype=np.float64)
 
     def to_dict(self) -> dict[str, Any]:
-        """What it says of itself."""
-        return {self.kind: {"law": str(self.law)}}
+        """What it says of itself, but for its place in memory: that would make each run another one."""
+        return {self.kind: {"law": re.sub(r" at 0x[0-9a-fA-F]+", "", str(self.law))}}
 
 
 def quantiles_of(law: Any) -> Any:

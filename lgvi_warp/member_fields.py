@@ -4,27 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lgvi_warp.status import Status, Warnings
 
 if TYPE_CHECKING:
+    from lgvi_warp.packets import Outcome
     from lgvi_warp.plan import Plan
-
-
-class Outcomes(Protocol):
-    """Arrays over members, as packets tell them (see packets.Outcome)."""
-
-    status: np.ndarray
-    failed_step: np.ndarray
-    failed_size: np.ndarray
-    chosen: np.ndarray
-    warnings: np.ndarray
-    warning_step: np.ndarray
-    warning_value: np.ndarray
-    substeps: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -37,28 +25,28 @@ class MemberField:
     name: str
     dtype: str
     attributes: dict[str, Any]
-    of: Callable[[Plan, Outcomes], np.ndarray]
+    of: Callable[[Plan, Outcome], np.ndarray]
     when: Callable[[Plan], bool] = lambda plan: True
 
 
-def _failure_time(plan: Plan, outcome: Outcomes) -> np.ndarray:
+def _failure_time(plan: Plan, outcome: Outcome) -> np.ndarray:
     """The time of the last good state; an event's size is the part of its step that was made before it."""
     steps = outcome.failed_step + np.where(outcome.status >= Status.SURFACE, outcome.failed_size, 0.0)
     return np.where(outcome.status != 0, steps * plan.grid.h, np.nan)
 
 
-def _failure_value(plan: Plan, outcome: Outcomes) -> np.ndarray:
+def _failure_value(plan: Plan, outcome: Outcome) -> np.ndarray:
     """What crossed its limit; 0 for an event."""
     size = np.where(outcome.status >= Status.SURFACE, 0.0, outcome.failed_size)
     return np.where(outcome.status != 0, size, np.nan)
 
 
-def _warning_time(plan: Plan, outcome: Outcomes) -> np.ndarray:
+def _warning_time(plan: Plan, outcome: Outcome) -> np.ndarray:
     """When the most serious warning was first seen."""
     return np.where(outcome.warnings != 0, outcome.warning_step * plan.grid.h, np.nan)
 
 
-def _warning_value(plan: Plan, outcome: Outcomes) -> np.ndarray:
+def _warning_value(plan: Plan, outcome: Outcome) -> np.ndarray:
     """What was seen then."""
     return np.where(outcome.warnings != 0, outcome.warning_value, np.nan)
 
@@ -100,6 +88,6 @@ def present(plan: Plan) -> tuple[MemberField, ...]:
     return tuple(one for one in FIELDS if one.when(plan))
 
 
-def of(plan: Plan, outcome: Outcomes) -> dict[str, np.ndarray]:
+def of(plan: Plan, outcome: Outcome) -> dict[str, np.ndarray]:
     """The fields of these members, by name."""
     return {one.name: one.of(plan, outcome).astype(one.dtype, copy=False) for one in present(plan)}

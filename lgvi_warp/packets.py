@@ -42,6 +42,21 @@ class Outcome:
     warning_value: np.ndarray
     substeps: np.ndarray
 
+    @classmethod
+    def clear(cls, members: int, paces: int = 0) -> Outcome:
+        """Of so many members that came through without fault; paces: columns of `chosen`."""
+        steps, values = (lambda: np.zeros(members, np.int64)), (lambda: np.zeros(members))
+        return cls(
+            status=np.zeros(members, np.uint8),
+            failed_step=steps(),
+            failed_size=values(),
+            chosen=np.zeros((members, paces), np.int64),
+            warnings=np.zeros(members, np.uint16),
+            warning_step=steps(),
+            warning_value=values(),
+            substeps=steps(),
+        )
+
 
 def pack(values: np.ndarray, width: int) -> np.ndarray:
     """Members' rows (m, d) as packets (ceil(m / width), d, width); the last packet is filled up with its last member."""

@@ -230,7 +230,7 @@ def run_plan(
     run_seconds = time.perf_counter() - start
     told = provenance(plan, observed, fields)
     parameters = Drawn(plan.ensemble, n)
-    of_members = {name: values[:n] for name, values in member_fields.of(plan, outcomes).items()}
+    of_members = {name: values[:n] for name, values in member_fields.of(plan, outcomes.all).items()}
     estimates, said = observing.read(told["ensemble"], of_members["status"])
     found = samples.fields if samples and samples.fields else {}
     return Result(

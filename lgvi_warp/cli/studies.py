@@ -3,12 +3,36 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli.progress import part_of, shown
 from lgvi_warp.cli.report import told
 from lgvi_warp.cli.settings import folder, overrides
 from lgvi_warp.errors import SceneError
+
+
+@dataclass
+class Written:
+    """Files that a study wrote, and those that it could not."""
+
+    files: list[Path] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+
+    def draw(self, plot: Callable[[Any, Path], Path], found: Any, path: Path) -> None:
+        """Draw what was found."""
+        try:
+            self.files.append(plot(found, path))
+        except (ImportError, ValueError) as error:
+            self.faults.append(f"{path} was not written: {error}")
+
+    def tell(self, report: str, quiet: bool) -> int:
+        """Print the report and the files. Returns the exit code."""
+        if not quiet:
+            print("\n".join([report, "", *(f"file        {path}" for path in self.files)]))
+        return 1 if told(self.faults) else 0
 
 
 def tradeoff(chosen: argparse.Namespace) -> int:
@@ -24,15 +48,9 @@ def tradeoff(chosen: argparse.Namespace) -> int:
 
     with shown(chosen.quiet) as progress:
         found = measure(scene, of=chosen.of, methods=methods, seconds=chosen.seconds, progress=progress)
-    files, faults = found.save(out), []
-    try:
-        files.append(plot_tradeoff(found, out / "tradeoff.png"))
-    except (ImportError, ValueError) as error:
-        faults.append(f"{out / 'tradeoff.png'} was not written: {error}")
-    if not chosen.quiet:
-        print(report_text(found))
-        print("\n".join(["", *(f"file        {path}" for path in files)]))
-    return 1 if told(faults) else 0
+    written = Written(found.save(out))
+    written.draw(plot_tradeoff, found, out / "tradeoff.png")
+    return written.tell(report_text(found), chosen.quiet)
 
 
 def sensitivity(chosen: argparse.Namespace) -> int:
@@ -55,14 +73,9 @@ def sensitivity(chosen: argparse.Namespace) -> int:
                 found = uq.sobol(scene, of, second_order=not first, **asked, **settings)
     except (uq.FailedMembers, ImportError) as error:
         return len(told([str(error)]))
-    files, faults = found.save(out), []
-    try:
-        files.append(plot_sensitivity(found, out / "sensitivity.png"))
-    except (ImportError, ValueError) as error:
-        faults.append(f"{out / 'sensitivity.png'} was not written: {error}")
-    if not chosen.quiet:
-        print("\n".join([str(found), "", *(f"file        {path}" for path in files)]))
-    return 1 if told(faults) else 0
+    written = Written(found.save(out))
+    written.draw(plot_sensitivity, found, out / "sensitivity.png")
+    return written.tell(str(found), chosen.quiet)
 
 
 def stability(chosen: argparse.Namespace) -> int:
@@ -87,20 +100,14 @@ def stability(chosen: argparse.Namespace) -> int:
         maps = {f"stability_{name}": GRIDS[name] for name in names}
     methods = None if chosen.methods is None else [name.strip() for name in chosen.methods.split(",")]
     t1 = scene.run.duration if chosen.duration is not None else None
-    files, faults, texts = [], [], []
+    written, texts = Written(), []
     with shown(chosen.quiet) as progress:
         for i, (name, (x, y)) in enumerate(maps.items()):
             found = stability_map(
                 scene, x, y, methods, points=chosen.points, t1=t1, error=chosen.error, of=chosen.of, seed=seed,
                 progress=part_of(progress, i, len(maps)),
             )  # fmt: skip
-            files += found.save(out, name)
+            written.files += found.save(out, name)
             texts.append(report_text(found))
-            try:
-                files.append(plot_stability(found, out / f"{name}.png"))
-            except (ImportError, ValueError) as error:
-                faults.append(f"{out / f'{name}.png'} was not written: {error}")
-    if not chosen.quiet:
-        print("\n\n".join(texts))
-        print("\n".join(["", *(f"file        {path}" for path in files)]))
-    return 1 if told(faults) else 0
+            written.draw(plot_stability, found, out / f"{name}.png")
+    return written.tell("\n\n".join(texts), chosen.quiet)

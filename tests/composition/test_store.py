@@ -673,3 +673,24 @@ def test_what_is_no_run_is_named(tmp_path):
     (tmp_path / "empty.zarr").mkdir()
     with pytest.raises(lw.SceneError, match="holds no run"):
         lw.open_run(tmp_path)
+
+
+class Tilted:
+    """A law of a user's, which says of itself where it lies in memory."""
+
+    def ppf(self, u):
+        return 0.1 * np.sqrt(u)
+
+
+def test_a_distribution_of_your_own_goes_on_with_its_ensemble(tmp_path):
+    def own():
+        return lw.Ensemble(fleet().scene, 600, 1, {"start.position": Tilted()})
+
+    whole, path = tmp_path / "whole.zarr", tmp_path / "run.zarr"
+    lw.solve(own(), **SETTINGS, store=whole)
+    lw.solve(own(), **SETTINGS, store=path)
+    (path / "blocks" / "000000256.json").unlink()
+    with pytest.raises(lw.SceneError, match="a law of your own, which a file does not hold; give the ensemble again"):
+        lw.resume(path)
+    lw.resume(path, own())
+    assert differing(whole, path) == []

@@ -29,13 +29,6 @@ from lgvi_warp.store_layout import columns
 from tests.toy_keeper import DepthSum
 
 
-def came_through(count):
-    """The outcome of so many members without fault."""
-    none, long = np.zeros(count), np.zeros(count, np.int64)
-    chosen, bits = np.zeros((count, 0), np.int64), np.zeros(count, np.uint16)
-    return Outcome(np.zeros(count, np.uint8), long, none, chosen, bits, long, none, long)
-
-
 def in_turn(calls, rounds):
     """{name: results} of calls by name, each of them made once a round, in an order that changes."""
     found = {name: [] for name in calls}
@@ -81,7 +74,7 @@ def into_store(plan, folder, threads, samples):
         for first in range(0, k, 10):
             when = slice(first, min(first + 10, k))
             writer.take(when, {name: values[when, : block.count] for name, values in samples.items()})
-        sink.finish(block, writer.close(came_through(block.count)), (), ())
+        sink.finish(block, writer.close(Outcome.clear(block.count)), (), ())
 
     start = time.perf_counter()
     with sink.commits, ThreadPoolExecutor(threads) as pool:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import errno
 import functools
 import os
-import socket
 import threading
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -15,7 +15,9 @@ from typing import Any
 
 import numpy as np
 
-UNFINISHED = ".part"
+from lgvi_warp import safe_files, scratch
+from lgvi_warp.scratch import UNFINISHED
+
 # A file at least so large goes to the disk as soon as it is written: the disk has work while others are made.
 EARLY_BYTES = 200_000
 # Syncs side by side, and large files that may wait for theirs: enough for any disk, few enough for the system's memory.
@@ -85,20 +87,19 @@ class Files:
         self._root = root
         # Where each lies, what it will be called, and its sync if that has begun.
         self._waiting: list[tuple[Path, Path, Future[None] | None]] = []
-        self._mark = f".{socket.gethostname()}-{os.getpid()}{UNFINISHED}"
         self.sums: dict[str, list[int]] = {}
 
     def write(self, key: str, data: Any, *, checked: bool = False) -> None:
         """Write a file below the root, and note its size and checksum; checked: with the data's own checksum at its end.
 
-        Waits where many large files have not reached the disk yet.
+        Waits where many large files have not reached the disk yet. Raises SceneError where a link stands in its way.
         """
         target = self._root / key
-        beside = target.with_name(target.name + self._mark)
+        beside = scratch.beside(target)
         view = memoryview(data).cast("B")
         crc = checksum(view)
         tail = crc.to_bytes(4, "little") if checked else b""
-        with named(target), beside.open("wb", buffering=0) as file:
+        with named(target), safe_files.created(self._root, beside) as file:
             self._waiting.append((beside, target, None))
             write_all(file, view)
             write_all(file, memoryview(tail))
@@ -119,7 +120,7 @@ class Files:
             assert sync is not None
             sync.result()
         for beside, target, _ in self._waiting:
-            beside.replace(target)
+            safe_files.rename(self._root, beside, target)
         folders = {target.parent for _, target, _ in self._waiting}
         self._waiting.clear()
         return folders
@@ -189,20 +190,72 @@ def write_whole(path: Path, data: bytes) -> None:
 
 def fault(root: Path, key: str, size: int, crc: int) -> str | None:
     """What is wrong with a file: "is missing", "is torn" or "has changed"; None if nothing is."""
-    path = root / key
     try:
-        if path.stat().st_size != size:
-            return "is torn"
-        return None if checksum(path.read_bytes()) == crc else "has changed"
+        with safe_files.opened(root, key) as file:
+            if os.fstat(file.fileno()).st_size != size:
+                return "is torn"
+            return None if checksum(file.read(size)) == crc else "has changed"
     except FileNotFoundError:
         return "is missing"
 
 
 def remove_unfinished(folders: Iterable[Path]) -> None:
-    """Remove what writers that were killed left behind."""
+    """Remove what writers that were killed left behind, of folders that one writer at a time may change."""
     for folder in folders:
         for path in folder.glob(f"*{UNFINISHED}"):
-            path.unlink(missing_ok=True)
+            if scratch.is_unfinished(path.name) and not path.is_dir():
+                path.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def placed(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """The name to write a file under: at the end it is made durable and put in its place; after an error it is removed.
+
+    What lay there before stays whole until then. Files of other writers of it that were killed are removed.
+    """
+    target = Path(path)
+    scratch.sweep(target)
+    beside = scratch.beside(target)
+    try:
+        yield beside
+        sync_file(beside, target)
+        with named(target):
+            beside.replace(target)
+        sync_folder(target.parent)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def put_folder(beside: Path, target: Path) -> None:
+    """Put a folder in the place of another, which is removed, or of none. A crash leaves one of the two there, whole."""
+    old = beside
+    if not target.exists():
+        beside.replace(target)
+    elif not _exchanged(beside, target):
+        # Two steps where the system has no exchange: a crash between them is mended by `restored`.
+        old = scratch.beside(target, scratch.OLD)
+        target.replace(old)
+        beside.replace(target)
+    sync_folder(target.parent)
+    scratch.remove_folder(old)
+
+
+def _exchanged(one: Path, other: Path) -> bool:
+    """Exchange two folders in one step; False where the system cannot."""
+    try:
+        rename = ctypes.CDLL(None, use_errno=True).renameat2
+    except (OSError, AttributeError, TypeError):
+        return False
+    here, exchange = -100, 2  # AT_FDCWD, RENAME_EXCHANGE
+    return bool(rename(here, os.fsencode(one), here, os.fsencode(other), exchange) == 0)
+
+
+def restored(target: Path) -> None:
+    """Put a folder back that a writer was killed while it replaced it, and nothing has its place."""
+    old = [path for path in scratch.left_behind(target) if path.suffix == scratch.OLD and not path.is_symlink()]
+    if len(old) == 1 and not target.exists():
+        old[0].replace(target)
+        sync_folder(target.parent)
 
 
 @contextlib.contextmanager

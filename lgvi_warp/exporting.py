@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp import durable
 from lgvi_warp.blocks import Block
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.resuming import state
@@ -45,19 +46,16 @@ def export(path: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | 
     if target.is_dir():
         raise SceneError([f"out = {target}: is a folder; give the name of a file"])
     check_whole(folder)
-    part = target.with_name(target.name + ".part")
     target.parent.mkdir(parents=True, exist_ok=True)
     try:
-        {"netcdf": _netcdf, "parquet": _parquet}[to](folder, part)
-        part.replace(target)
+        with durable.placed(target) as beside:
+            {"netcdf": _netcdf, "parquet": _parquet}[to](folder, beside)
     except ImportError as error:
         raise SceneError([f"to = {to!r}: {error}; install it: pip install 'lgvi-warp[export]'"]) from error
     except (OSError, RuntimeError) as error:
         # Neither library names the file, and netCDF4 not what the system said.
         what = getattr(error, "strerror", None) or f"was not written ({error}); is the disk full?"
         raise OSError(getattr(error, "errno", None) or errno.EIO, what, str(target)) from error
-    finally:
-        part.unlink(missing_ok=True)
     return target
 
 
@@ -75,8 +73,8 @@ def _netcdf(folder: Folder, target: Path) -> None:
 
     with netCDF4.Dataset(target, "w") as file:
         _netcdf_group(folder, file)
-        if (folder.path / KEPT).exists():
-            _netcdf_group(Folder(folder.path / KEPT), file.createGroup(KEPT))
+        if (kept := folder.kept()) is not None:
+            _netcdf_group(kept, file.createGroup(KEPT))
     if statistics := open_run(folder.path).statistics:
         statistics.dataset.to_netcdf(target, mode="a", group="statistics", engine="netcdf4")
 
@@ -119,8 +117,8 @@ def _parquet(folder: Folder, target: Path) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    if not _timed(folder.group()) and (folder.path / KEPT).exists():
-        folder = Folder(folder.path / KEPT)
+    if not _timed(folder.group()):
+        folder = folder.kept() or folder
     group = folder.group()
     units = {name: str(array.attrs["units"]) for name, array in group.arrays() if "units" in array.attrs}
     writer = None

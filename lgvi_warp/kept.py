@@ -8,7 +8,6 @@ The group is written by what writes a run: in blocks, each marked when all of it
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,11 +15,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp import scratch
 from lgvi_warp.errors import SceneError
 from lgvi_warp.executors import Executor
 from lgvi_warp.observation import Observation
 from lgvi_warp.running import Stored
-from lgvi_warp.store import KEPT, Folder, Store, whole_array
+from lgvi_warp.store import KEPT, Folder, Store, refuse_foreign, whole_array
 from lgvi_warp.store_layout import KEPT_MEMBER
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class KeptStore(Store):
     def is_there(self) -> bool:
         """Whether the folder holds the group, of these members; one that cannot be read does not."""
         try:
-            return np.array_equal(Folder(self.folder).group()[KEPT_MEMBER][:], self.members)
+            return np.array_equal(Folder(self.folder, self.whole).group()[KEPT_MEMBER][:], self.members)
         except (SceneError, OSError, ValueError, KeyError):
             return False
 
@@ -82,9 +82,10 @@ class KeptRun:
         store, path = run.store, run.store.folder / KEPT
         wanted = members_kept(self.observed.keep, Folder(store.folder), members)
         group = group_of(store, run.plan, wanted)
-        shutil.rmtree(path.with_name(f"{KEPT}.new"), ignore_errors=True)
-        if not len(wanted) or not group.is_there():
-            shutil.rmtree(path, ignore_errors=True)
+        for beside in (*store.folder.glob(f"{KEPT}.*{scratch.NEW}"), path):
+            if beside != path or not len(wanted) or not group.is_there():
+                refuse_foreign(beside)
+                scratch.remove_folder(beside)
         if not len(wanted):
             return 0
         plan = run.plan.part(group.members.tolist(), self.fields)

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp import invariants, member_fields, notation
+from lgvi_warp import durable, invariants, member_fields, notation, npy_files, result_file
+from lgvi_warp.errors import SceneError
 from lgvi_warp.statistics.estimate import Estimates
 from lgvi_warp.status import StatusArray, WarningArray
 from lgvi_warp.terms import Term, from_list
@@ -167,12 +168,10 @@ class Result:
         return xr.Dataset(data, coordinates, attributes)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write everything to an .npz file, whole or not at all. Returns its path. Raises OSError.
+        """Write everything to an .npz file, durable and whole or not at all. Returns its path. Raises OSError.
 
         Where no samples were kept, parameters are left out too: they follow from the provenance's ensemble.
         """
-        target = Path(path)
-        part = target.with_name(target.name + ".part")
         arrays = {"time": self.time, **self.samples}
         arrays |= {one.name: np.asarray(getattr(self, one.name)) for one in self._member_fields()}
         if self.samples:
@@ -185,13 +184,9 @@ class Result:
             arrays |= {f"kept/{name}": value for name, value in self.kept.samples.items()}
             arrays |= {"kept/members": self.kept_members}
             arrays |= {f"kept/parameters/{name}": value for name, value in self.kept.parameters.items()}
-        try:
-            with part.open("wb") as file:
-                np.savez(file, **arrays, **texts)  # type: ignore[arg-type]
-            part.replace(target)
-        finally:
-            part.unlink(missing_ok=True)
-        return target
+        with durable.placed(path) as beside, beside.open("xb") as file:
+            np.savez(file, **arrays, **texts)  # type: ignore[arg-type]
+        return Path(path)
 
     @classmethod
     def per_member(cls, arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
@@ -202,19 +197,32 @@ class Result:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Result:
-        """Read what `save` wrote. Raises OSError or ValueError if it is not such a file."""
-        with np.load(Path(path), allow_pickle=False) as data:
-            content = {name: data[name] for name in data.files}
+        """Read what `save` wrote, maybe somewhere else: nothing in it is executed, and it takes no more memory than the file.
+
+        Raises OSError, or SceneError (a ValueError) if it is not such a file, or a damaged one.
+        """
+        try:
+            with result_file.understood(path):
+                content = npy_files.of_npz(path)
+                texts = result_file.checked(content)
+                return cls._from(content, texts)
+        except MemoryError:
+            raise SceneError([f"{path}: does not fit into memory; read it on a larger machine"]) from None
+
+    @classmethod
+    def _from(cls, content: Mapping[str, np.ndarray], texts: Mapping[str, Any]) -> Result:
+        """From arrays and texts that were checked."""
         estimates = Estimates()
         if "statistics" in content:
             estimates = Estimates.from_arrays(_below("statistics/", content), str(content["statistics"]))
+        provenance = texts["provenance"]
         result = cls(
             time=content["time"],
             samples={name: content[name] for name in content if name in UNITS},
             **cls.per_member(content),
             parameters=_below("parameters/", content),
-            messages=tuple(json.loads(str(content["messages"]))),
-            provenance=(provenance := json.loads(str(content["provenance"]))),
+            messages=tuple(texts["messages"]),
+            provenance=provenance,
             terms=from_list(provenance["scene"].get("terms", ())),
             statistics=estimates,
         )

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from lgvi_warp import durable
+from lgvi_warp import durable, safe_files, scratch
 from lgvi_warp.blocks import Block, Keeper
 from lgvi_warp.commits import Commits
 from lgvi_warp.ensemble import Ensemble
@@ -19,10 +18,22 @@ from lgvi_warp.kept import KeptRun, keep_of, members_kept
 from lgvi_warp.observation import Observing, observation_of
 from lgvi_warp.recipe import of_store, refuse_another, same_run
 from lgvi_warp.result import Result
-from lgvi_warp.running import Stored
+from lgvi_warp.running import Stored, explained
 from lgvi_warp.scene import Scene
-from lgvi_warp.store import CREATED, KEPT, ROOT, Folder, Sink, Store, check, held, name_of, read_marker
-from lgvi_warp.store_layout import columns
+from lgvi_warp.store import (
+    CREATED,
+    KEPT,
+    ROOT,
+    Folder,
+    Store,
+    check,
+    held,
+    marker,
+    name_of,
+    read_marker,
+    refuse_foreign,
+    understood,
+)
 from lgvi_warp.stored import folder_of, result_of
 
 
@@ -51,7 +62,8 @@ def resume(
     given = Ensemble.from_scene(fleet) if isinstance(fleet, Scene) else fleet
     plan = folder.plan(given)
     told = folder.provenance.get("observed")
-    observed = observation_of(told, statistics)
+    with understood(folder.path / ROOT):
+        observed = observation_of(told, statistics)
     observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
     now = of_store(provenance(plan), plan.ensemble) | ({} if told is None else {"observed": told})
     messages = refuse_another(folder.path, folder.provenance, now, force)
@@ -90,26 +102,14 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
             raise SceneError(f"{text}: these are parts of different runs; merge parts of one run" for text in found)
     target = Path(out)
     target = target if target.suffix == ".zarr" else target / first.path.name
-    if target.exists() and not overwrite:
-        raise SceneError([f"{target}: holds a run already; give --overwrite, or another folder"])
-    _not_in_use(target)
-    beside = target.with_name(target.name + ".new")
-    shutil.rmtree(beside, ignore_errors=True)
-    base = _undamaged(parts)
-    _copy_frame(base.path, beside)
-    made = Folder(beside)
-    made.reopen()
-    with Commits() as commits:
-        for block in first.runs:
-            _copy_block(parts, block, beside, commits)
-    whole = not made.unfinished()
-    again = whole and len(members_kept(keep_of(made.provenance), made)) > 0
-    if whole and not again:
-        made.finish()
-    _not_in_use(target)
-    shutil.rmtree(target, ignore_errors=True)
-    beside.replace(target)
-    durable.sync_folder(target.parent)
+    try:
+        with held(target):
+            if os.path.lexists(target) and not overwrite:
+                raise SceneError([f"{target}: holds a run already; give --overwrite, or another folder"])
+            refuse_foreign(target)
+            again = _put_together(parts, Path(os.path.realpath(target)))
+    except OSError as error:
+        raise explained(error, target) from error
     if again:
         # Another machine, or laws of a user's own: then it waits for lw.resume.
         with contextlib.suppress(SceneError, MembersFailed):
@@ -117,11 +117,24 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
     return Folder(target)
 
 
-def _not_in_use(target: Path) -> None:
-    """Refuse to replace a store that another run is writing into. Raises SceneError."""
-    if target.exists():
-        with held(target):
-            pass
+def _put_together(parts: Sequence[Folder], target: Path) -> bool:
+    """Copy frame and blocks into a new store in the place of the target. Whether members are to be run again for it."""
+    beside = scratch.beside(target, scratch.NEW)
+    try:
+        _copy_frame(_undamaged(parts), beside)
+        made = Folder(beside)
+        made.reopen()
+        with Commits() as commits:
+            for block in parts[0].runs:
+                _copy_block(parts, block, beside, commits)
+        whole = not made.unfinished()
+        again = whole and len(members_kept(keep_of(made.provenance), made)) > 0
+        if whole and not again:
+            made.finish()
+        durable.put_folder(beside, target)
+    finally:
+        scratch.remove_folder(beside)
+    return again
 
 
 def _undamaged(parts: Sequence[Folder]) -> Folder:
@@ -134,14 +147,14 @@ def _undamaged(parts: Sequence[Folder]) -> Folder:
     raise SceneError(damage)
 
 
-def _copy_frame(root: Path, target: Path) -> None:
-    """All of a store that belongs to no block: what was made with it."""
+def _copy_frame(part: Folder, target: Path) -> None:
+    """All of a store that belongs to no block: what was made with it. Raises SceneError, OSError."""
     files = durable.Files(target)
     for name in ("blocks", "parts"):
         (target / name).mkdir(parents=True)
-    for key in (*(read_marker(root / CREATED) or {}), CREATED, ROOT):
+    for key, size in (part.layout.frame() | {CREATED: None, ROOT: None}).items():
         (target / key).parent.mkdir(parents=True, exist_ok=True)
-        files.write(key, (root / key).read_bytes())
+        files.write(key, safe_files.read(part.path, key, size or safe_files.MOST_JSON))
     files.finish()
 
 
@@ -149,23 +162,25 @@ def _copy_block(parts: Sequence[Folder], block: Block, target: Path, commits: Co
     """A block from the first of the stores that has it whole. Raises SceneError where each has it damaged."""
     damage = []
     for part in parts:
-        sink = Sink(part.path, ())
+        sink = part.sink
         sums = read_marker(sink.marker(block))
         if sums is None:
             continue
+        if unfit := sink.unfit(block, sums, part.layout.times, part.recipe["keepers"]):
+            damage += [f"{part.path}: {text}; `lgvi-warp resume {part.path}` first" for text in unfit]
+            continue
         files = durable.Files(target)
-        for key, (_, crc) in sums.items():
+        for key, wanted in sums.items():
             try:
-                data = (part.path / key).read_bytes()
+                files.write(key, safe_files.read(part.path, key, wanted[0]))
             except FileNotFoundError:
-                data = b""
-            files.write(key, data)
-            if files.sums[key][1] != crc:
+                files.write(key, b"")
+            if files.sums[key] != wanted:
                 damage.append(f"{part.path / key}: is torn, missing or changed; `lgvi-warp resume {part.path}` first")
                 files.drop()
                 break
         else:
-            commits.add(files, target / "blocks" / sink.marker(block).name, sink.marker(block).read_bytes())
+            commits.add(files, target / "blocks" / sink.marker(block).name, marker(sums))
             return
     if damage:
         raise SceneError(damage)
@@ -179,13 +194,8 @@ def state(path: str | os.PathLike[str]) -> dict[str, Any]:
     folder = Folder(folder_of(path))
     runs = folder.runs
     damage = folder.damage()
-    samples = int(folder.group()["time"].shape[0])
-    try:
-        found = columns(folder.plan(), store_of(folder))
-    except SceneError:  # a law that this process does not know: the markers alone say what there should be
-        found = ()
-    finished = 0
-    for _, faults in check(Sink(folder.path, found), runs, samples):
+    samples, finished = folder.layout.times, 0
+    for _, faults in check(folder.sink, runs, samples, folder.recipe["keepers"]):
         if faults != ["is not finished"]:
             finished += not faults
             damage += faults
@@ -201,7 +211,7 @@ def state(path: str | os.PathLike[str]) -> dict[str, Any]:
         "finished": finished,
         "kept": kept,
         "complete": folder.complete and finished == len(runs) and not damage,
-        "bytes": sum(path.stat().st_size for path in folder.path.rglob("*") if path.is_file()),
+        "bytes": safe_files.size_below(folder.path),
         "damage": damage,
         "provenance": folder.provenance,
     }
@@ -209,16 +219,15 @@ def state(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 def kept_state(folder: Folder, sound: bool) -> tuple[int, list[str]]:
     """(members kept, what is wrong with their files); sound: nothing is wrong with those of the run."""
-    path = folder.path / KEPT
     wanted = len(members_kept(keep_of(folder.provenance), folder)) if folder.complete and sound else 0
-    if not path.exists():
-        return wanted, [f"{KEPT} is missing"] if wanted else []
     try:
-        group = Folder(path)
+        group = folder.kept()
     except SceneError:
         return wanted, [f"{KEPT}/{ROOT} is damaged"] if folder.complete else []
+    if group is None:
+        return wanted, [f"{KEPT} is missing"] if wanted else []
     damage = group.damage()
-    for block, faults in check(Sink(path, ()), group.runs, 0):
+    for block, faults in check(group.sink, group.runs, group.layout.times):
         if faults == ["is not finished"]:
             faults = [f"blocks/{name_of(block)}.json is missing or damaged"] if folder.complete else []
         damage += faults

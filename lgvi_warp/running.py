@@ -10,12 +10,13 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from lgvi_warp import safe_files, scratch
 from lgvi_warp.blocks import Block, Keeper, PartKeeper, Work, blocks, in_order
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.executors import Executor
 from lgvi_warp.plan import Plan
 from lgvi_warp.recipe import refuse_another
-from lgvi_warp.store import Folder, Sink, Store, check, create, held, names_of, skeleton
+from lgvi_warp.store import ROOT, Folder, Sink, Store, check, create, foreign, held, names_of, refuse_foreign, skeleton
 from lgvi_warp.store_layout import columns
 
 # What the system says when a disk takes no more, or not from us.
@@ -102,9 +103,9 @@ class Stored:
     def run(self, executor: Executor, progress: Callable[[float], None] | None = None) -> Folder:
         """Run what is missing. Raises SceneError for what is refused, OSError where the disk takes no more."""
         check_keepers(self.keepers)
-        self._begin()
         path = self.store.folder
-        with held(path):
+        with self._alone():
+            self._begin()
             sink = Sink(path, columns(self.plan, self.store))
             sink.remove_unfinished()
             self._mend()
@@ -116,7 +117,7 @@ class Stored:
                 raise explained(error, self.store.whole) from error
             finally:
                 sink.remove_unfinished()
-            folder = Folder(path)
+            folder = Folder(path, self.store.whole)
             folder.ran = sum(block.first < members for block in left)
             folder.found = sum(block.first < members for block in self._runs()) - folder.ran
             beyond = [] if self.only else [block for block in self._runs() if block.first >= members]
@@ -128,6 +129,19 @@ class Stored:
                 folder.finish(members if beyond else None)
         return folder
 
+    @contextlib.contextmanager
+    def _alone(self) -> Iterator[None]:
+        """No other run writes into the store, from the look at what is there to the end; of a group, its run sees to that."""
+        if self.store.whole != self.store.folder:
+            yield
+            return
+        with contextlib.ExitStack() as stack:
+            try:
+                stack.enter_context(held(self.store.folder))
+            except OSError as error:
+                raise explained(error, self.store.whole) from error
+            yield
+
     def _runs(self) -> list[Block]:
         """The blocks of this run, in order."""
         runs = blocks(self.plan.ensemble.members)
@@ -136,12 +150,15 @@ class Stored:
     def _begin(self) -> None:
         """Make the folder, or see that what lies there is this run."""
         path, store = self.store.folder, self.store
-        there = path.exists()
+        there = os.path.lexists(path) and bool(os.listdir(path) if path.is_dir() else True)
         if there and store.existing == "refuse":
+            if what := foreign(path):
+                raise SceneError([f"{path}: {what}; give another folder"])
             remedy = 'go on with `lgvi-warp resume` (existing="resume"), or replace it with --overwrite (existing="overwrite")'
             raise SceneError([f"{path}: holds a run already; {remedy}"])
         if there and store.existing == "resume":
-            folder = Folder(path)
+            safe_files.refuse_links(path)
+            folder = Folder(path, store.whole)
             refuse_another(path, folder.provenance, self.provenance, store.force)
             there_is, asked = (
                 (folder.recipe["store"], folder.recipe["keepers"]),
@@ -151,12 +168,9 @@ class Stored:
                 if one != other:
                     raise SceneError([f"{path}: stores {one}, not {other}; ask for the same, or overwrite"])
             return
+        refuse_foreign(path)
         try:
-            if there:
-                with held(path):
-                    create(store, self.plan, self.provenance, self.messages, self.keepers)
-            else:
-                create(store, self.plan, self.provenance, self.messages, self.keepers)
+            create(store, self.plan, self.provenance, self.messages, self.keepers)
         except OSError as error:
             raise explained(error, self.store.whole) from error
 
@@ -165,19 +179,20 @@ class Stored:
         path = self.store.folder
         for name in ("blocks", "parts"):
             (path / name).mkdir(exist_ok=True)
-        if not Folder(path).damage():
+        folder = Folder(path, self.store.whole)
+        if not folder.damage():
             return
-        import shutil
-
-        beside = path.with_name(path.name + ".new")
-        shutil.rmtree(beside, ignore_errors=True)
-        skeleton(beside, self.store, self.plan, self.provenance, self.messages, self.keepers)
-        for one in sorted(beside.rglob("*")):
-            target = path / one.relative_to(beside)
-            if one.is_file() and one != beside / "zarr.json":
-                target.parent.mkdir(parents=True, exist_ok=True)
-                one.replace(target)
-        shutil.rmtree(beside)
+        beside = scratch.beside(path, scratch.NEW)
+        try:
+            skeleton(beside, self.store, self.plan, self.provenance, self.messages, self.keepers)
+            folder.take_layout(beside)
+            for one in sorted(beside.rglob("*")):
+                target = path / one.relative_to(beside)
+                if one.is_file() and one != beside / ROOT:
+                    target.parent.mkdir(parents=True, exist_ok=True)
+                    one.replace(target)
+        finally:
+            scratch.remove_folder(beside)
 
     def _left(self, sink: Sink) -> list[Block]:
         """Blocks to be run, without those that are finished and whole; a damaged one loses its marker."""

@@ -17,7 +17,7 @@ import json
 import os
 import shutil
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,14 +25,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp import durable, machine
+from lgvi_warp import durable, machine, npy_files, safe_files, scratch, store_check, store_texts
 from lgvi_warp.blocks import Block, Keeper, PartKeeper, blocks
 from lgvi_warp.commits import Commits
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.recipe import ensemble_of, plan_of, recipe
+from lgvi_warp.safe_files import parsed
 from lgvi_warp.saveat import FIELDS
 from lgvi_warp.store_blocks import BlockWriter, Room
 from lgvi_warp.store_layout import MEMBER, Column, columns, parameter_units, size
+from lgvi_warp.write_lock import write_lock
 
 if TYPE_CHECKING:
     from lgvi_warp.ensemble import Ensemble
@@ -162,16 +164,24 @@ class Sink:
             return None
         return unpacked(keepers, self.root / self.parts_key(block)) if keepers else ()
 
-    def faults(self, block: Block, samples: int, keepers: Sequence[Keeper]) -> list[str]:
+    def faults(self, block: Block, samples: int, keepers: Sequence[Any]) -> list[str]:
         """What is wrong with a finished block's files; "is not finished" alone for one that is not."""
         sums = read_marker(self.marker(block))
         if sums is None:
             return ["is not finished"]
-        wanted = [key for column in self.columns for key in column.keys(block, samples)]
-        wanted += [self.parts_key(block)] if keepers else []
-        found = [(key, "is not in the marker") for key in wanted if key not in sums]
-        found += [(key, text) for key, one in sums.items() if (text := durable.fault(self.root, key, *one))]
-        return [f"{key} {text}" for key, text in found]
+        if unfit := self.unfit(block, sums, samples, keepers):
+            return unfit
+        return [f"{key} {text}" for key, one in sums.items() if (text := durable.fault(self.root, key, *one))]
+
+    def unfit(self, block: Block, sums: Mapping[str, Sequence[int]], samples: int, keepers: Sequence[Any]) -> list[str]:
+        """What is wrong with the names and sizes in a block's marker: only its own chunks may be there, and its parts."""
+        sizes = {key: column.bytes for column in self.columns for key in column.keys(block, samples)}
+        parts = self.parts_key(block)
+        found = [f"{key} is not in the marker" for key in (*sizes, *([parts] if keepers else [])) if key not in sums]
+        strange = [key for key in sums if key not in sizes and key != parts]
+        found += [f"{key!r:.100} is in the marker of block {name_of(block)}, and is no file of it" for key in strange]
+        wrong = [key for key, size in sizes.items() if key in sums and sums[key][0] != size]
+        return found + [f"{key} has {sums[key][0]} bytes in the marker, not {sizes[key]}" for key in wrong]
 
     def remove(self, runs: Sequence[Block], samples: int) -> None:
         """Remove all there is of these blocks, their markers first."""
@@ -206,9 +216,9 @@ def packed(keepers: Sequence[Keeper], parts: Sequence[Any]) -> bytes:
 
 def unpacked(keepers: Sequence[Keeper], path: Path) -> tuple[Any, ...]:
     """The parts of these keepers, of all that were packed."""
-    with path.open("rb") as file:
-        told = json.loads(str(np.load(file)))
-        found = {name: ({one: np.load(file) for one in arrays}, content) for name, arrays, content in told}
+    with npy_files.opened(path) as arrays:
+        told = parsed(npy_files.text(arrays))
+        found = {name: ({one: next(arrays) for one in names}, content) for name, names, content in told}
     return tuple(keeper.from_arrays(*found[keeper.name]) for keeper in keepers if isinstance(keeper, PartKeeper))
 
 
@@ -219,39 +229,83 @@ def marker(sums: Mapping[str, list[int]]) -> bytes:
 
 
 def read_marker(path: Path) -> dict[str, list[int]] | None:
-    """What a marker lists; None if there is none, or a damaged one."""
+    """What a marker lists; None if there is none, or a damaged one. Raises SceneError where it is a link."""
     try:
-        text, _, last = path.read_bytes().rstrip(b"\n").rpartition(b"\n")
+        content = safe_files.read(path.parent.parent, f"{path.parent.name}/{path.name}", safe_files.MOST_JSON)
+        text, _, last = content.rstrip(b"\n").rpartition(b"\n")
         if int(last, 16) == durable.checksum(text):
-            return dict(json.loads(text))
-    except (OSError, ValueError):
+            sums = dict(parsed(text))
+            return sums if all(_is_sum(one) for one in sums.values()) else None
+    except SceneError:
+        raise
+    except (OSError, ValueError, TypeError):
         pass
     return None
 
 
-class Folder:
-    """A store that exists. Raises SceneError where there is none, or its metadata is damaged."""
+def _is_sum(value: Any) -> bool:
+    """Whether it is a size and a checksum."""
+    return isinstance(value, list) and len(value) == 2 and all(type(one) is int and one >= 0 for one in value)
 
-    def __init__(self, path: Path):
-        self.path = path
+
+@contextlib.contextmanager
+def understood(path: Path) -> Iterator[None]:
+    """What is no error of its own while a file is read is one of the file. Raises SceneError."""
+    try:
+        yield
+    except SceneError:
+        raise
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError, ArithmeticError, RecursionError) as error:
+        text = " ".join(str(error).split())[:200] or type(error).__name__
+        what = (
+            text if isinstance(error, store_check.NotOursError) else f"cannot be used ({type(error).__name__}: {text})"
+        )
+        raise SceneError(
+            [f"{path}: is not what lgvi-warp writes: {what}; ask for the run anew, or run it again"]
+        ) from error
+
+
+class Folder:
+    """A store that exists, maybe somebody else's: what it says is checked before it is used. Its folder may be a link.
+
+    within: the run that it is a group of. Raises SceneError where there is none, or its metadata is damaged.
+    """
+
+    def __init__(self, path: Path, within: Path | None = None):
+        self.path, self.within = path, within or path
         needed()
         try:
-            content = json.loads((path / ROOT).read_bytes())
+            content = self._root()
             self.attributes: dict[str, Any] = content["attributes"]
             texts = [self.attributes[name] for name in ("provenance", "recipe", "messages", "shared")]
             good = self.attributes["format"] == FORMAT and self.attributes["crc32c"] == checksum_of(texts)
         except FileNotFoundError:
             raise SceneError([f"{path}: holds no run; give a folder that `lgvi-warp run --store zarr` made"]) from None
-        except (ValueError, KeyError, TypeError):
+        except SceneError:
+            raise
+        except (ValueError, KeyError, TypeError, AttributeError):
             good = False
         if not good:
             raise SceneError(
                 [f"{path / ROOT}: is damaged, or of another version of the format; run again (--overwrite)"]
             )
-        self.provenance, self.recipe, messages, self.shared = (json.loads(text) for text in texts)
-        self.messages: tuple[str, ...] = tuple(messages)
+        with understood(path / ROOT):
+            self.provenance, self.recipe, messages, self.shared = (parsed(text) for text in texts)
+            store_texts.check(self.attributes, self.provenance, self.recipe, messages, self.shared)
+            self.messages: tuple[str, ...] = tuple(messages)
+            self.layout = store_check.layout_of(content, int(self.recipe["members"]))
         # What this process did: blocks that it found whole, those that it ran, and those of kept members that it ran.
         self.found, self.ran, self.ran_kept = 0, 0, 0
+
+    def _root(self) -> Any:
+        """The root's metadata. Raises ValueError, SceneError, OSError."""
+        if not self.path.is_dir():
+            raise FileNotFoundError
+        return safe_files.read_json(self.within, (self.path / ROOT).relative_to(self.within).as_posix())
+
+    def kept(self) -> Folder | None:
+        """The group of its kept members; None where there is none. Raises SceneError where it is damaged."""
+        return Folder(self.path / KEPT, self.path) if os.path.lexists(self.path / KEPT) else None
 
     @property
     def complete(self) -> bool:
@@ -268,15 +322,37 @@ class Folder:
         """The blocks of these members, in order."""
         return [block for block in blocks(int(self.recipe["members"])) if block.first < self.members]
 
+    @property
+    def sink(self) -> Sink:
+        """What knows its blocks and their files."""
+        return Sink(self.path, self.layout.columns)
+
+    def checked(self) -> Any:
+        """What zarr and xarray read it through."""
+        from lgvi_warp.store_zarr import CheckedStore
+
+        own = {name: value for name, value in self.attributes.items() if value is not None}
+        return CheckedStore(self.path, self.layout, self.layout.root(own))
+
     def group(self) -> Any:
         """The zarr group, for reading."""
         import zarr
 
-        return zarr.open_group(self.path, mode="r", zarr_format=3)
+        return zarr.open_group(self.checked(), mode="r", zarr_format=3)
+
+    def refuse_too_large(self) -> None:
+        """Raise SceneError where what is read at once, numbers of members without times, is more than the memory."""
+        each = sum(one.bytes for one in self.layout.columns if not one.times) * len(self.runs)
+        memory = machine.memory_bytes() or 2**40
+        if each > memory:
+            what = f"has {self.members:,} members, of which {each / 1e9:.0f} GB are read at once, and the memory is"
+            raise SceneError(
+                [f"{self.path}: {what} {memory / 1e9:.0f} GB; read it on a larger machine, or run it again"]
+            )
 
     def unfinished(self) -> list[Block]:
         """Blocks without a marker."""
-        sink = Sink(self.path, ())
+        sink = self.sink
         return [block for block in self.runs if read_marker(sink.marker(block)) is None]
 
     def plan(self, ensemble: Ensemble | None = None) -> Plan:
@@ -292,22 +368,42 @@ class Folder:
         except (ValueError, OSError, KeyError) as error:
             remedy = "run the same scene again with --store zarr --resume, which mends it"
             raise SceneError([f"{self.path}: {'; '.join(self.damage()) or error}; {remedy}"]) from error
-        if ensemble is None:
-            noise = given.pop("indices", None)
-            ensemble = ensemble_of(self.provenance["scene"], self.provenance["ensemble"], given, noise)
-        return plan_of(self.recipe, ensemble, steps, times)
+        with understood(self.path / ROOT):
+            if ensemble is None:
+                noise = given.pop("indices", None)
+                ensemble = ensemble_of(self.provenance["scene"], self.provenance["ensemble"], given, noise)
+            return plan_of(self.recipe, ensemble, steps, times)
 
     def damage(self) -> list[str]:
         """What is wrong with the files that do not belong to a block."""
-        sums = read_marker(self.path / CREATED)
+        sums, wanted = read_marker(self.path / CREATED), self.layout.frame()
         if sums is None:
             return [f"{CREATED} is damaged"]
-        return [f"{key} {text}" for key, one in sums.items() if (text := durable.fault(self.path, key, *one))]
+        if sums.keys() != wanted.keys() or any(size not in (None, sums[key][0]) for key, size in wanted.items()):
+            return [f"{CREATED} does not fit the arrays in {ROOT}"]
+        found = {key: text for key, one in sums.items() if (text := durable.fault(self.path, key, *one))}
+        return [f"{key} {text}" for key, text in found.items()] + self._unlike(found)
+
+    def _unlike(self, damaged: Container[str]) -> list[str]:
+        """Arrays whose own metadata is whole and says something else than that of the root."""
+        unlike = []
+        for name, array in self.layout.arrays.items():
+            key = f"{name}/{ROOT}"
+            if key not in damaged and safe_files.read_json(self.path, key) != array.metadata():
+                unlike.append(f"{key} says something else than {ROOT}")
+        return unlike
 
     def finish(self, members: int | None = None) -> None:
         """Say that the run is complete; members: with so many, where it ended before the last of the ensemble."""
         if not self.complete:
             self._say({"complete": True} | ({} if members is None else {"members": members}), below(self.path / KEPT))
+
+    def take_layout(self, other: Path) -> None:
+        """Say of the arrays what the root's metadata of another folder of the same run says; then it is not complete."""
+        content, right = self._root(), safe_files.read_json(other, ROOT)
+        if Folder(other).layout != self.layout:
+            right["attributes"] = content["attributes"] | {"complete": False}
+            durable.write_whole(self.path / ROOT, json.dumps(right, indent=2).encode())
 
     def reopen(self) -> None:
         """Say that the run is not complete."""
@@ -316,7 +412,7 @@ class Folder:
 
     def _say(self, said: dict[str, Any], kept: dict[str, Any]) -> None:
         """Write attributes of the run, and what lies in the group of its kept members."""
-        content = json.loads((self.path / ROOT).read_bytes())
+        content = self._root()
         content["attributes"] |= said
         arrays = content["consolidated_metadata"]["metadata"]
         own = {name: one for name, one in arrays.items() if name.partition("/")[0] != KEPT}
@@ -329,7 +425,7 @@ def below(path: Path) -> dict[str, Any]:
     """Metadata of a group and its arrays, as that of the group it lies in has them; none of one that is not there."""
     if not path.exists():
         return {}
-    own = json.loads((path / ROOT).read_bytes())
+    own = safe_files.read_json(path.parent, f"{path.name}/{ROOT}")
     arrays = own["consolidated_metadata"]["metadata"]
     own["consolidated_metadata"] = {**own["consolidated_metadata"], "metadata": {}}
     return {path.name: own} | {f"{path.name}/{name}": one for name, one in arrays.items()}
@@ -347,24 +443,25 @@ def create(
 
     keepers: whose parts it will hold; the recipe has their names.
     """
-    target = store.folder
+    target = Path(os.path.realpath(store.folder))
+    check_names(columns(plan, store))
     free_enough(target, size(plan, store))
     target.parent.mkdir(parents=True, exist_ok=True)
-    beside, old = (target.with_name(target.name + end) for end in (".new", ".old"))
-    for one in (beside, old):
-        shutil.rmtree(one, ignore_errors=True)
+    beside = scratch.beside(target, scratch.NEW)
     try:
         skeleton(beside, store, plan, provenance, messages, keepers)
-        if target.exists():
-            target.replace(old)
-            beside.replace(target)
-            shutil.rmtree(old)
-        else:
-            beside.replace(target)
-        durable.sync_folder(target.parent)
-    except BaseException:
-        shutil.rmtree(beside, ignore_errors=True)
-        raise
+        durable.put_folder(beside, target)
+    finally:
+        scratch.remove_folder(beside)
+
+
+def check_names(found: Sequence[Column]) -> None:
+    """Each array's name becomes that of a folder. Raises SceneError."""
+    faults = Faults("store.")
+    for name in (one.name for one in found if not store_check.is_name(one.name)):
+        remedy = 'give the term or event another name, without / \\ : * ? " < > | and of 200 bytes at most'
+        faults.add("fields", name, "cannot be the name of a folder", remedy)
+    faults.raise_if_any()
 
 
 def names_of(keepers: Sequence[Keeper]) -> list[str]:
@@ -466,7 +563,7 @@ def whole_array(group: Any, name: str, values: np.ndarray, dims: tuple[str, ...]
 
 
 def check(
-    sink: Sink, runs: Sequence[Block], samples: int, keepers: Sequence[Keeper] = ()
+    sink: Sink, runs: Sequence[Block], samples: int, keepers: Sequence[Any] = ()
 ) -> Iterator[tuple[Block, list[str]]]:
     """Each block and what is wrong with it (see Sink.faults), every file read, in order."""
     with ThreadPoolExecutor(machine.thread_count()) as pool:
@@ -476,8 +573,35 @@ def check(
 
 @contextlib.contextmanager
 def held(path: Path) -> Iterator[None]:
-    """Keep other runs out of a store. Raises SceneError where one is at work in it."""
-    with durable.locked(path) as mine:
-        if not mine:
-            raise SceneError([f"{path}: another run is writing into it; wait for it, or end it"])
+    """Keep other runs out of a store that is there or will be, from before the look at it; mend what a killed one left.
+
+    Raises SceneError naming the run that is at work in it, OSError.
+    """
+    with write_lock(path):
+        place = Path(os.path.realpath(path))
+        durable.restored(place)
+        for beside in scratch.left_behind(place):
+            if beside.suffix in (scratch.NEW, scratch.OLD) and not foreign(beside):
+                scratch.remove_folder(beside)
         yield
+
+
+def foreign(path: Path) -> str | None:
+    """What no run has written of a folder, or why it is none of a run; None where all of it is a run's."""
+    if path.is_symlink() or not path.is_dir():
+        return "is no folder of a run"
+    names = []
+    for name, entry in safe_files.entries(path):
+        folder = entry.is_dir(follow_symlinks=False)
+        if not folder and not (entry.is_file(follow_symlinks=False) and store_check.is_file_of_store(name)):
+            return f"holds {name}, which no run wrote"
+        names += [] if folder else [name]
+    if names and not {ROOT, CREATED} & set(names) and not any(scratch.is_unfinished(one) for one in names):
+        return f"holds {names[0]}, and nothing that says that it is a run"
+    return None
+
+
+def refuse_foreign(path: Path) -> None:
+    """Raise SceneError where a folder that is to be replaced holds what no run wrote."""
+    if os.path.lexists(path) and (what := foreign(Path(os.path.realpath(path)))):
+        raise SceneError([f"{path}: {what}; it is not overwritten: move it away, or give another folder"])

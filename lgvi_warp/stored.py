@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp import durable
+from lgvi_warp.blocks import Block
 from lgvi_warp.errors import SceneError
 from lgvi_warp.kept import keep_of, members_kept
 from lgvi_warp.observation import Observation, Observing, observation_of, replicates_of
 from lgvi_warp.result import UNITS, Result
 from lgvi_warp.statistics.estimate import Estimates
-from lgvi_warp.store import KEPT, Folder, Sink, name_of, read_marker
+from lgvi_warp.store import KEPT, ROOT, Folder, name_of, read_marker, understood
 from lgvi_warp.store_layout import KEPT_MEMBER, MEMBER
 from lgvi_warp.terms import Term, from_list
 
@@ -60,6 +61,9 @@ def folder_of(path: str | os.PathLike[str]) -> Path:
     if given.suffix == ".zarr":
         return given
     found = sorted(given.glob("*.zarr")) if given.is_dir() else []
+    if len(found) == 1 and found[0].is_symlink():
+        # A folder from elsewhere would lead to any run of the user's.
+        raise SceneError([f"{found[0]}: is a link; name the store that it leads to: {found[0].resolve()}"])
     if len(found) == 1:
         return found[0]
     what = "is not there" if not given.exists() else "is a file" if given.is_file() else "holds no store"
@@ -97,7 +101,9 @@ def open_run(
     told = folder.provenance.get("observed")
     if members is not None or told is None or (statistics is None and told.get("functions")):
         return result_of(folder, members, messages)
-    return result_of(folder, None, messages, observing=gathered(folder, observation_of(told, statistics)))
+    with understood(folder.path / ROOT):
+        observed = observation_of(told, statistics)
+    return result_of(folder, None, messages, observing=gathered(folder, observed))
 
 
 def times_of(folder: Folder) -> np.ndarray:
@@ -116,20 +122,24 @@ def gathered(folder: Folder, observed: Observation) -> Observing:
     """The statistics of a complete run, from the parts of its blocks."""
     replicates = replicates_of(folder.provenance["ensemble"])
     observing = Observing(observed, times_of(folder), int(folder.recipe["members"]), replicates)
-    sink = Sink(folder.path, ())
+    sink = folder.sink
     for block in folder.runs:
-        _check_parts(folder, read_marker(sink.marker(block)), name_of(block))
-        for keeper, part in zip(observing.keepers, sink.parts(block, observing.keepers) or (), strict=True):
-            keeper.merge(block, part)
+        _check_parts(folder, read_marker(sink.marker(block)), block)
+        with understood(folder.path / sink.parts_key(block)):
+            for keeper, part in zip(observing.keepers, sink.parts(block, observing.keepers) or (), strict=True):
+                keeper.merge(block, part)
     return observing
 
 
-def _check_parts(folder: Folder, sums: Mapping[str, Sequence[int]] | None, name: str) -> None:
+def _check_parts(folder: Folder, sums: Mapping[str, Sequence[int]] | None, block: Block) -> None:
     """A block's parts must be those that were written. Raises SceneError."""
-    keys = [key for key in sums or () if key.startswith("parts/")]
-    found = [f"{key} {text}" for key in keys if sums and (text := durable.fault(folder.path, key, *sums[key]))]
+    key = folder.sink.parts_key(block)
     if sums is None:
-        found = [f"blocks/{name}.json is missing or damaged"]
+        found = [f"blocks/{name_of(block)}.json is missing or damaged"]
+    elif key not in sums:
+        found = [f"{key} is not in the marker of its block"]
+    else:
+        found = [f"{key} {text}" for text in [durable.fault(folder.path, key, *sums[key])] if text]
     if found:
         raise SceneError(f"{folder.path}: {text}; `lgvi-warp resume {folder.path}` mends it" for text in found)
 
@@ -142,6 +152,7 @@ def result_of(
     observing: Observing | None = None,
 ) -> Result:
     """The Result of a folder; terms: those of the scene, where its file does not tell them; observing: its statistics."""
+    folder.refuse_too_large()
     group, time = folder.group(), times_of(folder)
     n, whole = folder.members, int(folder.recipe["members"])
     at = _places(members, n)
@@ -149,7 +160,8 @@ def result_of(
     fields = tuple(name for name in arrays if name in UNITS)
     varied = tuple(name for name in arrays if "." in name)
     small = Arrays(group, tuple(name for name in arrays if name not in (*fields, *varied, "time", "step")), 0, at)
-    shared = {name: np.asarray(value, dtype=np.float64) for name, value in folder.shared.items()}
+    with understood(folder.path / ROOT):
+        shared = {name: np.asarray(value, dtype=np.float64) for name, value in folder.shared.items()}
     provenance = dict(folder.provenance)
     for name in ("steps_made", "steps_tried"):
         if name in arrays:
@@ -159,7 +171,8 @@ def result_of(
     estimates, said = Estimates(), tuple[str, ...]()
     if observing is not None:
         estimates, said = observing.read(provenance["ensemble"], small["status"])
-    of_scene = tuple(from_list(provenance["scene"].get("terms", ())) if terms is None else terms)
+    with understood(folder.path / ROOT):
+        of_scene = tuple(from_list(provenance["scene"].get("terms", ())) if terms is None else terms)
     indices, kept = kept_of(folder, of_scene) if members is None else (np.empty(0, np.int64), None)
     return Result(
         time=time,
@@ -181,13 +194,17 @@ def kept_of(folder: Folder, terms: Sequence[Term]) -> tuple[np.ndarray, Result |
     wanted = members_kept(keep_of(folder.provenance), folder) if folder.complete else np.empty(0, np.int64)
     if not len(wanted):
         return wanted, None
-    path = folder.path / KEPT
-    if not path.exists():
-        raise SceneError([f"{path}: is missing; `lgvi-warp resume {folder.path}` makes it again"])
-    group = Folder(path)
+    group = folder.kept()
+    if group is None:
+        raise SceneError([f"{folder.path / KEPT}: is missing; `lgvi-warp resume {folder.path}` makes it again"])
     found = result_of(group, _chosen_places(group.group()), group.messages, terms)
     ensemble = found.provenance["ensemble"]
-    places = np.asarray(ensemble.get("indices", range(folder.members)))[wanted]
+    if found.members != len(wanted):
+        raise SceneError(
+            [f"{group.path}: holds {found.members} members, not {len(wanted)}; `lgvi-warp resume` mends it"]
+        )
+    with understood(folder.path / ROOT):
+        places = np.asarray(ensemble.get("indices", range(folder.members)))[wanted]
     return wanted, replace(found, provenance=found.provenance | {"ensemble": ensemble | {"indices": places.tolist()}})
 
 
@@ -219,7 +236,7 @@ def dataset(path: Path) -> xarray.Dataset:
     import xarray
 
     chunks: Any = {} if importlib.util.find_spec("dask") else None
-    whole = xarray.open_dataset(path, engine="zarr", chunks=chunks)
+    whole = xarray.open_dataset(Folder(path).checked(), engine="zarr", chunks=chunks)
     if KEPT_MEMBER in whole.dims:
         whole = whole.swap_dims({KEPT_MEMBER: MEMBER})
     if "chosen" in whole:

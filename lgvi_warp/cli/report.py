@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+
+from lgvi_warp.safe_files import size_below
+from lgvi_warp.write_lock import write_lock
 
 
 def report(result: Any, out: Path, quiet: bool, begun: float) -> list[str]:
@@ -73,7 +77,7 @@ def write(result: Any, drawn: Any, out: Path) -> tuple[list[Path], list[str]]:
         writers["statistics.png"] = lambda path: plot_statistics(result, path)
     if not writers:
         return files, faults
-    with ThreadPoolExecutor(len(writers)) as pool:
+    with _in_turn(out), ThreadPoolExecutor(len(writers)) as pool:
         jobs = {out / name: pool.submit(writer, out / name) for name, writer in writers.items()}
     for path, job in jobs.items():
         try:
@@ -81,6 +85,15 @@ def write(result: Any, drawn: Any, out: Path) -> tuple[list[Path], list[str]]:
         except (OSError, ImportError, ValueError) as error:
             faults.append(f"{path} was not written: {error}")
     return files, faults
+
+
+@contextlib.contextmanager
+def _in_turn(out: Path) -> Iterator[None]:
+    """Runs that end together in one folder write their files one after another: what is left are those of one of them."""
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):  # a folder that takes no file: each file says so
+            stack.enter_context(write_lock(out / "result", wait=True))
+        yield
 
 
 def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
@@ -162,6 +175,4 @@ def _speed(result: Any, seconds: float) -> list[str]:
 
 def size_of(path: Path) -> int:
     """Bytes of a file, or of all in a folder."""
-    return (
-        path.stat().st_size if path.is_file() else sum(one.stat().st_size for one in path.rglob("*") if one.is_file())
-    )
+    return path.stat().st_size if path.is_file() else size_below(path)

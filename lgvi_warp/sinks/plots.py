@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp import durable
+
 if TYPE_CHECKING:
     from lgvi_warp.result import Result
     from lgvi_warp.stability import StabilityMap
@@ -45,8 +47,14 @@ def plot(result: Result, path: str | os.PathLike[str]) -> Path:
     method, step = result.provenance["method"]["name"], result.provenance["step"]
     title = f"{result.members} members, {method}, step {step:g} s"
     figure.suptitle(title + (f", {failed} failed (left out)" if failed else ""))
+    return save_figure(figure, path, 100)
+
+
+def save_figure(figure: Any, path: str | os.PathLike[str], dpi: int) -> Path:
+    """Write a picture, whole or not at all; its ending chooses the format. Returns its path. Raises OSError."""
     target = Path(path)
-    figure.savefig(target, dpi=100)
+    with durable.placed(target) as beside:
+        figure.savefig(beside, dpi=dpi, format=target.suffix.removeprefix(".") or "png")
     return target
 
 
@@ -99,9 +107,7 @@ def plot_statistics(result: Result, path: str | os.PathLike[str]) -> Path:
     for axes in list(figure.axes)[len(drawn) :]:
         axes.set_axis_off()
     figure.suptitle(f"{result.members} members, intervals of {drawn[0].confidence:.0%}")
-    target = Path(path)
-    figure.savefig(target, dpi=100)
-    return target
+    return save_figure(figure, path, 100)
 
 
 def drawable(result: Result) -> list[Estimate]:
@@ -240,9 +246,7 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None 
         f"{found.members} members, 0 to {found.t1:g} s; reference {found.reference}; better is to the right and down"
     )
     figure.suptitle(title, fontsize="medium")
-    target = Path(path)
-    figure.savefig(target, dpi=100)
-    return target
+    return save_figure(figure, path, 100)
 
 
 # Colours of stability_map's classes, apart for every kind of colour vision and in grey; what must not be is hatched too.
@@ -282,9 +286,7 @@ def plot_stability(found: StabilityMap, path: str | os.PathLike[str]) -> Path:
     figure.suptitle(
         f"{scene}; bounded: energy up to {found.t1:.3g} s; worst of {found.directions} starts", fontsize="medium"
     )
-    target = Path(path)
-    figure.savefig(target, dpi=110)
-    return target
+    return save_figure(figure, path, 110)
 
 
 def _unit_of(found: StabilityMap) -> str:

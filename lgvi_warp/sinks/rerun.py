@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp import notation
+from lgvi_warp import durable, notation
 
 if TYPE_CHECKING:
     from lgvi_warp.result import Result
@@ -39,27 +39,24 @@ def log_rerun(result: Result, path: str | os.PathLike[str]) -> Path:
     except ImportError as error:
         raise ImportError("recordings need rerun-sdk: pip install 'lgvi-warp[viz]'") from error
     target = Path(path)
-    part = target.with_name(target.name + ".part")
     recording = rr.RecordingStream("lgvi_warp", recording_id="fleet")
     finite = np.isfinite(result.position[0]).all(axis=-1) & np.isfinite(result.attitude[0]).all(axis=(-1, -2))
     shown = np.flatnonzero(finite)
     shown = shown[np.unique(np.linspace(0, len(shown) - 1, min(MOST_BODIES, len(shown))).astype(int))]
     position = result.position[:, shown].astype(np.float32)
     try:
-        recording.save(part, default_blueprint=_blueprint(result.time, position))
-        _world(recording, rr, result, shown, position)
-        _curves(recording, rr, result)
-        text = "```json\n" + json.dumps(result.provenance, indent=2) + "\n```"
-        recording.log("run", rr.TextDocument(text, media_type="text/markdown"), static=True, strict=True)
-        recording.flush()
-        recording.disconnect()
-        part.replace(target)
+        with durable.placed(target) as beside:
+            recording.save(beside, default_blueprint=_blueprint(result.time, position))
+            _world(recording, rr, result, shown, position)
+            _curves(recording, rr, result)
+            text = "```json\n" + json.dumps(result.provenance, indent=2) + "\n```"
+            recording.log("run", rr.TextDocument(text, media_type="text/markdown"), static=True, strict=True)
+            recording.flush()
+            recording.disconnect()
     except RuntimeError as error:
         # rerun's word for a writer that could not begin, or not go on; it says why on stderr.
         text = f"the recording could not be written ({error}); is the disk full, or the folder read-only?"
         raise OSError(text) from error
-    finally:
-        part.unlink(missing_ok=True)
     return target
 
 

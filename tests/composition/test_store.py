@@ -13,7 +13,7 @@ import pytest
 import zarr
 
 import lgvi_warp as lw
-from lgvi_warp import cli, durable, machine, member_fields, resuming, store, store_layout
+from lgvi_warp import cli, durable, machine, member_fields, resuming, safe_files, store, store_layout
 from lgvi_warp.blocks import blocks
 from lgvi_warp.executors.threads import Threads
 from lgvi_warp.running import Stored
@@ -568,10 +568,10 @@ def test_a_file_system_that_is_read_only(tmp_path, monkeypatch, capsys):
 
 def test_chunks_are_synced_before_their_block_is_marked(tmp_path, monkeypatch):
     order = []
-    sync, replace = os.fsync, os.replace
+    sync, rename = os.fsync, safe_files.rename
     monkeypatch.setattr(os, "fsync", lambda fd: (order.append(("sync", os.readlink(f"/proc/self/fd/{fd}"))), sync(fd)))
     monkeypatch.setattr(
-        durable.Path, "replace", lambda self, to: (order.append(("name", str(to))), replace(self, to))[1] or to
+        safe_files, "rename", lambda root, path, to: (order.append(("name", str(to))), rename(root, path, to))[1]
     )
     lw.solve(fleet(200), **SETTINGS, store=tmp_path / "run.zarr", threads=1)
     root = str(tmp_path / "run.zarr")

@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from lgvi_warp import commits, durable
+from lgvi_warp import commits, durable, safe_files
 from lgvi_warp.commits import Commits
 
 
@@ -47,7 +47,7 @@ def full(of, before):
 
 def test_a_group_is_synced_named_and_then_marked(root, slowly, monkeypatch):
     order = []
-    file, folder, replace = durable.sync_file, durable.sync_folder, durable.Path.replace
+    file, folder, rename = durable.sync_file, durable.sync_folder, safe_files.rename
 
     def told(what, call):
         def telling(*paths):
@@ -58,7 +58,7 @@ def test_a_group_is_synced_named_and_then_marked(root, slowly, monkeypatch):
 
     monkeypatch.setattr(durable, "sync_file", told("synced", file))
     monkeypatch.setattr(durable, "sync_folder", told("synced", folder))
-    monkeypatch.setattr(durable.Path, "replace", told("named", replace))
+    monkeypatch.setattr(safe_files, "rename", told("named", rename))
     with Commits() as own:
         for i in range(3):
             add(own, root, i)

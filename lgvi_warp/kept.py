@@ -82,7 +82,7 @@ class KeptRun:
         store, path = run.store, run.store.folder / KEPT
         wanted = members_kept(self.observed.keep, Folder(store.folder), members)
         group = group_of(store, run.plan, wanted)
-        for beside in (*store.folder.glob(f"{KEPT}.*{scratch.NEW}"), path):
+        for beside in (*store.folder.glob(f"{KEPT}.*new"), path):
             if beside != path or not len(wanted) or not group.is_there():
                 refuse_foreign(beside)
                 scratch.remove_folder(beside)

@@ -80,14 +80,16 @@ def text(arrays: Iterator[np.ndarray]) -> str:
 
 
 class _Careful(io.BufferedReader):
-    """A file of which only so much is read at once: a list of files in an .npz may be as long as that file."""
+    """A file of which only so many bytes are read at once: a list of files in an .npz may be as long as that file."""
+
+    most = MOST_LIST
 
     def read(self, size: int | None = -1, /) -> bytes:
-        if size is None or size < 0 or size > max(MOST_LIST, self.most):
+        if size is None or size < 0:
+            size = os.fstat(self.fileno()).st_size - self.tell()
+        if size > self.most:
             raise zipfile.BadZipFile("its list of files is too long")
         return super().read(size)
-
-    most = 0
 
 
 def of_npz(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
@@ -114,7 +116,7 @@ def _arrays(archive: zipfile.ZipFile, file: _Careful, size: int) -> dict[str, np
         raise ValueError("is compressed, which no result is")
     if sum(one.file_size for one in members) > size or any(one.file_size != one.compress_size for one in members):
         raise ValueError("promises more bytes than it has")
-    file.most = size
+    file.most = max(size, MOST_LIST)
     arrays = {}
     for one in members:
         with archive.open(one) as stream:

@@ -121,10 +121,11 @@ def parsed(text: str | bytes) -> Any:
 @contextlib.contextmanager
 def created(root: Path, path: Path) -> Iterator[BinaryIO]:
     """A new file below the root, for writing. Raises SceneError where a folder on the way is a link, OSError."""
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _PLAIN
     with folder(root, path.parent) as inside:
-        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _PLAIN
-        descriptor = os.open(path if inside is None else path.name, flags, 0o666, dir_fd=inside)
-    with open(descriptor, "wb", buffering=0) as file:
+        where = path if inside is None else path.name
+        file = open(path, "wb", buffering=0, opener=lambda *_: os.open(where, flags, 0o666, dir_fd=inside))  # noqa: SIM115
+    with file:
         yield file
 
 

@@ -329,10 +329,10 @@ class Folder:
 
     def checked(self) -> Any:
         """What zarr and xarray read it through."""
-        from lgvi_warp.store_zarr import CheckedStore
+        from lgvi_warp.store_zarr import checked_store
 
         own = {name: value for name, value in self.attributes.items() if value is not None}
-        return CheckedStore(self.path, self.layout, self.layout.root(own))
+        return checked_store(self.path, self.layout, self.layout.root(own))
 
     def group(self) -> Any:
         """The zarr group, for reading."""

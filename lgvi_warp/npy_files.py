@@ -53,11 +53,13 @@ def read(file: Any, left: int) -> np.ndarray:
     count = math.prod(shape)
     if dtype.kind not in KINDS or dtype.itemsize == 0 or count * dtype.itemsize > left:
         raise ValueError(f"promises an array of type {dtype} and shape {shape}, which is not in the file")
-    data = file.read(count * dtype.itemsize)
-    if len(data) < count * dtype.itemsize:
-        raise ValueError("is torn")
-    array = np.frombuffer(bytearray(data), dtype).reshape(shape, order="F" if fortran else "C")
-    return array
+    array = np.empty(count, dtype)
+    view = memoryview(array.view(np.uint8).data) if count else memoryview(b"")
+    while len(view):
+        if not (got := file.readinto(view)):
+            raise ValueError("is torn")
+        view = view[got:]
+    return array.reshape(shape, order="F" if fortran else "C")
 
 
 def _described(header: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import os
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lgvi_warp.ensemble import STATES, Ensemble
-from lgvi_warp.errors import SceneError
+from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.method import Method
 from lgvi_warp.saveat import TimeGrid
 from lgvi_warp.scene import Scene
@@ -76,6 +77,7 @@ def ensemble_of(
     noise: np.ndarray | None,
 ) -> Ensemble:
     """The ensemble that provenance tells of; explicit: its arrays; noise: `indices` where they were set. Raises SceneError."""
+    _check_table(settings.get("sampling"))
     own = Scene.from_dict(scene)
     settings = {key: value for key, value in settings.items() if key != ARRAYS}
     if "explicit" in settings:
@@ -94,6 +96,19 @@ def ensemble_of(
     if noise is not None:
         ensemble.indices = noise
     return ensemble
+
+
+def _check_table(sampling: Any) -> None:
+    """A table's file that a store names is read if it is a plain file, and taken only with the checksum that it had."""
+    table = sampling.get("table") if isinstance(sampling, Mapping) else None
+    if not isinstance(table, Mapping) or "file" not in table:
+        return
+    faults, file = Faults("ensemble.sampling.table."), table["file"]
+    if not isinstance(table.get("sha256"), str):
+        faults.add("sha256", table.get("sha256"), "is missing beside the file", "run the scene again")
+    if not isinstance(file, str) or (os.path.exists(file) and not os.path.isfile(file)):
+        faults.add("file", file, "is no plain file", "give a CSV file, and run the scene again")
+    faults.raise_if_any()
 
 
 def same_run(

@@ -7,6 +7,7 @@ import errno
 import os
 import threading
 from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +17,20 @@ from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.executors import Executor
 from lgvi_warp.plan import Plan
 from lgvi_warp.recipe import refuse_another
-from lgvi_warp.store import ROOT, Folder, Sink, Store, check, create, foreign, held, names_of, refuse_foreign, skeleton
+from lgvi_warp.store import (
+    ROOT,
+    Folder,
+    Sink,
+    Store,
+    check,
+    create,
+    foreign,
+    held,
+    names_of,
+    refuse_foreign,
+    skeleton,
+    understood,
+)
 from lgvi_warp.store_layout import columns
 
 # What the system says when a disk takes no more, or not from us.
@@ -54,10 +68,14 @@ def run_blocks(
     left: those of the blocks that the store of the work has not, by default all. enough: asked after each block, with the
     members so far: the first yes ends the run, and blocks that are ahead of it are lost or of no account.
     """
+    fresh = set(left or ())
     with contextlib.closing(_in_turn(work, runs, runs if left is None else left, executor, advanced)) as done:
         for block, parts in done:
-            for keeper, part in zip(work.keepers, parts, strict=True):
-                keeper.merge(block, part)
+            # Parts that come from the store may be somebody else's.
+            old = work.sink if left is not None and block not in fresh else None
+            with understood(old.root / old.parts_key(block)) if old else nullcontext():
+                for keeper, part in zip(work.keepers, parts, strict=True):
+                    keeper.merge(block, part)
             if enough(block.stop):
                 return block.stop
     return runs[-1].stop

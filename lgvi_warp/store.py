@@ -162,7 +162,11 @@ class Sink:
         """The parts of a finished block; None if it is not finished."""
         if read_marker(self.marker(block)) is None:
             return None
-        return unpacked(keepers, self.root / self.parts_key(block)) if keepers else ()
+        if not keepers:
+            return ()
+        path = self.root / self.parts_key(block)
+        with understood(path):
+            return unpacked(keepers, path)
 
     def faults(self, block: Block, samples: int, keepers: Sequence[Any]) -> list[str]:
         """What is wrong with a finished block's files; "is not finished" alone for one that is not."""
@@ -218,7 +222,7 @@ def unpacked(keepers: Sequence[Keeper], path: Path) -> tuple[Any, ...]:
     """The parts of these keepers, of all that were packed."""
     with npy_files.opened(path) as arrays:
         told = parsed(npy_files.text(arrays))
-        found = {name: ({one: next(arrays) for one in names}, content) for name, names, content in told}
+        found = {name: (dict(zip(names, arrays, strict=False)), content) for name, names, content in told}
     return tuple(keeper.from_arrays(*found[keeper.name]) for keeper in keepers if isinstance(keeper, PartKeeper))
 
 

@@ -41,11 +41,17 @@ class Block:
         return self.stop - self.first
 
 
-def blocks(members: int) -> list[Block]:
-    """Runs of 256 to 4096 members, a power of two. Depends on the number of members only, so bits and files do too."""
+def block_size(members: int) -> int:
+    """256 to 4096 members, a power of two. Depends on the number of members only, so bits and files do too."""
     size = 256
     while size < 4096 and size * 64 <= members:
         size *= 2
+    return size
+
+
+def blocks(members: int) -> list[Block]:
+    """Runs of so many members as `block_size` says, the last one of what is left."""
+    size = block_size(members)
     return [Block(i, min(i + size, members)) for i in range(0, members, size)]
 
 

@@ -26,9 +26,9 @@ MOST_LIST, MOST_ARRAYS = 4_000_000, 20_000
 
 
 @contextlib.contextmanager
-def opened(path: Path) -> Iterator[Iterator[np.ndarray]]:
-    """The arrays of a file in turn, of its store's folder `path.parent.parent`. Raises ValueError, SceneError, OSError."""
-    with safe_files.opened(path.parent.parent, f"{path.parent.name}/{path.name}") as raw:
+def opened(root: Path, key: str) -> Iterator[Iterator[np.ndarray]]:
+    """The arrays of a file below the root, in turn. Raises ValueError, SceneError, OSError."""
+    with safe_files.opened(root, key) as raw:
         left = os.fstat(raw.fileno()).st_size
         with io.BufferedReader(raw) as file:  # type: ignore[type-var]
             yield _in_turn(file, left)
@@ -41,15 +41,7 @@ def _in_turn(file: BinaryIO, size: int) -> Iterator[np.ndarray]:
 
 def read(file: Any, left: int) -> np.ndarray:
     """One array of a stream that has so many bytes left. Raises ValueError where it is none, or longer than that."""
-    begin = file.read(6 + 2 + 4)
-    if len(begin) < 12 or begin[:6] != b"\x93NUMPY" or begin[6] not in (1, 2, 3):
-        raise ValueError("is no array in NumPy's format")
-    wide = begin[6] > 1
-    length = int.from_bytes(begin[8:12] if wide else begin[8:10], "little")
-    if length > 10_000:
-        raise ValueError("has a header of too many bytes")
-    header = (b"" if wide else begin[10:12]) + file.read(length - (0 if wide else 2))
-    shape, fortran, dtype = _described(begin[:8] + (begin[8:12] if wide else begin[8:10]) + header)
+    shape, fortran, dtype = _described(file)
     count = math.prod(shape)
     if dtype.kind not in KINDS or dtype.itemsize == 0 or count * dtype.itemsize > left:
         raise ValueError(f"promises an array of type {dtype} and shape {shape}, which is not in the file")
@@ -62,15 +54,14 @@ def read(file: Any, left: int) -> np.ndarray:
     return array.reshape(shape, order="F" if fortran else "C")
 
 
-def _described(header: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
-    """(shape, whether columns come first, type) of a header. Raises ValueError."""
-    stream = io.BytesIO(header)
+def _described(file: Any) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """(shape, whether columns come first, type) of an array, from its header. Raises ValueError."""
     try:
-        version = np.lib.format.read_magic(stream)
-        reader = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        return reader(stream)
-    except (SyntaxError, TypeError, RecursionError, MemoryError, UnicodeError) as error:
-        raise ValueError(f"has a header that cannot be read ({type(error).__name__})") from None
+        if np.lib.format.read_magic(file) != (1, 0):
+            raise ValueError("is no array of the version of NumPy's format that is written")
+        return np.lib.format.read_array_header_1_0(file)
+    except (SyntaxError, TypeError, RecursionError, MemoryError, ValueError) as error:
+        raise ValueError(f"has a header that cannot be read ({' '.join(str(error).split())[:100]})") from None
 
 
 def text(arrays: Iterator[np.ndarray]) -> str:

@@ -30,7 +30,6 @@ from lgvi_warp.store import (
     held,
     marker,
     name_of,
-    read_marker,
     refuse_foreign,
     understood,
 )
@@ -163,7 +162,7 @@ def _copy_block(parts: Sequence[Folder], block: Block, target: Path, commits: Co
     damage = []
     for part in parts:
         sink = part.sink
-        sums = read_marker(sink.marker(block))
+        sums = sink.sums(block)
         if sums is None:
             continue
         if unfit := sink.unfit(block, sums, part.layout.times, part.recipe["keepers"]):

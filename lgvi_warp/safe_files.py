@@ -154,6 +154,15 @@ def entries(root: Path, below: str = "") -> Iterator[tuple[str, os.DirEntry[str]
                 yield from entries(root, f"{name}/")
 
 
+def names(root: Path, key: str) -> set[str]:
+    """Names in a folder below the root, none of one that is not there. Raises SceneError where it is a link."""
+    try:
+        with folder(root, root / key) as inside:
+            return set(os.listdir(root / key if inside is None else inside))
+    except FileNotFoundError:
+        return set()
+
+
 def size_below(root: Path) -> int:
     """Bytes of all plain files below a folder."""
     plain = (one for _, one in entries(root) if one.is_file(follow_symlinks=False))

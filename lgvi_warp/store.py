@@ -154,23 +154,26 @@ class Sink:
         """The file of what keepers closed a block with, below the root."""
         return f"parts/{name_of(block)}.npy"
 
+    def sums(self, block: Block) -> dict[str, list[int]] | None:
+        """What the marker of a block lists; None if it is not finished. Raises SceneError where that is a link."""
+        return read_marker(self.root, f"blocks/{name_of(block)}.json")
+
     def marker(self, block: Block) -> Path:
         """The file that says that a block is finished."""
         return self.root / "blocks" / f"{name_of(block)}.json"
 
     def parts(self, block: Block, keepers: Sequence[Keeper]) -> tuple[Any, ...] | None:
         """The parts of a finished block; None if it is not finished."""
-        if read_marker(self.marker(block)) is None:
+        if self.sums(block) is None:
             return None
         if not keepers:
             return ()
-        path = self.root / self.parts_key(block)
-        with understood(path):
-            return unpacked(keepers, path)
+        with understood(self.root / self.parts_key(block)):
+            return unpacked(keepers, self.root, self.parts_key(block))
 
     def faults(self, block: Block, samples: int, keepers: Sequence[Any]) -> list[str]:
         """What is wrong with a finished block's files; "is not finished" alone for one that is not."""
-        sums = read_marker(self.marker(block))
+        sums = self.sums(block)
         if sums is None:
             return ["is not finished"]
         if unfit := self.unfit(block, sums, samples, keepers):
@@ -218,9 +221,9 @@ def packed(keepers: Sequence[Keeper], parts: Sequence[Any]) -> bytes:
     return buffer.getvalue()
 
 
-def unpacked(keepers: Sequence[Keeper], path: Path) -> tuple[Any, ...]:
-    """The parts of these keepers, of all that were packed."""
-    with npy_files.opened(path) as arrays:
+def unpacked(keepers: Sequence[Keeper], root: Path, key: str) -> tuple[Any, ...]:
+    """The parts of these keepers, of all that were packed into a file below the root."""
+    with npy_files.opened(root, key) as arrays:
         told = parsed(npy_files.text(arrays))
         found = {name: (dict(zip(names, arrays, strict=False)), content) for name, names, content in told}
     return tuple(keeper.from_arrays(*found[keeper.name]) for keeper in keepers if isinstance(keeper, PartKeeper))
@@ -232,10 +235,10 @@ def marker(sums: Mapping[str, list[int]]) -> bytes:
     return text + b"\n%08x\n" % durable.checksum(text)
 
 
-def read_marker(path: Path) -> dict[str, list[int]] | None:
-    """What a marker lists; None if there is none, or a damaged one. Raises SceneError where it is a link."""
+def read_marker(root: Path, key: str) -> dict[str, list[int]] | None:
+    """What a marker below the root lists; None if there is none, or a damaged one. Raises SceneError where it is a link."""
     try:
-        content = safe_files.read(path.parent.parent, f"{path.parent.name}/{path.name}", safe_files.MOST_JSON)
+        content = safe_files.read(root, key, safe_files.MOST_JSON)
         text, _, last = content.rstrip(b"\n").rpartition(b"\n")
         if int(last, 16) == durable.checksum(text):
             sums = dict(parsed(text))
@@ -356,8 +359,8 @@ class Folder:
 
     def unfinished(self) -> list[Block]:
         """Blocks without a marker."""
-        sink = self.sink
-        return [block for block in self.runs if read_marker(sink.marker(block)) is None]
+        sink, marked = self.sink, safe_files.names(self.path, "blocks")
+        return [block for block in self.runs if f"{name_of(block)}.json" not in marked or sink.sums(block) is None]
 
     def plan(self, ensemble: Ensemble | None = None) -> Plan:
         """The run's plan, made again; ensemble: where a scene file cannot tell it (laws of your own). Raises SceneError."""
@@ -380,7 +383,7 @@ class Folder:
 
     def damage(self) -> list[str]:
         """What is wrong with the files that do not belong to a block."""
-        sums, wanted = read_marker(self.path / CREATED), self.layout.frame()
+        sums, wanted = read_marker(self.path, CREATED), self.layout.frame()
         if sums is None:
             return [f"{CREATED} is damaged"]
         if sums.keys() != wanted.keys() or any(size not in (None, sums[key][0]) for key, size in wanted.items()):

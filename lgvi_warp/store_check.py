@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp import member_fields, scratch
-from lgvi_warp.blocks import SHAPES, blocks
+from lgvi_warp.blocks import SHAPES, block_size
 from lgvi_warp.store_layout import KEPT_MEMBER, MEMBER, Column
 
 # Types of arrays: zarr's names, NumPy's.
@@ -217,7 +217,7 @@ def _checked(arrays: dict[str, StoredArray], groups: tuple[str, ...], members: i
     missing = [name for name in ("time", "step", *REQUIRED) if name not in arrays]
     if missing:
         raise NotOursError(f"it has no {', '.join(missing)}")
-    k, length = arrays["time"].shape[0], blocks(members)[0].count
+    k, length = arrays["time"].shape[0], min(block_size(members), members)
     along = KEPT_MEMBER if KEPT_MEMBER in arrays else MEMBER
     fixed = {
         "time": ("<f8", (k,)),

@@ -17,7 +17,7 @@ from lgvi_warp.kept import keep_of, members_kept
 from lgvi_warp.observation import Observation, Observing, observation_of, replicates_of
 from lgvi_warp.result import UNITS, Result
 from lgvi_warp.statistics.estimate import Estimates
-from lgvi_warp.store import KEPT, ROOT, Folder, name_of, read_marker, understood
+from lgvi_warp.store import KEPT, ROOT, Folder, name_of, understood
 from lgvi_warp.store_layout import KEPT_MEMBER, MEMBER
 from lgvi_warp.terms import Term, from_list
 
@@ -124,7 +124,7 @@ def gathered(folder: Folder, observed: Observation) -> Observing:
     observing = Observing(observed, times_of(folder), int(folder.recipe["members"]), replicates)
     sink = folder.sink
     for block in folder.runs:
-        _check_parts(folder, read_marker(sink.marker(block)), block)
+        _check_parts(folder, sink.sums(block), block)
         with understood(folder.path / sink.parts_key(block)):
             for keeper, part in zip(observing.keepers, sink.parts(block, observing.keepers) or (), strict=True):
                 keeper.merge(block, part)

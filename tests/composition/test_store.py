@@ -621,9 +621,9 @@ def test_parts_of_several_keepers_lie_in_one_file(tmp_path):
         keeper.name = name
     path = tmp_path / "000000000.npy"
     path.write_bytes(store.packed(several, given))
-    found = store.unpacked(several[::-1], path)
+    found = store.unpacked(several[::-1], tmp_path, path.name)
     assert [one.tobytes() for one in found] == [one.tobytes() for one in given[::-1]]
-    assert [one.tobytes() for one in store.unpacked(several[1:2], path)] == [b""]
+    assert [one.tobytes() for one in store.unpacked(several[1:2], tmp_path, path.name)] == [b""]
 
 
 def test_keepers_that_cannot_be_stored_are_refused(tmp_path):

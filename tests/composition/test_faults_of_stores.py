@@ -1,4 +1,4 @@
-"""Two at once, killed at any moment, on a full or unwritable disk: what is left is whole, and nobody else's file is touched."""
+"""Two at once, killed at any moment, a full or unwritable disk: what is left is whole, and nobody else's file is touched."""
 
 import errno
 import json

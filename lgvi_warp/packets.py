@@ -125,6 +125,8 @@ class Packets:
             monitor.backward = -plan.grid.h * min(0.0, *plan.method.stages)
         if plan.spec.substep:
             monitor.substeps = wp.zeros(self.count, dtype=Ints, device="cpu")
+        if plan.spec.still:
+            monitor.still = wp.zeros((self.count, 3), dtype=Lane, device="cpu")
         return monitor
 
     def _limits(self) -> np.ndarray:

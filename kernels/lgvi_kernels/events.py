@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import warp as wp
 
-from lgvi_kernels.lanes import absolute, add, div, mul, ones, positive, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes import absolute, add, div, mul, neg, ones, positive, sub, vec3  # noqa: F401
 from lgvi_kernels.submaps import look, rotate
 
 # Status of the first event of a scene; the next have the next numbers.

@@ -20,13 +20,14 @@ from lgvi_warp.keepers import Outcomes, Samples
 from lgvi_warp.kept import KeptRun
 from lgvi_warp.method import Method
 from lgvi_warp.observation import Observation, Observing, observe
+from lgvi_warp.outcomes import failure_text
 from lgvi_warp.plan import Plan
 from lgvi_warp.recipe import of_store
 from lgvi_warp.result import Drawn, Result
 from lgvi_warp.running import Progress, Stored, run_blocks
 from lgvi_warp.saveat import FIELDS, SaveAt, time_grid
 from lgvi_warp.scene import Scene
-from lgvi_warp.status import Status, failure_text
+from lgvi_warp.status import Status
 from lgvi_warp.store import Folder, Store
 from lgvi_warp.stored import result_of
 

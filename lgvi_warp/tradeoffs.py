@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp import comparison
+from lgvi_warp import comparison, invariants
 from lgvi_warp.comparison import QUANTITIES, Growth, Reference, Sample, Setting
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
@@ -52,7 +52,8 @@ class Measurement:
     us_per_vehicle_second: microseconds of one core per vehicle and simulated second, without compiling. compile_seconds:
     to load its kernel, once a process. errors: quantity -> end_max, end_rms, path_max, path_rms, over the members, in
     comparison.QUANTITIES' units; empty where a member failed or noise acts. energy_drift: largest |E(t) - E(0)| [J], NaN
-    where a force of the scene takes or gives energy. biases: see comparison.biases. trusted: whether the reference is ten times better.
+    where a force of the scene takes or gives energy. biases: see comparison.biases. trusted: whether the reference is ten
+    times better.
     """
 
     setting: Setting

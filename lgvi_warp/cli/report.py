@@ -5,8 +5,12 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+from lgvi_warp.errors import MissingExtra, NothingToDraw
 
 
 def report(result: Any, out: Path, quiet: bool, begun: float) -> list[str]:
@@ -17,10 +21,10 @@ def report(result: Any, out: Path, quiet: bool, begun: float) -> list[str]:
             print(f"next        lgvi-warp merge {out} ... --out DIR, with the folders of the other parts")
         return []
     drawn = shown_members(result)
-    files, faults = write(result, drawn, out)
+    written = write(result, drawn, out)
     if not quiet:
-        print(summary(result, drawn, files, time.perf_counter() - begun))
-    return faults
+        print("\n".join([*written.note_lines(), summary(result, drawn, written.files, time.perf_counter() - begun)]))
+    return written.faults
 
 
 def told(faults: list[str]) -> list[str]:
@@ -53,39 +57,78 @@ def shown_members(result: Any) -> Any:
     return chosen(result, range(min(most, result.members)))
 
 
-def write(result: Any, drawn: Any, out: Path) -> tuple[list[Path], list[str]]:
+@dataclass
+class Written:
+    """Files that were written; notes on pictures that this machine or this run has none of; and what failed."""
+
+    files: list[Path] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    missing: dict[str, MissingExtra] = field(default_factory=dict)
+
+    def take(self, path: Path, write: Callable[[Path], Path]) -> None:
+        """Write a file, or note why it is not there."""
+        try:
+            self.files.append(write(path))
+        except MissingExtra as error:
+            self.missing[path.name] = error
+        except NothingToDraw as error:
+            self.notes.append(f"note        {path.name} was not made: {error}")
+        except (OSError, ImportError, ValueError) as error:
+            self.faults.append(f"{path} was not written: {error}")
+
+    def note_lines(self) -> list[str]:
+        """The notes; libraries that are not installed are told of in one line."""
+        if not self.missing:
+            return self.notes
+        files, errors = ", ".join(self.missing), self.missing.values()
+        extras = ",".join(dict.fromkeys(error.extra for error in errors))
+        libraries = " and ".join(dict.fromkeys(error.library for error in errors))
+        text = f"note        {files}: not made without {libraries}; to have pictures: pip install 'lgvi-warp[{extras}]'"
+        return [*self.notes, text]
+
+
+def write(result: Any, drawn: Any, out: Path) -> Written:
     """Write result.npz, fleet.png, fleet.rrd and statistics.png side by side: what there is of them.
 
-    drawn: the members of the pictures, None without. A result in a store is written already. Returns the files, and a text
-    for each that failed.
-    """
-    from concurrent.futures import ThreadPoolExecutor
+    An interrupt waits until the files that are being written are whole, and says which these are; a second one does not.
 
+    Args:
+        result: Of the run; one in a store is written already.
+        drawn: The members of the pictures, None without.
+        out: The folder.
+
+    Returns:
+        What was written.
+    """
     from lgvi_warp.sinks.plots import drawable, plot, plot_statistics
     from lgvi_warp.sinks.rerun import log_rerun
 
-    files: list[Path] = [result.store] if result.store else []
-    faults: list[str] = []
+    written = Written([result.store] if result.store else [])
     writers: dict[str, Callable[[Path], Path]] = {} if result.store else {"result.npz": result.save}
     if drawn is not None:
         writers |= {"fleet.png": lambda path: plot(drawn, path), "fleet.rrd": lambda path: log_rerun(drawn, path)}
     if drawable(result):
         writers["statistics.png"] = lambda path: plot_statistics(result, path)
     if not writers:
-        return files, faults
-    with ThreadPoolExecutor(len(writers)) as pool:
-        jobs = {out / name: pool.submit(writer, out / name) for name, writer in writers.items()}
+        return written
+    pool = ThreadPoolExecutor(len(writers))
+    jobs = {out / name: pool.submit(writer, out / name) for name, writer in writers.items()}
+    pool.shutdown(wait=False)
+    try:
+        wait(jobs.values())
+    except KeyboardInterrupt:
+        wait(jobs.values())
+        whole = [str(path) for path, job in jobs.items() if job.exception() is None]
+        raise KeyboardInterrupt(f"written: {', '.join(whole)}" if whole else "") from None
     for path, job in jobs.items():
-        try:
-            files.append(job.result())
-        except (OSError, ImportError, ValueError) as error:
-            faults.append(f"{path} was not written: {error}")
-    return files, faults
+        written.take(path, lambda _, job=job: job.result())
+    return written
 
 
 def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
     """The run in a few lines."""
-    from lgvi_warp import invariants
+    from lgvi_warp.outcomes import outcome_text, outcomes
     from lgvi_warp.statistics.table import table
     from lgvi_warp.status import Status
 
@@ -99,23 +142,12 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
         "status      " + ", ".join(f"{name} {number:,}" for name, number in result.status.counts().items()),
     ]
     if result.samples:
-        drift = invariants.drift(drawn)
-        whose = "all members" if drawn.members == result.members else f"the first {drawn.members:,} members"
-        lines.append(
-            f"drift       energy {drift['energy']:.2g} J, horizontal momentum {drift['horizontal_momentum']:.2g} N s, "
-            f"vertical angular momentum {drift['vertical_angular_momentum']:.2g} N m s (largest of {whose})"
-        )
+        lines += _energy_lines(result, drawn)
     elif result.kept is not None:
         lines.append(f"kept        {result.kept.members:,} members' samples, run again")
     elif settings.get("observed", {}).get("keep") == "failed":
         lines.append("kept        no samples: no member failed")
-    for code in Status:
-        failed = (result.status == code).nonzero()[0]
-        if code and len(failed):
-            first = int(failed[0])
-            lines.append(
-                f"  {code.name.lower()}: {code.text} (first: member {first} at {result.failure_time[first]:g} s)"
-            )
+    lines += [f"  {outcome_text(result, code)}" for code in outcomes(result) if code != Status.OK]
     lines += _warning_lines(result)
     if result.substeps.any():
         divided = result.substeps > 0
@@ -128,6 +160,31 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
         lines += [f"  {line}" for line in table(result.statistics)]
     lines += [f"file        {path} ({size_of(path) / 1e6:.1f} MB)" for path in files]
     return "\n".join(lines)
+
+
+# What may be conserved: its name in words and its unit.
+INVARIANTS = {
+    "energy": ("energy", "J"),
+    "horizontal_momentum": ("horizontal momentum", "N s"),
+    "vertical_angular_momentum": ("vertical angular momentum", "N m s"),
+}
+
+
+def _energy_lines(result: Any, drawn: Any) -> list[str]:
+    """How far what the scene conserves drifts, or how much energy changed where forces do work; none if all failed."""
+    import math
+
+    from lgvi_warp import invariants
+
+    drift, conserved = invariants.drift(drawn), invariants.conserved(drawn)
+    if math.isnan(drift["energy"]):
+        return []
+    whose = "all members" if drawn.members == result.members else f"the first {drawn.members:,} members"
+    if "energy" not in conserved:
+        names = ", ".join(invariants.at_work(drawn))
+        return [f"work        energy changed by up to {drift['energy']:.2g} J, through {names} (largest of {whose})"]
+    texts = [f"{words} {drift[name]:.2g} {unit}" for name, (words, unit) in INVARIANTS.items() if name in conserved]
+    return [f"drift       {', '.join(texts)} (largest of {whose})"]
 
 
 def _warning_lines(result: Any) -> list[str]:

@@ -66,16 +66,20 @@ class Written:
     notes: list[str] = field(default_factory=list)
     missing: dict[str, MissingExtra] = field(default_factory=dict)
 
-    def take(self, path: Path, write: Callable[[Path], Path]) -> None:
+    def take(self, path: Path, write: Callable[[], Path]) -> None:
         """Write a file, or note why it is not there."""
         try:
-            self.files.append(write(path))
+            self.files.append(write())
         except MissingExtra as error:
             self.missing[path.name] = error
         except NothingToDraw as error:
             self.notes.append(f"note        {path.name} was not made: {error}")
         except (OSError, ImportError, ValueError) as error:
             self.faults.append(f"{path} was not written: {error}")
+
+    def draw(self, plot: Callable[[Any, Path], Path], found: Any, path: Path) -> None:
+        """Draw what was found."""
+        self.take(path, lambda: plot(found, path))
 
     def note_lines(self) -> list[str]:
         """The notes; libraries that are not installed are told of in one line."""
@@ -122,7 +126,7 @@ def write(result: Any, drawn: Any, out: Path) -> Written:
         whole = [str(path) for path, job in jobs.items() if job.exception() is None]
         raise KeyboardInterrupt(f"written: {', '.join(whole)}" if whole else "") from None
     for path, job in jobs.items():
-        written.take(path, lambda _, job=job: job.result())
+        written.take(path, job.result)
     return written
 
 

@@ -33,7 +33,7 @@ def tradeoff(chosen: argparse.Namespace) -> int:
     with shown(chosen.quiet) as progress:
         found = measure(scene, of=chosen.of, methods=methods, seconds=chosen.seconds, progress=progress)
     written = Written(found.save(out))
-    written.take(out / "tradeoff.png", lambda path: plot_tradeoff(found, path))
+    written.draw(plot_tradeoff, found, out / "tradeoff.png")
     return finish(written, report_text(found), chosen.quiet)
 
 
@@ -58,7 +58,7 @@ def sensitivity(chosen: argparse.Namespace) -> int:
     except (uq.FailedMembers, ImportError) as error:
         return len(told([str(error)]))
     written = Written(found.save(out))
-    written.take(out / "sensitivity.png", lambda path: plot_sensitivity(found, path))
+    written.draw(plot_sensitivity, found, out / "sensitivity.png")
     return finish(written, str(found), chosen.quiet)
 
 
@@ -93,5 +93,5 @@ def stability(chosen: argparse.Namespace) -> int:
             )  # fmt: skip
             written.files += found.save(out, name)
             texts.append(report_text(found))
-            written.take(out / f"{name}.png", lambda path: plot_stability(found, path))
+            written.draw(plot_stability, found, out / f"{name}.png")
     return finish(written, "\n\n".join(texts), chosen.quiet)

@@ -24,6 +24,7 @@ def report(result: Any, out: Path, quiet: bool, begun: float) -> list[str]:
     written = write(result, drawn, out)
     if not quiet:
         print("\n".join([*written.note_lines(), summary(result, drawn, written.files, time.perf_counter() - begun)]))
+    told(written.empty)
     return written.faults
 
 
@@ -59,11 +60,11 @@ def shown_members(result: Any) -> Any:
 
 @dataclass
 class Written:
-    """Files that were written; notes on pictures that this machine or this run has none of; and what failed."""
+    """Files that were written; what failed; pictures without anything to draw; those that a library is missing for."""
 
     files: list[Path] = field(default_factory=list)
     faults: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    empty: list[str] = field(default_factory=list)
     missing: dict[str, MissingExtra] = field(default_factory=dict)
 
     def take(self, path: Path, write: Callable[[], Path]) -> None:
@@ -73,7 +74,7 @@ class Written:
         except MissingExtra as error:
             self.missing[path.name] = error
         except NothingToDraw as error:
-            self.notes.append(f"note        {path.name} was not made: {error}")
+            self.empty.append(f"{path} was not written: {error}")
         except (OSError, ImportError, ValueError) as error:
             self.faults.append(f"{path} was not written: {error}")
 
@@ -82,14 +83,15 @@ class Written:
         self.take(path, lambda: plot(found, path))
 
     def note_lines(self) -> list[str]:
-        """The notes; libraries that are not installed are told of in one line."""
+        """A line on the libraries that are not installed, if there are any."""
         if not self.missing:
-            return self.notes
+            return []
         files, errors = ", ".join(self.missing), self.missing.values()
         extras = ",".join(dict.fromkeys(error.extra for error in errors))
         libraries = " and ".join(dict.fromkeys(error.library for error in errors))
-        text = f"note        {files}: not made without {libraries}; to have pictures: pip install 'lgvi-warp[{extras}]'"
-        return [*self.notes, text]
+        return [
+            f"note        {files}: not made without {libraries}; to have pictures: pip install 'lgvi-warp[{extras}]'"
+        ]
 
 
 def write(result: Any, drawn: Any, out: Path) -> Written:

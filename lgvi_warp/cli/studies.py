@@ -16,6 +16,7 @@ def finish(written: Written, report: str, quiet: bool) -> int:
     if not quiet:
         files = (f"file        {path}" for path in written.files)
         print("\n".join([report, "", *written.note_lines(), *files]))
+    told(written.empty)
     return 1 if told(written.faults) else 0
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from lgvi_warp.errors import MissingExtra, NothingToDraw
 from lgvi_warp.outcomes import end_time, outcomes, under_way
 from lgvi_warp.sinks.fleet import LOOKS, energy_curve, evenly, quantiles, title
-from lgvi_warp.status import Status
+from lgvi_warp.status import Status, failed
 
 if TYPE_CHECKING:
     from lgvi_warp.result import Result
@@ -41,13 +41,12 @@ def plot(result: Result, path: str | os.PathLike[str]) -> Path:
 
     Raises:
         ImportError: Without matplotlib (extra: viz).
-        NothingToDraw: No member has a finite state.
+        NothingToDraw: Every member failed before the second sample, or none has a finite position.
         OSError: The file cannot be written.
     """
     figure_of = figure_class()
     counted = under_way(result)
-    if not (counted & np.isfinite(result.position).all(axis=-1)).any():
-        raise NothingToDraw("no member has a finite position: there is nothing to draw; see result.status")
+    _refuse_nothing(result, counted)
     figure = figure_of(figsize=(15.0, 4.8))
     depth, energy, paths = figure.subplots(1, 3)
     figure.subplots_adjust(left=0.05, right=0.985, bottom=0.12, top=0.85, wspace=0.26)
@@ -67,6 +66,17 @@ def plot(result: Result, path: str | os.PathLike[str]) -> Path:
     target = Path(path)
     figure.savefig(target, dpi=100)
     return target
+
+
+def _refuse_nothing(result: Result, counted: np.ndarray) -> None:
+    """Raise NothingToDraw where no member was anywhere, or went on beyond its start."""
+    reason = ""
+    if failed(result.status).all() and not counted[1:].any():
+        reason = "every member failed before the second sample"
+    elif not (counted & np.isfinite(result.position).all(axis=-1)).any():
+        reason = "no member has a finite position"
+    if reason:
+        raise NothingToDraw(f"{reason}: there is nothing to draw; see result.status and result.failure_time")
 
 
 def figure_class() -> Any:

@@ -165,6 +165,8 @@ def test_failures_are_drawn_until_they_fail(mixed, monkeypatch):
     assert {"step_too_large (3)", "not_converged (1)", "floor (1)"} <= set(texts(figure.axes[0]))
     # A colour says failure, a marker says which.
     assert len(marks(figure.axes[0], Status.STEP_TOO_LARGE)) == 4
+    # What an event stopped at once has its marks.
+    assert len(marks(drawn(ending(mixed, [17] * 7, [0.0] * 7), monkeypatch).axes[0], Status.FLOOR)) == 7
     every = ending(mixed, [1] * 7, [3.0] * 7)
     assert np.isfinite(drawn(every, monkeypatch).axes[0].lines[0].get_ydata()).sum() == 4
 
@@ -399,7 +401,11 @@ def test_a_run_that_all_sink_exits_with_0_and_has_its_pictures(scene_file, capsy
 def test_members_that_are_kept_since_they_failed_are_drawn(mixed, tmp_path):
     few = ending(mixed, [1] * 7, [2.0] * 7)
     written = report.write(few, few, tmp_path)
-    assert (written.faults, written.notes) == ([], []) and len(written.files) == 3
+    assert (written.faults, written.empty) == ([], []) and len(written.files) == 3
+    # One that failed at once has no picture, which is no fault of the run.
+    at_once = ending(mixed, [1] * 7, [0.0] * 7)
+    written = report.write(mixed, at_once, tmp_path)
+    assert written.faults == [] and "fleet.png was not written: every member failed before" in written.empty[0]
 
 
 def test_the_summary_says_work_where_forces_do_some(mixed):

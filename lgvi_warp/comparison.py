@@ -15,7 +15,7 @@ from lgvi_warp import invariants, notation, saveat
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.method import Method
-from lgvi_warp.outcomes import end_time
+from lgvi_warp.outcomes import stop_time
 from lgvi_warp.plan import Plan
 from lgvi_warp.result import Result
 from lgvi_warp.saveat import FIELDS, TimeGrid
@@ -158,7 +158,7 @@ def distances(result: Result, reference: Result) -> dict[str, np.ndarray]:
     chord = np.linalg.norm(np.subtract(*pairs["attitude"]), axis=(-2, -1))
     found["attitude"] = 2.0 * np.arcsin(np.minimum(chord / math.sqrt(8.0), 1.0))
     found["energy"] = np.abs(result.energy - reference.energy)
-    gone = reference.time[:, None] >= np.minimum(end_time(result), end_time(reference))
+    gone = reference.time[:, None] >= np.minimum(stop_time(result), stop_time(reference))
     return {name: np.where(gone, np.nan, found[name]) for name in QUANTITIES}
 
 

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 ROUNDING = 1e-12
 
 
-def end_time(result: Result) -> np.ndarray:
-    """When each member ended: the time of its event, or of its last good state.
+def stop_time(result: Result) -> np.ndarray:
+    """When each member stopped: the time of its event, or of its last good state where it failed.
 
     Args:
         result: Of a run.
@@ -36,7 +36,7 @@ def under_way(result: Result) -> np.ndarray:
     Returns:
         (k, n), bool.
     """
-    return np.asarray(result.time[:, None] <= end_time(result) * (1.0 + ROUNDING))
+    return np.asarray(result.time[:, None] <= stop_time(result) * (1.0 + ROUNDING))
 
 
 def outcomes(result: Result) -> list[Status]:
@@ -58,9 +58,9 @@ def outcome_text(result: Result, code: Status) -> str:
     many = f"{code.name.lower()}, {len(members):,} of {result.members:,} members"
     if code == Status.OK:
         return f"{many}: {code.text}"
-    first = int(members[end_time(result)[members].argmin()])
+    first = int(members[stop_time(result)[members].argmin()])
     value = "" if code.stopped else f", value {result.failure_value[first]:.4g}"
-    return f"{many} (first: member {first} at {end_time(result)[first]:g} s{value}): {code.text}"
+    return f"{many} (first: member {first} at {stop_time(result)[first]:g} s{value}): {code.text}"
 
 
 def failure_text(result: Result) -> str:

@@ -15,7 +15,7 @@ from lgvi_warp import comparison, invariants, plan
 from lgvi_warp.comparison import PRECISE
 from lgvi_warp.errors import SceneError
 from lgvi_warp.method import Method
-from lgvi_warp.outcomes import end_time
+from lgvi_warp.outcomes import stop_time
 from lgvi_warp.plan import Plan
 from lgvi_warp.result import Result
 from lgvi_warp.saveat import FIELDS, TimeGrid
@@ -238,7 +238,7 @@ def _judge(result: Result, column: Column, at: np.ndarray, found: Found, of: str
         reference = comparison.part(column.reference, at.tolist())
         apart = comparison.distances(_at_times(result, early), reference)[of]
         # Beyond an event there is no error; a member that was frozen has none at all.
-        stopped = np.isfinite(np.minimum(end_time(result), end_time(reference)))
+        stopped = np.isfinite(np.minimum(stop_time(result), stop_time(reference)))
         lost = failed(result.status) | (np.isnan(apart).any(axis=0) & ~stopped)
         largest = np.max(np.nan_to_num(apart, posinf=np.inf), axis=0)
         found.error[members] = np.where(lost, np.inf, largest)

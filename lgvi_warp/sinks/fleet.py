@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from lgvi_warp import invariants
-from lgvi_warp.outcomes import end_time
+from lgvi_warp.outcomes import stop_time
 from lgvi_warp.status import Status
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def identity(result: Result) -> str:
     The provenance alone is not enough: parts of a run share it.
     """
     found = hashlib.sha256(json.dumps(result.provenance, sort_keys=True).encode())
-    for array in (result.time, np.asarray(result.status), end_time(result), result.position[0], result.position[-1]):
+    for array in (result.time, np.asarray(result.status), stop_time(result), result.position[0], result.position[-1]):
         found.update(f"{array.shape} {array.dtype.str}\n".encode())
         found.update(np.ascontiguousarray(array).data)
     return found.hexdigest()[:16]

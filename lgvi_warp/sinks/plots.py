@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.errors import MissingExtra, NothingToDraw
-from lgvi_warp.outcomes import end_time, outcomes, under_way
+from lgvi_warp.outcomes import stop_time, outcomes, under_way
 from lgvi_warp.sinks.fleet import LOOKS, energy_curve, evenly, quantiles, title
 from lgvi_warp.status import Status, failed
 
@@ -112,7 +112,7 @@ MARKS = 1000
 
 def _ends(axes: Any, result: Result) -> None:
     """Where and when members ended that did not run to the end: their depths against the times, by outcome."""
-    when, depth = end_time(result), result.position[-1, :, 2]
+    when, depth = stop_time(result), result.position[-1, :, 2]
     for code in outcomes(result):
         members = np.flatnonzero(np.asarray(result.status) == code)
         if code != Status.OK:

@@ -96,7 +96,7 @@ def test_failed_and_stopped_are_told_apart():
 
 
 def test_members_are_under_way_until_they_end(mixed):
-    end = outcomes.end_time(mixed)
+    end = outcomes.stop_time(mixed)
     np.testing.assert_allclose(end, [3.0, 6.0, 12.0, np.inf, np.inf, 12.5, 5.0], rtol=1e-9)
     np.testing.assert_array_equal(outcomes.under_way(mixed).sum(axis=0), [4, 7, 13, 21, 21, 13, 6])
 

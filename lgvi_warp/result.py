@@ -48,9 +48,10 @@ class Result:
 
     time: (k,) [s]. samples: the fields that were kept, by name (also attributes: position (k, n, 3) [m, inertial],
     attitude (k, n, 3, 3) body to inertial, velocity (k, n, 3) [m/s, body], angular_velocity (k, n, 3) [rad/s, body]).
-    status: (n,), see Status; failure_time: (n,) [s], the time of the last good state, for an event its own
-    time, interpolated within the step; NaN where there was neither. failure_value: (n,), the |J^-1 a| or relative residual
-    that crossed its limit (psi_x: half the angle of its turns), 0 for a non-finite state and for an event.
+    status: (n,), see Status. A member that an event stopped stands at it from then on. failure_time: (n,) [s], the time of
+    the last good state, for an event its own time; NaN where there was neither; end_time: the same, and the end of the
+    run. failure_value: (n,), the |J^-1 a| or relative residual that crossed its limit (psi_x: half the angle of its turns),
+    0 for a non-finite state and for an event.
     warnings: (n,), bits of Warnings; warning_time (n,) [s] and warning_value (n,): when a member's most serious warning was
     first seen (0 for one that its start gives), and the value then; NaN without. Motion is looked at once in 128 steps and at
     the end, with checks="all" only. substeps: (n,), steps that were divided (on_failure="substep").
@@ -117,6 +118,14 @@ class Result:
     def energy(self) -> np.ndarray:
         """(k, n) [J], kinetic and potential energy, float64."""
         return invariants.energy(self)
+
+    @property
+    def end_time(self) -> np.ndarray:
+        """(n,) [s], until when each member went on: its event, its failure, or the end of the run.
+
+        With `status` these are the times and the kinds of what survival analysis is of.
+        """
+        return np.where(np.isnan(self.failure_time), self.time[-1], self.failure_time)
 
     def own(self, term: Term) -> dict[str, np.ndarray]:
         """A term's numbers, by field, with a leading dimension of 1 or n."""

@@ -69,7 +69,8 @@ def solve(
     progress: called with the fraction of the work that is done, from the threads that do it.
     statistics: gathered over the members at every sample time while the run goes: lw.Mean("position"), ...; they are
     in result.statistics. keep: "all" samples of members (default); "none", so that memory grows with neither members nor
-    steps; "failed", or indices of members: those are run again after the run, to the same bits, and are result.kept.
+    steps; "failed" (not those that an event stopped), or indices of members: those are run again after the run, to the same
+    bits, and are result.kept.
     until: lw.Until(...), to stop before the last member, once a statistic's interval is narrow enough; False: never, whatever
     the scene says (statistics=() likewise gathers none).
     store: a folder "runs/x/run.zarr", or a Store with more settings: samples go there block by block and not into memory,

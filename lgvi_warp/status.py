@@ -69,6 +69,16 @@ _TEXT = {
 class StatusArray(np.ndarray):
     """Status of each member, shape (n,), uint8: compares with `Status` members; `counts()` sums up."""
 
+    @property
+    def failed(self) -> np.ndarray:
+        """(n,), which members failed: neither got to the end nor were stopped by an event."""
+        return failed(self)
+
+    @property
+    def stopped(self) -> np.ndarray:
+        """(n,), which members an event of the scene stopped: an outcome, no failure."""
+        return stopped(self)
+
     def counts(self) -> dict[str, int]:
         """Members by status name, those that occur, the most serious last."""
         values, numbers = np.unique(np.asarray(self), return_counts=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.errors import MissingExtra, NothingToDraw
-from lgvi_warp.outcomes import stop_time, outcomes, under_way
+from lgvi_warp.outcomes import outcomes, stop_time, under_way
 from lgvi_warp.sinks.fleet import LOOKS, energy_curve, evenly, quantiles, title
 from lgvi_warp.status import Status, failed
 

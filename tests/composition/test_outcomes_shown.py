@@ -93,6 +93,8 @@ def test_failed_and_stopped_are_told_apart():
     assert failed(codes).tolist() == [False, True, True, False, False, False, True]
     assert stopped(codes).tolist() == [False, False, False, True, True, True, False]
     assert all(bool(stopped(code)) == code.stopped for code in Status)
+    of_result = codes.view(StatusArray)
+    assert (of_result.failed == failed(codes)).all() and (of_result.stopped == stopped(codes)).all()
 
 
 def test_members_are_under_way_until_they_end(mixed):
@@ -151,10 +153,9 @@ def test_ends_are_marked_and_counted_by_outcome(mixed, monkeypatch):
     assert {"floor (3)", "surface (2)"} <= set(texts(depth)) and {"ok", "floor", "surface"} <= set(texts(paths))
     at = marks(depth, Status.FLOOR)
     np.testing.assert_allclose(np.sort(at[:, 0]), [3.0, 6.0, 12.0], rtol=1e-9)
-    # Within a step of the floor at most.
-    np.testing.assert_allclose(at[:, 1], FLOOR, atol=0.1)
+    np.testing.assert_allclose(at[:, 1], FLOOR, atol=1e-6)
     np.testing.assert_allclose(np.sort(marks(depth, Status.SURFACE)[:, 0]), [5.0, 12.5], rtol=1e-9)
-    np.testing.assert_allclose(marks(paths, Status.FLOOR)[:, 1], FLOOR, atol=0.1)
+    np.testing.assert_allclose(marks(paths, Status.FLOOR)[:, 1], FLOOR, atol=1e-6)
 
 
 def test_failures_are_drawn_until_they_fail(mixed, monkeypatch):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -119,13 +119,21 @@ def write(result: Any, drawn: Any, out: Path) -> Written:
     if not writers:
         return written
     pool = ThreadPoolExecutor(len(writers))
-    jobs = {out / name: pool.submit(writer, out / name) for name, writer in writers.items()}
-    pool.shutdown(wait=False)
+    jobs: dict[Path, Future[Path]] = {}
+    whole: list[str] = []
+
+    def make(path: Path) -> Path:
+        writers[path.name](path)
+        whole.append(str(path))
+        return path
+
     try:
+        for name in writers:
+            jobs[out / name] = pool.submit(make, out / name)
         wait(jobs.values())
+        pool.shutdown()
     except KeyboardInterrupt:
-        wait(jobs.values())
-        whole = [str(path) for path, job in jobs.items() if job.exception() is None]
+        pool.shutdown()
         raise KeyboardInterrupt(f"written: {', '.join(whole)}" if whole else "") from None
     for path, job in jobs.items():
         written.take(path, job.result)

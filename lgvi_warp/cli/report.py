@@ -5,12 +5,10 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from lgvi_warp.errors import MissingExtra, NothingToDraw
+from lgvi_warp.cli.writing import Written, side_by_side
 
 
 def report(result: Any, out: Path, quiet: bool, begun: float) -> list[str]:
@@ -58,46 +56,8 @@ def shown_members(result: Any) -> Any:
     return chosen(result, range(min(most, result.members)))
 
 
-@dataclass
-class Written:
-    """Files that were written; what failed; pictures without anything to draw; those that a library is missing for."""
-
-    files: list[Path] = field(default_factory=list)
-    faults: list[str] = field(default_factory=list)
-    empty: list[str] = field(default_factory=list)
-    missing: dict[str, MissingExtra] = field(default_factory=dict)
-
-    def take(self, path: Path, write: Callable[[], Path]) -> None:
-        """Write a file, or note why it is not there."""
-        try:
-            self.files.append(write())
-        except MissingExtra as error:
-            self.missing[path.name] = error
-        except NothingToDraw as error:
-            self.empty.append(f"{path} was not written: {error}")
-        except (OSError, ImportError, ValueError) as error:
-            self.faults.append(f"{path} was not written: {error}")
-
-    def draw(self, plot: Callable[[Any, Path], Path], found: Any, path: Path) -> None:
-        """Draw what was found."""
-        self.take(path, lambda: plot(found, path))
-
-    def note_lines(self) -> list[str]:
-        """A line on the libraries that are not installed, if there are any."""
-        if not self.missing:
-            return []
-        files, errors = ", ".join(self.missing), self.missing.values()
-        extras = ",".join(dict.fromkeys(error.extra for error in errors))
-        libraries = " and ".join(dict.fromkeys(error.library for error in errors))
-        return [
-            f"note        {files}: not made without {libraries}; to have pictures: pip install 'lgvi-warp[{extras}]'"
-        ]
-
-
 def write(result: Any, drawn: Any, out: Path) -> Written:
     """Write result.npz, fleet.png, fleet.rrd and statistics.png side by side: what there is of them.
-
-    An interrupt waits until the files that are being written are whole, and says which these are; a second one does not.
 
     Args:
         result: Of the run; one in a store is written already.
@@ -116,25 +76,7 @@ def write(result: Any, drawn: Any, out: Path) -> Written:
         writers |= {"fleet.png": lambda path: plot(drawn, path), "fleet.rrd": lambda path: log_rerun(drawn, path)}
     if drawable(result):
         writers["statistics.png"] = lambda path: plot_statistics(result, path)
-    if not writers:
-        return written
-    pool = ThreadPoolExecutor(len(writers))
-    jobs: dict[Path, Future[Path]] = {}
-    whole: list[str] = []
-
-    def make(path: Path) -> Path:
-        writers[path.name](path)
-        whole.append(str(path))
-        return path
-
-    try:
-        for name in writers:
-            jobs[out / name] = pool.submit(make, out / name)
-        wait(jobs.values())
-        pool.shutdown()
-    except KeyboardInterrupt:
-        pool.shutdown()
-        raise KeyboardInterrupt(f"written: {', '.join(whole)}" if whole else "") from None
+    jobs = side_by_side({out / name: writer for name, writer in writers.items()})
     for path, job in jobs.items():
         written.take(path, job.result)
     return written

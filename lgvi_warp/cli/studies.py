@@ -6,8 +6,9 @@ import argparse
 from typing import Any
 
 from lgvi_warp.cli.progress import part_of, shown
-from lgvi_warp.cli.report import Written, told
+from lgvi_warp.cli.report import told
 from lgvi_warp.cli.settings import folder, overrides
+from lgvi_warp.cli.writing import Written
 from lgvi_warp.errors import SceneError
 
 

@@ -452,7 +452,7 @@ def test_an_interrupt_while_drawing_leaves_whole_files(mixed, tmp_path, monkeypa
     def interrupted(jobs):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(report, "wait", interrupted)
+    monkeypatch.setattr("lgvi_warp.cli.writing.wait", interrupted)
     with pytest.raises(KeyboardInterrupt) as caught:
         report.write(mixed, mixed, tmp_path)
     said = str(caught.value)

@@ -39,6 +39,8 @@ MEANINGS = {
     "energy": "kinetic and potential energy",
 }
 
+END_TIME = {"units": "s", "long_name": "time of the event or of the failure of a member, or the end of the run"}
+
 
 @dataclass(frozen=True, eq=False)
 class Result:
@@ -171,6 +173,7 @@ class Result:
             data[name] = (("time", "realization", *dims.get(values.ndim - 2, ())), values, attributes)
         for one in self._member_fields():
             data[one.name] = (("realization",), np.asarray(getattr(self, one.name)), one.attributes)
+        data["end_time"] = (("realization",), self.end_time, END_TIME)
         coordinates = {"time": ("time", self.time, {"units": "s", "long_name": "time since the start"})}
         attributes = {"Conventions": "CF-1.11", "provenance": json.dumps(self.provenance)}
         return xr.Dataset(data, coordinates, attributes)

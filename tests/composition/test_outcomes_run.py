@@ -72,6 +72,8 @@ def test_in_a_store_and_after_a_resume(tmp_path):
         assert all(one[key].tobytes() == back.statistics[name][key].tobytes() for key in one.arrays)
     np.testing.assert_array_equal(back.position[-1], whole.position[-1])
     np.testing.assert_array_equal(back.end_time, whole.end_time)
+    for result in (back, whole):
+        np.testing.assert_array_equal(result.dataset.end_time, whole.end_time)
     loaded = lw.Result.load(whole.save(tmp_path / "r.npz"))
     assert (
         loaded.statistics["outcome floor"]["end_time"].tobytes()

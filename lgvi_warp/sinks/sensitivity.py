@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp.sinks.plots import save_figure
+from lgvi_warp.sinks.plots import figure_class
 
 if TYPE_CHECKING:
     from lgvi_warp.uq import Indices
@@ -23,17 +23,14 @@ def plot_sensitivity(found: Indices, path: str | os.PathLike[str]) -> Path:
 
     Raises ImportError without matplotlib (extra: viz), ValueError when there is nothing to draw.
     """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise ImportError("plots need matplotlib: pip install 'lgvi-warp[viz]'") from error
+    figure_of = figure_class()
     shown = [q for q in range(len(found.quantities)) if np.isfinite(getattr(found, found.columns[0])[q]).any()][:MOST]
     if not shown:
         raise ValueError("no quantity varies: there is nothing to draw")
     d = len(found.factors)
     columns = min(len(shown), 3)
     lines = -(-len(shown) // columns)
-    figure = Figure(figsize=(2.5 + 4.5 * columns, 1.4 + lines * (1.2 + 0.35 * d)), layout="constrained")
+    figure = figure_of(figsize=(2.5 + 4.5 * columns, 1.4 + lines * (1.2 + 0.35 * d)), layout="constrained")
     panels = figure.subplots(lines, columns, squeeze=False, sharey=True).reshape(-1)
     for axes, q in zip(panels, shown, strict=False):
         _bars(axes, found, q)
@@ -47,7 +44,9 @@ def plot_sensitivity(found: Indices, path: str | os.PathLike[str]) -> Path:
     more = f"; {left} quantities not shown" if left else ""
     figure.suptitle(f"{found.name}, {found.samples} samples, {found.members} members{failed}; "
                     f"{found.confidence:.0%} intervals{more}", fontsize="medium")  # fmt: skip
-    return save_figure(figure, path, 100)
+    target = Path(path)
+    figure.savefig(target, dpi=100)
+    return target
 
 
 def _bars(axes: Any, found: Indices, q: int) -> None:

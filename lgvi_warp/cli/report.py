@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli.writing import Written, side_by_side
+from lgvi_warp.safe_files import size_below
+from lgvi_warp.write_lock import write_lock
 
 
 def report(result: Any, out: Path, quiet: bool, begun: float) -> list[str]:
@@ -76,10 +79,20 @@ def write(result: Any, drawn: Any, out: Path) -> Written:
         writers |= {"fleet.png": lambda path: plot(drawn, path), "fleet.rrd": lambda path: log_rerun(drawn, path)}
     if drawable(result):
         writers["statistics.png"] = lambda path: plot_statistics(result, path)
-    jobs = side_by_side({out / name: writer for name, writer in writers.items()})
+    with _in_turn(out):
+        jobs = side_by_side({out / name: writer for name, writer in writers.items()})
     for path, job in jobs.items():
         written.take(path, job.result)
     return written
+
+
+@contextlib.contextmanager
+def _in_turn(out: Path) -> Iterator[None]:
+    """Runs that end together in one folder write their files one after another: what is left are those of one of them."""
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):  # a folder that takes no file: each file says so
+            stack.enter_context(write_lock(out / "result", wait=True))
+        yield
 
 
 def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
@@ -175,6 +188,4 @@ def _speed(result: Any, seconds: float) -> list[str]:
 
 def size_of(path: Path) -> int:
     """Bytes of a file, or of all in a folder."""
-    return (
-        path.stat().st_size if path.is_file() else sum(one.stat().st_size for one in path.rglob("*") if one.is_file())
-    )
+    return path.stat().st_size if path.is_file() else size_below(path)

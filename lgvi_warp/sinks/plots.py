@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp import durable
 from lgvi_warp.errors import MissingExtra, NothingToDraw
 from lgvi_warp.outcomes import outcomes, stop_time, under_way
 from lgvi_warp.sinks.fleet import LOOKS, energy_curve, evenly, quantiles, title
@@ -24,6 +25,14 @@ if TYPE_CHECKING:
 BANDS = ((0.0, 1.0, 0.15), (0.05, 0.95, 0.25), (0.25, 0.75, 0.4))
 PATHS = 12
 COLOR = "tab:blue"
+
+
+def save_figure(figure: Any, path: str | os.PathLike[str], dpi: int) -> Path:
+    """Write a picture, whole or not at all; its ending chooses the format. Returns its path. Raises OSError."""
+    target = Path(path)
+    with durable.placed(target) as beside:
+        figure.savefig(beside, dpi=dpi, format=target.suffix.removeprefix(".") or "png")
+    return target
 
 
 def plot(result: Result, path: str | os.PathLike[str]) -> Path:
@@ -63,9 +72,7 @@ def plot(result: Result, path: str | os.PathLike[str]) -> Path:
         energy.axhline(0.0, color="black", linewidth=0.5)
     _paths(paths, result)
     figure.suptitle(title(result))
-    target = Path(path)
-    figure.savefig(target, dpi=100)
-    return target
+    return save_figure(figure, path, 100)
 
 
 def _refuse_nothing(result: Result, counted: np.ndarray) -> None:
@@ -157,9 +164,7 @@ def plot_statistics(result: Result, path: str | os.PathLike[str]) -> Path:
     for axes in list(figure.axes)[len(drawn) :]:
         axes.set_axis_off()
     figure.suptitle(f"{result.members} members, intervals of {drawn[0].confidence:.0%}")
-    target = Path(path)
-    figure.savefig(target, dpi=100)
-    return target
+    return save_figure(figure, path, 100)
 
 
 def drawable(result: Result) -> list[Estimate]:
@@ -309,9 +314,7 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None 
         f"{found.members} members, 0 to {found.t1:g} s; reference {found.reference}; better is to the right and down"
     )
     figure.suptitle(title, fontsize="medium")
-    target = Path(path)
-    figure.savefig(target, dpi=100)
-    return target
+    return save_figure(figure, path, 100)
 
 
 # Colours of stability_map's classes, apart for every kind of colour vision and in grey; what must not be is hatched too.
@@ -351,9 +354,7 @@ def plot_stability(found: StabilityMap, path: str | os.PathLike[str]) -> Path:
     figure.suptitle(
         f"{scene}; bounded: energy up to {found.t1:.3g} s; worst of {found.directions} starts", fontsize="medium"
     )
-    target = Path(path)
-    figure.savefig(target, dpi=110)
-    return target
+    return save_figure(figure, path, 110)
 
 
 def _unit_of(found: StabilityMap) -> str:

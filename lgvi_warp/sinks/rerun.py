@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp import notation
+from lgvi_warp import durable, notation
 from lgvi_warp.errors import MissingExtra, NothingToDraw
 from lgvi_warp.outcomes import outcome_text, outcomes, under_way
 from lgvi_warp.sinks.fleet import LOOKS, Curve, energy_curve, evenly, identity, quantiles, title
@@ -56,7 +56,6 @@ def log_rerun(result: Result, path: str | os.PathLike[str]) -> Path:
     except ModuleNotFoundError as error:
         raise MissingExtra("recordings", "rerun-sdk", "viz") from error
     target = Path(path)
-    part = target.with_name(target.name + ".part")
     finite = np.isfinite(result.position[0]).all(axis=-1) & np.isfinite(result.attitude[0]).all(axis=(-1, -2))
     if not finite.any():
         raise NothingToDraw("no member has a finite start: there is nothing to draw; see result.status")
@@ -66,22 +65,20 @@ def log_rerun(result: Result, path: str | os.PathLike[str]) -> Path:
     name = identity(result)
     recording = rr.RecordingStream(f"lgvi_warp_{name}", recording_id=name)
     try:
-        recording.save(part, default_blueprint=_blueprint(result.time, position, curve))
-        recording.send_recording_name(title(result))
-        _world(recording, rr, result, shown, position, counted[:, shown])
-        _fan(recording, rr, result.time, "depth", result.position[..., 2], counted)
-        _fan(recording, rr, result.time, entity_of(curve), curve.values, counted)
-        _members(recording, rr, result, counted)
-        recording.log("run", rr.TextDocument(_text(result), media_type="text/markdown"), static=True, strict=True)
-        recording.flush()
-        recording.disconnect()
-        part.replace(target)
+        with durable.placed(target) as beside:
+            recording.save(beside, default_blueprint=_blueprint(result.time, position, curve))
+            recording.send_recording_name(title(result))
+            _world(recording, rr, result, shown, position, counted[:, shown])
+            _fan(recording, rr, result.time, "depth", result.position[..., 2], counted)
+            _fan(recording, rr, result.time, entity_of(curve), curve.values, counted)
+            _members(recording, rr, result, counted)
+            recording.log("run", rr.TextDocument(_text(result), media_type="text/markdown"), static=True, strict=True)
+            recording.flush()
+            recording.disconnect()
     except RuntimeError as error:
         # rerun's word for a writer that could not begin, or not go on; it says why on stderr.
         text = f"the recording could not be written ({error}); is the disk full, or the folder read-only?"
         raise OSError(text) from error
-    finally:
-        part.unlink(missing_ok=True)
     return target
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp.sinks.plots import figure_class
+from lgvi_warp.sinks.plots import figure_class, save_figure
 
 if TYPE_CHECKING:
     from lgvi_warp.uq import Indices
@@ -44,9 +44,7 @@ def plot_sensitivity(found: Indices, path: str | os.PathLike[str]) -> Path:
     more = f"; {left} quantities not shown" if left else ""
     figure.suptitle(f"{found.name}, {found.samples} samples, {found.members} members{failed}; "
                     f"{found.confidence:.0%} intervals{more}", fontsize="medium")  # fmt: skip
-    target = Path(path)
-    figure.savefig(target, dpi=100)
-    return target
+    return save_figure(figure, path, 100)
 
 
 def _bars(axes: Any, found: Indices, q: int) -> None:

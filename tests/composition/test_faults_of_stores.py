@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -14,7 +15,8 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli, durable, safe_files, scratch, store, write_lock
-from lgvi_warp.cli.report import write
+from lgvi_warp.cli import report
+from tests import hostile
 from tests.conftest import ROOT
 from tests.stores import MEMBERS, SETTINGS, differing, fleet, tree
 
@@ -275,7 +277,7 @@ def test_two_runs_that_end_together_leave_the_files_of_one(results, tmp_path, mo
         return found
 
     monkeypatch.setattr(lw.Result, "save", slowly)
-    threads = [threading.Thread(target=write, args=(one, None, tmp_path)) for one in loaded]
+    threads = [threading.Thread(target=report.write, args=(one, None, tmp_path)) for one in loaded]
     for one in threads:
         one.start()
     for one in threads:
@@ -462,3 +464,18 @@ def test_a_full_disk_does_not_undo_what_is_overwritten(whole, tmp_path, monkeypa
     with pytest.raises(OSError, match="No space left"):
         lw.merge([path], tmp_path, overwrite=True)
     assert differing(whole, path) == [] and [one.name for one in tmp_path.iterdir()] == ["run.zarr"]
+
+
+def test_the_page_names_tests_that_there_are():
+    """Each test and each store or result that docs/what_files_can_do.md names for its sentences."""
+    text = (
+        (ROOT / "docs" / "what_files_can_do.md").read_text().partition("## Stores and results")[2].partition("\n## ")[0]
+    )
+    source = "".join(
+        (ROOT / "tests" / "composition" / f"test_{name}_stores.py").read_text() for name in ("hostile", "faults_of")
+    )
+    tests = re.findall(r"`(test_\w+)`", text)
+    named = re.findall(r'"([^"]+)"', " ".join(re.findall(r"\(`stores`:([^)]*)\)", text.replace("\n", " "))))
+    assert len(tests) > 10 and all(f"def {name}(" in source for name in tests)
+    rows = [*hostile.STORES, *hostile.RESULTS]
+    assert len(named) > 25 and all(any(row.startswith(name.removesuffix(" ...")) for row in rows) for name in named)

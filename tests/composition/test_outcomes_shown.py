@@ -7,7 +7,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from matplotlib.image import imread
 from rerun.chunk import RrdReader
 
@@ -15,6 +14,7 @@ import lgvi_warp as lw
 from lgvi_warp import cli, invariants, outcomes
 from lgvi_warp.cli import report
 from lgvi_warp.sinks import fleet as looks
+from lgvi_warp.sinks import plots
 from lgvi_warp.status import Status, StatusArray, failed, stopped
 from tests import laws
 
@@ -68,7 +68,7 @@ def drawn(result, monkeypatch):
     """The figure that `lw.plot` makes."""
     figures = []
     with monkeypatch.context() as patch:
-        patch.setattr(Figure, "savefig", lambda figure, path, **settings: figures.append(figure))
+        patch.setattr(plots, "save_figure", lambda figure, *_: figures.append(figure))
         lw.plot(result, "fleet.png")
     return figures[0]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar
@@ -38,9 +39,13 @@ class Frozen(Distribution):
 
     def __post_init__(self) -> None:
         faults = Faults()
-        if not is_frozen(self.distribution):
+        if (unfrozen := name_of_unfrozen(self.distribution)) is not None:
+            faults.add("distribution", f"scipy.stats.{unfrozen}", *without_numbers(self.distribution))
+        elif not is_frozen(self.distribution):
             faults.add("distribution", self.distribution, "is no frozen distribution of scipy.stats",
                        "give one with its numbers, such as scipy.stats.gamma(2.0, scale=3.0)")  # fmt: skip
+        elif not all([faults.finite(name, value) is not None for name, value in self._given_numbers().items()]):
+            pass
         elif not np.all(np.isfinite(self.distribution.ppf(0.5))):
             faults.add(
                 self.name, self._numbers(), "are numbers that scipy.stats refuses", "see its page for their limits"
@@ -58,12 +63,14 @@ class Frozen(Distribution):
         """In scipy.stats."""
         return str(getattr(self.distribution.dist, "name", None) or type(self.distribution.dist).__name__)
 
+    def _given_numbers(self) -> dict[str, Any]:
+        """By their names in scipy.stats, as they were given."""
+        known = [*_shapes(self.distribution.dist), "loc", "scale"]
+        return dict(zip(known, self.distribution.args, strict=False)) | dict(self.distribution.kwds)
+
     def _numbers(self) -> dict[str, Any]:
-        """By their names in scipy.stats."""
-        shapes = (self.distribution.dist.shapes or "").replace(" ", "").split(",")
-        known = [*(name for name in shapes if name), "loc", "scale"]
-        given = dict(zip(known, self.distribution.args, strict=False)) | self.distribution.kwds
-        return {name: np.asarray(value).tolist() for name, value in given.items()}
+        """The same as lists."""
+        return {name: np.asarray(value).tolist() for name, value in self._given_numbers().items()}
 
     def numbers(self) -> list[Any]:
         """Its parameters."""
@@ -94,7 +101,7 @@ class Frozen(Distribution):
             )
             faults.raise_if_any()
         assert law is not None
-        shapes = [one for one in (law.shapes or "").replace(" ", "").split(",") if one]
+        shapes = _shapes(law)
         known = [*shapes, "loc"] + ["scale"] * isinstance(law, stats.rv_continuous)
         given = {one: value for one, value in values.items() if kind in SCIPY or one != "name"}
         faults.keys(f"{key}.{kind}", given, known)
@@ -154,6 +161,10 @@ class OwnLaw(Distribution):
 
     def __post_init__(self) -> None:
         faults = Faults()
+        unfrozen = name_of_unfrozen(self.law)
+        if unfrozen is not None:
+            faults.add("law", f"scipy.stats.{unfrozen}", *without_numbers(self.law))
+            faults.raise_if_any()
         try:
             good = bool(
                 np.all(np.isfinite(np.asarray(quantiles_of(self.law)(np.array([0.25, 0.75])), dtype=np.float64)))
@@ -195,6 +206,25 @@ def is_frozen(value: Any) -> bool:
     return all(hasattr(value, name) for name in ("dist", "args", "kwds", "ppf"))
 
 
+def name_of_unfrozen(value: Any) -> str | None:
+    """The name of what scipy.stats holds as a distribution without numbers, such as scipy.stats.norm; None of all else."""
+    known = sys.modules.get("scipy.stats")
+    name = getattr(value, "name", None)
+    return name if isinstance(name, str) and known is not None and getattr(known, name, None) is value else None
+
+
+def without_numbers(value: Any) -> tuple[str, str]:
+    """(what is wrong, the remedy) with such a one."""
+    known = [*_shapes(value), "loc"] + ["scale"] * hasattr(value, "pdf")
+    numbers = ", ".join(f"{name}=..." for name in known)
+    return "has no numbers: it is not frozen", f"give them: scipy.stats.{value.name}({numbers})"
+
+
+def _shapes(law: Any) -> list[str]:
+    """Names of the shape parameters of a distribution of scipy.stats."""
+    return [name for name in (law.shapes or "").replace(" ", "").split(",") if name]
+
+
 def as_law(key: str, value: Any) -> Any:
     """What may stand in `vary` as a law: a table, what scipy.stats has, an object with quantiles; all else as it is.
 
@@ -213,7 +243,10 @@ def as_law(key: str, value: Any) -> Any:
         return Frozen(value)
     if type(value).__name__ == "multivariate_normal_frozen":
         return CorrelatedNormal(covariance=np.asarray(value.cov).tolist(), mean=np.asarray(value.mean).tolist())
-    return OwnLaw(value) if quantiles_of(value) else value
+    try:
+        return OwnLaw(value) if quantiles_of(value) else value
+    except SceneError as error:
+        raise SceneError(f"{key}: {fault}" for fault in error.faults) from None
 
 
 def from_dict(key: str, content: Any) -> Distribution:

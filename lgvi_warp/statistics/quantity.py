@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp import invariants
+from lgvi_warp import invariants, notation
 from lgvi_warp.errors import SceneError, closest, shown
 from lgvi_warp.saveat import FIELDS
 
@@ -46,6 +46,11 @@ class Quantity:
         """Number of components."""
         return len(self.labels)
 
+    @property
+    def may_be_true_or_false(self) -> bool:
+        """Whether its numbers may be a condition by themselves: a function of the user's without a unit."""
+        return self.unit in ("", "1") and self.name.partition("[")[0] not in KNOWN
+
     def __call__(self, samples: Fields, members: Members) -> np.ndarray:
         """Its numbers (k, d, n), contiguous: float32 where they are numbers of such a run as they stand, else float64."""
         values = np.asarray(self.function(samples, members))
@@ -69,6 +74,10 @@ def _speed(samples: Fields, members: Members) -> np.ndarray:
 def _velocity_inertial(samples: Fields, members: Members) -> np.ndarray:
     R, v = samples["attitude"], samples["velocity"].astype(np.float64, copy=False)
     return R[..., 0] * v[..., :1] + R[..., 1] * v[..., 1:2] + R[..., 2] * v[..., 2:]
+
+
+def _quaternion_wxyz(samples: Fields, members: Members) -> np.ndarray:
+    return notation.quaternion_from_matrix(samples["attitude"].astype(np.float64, copy=False))
 
 
 def _euler(samples: Fields, members: Members) -> np.ndarray:
@@ -106,6 +115,7 @@ KNOWN: dict[str, Quantity] = {
             "angular_velocity", _field("angular_velocity"), "rad/s", ("angular_velocity",), _labels("angular_velocity", 3)
         ),
         Quantity("attitude", _field("attitude"), "1", ("attitude",), _labels("attitude", 3, 3)),
+        Quantity("quaternion_wxyz", _quaternion_wxyz, "1", ("attitude",), _labels("quaternion_wxyz", 4)),
         Quantity("euler", _euler, "rad", ("attitude",), _labels("euler", 3)),
         Quantity("energy", _energy, "J"),
     )
@@ -120,7 +130,11 @@ def quantity(key: str, of: Any) -> Quantity:
     if isinstance(of, Quantity):
         return of
     if isinstance(of, str):
-        return _named(key, of)
+        if "(" in of:
+            from lgvi_warp.statistics.functional import functional
+
+            return functional(key, of).at_each_time()
+        return named(key, of)
     if callable(of):
         return Quantity(str(getattr(of, "__name__", type(of).__name__)), of)
     if isinstance(of, Sequence) and len(of):
@@ -129,7 +143,8 @@ def quantity(key: str, of: Any) -> Quantity:
     raise SceneError([f"{key} = {shown(of)}: is no quantity; {remedy}"])
 
 
-def _named(key: str, text: str) -> Quantity:
+def named(key: str, text: str) -> Quantity:
+    """The quantity of a name, or one component of it. Raises SceneError naming `key`."""
     found = re.fullmatch(r"(\w+)(\[[\d, ]+\])?", text.strip())
     base = KNOWN.get(found[1]) if found else None
     if base is None:

@@ -31,7 +31,7 @@ def columns_by_name(faults: Faults, key: str, value: Any) -> dict[str, Any]:
         return {}
     odd = [label for label in labels if not isinstance(label, str)]
     if odd:
-        what = f"has columns whose names are no texts ({', '.join(map(repr, odd[:6]))}{', ...' * (len(odd) > 6)})"
+        what = f"has no names of columns: they are called {', '.join(map(repr, odd[:6]))}{', ...' * (len(odd) > 6)}"
         faults.add(key, "...", what, "name the columns: table.columns = [...], or give .to_numpy() in the right order")
         return {}
     doubled = sorted({label for label in labels if labels.count(label) > 1})

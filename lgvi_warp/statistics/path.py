@@ -92,12 +92,16 @@ class OfPath(Statistic):
             elif one.of is not None:
                 faults.add(f"then[{i}].of", one.of, "is given already", f"leave it out: it is of the {self.type}")
         object.__setattr__(self, "then", tuple(found))
+        if self.of is not None and not faults:
+            with faults.including():
+                self.then_all  # noqa: B018  (a limit that is missing is told now)
 
     @property
     def then_all(self) -> tuple[Statistic, ...]:
         """The statistics of the paths, each knowing what it is of."""
         inner = self.quantity
-        whole = Quantity(self.key, inner.function, self.unit, inner.fields, self._labels)
+        needs_limit = inner.needs_limit and not isinstance(self, Condition)
+        whole = Quantity(self.key, inner.function, self.unit, inner.fields, self._labels, needs_limit)
         return tuple(replace(one, of=whole, stopped=self.stopped) for one in self.then)
 
     @property

@@ -27,8 +27,9 @@ class Quantity:
     """A function of a block's samples, (k times, n members): numbers (k, n), or (k, n, d) for d components.
 
     function(samples, members): samples["position"] (k, n, 3) and so on, samples.time (k,) [s], samples.terms; members
-    as lw.Ensemble.select gives them. fields: the samples that it needs. labels: names of the components. What is not
-    finite leaves its member out at that time.
+    as lw.Ensemble.select gives them. fields: the samples that it needs. labels: names of the components. needs_limit:
+    whether it is never true or false, so that a condition on it wants a number. What is not finite leaves its member out at
+    that time.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Quantity:
     unit: str = ""
     fields: tuple[str, ...] = FIELDS
     labels: tuple[str, ...] = ()
+    needs_limit: bool = False
 
     def __post_init__(self) -> None:
         if not self.labels:
@@ -45,11 +47,6 @@ class Quantity:
     def size(self) -> int:
         """Number of components."""
         return len(self.labels)
-
-    @property
-    def may_be_true_or_false(self) -> bool:
-        """Whether its numbers may be a condition by themselves: a function of the user's without a unit."""
-        return self.unit in ("", "1") and self.name.partition("[")[0] not in KNOWN
 
     def __call__(self, samples: Fields, members: Members) -> np.ndarray:
         """Its numbers (k, d, n), contiguous: float32 where they are numbers of such a run as they stand, else float64."""
@@ -104,7 +101,7 @@ def _labels(name: str, *shape: int) -> tuple[str, ...]:
 
 
 KNOWN: dict[str, Quantity] = {
-    one.name: one
+    one.name: replace(one, needs_limit=True)
     for one in (
         Quantity("position", _field("position"), "m", ("position",), _labels("position", 3)),
         Quantity("depth", lambda samples, members: samples["position"][..., 2], "m", ("position",)),
@@ -178,4 +175,5 @@ def _joined(parts: Sequence[Quantity]) -> Quantity:
     fields = tuple(name for name in FIELDS if any(name in part.fields for part in parts))
     units: Mapping[str, None] = dict.fromkeys(part.unit for part in parts)
     labels = tuple(label for part in parts for label in part.labels)
-    return Quantity(", ".join(part.name for part in parts), function, ", ".join(units), fields, labels)
+    needs_limit = any(part.needs_limit for part in parts)
+    return Quantity(", ".join(part.name for part in parts), function, ", ".join(units), fields, labels, needs_limit)

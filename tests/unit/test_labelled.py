@@ -160,7 +160,7 @@ BAD = {
     "extra": (lambda: FRAME.assign(id=1.0), ['X["id"]', "is not one of its columns"]),
     "misspelt": (lambda: FRAME.rename(columns={MASS: "vehicle.masss"}), ["vehicle.masss", "did you mean 'vehicle.mass'"]),
     "doubled": (lambda: pd.concat([FRAME, FRAME[[MASS]]], axis=1), ["columns of one name (vehicle.mass)"]),
-    "without names": (lambda: pd.DataFrame(ROWS), ["are no texts (0, 1, 2, 3, 4)", "to_numpy()"]),
+    "without names": (lambda: pd.DataFrame(ROWS), ["no names of columns: they are called 0, 1, 2, 3, 4", "to_numpy()"]),
     "vector and entry": (lambda: columns() | {"current.velocity": ROWS[:, 2:]}, ["current.velocity[0]", "is given twice"]),
     "vector of another shape": (lambda: {MASS: ROWS[:, 0], BUOYANCY: ROWS[:, 1], "current.velocity": ROWS[:, :2]},
                                 ["has shape (3, 2)", "(n, 3)"]),

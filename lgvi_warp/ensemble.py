@@ -452,7 +452,9 @@ def _given_parameters(faults: Faults, base: Mapping[str, np.ndarray], given: Any
     if given is None or (isinstance(given, Mapping) and not given):
         return {}
     if not is_labelled(given):
-        faults.add("parameters", given, "has no names", 'give {"vehicle.mass": array, ...} or a DataFrame with such names')
+        faults.add(
+            "parameters", given, "has no names", 'give {"vehicle.mass": array, ...} or a DataFrame with such names'
+        )
         return {}
     found: dict[str, np.ndarray] = {}
     named = []

@@ -217,7 +217,10 @@ def without_numbers(value: Any) -> tuple[str, str]:
     """(what is wrong, the remedy) with such a one."""
     known = [*_shapes(value), "loc"] + ["scale"] * hasattr(value, "pdf")
     numbers = ", ".join(f"{name}=..." for name in known)
-    return "is no frozen distribution of scipy.stats: it has no numbers", f"give them: scipy.stats.{value.name}({numbers})"
+    return (
+        "is no frozen distribution of scipy.stats: it has no numbers",
+        f"give them: scipy.stats.{value.name}({numbers})",
+    )
 
 
 def _shapes(law: Any) -> list[str]:

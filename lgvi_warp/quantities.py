@@ -54,7 +54,7 @@ class OfResult:
         Args:
             result: with the fields that it needs.
             members: as lw.Ensemble.select gives them, for a Quantity that looks at them; by default the result's own
-                parameters.
+                parameters and first samples.
 
         Raises:
             SceneError: for a function's result of another shape.
@@ -88,7 +88,8 @@ class _Samples(dict[str, np.ndarray]):
 def samples_of(result: Result, when: slice = slice(None), members: Any = None) -> tuple[Any, Any]:
     """(samples, members) of a result at some of its times, as a Quantity's function takes them."""
     fields = {name: result.samples[name][when] for name in FIELDS if name in result.samples}
-    known = SimpleNamespace(parameters=result.parameters, count=result.members)
+    start = {name: result.samples[name][0] for name in fields}
+    known = SimpleNamespace(parameters=result.parameters, count=result.members, **start)
     return _Samples(fields, result.time[when], result.terms), known if members is None else members
 
 
@@ -118,5 +119,9 @@ def _of_samples(function: Callable[..., Any]) -> bool:
         given = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):
         return False
-    plain = [one for one in given if one.kind in (one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD) and one.default is one.empty]
+    plain = [
+        one
+        for one in given
+        if one.kind in (one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD) and one.default is one.empty
+    ]
     return len(plain) == 2

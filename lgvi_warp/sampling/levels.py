@@ -51,14 +51,15 @@ class Levels(Sampling):
         if self.names is not None:
             faults.add("names", self.names, "are given beside points that have names", "leave them out")
         columns = columns_by_name(faults, "points", self.points)
-        arrays = [faults.finite(f'points["{name}"]', column) for name, column in columns.items()]
+        given = [faults.finite(f'points["{name}"]', column) for name, column in columns.items()]
+        arrays = [array for array in given if array is not None]
         if faults:
             return None
-        if len({np.shape(array) for array in arrays}) != 1 or np.ndim(arrays[0]) != 1:
+        if len({array.shape for array in arrays}) != 1 or arrays[0].ndim != 1:
             faults.add("points", "...", "has columns of other shapes than one (n,)", "give one number for each member")
             return None
         object.__setattr__(self, "names", list(columns))
-        return np.column_stack(arrays)  # type: ignore[arg-type]
+        return np.column_stack(arrays)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The points."""

@@ -139,7 +139,9 @@ class Model:
                 faults.add("X", "...", f"has shape {array.shape}", shape)
         if array is not None and self.levels and not np.all((array >= 0.0) & (array <= 1.0)):
             odd = array[~((array >= 0.0) & (array <= 1.0))][0]
-            faults.add("X", odd, "is no level between 0 and 1", "give levels, or leave out levels=True to give the numbers")
+            faults.add(
+                "X", odd, "is no level between 0 and 1", "give levels, or leave out levels=True to give the numbers"
+            )
         faults.raise_if_any()
         assert array is not None
         return array

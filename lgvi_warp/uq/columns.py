@@ -61,7 +61,8 @@ def _entries(
         fixed[index] = False
         if target.name in MATRICES:
             fixed[index[::-1]] = False
-        found[name] = array[(slice(None), *index)]
+        place: tuple[Any, ...] = (slice(None), *index)
+        found[name] = array[place]
     if key in MATRICES and not np.array_equal(array, np.swapaxes(array, 1, 2)):
         faults.add(f'X["{key}"]', "...", "holds a matrix that is not symmetric", "give symmetric matrices")
     elif np.any(array[:, fixed] != whole[fixed]):

@@ -69,9 +69,7 @@ def evaluate(
         part = progress and _part(progress, first / fleet.members, len(chosen) / fleet.members)
         # What the scene keeps of its own runs, and when those end, is no matter of a design that must be whole.
         group = fleet.subset(chosen)
-        result = solve(
-            group, save=save, progress=part, statistics=(), keep="all", until=False, **settings
-        )
+        result = solve(group, save=save, progress=part, statistics=(), keep="all", until=False, **settings)
         members = group.select(0, len(chosen)) if looks_at_members else None
         values.append([one.values(result, members) for one in asked])
         status.append(np.asarray(result.status))

@@ -156,7 +156,9 @@ def test_suggestions_for_twenty_scenes():
     ("arguments", "words"),
     [
         ({"error": -1.0}, ["error = -1.0", "above 0 [m]"]),
-        ({"of": "speed"}, ["of = 'speed'", "known: position"]),
+        ({"of": "spead"}, ["of = 'spead'", "did you mean 'speed'"]),
+        ({"of": "max(depth)"}, ["of = 'max(depth)'", "give 'depth'"]),
+        ({"of": ["depth", "speed"]}, ["of = ['depth', 'speed']", "one of them"]),
         ({"methods": ["psi_z"]}, ["methods = 'psi_z'", "psi_x"]),
         ({"methods": []}, ["methods = []", "name one"]),
         ({"t1": 0.0}, ["t1 = 0.0"]),

@@ -133,7 +133,8 @@ def test_levels_are_read_in_the_order_of_the_laws(drifting, seen):
 
 
 def test_a_joint_law_keeps_its_place_among_levels(drifting, seen):
-    vary = {"vehicle.mass": lw.Normal(std=0.1), "start.attitude": lw.UniformRotation(), "environment.gravity": lw.Normal(std=0.1)}
+    gravity = {"environment.gravity": lw.Normal(std=0.1)}
+    vary = {"vehicle.mass": lw.Normal(std=0.1), "start.attitude": lw.UniformRotation(), **gravity}
     model = uq.model(drifting, vary, "position[2]", levels=True, h=0.01, t1=0.02)
     joint = [f"start.attitude {i}" for i in range(3)]
     assert model.names == ("vehicle.mass", *joint, "environment.gravity")
@@ -167,7 +168,8 @@ BAD = {
     "other lengths": (lambda: columns() | {MASS: [1.0, 2.0]}, ["vehicle.mass (2,)", "one number for each member"]),
     "texts": (lambda: FRAME.astype(str), ['X["vehicle.mass"]', "is not numeric"]),
     "masked": (lambda: np.ma.masked_greater(ROWS, 1216.5), ["hides 1 of 15 numbers", "[2, 1]"]),
-    "masked column": (lambda: columns() | {MASS: np.ma.masked_equal(ROWS[:, 0], 124.0)}, ["hides 1 of 3", 'X["vehicle.mass"]']),
+    "masked column": (lambda: columns() | {MASS: np.ma.masked_equal(ROWS[:, 0], 124.0)},
+                      ["hides 1 of 3", 'X["vehicle.mass"]']),
     "truth values": (lambda: ROWS > 1.0, ["X = ", "is not numeric"]),
     "complex": (lambda: ROWS + 0j, ["is not numeric"]),
     "dates": (lambda: FRAME.assign(**{MASS: pd.Timestamp("2026-01-01")}), ["is not numeric"]),

@@ -80,8 +80,7 @@ DOORS = {
     "vehicle's buoyancy": lambda x: lw.Vehicle(mass=10.0, inertia=[5.0, 6.0, 7.0], center_of_buoyancy=x),
     "start": lambda x: lw.Start(position=x),
     "term": lambda x: lw.Current(velocity=x),
-    "schedule": lambda x: lw.WrenchSchedule(times=[0.0, 1.0, 2.0], force=np.ma.array(np.ones((3, 3)), mask=[np.ma.getmaskarray(x)] * 3)
-                                            if np.ma.is_masked(x) else [x] * 3),
+    "schedule": lambda x: lw.WrenchSchedule(times=[0.0, 1.0, 2.0], force=[x] * 3),
     "normal": lambda x: lw.Normal(std=x),
     "uniform": lambda x: lw.Uniform(low=[-9.0] * 3, high=x),
     "choice": lambda x: lw.Choice(x),
@@ -89,7 +88,7 @@ DOORS = {
     "correlated": lambda x: lw.CorrelatedNormal(std=x),
     "frozen": lambda x: lw.Frozen(stats.norm(loc=x)),
     "table": lambda x: lw.Table({"vehicle.mass": x}),
-    "levels": lambda x: lw.Levels(np.ma.array([[0.1, 0.2, 0.3]], mask=[np.ma.getmaskarray(x)]) if np.ma.is_masked(x) else [x]),
+    "levels": lambda x: lw.Levels([x]),
     "grid": lambda x: lw.Grid({"vehicle.mass": x}),
     "saving": lambda x: lw.SaveAt(at=x),
     "limits": lambda x: lw.Exceedance("position", above=x),

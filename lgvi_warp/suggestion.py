@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp import comparison, machine, tradeoffs
+from lgvi_warp import comparison, cost, machine, tradeoffs
 from lgvi_warp.blocks import blocks
 from lgvi_warp.compared import Compared, compared_in
 from lgvi_warp.comparison import Reference, Sample, Setting
@@ -35,8 +35,9 @@ CANDIDATES = tuple(name for name in tradeoffs.CANDIDATES if name not in ("phi", 
 CHECKED = 1024
 # Members that a finished run is checked on.
 CONFIRMED = 64
-# Settings of the last comparison of costs.
+# Settings of the last comparison of costs, and readings of each cost.
 FINALISTS = 4
+ROUNDS = 7
 # Bytes of a member besides its samples: state, parameters, status, and the arrays they are made from.
 BYTES_OF_A_MEMBER = 2000
 
@@ -50,7 +51,7 @@ class Suggestion:
     predicted for all members on `threads` cores, without compiling; memory_bytes: predicted for the result and the run.
     members: of the sample that was checked; reference: what against, reference_error: how good that is.
     rivals: (setting, cost, error) of the next best. worst: members with the largest errors, for the check after the run;
-    asked: what the error is of, for the same.
+    asked: what the error is of, for the same. messages: what the user should know.
     """
 
     settings: dict[str, Any]
@@ -70,6 +71,7 @@ class Suggestion:
     rivals: tuple[tuple[Setting, float, float], ...] = ()
     worst: tuple[int, ...] = ()
     asked: Compared | None = field(default=None, repr=False, compare=False)
+    messages: tuple[str, ...] = ()
 
     @property
     def margin(self) -> float:
@@ -79,14 +81,15 @@ class Suggestion:
     def __str__(self) -> str:
         s = self.setting
         lines = [
+            *(f"note        {message}" for message in self.messages),
             f"chosen      {s.name}, {s.dtype}, step {s.h:.6g} s: {self.of} to {self.expected:.1e} {self.unit} up to "
             f"{self.t1:g} s, {self.margin:.2g} times better than asked ({self.members} members checked)",
             f"predicted   {self.run_seconds:.2g} s on {self.threads} thread{'s' * (self.threads > 1)}, "
             f"{self.memory_bytes / 1e6:.2g} MB",
             f"reference   {self.reference}: they agree to {self.reference_error:.1e} {self.unit}",
         ]
-        for rival, cost, error in self.rivals:
-            times = cost / self.us_per_vehicle_second
+        for rival, price, error in self.rivals:
+            times = price / self.us_per_vehicle_second
             lines.append(f"  next best {rival.name}, {rival.dtype}, step {rival.h:.4g} s: {times:.2f} times the time, "
                          f"{self.of} to {error:.1e} {self.unit}")  # fmt: skip
         return "\n".join(lines)
@@ -146,7 +149,11 @@ def suggest(
         reference = checked_reference(more, asked, error, 0.4 * seconds, taken)
     final = [refined(more, one.setting, reference, asked.name, error / SAFETY**0.5) for one in found[:FINALISTS]]
     final = [one for one in final if one.error(asked.name) <= error] or final[:1]
-    prices = costs([one.plan for one in final], rounds=7)
+    readings = cost.costs([one.plan for one in final], rounds=ROUNDS)
+    prices = [one.us_per_vehicle_second for one in readings]
+    text = cost.disagreement(
+        [(f"{one.setting.name} {one.setting.dtype}", price) for one, price in zip(final, readings, strict=True)]
+    )
     order = sorted(range(len(final)), key=prices.__getitem__)
     best, price = final[order[0]], prices[order[0]]
     whole = sample.whole
@@ -170,6 +177,7 @@ def suggest(
         rivals=tuple((final[i].setting, prices[i], final[i].error(asked.name)) for i in order[1:]),
         worst=worst_of(best, reference, asked.name),
         asked=asked,
+        messages=(text,) if text else (),
     )
 
 
@@ -221,24 +229,29 @@ def search(
         m, before, worse = sample.coarsest(2.0), math.inf, 0
         plan = sample.plan(sample.setting(method, m, dtype))
         deadline += plan.compile()
-        per_step = costs([plan], 3)[0] * sample.h(m)
-        cheapest = min((cost for cost, _ in found), default=math.inf)
+        per_step = step_cost(plan)
+        cheapest = min((price for price, _ in found), default=math.inf)
         while per_step / sample.h(m) < 2.0 * cheapest:
             one = tried(sample, sample.setting(method, m, dtype), reference)
             deadline += one.result.compile_seconds
             size = one.error(of)
             if size <= target:
                 best = lengthened(sample, one, m, before, reference, of, target)
-                cost = per_step / best.setting.h
-                found.append((cost, best))
+                # Of a step that iterates, a shorter one is less work; one that fails is other work.
+                found.append((step_cost(best.plan) / best.setting.h, best))
                 break
             worse = worse + 1 if size > 0.8 * before and before < 0.1 else 0
             if worse >= 2 or m > 10**7 or time.perf_counter() > deadline:
                 break
             before = size
             m *= 2
-    cheapest = min((cost for cost, _ in found), default=math.inf)
-    return [one for cost, one in sorted(found, key=lambda pair: pair[0]) if cost < 1.5 * cheapest]
+    cheapest = min((price for price, _ in found), default=math.inf)
+    return [one for price, one in sorted(found, key=lambda pair: pair[0]) if price < 1.5 * cheapest]
+
+
+def step_cost(plan: Plan) -> float:
+    """Microseconds of one core for one step of one vehicle."""
+    return costs([plan], ROUNDS)[0] * plan.grid.h
 
 
 def lengthened(
@@ -279,10 +292,11 @@ def refined(sample: Sample, setting: Setting, reference: Reference, of: str, tar
 
 
 def seconds_of(fleet: Ensemble, setting: Setting, t1: float, members: int = 256) -> float:
-    """What all members take on one core, the scene's samples included, from a run of a few of them [s]."""
+    """What all members take on one core, the scene's samples included, from the CPU time of a few of them [s]."""
     n = min(members, fleet.members)
     plan = make_plan(fleet.subset(range(n)), setting.resolved(), setting.h, t1, dtype=setting.dtype)
-    return min(run_plan(plan, 1).run_seconds for _ in range(2)) * fleet.members / n
+    plan.compile()
+    return float(cost.timed([lambda: run_plan(plan, 1)], 2).min()) * fleet.members / n
 
 
 def memory_of(fleet: Ensemble, setting: Setting, t1: float) -> int:

@@ -13,17 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp import comparison
+from lgvi_warp import comparison, cost
 from lgvi_warp.compared import QUANTITIES, Compared, compared_in
 from lgvi_warp.comparison import Growth, Reference, Sample, Setting
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.method import COMPOSITIONS, PROGRAMS, Method
-from lgvi_warp.packets import Packets
 from lgvi_warp.plan import DTYPES, Plan
 from lgvi_warp.result import Result
 from lgvi_warp.scene import Scene
-from lgvi_warp.speed import interleaved, void
+from lgvi_warp.speed import void
 from lgvi_warp.tables import write_csv
 
 # Tried in this order; a name that this version does not know, or that a scene refuses, is left out.
@@ -40,8 +39,6 @@ COMPENSATED = ("psi_x", "psi_s", "su4(psi_x)", "kl6(psi_x)")
 DECIDING = ("position", "attitude")
 # Errors shown are at least so many times the reference's own.
 TRUST = 10.0
-# A launch that is timed takes about so long [s].
-TIMED = 2e-3
 # A ladder of steps ends where another setting is as good in so many times less time.
 HOPELESS = 10.0
 
@@ -50,7 +47,8 @@ HOPELESS = 10.0
 class Measurement:
     """One setting: cost and errors.
 
-    us_per_vehicle_second: microseconds of one core per vehicle and simulated second, without compiling. compile_seconds:
+    us_per_vehicle_second: microseconds of one core per vehicle and simulated second, without compiling (see cost.py);
+    cost_spread: the median of the readings over the least, which it is. compile_seconds:
     to load its kernel, once a process. errors: quantity -> end_max, end_rms, path_max, path_rms, over the members, in
     comparison.QUANTITIES' units; empty where a member failed or noise acts. energy_drift: largest |E(t) - E(0)| [J], of use
     where nothing takes or gives energy. biases: see comparison.biases. trusted: whether the reference is ten times better.
@@ -64,6 +62,7 @@ class Measurement:
     biases: dict[str, float]
     order: int
     trusted: dict[str, bool]
+    cost_spread: float = 1.0
 
     def error(self, of: str = "position", kind: str = "path_max") -> float:
         """One error; infinite where there is none."""
@@ -126,7 +125,8 @@ class Tradeoff:
         rows = []
         for one in self.measurements:
             row: dict[str, Any] = asdict(one.setting) | {"order": one.order, "front": one.setting in on_front}
-            row |= {"us_per_vehicle_second": one.us_per_vehicle_second, "compile_seconds": one.compile_seconds}
+            row |= {"us_per_vehicle_second": one.us_per_vehicle_second, "cost_spread": one.cost_spread}
+            row |= {"compile_seconds": one.compile_seconds}
             for of in self.units:
                 row |= {f"{of}_{kind}": one.error(of, kind) for kind in KINDS}
                 row[f"{of}_trusted"] = one.trusted.get(of, False)
@@ -162,12 +162,13 @@ def _finite(value: Any) -> Any:
 
 @dataclass(eq=False)
 class Trial:
-    """A setting that was run: its plan, its errors, and how long its kernel took to load [s]."""
+    """A setting that was run: its plan, its errors, and the CPU time of the run [s], without compiling."""
 
     setting: Setting
     plan: Plan
     result: Result
     errors: dict[str, dict[str, float]]
+    cpu_seconds: float
 
     def error(self, of: str) -> float:
         """Largest over members and path; infinite where a member failed."""
@@ -177,30 +178,23 @@ class Trial:
 def tried(sample: Sample, setting: Setting, reference: Reference | None, until: int = -1) -> Trial:
     """Run a setting and compare it. Raises SceneError where the scene refuses it."""
     plan = sample.plan(setting)
+    compile_seconds = plan.compile()
     with np.errstate(all="ignore"):
-        result = comparison.run_plan(plan, 1)
+        begun = cost.thread_seconds()
+        result = replace(comparison.run_plan(plan, 1), compile_seconds=compile_seconds)
+        cpu_seconds = cost.thread_seconds() - begun
         found: dict[str, dict[str, float]] = {}
         if reference is not None and not comparison.failed(result):
             until = until % len(sample.times)
             found = comparison.errors(comparison.distances(result, reference.result, reference.asked), until)
             if not all(np.isfinite(one["path_max"]) for one in found.values()):
                 found = {}
-    return Trial(setting, plan, result, found)
+    return Trial(setting, plan, result, found, cpu_seconds)
 
 
 def costs(plans: Sequence[Plan], rounds: int = 5) -> list[float]:
-    """Microseconds per vehicle and simulated second of each plan on one core, medians of interleaved rounds."""
-    calls, steps = [], []
-    for plan in plans:
-        packets = Packets(plan, plan.ensemble.select(0, plan.ensemble.members))
-        guess = 10e-9 * len(plan.method.stages) * max(plan.ensemble.members, plan.spec.width)
-        steps.append(int(min(max(TIMED / guess, 10), 100_000)))
-        calls.append(lambda packets=packets, n=steps[-1]: void(packets.advance(0, n)))
-    seconds = interleaved(calls, rounds)
-    return [
-        1e6 * one / (n * plan.grid.h * plan.ensemble.members)
-        for one, n, plan in zip(seconds, steps, plans, strict=True)
-    ]
+    """Microseconds of one core per vehicle and simulated second of each plan (see cost.py)."""
+    return [one.us_per_vehicle_second for one in cost.costs(plans, rounds)]
 
 
 def known(name: str) -> bool:
@@ -282,6 +276,12 @@ def tradeoff(
     if left:
         messages.append(f"no time for {', '.join(left)}: run again, the kernels are compiled now, or give more seconds")
     measured = measurements(sample, trials, reference, finest, until, asked)
+    prices = [
+        (f"{one.setting.name} {one.setting.dtype}", cost.Cost(one.us_per_vehicle_second, one.cost_spread))
+        for one in measured
+    ]
+    doubt = cost.disagreement(prices)
+    messages += [doubt] if doubt else []
     report(1.0)
     return Tradeoff(
         measurements=tuple(measured),
@@ -370,13 +370,13 @@ def sweep(
 def hopeless(one: Trial, trials: Sequence[Trial]) -> bool:
     """Whether another setting was better in much less time."""
     error = max(one.error(of) for of in DECIDING)
-    rivals = (two for two in trials if HOPELESS * two.result.run_seconds < one.result.run_seconds)
+    rivals = (two for two in trials if HOPELESS * two.cpu_seconds < one.cpu_seconds)
     return math.isfinite(error) and any(max(two.error(of) for of in DECIDING) < error for two in rivals)
 
 
 def between(sample: Sample, trials: list[Trial], reference: Reference, until: int, deadline: float) -> None:
     """Near the front, add the steps between those tried."""
-    found = sorted((one.result.run_seconds, one.error(DECIDING[0]), i) for i, one in enumerate(trials))
+    found = sorted((one.cpu_seconds, one.error(DECIDING[0]), i) for i, one in enumerate(trials))
     best, near = math.inf, list[Trial]()
     for _, error, i in found:
         if error < best:
@@ -407,7 +407,7 @@ def measurements(
         key = one.setting.name, one.setting.dtype
         compiled[key] = max(compiled.get(key, 0.0), one.result.compile_seconds)
     found = []
-    for one, cost in zip(good, costs([trial.plan for trial in good]), strict=True):
+    for one, price in zip(good, cost.costs([trial.plan for trial in good]), strict=True):
         limits = {of: reference.error(of, until) for of in one.errors} if reference else {}
         with np.errstate(all="ignore"):
             biases = comparison.biases(one.result, finest, asked)
@@ -415,7 +415,8 @@ def measurements(
         found.append(
             Measurement(
                 setting=one.setting,
-                us_per_vehicle_second=cost,
+                us_per_vehicle_second=price.us_per_vehicle_second,
+                cost_spread=price.spread,
                 compile_seconds=compiled[one.setting.name, one.setting.dtype],
                 errors=one.errors,
                 energy_drift=drift,
@@ -440,6 +441,8 @@ def report_text(found: Tradeoff) -> str:
         lines.append(f"predictable {growth_text(found.growth)}")
     if found.refused:
         lines.append(f"refused     {', '.join(found.refused)} (why: tradeoff.json)")
+    if found.measurements:
+        lines.append(f"costs       {cost.agreement_text([one.cost_spread for one in found.measurements])}")
     front = found.front()
     if front:
         header = ("us/vehicle/s", "method", "precision", "step [s]", f"{found.of} [{unit}]", "rms",

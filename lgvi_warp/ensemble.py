@@ -336,7 +336,7 @@ class Ensemble:
     def subset(self, indices: Sequence[int] | np.ndarray) -> Ensemble:
         """These members, in this order, as an ensemble of its own with the same numbers. Raises IndexError."""
         chosen = np.asarray(indices)
-        if chosen.ndim != 1 or not len(chosen) or chosen.dtype.kind not in "iu":
+        if chosen.ndim != 1 or not len(chosen) or chosen.dtype.kind not in "iu" or np.ma.is_masked(indices):
             raise IndexError(f"members {shown(indices)}: give a list of one or more whole numbers")
         if chosen.min() < 0 or chosen.max() >= self.members:
             raise IndexError(f"members {chosen.min()} to {chosen.max()} of {self.members}")

@@ -13,6 +13,7 @@ import numpy as np
 from lgvi_warp.distributions import Choice, Distribution, LogNormal, Normal, TruncatedNormal, Uniform
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.joint_laws import CorrelatedNormal, PhysicalInertia, PositiveDefinite, RotationNormal, UniformRotation
+from lgvi_warp.real_numbers import real_results
 
 # Name in a scene file -> name in scipy.stats, whose parameters, loc and scale it takes.
 SCIPY = {
@@ -69,8 +70,9 @@ class Frozen(Distribution):
         return dict(zip(known, self.distribution.args, strict=False)) | dict(self.distribution.kwds)
 
     def _numbers(self) -> dict[str, Any]:
-        """The same as lists."""
-        return {name: np.asarray(value).tolist() for name, value in self._given_numbers().items()}
+        """The same as lists; of one that was frozen with none, where it lies, so that a file holds a number."""
+        given = self._given_numbers() or {"loc": 0.0}
+        return {name: np.asarray(value).tolist() for name, value in given.items()}
 
     def numbers(self) -> list[Any]:
         """Its parameters."""
@@ -101,13 +103,14 @@ class Frozen(Distribution):
             )
             faults.raise_if_any()
         assert law is not None
-        shapes = _shapes(law)
-        known = [*shapes, "loc"] + ["scale"] * isinstance(law, stats.rv_continuous)
+        shapes, known = _shapes(law), _numbers_of(law)
         given = {one: value for one, value in values.items() if kind in SCIPY or one != "name"}
         faults.keys(f"{key}.{kind}", given, known)
         for one in shapes:
             if one not in given:
                 faults.add(f"{key}.{kind}.{one}", None, "is missing", f"scipy.stats.{name} takes {', '.join(known)}")
+        if not given and not shapes:
+            faults.add(f"{key}.{kind}", dict(values), "has no numbers", f"give one or more of {', '.join(known)}")
         for one, value in given.items():
             faults.finite(f"{key}.{kind}.{one}", value)
         faults.raise_if_any()
@@ -166,9 +169,7 @@ class OwnLaw(Distribution):
             faults.add("law", f"scipy.stats.{unfrozen}", *without_numbers(self.law))
             faults.raise_if_any()
         try:
-            good = bool(
-                np.all(np.isfinite(np.asarray(quantiles_of(self.law)(np.array([0.25, 0.75])), dtype=np.float64)))
-            )
+            good = bool(np.all(np.isfinite(self._quantiles(np.array([0.25, 0.75])))))
         except Exception:  # whatever a user's object raises
             good = False
         if not good:
@@ -181,7 +182,10 @@ class OwnLaw(Distribution):
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
         """The object's."""
-        return np.asarray(quantiles_of(self.law)(u), dtype=np.float64)
+        return self._quantiles(u)
+
+    def _quantiles(self, u: np.ndarray) -> np.ndarray:
+        return real_results(quantiles_of(self.law)(u)).astype(np.float64)
 
     def to_dict(self) -> dict[str, Any]:
         """What it says of itself, but for its place in memory: that would make each run another one."""
@@ -215,8 +219,7 @@ def name_of_unfrozen(value: Any) -> str | None:
 
 def without_numbers(value: Any) -> tuple[str, str]:
     """(what is wrong, the remedy) with such a one."""
-    known = [*_shapes(value), "loc"] + ["scale"] * hasattr(value, "pdf")
-    numbers = ", ".join(f"{name}=..." for name in known)
+    numbers = ", ".join(f"{name}=..." for name in _numbers_of(value))
     return (
         "is no frozen distribution of scipy.stats: it has no numbers",
         f"give them: scipy.stats.{value.name}({numbers})",
@@ -226,6 +229,11 @@ def without_numbers(value: Any) -> tuple[str, str]:
 def _shapes(law: Any) -> list[str]:
     """Names of the shape parameters of a distribution of scipy.stats."""
     return [name for name in (law.shapes or "").replace(" ", "").split(",") if name]
+
+
+def _numbers_of(law: Any) -> list[str]:
+    """Names of all of its parameters."""
+    return [*_shapes(law), "loc"] + ["scale"] * hasattr(law, "pdf")
 
 
 def as_law(key: str, value: Any) -> Any:

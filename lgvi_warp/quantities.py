@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.errors import Faults
+from lgvi_warp.real_numbers import NotReal, real_results
 from lgvi_warp.result import Result
 from lgvi_warp.saveat import FIELDS
 from lgvi_warp.statistics.functional import Functional, functional
@@ -62,9 +63,13 @@ class OfResult:
         if isinstance(self.of, Functional):
             found = self.of(*samples_of(result, slice(None) if self.over_path else slice(-1, None), members))
             return found if self.over_path else found[-1]
-        found = np.asarray(self.of(result), dtype=np.float64)
+        faults = Faults()
+        try:
+            found = real_results(self.of(result)).astype(np.float64)
+        except NotReal as error:
+            faults.add(self.label, "...", error.what, "return an array of real numbers")
+        faults.raise_if_any()
         if found.ndim not in (1, 2) or len(found) != result.members:
-            faults = Faults()
             remedy = f"return an array of shape ({result.members},) or ({result.members}, m)"
             faults.add(self.label, "...", f"gave an array of shape {found.shape}", remedy)
             faults.raise_if_any()

@@ -42,6 +42,25 @@ def real_numbers(value: Any) -> np.ndarray:
     raise NotReal("is not numeric")
 
 
+def real_results(values: Any) -> np.ndarray:
+    """What a user's function gave, as an array of numbers: NaN where it is masked; truth values stay as they are.
+
+    Raises:
+        NotReal: for complex numbers, texts, and what is no array.
+    """
+    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+        if values.dtype.kind not in "biuf":
+            raise NotReal("gave no real numbers")
+        return np.asarray(np.ma.filled(values.astype(np.float64), np.nan))
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise NotReal("gave lists of different lengths") from None
+    if array.dtype.kind not in "biuf":
+        raise NotReal(f"gave {'complex' if array.dtype.kind == 'c' else 'no'} numbers")
+    return array
+
+
 def holds_bool(value: Any) -> bool:
     """Whether a truth value hides among numbers: [true, 1.0] would pass for [1.0, 1.0]."""
     return any(_is_bool(part) for part in _parts(value))

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp import comparison, invariants, plan
-from lgvi_warp.compared import Compared
+from lgvi_warp.compared import Compared, compared_in
 from lgvi_warp.comparison import PRECISE
 from lgvi_warp.errors import SceneError
 from lgvi_warp.method import Method
@@ -122,14 +122,15 @@ def _carried(term: Any, module: Any) -> bool:
 
 
 def make_references(
-    grid: Grid, columns: Sequence[Column], of: Compared, error: float, threads: int, report: Callable[[float], None]
+    grid: Grid, columns: Sequence[Column], of: Any, error: float, threads: int, report: Callable[[float], None]
 ) -> str:
     """Give every column the states at its error times; says by which methods."""
+    asked = compared_in(of)
     first, second = _precise(grid)
     rates = np.max(list(grid.rates().values()), axis=0)
     done = 0
     with ThreadPoolExecutor(threads) as pool:
-        jobs = [pool.submit(_reference, grid, one, (first, second), rates, of, error / TRUST) for one in columns]
+        jobs = [pool.submit(_reference, grid, one, (first, second), rates, asked, error / TRUST) for one in columns]
         for job in as_completed(jobs):
             job.result()
             done += 1

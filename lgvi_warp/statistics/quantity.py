@@ -12,6 +12,7 @@ import numpy as np
 
 from lgvi_warp import invariants, notation
 from lgvi_warp.errors import SceneError, closest, shown
+from lgvi_warp.real_numbers import NotReal, real_results
 from lgvi_warp.saveat import FIELDS
 
 if TYPE_CHECKING:
@@ -50,7 +51,10 @@ class Quantity:
 
     def __call__(self, samples: Fields, members: Members) -> np.ndarray:
         """Its numbers (k, d, n), contiguous: float32 where they are numbers of such a run as they stand, else float64."""
-        values = np.asarray(self.function(samples, members))
+        try:
+            values = real_results(self.function(samples, members))
+        except NotReal as error:
+            raise ValueError(f"quantity {self.name}: {error.what}; real numbers, true or false are wanted") from None
         k, n = len(samples.time), members.count
         if values.shape not in ((k, n), (k, n, self.size)) or (values.ndim == 2 and self.size != 1):
             wanted = f"({k}, {n})" if self.size == 1 else f"({k}, {n}, {self.size})"

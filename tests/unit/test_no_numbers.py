@@ -149,6 +149,61 @@ def test_laws_with_all_their_numbers_are_taken(scene):
         assert np.isfinite(settings.vary["vehicle.buoyancy"].quantile(np.array([0.25, 0.75]), np.array(1215.0))).all()
 
 
+@pytest.mark.parametrize("table", [{"scipy": {"name": "norm"}}, {"exponential": {}}], ids=str)
+def test_a_table_of_a_law_without_numbers_is_refused(scene, table):
+    assert "has no numbers; give one or more of loc, scale" in refused(
+        lw.Ensemble, scene, 4, 0, {"vehicle.mass": table}
+    )
+
+
+def test_what_was_frozen_without_numbers_is_read_again():
+    law = lw.Frozen(stats.norm())
+    settings = lw.scene.EnsembleSettings(4, 0, {"vehicle.mass": law.to_dict()})
+    levels = np.array([0.2, 0.7])
+    np.testing.assert_array_equal(settings.vary["vehicle.mass"].quantile(levels, 0.0), stats.norm().ppf(levels))
+
+
+# What functions of the user's give ------------------------------------------------------------------------------------------
+
+
+def test_what_a_law_of_the_users_gives():
+    class Law:
+        def __init__(self, values):
+            self.values = values
+
+        def ppf(self, u):
+            return self.values(np.asarray(u))
+
+    for odd in (lambda u: u + 0j, lambda u: np.ma.masked_greater(u, 0.5), lambda u: u.astype(str)):
+        with pytest.raises(lw.SceneError, match="gives no numbers"):
+            lw.scene.EnsembleSettings(4, 0, {"vehicle.mass": Law(odd)})
+    late = lw.scene.EnsembleSettings(4, 0, {"vehicle.mass": Law(lambda u: np.ma.masked_greater(120.0 + u, 120.9))})
+    drawn = late.vary["vehicle.mass"].quantile(np.array([0.5, 0.95]), 0.0)
+    np.testing.assert_array_equal(drawn, [120.5, np.nan])
+
+
+def test_what_a_quantity_of_the_users_gives():
+    from types import SimpleNamespace
+
+    samples = type("Samples", (dict,), {"time": np.arange(2.0), "terms": ()})(position=np.arange(18.0).reshape(2, 3, 3))
+    members = SimpleNamespace(count=3)
+    hidden = lw.Quantity("hidden", lambda samples, members: np.ma.masked_less(samples["position"][..., 0], 4.0))
+    np.testing.assert_array_equal(hidden(samples, members)[:, 0], [[np.nan, np.nan, 6.0], [9.0, 12.0, 15.0]])
+    for odd in (lambda s, m: s["position"][..., 0] + 0j, lambda s, m: s["position"][..., 0].astype(str)):
+        with pytest.raises(ValueError, match="quantity odd: gave"):
+            lw.Quantity("odd", odd)(samples, members)
+
+
+def test_what_a_function_of_a_result_gives():
+    from lgvi_warp.quantities import quantities
+
+    result = type("Result", (), {"members": 3})()
+    (one,) = quantities(lambda result: np.ma.array([1.0, 2.0, 3.0], mask=[0, 1, 0]))
+    np.testing.assert_array_equal(one.values(result)[:, 0], [1.0, np.nan, 3.0])
+    (one,) = quantities(lambda result: np.array([1j, 2.0, 3.0]))
+    assert "gave complex numbers" in refused(one.values, result)
+
+
 # Conditions without a number -----------------------------------------------------------------------------------------------
 
 LIMITED = [

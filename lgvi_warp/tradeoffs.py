@@ -360,7 +360,7 @@ def sweep(
             worse = worse + 1 if error > 0.8 * best and best < 0.1 else 0
             best = min(best, error)
             noise = TRUST * max(reference.error(of, until) for of in DECIDING)
-            if worse >= 2 or error < noise or one.result.run_seconds > longest or hopeless(one, trials):
+            if worse >= 2 or error < noise or one.cpu_seconds > longest or hopeless(one, trials):
                 break
     if reference is not None:
         between(sample, trials, reference, until, deadline)

@@ -70,6 +70,14 @@ def test_readings_that_disagree_are_told(noise, told):
         assert text is None
 
 
+def test_a_least_reading_is_met_again():
+    kinds = [Kind("a", 1.0), Kind("a", 0.5), Kind("b", 1.0), Kind("c", 1.0)]
+    nan = np.nan
+    seconds = np.array([[1.0, 5.0, nan], [1.04, 7.0, nan], [1.0, 1.2, 1.3], [2.0, nan, nan]])
+    assert cost.confirmed(kinds, seconds) == [True, True, False, False]
+    assert [least for least, _ in of_steps(kinds, seconds)] == [1.0, 1.0, 1.0, 2.0]
+
+
 def test_many_are_told_few_by_name():
     text = cost.disagreement([(f"m{i}", Cost(1.0, 2.0 + i)) for i in range(9)])
     assert "m8 (10 times), m7 (9 times)" in text and "and 3 more" in text and "m0" not in text

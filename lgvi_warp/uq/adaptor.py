@@ -15,7 +15,7 @@ from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.labelled import columns_by_name, is_labelled
 from lgvi_warp.quantities import OfInterest, quantities
 from lgvi_warp.scene import Scene
-from lgvi_warp.uq.columns import stacked, whole_columns
+from lgvi_warp.uq.columns import as_given, columns_of, names_of, stacked, whole_columns
 from lgvi_warp.uq.outputs import FailedMembers, evaluate
 
 
@@ -33,18 +33,18 @@ class Model:
             quantities(of)
         faults.choice("failed", failed, ("refuse", "nan"))
         self.vary = dict(vary) if isinstance(vary, Mapping) else None
-        names = () if self.vary is not None else _names(faults, vary)
+        names = () if self.vary is not None else names_of(faults, vary)
         faults.raise_if_any()
         if self.vary is None and levels:
             raise SceneError([f"vary = {vary!r}: names no laws that levels could be of; map names to distributions"])
         self._fleet = Ensemble(scene, 1, 0, self.vary)
-        self._variations = _as_given(self._fleet)
+        self._variations = as_given(self._fleet)
         joint = [one.key for one in self._variations if one.law.joint]
         if joint and not levels:
             raise SceneError([f"vary.\"{key}\": is a joint law, whose values are no numbers by themselves; use levels=True"
                               for key in joint])  # fmt: skip
         # Which column of the ensemble's cube, whose keys are sorted, each column of X is.
-        self._columns = [column for one in self._variations for column in _columns_of(self._fleet.space, one.key)]
+        self._columns = [column for one in self._variations for column in columns_of(self._fleet.space, one.key)]
         if self.vary is None:
             self.names = names
             self._run(np.array([[float(self._scene_value(name)) for name in names]]), dry=True)
@@ -165,32 +165,6 @@ class Model:
                 raise FailedMembers([outputs.text('mend what fails, or take NaN for them: failed="nan"')])
             return np.where(outputs.failed[:, None], np.nan, outputs.values)
         return outputs.values
-
-
-def _names(faults: Faults, vary: Any) -> tuple[str, ...]:
-    """The names alone, as they are spelled everywhere; notes what is no list of names, and what is named twice."""
-    given = [vary] if isinstance(vary, str) else vary
-    if not isinstance(given, Sequence) or not given or not all(isinstance(name, str) for name in given):
-        remedy = 'give {"vehicle.mass": lw.Normal(...)} or a list of names, ["vehicle.mass", "start.position[2]"]'
-        faults.add("vary", vary, "is no list of names, and maps none to distributions", remedy)
-        return ()
-    names = tuple(", ".join(target.label for target in variations.targets(name)) for name in given)
-    for name in sorted({name for name in names if names.count(name) > 1}):
-        faults.add("vary", name, "is named twice", "name each number once")
-    return names
-
-
-def _as_given(fleet: Ensemble) -> list[variations.Variation]:
-    """What varies, in the order of `vary`."""
-    by_key = {one.key: one for one in fleet._variations}
-    return [by_key[key] for key in fleet.vary]
-
-
-def _columns_of(space: variations.Space, key: str) -> range:
-    """The columns of the cube that a key has."""
-    place = space.keys.index(key)
-    first = sum(space.sizes[:place])
-    return range(first, first + space.sizes[place])
 
 
 @dataclass(frozen=True)

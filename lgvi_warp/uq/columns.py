@@ -1,4 +1,4 @@
-"""Columns that a user gives by name, as those that a model has."""
+"""The columns of a model: their names and order, and those that a user gives by name."""
 
 from __future__ import annotations
 
@@ -7,9 +7,36 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults
 from lgvi_warp.labelled import match
-from lgvi_warp.variations import MATRICES, Target, targets
+from lgvi_warp.variations import MATRICES, Space, Target, Variation, targets
+
+
+def names_of(faults: Faults, vary: Any) -> tuple[str, ...]:
+    """The names alone, as they are spelled everywhere; notes what is no list of names, and what is named twice."""
+    given = [vary] if isinstance(vary, str) else vary
+    if not isinstance(given, Sequence) or not given or not all(isinstance(name, str) for name in given):
+        remedy = 'give {"vehicle.mass": lw.Normal(...)} or a list of names, ["vehicle.mass", "start.position[2]"]'
+        faults.add("vary", vary, "is no list of names, and maps none to distributions", remedy)
+        return ()
+    names = tuple(", ".join(target.label for target in targets(name)) for name in given)
+    for name in sorted({name for name in names if names.count(name) > 1}):
+        faults.add("vary", name, "is named twice", "name each number once")
+    return names
+
+
+def as_given(fleet: Ensemble) -> list[Variation]:
+    """What varies, in the order of `vary`."""
+    by_key = {one.key: one for one in fleet._variations}
+    return [by_key[key] for key in fleet.vary]
+
+
+def columns_of(space: Space, key: str) -> range:
+    """The columns of the cube that a key has."""
+    place = space.keys.index(key)
+    first = sum(space.sizes[:place])
+    return range(first, first + space.sizes[place])
 
 
 def whole_columns(

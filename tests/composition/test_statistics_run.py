@@ -294,8 +294,8 @@ def test_paths_of_members_that_fail_are_left_out(spinning):
     whole, depth = r.status == 0, r.position[..., 2]
     assert 0 < whole.sum() < 600
     truths = [depth.mean(axis=0), depth.mean(axis=0), 0.0 * depth[0], 4.0 * (depth[0] > 0.0)]  # none moves
-    for one, truth in zip(asked, truths, strict=True):
-        found = r.statistics[f"mean {one.key}"]
+    for statistic, truth in zip(asked, truths, strict=True):
+        found = r.statistics[f"mean {statistic.key}"]
         assert found.count.tolist() == [whole.sum()]
         assert found.value[0, 0] == pytest.approx(truth[whole].mean(), rel=1e-12)
 

@@ -16,12 +16,13 @@ from lgvi_warp.compared import QUANTITIES, Compared, compared_in
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.method import Method
+from lgvi_warp.outcomes import stop_time
 from lgvi_warp.plan import Plan
 from lgvi_warp.result import Result
 from lgvi_warp.saveat import FIELDS, TimeGrid
 from lgvi_warp.scene import Scene
 from lgvi_warp.solving import run_plan
-from lgvi_warp.status import Status
+from lgvi_warp.status import failed as failed_members
 
 # An error at which a trajectory says nothing any more [m or rad].
 LOST = 1e-2
@@ -145,8 +146,7 @@ class Sample:
 
 def failed(result: Result) -> bool:
     """Whether some member failed, events not counted."""
-    status = np.asarray(result.status)
-    return bool(np.any((status != Status.OK) & (status < Status.SURFACE)))
+    return bool(failed_members(result.status).any())
 
 
 def distances(result: Result, reference: Result, asked: Compared | None = None) -> dict[str, np.ndarray]:
@@ -163,9 +163,7 @@ def distances(result: Result, reference: Result, asked: Compared | None = None) 
     found = {name: found[name] for name in QUANTITIES}
     if asked is not None and asked.name not in found:
         found[asked.name] = asked.distance(result, reference)
-    stop = np.fmin(result.failure_time, reference.failure_time)
-    with np.errstate(invalid="ignore"):
-        gone = reference.time[:, None] >= stop
+    gone = reference.time[:, None] >= np.minimum(stop_time(result), stop_time(reference))
     return {name: np.where(gone, np.nan, values) for name, values in found.items()}
 
 

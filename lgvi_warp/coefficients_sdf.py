@@ -1,213 +1,429 @@
-"""Vehicles from the `<fluid_added_mass>` block and the hydrodynamics plugin of an SDF file."""
+"""Vehicles from the robot descriptions that Gazebo reads: SDF, and URDF with the plugin of uuv_simulator or Gazebo."""
 
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from itertools import combinations_with_replacement
 from typing import Any
-from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from lgvi_warp.coefficients import (
-    HALF_TURN,
-    HALF_TURN_6,
-    PAIRS,
-    STANDARD_GRAVITY,
-    Coefficients,
-    as_positive,
-    cross,
-    inertia_from_names,
-    read_text,
-    rigid_body,
-    symmetric,
-    turned,
+from lgvi_warp.coefficients import HALF_TURN, HALF_TURN_6, STANDARD_GRAVITY, Coefficients, rigid_body, turned
+from lgvi_warp.coefficients_links import (
+    MOST_LINKS,
+    Joint,
+    Link,
+    Lump,
+    add_volumes,
+    beside,
+    joined,
+    link_named,
+    lumped,
+    main_link,
+    read_inertia,
+    volume_of,
 )
+from lgvi_warp.coefficients_plugins import (
+    Hydrodynamics,
+    add_to,
+    is_hydrodynamics,
+    is_read,
+    is_underwater_object,
+    read_hydrodynamics,
+    read_underwater_object,
+    unread,
+)
+from lgvi_warp.coefficients_poses import Poses, Scope, read_pose
+from lgvi_warp.coefficients_urdf import read_urdf
+from lgvi_warp.coefficients_xml import is_true, number, numbers, parse_xml, plugin_name, plugins_of, text_of
 from lgvi_warp.errors import Faults, SceneError, closest
 
-# SDF ----------------------------------------------------------------------------------------------------------------
+GAZEBO_GRAVITY = 9.8  # m/s2: of a <world> that gives none
+GAZEBO_DENSITY = 1000.0  # kg/m3: of Gazebo's Buoyancy system, if none is given
 
-_PLUGIN = re.compile(r"^([xyzkmn])(Dot)?([UVWPQR])(abs)?([UVWPQR])?$")
+
+@dataclass
+class Water:
+    """What a file's <world> says: gravity [m/s2], density [kg/m3], and which models have buoyancy (none named: all)."""
+
+    gravity: float | None = None
+    density: float | None = None
+    enabled: tuple[str, ...] = ()
+
+
+@dataclass
+class Model:
+    """A model as read: its links by full name, joints, what its plugins say, its water, and what the user should know."""
+
+    name: str
+    links: dict[str, Link]
+    joints: list[Joint]
+    hydrodynamics: list[Hydrodynamics]
+    water: Water
+    warnings: list[str] = field(default_factory=list)
 
 
 def from_sdf(
     source: str | os.PathLike[str],
     *,
+    model: str | None = None,
     link: str | None = None,
+    world: str | os.PathLike[str] | None = None,
     buoyancy: float | None = None,
     volume: float | None = None,
     water_density: float | None = None,
     center_of_buoyancy: Sequence[float] | None = None,
-    gravity: float = STANDARD_GRAVITY,
+    gravity: float | None = None,
 ) -> dict[str, Any]:
-    """A vehicle and its drag from an SDF file (Gazebo), given as a path or as text.
+    """A vehicle, its drag and its water from an SDF file (Gazebo) or a URDF, given as a path or as text.
 
-    Read are <inertial> (mass, pose, inertia, fluid_added_mass about the link's origin) of one link, and the
-    coefficients xDotU ..., xU ..., xUabsU ... (older: xUU ...) of the Hydrodynamics plugin; signs are Fossen's or all
-    positive. SDF's link axes are x ahead, y to port, z up: turned here to x ahead, y to starboard, z down.
-    link: its name; if not given, that of the plugin, or the heaviest. SDF has no displaced volume: give buoyancy [N],
-    or volume [m3] (water_density [kg/m3], or the plugin's); else the vehicle is neutral. center_of_buoyancy: (3,) [m]
-    in SDF's link axes, the link's origin if not given. gravity [m/s2].
+    Read as Gazebo does: mass, pose, inertia and fluid_added_mass of every link; volume and centre of the collision shapes
+    (box, sphere, cylinder, capsule, ellipsoid, cone); the coefficients xDotU ..., xU ..., xUabsU ... (older: xUU ...) of
+    the Hydrodynamics plugin, in Fossen's signs or all positive; the plugin of uuv_simulator; of a <world> gravity and the
+    Buoyancy plugin. Links that joints join are one body about the origin of the main link; those that can move are held
+    where the file has them and named in the warnings. Gazebo's axes x ahead, y to port, z up become x ahead, y to
+    starboard, z down.
 
-    Raises SceneError naming every fault.
+    Args:
+        source: path of the file, or its text.
+        model: its name, where the file holds several.
+        world: another SDF file (path or text), whose <world> the model of this one is put into: gravity, density.
+        link: name of the main link; by default that of the plugin, else the first of the heaviest joined links.
+        buoyancy: [N], in place of that of the shapes.
+        volume: displaced volume [m3], in place of that of the shapes.
+        water_density: [kg/m3]; by default that of the world or of a plugin, else 1000.
+        center_of_buoyancy: (3,) [m] in the main link's axes (z up), in place of that of the shapes.
+        gravity: [m/s2]; by default the world's, else 9.80665.
+
+    Returns:
+        The tables "vehicle", "environment" and "terms" of a scene file. Without a shape the vehicle is neutral.
+
+    Raises:
+        SceneError: naming every fault: a mass that is no number, a mesh without a volume given, a template.
     """
     faults = Faults()
-    root = parse_xml(source)
-    plugin = next((p for p in root.iter("plugin") if is_hydrodynamics(p)), None)
-    found = find_link(root, plugin, link)
-    inertial = found.find("inertial")
-    if inertial is None:
-        raise SceneError([f"SDF link {found.get('name')!r}: has no <inertial>; add mass, pose and inertia"])
-    if buoyancy is None and volume is not None:
-        density = water_density if water_density is not None else plugin_density(plugin)
-        values = [faults.positive(*a) for a in (("volume", volume, "m3"), ("water_density", density, "kg/m3"))]
-        values.append(faults.positive("gravity", gravity, "m/s2"))
-        buoyancy = None if None in values else float(np.prod(np.array(values, dtype=float)))
-    center, turn = read_pose(faults, inertial.find("pose"))
-    inertia = HALF_TURN[:, None] * (turn @ read_inertia(faults, inertial.find("inertia")) @ turn.T) * HALF_TURN
-    at = turned((0.0, 0.0, 0.0) if center_of_buoyancy is None else center_of_buoyancy, HALF_TURN)
-    if not (inertial.findtext("mass") or "").strip():
-        faults.add("<mass>", "", "is missing", "give the mass of the link [kg]")
-    mass = numbers(faults, inertial.find("mass"), 1, "1")[0]
-    body = rigid_body(faults, mass, inertia, HALF_TURN * center, at, None, buoyancy, gravity)
-    body.added_mass = read_fluid_added_mass(faults, inertial.find("fluid_added_mass"))
-    if plugin is not None:
-        add_plugin(faults, body, plugin)
+    root = parse_xml(source, "SDF")
+    read = model_of_urdf(faults, root) if root.tag == "robot" else model_of_sdf(faults, root, model, link)
+    if world is not None:
+        read.water = read_water(faults, read.warnings, world_of(parse_xml(world, "world")))
+    refuse_empty(faults, read)
+    main = read.links[chosen_link(read, link)]
+    parts = [read.links[name] for name in together(read, main)]
+    names = {part.name for part in parts}
+    own = [each for each in read.hydrodynamics if each.link in names]
+    set_water(faults, read, water_density, gravity)
+    if volume is not None:
+        volume = faults.positive("volume", volume, "m3")
+    elif buoyancy is None:
+        refuse_shapeless(faults, parts, own)
+    displaced, center = displaced_by(read, parts, main, own)
+    if buoyancy is None:
+        buoyancy = weight_of(read, displaced if volume is None else volume)
+    at = turned(center if center_of_buoyancy is None else center_of_buoyancy, HALF_TURN)
+    body = body_of(faults, lumped(parts, main), buoyancy, at, read.water.gravity)
+    for each in own:
+        add_to(faults, body, each, main.pose.inverse().then(read.links[each.link].pose))
+    body.water_density, body.warnings = read.water.density, read.warnings
     return body.to_dict(faults)
 
 
-def parse_xml(source: str | os.PathLike[str]) -> ElementTree.Element:
-    """The root of an SDF text or file."""
-    text = read_text(source, isinstance(source, str) and source.lstrip().startswith("<"), "SDF file")
-    try:
-        return ElementTree.fromstring(text.lstrip())
-    except ElementTree.ParseError as error:
-        raise SceneError([f"SDF is not XML: {error}; mend that line"]) from None
+def refuse_crowd(elements: Sequence[Element]) -> None:
+    """Raises SceneError for more links, joints or plugins than any vehicle has: what follows takes them in pairs."""
+    if len(elements) > MOST_LINKS:
+        what = f"the model has {len(elements):,} of <{elements[0].tag}>, more than {MOST_LINKS:,}"
+        raise SceneError([f"SDF model: {what}; give the vehicle alone"])
 
 
-def is_hydrodynamics(plugin: ElementTree.Element) -> bool:
-    """Whether a plugin is Gazebo's Hydrodynamics, or has its coefficients."""
-    named = "hydrodynamics" in (plugin.get("name", "") + plugin.get("filename", "")).lower()
-    return named or any(_PLUGIN.match(child.tag) for child in plugin)
+def refuse_empty(faults: Faults, read: Model) -> None:
+    """Raises SceneError for a model without a link."""
+    if not read.links:
+        faults.raise_if_any()
+        known = "; ".join(["the model has none", *read.warnings])
+        raise SceneError([f"SDF link: {known}; give an SDF model with a <link>"])
 
 
-def plugin_density(plugin: ElementTree.Element | None) -> Any:
-    """The plugin's water density [kg/m3]; its documented default is 998."""
-    texts = [plugin.findtext(tag) for tag in ("water_density", "waterDensity")] if plugin is not None else []
-    return next((as_number(text) for text in texts if text), 998.0)
+def weight_of(read: Model, volume: float | None) -> float | None:
+    """The weight [N] of that volume [m3] of water; None where nothing is displaced though nothing forbids it."""
+    water = read.water
+    if not volume and not water.enabled:
+        read.warnings.append("no collision shape displaces water: buoyancy is taken as the weight")
+        return None
+    return None if water.density is None or water.gravity is None else (volume or 0.0) * water.density * water.gravity
 
 
-def as_number(text: str | None) -> Any:
-    """The number in a text, or the text itself for the check to refuse."""
-    try:
-        return float(text or 0.0)
-    except ValueError:
-        return text
+def body_of(faults: Faults, lump: Lump, buoyancy: float | None, at: Any, gravity: float | None) -> Coefficients:
+    """The rigid body of the lump, with its added mass, in axes x ahead, y to starboard, z down."""
+    inertia = HALF_TURN[:, None] * lump.inertia * HALF_TURN
+    gravity = 0.0 if gravity is None else gravity  # a fault by then
+    body = rigid_body(faults, lump.mass, inertia, HALF_TURN * lump.center, at, None, buoyancy, gravity)
+    body.added_mass = HALF_TURN_6[:, None] * lump.added_mass * HALF_TURN_6
+    return body
 
 
-def find_link(root: ElementTree.Element, plugin: ElementTree.Element | None, name: str | None) -> ElementTree.Element:
-    """The link of that name, the plugin's link, or the heaviest. Raises SceneError if there is none."""
-    links = {str(item.get("name")): item for item in root.iter("link")}
-    if name is None and plugin is not None:
-        name = (plugin.findtext("link_name") or "").strip() or None
-    if name is not None and name not in links:
-        raise SceneError([f"SDF link = {name!r}: is not in the file; {closest(name, links)}"])
-    if not links:
-        raise SceneError(["SDF link: the file has none; give an SDF model with a <link>"])
-    if name is not None:
-        return links[name]
-    masses = {key: as_number(item.findtext("inertial/mass")) for key, item in links.items()}
-    return links[max(masses, key=lambda key: masses[key] if isinstance(masses[key], float) else 0.0)]
+def chosen_link(read: Model, link: str | None) -> str:
+    """The full name of the main link."""
+    if link is not None:
+        return link_named(read.links, link)
+    if read.hydrodynamics:
+        return read.hydrodynamics[0].link
+    return main_link(read.links, read.joints)
 
 
-def numbers(faults: Faults, element: ElementTree.Element | None, count: int, default: str) -> np.ndarray:
-    """The numbers in an element's text; zeros after noting a fault."""
-    text = default if element is None or element.text is None else element.text
-    try:
-        values = np.array([float(word) for word in text.split()])
-    except ValueError:
-        values = np.array([])
-    if values.shape == (count,) and np.all(np.isfinite(values)):
-        return values
-    faults.add(f"<{'' if element is None else element.tag}>", text, f"does not hold {count} finite numbers", "mend it")
-    return np.zeros(count)
+def together(read: Model, main: Link) -> list[str]:
+    """The links of the main one's body. What moves or is left out is noted."""
+    every = [name for name in joined(main.name, beside(read.joints)) if name in read.links]
+    fixed = set(joined(main.name, beside(read.joints, ("fixed",))))
+    moving = [name for name in every if name not in fixed]
+    reached = set(every)
+    apart = [name for name in read.links if name not in reached]
+    if moving:
+        read.warnings.append(f"links that can move are held where the file has them: {listed(moving)}")
+    if apart:
+        read.warnings.append(f"links that no joint joins to {main.name} are left out: {listed(apart)}")
+    return every
 
 
-def read_pose(faults: Faults, pose: ElementTree.Element | None) -> tuple[np.ndarray, np.ndarray]:
-    """Position (3,) [m] and rotation (3, 3) of the frame of the centre of mass in the link."""
-    if pose is None:
-        return np.zeros(3), np.eye(3)
-    if pose.get("relative_to"):
-        faults.add("<pose>", pose.get("relative_to"), "is relative to another frame", "give it relative to the link")
-    if pose.get("rotation_format") == "quat_xyzw":
-        values = numbers(faults, pose, 7, "")
-        x, y, z, w = values[3:] / (np.linalg.norm(values[3:]) or 1.0)
-        S = cross(np.array([x, y, z]))
-        return values[:3], np.eye(3) + 2.0 * w * S + 2.0 * S @ S
-    values = numbers(faults, pose, 6, "")
-    angles = np.radians(values[3:]) if pose.get("degrees") in ("true", "1") else values[3:]
-    return values[:3], rotation_from_rpy(angles)
+def listed(names: Sequence[str], most: int = 20) -> str:
+    """Names, at most so many, and how many more there are."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
 
 
-def rotation_from_rpy(angles: np.ndarray) -> np.ndarray:
-    """Rz(yaw) Ry(pitch) Rx(roll), (3, 3), from (roll, pitch, yaw) [rad]."""
-    (sr, sp, sy), (cr, cp, cy) = np.sin(angles), np.cos(angles)
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
+def set_water(faults: Faults, read: Model, density: float | None, gravity: float | None) -> None:
+    """Settle density [kg/m3] and gravity [m/s2]: given, else the world's, else a plugin's, else the default."""
+    named = [each.density for each in read.hydrodynamics if each.density is not None]
+    density = next(x for x in (density, read.water.density, *named, GAZEBO_DENSITY) if x is not None)
+    gravity = next(x for x in (gravity, read.water.gravity, STANDARD_GRAVITY) if x is not None)
+    read.water.density = faults.positive("water_density", density, "kg/m3")
+    read.water.gravity = faults.number("gravity", gravity, "m/s2", least=0.0)
+
+
+def displaced_by(
+    read: Model, parts: Sequence[Link], main: Link, own: Sequence[Hydrodynamics]
+) -> tuple[float, np.ndarray]:
+    """Volume [m3] and its centre (3,) [m] in the main link's axes: of the shapes, or as uuv_simulator's plugin gives it."""
+    by_plugin = [each for each in own if each.volume is not None]
+    for each in by_plugin:
+        part = read.links[each.link]
+        part.volume = part.mass / (each.density or 1.0) if each.neutral else float(each.volume or 0.0)
+        part.volume_center = each.volume_center
+    floating = [read.links[each.link] for each in by_plugin] or [
+        part for part in parts if has_buoyancy(read, part.name)
+    ]
+    if not by_plugin and len(floating) < len(parts):
+        read.warnings.append(f"the Buoyancy plugin is enabled for {listed(read.water.enabled)} alone")
+    lump = lumped(floating, main)
+    return lump.volume, lump.volume_center
+
+
+def has_buoyancy(read: Model, name: str) -> bool:
+    """Whether Gazebo's Buoyancy system acts on a link: on all, or on those named by <enable>, or on their model."""
+    scoped = f"{read.name}::{name}"
+    return not read.water.enabled or any(
+        scoped == enabled or scoped.startswith(f"{enabled}::") for enabled in read.water.enabled
     )
 
 
-def read_inertia(faults: Faults, element: ElementTree.Element | None) -> np.ndarray:
-    """The inertia (3, 3) [kg m2] of an SDF, URDF or YAML of six names; SDF's defaults where one is missing."""
-    if element is None:
-        faults.add("<inertia>", "", "is missing", "give ixx, iyy, izz [kg m2]")
-        return np.eye(3)
-    children = {f"i{pair}": element.find(f"i{pair}") for pair in PAIRS}
-    default = {f"i{pair}": "1" if pair[0] == pair[1] else "0" for pair in PAIRS}
-    named = {name: float(numbers(faults, child, 1, default[name])[0]) for name, child in children.items()}
-    return inertia_from_names(named)
+def refuse_shapeless(faults: Faults, parts: Sequence[Link], own: Sequence[Hydrodynamics]) -> None:
+    """Shapes whose volume lies in another file cannot be left out: the vehicle would sink."""
+    if any(each.volume is not None for each in own):
+        return
+    for part in parts:
+        if part.shapeless:
+            remedy = "give volume= [m3] or buoyancy= [N], and center_of_buoyancy=, of the whole vehicle"
+            faults.add(f"{part.name} <collision>", listed(part.shapeless), "is no shape whose volume is known", remedy)
 
 
-def read_fluid_added_mass(faults: Faults, element: ElementTree.Element | None) -> np.ndarray:
-    """<fluid_added_mass> xx, xy ... rr as (6, 6) in axes x ahead, y to starboard, z down."""
+# URDF ---------------------------------------------------------------------------------------------------------------
+
+
+def model_of_urdf(faults: Faults, root: Element) -> Model:
+    """The model of a URDF."""
+    for tag in ("link", "joint", "plugin"):
+        refuse_crowd(list(root.iter(tag)))
+    links, joints = read_urdf(faults, root)
+    read = Model(root.get("name", "robot"), links, joints, [], Water())
+    add_plugins(faults, read, list(plugins_of(root)), "")
+    return read
+
+
+# SDF ----------------------------------------------------------------------------------------------------------------
+
+
+def model_of_sdf(faults: Faults, root: Element, name: str | None, link: str | None) -> Model:
+    """The model that is asked for, or the only one, or the only one with hydrodynamics. Raises SceneError otherwise."""
+    element, world = chosen_model(root, name, link)
+    for tag in ("link", "joint", "plugin", "frame", "model"):
+        refuse_crowd(list(element.iter(tag)))
+    scope = Scope(element)
+    read = Model(element.get("name", ""), {}, [], [], Water())
+    if world is not None:
+        read.water = read_water(faults, read.warnings, world)
+    poses = Poses(faults, scope)
+    for inner in scope.each():
+        for key, child in inner.named.items():
+            if child.tag == "link":
+                read.links[inner.prefix + key] = read_link(faults, read.warnings, poses, inner, key)
+        read.joints += joints_of(scope, inner)
+        included = [text_of(child.find("uri")) for child in inner.model.findall("include")]
+        if included:
+            read.warnings.append(f"what the model includes lies in other files and is left out: {listed(included)}")
+    for inner in scope.each():
+        add_plugins(faults, read, inner.model.findall("plugin"), inner.prefix)
+    return read
+
+
+def world_of(root: Element) -> Element:
+    """The first <world> of a file. Raises SceneError if there is none."""
+    world = next(root.iter("world"), None)
+    if world is None:
+        raise SceneError(["world: the file has no <world>; give an SDF file with one"])
+    return world
+
+
+def chosen_model(root: Element, name: str | None, link: str | None) -> tuple[Element, Element | None]:
+    """A top-level <model>, and the <world> that it stands in, if any."""
+    known: list[tuple[Element, Element | None]] = []
+    known += [(child, world) for world in root.iter("world") for child in world.findall("model")]
+    known += [(child, None) for child in ([root] if root.tag == "model" else root.findall("model"))]
+    if not known:
+        included = listed([text_of(child) for child in root.iter("uri")])
+        what = (
+            f"the file has none of its own, it includes {included}; read that one" if included else "the file has none"
+        )
+        raise SceneError([f"SDF model: {what}"])
+    fitting = [pair for pair in known if not is_true(pair[0].findtext("static"))] or known
+    if name is not None:
+        fitting = [pair for pair in known if pair[0].get("name") == name]
+        if not fitting:
+            raise SceneError([f"SDF model = {name!r}: is not in the file; {closest(name, _names(known))}"])
+    for narrowed in (
+        [pair for pair in fitting if link is not None and any(x.get("name") == link for x in pair[0].iter("link"))],
+        [pair for pair in fitting if any(is_read(plugin) for plugin in plugins_of(pair[0]))],
+    ):
+        fitting = narrowed if len(fitting) > 1 and narrowed else fitting
+    if len(fitting) > 1:
+        raise SceneError([f"SDF model: the file holds several: {listed(_names(fitting))}; name one, model=..."])
+    return fitting[0]
+
+
+def _names(pairs: Sequence[tuple[Element, Element | None]]) -> list[str]:
+    return [pair[0].get("name", "") for pair in pairs]
+
+
+def read_water(faults: Faults, warnings: list[str], world: Element) -> Water:
+    """Gravity and density of a world; where the density changes with depth, that below all layers."""
+    vector = numbers(faults, "<world> ", world, "gravity", f"0 0 {-GAZEBO_GRAVITY}")
+    if np.any(vector[:2]) or vector[2] > 0.0:
+        faults.add("<gravity>", vector, "does not point down", "turn the world so that it is along -z")
+    plugin = next((p for p in world.findall("plugin") if is_buoyancy(p)), None)
+    if plugin is None:
+        warnings.append(
+            f"the world has no Buoyancy plugin, without which all sinks in Gazebo: water of {GAZEBO_DENSITY:g} kg/m3"
+        )
+        return Water(abs(vector[2]))
+    graded = plugin.find("graded_buoyancy")
+    if text_of(plugin.find("uniform_fluid_density")) or graded is None:
+        density = number(faults, "", plugin, "uniform_fluid_density", f"{GAZEBO_DENSITY}")
+    else:
+        density = number(faults, "", graded, "default_density", f"{GAZEBO_DENSITY}")
+        for layer in graded.findall("density_change"):
+            above = number(faults, "", layer, "above_depth", "0")
+            if above < 0.0:
+                warnings.append(
+                    f"the water's density changes at {-above:g} m of depth: taken as {density:g} kg/m3 everywhere"
+                )
+    return Water(abs(vector[2]), density, tuple(text_of(child) for child in plugin.findall("enable")))
+
+
+def is_buoyancy(plugin: Element) -> bool:
+    """Whether a plugin is Gazebo's Buoyancy, not its BuoyancyEngine."""
+    return "buoyancy" in plugin_name(plugin) and "engine" not in plugin_name(plugin)
+
+
+def read_link(faults: Faults, warnings: list[str], poses: Poses, scope: Scope, name: str) -> Link:
+    """Mass, inertia, added mass and displaced volume of one link, and where it lies."""
+    element = scope.named[name]
+    link, where = Link(scope.prefix + name, poses.of(scope, name)), f"{scope.prefix}{name} "
+    inertial = element.find("inertial")
+    if inertial is None:
+        warnings.append(f"link {link.name} has no <inertial>: Gazebo gives it 1 kg")
+    elif is_true(inertial.get("auto")):
+        faults.add(f"{where}<inertial auto>", "true", "is left to Gazebo to compute", "write mass and inertia")
+    elif inertial.find("mass") is None or not text_of(inertial.find("mass")):
+        faults.add(f"{where}<mass>", "", "is missing", "give the mass of the link [kg]")
+    link.mass = number(faults, where, inertial, "mass", "1")
+    pose = None if inertial is None else inertial.find("pose")
+    if pose is not None and pose.get("relative_to"):
+        faults.add(f"{where}<pose>", pose.get("relative_to"), "is relative to another frame", "give it in the link's")
+    center = read_pose(faults, where, pose)
+    link.center = center.position
+    inertia = read_inertia(faults, where, None if inertial is None else inertial.find("inertia"))
+    link.inertia = center.rotation @ inertia @ center.rotation.T
+    link.added_mass = read_fluid_added_mass(
+        faults, where, None if inertial is None else inertial.find("fluid_added_mass")
+    )
+    if text_of(element.find("gravity")) and not is_true(element.findtext("gravity")):
+        warnings.append(f"link {link.name}: <gravity> false is not followed; its weight acts")
+    shapes = []
+    for collision in element.findall("collision"):
+        place = poses.placed(scope, collision, name)
+        key = collision.get("name", "")
+        at = poses.of(scope, name).inverse().then(place).position
+        shapes.append((key, volume_of(faults, f"{where}{key} ", collision), at))
+    add_volumes(link, shapes)
+    return link
+
+
+def joints_of(root: Scope, scope: Scope) -> list[Joint]:
+    """The joints of a scope, and what a detachable joint holds together at the start."""
+    joints = []
+    for element in scope.named.values():
+        if element.tag == "joint":
+            ends = [
+                scope.link_of(text_of(element.find(tag))) or text_of(element.find(tag)) for tag in ("parent", "child")
+            ]
+            joints.append(Joint(element.get("type", ""), *ends))
+    for plugin in scope.model.findall("plugin"):
+        if "detachable" in plugin_name(plugin):
+            parent, child = (scope.link_of(text_of(plugin.find(tag))) for tag in ("parent_link", "child_link"))
+            if parent and child and text_of(plugin.find("child_model")) in ("__self__", root.model.get("name")):
+                joints.append(Joint("fixed", parent, child))
+    return joints
+
+
+def read_fluid_added_mass(faults: Faults, where: str, element: Element | None) -> np.ndarray:
+    """<fluid_added_mass> xx, xy ... rr as (6, 6), in the link's axes about its origin."""
     matrix = np.zeros((6, 6))
     for row, column in combinations_with_replacement(range(6), 2):
-        child = None if element is None else element.find("xyzpqr"[row] + "xyzpqr"[column])
-        matrix[row, column] = matrix[column, row] = numbers(faults, child, 1, "0")[0]
+        value = number(faults, f"{where}<fluid_added_mass> ", element, "xyzpqr"[row] + "xyzpqr"[column], "0")
+        matrix[row, column] = matrix[column, row] = value
     if np.any(np.diag(matrix) < 0.0):
-        faults.add("<fluid_added_mass>", np.diag(matrix), "is negative on its diagonal", "SDF's added mass is positive")
-    return HALF_TURN_6[:, None] * matrix * HALF_TURN_6
+        what = "is negative on its diagonal"
+        faults.add(f"{where}<fluid_added_mass>", np.diag(matrix), what, "SDF's added mass is positive")
+    return matrix
 
 
-def add_plugin(faults: Faults, body: Coefficients, plugin: ElementTree.Element) -> None:
-    """The coefficients of the Hydrodynamics plugin, of either sign convention."""
-    matrices = {"added mass": np.zeros((6, 6)), "linear drag": np.zeros((6, 6)), "quadratic drag": np.zeros((6, 6))}
-    for child in plugin:
-        if not (match := _PLUGIN.match(child.tag)):
-            continue
-        force, dot, first, bars, second = match.groups()
-        row, column = "xyzkmn".index(force), "UVWPQR".index(first)
-        value = numbers(faults, child, 1, "0")[0]
-        if dot:
-            matrices["added mass"][row, column] = value
-        elif second is None:
-            matrices["linear drag"][row, column] = value
-        elif first == second and (bars or row == column):
-            matrices["quadratic drag"][row, column] = value
-        elif value != 0.0:
-            remedy = "only |v| v of one velocity is a drag: leave it out, or add a term of your own"
-            faults.add(f"<{child.tag}>", value, "is a product of velocities", remedy)
-    frd = [
-        HALF_TURN_6[:, None] * as_positive(faults, f"plugin's {key}", matrix) * HALF_TURN_6
-        for key, matrix in matrices.items()
-    ]
-    if np.any(frd[0]) and np.any(body.added_mass):
-        faults.add("<fluid_added_mass>", "...", "and the plugin's xDotU ... both give added mass", "keep one of them")
-    body.added_mass = body.added_mass + symmetric(faults, "plugin's added mass", frd[0])
-    body.linear, body.quadratic = frd[1], frd[2]
+def add_plugins(faults: Faults, read: Model, plugins: Sequence[Element], prefix: str) -> None:
+    """What the plugins of a model say of its links."""
+    for plugin in plugins:
+        if is_underwater_object(plugin):
+            read.hydrodynamics += read_underwater_object(faults, read.warnings, plugin)
+        elif is_hydrodynamics(plugin):
+            name = text_of(plugin.find("link_name"))
+            if not name and len(read.links) == 1:
+                name = next(iter(read.links))
+            if not name:
+                faults.add("<link_name>", "", "is missing in the Hydrodynamics plugin", "name the link it acts on")
+                continue
+            read.hydrodynamics.append(read_hydrodynamics(faults, read.warnings, plugin, prefix + name))
+    known = []
+    for each in read.hydrodynamics:
+        with faults.including():
+            each.link = link_named(read.links, each.link)
+            known.append(each)
+    read.hydrodynamics = known
+    read.warnings += unread(plugins)

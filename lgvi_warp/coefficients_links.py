@@ -23,7 +23,7 @@ class Link:
     """One link: mass [kg], inertia (3, 3) [kg m2] about the centre of mass (3,) [m], volume [m3] and its centre (3,) [m],
     in the link's axes (x ahead, y to port, z up) from its origin; added_mass (6, 6) about that; pose in the model.
 
-    shapeless: names of collision shapes whose volume the file does not hold.
+    weighed: whether the file gives its mass; shapeless: names of collision shapes whose volume the file does not hold.
     """
 
     name: str
@@ -34,6 +34,7 @@ class Link:
     volume: float = 0.0
     volume_center: np.ndarray = field(default_factory=lambda: np.zeros(3))
     added_mass: np.ndarray = field(default_factory=_zeros)
+    weighed: bool = True
     shapeless: tuple[str, ...] = ()
 
 

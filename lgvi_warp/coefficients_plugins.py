@@ -193,6 +193,7 @@ def add_to(faults: Faults, body: Coefficients, found: Hydrodynamics, pose: Pose)
     X = HALF_TURN_6[:, None] * carried(pose) * HALF_TURN_6
     for name in ("added_mass", "linear"):
         setattr(body, name, getattr(body, name) + X.T @ getattr(found, name) @ X)
+    body.current = body.current + found.current
     for name in ("quadratic", "forward"):
         matrix = getattr(found, name)
         if np.any(matrix) and not np.allclose(X, np.eye(6), atol=1e-12):

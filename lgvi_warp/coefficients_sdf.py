@@ -112,6 +112,7 @@ def from_sdf(
     refuse_empty(faults, read)
     main = read.links[chosen_link(read, link)]
     parts = [read.links[name] for name in together(read, main)]
+    refuse_unweighed(read, main, parts)
     names = {part.name for part in parts}
     own = [each for each in read.hydrodynamics if each.link in names]
     set_water(faults, read, water_density, gravity)
@@ -125,7 +126,13 @@ def from_sdf(
     at = turned(center if center_of_buoyancy is None else center_of_buoyancy, HALF_TURN)
     body = body_of(faults, lumped(parts, main), buoyancy, at, read.water.gravity)
     for each in own:
-        add_to(faults, body, each, main.pose.inverse().then(read.links[each.link].pose))
+        part = read.links[each.link]
+        if np.any(each.added_mass) and np.any(part.added_mass):
+            remedy = "keep one of them, or set disable_added_mass in the plugin"
+            faults.add(
+                f"{part.name} <fluid_added_mass>", "...", "and the plugin's xDotU ... both give added mass", remedy
+            )
+        add_to(faults, body, each, main.pose.inverse().then(part.pose))
     body.water_density, body.warnings = read.water.density, read.warnings
     return body.to_dict(faults)
 
@@ -143,6 +150,15 @@ def refuse_empty(faults: Faults, read: Model) -> None:
         faults.raise_if_any()
         known = "; ".join(["the model has none", *read.warnings])
         raise SceneError([f"SDF link: {known}; give an SDF model with a <link>"])
+
+
+def refuse_unweighed(read: Model, main: Link, parts: Sequence[Link]) -> None:
+    """Raises SceneError for a main link without inertia. Others that have none weigh 1 kg in Gazebo, which is noted."""
+    if not main.weighed:
+        raise SceneError([f"SDF link {main.name!r}: has no <inertial>; add mass, pose and inertia"])
+    unweighed = [part.name for part in parts if not part.weighed]
+    if unweighed:
+        read.warnings.append(f"links without <inertial>, to which Gazebo gives 1 kg and 1 kg m2: {listed(unweighed)}")
 
 
 def weight_of(read: Model, volume: float | None) -> float | None:
@@ -289,12 +305,12 @@ def chosen_model(root: Element, name: str | None, link: str | None) -> tuple[Ele
     known: list[tuple[Element, Element | None]] = []
     known += [(child, world) for world in root.iter("world") for child in world.findall("model")]
     known += [(child, None) for child in ([root] if root.tag == "model" else root.findall("model"))]
+    if not known and root.find("link") is not None:
+        return root, None
     if not known:
         included = listed([text_of(child) for child in root.iter("uri")])
-        what = (
-            f"the file has none of its own, it includes {included}; read that one" if included else "the file has none"
-        )
-        raise SceneError([f"SDF model: {what}"])
+        what = f"the file has none of its own, it includes {included}" if included else "the file has none"
+        raise SceneError([f"SDF link: {what}; give an SDF model with a <link>"])
     fitting = [pair for pair in known if not is_true(pair[0].findtext("static"))] or known
     if name is not None:
         fitting = [pair for pair in known if pair[0].get("name") == name]
@@ -350,7 +366,7 @@ def read_link(faults: Faults, warnings: list[str], poses: Poses, scope: Scope, n
     link, where = Link(scope.prefix + name, poses.of(scope, name)), f"{scope.prefix}{name} "
     inertial = element.find("inertial")
     if inertial is None:
-        warnings.append(f"link {link.name} has no <inertial>: Gazebo gives it 1 kg")
+        link.weighed = False
     elif is_true(inertial.get("auto")):
         faults.add(f"{where}<inertial auto>", "true", "is left to Gazebo to compute", "write mass and inertia")
     elif inertial.find("mass") is None or not text_of(inertial.find("mass")):

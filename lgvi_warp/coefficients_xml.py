@@ -125,13 +125,13 @@ def numbers_in(faults: Faults, key: str, text: str, count: int) -> np.ndarray:
     if values is not None and values.shape == (count,) and np.all(np.isfinite(values)):
         return values
     mark = next((mark for mark in TEMPLATES if mark in text), None)
-    wanted = "a finite number" if count == 1 else f"{count} finite numbers"
+    wanted = f"{count} finite numbers" if count > 1 else "a finite number"
     if values is None and mark is not None:
         faults.add(
             key, text, f"is not {wanted} but a placeholder of a template, which is not executed", TEMPLATES[mark]
         )
     else:
-        faults.add(key, text, f"does not hold {wanted}", f"write {wanted}")
+        faults.add(key, text, f"does not hold {count} finite numbers", f"write {wanted}")
     return np.zeros(count)
 
 

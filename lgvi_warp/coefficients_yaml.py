@@ -183,7 +183,7 @@ def is_neutral(faults: Faults, read: Mapping[str, Any]) -> bool:
 def displaced_weight(faults: Faults, volume: Any, density: Any, gravity: Any, is_given: bool) -> float | None:
     """The weight [N] of the displaced water; None after noting a fault."""
     if not is_given:
-        faults.add("density", "not given", "is needed with volume", "add density to the file, or pass density= [kg/m3]")
+        faults.positive("density", "not given", "kg/m3 (with volume)")
     values = [faults.positive("volume", volume, "m3"), density, Faults().number("gravity", gravity, least=0.0)]
     return None if None in values else float(np.prod(np.array(values, dtype=float)))
 

@@ -19,7 +19,9 @@ SHAPES = {
     "sphere": lambda g: 4.0 / 3.0 * np.pi * float(g.findtext("radius")) ** 3,
     "cylinder": lambda g: np.pi * float(g.findtext("radius")) ** 2 * float(g.findtext("length")),
     "capsule": lambda g: (
-        np.pi * float(g.findtext("radius")) ** 2 * (float(g.findtext("length")) + 4.0 / 3.0 * float(g.findtext("radius")))
+        np.pi
+        * float(g.findtext("radius")) ** 2
+        * (float(g.findtext("length")) + 4.0 / 3.0 * float(g.findtext("radius")))
     ),
     "ellipsoid": lambda g: 4.0 / 3.0 * np.pi * np.prod([float(x) for x in g.findtext("radii").split()]),
     "cone": lambda g: np.pi / 3.0 * float(g.findtext("radius")) ** 2 * float(g.findtext("length")),
@@ -155,6 +157,8 @@ def tilts():
 def about_gravity(forces, attitudes):
     """Torque about the centre of the weights (n, 3): what turns the vehicle."""
     weights = [(p, up) for p, up in forces if up < 0.0]
+    if not weights:  # no gravity
+        return np.zeros((len(attitudes), 3))
     center = sum(up * p for p, up in weights) / sum(up for _, up in weights)
     return moments([(p - center, up) for p, up in forces], attitudes)
 
@@ -185,7 +189,10 @@ def rows(folder):
 
 def table(folder):
     """The table of a folder, as text."""
-    lines = [f"| file | ours, rolled by {TILT} rad [N m] | Gazebo's | ours, pitched | Gazebo's |", "|---|---|---|---|---|"]
+    lines = [
+        f"| file | ours, rolled by {TILT} rad [N m] | Gazebo's | ours, pitched | Gazebo's |",
+        "|---|---|---|---|---|",
+    ]
     for name, ours, theirs in rows(folder):
         lines.append(f"| {name} | {ours[0]:.6g} | {theirs[0]:.6g} | {ours[1]:.6g} | {theirs[1]:.6g} |")
     return "\n".join(lines)

@@ -116,7 +116,7 @@ def test_a_polynomial_is_there_only_if_asked_for(tmp_path):
     assert plans["none"].advance is plans["square"].advance
     for name in ("none", "cubic"):
         (tmp_path / name).mkdir()
-        assert ("polynomial_at" in source(scenes[name], tmp_path / name)) == (name == "cubic")
+        assert ("polynomial_law" in source(scenes[name], tmp_path / name)) == (name == "cubic")
     assert "polynomial" not in plain.to_dict()
 
 

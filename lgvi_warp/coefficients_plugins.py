@@ -46,9 +46,10 @@ class Hydrodynamics:
 
 
 def is_hydrodynamics(plugin: Element) -> bool:
-    """Whether a plugin has the coefficients of Gazebo's Hydrodynamics, or its name and a link. Others have that name too."""
+    """Whether a plugin has the coefficients of Gazebo's Hydrodynamics, or its name and a link. Others have that name too,
+    and a controller's gain may be called kP as a drag is."""
     named = "hydrodynamics" in plugin_name(plugin) and plugin.find("link_name") is not None
-    return named or any(_TERM.match(child.tag) for child in plugin)
+    return named or any(_TERM.match(child.tag) and child.tag[0] in "xyz" for child in plugin)
 
 
 def is_underwater_object(plugin: Element) -> bool:

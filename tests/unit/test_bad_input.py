@@ -67,7 +67,7 @@ TERMS = [
         "is missing",
         "or a polynomial [N]",
     ),
-    (THRUSTER | {"polynomial": [[1.0]]}, "thrusters.polynomial", "has shape (1, 1)", "give p numbers"),
+    (THRUSTER | {"polynomial": [[1.0]]}, "thrusters.polynomial = [[1.0]]", "has shape (1, 1)", "give p numbers"),
     (THRUSTER | {"coefficient": [-1.0]}, "thrusters.coefficient = [-1.0]", "out of bounds", "from 0"),
     (THRUSTER | {"time_constant": -0.1}, "thrusters.time_constant", "out of bounds", "from 0 [s]"),
     (HULL | {"diameters": [0.1, -0.1]}, "cross_flow.diameters = [0.1, -0.1]", "out of bounds", "from 0 [m]"),

@@ -229,6 +229,11 @@ def test_a_current_is_turned_from_east_north_up():
     assert {"type": "current", "velocity": [0.1, 0.2, 0.0]} in terms
 
 
+def test_a_controllers_gain_is_no_drag():
+    controller = "<plugin name='controller'><kP>12</kP><kI>1</kI></plugin>"
+    assert lw.from_sdf(link(outside=controller))["terms"] == []
+
+
 # Shapes
 
 VOLUMES = {
@@ -282,6 +287,10 @@ def test_a_mass_that_is_no_number_is_refused(mass, remedy):
     battery = '<link name="battery"><inertial><mass>5</mass></inertial></link>'
     message = refused(lw.from_sdf, link(mass=mass, outside=battery))
     assert "hull <mass>" in message and remedy in message and "\n" not in message
+
+
+def test_a_negative_mass_is_refused():
+    assert "is negative" in refused(lw.from_sdf, link(outside='<link name="b"><inertial><mass>-1</mass></inertial></link>'))
 
 
 def test_templates_and_xacro_are_named():

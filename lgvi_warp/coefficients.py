@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.errors import Faults, SceneError, closest
+from lgvi_warp.vehicle import LITTLE, ROUND_OFF, shortage
 
 FORCES, VELOCITIES = "XYZKMN", "uvwpqr"
 STANDARD_GRAVITY = 9.80665  # m/s2, ISO 80000-3
@@ -100,6 +101,8 @@ class Coefficients:
         water = {"gravity": self.gravity, "water_density": self.water_density}
         tables["environment"] = {key: float(value) for key, value in water.items() if value is not None}
         tables["terms"] = self.terms()
+        if ROUND_OFF < float(shortage(rigid[None])[0]) <= LITTLE:
+            tables["vehicle"]["inertia_tolerance"] = LITTLE
         warnings = [*self.warnings, *self.unstable()]
         if warnings:
             tables["vehicle"]["warnings"] = warnings

@@ -36,8 +36,8 @@ UNITS = {
 }
 # The least mass or inertia: what is smaller has no inverse in float64.
 LEAST = float(np.finfo(np.float64).tiny)
-# Two principal inertias of a rigid body do not sum to less than the third. Round-off; and by how much of the third
-# published inertias miss it (those of the ECA A9 by 0.126): these are taken with a warning.
+# By what part of the third two principal inertias of a rigid body may sum to less than it: round-off; and as far as
+# published ones miss it (those of the ECA A9 by 0.126).
 ROUND_OFF, LITTLE = 1e-6, 0.15
 SYMMETRIC = ("added_mass", "inertia", "rigid_body_mass_matrix", "added_mass_matrix")
 
@@ -55,6 +55,9 @@ class Vehicle:
     linear first [kg, kg m, kg m2], added mass positive (minus Fossen's X_udot ...); weight [N], which acts at
     center_of_gravity (3,) [m] from the origin (by default where the rigid body's matrix has it).
 
+    inertia_tolerance: by what part of the largest the other two principal inertias may sum to less than it, in the 6x6
+    form; 0 by default, where a matrix that no rigid body has is refused. Importers set it for published numbers.
+
     buoyancy: weight of the displaced water [N], at center_of_buoyancy (3,) [m] from the origin. Matrices are kept in
     full. `warnings` holds what is unusual but allowed: texts given here, as an importer does, and what is found. They are
     among the messages of a run.
@@ -71,6 +74,7 @@ class Vehicle:
     added_mass_matrix: Any = None
     weight: float | None = None
     center_of_gravity: Any = None
+    inertia_tolerance: float = 0.0
     warnings: Sequence[str] = ()
 
     def __post_init__(self) -> None:
@@ -80,6 +84,8 @@ class Vehicle:
             "center_of_buoyancy": faults.finite("center_of_buoyancy", self.center_of_buoyancy, (3,), "m"),
         }
         given = _texts(faults, self.warnings)
+        tolerance = faults.number("inertia_tolerance", self.inertia_tolerance, "1", least=0.0)
+        object.__setattr__(self, "inertia_tolerance", tolerance or 0.0)
         values |= self._full(faults) if self.full else self._simple(faults)
         values["warnings"] = (*given, *map(Seen, values["warnings"]))
         faults.raise_if_any()
@@ -143,18 +149,18 @@ class Vehicle:
         return values | {"center_of_gravity": center, "warnings": warnings}
 
     def _triangle(self, faults: Faults, rigid: np.ndarray) -> tuple[str, ...]:
-        """Refuse principal inertias that no rigid body has by far; warn of those that miss by a little."""
+        """Refuse principal inertias that no rigid body has; warn of those that the tolerance allows."""
         short = float(shortage(rigid[None])[0])
         if short <= ROUND_OFF:
             return ()
-        small, middle, large = np.linalg.eigvalsh(about_center(rigid[None])[0])
-        sums = (
-            f"principal inertias {small:.6g} + {middle:.6g} < {large:.6g} kg m2, by {100.0 * short:.2g} % of the last"
-        )
-        if short <= LITTLE:
-            return (f"vehicle.rigid_body_mass_matrix: {sums}: no rigid body has these; taken as they are",)
+        moments = ", ".join(f"{one:.6g}" for one in np.linalg.eigvalsh(about_center(rigid[None])[0]))
+        what = f"has principal inertias {moments} kg m2, two of which sum to less than the third"
+        by = f"by {100.0 * short:.2g} % of it"
+        if short <= self.inertia_tolerance:
+            return (f"vehicle.rigid_body_mass_matrix: {what}, {by}: no rigid body has; taken as it is",)
         remedy = "give the rigid body's own inertia here, and added inertia in added_mass_matrix"
-        faults.add("rigid_body_mass_matrix", rigid[3:, 3:], f"has {sums}: no rigid body has", remedy)
+        remedy += f"; or allow it: inertia_tolerance = {short * 1.01:.2g}" if short <= LITTLE else ""
+        faults.add("rigid_body_mass_matrix", rigid[3:, 3:], f"{what}: no rigid body has", f"it misses {by}; {remedy}")
         return ()
 
     def _rigid(self, faults: Faults, rigid: np.ndarray, center: Any) -> tuple[np.ndarray | None, tuple[str, ...]]:
@@ -198,6 +204,7 @@ class Vehicle:
             full = name in ("rigid_body_mass_matrix", "added_mass_matrix")
             content[name] = compact(value) if value.shape == (3, 3) and not full else value.tolist()
         given = [text for text in self.warnings if not isinstance(text, Seen)]
+        content |= {"inertia_tolerance": self.inertia_tolerance} if self.inertia_tolerance else {}
         return content | ({"warnings": given} if given else {})
 
 
@@ -247,9 +254,9 @@ def shortage(rigid: np.ndarray) -> np.ndarray:
     return np.asarray(1.0 - (small + middle) / large)
 
 
-def impossible(rigid: np.ndarray) -> np.ndarray:
-    """Which matrices (n, 6, 6) no rigid body has, by more than published ones miss it."""
-    return shortage(rigid) > LITTLE
+def impossible(rigid: np.ndarray, tolerance: float = 0.0) -> np.ndarray:
+    """Which matrices (n, 6, 6) no rigid body has: two principal inertias sum to less than the third by more."""
+    return shortage(rigid) > max(tolerance, ROUND_OFF)
 
 
 def inertia6(p: Numbers) -> np.ndarray:

@@ -290,7 +290,9 @@ def test_a_mass_that_is_no_number_is_refused(mass, remedy):
 
 
 def test_a_negative_mass_is_refused():
-    assert "is negative" in refused(lw.from_sdf, link(outside='<link name="b"><inertial><mass>-1</mass></inertial></link>'))
+    assert "is negative" in refused(
+        lw.from_sdf, link(outside='<link name="b"><inertial><mass>-1</mass></inertial></link>')
+    )
 
 
 def test_templates_and_xacro_are_named():
@@ -408,7 +410,7 @@ def test_warnings_are_messages_of_the_run():
 
 def test_a_vehicles_warnings():
     rigid = np.diag([2.0, 2.0, 2.0, 0.1, 1.0, 1.2])
-    vehicle = lw.Vehicle(rigid_body_mass_matrix=rigid, warnings=["from the file"])
+    vehicle = lw.Vehicle(rigid_body_mass_matrix=rigid, inertia_tolerance=0.1, warnings=["from the file"])
     assert vehicle.warnings[0] == "from the file" and "by 8.3 %" in vehicle.warnings[1]
     assert vehicle.to_dict()["warnings"] == ["from the file"]
     assert lw.Vehicle(**vehicle.to_dict()).warnings == vehicle.warnings
@@ -418,12 +420,20 @@ def test_a_vehicles_warnings():
     assert "is not a list of texts" in refused(lw.Vehicle, mass=1.0, inertia=(1.0, 1.0, 1.0), warnings="one")
 
 
-def test_inertia_that_misses_the_triangle_by_far_is_refused():
-    assert "no rigid body has" in refused(lw.Vehicle, rigid_body_mass_matrix=np.diag([2.0, 2.0, 2.0, 0.1, 1.0, 1.4]))
-    published = lw.Vehicle(rigid_body_mass_matrix=np.diag([69.7, 69.7, 69.7, 0.6, 30.0, 35.0]))  # ECA A9, uuv_simulator
-    assert "by 13 %" in published.warnings[0]
-    members = lw.Ensemble(lw.Scene(published), 20, 1, {"vehicle.added_mass_matrix": lw.Normal(std=0.0)})
-    assert members.members == 20
+def test_inertia_that_misses_the_triangle_is_taken_from_a_file():
+    """Those of the ECA A9 in uuv_simulator miss it by (35 - 30.6)/35; by hand they are refused, with the tolerance named."""
+    inertia = np.array([0.6, 30.0, 35.0])
+    rigid = np.diag([*[69.7] * 3, *inertia])
+    message = refused(lw.Vehicle, rigid_body_mass_matrix=rigid)
+    assert "two of which sum to less than the third" in message and "inertia_tolerance = 0.13" in message
+    scene = lw.Scene.from_dict(lw.from_fossen({}, mass=69.7, inertia=inertia))
+    assert "by 13 % of it" in scene.vehicle.warnings[0]
+    assert lw.Scene.from_dict(scene.to_dict()).vehicle.warnings == scene.vehicle.warnings
+    varied = {"vehicle.rigid_body_mass_matrix": lw.Normal(relative=1e-3)}
+    assert lw.Ensemble(scene, 20, 1, varied).members == 20
+    far = lw.from_fossen({}, mass=69.7, inertia=(0.6, 20.0, 35.0))
+    assert "no rigid body has" in refused(lw.Scene.from_dict, far)
+    assert "inertia_tolerance" in refused(lw.Vehicle, rigid_body_mass_matrix=rigid, inertia_tolerance=-1.0)
 
 
 @pytest.mark.skipif("VEHICLE_FILES" not in os.environ, reason="VEHICLE_FILES names no folder of real files")

@@ -56,7 +56,7 @@ def listed(names: Sequence[str], most: int = 20) -> str:
 
 
 def refuse_crowd(elements: Sequence[Element]) -> None:
-    """Raises SceneError for more links, joints or plugins than any vehicle has: what follows takes them in pairs."""
+    """Raises SceneError for more links, joints, shapes or plugins than any vehicle has, for which time is not bounded."""
     if len(elements) > MOST_LINKS:
         what = f"the model has {len(elements):,} of <{elements[0].tag}>, more than {MOST_LINKS:,}"
         raise SceneError([f"SDF model: {what}; give the vehicle alone"])
@@ -72,7 +72,7 @@ def read_model(faults: Faults, root: Element, name: str | None, link: str | None
 
 def model_of_urdf(faults: Faults, root: Element) -> Model:
     """The model of a URDF."""
-    for tag in ("link", "joint", "plugin"):
+    for tag in ("link", "joint", "plugin", "collision"):
         refuse_crowd(list(root.iter(tag)))
     links, joints = read_urdf(faults, root)
     read = Model(root.get("name", "robot"), links, joints, [], Water())
@@ -86,7 +86,7 @@ def model_of_urdf(faults: Faults, root: Element) -> Model:
 def model_of_sdf(faults: Faults, root: Element, name: str | None, link: str | None) -> Model:
     """The model that is asked for, or the only one, or the only one with hydrodynamics. Raises SceneError otherwise."""
     element, world = chosen_model(root, name, link)
-    for tag in ("link", "joint", "plugin", "frame", "model"):
+    for tag in ("link", "joint", "plugin", "collision", "frame", "model"):
         refuse_crowd(list(element.iter(tag)))
     scope = Scope(element)
     read = Model(element.get("name", ""), {}, [], [], Water())

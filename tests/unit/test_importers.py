@@ -346,6 +346,9 @@ HOSTILE = {
     "20 MiB of text": "<sdf>" + " " * (20 * 2**20) + "</sdf>",
     "100,000 attributes": "<sdf " + " ".join(f'a{i}="1"' for i in range(100_000)) + "/>",
     "links in crowds": "<sdf><model>" + "".join(f"<link name='l{i}'/>" for i in range(50_000)) + "</model></sdf>",
+    "shapes in crowds": link(
+        outside="<link name='b'>" + "<collision name='c'><geometry/></collision>" * 40_000 + "</link>"
+    ),
     "joints in crowds": link(outside="<joint name='j'/>" * 50_000),
     "a NUL": "<sdf>\0</sdf>",
     "an end that is missing": "<sdf><model>",

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.real_numbers import NotReal, real_numbers
+
 
 class SceneError(ValueError):
     """A scene, an ensemble or a setting that is refused. `faults` holds one text per fault."""
@@ -63,11 +65,6 @@ def shown(value: Any) -> str:
     return text if len(text) <= 80 else text[:77] + "..."
 
 
-def holds_bool(value: Any) -> bool:
-    """Whether a truth value hides among numbers: [true, 1.0] would pass for [1.0, 1.0]."""
-    return isinstance(value, bool) or (isinstance(value, list | tuple) and any(holds_bool(item) for item in value))
-
-
 def ragged(value: Any) -> bool:
     """Whether lists within lists differ in length, so that NumPy makes no array of them."""
     try:
@@ -116,17 +113,20 @@ class Faults:
                 value = given[name] if isinstance(given, Mapping) else "..."
                 self.add(f"{key}.{name}" if key else name, value, "is an unknown key", closest(name, known))
 
+    def real(self, key: str, value: Any, remedy: str = "give numbers") -> np.ndarray | None:
+        """A new float64 array of the same numbers, which may be NaN; None after noting a fault."""
+        try:
+            return real_numbers(value)
+        except NotReal as error:
+            self.add(key, value, error.what, error.remedy or remedy)
+            return None
+
     def finite(self, key: str, value: Any, shape: tuple[int, ...] | None = None, unit: str = "") -> np.ndarray | None:
         """A finite float64 array, of this shape if one is given; None after noting a fault."""
         wanted = "a number" if shape == () else f"numbers of shape {shape}" if shape else "numbers"
         remedy = f"give {wanted}" + (f" [{unit}]" if unit else "")
-        try:
-            array = np.array(value)
-            if array.dtype.kind not in "iuf" or holds_bool(value):
-                raise ValueError
-            array = array.astype(np.float64)
-        except (ValueError, TypeError):
-            self.add(key, value, "is not numeric", remedy)
+        array = self.real(key, value, remedy)
+        if array is None:
             return None
         if shape is not None and array.shape != shape:
             self.add(key, value, f"has shape {array.shape}", remedy)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp import durable
+from lgvi_warp import durable, member_fields
 from lgvi_warp.blocks import Block
 from lgvi_warp.errors import SceneError
 from lgvi_warp.kept import keep_of, members_kept
@@ -164,6 +164,9 @@ def result_of(
     small = Arrays(group, tuple(name for name in arrays if name not in (*fields, *varied, "time", "step")), 0, at)
     with understood(folder.path / ROOT):
         shared = {name: np.asarray(value, dtype=np.float64) for name, value in folder.shared.items()}
+    strange = np.setdiff1d(small["status"], member_fields.STATUS["flag_values"])
+    if len(strange):
+        raise SceneError([f"{folder.path}: has the status {strange[0]}, which no member ends with; run it again"])
     provenance = dict(folder.provenance)
     for name in ("steps_made", "steps_tried"):
         if name in arrays:

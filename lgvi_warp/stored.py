@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp import durable, member_fields
+from lgvi_warp import durable
 from lgvi_warp.blocks import Block
 from lgvi_warp.errors import SceneError
 from lgvi_warp.kept import keep_of, members_kept
 from lgvi_warp.observation import Observation, Observing, observation_of, replicates_of
 from lgvi_warp.result import END_TIME, UNITS, Result
 from lgvi_warp.statistics.estimate import Estimates
+from lgvi_warp.status import Status
 from lgvi_warp.store import KEPT, ROOT, Folder, name_of, understood
 from lgvi_warp.store_layout import KEPT_MEMBER, MEMBER
 from lgvi_warp.terms import Term, from_list
@@ -164,7 +165,7 @@ def result_of(
     small = Arrays(group, tuple(name for name in arrays if name not in (*fields, *varied, "time", "step")), 0, at)
     with understood(folder.path / ROOT):
         shared = {name: np.asarray(value, dtype=np.float64) for name, value in folder.shared.items()}
-    strange = np.setdiff1d(small["status"], member_fields.STATUS["flag_values"])
+    strange = np.setdiff1d(small["status"], np.array([int(one) for one in Status]))
     if len(strange):
         raise SceneError([f"{folder.path}: has the status {strange[0]}, which no member ends with; run it again"])
     provenance = dict(folder.provenance)

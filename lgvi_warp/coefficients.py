@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.errors import Faults, SceneError, closest
+from lgvi_warp.reading import file_text
 
 FORCES, VELOCITIES = "XYZKMN", "uvwpqr"
 STANDARD_GRAVITY = 9.80665  # m/s2, ISO 80000-3
@@ -329,7 +330,4 @@ def read_text(source: str | os.PathLike[str], is_text: bool, what: str) -> str:
     """The text itself, or that of the file it names."""
     if is_text:
         return str(source)
-    try:
-        return Path(source).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError, TypeError) as error:
-        raise SceneError([f"{what} {source}: {error}; give the path of a file, or its text"]) from None
+    return file_text(source, what)

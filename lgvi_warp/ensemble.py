@@ -445,7 +445,8 @@ def check_names(vary: Mapping[str, Any], parameters: Sequence[str]) -> None:
     for key, law in vary.items():
         for target in variations.targets(key):
             if target.name not in known:
-                faults.add(f'"{key}"', law, "does not name what a scene has", closest(target.name, known))
+                remedy = functools.partial(closest, target.name, known)
+                faults.add(f'"{key}"', law, "does not name what a scene has", remedy)
     faults.raise_if_any()
 
 

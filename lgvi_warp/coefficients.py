@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.errors import Faults, SceneError, closest
-from lgvi_warp.reading import file_text
+from lgvi_warp.reading import MOST_BYTES, MOST_OTHERS, file_text
 
 FORCES, VELOCITIES = "XYZKMN", "uvwpqr"
 STANDARD_GRAVITY = 9.80665  # m/s2, ISO 80000-3
@@ -329,5 +329,8 @@ def turned(value: Any, axes: np.ndarray) -> Any:
 def read_text(source: str | os.PathLike[str], is_text: bool, what: str) -> str:
     """The text itself, or that of the file it names."""
     if is_text:
-        return str(source)
+        text = str(source)
+        if len(text) > (most := MOST_BYTES.get(what, MOST_OTHERS)):
+            raise SceneError([f"{what}: a text of {len(text):,} characters; give at most {most:,}"])
+        return text
     return file_text(source, what)

@@ -45,8 +45,8 @@ def parsed(text: str, name: str) -> dict[str, Any]:
         raise SceneError([f"{name} is not TOML: {error}; mend that line"]) from error
     except RecursionError:
         raise SceneError([_deep(name)]) from None
-    except ValueError as error:  # a date that there is not, a whole number of thousands of digits
-        raise SceneError([f"{name} is not TOML: {error}; mend that value"]) from None
+    except ValueError:  # Python reads no whole number of some thousand digits
+        raise SceneError([f"{name}: has a whole number of thousands of digits; write it with a point: 1.0e20"]) from None
     _check(content, name)
     return content
 

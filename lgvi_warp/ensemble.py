@@ -333,6 +333,12 @@ class Ensemble:
         own = drawn | {target.name for target, _ in self._columns} | self._explicit.keys()
         return [name for name in self._base if name in own]
 
+    @property
+    def starts_vary(self) -> bool:
+        """Whether members start differently."""
+        names = {target.name for one in self._variations for target in one.targets}
+        return not {*names, *(target.name for target, _ in self._columns), *self._explicit} <= self._base.keys()
+
     def subset(self, indices: Sequence[int] | np.ndarray) -> Ensemble:
         """These members, in this order, as an ensemble of its own with the same numbers. Raises IndexError."""
         chosen = np.asarray(indices)

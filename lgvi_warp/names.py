@@ -22,6 +22,8 @@ def wrong_with(name: str) -> tuple[str, str] | None:
     Returns:
         (what is wrong, the remedy), None for a good name.
     """
+    if not name:
+        return "is empty", RULE
     bad = next((one for one in name if not (one.isalnum() or one in BESIDE)), None)
     if bad is not None:
         return f"has {shown_character(bad)}, which no folder's name may have everywhere", RULE

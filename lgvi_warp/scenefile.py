@@ -70,7 +70,9 @@ def _value_of(key: str, text: str) -> Any:
     try:
         content = parsed(f"value = {text}", key)
     except SceneError as error:
-        if "\n" not in text.strip() and isinstance(error.__cause__, tomllib.TOMLDecodeError):
+        if not isinstance(error.__cause__, tomllib.TOMLDecodeError):
+            raise SceneError((key + one.removeprefix("value") for one in error.faults), error.more) from None
+        if "\n" not in text.strip():
             return text
         content = {}
     if len(content) != 1:

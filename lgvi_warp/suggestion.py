@@ -15,6 +15,7 @@ from lgvi_warp.blocks import blocks
 from lgvi_warp.comparison import QUANTITIES, Reference, Sample, Setting
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
+from lgvi_warp.executors import check_threads
 from lgvi_warp.method import Method
 from lgvi_warp.plan import Plan
 from lgvi_warp.result import Result
@@ -113,6 +114,8 @@ def suggest(
     check_of(of)
     faults = Faults()
     faults.positive("error", error, QUANTITIES[of])
+    faults.positive("seconds", seconds)
+    check_threads(faults, threads)
     faults.raise_if_any()
     names = chosen_methods(methods, CANDIDATES)
     report = progress or void

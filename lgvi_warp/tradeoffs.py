@@ -253,6 +253,9 @@ def tradeoff(
     Raises SceneError naming every fault, and where no reference can be found.
     """
     check_of(of)
+    faults = Faults()
+    faults.positive("seconds", seconds)
+    faults.raise_if_any()
     names = chosen_methods(methods)
     begun = time.perf_counter()
     report = progress or void

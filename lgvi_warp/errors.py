@@ -90,7 +90,9 @@ class _Brief(reprlib.Repr):
 
     def repr_int(self, x: int, level: int) -> str:
         """Python writes no whole number of more than some thousand digits."""
-        return repr(x) if x.bit_length() < 1000 else f"<a whole number of about {round(x.bit_length() * 0.30103)} digits>"
+        return (
+            repr(x) if x.bit_length() < 1000 else f"<a whole number of about {round(x.bit_length() * 0.30103)} digits>"
+        )
 
 
 _brief = _Brief()

@@ -15,7 +15,7 @@ from lgvi_warp import terms, vehicle
 from lgvi_warp.ensemble import Ensemble, over_members
 from lgvi_warp.errors import Faults, closest
 from lgvi_warp.method import FORCED, Method, Program, divided, merged, simplified, with_hops
-from lgvi_warp.plausibility import Oddities
+from lgvi_warp.oddities import Oddities
 from lgvi_warp.survey import COUPLINGS, SHAPES_OF_MASS, UNCOUPLED, Survey, survey
 from lgvi_warp.terms.base import Term
 from lgvi_warp.terms.drag import PARTS, Drag

@@ -9,13 +9,13 @@ import functools
 import math
 import operator
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from lgvi_warp import vehicle as vehicles
 from lgvi_warp.ensemble import Ensemble, Members, over_members
+from lgvi_warp.oddities import Look, Oddities, gathered
 from lgvi_warp.scene import Scene
 from lgvi_warp.terms.base import Term
 from lgvi_warp.terms.control_fins import ControlFins
@@ -39,7 +39,9 @@ LIMITS = {
     "current": Limit(5.0, "m/s", "the strongest tides through straits; knots are half of m/s"),
     "fin angle": Limit(math.pi / 2.0, "rad", "a fin across the flow; 20 would be in degrees"),
     "speed": Limit(30.0, "m/s", "the fastest torpedoes without a cavity; km/h or mm/s would be more"),
-    "depth": Limit(0.0, "m", "depth is positive down; above the surface there is no water, which this model does not know"),
+    "depth": Limit(
+        0.0, "m", "depth is positive down; above the surface there is no water, which this model does not know"
+    ),
 }
 # Fields of terms that hold velocities of water [m/s].
 CURRENTS = {
@@ -52,50 +54,6 @@ CURRENTS = {
 DEPTHS = {"floor": "depth", "current_profile": "depths", "stratification": "reference_depth"}
 # Samples that are looked at after a run, in numbers: of more, the last times alone.
 MOST_SAMPLES = 30_000_000
-
-
-@dataclass(frozen=True)
-class Odd:
-    """What is odd of one quantity.
-
-    text: of the first member that has it. first: its index. count: how many have it; shared: all do, by one number.
-    """
-
-    text: str
-    first: int
-    count: int
-    shared: bool
-
-
-class Oddities:
-    """What is odd by name, of some members; `|` joins those of more members after them."""
-
-    def __init__(self, found: Mapping[str, Odd] | None = None):
-        self.found = dict(found or {})
-
-    def __or__(self, other: Oddities) -> Oddities:
-        joined = dict(self.found)
-        for key, odd in other.found.items():
-            mine = joined.get(key)
-            joined[key] = odd if mine is None else replace(mine, count=mine.count + odd.count)
-        return Oddities(joined)
-
-    def messages(self, members: int, most: int | None = None) -> tuple[str, ...]:
-        """A sentence each, with how many of so many members; most: how many of them were looked at."""
-        return tuple(f"{key}: {odd.text}{_whose(odd, members, most)}" for key, odd in self.found.items())
-
-
-def _whose(odd: Odd, members: int, most: int | None) -> str:
-    if members == 1:
-        return ""
-    if odd.shared or odd.count == members:
-        return f" (all {members:,} members)"
-    whole = f"{members:,}" if most is None or members <= most else f"the first {most:,}"
-    return f" ({odd.count:,} of {whole} members; first: member {odd.first})"
-
-
-# A quantity's name, which members are odd (1 or n,), and what to say of member i.
-Look = tuple[str, np.ndarray, Callable[[int], str]]
 
 
 def net_weight(scene: Scene, p: Numbers) -> Iterator[Look]:
@@ -115,7 +73,11 @@ def density(scene: Scene, p: Numbers) -> Iterator[Look]:
     """Water that is none."""
     rho = p["environment.water_density"]
     odd = (rho < LIMITS["light water"].value) | (rho > LIMITS["heavy water"].value)
-    yield "environment.water_density", odd, lambda i: f"{rho[i]:.6g} kg/m3 is not water, which has 1,000 or more: a unit?"
+    yield (
+        "environment.water_density",
+        odd,
+        lambda i: f"{rho[i]:.6g} kg/m3 is not water, which has 1,000 or more: a unit?",
+    )
 
 
 def currents(scene: Scene, p: Numbers) -> Iterator[Look]:
@@ -225,7 +187,7 @@ def of_numbers(scene: Scene, p: Numbers, first: int, stop: int) -> Oddities:
         What is odd.
     """
     with np.errstate(all="ignore"):
-        return _gathered((look for check in OF_NUMBERS for look in check(scene, p)), first, stop)
+        return gathered((look for check in OF_NUMBERS for look in check(scene, p)), first, stop)
 
 
 def of_ensemble(ensemble: Ensemble) -> Oddities:
@@ -257,7 +219,7 @@ def of_start(scene: Scene, members: Members, first: int = 0) -> Oddities:
         What is odd.
     """
     with np.errstate(all="ignore"):
-        return _gathered(_of_start(scene, members), first, first + members.count)
+        return gathered(_of_start(scene, members), first, first + members.count)
 
 
 def _of_start(scene: Scene, members: Members) -> Iterator[Look]:
@@ -296,52 +258,38 @@ def on_the_way(scene: Scene, samples: Mapping[str, np.ndarray]) -> Oddities:
     Returns:
         What is odd; nothing where there is no such sample.
     """
+    limit = LIMITS["speed"].value
     with np.errstate(all="ignore"):
-        looks = [*_way_of(samples.get("velocity"), _faster)]
-        if not ends_at_the_surface(scene):
-            looks += _way_of(samples.get("position"), _higher)
-        count = max((len(odd) for _, odd, _ in looks), default=0)
-        return _gathered(iter(looks), 0, count)
+        fast, speed = _later(samples.get("velocity"), _speed, limit)
+        high, height = _later(samples.get("position"), _higher, -LIMITS["depth"].value)
+    if ends_at_the_surface(scene):
+        high = np.zeros_like(high)
+    looks: list[Look] = [
+        ("velocity", fast, lambda i: f"{speed[i]:.4g} m/s on the way is beyond {limit:g} m/s: a unit, or the step?"),
+        ("position", high, lambda i: f"rises {height[i]:.4g} m above the surface, where no water is: {STOP}"),
+    ]
+    return gathered(looks, 0, max(len(fast), len(high)))
 
 
-def _faster(values: np.ndarray) -> np.ndarray:
-    return _speed(values)
+STOP = "stop members there by the event lw.Surface()"
 
 
-def _higher(values: np.ndarray) -> np.ndarray:
-    return -values[:, 2]
+def _higher(position: np.ndarray) -> np.ndarray:
+    return -position[:, 2]
 
 
-_WAYS = {
-    _faster: ("speed", "velocity", "a speed of {:.4g} m/s on the way is beyond 30 m/s: a unit, or the step?"),
-    _higher: ("depth", "position", "rises {:.4g} m above the surface, where there is no water: stop there by lw.Surface()"),
-}
-
-
-def _way_of(samples: np.ndarray | None, size: Callable[[np.ndarray], np.ndarray]) -> Iterator[Look]:
-    """Members whose largest size is odd, where that of the start is below the limit."""
-    if samples is None or not isinstance(samples, np.ndarray) or len(samples) < 2:
-        return
-    kind, name, words = _WAYS[size]
-    limit = LIMITS[kind].value
+def _later(
+    samples: np.ndarray | None, size: Callable[[np.ndarray], np.ndarray], limit: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Of each member (n,): whether its largest size after the start is beyond a limit that the start keeps, and the size."""
+    if not isinstance(samples, np.ndarray) or len(samples) < 2:
+        return np.zeros(0, dtype=bool), np.zeros(0)
     times = range(1, len(samples)) if samples.size <= MOST_SAMPLES else range(len(samples) - 1, len(samples))
     largest = np.full(samples.shape[1], -np.inf)
     for time in times:
         np.fmax(largest, size(samples[time]), out=largest)
-    yield name, (size(samples[0]) < limit) & (largest > limit), lambda i: words.format(largest[i])
+    return (size(samples[0]) < limit) & (largest > limit), largest
 
 
 def _speed(velocity: np.ndarray) -> np.ndarray:
     return np.sqrt(np.einsum("ni,ni->n", velocity, velocity, dtype=np.float64))
-
-
-def _gathered(looks: Iterator[Look], first: int, stop: int) -> Oddities:
-    """What is odd by name; of the same name the first that is said."""
-    found: dict[str, Odd] = {}
-    for key, odd, text in looks:
-        odd = np.atleast_1d(odd)
-        if key not in found and odd.any():
-            i = int(odd.argmax())
-            shared = len(odd) == 1
-            found[key] = Odd(text(i), first + i, stop - first if shared else int(odd.sum()), shared)
-    return Oddities(found)

@@ -24,7 +24,7 @@ KINDS = (
 )
 
 
-class Unreadable(ValueError):
+class UnreadableError(ValueError):
     """A file that is not read.
 
     Args:
@@ -48,7 +48,7 @@ def file_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
         The bytes.
 
     Raises:
-        Unreadable: It is no regular file, is too large, or the system does not give it.
+        UnreadableError: It is no regular file, is too large, or the system does not give it.
     """
     remedy, most = PATHS.get(kind, OTHER_PATHS), MOST_BYTES.get(kind, MOST_OTHERS)
     try:
@@ -59,30 +59,32 @@ def file_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
             _refuse(os.fstat(descriptor), kind)
             content = file.read(most + 1)
     except (OSError, ValueError, TypeError) as error:
-        if isinstance(error, Unreadable):
+        if isinstance(error, UnreadableError):
             raise
-        raise Unreadable(str(getattr(error, "strerror", None) or error), remedy) from None
+        raise UnreadableError(str(getattr(error, "strerror", None) or error), remedy) from None
     if content is None or len(content) > most:
-        raise Unreadable("never ends", remedy)
+        raise UnreadableError("never ends", remedy)
     return content
 
 
 def _refuse(found: os.stat_result, kind: str) -> None:
-    """Raise Unreadable for what is no regular file, or is too large."""
+    """Raise UnreadableError for what is no regular file, or is too large."""
     for is_kind, what in KINDS:
         if is_kind(found.st_mode):
-            raise Unreadable(what, PATHS.get(kind, OTHER_PATHS))
+            raise UnreadableError(what, PATHS.get(kind, OTHER_PATHS))
     most = MOST_BYTES.get(kind, MOST_OTHERS)
     if found.st_size > most:
         what = f"has {found.st_size / 1e6:,.1f} MB, more than the {most / 1e6:,.1f} MB that a {kind} may have"
-        raise Unreadable(what, _smaller(kind))
+        raise UnreadableError(what, _smaller(kind))
 
 
 def _smaller(kind: str) -> str:
     """How to do with a smaller file."""
     if kind == "CSV file":
         return "leave out columns or members, or give the numbers as arrays: lw.Table({name: array})"
-    return "give members' own numbers as a table (CSV), long schedules as arrays" if kind == "scene file" else "shorten it"
+    return (
+        "give members' own numbers as a table (CSV), long schedules as arrays" if kind == "scene file" else "shorten it"
+    )
 
 
 def text_of(content: bytes) -> str:
@@ -95,15 +97,15 @@ def text_of(content: bytes) -> str:
         The text.
 
     Raises:
-        Unreadable: They are no text in UTF-8.
+        UnreadableError: They are no text in UTF-8.
     """
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        raise Unreadable("is in UTF-16", "save it in UTF-8")
+        raise UnreadableError("is in UTF-16", "save it in UTF-8")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         what = f"is no text in UTF-8: byte 0x{content[error.start]:02x} at {error.start:,}"
-        raise Unreadable(what, "save it in UTF-8") from None
+        raise UnreadableError(what, "save it in UTF-8") from None
 
 
 def file_text(path: str | os.PathLike[str], kind: str) -> str:
@@ -121,11 +123,11 @@ def file_text(path: str | os.PathLike[str], kind: str) -> str:
     """
     try:
         content = file_bytes(path, kind)
-    except Unreadable as error:
+    except UnreadableError as error:
         raise SceneError([f"{kind} {_name(path)}: {error}"]) from None
     try:
         return text_of(content)
-    except Unreadable as error:
+    except UnreadableError as error:
         raise SceneError([f"{kind} {_name(path)}: {error}, or {PATHS.get(kind, OTHER_PATHS)}"]) from None
 
 

@@ -76,7 +76,9 @@ def _value_of(key: str, text: str) -> Any:
             return text
         content = {}
     if len(content) != 1:
-        raise SceneError([f"{key} = {shown(text)}: is not one value; write one value on one line, and --set once for each key"])
+        raise SceneError(
+            [f"{key} = {shown(text)}: is not one value; write one value on one line, and --set once for each key"]
+        )
     return content["value"]
 
 

@@ -12,7 +12,8 @@ from lgvi_warp import inertia, terms, vehicle
 from lgvi_warp.ensemble import Ensemble, over_members
 from lgvi_warp.inertia import Frame
 from lgvi_warp.method import Method, middle_axis
-from lgvi_warp.plausibility import Oddities, of_numbers
+from lgvi_warp.oddities import Oddities
+from lgvi_warp.plausibility import of_numbers
 from lgvi_warp.terms.base import Setting
 from lgvi_warp.terms.drag import Drag, has_exact_flow
 

@@ -46,7 +46,9 @@ def parsed(text: str, name: str) -> dict[str, Any]:
     except RecursionError:
         raise SceneError([_deep(name)]) from None
     except ValueError:  # Python reads no whole number of some thousand digits
-        raise SceneError([f"{name}: has a whole number of thousands of digits; write it with a point: 1.0e20"]) from None
+        raise SceneError(
+            [f"{name}: has a whole number of thousands of digits; write it with a point: 1.0e20"]
+        ) from None
     _check(content, name)
     return content
 

@@ -58,7 +58,7 @@ def parsed(text: str) -> Any:
 def _loader(yaml: Any) -> Any:
     """PyYAML's safe loader, in Python: the one in C calls itself as deep as a text is, and crashes."""
 
-    class Loader(yaml.SafeLoader):  # type: ignore[misc]
+    class Loader(yaml.SafeLoader):
         """With numbers such as 1e3, which YAML 1.2 has."""
 
     Loader.add_implicit_resolver("tag:yaml.org,2002:float", EXPONENT, list("-+.0123456789"))

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.errors import Faults, closest
-from lgvi_warp.reading import Unreadable, file_bytes
+from lgvi_warp.reading import UnreadableError, file_bytes
 from lgvi_warp.sampling.base import Drawn, Sampling
 from lgvi_warp.sampling.csv_file import columns_of
 from lgvi_warp.sampling.random import Random
@@ -104,11 +104,13 @@ class Table(Sampling):
         path = os.fspath(self.file)
         try:
             content = file_bytes(path, "CSV file")
-        except Unreadable as error:
+        except UnreadableError as error:
             faults.add("file", path, f"cannot be read ({error.what})", error.remedy)
             return {}
         if content.startswith(BINARY):
-            faults.add("file", path, "is a file of NumPy, or an archive", "give a CSV file, or arrays: lw.Table({name: array})")
+            faults.add(
+                "file", path, "is a file of NumPy, or an archive", "give a CSV file, or arrays: lw.Table({name: array})"
+            )
             return {}
         found = hashlib.sha256(content).hexdigest()
         if self.sha256 not in (None, found):

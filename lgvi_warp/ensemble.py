@@ -15,7 +15,7 @@ import numpy as np
 from lgvi_warp import machine, notation, variations
 from lgvi_warp import scene as scenes
 from lgvi_warp import vehicle as vehicles
-from lgvi_warp.errors import Faults, closest, shown
+from lgvi_warp.errors import Faults, closest, cut, shown
 from lgvi_warp.sampling import Sampling
 from lgvi_warp.scene import Scene
 from lgvi_warp.variations import MATRICES, Space, Target, Variation
@@ -181,7 +181,7 @@ class Ensemble:
             (target, *more) = variations.targets(key)
             if more:
                 tables.add(f'"{key}"', "...", "names several numbers", "give each a column of its own")
-            elif variations.known_target(tables, key, "...", target, known, f'; or leave it out: ignore = ["{key}"]'):
+            elif variations.known_target(tables, key, "...", target, known, f'; or leave it out: ignore = ["{cut(key)}"]'):
                 named.append((key, (target,)))
                 shape = (len(column), *target.of(known[target.name]).shape)
                 name = target.name if target.index is None else key

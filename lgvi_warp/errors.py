@@ -15,8 +15,8 @@ import numpy as np
 MOST_FAULTS = 20
 # Characters of one fault: its head, and its end, which has the remedy.
 HEAD, END = 1500, 500
-# Characters of a value in a message.
-LONGEST_VALUE = 80
+# Characters of a value, and of a name, in a message.
+LONGEST_VALUE, LONGEST_NAME = 80, 200
 
 
 class SceneError(ValueError):
@@ -108,6 +108,11 @@ def shown(value: Any) -> str:
     return text if len(text) <= LONGEST_VALUE else text[: LONGEST_VALUE - 3] + "..."
 
 
+def cut(name: str) -> str:
+    """A name in a message, which a file may have written without end."""
+    return name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
+
+
 def one_line(fault: str) -> str:
     """A fault on one line of bearable length: what a file says may hold line ends, or codes that a terminal obeys."""
     text = fault if len(fault) <= HEAD + END else f"{fault[:HEAD]} ... {fault[-END:]}"
@@ -156,7 +161,7 @@ class Faults:
             self._more += 1
             return
         words = remedy if isinstance(remedy, str) else remedy()
-        self._found.append(f"{self._prefix}{key} = {shown(value)}: {what}; {words}")
+        self._found.append(f"{self._prefix}{cut(key)} = {shown(value)}: {what}; {words}")
 
     @contextlib.contextmanager
     def including(self) -> Iterator[None]:

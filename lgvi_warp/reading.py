@@ -83,7 +83,7 @@ def _smaller(kind: str) -> str:
     if kind == "CSV file":
         return "leave out columns or members, or give the numbers as arrays: lw.Table({name: array})"
     return (
-        "give members' own numbers as a table (CSV), long schedules as arrays" if kind == "scene file" else "shorten it"
+        "give members' own numbers as a table (CSV), long schedules as arrays" if kind == "scene file" else "give a shorter one"
     )
 
 

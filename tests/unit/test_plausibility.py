@@ -241,12 +241,12 @@ def test_of_very_many_samples_the_last_are_looked_at(monkeypatch):
 def test_a_result_says_what_is_odd():
     fleet = lw.Ensemble(
         lw.Scene(lw.Vehicle(10.0, [1.0, 2.0, 2.5], buoyancy=200.0), start=lw.Start([0.0, 0.0, 1.0])),
-        3,
+        20,
         vary={"start.velocity": lw.Uniform(low=[0.0, 0.0, 0.0], high=[60.0, 0.1, 0.1])},
     )
     texts = lw.solve(fleet, h=0.01, t1=1.0).messages
     assert [text.split(":")[0] for text in texts] == ["vehicle.buoyancy", "start.velocity", "position"]
-    assert "(all 3 members)" in texts[0] and " of 3 members; first: member " in texts[1]
+    assert "(all 20 members)" in texts[0] and " of 20 members; first: member " in texts[1]
 
 
 NAMED = {name: lw.Scene.named(name) for name in lw.vehicles()}

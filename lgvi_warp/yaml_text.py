@@ -16,6 +16,9 @@ OCTAL = re.compile(r"[-+]?0[0-9_]+")
 SIXTIES = re.compile(r"[-+]?[0-9][0-9_]*(:[0-5]?[0-9])+(\.[0-9_]*)?")
 # What YAML 1.2 reads as a number, and 1.1 as a text: without a point, or without a sign after the e.
 EXPONENT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)[eE][-+]?[0-9]+")
+# Brackets within brackets.
+DEEPEST = 50
+DEEP = "YAML: is nested too deep; write mass: ..., added_mass: ..."
 PLAIN = {f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "int", "float", "str", "seq", "map")}
 
 
@@ -36,6 +39,8 @@ def parsed(text: str) -> Any:
         yaml = importlib.import_module("yaml")
     except ImportError:
         raise ImportError("reading YAML needs PyYAML: pip install 'lgvi-warp[yaml]'") from None
+    if _depth(text) > DEEPEST:
+        raise SceneError([DEEP])
     try:
         loader = _loader(yaml)(text)
         node = loader.get_single_node()
@@ -47,11 +52,20 @@ def parsed(text: str) -> Any:
     except SceneError:
         raise
     except RecursionError:
-        raise SceneError(["YAML: is nested too deep; write mass: ..., added_mass: ..."]) from None
+        raise SceneError([DEEP]) from None
     except yaml.YAMLError as error:
         raise SceneError([f"YAML: {' '.join(str(error).split())}; mend that line"]) from None
     except Exception as error:  # PyYAML lets through whatever int(), float() and dates raise
         raise SceneError([f"YAML: has a value that is none ({type(error).__name__}: {error}); mend it"]) from None
+
+
+def _depth(text: str) -> int:
+    """How deep brackets are open in a text, those within its words as well: PyYAML's time grows with it."""
+    depth = deepest = 0
+    for bracket in re.finditer(r"[\[\]{}]", text):
+        depth += 1 if bracket[0] in "[{" else -1
+        deepest = max(deepest, depth)
+    return deepest
 
 
 @functools.cache

@@ -58,7 +58,12 @@ class Fields(dict[str, np.ndarray]):
     def __init__(self, fields: Mapping[str, np.ndarray], plan: Plan, when: slice, outcome: Callable[[], Outcome]):
         super().__init__(fields)
         self.time, self.terms = plan.grid.times[when], plan.ensemble.scene.terms
-        self._steps, self._outcome = plan.grid.sample_steps[when], outcome
+        self._steps, self._outcome, self._plan, self._when = plan.grid.sample_steps[when], outcome, plan, when
+
+    def last(self) -> Fields:
+        """The last of these samples alone."""
+        stop = self._when.stop
+        return Fields({n: a[-1:] for n, a in self.items()}, self._plan, slice(stop - 1, stop), self._outcome)
 
     @functools.cached_property
     def _ends(self) -> tuple[np.ndarray, np.ndarray] | None:

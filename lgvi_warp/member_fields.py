@@ -30,9 +30,8 @@ class MemberField:
 
 
 def _failure_time(plan: Plan, outcome: Outcome) -> np.ndarray:
-    """The time of the last good state; an event's size is the part of its step that was made before it."""
-    steps = outcome.failed_step + np.where(outcome.status >= Status.SURFACE, outcome.failed_size, 0.0)
-    return np.where(outcome.status != 0, steps * plan.grid.h, np.nan)
+    """The time of the last good state, for an event its own; NaN where there was neither."""
+    return np.where(outcome.status != 0, outcome.end_time(plan), np.nan)
 
 
 def _failure_value(plan: Plan, outcome: Outcome) -> np.ndarray:

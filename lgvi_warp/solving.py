@@ -87,7 +87,7 @@ def solve(
     faults = Faults()
     observed, runner = Observation(), None
     with faults.including():
-        observed = observe(ensemble.members, ensemble.scene.run, statistics, keep, until)
+        observed = observe(ensemble.members, ensemble.scene.run, statistics, keep, until, ensemble.scene.events)
     with faults.including():
         runner = executor_of(executor, threads, scheduler)
     if only is not None and store is None:

@@ -7,7 +7,7 @@ import warp as wp
 
 from lgvi_kernels import monitor as monitors
 from lgvi_kernels.compose import params_of, superpose
-from lgvi_kernels.events import FIRST, make_watch
+from lgvi_kernels.events import FIRST, make_arrival, make_watch
 from lgvi_kernels.flags import CPU_FLAGS
 from lgvi_kernels.lanes import (
     add,  # noqa: F401
@@ -95,6 +95,11 @@ class Spec(NamedTuple):
         return self.explicit is not None and self.explicit.kind == "inertial"
 
     @property
+    def still(self) -> bool:
+        """Whether the water that a stopped member was in is kept: it goes on changing."""
+        return bool(self.events) and self.flow in ("uniform", "varying")
+
+    @property
     def state_fields(self) -> int:
         """Numbers of a packet's state."""
         paced = self.explicit is not None and self.explicit.adaptive
@@ -151,7 +156,8 @@ def make_advance(spec):
     method = make_method(spec)
     step, lead, prepare, momentum = method.step, method.lead, method.prepare, method.momentum
     has_lead, watched = spec.lead is not None, bool(spec.events)
-    watch, passage = make_watch(spec.events, View, "origin" in spec.parts) if watched else (step, step)
+    watch = make_watch(spec.events, View, "origin" in spec.parts, real) if watched else None
+    to_event = watch.alarm if watched else step
     lead_coefficient = spec.lead[1] if has_lead else 0.0
     # A drift that leads has passed half of its time when a step begins; with stages, of the first one's.
     lead_time = spec.lead_time if has_lead and spec.lead[0] in ("Ab", "T", "B") else 0.0
@@ -160,14 +166,14 @@ def make_advance(spec):
     paced, compensated = spec.explicit is not None and spec.explicit.adaptive, spec.compensated
     turned = any(letter[0] == "R" for letter, _ in spec.maps)
     per_sample = sum(spec.sample_fields.values())
-    looks, energetic, backward, substepped = spec.looks, spec.energy, spec.backward, spec.substep
-    Monitor = monitors.monitor_struct(width, real, looks, energetic, backward, substepped)
+    looks, energetic, backward, substepped, stills = spec.looks, spec.energy, spec.backward, spec.substep, spec.still
+    Monitor = monitors.monitor_struct(width, real, looks, energetic, backward, substepped, spec.still)
     apart = spec.explicit is None
     warned, looking = bool(looks), bool(looks) or energetic
     look_at, energies, supplies, growth, drag_back = _watchers(spec, method)
 
     read, write, back_up = make_rows(Lane, State, paced, compensated)
-    sample = make_sample(Lane, spec.fields, compensated, method, superpose(spec.laws, "flow") is not None)
+    sample = make_sample(Lane, spec.fields, compensated, method, superpose(spec.laws, "flow") is not None, spec.still)
 
     @wp.func
     def at_step(x: State, k: int, h: wp.float64):
@@ -206,7 +212,7 @@ def make_advance(spec):
         if wp.static(backward):
             x = drag_back(x, c, monitor.backward)
         if wp.static(watched):
-            x = watch(x, c, real(h))
+            x = to_event(x, c, real(h))
         return x
 
     @wp.func(inline=False)
@@ -281,28 +287,39 @@ def make_advance(spec):
         """Look at the state after k steps, without the lead of the next."""
         warn(closed(x, c, k, h, opening), c, monitor, k, h, frozen)
 
-    @wp.func
-    def in_parts(x: State, c: Constants, k: int, h: wp.float64, parts: int, stage_h: wp.array(dtype=real),
-                lead_h: wp.array(dtype=real), opening: real):  # fmt: skip
-        """One step as so many equal ones, from and to a state that the lead has opened for h."""
-        r = real(1.0) / real(parts)
+    @wp.func(inline=False)
+    def in_parts(x: State, c: Constants, k: int, h: wp.float64, part: real, parts: int, stage_h: wp.array(dtype=real),
+                 lead_h: wp.array(dtype=real), opening: real, among: Lane):  # fmt: skip
+        """So many equal parts of step k, `part` of its length each, from and to a state that the lead has opened for h.
+
+        among: the lanes that are looked at; what a packet that chooses its steps does depends on them alone.
+        """
         stages = lead_h.shape[0] - 1
+        x.alarm = Alarm()
+        if wp.static(paced):
+            x.alarm.code = ones(among) - among
+            x.pace.stride = real(0.0)
+            x.pace.before = real(0.0)
+        if wp.static(remembers):
+            back_up(c.memory, c.packet, 1, 0)
         x = at_step(x, k, h)
-        x = opened(opened(x, c, -opening), c, r * opening)
+        x = opened(opened(x, c, -opening), c, part * opening)
         for _ in range(parts):
             for g in range(stages):
                 if wp.static(paired):
-                    x = step(x, c, r * stage_h[2 * g], r * stage_h[2 * g + 1])
+                    x = step(x, c, part * stage_h[2 * g], part * stage_h[2 * g + 1])
                 else:
-                    x = step(x, c, r * stage_h[g])
+                    x = step(x, c, part * stage_h[g])
                 if wp.static(has_lead):
                     if wp.static(composed):
-                        x = lead(x, c, r * lead_h[g])
+                        x = lead(x, c, part * lead_h[g])
                     else:
-                        x = lead(x, c, r * (opening + opening))
+                        x = lead(x, c, part * (opening + opening))
             if wp.static(compensated):
                 x = settled(x)
-        return opened(opened(x, c, -(r * opening)), c, opening)
+        if wp.static(turned):
+            x.alarm = turned_too_far(x.alarm)
+        return opened(opened(x, c, -(part * opening)), c, opening)
 
     @wp.func(inline=False)
     def retried(good: State, x: State, code: Lane, c: Constants, k: int, h: wp.float64, stage_h: wp.array(dtype=real),
@@ -319,10 +336,9 @@ def make_advance(spec):
         while parts < wp.static(MOST_PARTS) and any_positive(pending):
             parts = 2 * parts
             y = choose(pending, good, at_rest(good))
-            y.alarm = Alarm()
-            y = in_parts(y, c, k, h, parts, stage_h, lead_h, opening)
+            y = in_parts(y, c, k, h, real(1.0) / real(parts), parts, stage_h, lead_h, opening, pending)
             if wp.static(watched):
-                y = watch(y, c, real(h))
+                y = to_event(y, c, real(h))
             wrong = failures(y, one - pending)
             solved = one - one
             for j in range(wp.static(width)):
@@ -333,6 +349,11 @@ def make_advance(spec):
                     left[j] = wrong[j]
             x = choose(solved, y, x)
         return x, left
+
+    arrival = step
+    if watched:
+        water = method.water_velocity if spec.still else None
+        arrival = make_arrival(watch.nearest, in_parts, choose, water, real, width, MOST_PARTS if substepped else 1)
 
     @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": CPU_FLAGS})
     def advance(
@@ -445,16 +466,29 @@ def make_advance(spec):
                         if wp.static(looking):
                             suspects = code
                     else:
+                        landed = good
                         if wp.static(watched):
-                            x.alarm.size = positive(
-                                x.alarm.size, x.alarm.size, passage(at_step(good, k, h), x, c, real(h))
-                            )
+                            # The failed lanes keep their last good state, those that an event stops the state at it.
+                            begun = at_step(good, k, h)
+                            landed, code, part, still = arrival(begun, x, code, c, k, h, stage_h, lead_h, opening)
+                            for j in range(wp.static(width)):
+                                if code[j] >= real(wp.static(float(FIRST))):
+                                    x.alarm.size[j] = part[j] * part[j]
+                                if wp.static(stills):
+                                    if code[j] > real(0.0):
+                                        monitor.still[i, 0][j] = still.x[j]
+                                        monitor.still[i, 1][j] = still.y[j]
+                                        monitor.still[i, 2][j] = still.z[j]
+                            if wp.static(remembers):
+                                # Laws of the other lanes are to remember the whole step.
+                                back_up(memory, i, 1, 0)
+                                begun = one_step(begun, c, monitor, k, h, stage_h, lead_h, first_h, opening)
                         for j in range(wp.static(width)):
                             if code[j] > real(0.0):
                                 status[i][j] = int(code[j])
                                 failed_step[i][j] = k
                                 failed_size[i][j] = x.alarm.size[j]
-                        kept = choose(code, good, kept)
+                        kept = choose(code, landed, kept)
                         frozen = frozen + code
                         any_frozen = True
                 if any_frozen:
@@ -479,7 +513,7 @@ def make_advance(spec):
                     if any_frozen:
                         y = choose(frozen, kept, x)
                     y = opened(at_step(y, k, h), c, -opening)
-                    sample(out, i, (s - s0) * wp.static(per_sample), y, c, real(h))
+                    sample(out, i, (s - s0) * wp.static(per_sample), y, c, real(h), monitor, frozen)
                     s += 1
         if any_frozen:
             x = choose(frozen, kept, x)

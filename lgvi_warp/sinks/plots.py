@@ -156,6 +156,7 @@ _PANEL = {
     "circular_mean": _lines_panel,
     "exceedance": _lines_panel,
     "first_passage": _lines_panel,
+    "outcome": _lines_panel,
     "extremes": _extremes_panel,
     "histogram": _histogram_panel,
 }

@@ -181,7 +181,9 @@ class Ensemble:
             (target, *more) = variations.targets(key)
             if more:
                 tables.add(f'"{key}"', "...", "names several numbers", "give each a column of its own")
-            elif variations.known_target(tables, key, "...", target, known, f'; or leave it out: ignore = ["{cut(key)}"]'):
+            elif variations.known_target(
+                tables, key, "...", target, known, f'; or leave it out: ignore = ["{cut(key)}"]'
+            ):
                 named.append((key, (target,)))
                 shape = (len(column), *target.of(known[target.name]).shape)
                 name = target.name if target.index is None else key

@@ -108,9 +108,10 @@ def shown(value: Any) -> str:
     return text if len(text) <= LONGEST_VALUE else text[: LONGEST_VALUE - 3] + "..."
 
 
-def cut(name: str) -> str:
+def cut(name: Any) -> str:
     """A name in a message, which a file may have written without end."""
-    return name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
+    text = name if isinstance(name, str) else shown(name)
+    return text if len(text) <= LONGEST_NAME else f"{text[:LONGEST_NAME]}..."
 
 
 def one_line(fault: str) -> str:

@@ -82,9 +82,9 @@ def _smaller(kind: str) -> str:
     """How to do with a smaller file."""
     if kind == "CSV file":
         return "leave out columns or members, or give the numbers as arrays: lw.Table({name: array})"
-    return (
-        "give members' own numbers as a table (CSV), long schedules as arrays" if kind == "scene file" else "give a shorter one"
-    )
+    if kind == "scene file":
+        return "give members' own numbers as a table (CSV), long schedules as arrays"
+    return "give a shorter one"
 
 
 def text_of(content: bytes) -> str:

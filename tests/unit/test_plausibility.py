@@ -175,7 +175,9 @@ def test_a_vehicle_without_weight_has_none_to_compare():
     assert said(scene({"buoyancy": 0.0}, environment={"gravity": 0.0})) == ()
 
 
-@pytest.mark.parametrize("event", [{"type": "surface"}, {"type": "box", "lower": [-9.0, -9.0, 0.0], "upper": [9.0, 9.0, 9.0]}])
+@pytest.mark.parametrize(
+    "event", [{"type": "surface"}, {"type": "box", "lower": [-9.0, -9.0, 0.0], "upper": [9.0, 9.0, 9.0]}]
+)
 def test_an_event_at_the_surface_knows_what_is_above(event):
     above = {"start": {"position": [0.0, 0.0, -0.1]}}
     assert said(scene(**above, events=[event])) == ()
@@ -198,7 +200,9 @@ def test_members_are_counted_and_the_first_is_named(monkeypatch):
 
 
 def test_what_all_share_is_said_of_all():
-    fleet = lw.Ensemble(scene(environment={"water_density": 1.025}), 1000, 1, {"vehicle.mass": lw.Normal(relative=1e-3)})
+    fleet = lw.Ensemble(
+        scene(environment={"water_density": 1.025}), 1000, 1, {"vehicle.mass": lw.Normal(relative=1e-3)}
+    )
     (message,) = said(fleet)
     assert message.endswith("(all 1,000 members)")
 

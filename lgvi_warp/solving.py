@@ -232,13 +232,15 @@ def run_plan(
     parameters = Drawn(plan.ensemble, n)
     of_members = {name: values[:n] for name, values in member_fields.of(plan, outcomes.all).items()}
     estimates, said = observing.read(told["ensemble"], of_members["status"])
-    found = samples.fields if samples and samples.fields else {}
+    # What lies beyond the last member was never written.
+    kept = samples.fields if samples and samples.fields else {}
+    histories = {name: values[:, :n] for name, values in kept.items()}
     return Result(
         time=plan.grid.times,
-        samples={name: values[:, :n] for name, values in found.items()},
+        samples=histories,
         **Result.per_member(of_members),
         parameters=dict(parameters) if samples is not None else parameters,
-        messages=messages(plan) + said + plausibility.on_the_way(plan.ensemble.scene, found).messages(n),
+        messages=messages(plan) + said + plausibility.on_the_way(plan.ensemble.scene, histories).messages(n),
         provenance=told
         | {name: float(of_members[name].mean()) for name in ("steps_made", "steps_tried") if name in of_members}
         | ({"members": n} if n < total else {}),

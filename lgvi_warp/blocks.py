@@ -12,7 +12,7 @@ import numpy as np
 from lgvi_warp import notation
 from lgvi_warp.inertia import Frame
 from lgvi_warp.machine import DTYPES
-from lgvi_warp.status import Status
+from lgvi_warp.status import failed
 
 if TYPE_CHECKING:
     from lgvi_warp.ensemble import Members
@@ -76,7 +76,7 @@ class Fields(dict[str, np.ndarray]):
         if self._ends is None:
             return None
         status, step = self._ends
-        ended = (status != 0) & (status < Status.SURFACE) if held else status != 0
+        ended = failed(status) if held else status != 0
         if not ended.any():
             return None
         return np.asarray(~ended | (self._steps[:, None] <= step))

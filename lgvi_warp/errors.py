@@ -54,6 +54,24 @@ class MembersFailed(RuntimeError):  # noqa: N818
         self.result = result
 
 
+class NothingToDraw(ValueError):  # noqa: N818
+    """A picture that would be empty: the message says why."""
+
+
+class MissingExtra(ImportError):  # noqa: N818
+    """A library that is not installed, of one of the package's extras.
+
+    Args:
+        what: What needs it, as "plots".
+        library: Its name as pip knows it.
+        extra: The extra of lgvi-warp that brings it.
+    """
+
+    def __init__(self, what: str, library: str, extra: str):
+        super().__init__(f"{what} need {library}: pip install 'lgvi-warp[{extra}]'", name=library)
+        self.library, self.extra = library, extra
+
+
 # So many of the names that are known are said.
 MOST_KNOWN = 60
 

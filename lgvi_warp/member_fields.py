@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp.status import Status, Warnings
+from lgvi_warp.status import Status, Warnings, stopped
 
 if TYPE_CHECKING:
     from lgvi_warp.packets import Outcome
@@ -36,7 +36,7 @@ def _failure_time(plan: Plan, outcome: Outcome) -> np.ndarray:
 
 def _failure_value(plan: Plan, outcome: Outcome) -> np.ndarray:
     """What crossed its limit; 0 for an event."""
-    size = np.where(outcome.status >= Status.SURFACE, 0.0, outcome.failed_size)
+    size = np.where(stopped(outcome.status), 0.0, outcome.failed_size)
     return np.where(outcome.status != 0, size, np.nan)
 
 

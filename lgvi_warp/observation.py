@@ -17,7 +17,7 @@ from lgvi_warp.statistics import Estimate, Estimates, Quantity, Statistic
 from lgvi_warp.statistics.ends import check_outcomes, outcomes
 from lgvi_warp.statistics.keeper import Gathered
 from lgvi_warp.statistics.until import Until, Watch, from_dict, watch
-from lgvi_warp.status import Status
+from lgvi_warp.status import failed, stopped
 
 # Samplings whose means are at least as close as those of independent members.
 EVENLY_SPREAD = ("latin_hypercube", "sobol", "halton")
@@ -67,7 +67,7 @@ class Observation:
     def again(self, status: np.ndarray) -> np.ndarray:
         """Indices of the members to be run again for their samples, of those whose status is given."""
         if isinstance(self.keep, str):
-            return np.flatnonzero(_failed(status)) if self.keep == "failed" else np.empty(0, np.int64)
+            return np.flatnonzero(failed(status)) if self.keep == "failed" else np.empty(0, np.int64)
         return np.array([i for i in self.keep if i < len(status)], dtype=np.int64)
 
     def to_dict(self) -> dict[str, Any]:
@@ -215,17 +215,12 @@ def _left_out(estimates: Mapping[str, Estimate], status: np.ndarray, apart: Coll
     fewer = [one for one, number in count.items() if number < members]
     if not fewer:
         return ()
-    failed, ended = int(_failed(status).sum()), int((status >= Status.SURFACE).sum())
+    failures, ended = int(failed(status).sum()), int(stopped(status).sum())
     out = {one: ended if one.settings.get("stopped") == "left_out" else 0 for one in fewer}
-    why = [f"{failed} members from their failure on"] if failed else []
+    why = [f"{failures} members from their failure on"] if failures else []
     if any(out.values()):
         why += [f'{ended} members from the event on that stopped them (stopped = "left_out")']
-    if any(count[one] < members - failed - out[one] for one in fewer):
+    if any(count[one] < members - failures - out[one] for one in fewer):
         why += ["members where a number of theirs is not finite"]
     text = f"statistics leave out {', and '.join(why)}: {min(count.values())} of {members} count where fewest do"
     return (f"{text} (count of each statistic)",)
-
-
-def _failed(status: np.ndarray) -> np.ndarray:
-    """Which members failed: an event's end is no failure."""
-    return np.asarray((status != 0) & (status < Status.SURFACE))

@@ -101,9 +101,9 @@ class Packets:
         self.scale = self.frame.J.max(axis=1)
         if not plan.spec.scaled:
             self.scale = np.ones_like(self.scale)
-        width, Lane = plan.spec.width, plan.advance.Lane
+        width, Lane = plan.spec.width, plan.advance.types.Lane
         self.count = -(-members.count // width)
-        Inertia, Params, Events = plan.advance.Inertia, plan.advance.Params, plan.advance.Events
+        Inertia, Params, Events = plan.advance.types.Inertia, plan.advance.types.Params, plan.advance.types.Events
         setting = Setting(
             members.parameters, self.frame, members.indices, members.seed, plan.grid.h, plan.model.aligned
         )
@@ -127,10 +127,10 @@ class Packets:
 
     def _monitor(self) -> Any:
         """What the kernel compares with now and then, and where it notes what it saw."""
-        plan, monitor = self.plan, self.plan.advance.Monitor()
-        Lane, Ints = plan.advance.Lane, int_lane(plan.spec.width)
+        plan, monitor = self.plan, self.plan.advance.types.Monitor()
+        Lane, Ints = plan.advance.types.Lane, int_lane(plan.spec.width)
         if plan.spec.looks:
-            monitor.limits = _structs(self._limits(), plan.advance.Limits)
+            monitor.limits = _structs(self._limits(), plan.advance.types.Limits)
             for name, kind in (("warned", Ints), ("warned_step", Ints), ("warned_size", Lane)):
                 setattr(monitor, name, wp.zeros(self.count, dtype=kind, device="cpu"))
         if plan.spec.energy:
@@ -334,7 +334,7 @@ class Packets:
         width = plan.spec.width
         shape = (self.count, max(1, (s1 - s0) * numbers))
         if self.out is None or self.out.shape != shape:
-            self.out = wp.empty(shape, dtype=plan.advance.Lane, device="cpu")
+            self.out = wp.empty(shape, dtype=plan.advance.types.Lane, device="cpu")
         real, dtype = plan.spec.real, plan.dtype
         stage_h, lead_h, sample_step = plan.times
         inputs = [self.inertia, self.params, self.events, self.table]

@@ -11,7 +11,7 @@ from lgvi_warp.errors import SceneError
 # Bytes of the largest file of each kind. A scene, and coefficients in YAML or XML, are written by hand or by a script: the
 # parsers read a megabyte or two a second (TOML), and a tenth of that (YAML). A table may hold millions of numbers.
 MOST_BYTES = {"scene file": 1 << 20, "YAML file": 128 << 10, "CSV file": 512 << 20}
-MOST_OTHERS = 8 << 20
+MOST_OTHERS = 16 << 20
 PATHS = {"scene file": "give the path of a TOML file", "CSV file": "give the path of a CSV file"}
 OTHER_PATHS = "give the path of a file, or its text"
 

@@ -20,13 +20,14 @@ from lgvi_warp.keepers import Outcomes, Samples
 from lgvi_warp.kept import KeptRun
 from lgvi_warp.method import Method
 from lgvi_warp.observation import Observation, Observing, observe
+from lgvi_warp.outcomes import failure_text
 from lgvi_warp.plan import Plan
 from lgvi_warp.recipe import of_store
 from lgvi_warp.result import Drawn, Result
 from lgvi_warp.running import Progress, Stored, run_blocks
 from lgvi_warp.saveat import FIELDS, SaveAt, time_grid
 from lgvi_warp.scene import Scene
-from lgvi_warp.status import Status, failure_text
+from lgvi_warp.status import Status
 from lgvi_warp.store import Folder, Store
 from lgvi_warp.stored import result_of
 
@@ -68,7 +69,8 @@ def solve(
     progress: called with the fraction of the work that is done, from the threads that do it.
     statistics: gathered over the members at every sample time while the run goes: lw.Mean("position"), ...; they are
     in result.statistics. keep: "all" samples of members (default); "none", so that memory grows with neither members nor
-    steps; "failed", or indices of members: those are run again after the run, to the same bits, and are result.kept.
+    steps; "failed" (not those that an event stopped), or indices of members: those are run again after the run, to the same
+    bits, and are result.kept.
     until: lw.Until(...), to stop before the last member, once a statistic's interval is narrow enough; False: never, whatever
     the scene says (statistics=() likewise gathers none).
     store: a folder "runs/x/run.zarr", or a Store with more settings: samples go there block by block and not into memory,

@@ -82,9 +82,9 @@ def stored(fleet, **settings):
 def _terms() -> dict[str, Callable[[], str]]:
     from tests.laws import CASES
 
-    names = ("drag", "quadratic drag", "current", "wrench schedule", "drag matrix", "current profile", "tether", "thrusters", "waves", "Gauss-Markov current", "fins",
-             "control fins with rates", "cross-flow", "body lift", "stratification", "wrench noise",
-             "all together")  # fmt: skip
+    names = ("drag", "quadratic drag", "drag matrix", "current", "current profile", "tether", "wrench schedule", "thrusters",
+             "waves", "Gauss-Markov current", "fins", "control fins with rates", "cross-flow", "body lift", "stratification",
+             "wrench noise", "all together")  # fmt: skip
 
     def run(name):
         return hashed(solved(named("torpedo", terms=list(CASES[name].terms)), "psi_x"))

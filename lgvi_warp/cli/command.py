@@ -47,8 +47,8 @@ def main(arguments: list[str] | None = None) -> int:
     except MemoryError as error:
         print(f"lgvi-warp: {error or 'out of memory'}; run fewer members or keep fewer samples", file=sys.stderr)
         return 1
-    except KeyboardInterrupt:
-        print(f"lgvi-warp: interrupted; {left(chosen)}", file=sys.stderr)
+    except KeyboardInterrupt as interrupt:
+        print(f"lgvi-warp: interrupted; {str(interrupt) or left(chosen)}", file=sys.stderr)
         return 130
 
 

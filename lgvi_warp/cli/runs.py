@@ -44,9 +44,9 @@ def run(chosen: argparse.Namespace) -> int:
 
 def all_failed(result: Any) -> bool:
     """Whether no member got to its end, or to the event that ended it."""
-    from lgvi_warp.status import Status
+    from lgvi_warp.status import failed
 
-    return bool(((result.status != 0) & (result.status < Status.SURFACE)).all())
+    return bool(failed(result.status).all())
 
 
 def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:

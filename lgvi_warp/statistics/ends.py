@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lgvi_warp.errors import Faults, closest
-from lgvi_warp.status import Status
+from lgvi_warp.status import Status, failed, stopped
 
 # Words for several statuses: any event, any failure.
 STOPPED, FAILED = "stopped", "failed"
@@ -42,9 +42,9 @@ class Ends:
         if outcome in self.events:
             return np.asarray(self.event == 1 + self.events.index(outcome))
         if outcome == STOPPED:
-            return np.asarray(self.status >= Status.SURFACE)
+            return stopped(self.status)
         if outcome == FAILED:
-            return np.asarray((self.status != Status.OK) & (self.status < Status.SURFACE))
+            return failed(self.status)
         return np.asarray(self.status == Status[outcome.upper()])
 
 

@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.real_numbers import NotReal, holds_words, real_numbers
+
 # So many faults are said one by one, the rest are counted: a file may have a million of them.
 MOST_FAULTS = 20
 # Characters of one fault: its head, and its end, which has the remedy.
@@ -138,20 +140,6 @@ def one_line(fault: str) -> str:
     return text if text.isprintable() else "".join(one if one.isprintable() else ascii(one)[1:-1] for one in text)
 
 
-# NumPy's arrays have no more dimensions than that.
-DEEPEST = 64
-
-
-def holds_words(value: Any, depth: int = 0) -> bool:
-    """Whether a truth value or a text hides among numbers, or lists within lists without end.
-
-    [true, 1.0] would pass for [1.0, 1.0], and of one long text among many numbers NumPy makes as many long texts.
-    """
-    if isinstance(value, list | tuple):
-        return depth > DEEPEST or any(holds_words(item, depth + 1) for item in value)
-    return isinstance(value, bool | str | bytes)
-
-
 def ragged(value: Any) -> bool:
     """Whether lists within lists differ in length, so that NumPy makes no array of them."""
     try:
@@ -214,19 +202,20 @@ class Faults:
                 remedy = functools.partial(closest, name, known)
                 self.add(f"{key}.{name}" if key else name, value, "is an unknown key", remedy)
 
+    def real(self, key: str, value: Any, remedy: str = "give numbers") -> np.ndarray | None:
+        """A new float64 array of the same numbers, which may be NaN; None after noting a fault."""
+        try:
+            return real_numbers(value)
+        except NotReal as error:
+            self.add(key, value, error.what, error.remedy or remedy)
+            return None
+
     def finite(self, key: str, value: Any, shape: tuple[int, ...] | None = None, unit: str = "") -> np.ndarray | None:
         """A finite float64 array, of this shape if one is given; None after noting a fault."""
         wanted = "a number" if shape == () else f"numbers of shape {shape}" if shape else "numbers"
         remedy = f"give {wanted}" + (f" [{unit}]" if unit else "")
-        try:
-            if holds_words(value):
-                raise ValueError
-            array = np.array(value)
-            if array.dtype.kind not in "iuf":
-                raise ValueError
-            array = array.astype(np.float64)
-        except (ValueError, TypeError, OverflowError, RecursionError):
-            self.add(key, value, "is not numeric", remedy)
+        array = self.real(key, value, remedy)
+        if array is None:
             return None
         if shape is not None and array.shape != shape:
             self.add(key, value, f"has shape {array.shape}", remedy)

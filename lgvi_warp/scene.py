@@ -12,10 +12,11 @@ import numpy as np
 
 from lgvi_warp import events, laws, notation, terms
 from lgvi_warp import statistics as kinds
-from lgvi_warp.errors import Faults, SceneError, holds_words
+from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.machine import DTYPES
 from lgvi_warp.method import Method
 from lgvi_warp.names import alike, folded
+from lgvi_warp.real_numbers import holds_words
 from lgvi_warp.sampling import sampling_of
 from lgvi_warp.statistics import until as stopping
 from lgvi_warp.status import CHECKS, ON_FAILURE
@@ -136,7 +137,8 @@ def check_keep(faults: Faults, key: str, keep: Any, members: int | None = None) 
         faults.choice(key, keep, KEEP)
         return
     indices = np.asarray(keep) if isinstance(keep, list | tuple | np.ndarray | range) else np.array(None)
-    if indices.ndim != 1 or indices.size == 0 or indices.dtype.kind not in "iu" or np.any(indices < 0):
+    whole = indices.ndim == 1 and indices.size > 0 and indices.dtype.kind in "iu" and not np.ma.is_masked(keep)
+    if not whole or np.any(indices < 0):
         faults.add(key, keep, "names no members", f"give {', '.join(map(repr, KEEP))}, or a list of indices from 0")
     elif members is not None and np.any(indices >= members):
         faults.add(
@@ -271,7 +273,8 @@ def _whole_numbers(value: Any) -> bool:
         array = np.asarray(value)
     except ValueError:
         return False
-    return bool(array.ndim == 1 and len(array) > 0 and array.dtype.kind in "iu" and array.min() >= 0)
+    plain = not np.ma.is_masked(value)
+    return bool(array.ndim == 1 and len(array) > 0 and array.dtype.kind in "iu" and plain and array.min() >= 0)
 
 
 @dataclass(frozen=True, eq=False)

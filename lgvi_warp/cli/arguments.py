@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-OF = "position, attitude, velocity, angular_velocity or energy"
+OF = 'position, attitude, velocity, angular_velocity, energy, depth, speed, euler, "position[2]", "norm(velocity)" ...'
 
 
 EPILOG = """examples:
@@ -115,7 +115,7 @@ def _add_sensitivity(verbs: Any) -> None:
     )
     verb.add_argument("scene", metavar="SCENE", help="scene file (TOML) with [ensemble.vary]")
     verb.add_argument("--of", metavar="Q", action="append", help='quantity of interest: "position[2]" (the default), '
-                      '"norm(velocity)", "max(energy)" ...; may be given several times')  # fmt: skip
+                      'depth, speed, "norm(velocity)", "max(energy)" ...; may be given several times')  # fmt: skip
     verb.add_argument("--out", metavar="DIR", type=Path, help="folder for the files (default: runs/NAME_sensitivity)")
     verb.add_argument("--analysis", choices=("sobol", "morris"), default="sobol", help="default sobol")
     verb.add_argument("--samples", metavar="N", type=int, help="groups of the design (default: sobol 256, morris 64)")

@@ -5,13 +5,14 @@ from __future__ import annotations
 import functools
 import hashlib
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
 from lgvi_warp.errors import Faults, closest
+from lgvi_warp.labelled import columns_by_name, is_labelled
 from lgvi_warp.reading import UnreadableError, file_bytes
 from lgvi_warp.sampling.base import Drawn, Sampling
 from lgvi_warp.sampling.csv_file import columns_of
@@ -28,9 +29,10 @@ class Table(Sampling):
 
     file: its columns are numbers of the scene or entries of them, "vehicle.mass", "start.position[2]" (quote a name with a
     comma in it), parted by commas, semicolons or tabs; empty lines and those that begin with # are passed over. values:
-    name -> (n,) or (n, *shape), or a pandas DataFrame. columns: those to take; ignore: those to leave out, such as an id.
-    sha256: of the file as it must be, written by `to_dict`. Names of `vary` that the table does not have are drawn at
-    random. The number of members is that of the lines, or less: the first ones; lines may be added.
+    name -> (n,) or (n, *shape), a data frame, a structured array, or an xarray Dataset with such names. columns: those to
+    take; ignore: those to leave out, such as an id. sha256: of the file as it must be, written by `to_dict`. Names of `vary`
+    that the table does not have are drawn at random. The number of members is that of the lines, or less: the first ones;
+    lines may be added.
     Raises SceneError naming every fault.
     """
 
@@ -87,10 +89,12 @@ class Table(Sampling):
 
     def _from_values(self, faults: Faults) -> dict[str, np.ndarray]:
         read: dict[str, np.ndarray] = {}
-        given = _columns_by_name(self.values)
-        if not given:
+        if not is_labelled(self.values):
             remedy = 'give a file, {"vehicle.mass": array, ...} or a DataFrame with such names'
             faults.add("values", self.values, "has no names of columns", remedy)
+            return read
+        given = columns_by_name(faults, "values", self.values)
+        if not given:
             return read
         for name in self._chosen(faults, list(given)):
             array = _column(faults, f'"{name}"', given[name])
@@ -148,17 +152,10 @@ class Table(Sampling):
         return {self.kind: {"file": os.path.abspath(self.file), "sha256": self.sha256, **chosen}}
 
 
-def _columns_by_name(values: Any) -> dict[str, Any]:
-    """Columns of a mapping, or of a table such as pandas.DataFrame; none if they have no names."""
-    names = values if isinstance(values, Mapping) else getattr(values, "columns", None)
-    if not isinstance(names, Iterable) or not all(isinstance(name, str) for name in names):
-        return {}
-    return {name: values[name] if isinstance(values, Mapping) else np.asarray(values[name]) for name in names}
-
-
 def _column(faults: Faults, key: str, given: Any) -> np.ndarray | None:
     """A column of finite numbers; None after noting a fault."""
-    if isinstance(given, np.ndarray) and given.dtype.kind == "f" and given.ndim and not np.isfinite(given).all():
+    plain = isinstance(given, np.ndarray) and given.dtype.kind == "f" and given.ndim and not np.ma.is_masked(given)
+    if plain and not np.isfinite(given).all():
         row = int(np.argmin(np.isfinite(given.reshape(len(given), -1)).all(axis=1)))
         faults.add(key, given[row], f"is not finite, of member {row}", "give a number, or drop that member")
         return None

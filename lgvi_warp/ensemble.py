@@ -15,7 +15,7 @@ import numpy as np
 from lgvi_warp import machine, notation, variations
 from lgvi_warp import scene as scenes
 from lgvi_warp import vehicle as vehicles
-from lgvi_warp.errors import Faults, closest, shown
+from lgvi_warp.errors import Faults, closest, cut, shown
 from lgvi_warp.labelled import columns_by_name, is_labelled, match
 from lgvi_warp.real_numbers import column_names
 from lgvi_warp.sampling import Sampling
@@ -181,7 +181,9 @@ class Ensemble:
             (target, *more) = variations.targets(key)
             if more:
                 tables.add(f'"{key}"', "...", "names several numbers", "give each a column of its own")
-            elif variations.known_target(tables, key, "...", target, known, f'; or leave it out: ignore = ["{key}"]'):
+            elif variations.known_target(
+                tables, key, "...", target, known, f'; or leave it out: ignore = ["{cut(key)}"]'
+            ):
                 named.append((key, (target,)))
                 shape = (len(column), *target.of(known[target.name]).shape)
                 name = target.name if target.index is None else key
@@ -333,6 +335,12 @@ class Ensemble:
         own = drawn | {target.name for target, _ in self._columns} | self._explicit.keys()
         return [name for name in self._base if name in own]
 
+    @property
+    def starts_vary(self) -> bool:
+        """Whether members start differently."""
+        names = {target.name for one in self._variations for target in one.targets}
+        return not {*names, *(target.name for target, _ in self._columns), *self._explicit} <= self._base.keys()
+
     def subset(self, indices: Sequence[int] | np.ndarray) -> Ensemble:
         """These members, in this order, as an ensemble of its own with the same numbers. Raises IndexError."""
         chosen = np.asarray(indices)
@@ -482,7 +490,8 @@ def check_names(vary: Mapping[str, Any], parameters: Sequence[str]) -> None:
     for key, law in vary.items():
         for target in variations.targets(key):
             if target.name not in known:
-                faults.add(f'"{key}"', law, "does not name what a scene has", closest(target.name, known))
+                remedy = functools.partial(closest, target.name, known)
+                faults.add(f'"{key}"', law, "does not name what a scene has", remedy)
     faults.raise_if_any()
 
 

@@ -117,7 +117,7 @@ class Frozen(Distribution):
         try:
             return cls(law(**{one: np.asarray(value)[()] for one, value in given.items()}))
         except SceneError as error:
-            raise SceneError(f"{key}.{kind}: {fault}" for fault in error.faults) from None
+            raise error.prefixed(f"{key}.{kind}: ") from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,4 +282,4 @@ def from_dict(key: str, content: Any) -> Distribution:
     try:
         return KINDS[kind](**values)
     except SceneError as error:
-        raise SceneError(f"{key}: {fault}" for fault in error.faults) from None
+        raise error.prefixed(f"{key}: ") from None

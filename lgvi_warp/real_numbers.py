@@ -33,7 +33,7 @@ def real_numbers(value: Any) -> np.ndarray:
         value = value.data
     try:
         array = np.array(value)
-        if array.dtype.kind == "O" and all(isinstance(one, Real) and not _is_bool(one) for one in array.flat):
+        if array.dtype.kind == "O" and all(isinstance(one, Real) and not _is_word(one) for one in array.flat):
             return array.astype(np.float64)
         if array.dtype.kind in "iuf":
             return array.astype(np.float64)
@@ -61,9 +61,12 @@ def real_results(values: Any) -> np.ndarray:
     return array
 
 
-def holds_bool(value: Any) -> bool:
-    """Whether a truth value hides among numbers: [true, 1.0] would pass for [1.0, 1.0]."""
-    return any(_is_bool(part) for part in _parts(value))
+def holds_words(value: Any) -> bool:
+    """Whether a truth value or a text hides among numbers.
+
+    [true, 1.0] would pass for [1.0, 1.0], and of one long text among many numbers NumPy makes as many long texts.
+    """
+    return any(_is_word(part) for part in _parts(value))
 
 
 def column_names(value: Any) -> list[Any] | None:
@@ -78,24 +81,31 @@ def column_names(value: Any) -> list[Any] | None:
     return None
 
 
-def _parts(value: Any) -> Iterator[Any]:
-    """What lists within lists hold; the value itself where it is no list."""
-    if isinstance(value, list | tuple):
+# NumPy's arrays have no more dimensions than that.
+DEEPEST = 64
+
+
+def _parts(value: Any, depth: int = 0) -> Iterator[Any]:
+    """What lists within lists hold, a word for those that are too deep; the value itself where it is no list."""
+    if depth > DEEPEST:
+        yield "too deep"
+    elif isinstance(value, list | tuple):
         for part in value:
-            yield from _parts(part)
+            yield from _parts(part, depth + 1)
     else:
         yield value
 
 
-def _is_bool(part: Any) -> bool:
-    if isinstance(part, bool | np.bool_):
+def _is_word(part: Any) -> bool:
+    """Whether it is a truth value, an array of them, or a text."""
+    if isinstance(part, bool | np.bool_ | str | bytes):
         return True
     return isinstance(part, np.ndarray) and part.dtype.kind == "b"
 
 
 def _check(part: Any) -> None:
     """Refuse what NumPy would take without a word."""
-    if _is_bool(part):
+    if _is_word(part):
         raise NotReal("is not numeric")
     if isinstance(part, np.ma.MaskedArray) and np.ma.is_masked(part):
         raise NotReal(*_masked(part))

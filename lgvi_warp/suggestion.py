@@ -16,6 +16,7 @@ from lgvi_warp.compared import Compared, compared_in
 from lgvi_warp.comparison import Reference, Sample, Setting
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
+from lgvi_warp.executors import check_threads
 from lgvi_warp.method import Method
 from lgvi_warp.plan import Plan
 from lgvi_warp.result import Result
@@ -120,6 +121,8 @@ def suggest(
     asked = compared_in(of)
     faults = Faults()
     faults.positive("error", error, asked.unit)
+    faults.positive("seconds", seconds)
+    check_threads(faults, threads)
     faults.raise_if_any()
     names = chosen_methods(methods, CANDIDATES)
     report = progress or void

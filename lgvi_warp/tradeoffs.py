@@ -246,6 +246,9 @@ def tradeoff(
     Raises SceneError naming every fault, and where no reference can be found.
     """
     asked = compared_in(of)
+    faults = Faults()
+    faults.positive("seconds", seconds)
+    faults.raise_if_any()
     names = chosen_methods(methods)
     begun = time.perf_counter()
     report = progress or void

@@ -11,6 +11,7 @@ OF = 'position, attitude, velocity, angular_velocity, energy, depth, speed, eule
 
 EPILOG = """examples:
   lgvi-warp run examples/paper.toml --out runs/paper
+  lgvi-warp check examples/paper.toml
   lgvi-warp run examples/paper.toml --members 20000 --dtype float32 --set vehicle.mass=120
   lgvi-warp run examples/paper.toml --error 1e-3
   lgvi-warp run examples/paper.toml --members 1000000 --store zarr --out runs/large
@@ -77,6 +78,7 @@ def parser() -> argparse.ArgumentParser:
     there = run.add_mutually_exclusive_group()
     there.add_argument("--overwrite", action="store_true", help="replace a run.zarr that is there")
     there.add_argument("--resume", action="store_true", help="go on with a run.zarr that is there, if it is this run")
+    _add_check(verbs)
     _add_plan(verbs)
     _add_store_verbs(verbs)
     trade = verbs.add_parser(
@@ -164,6 +166,22 @@ def _add_executor(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--threads", metavar="N", type=int, help="threads, processes or workers (default: all cores)")
     verb.add_argument("--executor", default="threads", help="threads (default), processes or dask")
     verb.add_argument("--scheduler", metavar="ADDRESS", help="of Dask; without one, a cluster on this machine")
+
+
+def _add_check(verbs: Any) -> None:
+    """The verb check."""
+    verb = verbs.add_parser(
+        "check", help="whether a scene can run, and what is odd about it and most likely a unit; nothing runs"
+    )
+    verb.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
+    verb.add_argument("--method", help="as for run")
+    verb.add_argument("--step", metavar="S", help="time step [s]")
+    verb.add_argument("--dtype", help="as for run")
+    verb.add_argument("--duration", metavar="S", help="end of the run [s]")
+    verb.add_argument("--members", metavar="N", help="number of vehicles")
+    verb.add_argument("--seed", metavar="N", help="seed of what varies")
+    verb.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="replace a key of the scene file")
+    verb.add_argument("--quiet", action="store_true", help="the exit code alone")
 
 
 def _add_plan(verbs: Any) -> None:

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
 from lgvi_warp.errors import Faults, closest
 from lgvi_warp.labelled import columns_by_name, is_labelled
+from lgvi_warp.reading import UnreadableError, file_bytes
 from lgvi_warp.sampling.base import Drawn, Sampling
 from lgvi_warp.sampling.csv_file import columns_of
 from lgvi_warp.sampling.random import Random
 from lgvi_warp.variations import Space
+
+# What files of numpy.save, numpy.savez and archives begin with. None is opened: objects in them could be code.
+BINARY = (b"\x93NUMPY", b"PK\x03\x04", b"\x1f\x8b")
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,11 +75,13 @@ class Table(Sampling):
 
     def _chosen(self, faults: Faults, names: Sequence[str]) -> list[str]:
         """Which of the columns there are to take."""
+        known = set(names)
         for option in ("columns", "ignore"):
             for name in getattr(self, option) or ():
-                if name not in names:
-                    faults.add(option, name, "is no column of the table", closest(name, names))
-        wanted, unwanted = self.columns or names, self.ignore or ()
+                if name not in known:
+                    remedy = functools.partial(closest, name, names)
+                    faults.add(option, name, "is no column of the table", remedy)
+        wanted, unwanted = set(self.columns or names), set(self.ignore or ())
         chosen = [name for name in names if name in wanted and name not in unwanted]
         if not chosen and not faults:
             faults.add("ignore", self.ignore, "leaves no column", "keep one or more")
@@ -101,9 +107,14 @@ class Table(Sampling):
         assert self.file is not None
         path = os.fspath(self.file)
         try:
-            content = Path(path).read_bytes()
-        except OSError as error:
-            faults.add("file", path, f"cannot be read ({error.strerror})", "give a CSV file")
+            content = file_bytes(path, "CSV file")
+        except UnreadableError as error:
+            faults.add("file", path, f"cannot be read ({error.what})", error.remedy)
+            return {}
+        if content.startswith(BINARY):
+            faults.add(
+                "file", path, "is a file of NumPy, or an archive", "give a CSV file, or arrays: lw.Table({name: array})"
+            )
             return {}
         found = hashlib.sha256(content).hexdigest()
         if self.sha256 not in (None, found):

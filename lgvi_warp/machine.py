@@ -80,7 +80,7 @@ def fma_peak(dtype: str = "float64", width: int | None = None, rounds: int = 5, 
     import warp as wp
 
     from lgvi_kernels.peak import CHAINS, make_peak
-    from lgvi_warp import warp_setup
+    from lgvi_warp import kernel_cache, warp_setup
 
     warp_setup.start()
     real = wp.float64 if dtype == "float64" else wp.float32
@@ -88,6 +88,7 @@ def fma_peak(dtype: str = "float64", width: int | None = None, rounds: int = 5, 
     kernel, Lane = make_peak(width, real)
     values = np.full((CHAINS + 3, width), 0.5, dtype=dtype)
     data = wp.array(values, dtype=Lane, device="cpu")
+    kernel_cache.load(kernel.module)
     command = wp.launch(kernel, dim=1, inputs=[data, loops], device="cpu", record_cmd=True)
     best = 0.0
     for _ in range(rounds):

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import warp as wp
+import warp._src.context as context
 
 
 @contextlib.contextmanager
@@ -78,17 +79,13 @@ def unusable(cache: str | os.PathLike[str], error: OSError) -> OSError:
     """
     full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
     what = "has no room for a new kernel" if full else "cannot be written"
-    remedy = (
-        "make room, or set WARP_CACHE_PATH to another folder"
-        if full
-        else "set WARP_CACHE_PATH to a folder that can be written"
-    )
+    remedy = f"{'make room, or ' if full else ''}set WARP_CACHE_PATH to another folder"
     return OSError(error.errno, f"the kernel cache {what} ({error.strerror}); {remedy}", os.fspath(cache))
 
 
 def header_folders() -> dict[int, Any]:
     """Temporary folders of Clang's precompiled headers, by thread; empty where Warp keeps them otherwise."""
-    return getattr(wp._src.context.runtime, "_pch_dirs", {})
+    return getattr(context.runtime, "_pch_dirs", {})
 
 
 def end() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import multiprocessing
 import pickle
 import signal
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -16,6 +17,8 @@ from lgvi_warp.errors import Faults, SceneError, closest
 Advanced = Callable[[Block, int], None]
 
 NAMES = ("threads", "processes", "dask")
+# Those that start processes of their own.
+STARTING = ("processes", "dask")
 # A block whose worker died this many times is not tried again: the block itself may be what kills them.
 MOST_DEATHS = 3
 
@@ -41,6 +44,9 @@ def executor_of(given: Any, threads: int | None = None, scheduler: str | None = 
         faults.add("executor", given, "is not known", f"{closest(str(given), NAMES)}; or give an object with run(...)")
     if scheduler is not None and given != "dask":
         faults.add("scheduler", scheduler, "is for the executor dask alone", 'give executor="dask", or leave it out')
+    if given in STARTING and scheduler is None and multiprocessing.current_process().daemon:
+        what = "starts processes, which a worker of multiprocessing or Celery may not"
+        faults.add("executor", given, what, 'use executor="threads" in it, or run outside of it')
     faults.raise_if_any()
     if isinstance(given, Executor):
         return given

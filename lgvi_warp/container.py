@@ -59,7 +59,7 @@ def _folders(root: Path, own: Path, controller: str) -> Iterator[Path]:
 
 
 def _top(root: Path, names: str, controller: str) -> Path:
-    """Where a hierarchy is mounted: by its controller or by all of them, cpu,cpuacct; version 2 beside version 1 in unified."""
+    """Where a hierarchy is mounted: by its controller or by all of them, cpu,cpuacct; version 2 beside 1 in unified."""
     if controller:
         return next((root / name for name in (controller, names) if (root / name).is_dir()), root / controller)
     return root / "unified" if (root / "unified").is_dir() else root

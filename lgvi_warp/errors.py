@@ -31,6 +31,14 @@ class MembersFailed(RuntimeError):  # noqa: N818
         self.result = result
 
 
+class Interrupted(KeyboardInterrupt):
+    """A run in memory was interrupted. `result` holds the members that were finished: nothing of them is lost."""
+
+    def __init__(self, text: str, result: Any):
+        super().__init__(text)
+        self.result = result
+
+
 def closest(word: str, known: Iterable[str]) -> str:
     """ "did you mean ..." or the list of what is known."""
     names = [str(name) for name in known]

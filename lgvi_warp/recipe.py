@@ -135,7 +135,7 @@ def same_run(
 
 
 def _comparable(provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """Without what changes no bit: the number of threads, the version of Python, the scene's own [ensemble] and [run], a file's place."""
+    """Without what changes no bit: threads, the version of Python, the scene's own [ensemble] and [run], a file's place."""
     content = dict(provenance)
     content["scene"] = {key: value for key, value in content["scene"].items() if key not in ("ensemble", "run")}
     content["machine"] = {key: value for key, value in content["machine"].items() if key in ("cpu", "simd")}

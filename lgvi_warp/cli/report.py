@@ -8,6 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from lgvi_warp.cli.signals import Ended
+
 
 def report(result: Any, out: Path, quiet: bool, begun: float) -> list[str]:
     """Write the files of a finished run, print its summary, and return what failed."""
@@ -59,7 +61,7 @@ def write(result: Any, drawn: Any, out: Path) -> tuple[list[Path], list[str]]:
     drawn: the members of the pictures, None without. A result in a store is written already. Returns the files, and a text
     for each that failed.
     """
-    from concurrent.futures import ThreadPoolExecutor
+    from concurrent.futures import ThreadPoolExecutor, wait
 
     from lgvi_warp.sinks.plots import drawable, plot, plot_statistics
     from lgvi_warp.sinks.rerun import log_rerun
@@ -73,8 +75,16 @@ def write(result: Any, drawn: Any, out: Path) -> tuple[list[Path], list[str]]:
         writers["statistics.png"] = lambda path: plot_statistics(result, path)
     if not writers:
         return files, faults
-    with ThreadPoolExecutor(len(writers)) as pool:
-        jobs = {out / name: pool.submit(writer, out / name) for name, writer in writers.items()}
+    pool = ThreadPoolExecutor(len(writers))
+    jobs = {out / name: pool.submit(writer, out / name) for name, writer in writers.items()}
+    try:
+        wait(jobs.values())
+    except KeyboardInterrupt as error:
+        # A file that is half written is worth nothing.
+        wait(jobs.values())
+        raise Ended(f"the run is finished, and its files are in {out}") from error
+    finally:
+        pool.shutdown()
     for path, job in jobs.items():
         try:
             files.append(job.result())

@@ -11,6 +11,7 @@ from typing import Any
 from lgvi_warp.cli.progress import part_of, shown
 from lgvi_warp.cli.report import told
 from lgvi_warp.cli.settings import folder, overrides
+from lgvi_warp.cli.signals import Ended
 from lgvi_warp.errors import SceneError
 
 
@@ -27,6 +28,10 @@ class Written:
             self.files.append(plot(found, path))
         except (ImportError, ValueError) as error:
             self.faults.append(f"{path} was not written: {error}")
+
+    def ended(self, i: int, n: int, out: Path) -> KeyboardInterrupt:
+        """An interrupt of the study's part i of n."""
+        return Ended(f"{i} of {n} maps are finished, in {out}") if self.files else KeyboardInterrupt()
 
     def tell(self, report: str, quiet: bool) -> int:
         """Print the report and the files. Returns the exit code."""
@@ -103,10 +108,13 @@ def stability(chosen: argparse.Namespace) -> int:
     written, texts = Written(), []
     with shown(chosen.quiet) as progress:
         for i, (name, (x, y)) in enumerate(maps.items()):
-            found = stability_map(
-                scene, x, y, methods, points=chosen.points, t1=t1, error=chosen.error, of=chosen.of, seed=seed,
-                progress=part_of(progress, i, len(maps)),
-            )  # fmt: skip
+            try:
+                found = stability_map(
+                    scene, x, y, methods, points=chosen.points, t1=t1, error=chosen.error, of=chosen.of, seed=seed,
+                    progress=part_of(progress, i, len(maps)),
+                )  # fmt: skip
+            except KeyboardInterrupt as error:
+                raise written.ended(i, len(maps), out) from error
             written.files += found.save(out, name)
             texts.append(report_text(found))
             written.draw(plot_stability, found, out / f"{name}.png")

@@ -6,7 +6,8 @@ import contextlib
 import multiprocessing
 import pickle
 import signal
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from concurrent.futures import Future
 from typing import Any, Protocol, runtime_checkable
 
 from lgvi_warp import machine
@@ -64,6 +65,13 @@ def executor_of(given: Any, threads: int | None = None, scheduler: str | None = 
     from lgvi_warp.executors.threads import Threads
 
     return Threads(count)
+
+
+def ended(futures: Mapping[Future[Any], Block]) -> Iterator[tuple[Block, Any]]:
+    """Blocks that came to their end, of those whose run was interrupted."""
+    for future, block in futures.items():
+        if future.done() and not future.cancelled() and future.exception() is None and future.result() is not None:
+            yield block, future.result()
 
 
 @contextlib.contextmanager

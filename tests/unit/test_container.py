@@ -40,7 +40,7 @@ TREES = {
         2.5, 7000,
     ),
     "v1, told by the hierarchy alone": (
-        "3:memory:/", {"memory/memory.limit_in_bytes": str(NONE_V1), "memory/memory.stat": "x 0\nhierarchical_memory_limit 9000"},
+        "3:memory:/", {"memory/memory.limit_in_bytes": str(NONE_V1), "memory/memory.stat": "hierarchical_memory_limit 9000"},
         None, 9000,
     ),
     "v1 beside v2": (

@@ -61,7 +61,7 @@ def write(result: Any, drawn: Any, out: Path) -> tuple[list[Path], list[str]]:
     drawn: the members of the pictures, None without. A result in a store is written already. Returns the files, and a text
     for each that failed.
     """
-    from concurrent.futures import ThreadPoolExecutor, wait
+    from concurrent.futures import Future, ThreadPoolExecutor, wait
 
     from lgvi_warp.sinks.plots import drawable, plot, plot_statistics
     from lgvi_warp.sinks.rerun import log_rerun
@@ -75,14 +75,20 @@ def write(result: Any, drawn: Any, out: Path) -> tuple[list[Path], list[str]]:
         writers["statistics.png"] = lambda path: plot_statistics(result, path)
     if not writers:
         return files, faults
+    jobs: dict[Path, Future[Path]] = {}
     pool = ThreadPoolExecutor(len(writers))
-    jobs = {out / name: pool.submit(writer, out / name) for name, writer in writers.items()}
     try:
-        wait(jobs.values())
+        for name, writer in writers.items():
+            jobs[out / name] = pool.submit(writer, out / name)
+        while wait(jobs.values(), timeout=0.2).not_done:
+            pass  # an interrupt that comes just before it waits is heard afterwards
     except KeyboardInterrupt as error:
         # A file that is half written is worth nothing.
         wait(jobs.values())
-        raise Ended(f"the run is finished, and its files are in {out}") from error
+        written = [path for path, job in jobs.items() if job.exception() is None]
+        if "result.npz" in writers and out / "result.npz" not in written:
+            raise
+        raise Ended(f"the run is finished; written: {', '.join(map(str, written)) or result.store}") from error
     finally:
         pool.shutdown()
     for path, job in jobs.items():

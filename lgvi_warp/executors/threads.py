@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import functools
+import queue
 import threading
 from collections.abc import Generator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
 from lgvi_warp.blocks import Block, Work
 from lgvi_warp.executors import Advanced, ended
+
+# A signal that comes just before the main thread begins to wait is heard so much later [s].
+PERIOD = 0.2
 
 
 @dataclass(frozen=True)
@@ -36,9 +40,18 @@ class Threads:
                 yield block, one(block)
             return
         with ThreadPoolExecutor(self.threads, thread_name_prefix="lgvi_warp") as pool:
-            futures = {pool.submit(one, block): block for block in blocks}
+            futures: dict[Future[Any], Block] = {}
+            done: queue.SimpleQueue[Future[Any]] = queue.SimpleQueue()
             try:
-                for future in as_completed(futures):
+                for block in blocks:
+                    future = pool.submit(one, block)
+                    futures[future] = block
+                    future.add_done_callback(done.put)
+                while futures:
+                    try:
+                        future = done.get(timeout=PERIOD)
+                    except queue.Empty:
+                        continue
                     value = future.result()
                     yield futures.pop(future), value
             except KeyboardInterrupt:

@@ -396,8 +396,12 @@ def test_an_interrupt_while_files_are_written_leaves_them_whole(tmp_path, monkey
 
     monkeypatch.setattr(plots, "plot", slow)
     assert cli.main([*SHORT, "--out", str(tmp_path), "--quiet"]) == 130
-    assert capsys.readouterr().err == f"lgvi-warp: interrupted; the run is finished, and its files are in {tmp_path}\n"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["fleet.png", "fleet.rrd", "result.npz"]
+    there = sorted(path.name for path in tmp_path.iterdir())
+    # The interrupt may come before the last of them was begun.
+    assert there[-1] == "result.npz" and "fleet.png" in there and lw.Result.load(tmp_path / "result.npz").members == 20
+    said = capsys.readouterr().err
+    assert said.startswith("lgvi-warp: interrupted; the run is finished; written: ") and said.count("\n") == 1
+    assert all(str(tmp_path / name) in said for name in ("result.npz", "fleet.png"))
 
 
 def test_a_part_that_cannot_be_saved_is_told(tmp_path, monkeypatch):

@@ -76,16 +76,19 @@ def ended(futures: Mapping[Future[Any], Block]) -> Iterator[tuple[Block, Any]]:
 
 @contextlib.contextmanager
 def deaf() -> Iterator[None]:
-    """Processes that are started inside leave interrupts from the keyboard to this one, from their first moment on."""
+    """Processes that are started inside leave what a terminal sends to all of them to this one, from their first moment."""
+    before: dict[int, Any] = {}
     try:
-        before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    except ValueError:  # not in the main thread, where no interrupt is heard
+        for number in (getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(signal, name)):
+            before[number] = signal.signal(number, signal.SIG_IGN)
+    except ValueError:  # not in the main thread, where no signal is heard
         yield
         return
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before or signal.SIG_DFL)
+        for number, handler in before.items():
+            signal.signal(number, handler or signal.SIG_DFL)
 
 
 def sent(work: Work, name: str) -> bytes:

@@ -50,9 +50,10 @@ class Processes:
         context = multiprocessing.get_context("spawn")
         # Steps made of each block, and a word to all. Without a lock: a process that is killed holds none.
         made = context.RawArray("q", max(left) + 2)
-        pool = ProcessPoolExecutor(
-            min(self.workers, len(left)), mp_context=context, initializer=_begin, initargs=(data, made)
-        )
+        with deaf():  # Python's tracker of resources is a process too
+            pool = ProcessPoolExecutor(
+                min(self.workers, len(left)), mp_context=context, initializer=_begin, initargs=(data, made)
+            )
         waiting: dict[Future[Any], int] = {}
         try:
             with deaf():

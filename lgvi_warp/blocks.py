@@ -12,7 +12,7 @@ import numpy as np
 from lgvi_warp import notation
 from lgvi_warp.inertia import Frame
 from lgvi_warp.machine import DTYPES
-from lgvi_warp.status import Status
+from lgvi_warp.status import failed
 
 if TYPE_CHECKING:
     from lgvi_warp.ensemble import Members
@@ -58,7 +58,12 @@ class Fields(dict[str, np.ndarray]):
     def __init__(self, fields: Mapping[str, np.ndarray], plan: Plan, when: slice, outcome: Callable[[], Outcome]):
         super().__init__(fields)
         self.time, self.terms = plan.grid.times[when], plan.ensemble.scene.terms
-        self._steps, self._outcome = plan.grid.sample_steps[when], outcome
+        self._steps, self._outcome, self._plan, self._when = plan.grid.sample_steps[when], outcome, plan, when
+
+    def last(self) -> Fields:
+        """The last of these samples alone."""
+        stop = self._when.stop
+        return Fields({n: a[-1:] for n, a in self.items()}, self._plan, slice(stop - 1, stop), self._outcome)
 
     @functools.cached_property
     def _ends(self) -> tuple[np.ndarray, np.ndarray] | None:
@@ -71,7 +76,7 @@ class Fields(dict[str, np.ndarray]):
         if self._ends is None:
             return None
         status, step = self._ends
-        ended = (status != 0) & (status < Status.SURFACE) if held else status != 0
+        ended = failed(status) if held else status != 0
         if not ended.any():
             return None
         return np.asarray(~ended | (self._steps[:, None] <= step))

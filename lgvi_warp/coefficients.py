@@ -1,7 +1,8 @@
 """Vehicles from the usual forms of hydrodynamic coefficients, and the vehicles that come with the package.
 
-Every importer returns a plain dict in the scene file's form, {"vehicle": {...}, "terms": [...]}, about the body
-origin, in body axes x ahead, y to starboard, z down, linear before angular. All faults come at once, as a SceneError.
+Every importer returns a plain dict in the scene file's form, {"vehicle": {...}, "environment": {...}, "terms": [...]},
+about the body origin, in body axes x ahead, y to starboard, z down, linear before angular. All faults come at once, as a
+SceneError.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.errors import Faults, SceneError, closest
+from lgvi_warp.vehicle import LITTLE, ROUND_OFF, shortage
 
 FORCES, VELOCITIES = "XYZKMN", "uvwpqr"
 STANDARD_GRAVITY = 9.80665  # m/s2, ISO 80000-3
@@ -57,7 +59,9 @@ class Coefficients:
     """What an importer has read, before it is checked.
 
     Mass [kg]; inertia (3, 3) about the centre of gravity [kg m2]; centres (3,) from the body origin [m]; weight and
-    buoyancy [N]; added_mass (6, 6), positive; linear and quadratic drag (6, 6): force_i = -(l_ij + q_ij |v_j|) v_j.
+    buoyancy [N]; added_mass (6, 6), positive; linear and quadratic drag (6, 6): force_i = -(l_ij + q_ij |v_j|) v_j;
+    forward (6, 6), drag in proportion to the speed ahead u: force_i = -u f_ij v_j; current: velocity (3,) [m/s] of the
+    water, north, east, down; gravity [m/s2] and water_density [kg/m3] that the forces were found with; warnings: texts.
     """
 
     mass: float | None
@@ -69,6 +73,11 @@ class Coefficients:
     added_mass: np.ndarray = field(default_factory=lambda: np.zeros((6, 6)))
     linear: np.ndarray = field(default_factory=lambda: np.zeros((6, 6)))
     quadratic: np.ndarray = field(default_factory=lambda: np.zeros((6, 6)))
+    forward: np.ndarray = field(default_factory=lambda: np.zeros((6, 6)))
+    current: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    gravity: float | None = None
+    water_density: float | None = None
+    warnings: list[str] = field(default_factory=list)
 
     def to_dict(self, faults: Faults) -> dict[str, Any]:
         """The scene file's tables. Raises SceneError with every fault noted so far and those of the sums."""
@@ -88,16 +97,40 @@ class Coefficients:
             "buoyancy": self.buoyancy,
             "center_of_buoyancy": self.center_of_buoyancy,
         }
-        return {"vehicle": {key: plain(value) for key, value in vehicle.items()}, "terms": self.terms()}
+        tables: dict[str, Any] = {"vehicle": {key: plain(value) for key, value in vehicle.items()}}
+        water = {"gravity": self.gravity, "water_density": self.water_density}
+        tables["environment"] = {key: float(value) for key, value in water.items() if value is not None}
+        tables["terms"] = self.terms()
+        if ROUND_OFF < float(shortage(rigid[None])[0]) <= LITTLE:
+            tables["vehicle"]["inertia_tolerance"] = LITTLE
+        warnings = [*self.warnings, *self.unstable()]
+        if warnings:
+            tables["vehicle"]["warnings"] = warnings
+        return tables
+
+    def unstable(self) -> list[str]:
+        """A text if the centre of gravity is above the centre of buoyancy: what floats so turns upside down."""
+        assert self.center_of_gravity is not None and self.center_of_buoyancy is not None
+        above = float(self.center_of_buoyancy[2] - self.center_of_gravity[2])
+        if not self.buoyancy or above <= RELATIVE:
+            return []
+        what = f"the centre of gravity is {above:.3g} m above the centre of buoyancy"
+        return [f"{what}: the vehicle turns upside down; check both, and that z is down"]
 
     def terms(self) -> list[dict[str, Any]]:
-        """The drag as one term: by axis where it is diagonal, as matrices where it is not, none where it is zero."""
+        """The drag: by axis where it is diagonal, as matrices where it is not; lift, current. None of what is zero."""
+        terms: list[dict[str, Any]] = []
         pair = (self.linear, self.quadratic)
-        if not any(np.any(matrix) for matrix in pair):
-            return []
-        diagonal = all(np.array_equal(matrix, np.diag(np.diag(matrix))) for matrix in pair)
-        values = [plain(np.diag(matrix) if diagonal else matrix) for matrix in pair]
-        return [{"type": "drag" if diagonal else "drag_matrix", "linear": values[0], "quadratic": values[1]}]
+        if any(np.any(matrix) for matrix in pair):
+            diagonal = all(np.array_equal(matrix, np.diag(np.diag(matrix))) for matrix in pair)
+            values = [plain(np.diag(matrix) if diagonal else matrix) for matrix in pair]
+            kind = "drag" if diagonal else "drag_matrix"
+            terms.append({"type": kind, "linear": values[0], "quadratic": values[1]})
+        if np.any(self.forward):
+            terms.append({"type": "body_lift", "matrix": plain(self.forward)})
+        if np.any(self.current):
+            terms.append({"type": "current", "velocity": plain(self.current)})
+        return terms
 
 
 def plain(value: Any) -> Any:
@@ -137,7 +170,7 @@ def rigid_body(
     gravity: Any,
 ) -> Coefficients:
     """Mass, centres and forces, checked. Not given: weight is mass x gravity, buoyancy is the weight."""
-    mass, gravity = faults.positive("mass", mass, "kg"), faults.positive("gravity", gravity, "m/s2")
+    mass, gravity = faults.positive("mass", mass, "kg"), faults.number("gravity", gravity, "m/s2", least=0.0)
     inertia = faults.symmetric("inertia", inertia, "kg m2")
     centers = [
         faults.finite(key, value, (3,), "m")
@@ -148,7 +181,7 @@ def rigid_body(
     elif mass is not None and gravity is not None:
         weight = mass * gravity
     buoyancy = weight if buoyancy is None else faults.number("buoyancy", buoyancy, "N", least=0.0)
-    return Coefficients(mass, inertia, centers[0], centers[1], weight, buoyancy)
+    return Coefficients(mass, inertia, centers[0], centers[1], weight, buoyancy, gravity=gravity)
 
 
 # Fossen's names -----------------------------------------------------------------------------------------------------
@@ -160,7 +193,7 @@ _NAMES = "X_udot (or Xudot, X_du, X_{\\dot u}), X_u, X_uu (or X_u|u|, X_{u|u|}, 
 
 @dataclass(frozen=True)
 class Name:
-    """A coefficient's name, read: kind "dot", "linear", "quadratic", "even" or "product", and the row and columns."""
+    """A coefficient's name, read: "dot", "linear", "quadratic", "even", "product" or "modulus", and the row and columns."""
 
     kind: str
     row: int
@@ -177,7 +210,7 @@ def read_name(name: str) -> Name | None:
         return Name("dot", row, (VELOCITIES.index("".join(filter(None, match.groups()))),))
     if match := _ABS.match(tail):
         first, second = (VELOCITIES.index(letter) for letter in filter(None, match.groups()))
-        return Name("quadratic" if first == second else "product", row, (first, second))
+        return Name("quadratic" if first == second else "modulus", row, (first, second))
     if not 1 <= len(tail) <= 2 or any(letter not in VELOCITIES for letter in tail):
         return None
     columns = tuple(VELOCITIES.index(letter) for letter in tail)
@@ -206,9 +239,11 @@ def from_fossen(
     """A vehicle and its drag from hydrodynamic derivatives in Fossen's (SNAME) names and signs.
 
     coefficients: X_udot ... N_rdot [kg, kg m, kg m2], X_u ... N_r [N s/m, N m s], X_uu ... N_rr [N s2/m2, N m s2], in
-    any spelling of read_name, negative on the diagonal. Of a pair such as Y_rdot, N_vdot one suffices. X_qq and the
-    like, which are even, and products (Y_uv, X_wq) are refused: those of the added mass follow from its matrix, lift
-    is for fins. `ignore` names the coefficients to leave out all the same.
+    any spelling of read_name, negative on the diagonal. Of a pair such as Y_rdot, N_vdot one suffices. Refused are X_qq and
+    the like, which are even; products (Y_uv, X_wq), of which those of the added mass follow from its matrix, and those
+    with u are a hull's lift, the term body_lift; and second-order moduli such as Y_|v|r (Fossen 2021, nonlinear
+    damping), which are drag of the flow across the hull: the force of speed and yaw rate together, for which a drag matrix
+    has no place. The term cross_flow has that force, found along the hull. `ignore` names the coefficients to leave out.
     mass [kg]; inertia (3,) or (3, 3) [kg m2], about the body "origin" or the centre of "gravity" (inertia_about);
     centers (3,) from the body origin [m]; weight [N], mass x gravity [m/s2] if not given; buoyancy [N], the weight if
     not given.
@@ -267,9 +302,13 @@ def refuse_name(faults: Faults, key: str, value: Any, name: Name | None) -> None
         bars = f"{key[0]}_|{VELOCITIES[name.columns[0]]}|{VELOCITIES[name.columns[0]]}"
         remedy = f"leave it out (ignore=) if it comes from the added mass, or write {bars} if it is drag"
         faults.add(key, value, "is the same for either sign of the velocity, so it is no drag", remedy)
+    elif name.kind == "modulus":
+        what = "is the product of one velocity and the modulus of another, drag of the flow across the hull"
+        faults.add(key, value, what, "give the hull's cross-flow drag as a term cross_flow, and leave it out (ignore=)")
     else:
-        remedy = "leave it out (ignore=) if it comes from the added mass, which implies it; give lift as fins"
-        faults.add(key, value, "is a product of two velocities", remedy)
+        remedy = "leave it out (ignore=) if it comes from the added mass, which implies it"
+        lift = "; lift with the speed ahead is a term body_lift, lift of fins a term fins" if 0 in name.columns else ""
+        faults.add(key, value, "is a product of two velocities", remedy + lift)
 
 
 def refuse_sign(faults: Faults, key: str, number: float, name: Name) -> None:

@@ -24,6 +24,7 @@ from lgvi_warp.coefficients import (
     symmetric,
     turned,
 )
+from lgvi_warp.coefficients_plugins import by_diagonal
 from lgvi_warp.errors import Faults, SceneError, closest
 
 # YAML ---------------------------------------------------------------------------------------------------------------
@@ -33,6 +34,7 @@ _ALIASES = {
     "inertia": ("inertia", "inertial", "inertia_matrix", "moments_of_inertia"),
     "added_mass": ("added_mass", "Ma", "added_mass_matrix"),
     "linear": ("linear_damping", "linear_drag", "damping_linear"),
+    "forward": ("linear_damping_forward_speed",),
     "quadratic": ("quadratic_damping", "quad_damping", "quadratic_drag", "damping_quadratic"),
     "volume": ("volume",),
     "buoyancy": ("buoyancy",),
@@ -41,8 +43,11 @@ _ALIASES = {
     "center_of_gravity": ("center_of_gravity", "center_of_mass", "cog", "com", "centre_of_gravity"),
     "density": ("density", "water_density", "fluid_density", "rho"),
     "gravity": ("gravity", "g"),
+    "neutrally_buoyant": ("neutrally_buoyant",),
     "coefficients": ("coefficients", "hydrodynamics", "hydrodynamic_coefficients", "derivatives"),
 }
+# Of uuv_simulator's files: names, and sizes that matter near the surface alone. Known, and not needed.
+_NOT_NEEDED = ("model", "name", "type", "base_link", "body_frame", "tf_prefix", "length", "width", "height", "radius")
 
 
 def from_yaml(
@@ -50,22 +55,35 @@ def from_yaml(
     *,
     position_axes: str = "flu",
     matrix_axes: str = "frd",
+    quadratic: str = "diagonal",
     ignore: Iterable[str] = (),
     **given: Any,
 ) -> dict[str, Any]:
-    """A vehicle and its drag from a YAML file of a robotics package (uuv_simulator, Plankton), as a path or as text.
+    """A vehicle, its drag and its water from a YAML file of a robotics package (uuv_simulator, Plankton).
 
-    Keys, at the top or one level below: mass, inertia (3, 3x3 or ixx ...) about the centre of gravity, volume (with
-    density) or buoyancy, cog, cob, added_mass (6x6 or 6), linear_damping, quadratic_damping (6 or 6x6; derivatives or
-    magnitudes), or a map `coefficients` of Fossen's names. Others are refused unless named in `ignore`; `given`
-    (mass=..., density=...) adds or replaces.
-    position_axes: axes of the centres and of the inertia, "flu" (x ahead, y to port, z up, as uuv_simulator has them)
-    or "frd" (x ahead, y to starboard, z down). matrix_axes: those of added mass and damping, which uuv_simulator gives
-    in "frd".
+    Keys, at the top or below a table: mass, inertia (3, 3x3 or ixx ...) about the centre of gravity, volume (with
+    density), buoyancy or neutrally_buoyant, cog, cob, added_mass (6x6 or 6), linear_damping,
+    linear_damping_forward_speed and quadratic_damping (6 or 6x6; derivatives or magnitudes), or a map `coefficients` of
+    Fossen's names. Damping in proportion to the forward speed, force_i = -u d_ij v_j, becomes a term body_lift.
 
-    Raises SceneError naming every fault; ImportError if PyYAML is not installed.
+    Args:
+        source: path of the file, or its text.
+        position_axes: axes of the centres and of the inertia, "flu" (x ahead, y to port, z up, as uuv_simulator has
+            them) or "frd" (x ahead, y to starboard, z down).
+        matrix_axes: axes of added mass and damping, which uuv_simulator gives in "frd".
+        quadratic: what a 6x6 matrix of quadratic damping stands for: its "diagonal", as in uuv_simulator, or "full".
+        ignore: keys to leave out; others that are not known are refused.
+        given: values by key (mass=..., density=...) that add to the file's or replace them.
+
+    Returns:
+        The tables "vehicle", "environment" and "terms" of a scene file.
+
+    Raises:
+        SceneError: naming every fault.
+        ImportError: if PyYAML is not installed.
     """
     faults = Faults()
+    faults.choice("quadratic", quadratic, ("diagonal", "full"))
     for key, value in (("position_axes", position_axes), ("matrix_axes", matrix_axes)):
         faults.choice(key, value, ("flu", "frd"))
     ignore = {ignore} if isinstance(ignore, str) else set(ignore)
@@ -73,11 +91,13 @@ def from_yaml(
     positions = HALF_TURN if position_axes == "flu" else np.ones(3)
     matrices = HALF_TURN_6 if matrix_axes == "flu" else np.ones(6)
     body = yaml_body(faults, read, positions)
-    for name in ("added_mass", "linear", "quadratic"):
+    for name in ("added_mass", "linear", "forward", "quadratic"):
         value = matrices[:, None] * matrix_6(faults, name, read.get(name)) * matrices
         setattr(body, name, symmetric(faults, name, value) if name == "added_mass" else value)
+    if quadratic == "diagonal":
+        body.quadratic = by_diagonal(body.warnings, body.quadratic)
     if "coefficients" in read:
-        for name in {"added_mass", "linear", "quadratic"} & set(read):
+        for name in {"added_mass", "linear", "forward", "quadratic"} & set(read):
             faults.add(name, read[name], "is given besides coefficients by name", "keep one of them")
         if matrix_axes == "flu":
             faults.add("matrix_axes", "flu", "does not go with coefficients by name", "Fossen's names are for frd")
@@ -107,7 +127,7 @@ def by_meaning(faults: Faults, content: Mapping[str, Any], ignore: set[str]) -> 
     read: dict[str, Any] = {}
     for key, value in content.items():
         name = meanings.get(key)
-        if key in ignore:
+        if key in ignore or (key in _NOT_NEEDED and not isinstance(value, Mapping)):
             continue
         if name in read and name != "coefficients":
             faults.add(key, value, f"is given twice, as another name of {name}", "keep one of them")
@@ -138,20 +158,34 @@ def yaml_body(faults: Faults, read: Mapping[str, Any], positions: np.ndarray) ->
     square = Faults().symmetric("inertia", inertia, "") if inertia is not None else None
     if square is not None:
         inertia = positions[:, None] * square * positions
+    density = read.get("density")
+    density = None if density is None else faults.positive("density", density, "kg/m3")
     buoyancy = read.get("buoyancy")
-    if buoyancy is None and "volume" in read:
-        numbers_ = [
-            faults.positive("volume", read["volume"], "m3"),
-            faults.positive("density", read.get("density", "not given"), "kg/m3 (with volume)"),
-            faults.positive("gravity", gravity, "m/s2"),
-        ]
-        buoyancy = None if None in numbers_ else float(np.prod(np.array(numbers_, dtype=float)))
+    if buoyancy is None and "volume" in read and not is_neutral(faults, read):
+        buoyancy = displaced_weight(faults, read["volume"], density, gravity, "density" in read)
     zero = (0.0, 0.0, 0.0)
     gravity_at = turned(read.get("center_of_gravity", zero), positions)
     buoyancy_at = turned(read.get("center_of_buoyancy", zero), positions)
     mass = 1.0 if read.get("mass") is None else read["mass"]
     inertia = np.eye(3) if inertia is None else inertia
-    return rigid_body(faults, mass, inertia, gravity_at, buoyancy_at, read.get("weight"), buoyancy, gravity)
+    body = rigid_body(faults, mass, inertia, gravity_at, buoyancy_at, read.get("weight"), buoyancy, gravity)
+    body.water_density = density
+    return body
+
+
+def is_neutral(faults: Faults, read: Mapping[str, Any]) -> bool:
+    """Whether the file asks for a buoyancy that is the weight."""
+    given = read.get("neutrally_buoyant", False)
+    faults.choice("neutrally_buoyant", bool(given) if given in (0, 1) else given, (True, False))
+    return bool(given)
+
+
+def displaced_weight(faults: Faults, volume: Any, density: Any, gravity: Any, is_given: bool) -> float | None:
+    """The weight [N] of the displaced water; None after noting a fault."""
+    if not is_given:
+        faults.positive("density", "not given", "kg/m3 (with volume)")
+    values = [faults.positive("volume", volume, "m3"), density, Faults().number("gravity", gravity, least=0.0)]
+    return None if None in values else float(np.prod(np.array(values, dtype=float)))
 
 
 def matrix_6(faults: Faults, key: str, value: Any) -> np.ndarray:

@@ -15,12 +15,13 @@ from lgvi_warp import invariants, notation, saveat
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.method import Method
+from lgvi_warp.outcomes import stop_time
 from lgvi_warp.plan import Plan
 from lgvi_warp.result import Result
 from lgvi_warp.saveat import FIELDS, TimeGrid
 from lgvi_warp.scene import Scene
 from lgvi_warp.solving import run_plan
-from lgvi_warp.status import Status
+from lgvi_warp.status import failed as failed_members
 
 # What errors are of, with their units. Attitude is the angle between the two.
 QUANTITIES = {"position": "m", "attitude": "rad", "velocity": "m/s", "angular_velocity": "rad/s", "energy": "J"}
@@ -146,8 +147,7 @@ class Sample:
 
 def failed(result: Result) -> bool:
     """Whether some member failed, events not counted."""
-    status = np.asarray(result.status)
-    return bool(np.any((status != Status.OK) & (status < Status.SURFACE)))
+    return bool(failed_members(result.status).any())
 
 
 def distances(result: Result, reference: Result) -> dict[str, np.ndarray]:
@@ -158,9 +158,7 @@ def distances(result: Result, reference: Result) -> dict[str, np.ndarray]:
     chord = np.linalg.norm(np.subtract(*pairs["attitude"]), axis=(-2, -1))
     found["attitude"] = 2.0 * np.arcsin(np.minimum(chord / math.sqrt(8.0), 1.0))
     found["energy"] = np.abs(result.energy - reference.energy)
-    stop = np.fmin(result.failure_time, reference.failure_time)
-    with np.errstate(invalid="ignore"):
-        gone = reference.time[:, None] >= stop
+    gone = reference.time[:, None] >= np.minimum(stop_time(result), stop_time(reference))
     return {name: np.where(gone, np.nan, found[name]) for name in QUANTITIES}
 
 

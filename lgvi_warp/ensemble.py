@@ -264,7 +264,7 @@ class Ensemble:
     def _look_at(self, varied: set[str], first: int, stop: int) -> dict[str, _Unphysical]:
         with np.errstate(over="ignore", invalid="ignore"):
             p = self.parameters(first, stop)
-            checks = _vehicle_checks(p, varied)
+            checks = _vehicle_checks(p, varied, self.scene.vehicle.inertia_tolerance)
             for one in (*self.scene.terms, *self.scene.events):
                 own = self.own(one, p)
                 if any(f"{one.key}.{name}" in varied for name in own):
@@ -400,8 +400,8 @@ def _is_name(name: Any) -> bool:
     return isinstance(name, str) or (isinstance(name, tuple) and all(isinstance(one, str) for one in name))
 
 
-def _vehicle_checks(p: Mapping[str, np.ndarray], varied: set[str]) -> dict[str, np.ndarray]:
-    """Name -> (n,), which members' numbers of vehicle and environment are unphysical."""
+def _vehicle_checks(p: Mapping[str, np.ndarray], varied: set[str], tolerance: float) -> dict[str, np.ndarray]:
+    """Name -> (n,), which members' numbers of vehicle and environment are unphysical. tolerance: see Vehicle."""
     checks: dict[str, np.ndarray] = {}
     if "vehicle.mass" in p:
         mass = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
@@ -415,7 +415,7 @@ def _vehicle_checks(p: Mapping[str, np.ndarray], varied: set[str]) -> dict[str, 
         rigid, added = "vehicle.rigid_body_mass_matrix", "vehicle.added_mass_matrix"
         good = _positive_definite(p[rigid])
         possible = np.where(good[:, None, None], p[rigid], np.eye(6))
-        bad = ~good | vehicles.impossible(possible)
+        bad = ~good | vehicles.impossible(possible, tolerance)
         checks |= {rigid: bad, f"{rigid} + {added}": ~_positive_definite(p[rigid] + p[added])}
     for key in ("vehicle.center_of_buoyancy", "vehicle.center_of_gravity"):
         if key in p:

@@ -39,6 +39,24 @@ class Interrupted(KeyboardInterrupt):
         self.result = result
 
 
+class NothingToDraw(ValueError):  # noqa: N818
+    """A picture that would be empty: the message says why."""
+
+
+class MissingExtra(ImportError):  # noqa: N818
+    """A library that is not installed, of one of the package's extras.
+
+    Args:
+        what: What needs it, as "plots".
+        library: Its name as pip knows it.
+        extra: The extra of lgvi-warp that brings it.
+    """
+
+    def __init__(self, what: str, library: str, extra: str):
+        super().__init__(f"{what} need {library}: pip install 'lgvi-warp[{extra}]'", name=library)
+        self.library, self.extra = library, extra
+
+
 def closest(word: str, known: Iterable[str]) -> str:
     """ "did you mean ..." or the list of what is known."""
     names = [str(name) for name in known]

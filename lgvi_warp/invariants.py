@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lgvi_warp import terms, vehicle
+from lgvi_warp.outcomes import under_way
+from lgvi_warp.status import failed
+from lgvi_warp.terms.base import CONSERVED, Term
 
 if TYPE_CHECKING:
     from lgvi_warp.result import Result
@@ -86,18 +89,47 @@ def energy_growth(result: Result, *, dissipative: bool = False) -> np.ndarray:
     return np.where(np.isfinite(total).all(axis=0), growth, np.inf)
 
 
-def drift(result: Result) -> dict[str, float]:
-    """Largest change over times and members of what every scene of weight and buoyancy conserves.
+def _present(result: Result) -> tuple[Term, ...]:
+    """The terms that some member of a result feels."""
+    return (*terms.IMPLIED, *(term for term in result.terms if term.present(result.own(term))))
 
-    energy [J]; horizontal linear momentum [N s]; vertical angular momentum [N m s]. Members that failed are left out;
-    NaN if none is left.
+
+def conserved(result: Result) -> frozenset[str]:
+    """What the laws of a result's scene conserve, as each term says itself (`Term.conserves`).
+
+    Args:
+        result: Of a run; its parameters say which terms are felt.
+
+    Returns:
+        Those of "energy", "horizontal_momentum" and "vertical_angular_momentum" that every term keeps.
     """
-    good = np.asarray(result.status) == 0
+    return CONSERVED.intersection(*(term.conserves for term in _present(result)))
+
+
+def at_work(result: Result) -> tuple[str, ...]:
+    """Keys of the terms that give or take energy: drag, thrust, noise, moving water and the like; () where none does."""
+    return tuple(term.key for term in _present(result) if "energy" not in term.conserves)
+
+
+def drift(result: Result) -> dict[str, float]:
+    """Largest change of energy and momenta, over the times that each member was under way.
+
+    What of it is an error, and what the work of forces, `conserved` tells.
+
+    Args:
+        result: Of a run, with all four fields of the state.
+
+    Returns:
+        energy [J], horizontal_momentum [N s] and vertical_angular_momentum [N m s]: the largest over times and members.
+        Members that failed are left out; NaN where none is left.
+    """
+    good = ~failed(result.status)
     if not good.any():
-        return {"energy": np.nan, "horizontal_momentum": np.nan, "vertical_angular_momentum": np.nan}
+        return dict.fromkeys(sorted(CONSERVED), np.nan)
     changes = {
         "energy": result.energy,
         "horizontal_momentum": linear_momentum(result)[..., :2],
         "vertical_angular_momentum": angular_momentum(result)[..., 2],
     }
-    return {name: float(np.abs(values - values[:1])[:, good].max()) for name, values in changes.items()}
+    counted = under_way(result)[:, good]
+    return {name: float(np.abs(values - values[:1])[:, good][counted].max()) for name, values in changes.items()}

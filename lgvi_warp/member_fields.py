@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp.status import Status, Warnings
+from lgvi_warp.status import Status, Warnings, stopped
 
 if TYPE_CHECKING:
     from lgvi_warp.packets import Outcome
@@ -30,14 +30,13 @@ class MemberField:
 
 
 def _failure_time(plan: Plan, outcome: Outcome) -> np.ndarray:
-    """The time of the last good state; an event's size is the part of its step that was made before it."""
-    steps = outcome.failed_step + np.where(outcome.status >= Status.SURFACE, outcome.failed_size, 0.0)
-    return np.where(outcome.status != 0, steps * plan.grid.h, np.nan)
+    """The time of the last good state, for an event its own; NaN where there was neither."""
+    return np.where(outcome.status != 0, outcome.end_time(plan), np.nan)
 
 
 def _failure_value(plan: Plan, outcome: Outcome) -> np.ndarray:
     """What crossed its limit; 0 for an event."""
-    size = np.where(outcome.status >= Status.SURFACE, 0.0, outcome.failed_size)
+    size = np.where(stopped(outcome.status), 0.0, outcome.failed_size)
     return np.where(outcome.status != 0, size, np.nan)
 
 

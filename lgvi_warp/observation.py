@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -10,12 +10,14 @@ import numpy as np
 
 from lgvi_warp import statistics as kinds
 from lgvi_warp.errors import Faults, SceneError
+from lgvi_warp.events import Event
 from lgvi_warp.saveat import FIELDS
 from lgvi_warp.scene import check_keep
 from lgvi_warp.statistics import Estimate, Estimates, Quantity, Statistic
+from lgvi_warp.statistics.ends import check_outcomes, outcomes
 from lgvi_warp.statistics.keeper import Gathered
 from lgvi_warp.statistics.until import Until, Watch, from_dict, watch
-from lgvi_warp.status import Status
+from lgvi_warp.status import failed, stopped
 
 # Samplings whose means are at least as close as those of independent members.
 EVENLY_SPREAD = ("latin_hypercube", "sobol", "halton")
@@ -65,7 +67,7 @@ class Observation:
     def again(self, status: np.ndarray) -> np.ndarray:
         """Indices of the members to be run again for their samples, of those whose status is given."""
         if isinstance(self.keep, str):
-            return np.flatnonzero(_failed(status)) if self.keep == "failed" else np.empty(0, np.int64)
+            return np.flatnonzero(failed(status)) if self.keep == "failed" else np.empty(0, np.int64)
         return np.array([i for i in self.keep if i < len(status)], dtype=np.int64)
 
     def to_dict(self) -> dict[str, Any]:
@@ -137,7 +139,7 @@ class Observing:
     def read(self, ensemble: Mapping[str, Any], status: np.ndarray) -> tuple[Estimates, tuple[str, ...]]:
         """(statistics, what the user should know of them); ensemble: its provenance; status: of the members that ran."""
         estimates, members = self._gathered.result() if self._gathered else Estimates(), len(status)
-        said = notes(estimates, ensemble, status)
+        said = notes(estimates, ensemble, status, self._gathered.apart if self._gathered else ())
         return estimates, said + ((self._watch.report(members, self._watched()),) if self._watch else ())
 
 
@@ -146,14 +148,23 @@ def watch_fields(until: Until, statistics: Sequence[Statistic]) -> tuple[str, ..
     return watch(Until(until.statistic, until.half_width), statistics, np.zeros(1)).statistic.quantity.fields
 
 
-def observe(plan_members: int, settings: Any, given: Any, keep: Any, until: Any) -> Observation:
-    """From the arguments of solve, and from the scene's [run] for those that are None. Raises SceneError."""
+def observe(
+    plan_members: int, settings: Any, given: Any, keep: Any, until: Any, events: Sequence[Event] = ()
+) -> Observation:
+    """From the arguments of solve, and from the scene's [run] for those that are None. Raises SceneError.
+
+    events: those of the scene.
+    """
     faults = Faults()
     found: tuple[Statistic, ...] = ()
     stop: Until | None = None
     keep = settings.keep if keep is None else keep
     with faults.including():
         found = kinds.from_list(settings.statistics if given is None else given)
+    known = outcomes([one.key for one in events], [one.status for one in events])
+    for one in found:
+        with faults.including():
+            check_outcomes(f"{one.type}.{'at' if one.at else 'of'}", one.outcomes, known)
     with faults.including():
         asked = settings.until if until is None else until
         stop = None if asked is None or asked is False else from_dict(asked)
@@ -166,11 +177,16 @@ def observe(plan_members: int, settings: Any, given: Any, keep: Any, until: Any)
     return Observation(found, chosen, stop)
 
 
-def notes(estimates: Mapping[str, Estimate], ensemble: Mapping[str, Any], status: np.ndarray) -> tuple[str, ...]:
-    """What a user should know of his statistics; ensemble: its provenance; status: of the members that ran."""
+def notes(
+    estimates: Mapping[str, Estimate], ensemble: Mapping[str, Any], status: np.ndarray, apart: Collection[str] = ()
+) -> tuple[str, ...]:
+    """What a user should know of his statistics; ensemble: its provenance; status: of the members that ran.
+
+    apart: names of estimates that are not of all members on purpose.
+    """
     if not estimates:
         return ()
-    members, found = len(status), _left_out(estimates, status)
+    members, found = len(status), _left_out(estimates, status, apart)
     sampling, R = ensemble.get("sampling", "random"), replicates_of(ensemble)
     kind = sampling if isinstance(sampling, str) else next(iter(sampling))
     if R > 1:
@@ -188,24 +204,23 @@ def notes(estimates: Mapping[str, Estimate], ensemble: Mapping[str, Any], status
     return found
 
 
-def _left_out(estimates: Mapping[str, Estimate], status: np.ndarray) -> tuple[str, ...]:
-    """That some members do not count, and why; first passages tell of theirs as lost."""
+def _left_out(estimates: Mapping[str, Estimate], status: np.ndarray, apart: Collection[str]) -> tuple[str, ...]:
+    """That some members do not count, and why; first passages tell of theirs as lost.
+
+    apart: names of estimates that are not of all members on purpose.
+    """
     members = len(status)
-    count = {one: int(one.count.min()) for one in estimates.values() if one.settings["type"] != "first_passage"}
+    of_all = (one for one in estimates.values() if one.name not in apart and one.settings["type"] != "first_passage")
+    count = {one: int(one.count.min()) for one in of_all}
     fewer = [one for one, number in count.items() if number < members]
     if not fewer:
         return ()
-    failed, ended = int(_failed(status).sum()), int((status >= Status.SURFACE).sum())
+    failures, ended = int(failed(status).sum()), int(stopped(status).sum())
     out = {one: ended if one.settings.get("stopped") == "left_out" else 0 for one in fewer}
-    why = [f"{failed} members from their failure on"] if failed else []
+    why = [f"{failures} members from their failure on"] if failures else []
     if any(out.values()):
         why += [f'{ended} members from the event on that stopped them (stopped = "left_out")']
-    if any(count[one] < members - failed - out[one] for one in fewer):
+    if any(count[one] < members - failures - out[one] for one in fewer):
         why += ["members where a number of theirs is not finite"]
     text = f"statistics leave out {', and '.join(why)}: {min(count.values())} of {members} count where fewest do"
     return (f"{text} (count of each statistic)",)
-
-
-def _failed(status: np.ndarray) -> np.ndarray:
-    """Which members failed: an event's end is no failure."""
-    return np.asarray((status != 0) & (status < Status.SURFACE))

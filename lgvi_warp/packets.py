@@ -10,6 +10,7 @@ import numpy as np
 import warp as wp
 
 from lgvi_kernels.collocation import SLOPE_FIELDS
+from lgvi_kernels.events import FIRST
 from lgvi_kernels.lanes import int_lane
 from lgvi_kernels.monitor import ENERGY_FIELDS
 from lgvi_kernels.rows import PACE_FIELDS, STATE_FIELDS
@@ -20,7 +21,7 @@ from lgvi_warp.events import Event
 from lgvi_warp.kernel_cache import build_lock
 from lgvi_warp.machine import DTYPES
 from lgvi_warp.plan import Plan
-from lgvi_warp.status import Status
+from lgvi_warp.statistics.ends import Ends
 from lgvi_warp.survey import frame_of
 from lgvi_warp.terms.base import Packed, Setting
 from lgvi_warp.terms.drag import Drag
@@ -31,7 +32,7 @@ class Outcome:
     """What a block's members came to: arrays over its members. chosen: steps made and tried (count, 2), where they choose.
 
     warnings: bits of Warnings; warning_step, warning_value: steps made and value at the first crossing of the most serious
-    one. substeps: steps that were divided.
+    one. substeps: steps that were divided. event: the number of the event that stopped a member, from 1; 0 for none.
     """
 
     status: np.ndarray
@@ -42,6 +43,7 @@ class Outcome:
     warning_step: np.ndarray
     warning_value: np.ndarray
     substeps: np.ndarray
+    event: np.ndarray
 
     @classmethod
     def clear(cls, members: int, paces: int = 0) -> Outcome:
@@ -56,7 +58,19 @@ class Outcome:
             warning_step=steps(),
             warning_value=values(),
             substeps=steps(),
+            event=np.zeros(members, np.uint8),
         )
+
+    def end_time(self, plan: Plan) -> np.ndarray:
+        """(n,) [s], until when each member went on: its event, its failure, or the end of the run."""
+        # An event's size is the part of its step that was made before it.
+        part = np.where(self.event != 0, self.failed_size, 0.0)
+        return np.where(self.status != 0, (self.failed_step + part) * plan.grid.h, plan.grid.times[-1])
+
+    def ends(self, plan: Plan) -> Ends:
+        """How and when the members ended, for statistics."""
+        events = tuple(one.key for one in plan.ensemble.scene.events)
+        return Ends(self.status, self.event, self.end_time(plan), events)
 
 
 def pack(values: np.ndarray, width: int) -> np.ndarray:
@@ -88,9 +102,9 @@ class Packets:
         self.scale = self.frame.J.max(axis=1)
         if not plan.spec.scaled:
             self.scale = np.ones_like(self.scale)
-        width, Lane = plan.spec.width, plan.advance.Lane
+        width, Lane = plan.spec.width, plan.advance.types.Lane
         self.count = -(-members.count // width)
-        Inertia, Params, Events = plan.advance.Inertia, plan.advance.Params, plan.advance.Events
+        Inertia, Params, Events = plan.advance.types.Inertia, plan.advance.types.Params, plan.advance.types.Events
         setting = Setting(
             members.parameters, self.frame, members.indices, members.seed, plan.grid.h, plan.model.aligned
         )
@@ -114,10 +128,10 @@ class Packets:
 
     def _monitor(self) -> Any:
         """What the kernel compares with now and then, and where it notes what it saw."""
-        plan, monitor = self.plan, self.plan.advance.Monitor()
-        Lane, Ints = plan.advance.Lane, int_lane(plan.spec.width)
+        plan, monitor = self.plan, self.plan.advance.types.Monitor()
+        Lane, Ints = plan.advance.types.Lane, int_lane(plan.spec.width)
         if plan.spec.looks:
-            monitor.limits = _structs(self._limits(), plan.advance.Limits)
+            monitor.limits = _structs(self._limits(), plan.advance.types.Limits)
             for name, kind in (("warned", Ints), ("warned_step", Ints), ("warned_size", Lane)):
                 setattr(monitor, name, wp.zeros(self.count, dtype=kind, device="cpu"))
         if plan.spec.energy:
@@ -126,6 +140,8 @@ class Packets:
             monitor.backward = -plan.grid.h * min(0.0, *plan.method.stages)
         if plan.spec.substep:
             monitor.substeps = wp.zeros(self.count, dtype=Ints, device="cpu")
+        if plan.spec.still:
+            monitor.still = wp.zeros((self.count, 3), dtype=Lane, device="cpu")
         return monitor
 
     def _limits(self) -> np.ndarray:
@@ -319,7 +335,7 @@ class Packets:
         width = plan.spec.width
         shape = (self.count, max(1, (s1 - s0) * numbers))
         if self.out is None or self.out.shape != shape:
-            self.out = wp.empty(shape, dtype=plan.advance.Lane, device="cpu")
+            self.out = wp.empty(shape, dtype=plan.advance.types.Lane, device="cpu")
         real, dtype = plan.spec.real, plan.dtype
         stage_h, lead_h, sample_step = plan.times
         inputs = [self.inertia, self.params, self.events, self.table]
@@ -336,10 +352,12 @@ class Packets:
         m = self.members.count
         kept = PACE_FIELDS if self.plan.method.adaptive else 0
         pace = self.state.numpy()[:, STATE_FIELDS + 2 : STATE_FIELDS + kept]
-        status = self.status.numpy().reshape(-1)[:m].astype(np.uint8)
-        for number, (event, _) in reversed(list(enumerate(self.plan.model.events))):
+        code = self._of_members(self.status, np.uint8)
+        status, stopped_by = code.copy(), np.zeros(m, np.uint8)
+        for number, (event, _) in enumerate(self.plan.model.events):
             assert isinstance(event, Event)
-            status[self.status.numpy().reshape(-1)[:m] == Status.SURFACE + number] = event.status
+            stopped = code == FIRST + number
+            status[stopped], stopped_by[stopped] = event.status, 1 + number
         return Outcome(
             status,
             self.failed_step.numpy().reshape(-1)[:m].astype(np.int64),
@@ -347,6 +365,7 @@ class Packets:
             pace.transpose(0, 2, 1).reshape(self.count * self.plan.spec.width, pace.shape[1])[:m].astype(np.int64),
             *self._warnings(),
             self._of_members(self.monitor.substeps, np.int64) if self.plan.spec.substep else np.zeros(m, np.int64),
+            stopped_by,
         )
 
     def _of_members(self, lanes: Any, kind: Any) -> np.ndarray:

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from lgvi_kernels.advance import CHUNK, Advance, Spec, make_advance
+from lgvi_kernels.advance.kernel import Advance, make_advance
+from lgvi_kernels.advance.spec import CHUNK, Spec
 from lgvi_kernels.explicit import Explicit
 from lgvi_kernels.lanes import WIDTHS
 from lgvi_kernels.rows import SAMPLE_FIELDS
@@ -236,7 +237,12 @@ class Plan:
     @functools.cached_property
     def dtypes(self) -> tuple[np.dtype, ...]:
         """NumPy's types of the kernel's Inertia, Params, Events and Limits."""
-        types = (self.advance.Inertia, self.advance.Params, self.advance.Events, self.advance.Limits)
+        types = (
+            self.advance.types.Inertia,
+            self.advance.types.Params,
+            self.advance.types.Events,
+            self.advance.types.Limits,
+        )
         return tuple(np.dtype(one.numpy_dtype()) for one in types)
 
     @functools.cached_property

@@ -102,8 +102,9 @@ def predict(
     from lgvi_warp.solving import make_plan, settled
 
     ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
-    asked = [settings.pop(name, None) for name in ("statistics", "keep", "until")]
-    observed = observe(ensemble.members, ensemble.scene.run, *asked)
+    statistics, keep, until = (settings.pop(name, None) for name in ("statistics", "keep", "until"))
+    scene = ensemble.scene
+    observed = observe(ensemble.members, scene.run, statistics, keep, until, scene.events)
     fields = (settings.get("save") or SaveAt()).fields
     plan = make_plan(ensemble, **settings, fields=observed.fields)
     compile_seconds = plan.compile()

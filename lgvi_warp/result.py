@@ -39,6 +39,8 @@ MEANINGS = {
     "energy": "kinetic and potential energy",
 }
 
+END_TIME = {"units": "s", "long_name": "time of the event or of the failure of a member, or the end of the run"}
+
 
 @dataclass(frozen=True, eq=False)
 class Result:
@@ -48,9 +50,10 @@ class Result:
 
     time: (k,) [s]. samples: the fields that were kept, by name (also attributes: position (k, n, 3) [m, inertial],
     attitude (k, n, 3, 3) body to inertial, velocity (k, n, 3) [m/s, body], angular_velocity (k, n, 3) [rad/s, body]).
-    status: (n,), see Status; failure_time: (n,) [s], the time of the last good state, for an event its own
-    time, interpolated within the step; NaN where there was neither. failure_value: (n,), the |J^-1 a| or relative residual
-    that crossed its limit (psi_x: half the angle of its turns), 0 for a non-finite state and for an event.
+    status: (n,), see Status. A member that an event stopped stands at it from then on. failure_time: (n,) [s], the time of
+    the last good state, for an event its own time; NaN where there was neither; end_time: the same, and the end of the
+    run. failure_value: (n,), the |J^-1 a| or relative residual that crossed its limit (psi_x: half the angle of its turns),
+    0 for a non-finite state and for an event.
     warnings: (n,), bits of Warnings; warning_time (n,) [s] and warning_value (n,): when a member's most serious warning was
     first seen (0 for one that its start gives), and the value then; NaN without. Motion is looked at once in 128 steps and at
     the end, with checks="all" only. substeps: (n,), steps that were divided (on_failure="substep").
@@ -118,6 +121,14 @@ class Result:
         """(k, n) [J], kinetic and potential energy, float64."""
         return invariants.energy(self)
 
+    @property
+    def end_time(self) -> np.ndarray:
+        """(n,) [s], until when each member went on: its event, its failure, or the end of the run.
+
+        With `status` these are the times and the kinds of what survival analysis is of.
+        """
+        return np.where(np.isnan(self.failure_time), self.time[-1], self.failure_time)
+
     def own(self, term: Term) -> dict[str, np.ndarray]:
         """A term's numbers, by field, with a leading dimension of 1 or n."""
         return {name: self.parameters[f"{term.key}.{name}"] for name in term.parameters()}
@@ -162,6 +173,7 @@ class Result:
             data[name] = (("time", "realization", *dims.get(values.ndim - 2, ())), values, attributes)
         for one in self._member_fields():
             data[one.name] = (("realization",), np.asarray(getattr(self, one.name)), one.attributes)
+        data["end_time"] = (("realization",), self.end_time, END_TIME)
         coordinates = {"time": ("time", self.time, {"units": "s", "long_name": "time since the start"})}
         attributes = {"Conventions": "CF-1.11", "provenance": json.dumps(self.provenance)}
         return xr.Dataset(data, coordinates, attributes)

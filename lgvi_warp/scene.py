@@ -129,7 +129,7 @@ KEEP = ("all", "none", "failed")
 
 
 def check_keep(faults: Faults, key: str, keep: Any, members: int | None = None) -> None:
-    """Which members' samples to keep: all, none, those that failed, or indices below the number of members."""
+    """Which members' samples to keep: all, none, those that failed (not those that an event stopped), or some by index."""
     if isinstance(keep, str):
         faults.choice(key, keep, KEEP)
         return

@@ -20,6 +20,7 @@ from lgvi_warp.keepers import Outcomes, Samples
 from lgvi_warp.kept import KeptRun
 from lgvi_warp.method import Method
 from lgvi_warp.observation import Observation, Observing, observe
+from lgvi_warp.outcomes import failure_text
 from lgvi_warp.plan import Plan
 from lgvi_warp.recipe import of_store
 from lgvi_warp.result import Drawn, Result
@@ -27,7 +28,7 @@ from lgvi_warp.running import Merged, Progress, Stored, run_blocks
 from lgvi_warp.saveat import FIELDS, SaveAt, time_grid
 from lgvi_warp.scene import Scene
 from lgvi_warp.statistics.estimate import Estimates
-from lgvi_warp.status import Status, failure_text
+from lgvi_warp.status import Status
 from lgvi_warp.store import Folder, Store
 from lgvi_warp.stored import result_of
 
@@ -69,7 +70,8 @@ def solve(
     progress: called with the fraction of the work that is done, from the threads that do it.
     statistics: gathered over the members at every sample time while the run goes: lw.Mean("position"), ...; they are
     in result.statistics. keep: "all" samples of members (default); "none", so that memory grows with neither members nor
-    steps; "failed", or indices of members: those are run again after the run, to the same bits, and are result.kept.
+    steps; "failed" (not those that an event stopped), or indices of members: those are run again after the run, to the same
+    bits, and are result.kept.
     until: lw.Until(...), to stop before the last member, once a statistic's interval is narrow enough; False: never, whatever
     the scene says (statistics=() likewise gathers none).
     store: a folder "runs/x/run.zarr", or a Store with more settings: samples go there block by block and not into memory,
@@ -89,7 +91,7 @@ def solve(
     faults = Faults()
     observed, runner = Observation(), None
     with faults.including():
-        observed = observe(ensemble.members, ensemble.scene.run, statistics, keep, until)
+        observed = observe(ensemble.members, ensemble.scene.run, statistics, keep, until, ensemble.scene.events)
     with faults.including():
         runner = executor_of(executor, threads, scheduler)
     if only is not None and store is None:

@@ -34,7 +34,7 @@ from lgvi_warp.stability_runs import (
     refusals,
     run_method,
 )
-from lgvi_warp.status import Status
+from lgvi_warp.status import Status, failed, stopped
 from lgvi_warp.tables import write_csv
 from lgvi_warp.tradeoffs import _finite, check_of, chosen_methods
 
@@ -312,8 +312,7 @@ def _worst(grid: Grid, values: np.ndarray) -> np.ndarray:
 
 def _worst_status(grid: Grid, status: np.ndarray) -> np.ndarray:
     """(ny, nx): what the program refused before failures, those before events, and the latter before OK."""
-    event = (status >= Status.SURFACE) & (status < REFUSED)
-    rank = np.where(event, status - 500, np.where(status == Status.OK, -1000, status)).reshape(grid.shape)
+    rank = np.where(stopped(status), status - 500, np.where(status == Status.OK, -1000, status)).reshape(grid.shape)
     chosen = np.argmax(rank, axis=2)[:, :, None]
     return np.take_along_axis(status.reshape(grid.shape), chosen, axis=2)[:, :, 0]
 
@@ -321,7 +320,7 @@ def _worst_status(grid: Grid, status: np.ndarray) -> np.ndarray:
 def cells_of(one: Found, verified: np.ndarray, error: float, energy_bound: float) -> np.ndarray:
     """The class of every member."""
     unbounded = ~(one.growth / energy_bound <= 1.0)
-    flagged = one.warned | ((one.status != Status.OK) & ((one.status < Status.SURFACE) | (one.status == REFUSED)))
+    flagged = one.warned | failed(one.status)
     accurate = verified & (one.error <= error)
     quiet = np.where(accurate, Cell.ACCURATE, Cell.BOUNDED)
     return np.where(unbounded, np.where(flagged, Cell.FAILED, Cell.SILENT), np.where(flagged, Cell.FLAGGED, quiet))

@@ -14,12 +14,13 @@ from lgvi_warp import comparison, invariants, plan
 from lgvi_warp.comparison import PRECISE
 from lgvi_warp.errors import SceneError
 from lgvi_warp.method import Method
+from lgvi_warp.outcomes import stop_time
 from lgvi_warp.plan import Plan
 from lgvi_warp.result import Result
 from lgvi_warp.saveat import FIELDS, TimeGrid
 from lgvi_warp.solving import run_plan
 from lgvi_warp.stability_grid import Grid
-from lgvi_warp.status import Status
+from lgvi_warp.status import Status, failed
 
 # Times that errors are taken at, and that energies are looked at.
 ERROR_SAMPLES, ENERGY_SAMPLES = 8, 64
@@ -163,7 +164,7 @@ def _reference(grid: Grid, column: Column, names: tuple[str, str], rates: np.nda
                 a, b = (run_plan(plan_of(grid, members, name, column.grid(k, whole=False), "float64"), 1)
                         for name, k in zip(names, (finer, math.ceil(1.5 * finer)), strict=True))  # fmt: skip
                 apart = comparison.distances(a, b)[of]
-                good = ~failed_members(a) & ~failed_members(b) & np.isfinite(b.attitude).all(axis=(0, 2, 3))
+                good = ~failed(a.status) & ~failed(b.status) & np.isfinite(b.attitude).all(axis=(0, 2, 3))
                 good &= np.max(np.nan_to_num(apart, posinf=np.inf), axis=0) <= goal
         except SceneError:
             # Too long for a stage that goes backward.
@@ -175,12 +176,6 @@ def _reference(grid: Grid, column: Column, names: tuple[str, str], rates: np.nda
         finer *= 2
         if len(open_) == 0:
             break
-
-
-def failed_members(result: Result) -> np.ndarray:
-    """Which members got a status that is no event's."""
-    status = np.asarray(result.status)
-    return np.asarray((status != Status.OK) & (status < Status.SURFACE))
 
 
 def _joined(whole: Result | None, part: Result, at: np.ndarray) -> Result:
@@ -239,8 +234,8 @@ def _judge(result: Result, column: Column, at: np.ndarray, found: Found, of: str
         reference = comparison.part(column.reference, at.tolist())
         apart = comparison.distances(_at_times(result, early), reference)[of]
         # Beyond an event there is no error; a member that was frozen has none at all.
-        stopped = np.isfinite(np.fmin(result.failure_time, reference.failure_time))
-        lost = failed_members(result) | (np.isnan(apart).any(axis=0) & ~stopped)
+        stopped = np.isfinite(np.minimum(stop_time(result), stop_time(reference)))
+        lost = failed(result.status) | (np.isnan(apart).any(axis=0) & ~stopped)
         largest = np.max(np.nan_to_num(apart, posinf=np.inf), axis=0)
         found.error[members] = np.where(lost, np.inf, largest)
         if judged == "driven":

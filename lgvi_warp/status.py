@@ -69,6 +69,16 @@ _TEXT = {
 class StatusArray(np.ndarray):
     """Status of each member, shape (n,), uint8: compares with `Status` members; `counts()` sums up."""
 
+    @property
+    def failed(self) -> np.ndarray:
+        """(n,), which members failed: neither got to the end nor were stopped by an event."""
+        return failed(self)
+
+    @property
+    def stopped(self) -> np.ndarray:
+        """(n,), which members an event of the scene stopped: an outcome, no failure."""
+        return stopped(self)
+
     def counts(self) -> dict[str, int]:
         """Members by status name, those that occur, the most serious last."""
         values, numbers = np.unique(np.asarray(self), return_counts=True)
@@ -140,16 +150,28 @@ _WARNING_VALUE = {
 }
 
 
-def failure_text(result: Any) -> str:
-    """Counts of the members that failed, by status, with the first of each, its time and the remedy; "" without any."""
-    lines = []
-    for code in Status:
-        members = np.flatnonzero(np.asarray(result.status) == code)
-        if code and not code.stopped and len(members):
-            first = int(members[0])
-            when = f"first: member {first} at {result.failure_time[first]:g} s, value {result.failure_value[first]:.4g}"
-            lines.append(f"{code.name.lower()}, {len(members):,} of {result.members:,} members ({when}): {code.text}")
-    return "\n".join(lines)
+def stopped(status: Any) -> np.ndarray:
+    """Which members an event of the scene stopped: an outcome, no failure.
+
+    Args:
+        status: (n,), codes of `Status`.
+
+    Returns:
+        (n,), bool.
+    """
+    return np.isin(np.asarray(status), [code for code in Status if code.stopped])
+
+
+def failed(status: Any) -> np.ndarray:
+    """Which members failed: neither got to the end nor were stopped by an event.
+
+    Args:
+        status: (n,), codes of `Status`.
+
+    Returns:
+        (n,), bool.
+    """
+    return np.asarray((np.asarray(status) != Status.OK) & ~stopped(status))
 
 
 class WarningArray(np.ndarray):

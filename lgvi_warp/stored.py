@@ -14,7 +14,7 @@ from lgvi_warp import durable
 from lgvi_warp.errors import SceneError
 from lgvi_warp.kept import keep_of, members_kept
 from lgvi_warp.observation import Observation, Observing, observation_of, replicates_of
-from lgvi_warp.result import UNITS, Result
+from lgvi_warp.result import END_TIME, UNITS, Result
 from lgvi_warp.statistics.estimate import Estimates
 from lgvi_warp.store import KEPT, Folder, Sink, name_of, read_marker
 from lgvi_warp.store_layout import KEPT_MEMBER, MEMBER
@@ -224,4 +224,7 @@ def dataset(path: Path) -> xarray.Dataset:
         whole = whole.swap_dims({KEPT_MEMBER: MEMBER})
     if "chosen" in whole:
         whole = whole.isel(realization=np.flatnonzero(whole.chosen.values))
+    if "failure_time" in whole:
+        ends = whole.failure_time.fillna(whole.time[-1]).drop_vars("time", errors="ignore")
+        whole = whole.assign(end_time=ends.assign_attrs(END_TIME))
     return whole.isel(realization=slice(0, whole.attrs["members"])) if "members" in whole.attrs else whole

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp import comparison
+from lgvi_warp import comparison, invariants
 from lgvi_warp.comparison import QUANTITIES, Growth, Reference, Sample, Setting
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
@@ -51,8 +51,9 @@ class Measurement:
 
     us_per_vehicle_second: microseconds of one core per vehicle and simulated second, without compiling. compile_seconds:
     to load its kernel, once a process. errors: quantity -> end_max, end_rms, path_max, path_rms, over the members, in
-    comparison.QUANTITIES' units; empty where a member failed or noise acts. energy_drift: largest |E(t) - E(0)| [J], of use
-    where nothing takes or gives energy. biases: see comparison.biases. trusted: whether the reference is ten times better.
+    comparison.QUANTITIES' units; empty where a member failed or noise acts. energy_drift: largest |E(t) - E(0)| [J], NaN
+    where a force of the scene takes or gives energy. biases: see comparison.biases. trusted: whether the reference is ten
+    times better.
     """
 
     setting: Setting
@@ -405,7 +406,8 @@ def measurements(
         limits = {of: reference.error(of, until) for of in QUANTITIES} if reference else {}
         with np.errstate(all="ignore"):
             biases = comparison.biases(one.result, finest)
-            drift = float(np.nanmax(np.abs(one.result.energy - one.result.energy[:1])))
+            kept = "energy" in invariants.conserved(one.result)
+            drift = invariants.drift(one.result)["energy"] if kept else math.nan
         found.append(
             Measurement(
                 setting=one.setting,
@@ -435,16 +437,17 @@ def report_text(found: Tradeoff) -> str:
     if found.refused:
         lines.append(f"refused     {', '.join(found.refused)} (why: tradeoff.json)")
     front = found.front()
+    kept = any(np.isfinite(one.energy_drift) for one in front)
     if front:
-        header = ("us/vehicle/s", "method", "precision", "step [s]", f"{found.of} [{unit}]", "rms",
-                  "energy drift [J]")  # fmt: skip
+        header = ("us/vehicle/s", "method", "precision", "step [s]", f"{found.of} [{unit}]", "rms")
+        heads = "{:>12}  {:<18}{:<20}{:>10}{:>15}{:>10}".format(*header)
         lines += ["", f"Cheapest settings for each error ({found.of}, largest over members and path):",
-                  "{:>12}  {:<18}{:<20}{:>10}{:>15}{:>10}{:>18}".format(*header)]  # fmt: skip
+                  heads + ("{:>18}".format("energy drift [J]") if kept else "")]  # fmt: skip
     for one in front:
         s = one.setting
         lines.append(f"{one.us_per_vehicle_second:>12.3g}  {s.name:<18}{s.dtype:<20}{s.h:>10.4g}"
                      f"{one.error(found.of):>15.1e}{one.error(found.of, 'path_rms'):>10.1e}"
-                     f"{one.energy_drift:>18.1e}")  # fmt: skip
+                     + (f"{one.energy_drift:>18.1e}" if kept else ""))  # fmt: skip
     return "\n".join([*lines, *bias_lines(found)])
 
 

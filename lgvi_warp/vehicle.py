@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -36,7 +36,14 @@ UNITS = {
 }
 # The least mass or inertia: what is smaller has no inverse in float64.
 LEAST = float(np.finfo(np.float64).tiny)
+# By what part of the third two principal inertias of a rigid body may sum to less than it: round-off; and as far as
+# published ones miss it (those of the ECA A9 by 0.126).
+ROUND_OFF, LITTLE = 1e-6, 0.15
 SYMMETRIC = ("added_mass", "inertia", "rigid_body_mass_matrix", "added_mass_matrix")
+
+
+class Seen(str):
+    """A warning that a vehicle found in its own numbers: found anew where it is made again from another's fields."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +55,12 @@ class Vehicle:
     linear first [kg, kg m, kg m2], added mass positive (minus Fossen's X_udot ...); weight [N], which acts at
     center_of_gravity (3,) [m] from the origin (by default where the rigid body's matrix has it).
 
+    inertia_tolerance: by what part of the largest the other two principal inertias may sum to less than it, in the 6x6
+    form; 0 by default, where a matrix that no rigid body has is refused. Importers set it for published numbers.
+
     buoyancy: weight of the displaced water [N], at center_of_buoyancy (3,) [m] from the origin. Matrices are kept in
-    full. `warnings` holds what is unusual but allowed.
+    full. `warnings` holds what is unusual but allowed: texts given here, as an importer does, and what is found. They are
+    among the messages of a run.
 
     Raises SceneError naming every fault: not positive, not finite, wrong shape, not symmetric, not positive definite.
     """
@@ -63,7 +74,8 @@ class Vehicle:
     added_mass_matrix: Any = None
     weight: float | None = None
     center_of_gravity: Any = None
-    warnings: tuple[str, ...] = field(default=(), init=False)
+    inertia_tolerance: float = 0.0
+    warnings: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         faults = Faults("vehicle.")
@@ -71,10 +83,11 @@ class Vehicle:
             "buoyancy": faults.number("buoyancy", self.buoyancy, "N", least=0.0),
             "center_of_buoyancy": faults.finite("center_of_buoyancy", self.center_of_buoyancy, (3,), "m"),
         }
-        if self.full:
-            values |= self._full(faults)
-        else:
-            values |= self._simple(faults)
+        given = _texts(faults, self.warnings)
+        tolerance = faults.number("inertia_tolerance", self.inertia_tolerance, "1", least=0.0)
+        object.__setattr__(self, "inertia_tolerance", tolerance or 0.0)
+        values |= self._full(faults) if self.full else self._simple(faults)
+        values["warnings"] = (*given, *map(Seen, values["warnings"]))
         faults.raise_if_any()
         for name, value in values.items():
             if isinstance(value, np.ndarray):
@@ -128,15 +141,27 @@ class Vehicle:
             center = faults.finite("center_of_gravity", self.center_of_gravity, (3,), "m")
         if rigid is not None:
             center, warnings = self._rigid(faults, rigid, center)
-            if _definite(rigid) and bool(impossible(rigid[None])[0]):
-                moments = ", ".join(f"{one:.6g}" for one in np.linalg.eigvalsh(about_center(rigid[None])[0]))
-                what = f"has principal inertias {moments} kg m2, two of which sum to less than the third: no rigid body has"
-                remedy = "give the rigid body's own inertia here, and added inertia in added_mass_matrix"
-                faults.add("rigid_body_mass_matrix", rigid[3:, 3:], what, remedy)
+            if _definite(rigid):
+                warnings += self._triangle(faults, rigid)
         if rigid is not None and added is not None and _definite(rigid) and not _definite(added, rigid):
             faults.add("added_mass_matrix", given, "with the rigid body's is not positive definite", SIGN)
         values = {"rigid_body_mass_matrix": rigid, "added_mass_matrix": added, "weight": weight}
         return values | {"center_of_gravity": center, "warnings": warnings}
+
+    def _triangle(self, faults: Faults, rigid: np.ndarray) -> tuple[str, ...]:
+        """Refuse principal inertias that no rigid body has; warn of those that the tolerance allows."""
+        short = float(shortage(rigid[None])[0])
+        if short <= ROUND_OFF:
+            return ()
+        moments = ", ".join(f"{one:.6g}" for one in np.linalg.eigvalsh(about_center(rigid[None])[0]))
+        what = f"has principal inertias {moments} kg m2, two of which sum to less than the third"
+        by = f"by {100.0 * short:.2g} % of it"
+        if short <= self.inertia_tolerance:
+            return (f"vehicle.rigid_body_mass_matrix: {what}, {by}: no rigid body has; taken as it is",)
+        remedy = "give the rigid body's own inertia here, and added inertia in added_mass_matrix"
+        remedy += f"; or allow it: inertia_tolerance = {short * 1.01:.2g}" if short <= LITTLE else ""
+        faults.add("rigid_body_mass_matrix", rigid[3:, 3:], f"{what}: no rigid body has", f"it misses {by}; {remedy}")
+        return ()
 
     def _rigid(self, faults: Faults, rigid: np.ndarray, center: Any) -> tuple[np.ndarray | None, tuple[str, ...]]:
         """Check that the matrix is that of a rigid body: m I, -m hat(r), a positive inertia. Returns r, warnings."""
@@ -178,7 +203,17 @@ class Vehicle:
         for name, value in self.parameters().items():
             full = name in ("rigid_body_mass_matrix", "added_mass_matrix")
             content[name] = compact(value) if value.shape == (3, 3) and not full else value.tolist()
-        return content
+        given = [text for text in self.warnings if not isinstance(text, Seen)]
+        content |= {"inertia_tolerance": self.inertia_tolerance} if self.inertia_tolerance else {}
+        return content | ({"warnings": given} if given else {})
+
+
+def _texts(faults: Faults, given: Any) -> tuple[str, ...]:
+    """The texts given as warnings, without those that a vehicle found itself; none after noting a fault."""
+    if isinstance(given, list | tuple) and all(isinstance(text, str) for text in given):
+        return tuple(text for text in given if not isinstance(text, Seen))
+    faults.add("warnings", given, "is not a list of texts", 'give ["..."], or leave it out')
+    return ()
 
 
 SIGN = "added mass is positive here: minus Fossen's X_udot, Y_vdot, Z_wdot ..."
@@ -213,10 +248,15 @@ def about_center(rigid: np.ndarray) -> np.ndarray:
     return np.asarray(rigid[:, 3:, 3:] + m * (H @ H))
 
 
-def impossible(rigid: np.ndarray) -> np.ndarray:
-    """Which matrices (n, 6, 6) no rigid body has: two principal inertias sum to less than the third, to 1e-6."""
+def shortage(rigid: np.ndarray) -> np.ndarray:
+    """By what part of the largest the other two principal inertias of matrices (n, 6, 6) sum to less than it; or below 0."""
     small, middle, large = np.linalg.eigvalsh(about_center(rigid)).T
-    return np.asarray(small + middle < large * (1.0 - 1e-6))
+    return np.asarray(1.0 - (small + middle) / large)
+
+
+def impossible(rigid: np.ndarray, tolerance: float = 0.0) -> np.ndarray:
+    """Which matrices (n, 6, 6) no rigid body has: two principal inertias sum to less than the third by more."""
+    return shortage(rigid) > max(tolerance, ROUND_OFF)
 
 
 def inertia6(p: Numbers) -> np.ndarray:

@@ -85,6 +85,26 @@ CASES = {
         ),
         False,
     ),
+    "thrusters with polynomials": Case(
+        (
+            terms.Thrusters(
+                **THRUSTERS, **COMMANDS, coefficient=(2.0, 3.0, 1.0), coefficient_astern=(1.5, 2.5, 0.5),
+                polynomial=(3.0, 0.5, 8.0, -2.0, 1.0), polynomial_astern=(2.0, 7.0, -1.5),
+            ),
+        ),
+        (
+            Thrusters(
+                **{k: np.array(v) for k, v in THRUSTERS.items()},
+                forward=np.array((2.0, 3.0, 1.0)),
+                backward=np.array((1.5, 2.5, 0.5)),
+                times=np.array(COMMANDS["times"]),
+                command=np.array(COMMANDS["command_schedule"]),
+                polynomial=(3.0, 0.5, 8.0, -2.0, 1.0),
+                polynomial_astern=(2.0, 7.0, -1.5),
+            ),
+        ),
+        False,
+    ),
 }  # fmt: skip
 
 from tests.laws_water import CASES as _water  # noqa: E402, N811

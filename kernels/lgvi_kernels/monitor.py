@@ -61,11 +61,12 @@ def seen_struct(width, real):
 
 
 @functools.cache
-def monitor_struct(width, real, rows, energy, backward, substep):
+def monitor_struct(width, real, rows, energy, backward, substep, still):
     """The kernel's argument: limits, one entry or one a packet, and what looks leave behind, by packet.
 
     warned: bits; warned_step and warned_size: steps made at the first crossing of the most serious row, and its square.
     energy: rows of ENERGY_FIELDS. backward: the part of h that stages go back at once. substeps: steps that were divided.
+    still: R^T u where and when a lane was frozen, three rows.
     """
     Lane, Ints = lane(width, real), int_lane(width)
     fields = {}
@@ -79,6 +80,8 @@ def monitor_struct(width, real, rows, energy, backward, substep):
         fields["backward"] = real
     if substep:
         fields["substeps"] = wp.array(dtype=Ints)
+    if still:
+        fields["still"] = wp.array2d(dtype=Lane)
     return struct("Monitor", **fields) if fields else struct("NoMonitor", unused=wp.uint8)
 
 

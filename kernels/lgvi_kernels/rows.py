@@ -4,7 +4,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes import add, mul, ones, vec3  # noqa: F401
+from lgvi_kernels.lanes import add, mul, ones, positive, vec3  # noqa: F401
 from lgvi_kernels.packet import put
 
 # Numbers of a packet's state in `state[packet, field]`: R row by row, b, p (or R p, see Spec.inertial), pi; with compensated
@@ -74,12 +74,15 @@ def make_rows(Lane, State, paced, compensated):
     return read, write, back_up
 
 
-def make_sample(Lane, fields, compensated, method, drifts):
-    """What writes one sample. method: its functions (see Step); drifts: the water moves."""
+def make_sample(Lane, fields, compensated, method, drifts, still):
+    """What writes one sample.
+
+    method: its functions (see Step); drifts: the water moves; still: a frozen lane keeps the water that it was stopped in.
+    """
     momentum, velocities, water_velocity = method.momentum, method.velocities, method.water_velocity
 
     @wp.func
-    def sample(out: wp.array2d(dtype=Lane), i: int, first: int, x: Any, c: Any, h: Any):
+    def sample(out: wp.array2d(dtype=Lane), i: int, first: int, x: Any, c: Any, h: Any, monitor: Any, frozen: Lane):
         """Write the chosen fields of one sample: b, R, nu (that of the water added), Om."""
         o = first
         if wp.static("position" in fields):
@@ -98,7 +101,11 @@ def make_sample(Lane, fields, compensated, method, drifts):
         nu, Om = velocities(c.inertia, x.p, x.pi)
         if wp.static("velocity" in fields):
             if wp.static(drifts):
-                nu = nu + water_velocity(x, c, h)
+                water = water_velocity(x, c, h)
+                if wp.static(still):
+                    kept = vec3(monitor.still[i, 0], monitor.still[i, 1], monitor.still[i, 2])
+                    water = positive(frozen, kept, water)
+                nu = nu + water
             put(out, i, o, nu)
             o += 3
         if wp.static("angular_velocity" in fields):

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from lgvi_warp.cli.signals import Ended
+from lgvi_warp.cli.writing import Written, side_by_side
 
 
 def report(result: Any, out: Path, quiet: bool, begun: float) -> list[str]:
@@ -19,10 +19,11 @@ def report(result: Any, out: Path, quiet: bool, begun: float) -> list[str]:
             print(f"next        lgvi-warp merge {out} ... --out DIR, with the folders of the other parts")
         return []
     drawn = shown_members(result)
-    files, faults = write(result, drawn, out)
+    written = write(result, drawn, out)
     if not quiet:
-        print(summary(result, drawn, files, time.perf_counter() - begun))
-    return faults
+        print("\n".join([*written.note_lines(), summary(result, drawn, written.files, time.perf_counter() - begun)]))
+    told(written.empty)
+    return written.faults
 
 
 def told(faults: list[str]) -> list[str]:
@@ -55,53 +56,35 @@ def shown_members(result: Any) -> Any:
     return chosen(result, range(min(most, result.members)))
 
 
-def write(result: Any, drawn: Any, out: Path) -> tuple[list[Path], list[str]]:
+def write(result: Any, drawn: Any, out: Path) -> Written:
     """Write result.npz, fleet.png, fleet.rrd and statistics.png side by side: what there is of them.
 
-    drawn: the members of the pictures, None without. A result in a store is written already. Returns the files, and a text
-    for each that failed.
-    """
-    from concurrent.futures import Future, ThreadPoolExecutor, wait
+    Args:
+        result: Of the run; one in a store is written already.
+        drawn: The members of the pictures, None without.
+        out: The folder.
 
+    Returns:
+        What was written.
+    """
     from lgvi_warp.sinks.plots import drawable, plot, plot_statistics
     from lgvi_warp.sinks.rerun import log_rerun
 
-    files: list[Path] = [result.store] if result.store else []
-    faults: list[str] = []
+    written = Written([result.store] if result.store else [])
     writers: dict[str, Callable[[Path], Path]] = {} if result.store else {"result.npz": result.save}
     if drawn is not None:
         writers |= {"fleet.png": lambda path: plot(drawn, path), "fleet.rrd": lambda path: log_rerun(drawn, path)}
     if drawable(result):
         writers["statistics.png"] = lambda path: plot_statistics(result, path)
-    if not writers:
-        return files, faults
-    jobs: dict[Path, Future[Path]] = {}
-    pool = ThreadPoolExecutor(len(writers))
-    try:
-        for name, writer in writers.items():
-            jobs[out / name] = pool.submit(writer, out / name)
-        while wait(jobs.values(), timeout=0.2).not_done:
-            pass  # an interrupt that comes just before it waits is heard afterwards
-    except KeyboardInterrupt as error:
-        # A file that is half written is worth nothing.
-        wait(jobs.values())
-        written = [path for path, job in jobs.items() if job.exception() is None]
-        if "result.npz" in writers and out / "result.npz" not in written:
-            raise
-        raise Ended(f"the run is finished; written: {', '.join(map(str, written)) or result.store}") from error
-    finally:
-        pool.shutdown()
+    jobs = side_by_side({out / name: writer for name, writer in writers.items()})
     for path, job in jobs.items():
-        try:
-            files.append(job.result())
-        except (OSError, ImportError, ValueError) as error:
-            faults.append(f"{path} was not written: {error}")
-    return files, faults
+        written.take(path, job.result)
+    return written
 
 
 def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
     """The run in a few lines."""
-    from lgvi_warp import invariants
+    from lgvi_warp.outcomes import outcome_text, outcomes
     from lgvi_warp.statistics.table import table
     from lgvi_warp.status import Status
 
@@ -115,23 +98,12 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
         "status      " + ", ".join(f"{name} {number:,}" for name, number in result.status.counts().items()),
     ]
     if result.samples:
-        drift = invariants.drift(drawn)
-        whose = "all members" if drawn.members == result.members else f"the first {drawn.members:,} members"
-        lines.append(
-            f"drift       energy {drift['energy']:.2g} J, horizontal momentum {drift['horizontal_momentum']:.2g} N s, "
-            f"vertical angular momentum {drift['vertical_angular_momentum']:.2g} N m s (largest of {whose})"
-        )
+        lines += _energy_lines(result, drawn)
     elif result.kept is not None:
         lines.append(f"kept        {result.kept.members:,} members' samples, run again")
     elif settings.get("observed", {}).get("keep") == "failed":
         lines.append("kept        no samples: no member failed")
-    for code in Status:
-        failed = (result.status == code).nonzero()[0]
-        if code and len(failed):
-            first = int(failed[0])
-            lines.append(
-                f"  {code.name.lower()}: {code.text} (first: member {first} at {result.failure_time[first]:g} s)"
-            )
+    lines += [f"  {outcome_text(result, code)}" for code in outcomes(result) if code != Status.OK]
     lines += _warning_lines(result)
     if result.substeps.any():
         divided = result.substeps > 0
@@ -144,6 +116,31 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
         lines += [f"  {line}" for line in table(result.statistics)]
     lines += [f"file        {path} ({size_of(path) / 1e6:.1f} MB)" for path in files]
     return "\n".join(lines)
+
+
+# What may be conserved: its name in words and its unit.
+INVARIANTS = {
+    "energy": ("energy", "J"),
+    "horizontal_momentum": ("horizontal momentum", "N s"),
+    "vertical_angular_momentum": ("vertical angular momentum", "N m s"),
+}
+
+
+def _energy_lines(result: Any, drawn: Any) -> list[str]:
+    """How far what the scene conserves drifts, or how much energy changed where forces do work; none if all failed."""
+    import math
+
+    from lgvi_warp import invariants
+
+    drift, conserved = invariants.drift(drawn), invariants.conserved(drawn)
+    if math.isnan(drift["energy"]):
+        return []
+    whose = "all members" if drawn.members == result.members else f"the first {drawn.members:,} members"
+    if "energy" not in conserved:
+        names = ", ".join(invariants.at_work(drawn))
+        return [f"work        energy changed by up to {drift['energy']:.2g} J, through {names} (largest of {whose})"]
+    texts = [f"{words} {drift[name]:.2g} {unit}" for name, (words, unit) in INVARIANTS.items() if name in conserved]
+    return [f"drift       {', '.join(texts)} (largest of {whose})"]
 
 
 def _warning_lines(result: Any) -> list[str]:

@@ -45,9 +45,9 @@ def run(chosen: argparse.Namespace) -> int:
     try:
         warm.join()
         faults = report(result, out, chosen.quiet, begun) + failures
-    except Ended:
-        raise
     except KeyboardInterrupt as error:
+        if str(out / RESULT) in str(error):
+            raise  # it is written
         raise Ended(rescued(result, out)) from error
     if suggested:
         faults += check_error(scene, result, suggested, chosen.quiet)
@@ -73,9 +73,9 @@ def rescued(result: Any, out: Path) -> str:
 
 def all_failed(result: Any) -> bool:
     """Whether no member got to its end, or to the event that ended it."""
-    from lgvi_warp.status import Status
+    from lgvi_warp.status import failed
 
-    return bool(((result.status != 0) & (result.status < Status.SURFACE)).all())
+    return bool(failed(result.status).all())
 
 
 def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:

@@ -3,41 +3,23 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli.progress import part_of, shown
 from lgvi_warp.cli.report import told
 from lgvi_warp.cli.settings import folder, overrides
 from lgvi_warp.cli.signals import Ended
+from lgvi_warp.cli.writing import Written
 from lgvi_warp.errors import SceneError
 
 
-@dataclass
-class Written:
-    """Files that a study wrote, and those that it could not."""
-
-    files: list[Path] = field(default_factory=list)
-    faults: list[str] = field(default_factory=list)
-
-    def draw(self, plot: Callable[[Any, Path], Path], found: Any, path: Path) -> None:
-        """Draw what was found."""
-        try:
-            self.files.append(plot(found, path))
-        except (ImportError, ValueError) as error:
-            self.faults.append(f"{path} was not written: {error}")
-
-    def ended(self, i: int, n: int, out: Path) -> KeyboardInterrupt:
-        """An interrupt of the study's part i of n."""
-        return Ended(f"{i} of {n} maps are finished, in {out}") if self.files else KeyboardInterrupt()
-
-    def tell(self, report: str, quiet: bool) -> int:
-        """Print the report and the files. Returns the exit code."""
-        if not quiet:
-            print("\n".join([report, "", *(f"file        {path}" for path in self.files)]))
-        return 1 if told(self.faults) else 0
+def finish(written: Written, report: str, quiet: bool) -> int:
+    """Print a study's report, its files and its notes, and say what failed. Returns the exit code."""
+    if not quiet:
+        files = (f"file        {path}" for path in written.files)
+        print("\n".join([report, "", *written.note_lines(), *files]))
+    told(written.empty)
+    return 1 if told(written.faults) else 0
 
 
 def tradeoff(chosen: argparse.Namespace) -> int:
@@ -55,7 +37,7 @@ def tradeoff(chosen: argparse.Namespace) -> int:
         found = measure(scene, of=chosen.of, methods=methods, seconds=chosen.seconds, progress=progress)
     written = Written(found.save(out))
     written.draw(plot_tradeoff, found, out / "tradeoff.png")
-    return written.tell(report_text(found), chosen.quiet)
+    return finish(written, report_text(found), chosen.quiet)
 
 
 def sensitivity(chosen: argparse.Namespace) -> int:
@@ -80,7 +62,7 @@ def sensitivity(chosen: argparse.Namespace) -> int:
         return len(told([str(error)]))
     written = Written(found.save(out))
     written.draw(plot_sensitivity, found, out / "sensitivity.png")
-    return written.tell(str(found), chosen.quiet)
+    return finish(written, str(found), chosen.quiet)
 
 
 def stability(chosen: argparse.Namespace) -> int:
@@ -114,8 +96,10 @@ def stability(chosen: argparse.Namespace) -> int:
                     progress=part_of(progress, i, len(maps)),
                 )  # fmt: skip
             except KeyboardInterrupt as error:
-                raise written.ended(i, len(maps), out) from error
+                if not written.files:
+                    raise
+                raise Ended(f"{i} of {len(maps)} maps are finished, in {out}") from error
             written.files += found.save(out, name)
             texts.append(report_text(found))
             written.draw(plot_stability, found, out / f"{name}.png")
-    return written.tell("\n\n".join(texts), chosen.quiet)
+    return finish(written, "\n\n".join(texts), chosen.quiet)

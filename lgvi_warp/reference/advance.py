@@ -1,6 +1,6 @@
 """Programs of sub-maps, run step by step."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from lgvi_warp.reference.paper import FORCED
@@ -54,3 +54,27 @@ def trajectory(
     for _ in range(steps // every):
         states.append(advance(states[-1], body, program, h, every, stages, solve))
     return states
+
+
+def arrival(
+    x: State,
+    body: Body,
+    program: Program,
+    h: float,
+    distance: Callable[[State], float],
+    stages: Sequence[float] = (1.0,),
+    solve: Solver = newton,
+) -> tuple[State, float]:
+    """The state where a step from x comes to a distance of 0, and the part of h [s] until then.
+
+    distance: positive at x, zero or below after the whole step.
+    """
+    start = replace(x, t=x.step * h)
+
+    def after(part: float) -> State:
+        return step(start, body, program, part * h, stages, solve)
+
+    low, high = 0.0, 1.0
+    while low < (middle := 0.5 * (low + high)) < high:
+        low, high = (middle, high) if distance(after(middle)) > 0.0 else (low, middle)
+    return after(high), high

@@ -1,4 +1,4 @@
-"""A picture of a fleet: depth as a fan of quantiles, the energy error, and a few paths."""
+"""A picture of a fleet: depth as a fan of quantiles, energy, and a few paths."""
 
 from __future__ import annotations
 
@@ -7,6 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from lgvi_warp.errors import MissingExtra, NothingToDraw
+from lgvi_warp.outcomes import outcomes, stop_time, under_way
+from lgvi_warp.sinks.fleet import LOOKS, energy_curve, evenly, quantiles, title
+from lgvi_warp.status import Status, failed
 
 if TYPE_CHECKING:
     from lgvi_warp.result import Result
@@ -22,52 +27,105 @@ COLOR = "tab:blue"
 
 
 def plot(result: Result, path: str | os.PathLike[str]) -> Path:
-    """Draw the fleet into a picture file; its ending chooses the format. Returns the path.
+    """Draw the fleet into a picture file: depth, energy and a few paths; the file's ending chooses the format.
 
-    Needs position, attitude, velocity and angular velocity at two times or more. Members that failed are left out.
-    Raises ImportError without matplotlib (extra: viz), ValueError when there is nothing to draw.
+    The fans are of the members under way at each time. Where events stopped the others, and where members failed, is
+    marked in the colour of the outcome. Energy is drawn as its error where the scene's laws conserve it.
+
+    Args:
+        result: With position, attitude, velocity and angular velocity.
+        path: Of the file.
+
+    Returns:
+        The path.
+
+    Raises:
+        ImportError: Without matplotlib (extra: viz).
+        NothingToDraw: Every member failed before the second sample, or none has a finite position.
+        OSError: The file cannot be written.
     """
-    figure_of = _figure()
-    good = np.flatnonzero(np.asarray(result.status) == 0)
-    if len(good) == 0:
-        raise ValueError("every member failed: there is nothing to draw; see result.status and result.failure_time")
+    figure_of = figure_class()
+    counted = under_way(result)
+    _refuse_nothing(result, counted)
     figure = figure_of(figsize=(15.0, 4.8))
     depth, energy, paths = figure.subplots(1, 3)
     figure.subplots_adjust(left=0.05, right=0.985, bottom=0.12, top=0.85, wspace=0.26)
-    fan(depth, result.time, result.position[:, good, 2])
+    fan(depth, result.time, result.position[..., 2], counted)
+    _ends(depth, result)
     depth.set(title="Depth", xlabel="time [s]", ylabel="depth b3 [m], down")
     depth.invert_yaxis()
-    fan(energy, result.time, result.energy[:, good] - result.energy[:1, good])
-    energy.set(title="Energy error", xlabel="time [s]", ylabel="E(t) - E(0) [J]")
-    energy.axhline(0.0, color="black", linewidth=0.5)
-    _paths(paths, result.position[:, good])
-    failed = result.members - len(good)
-    method, step = result.provenance["method"]["name"], result.provenance["step"]
-    title = f"{result.members} members, {method}, step {step:g} s"
-    figure.suptitle(title + (f", {failed} failed (left out)" if failed else ""))
+    depth.legend(loc="best", fontsize="small", title=_counted_text(result, counted), title_fontsize="small")
+    curve = energy_curve(result)
+    fan(energy, result.time, curve.values, counted)
+    energy.set(title=curve.name, xlabel="time [s]", ylabel=curve.label)
+    energy.legend(loc="best", fontsize="small")
+    if curve.name == "Energy error":
+        energy.axhline(0.0, color="black", linewidth=0.5)
+    _paths(paths, result)
+    figure.suptitle(title(result))
     target = Path(path)
     figure.savefig(target, dpi=100)
     return target
 
 
-def _figure() -> Any:
+def _refuse_nothing(result: Result, counted: np.ndarray) -> None:
+    """Raise NothingToDraw where no member was anywhere, or went on beyond its start."""
+    reason = ""
+    if failed(result.status).all() and not counted[1:].any():
+        reason = "every member failed before the second sample"
+    elif not (counted & np.isfinite(result.position).all(axis=-1)).any():
+        reason = "no member has a finite position"
+    if reason:
+        raise NothingToDraw(f"{reason}: there is nothing to draw; see result.status and result.failure_time")
+
+
+def figure_class() -> Any:
     """Matplotlib's Figure. Raises ImportError with the remedy."""
     try:
         from matplotlib.figure import Figure
-    except ImportError as error:
-        raise ImportError("plots need matplotlib: pip install 'lgvi-warp[viz]'") from error
+    except ModuleNotFoundError as error:
+        raise MissingExtra("plots", "matplotlib", "viz") from error
     return Figure
 
 
-def fan(axes: Any, time: np.ndarray, values: np.ndarray) -> None:
-    """Quantile bands and the median of values (k, n) against time (k,)."""
+def fan(axes: Any, time: np.ndarray, values: np.ndarray, counted: np.ndarray) -> None:
+    """Quantile bands and the median of values (k, n) against time (k,), of the members that count (k, n) at each time."""
     levels = sorted({q for low, high, _ in BANDS for q in (low, high)} | {0.5})
-    curves = dict(zip(levels, np.quantile(values.astype(np.float64), levels, axis=1), strict=True))
+    curves = dict(zip(levels, quantiles(values, counted, levels), strict=True))
     for low, high, alpha in BANDS:
         label = "all" if low == 0.0 else f"{high - low:.0%}"
         axes.fill_between(time, curves[low], curves[high], color=COLOR, alpha=alpha, linewidth=0, label=label)
     axes.plot(time, curves[0.5], color="black", linewidth=1.0, label="median")
-    axes.legend(loc="best", fontsize="small")
+
+
+def _counted_text(result: Result, counted: np.ndarray) -> str:
+    """How many members the fan is of: at its beginning, and at its end."""
+    if counted.all():
+        return f"{result.members:,} members"
+    first, last = (int(counted[i].sum()) for i in (0, -1))
+    return f"under way: {first:,} at {result.time[0]:g} s,\n{last:,} at {result.time[-1]:g} s"
+
+
+# Marks of ended members with one outcome, at most.
+MARKS = 1000
+
+
+def _ends(axes: Any, result: Result) -> None:
+    """Where and when members ended that did not run to the end: their depths against the times, by outcome."""
+    when, depth = stop_time(result), result.position[-1, :, 2]
+    for code in outcomes(result):
+        members = np.flatnonzero(np.asarray(result.status) == code)
+        if code != Status.OK:
+            drawn = evenly(members, MARKS)
+            label = f"{code.name.lower()} ({len(members):,})"
+            axes.scatter(when[drawn], depth[drawn], s=18, zorder=3, label=label, **_mark(code))
+
+
+def _mark(code: Status) -> dict[str, Any]:
+    """Colour and marker of an outcome; filled markers have a black edge."""
+    look = LOOKS[code]
+    edge = {"edgecolors": "black", "linewidths": 0.4} if code.stopped else {"linewidths": 1.2}
+    return {"color": look.color, "marker": look.marker} | edge
 
 
 # What of a run's statistics is drawn: so many panels, and lines in a panel, at most.
@@ -80,7 +138,7 @@ def plot_statistics(result: Result, path: str | os.PathLike[str]) -> Path:
     Statistics of paths, which have one time, and covariances are left to the table. Returns the path. Raises ImportError
     without matplotlib (extra: viz), ValueError when there is nothing to draw.
     """
-    figure_of = _figure()
+    figure_of = figure_class()
     drawn = drawable(result)[:PANELS]
     if not drawn:
         raise ValueError("no statistic against time was gathered: there is nothing to draw; give statistics=[...]")
@@ -156,19 +214,30 @@ _PANEL = {
     "circular_mean": _lines_panel,
     "exceedance": _lines_panel,
     "first_passage": _lines_panel,
+    "outcome": _lines_panel,
     "extremes": _extremes_panel,
     "histogram": _histogram_panel,
 }
 
 
-def _paths(axes: Any, position: np.ndarray) -> None:
-    """Paths of a few members from the side: horizontal distance from the start against depth."""
-    chosen = np.unique(np.linspace(0, position.shape[1] - 1, PATHS).astype(int))
-    start = position[0, :, :2].mean(axis=0)
+def _paths(axes: Any, result: Result) -> None:
+    """Paths of a few members from the side: horizontal distance from the start against depth, and where they ended."""
+    finite = np.flatnonzero(np.isfinite(result.position[0]).all(axis=-1))
+    chosen = evenly(finite, PATHS)
+    start = result.position[0, finite, :2].mean(axis=0)
+    labelled: set[Status] = set()
     for member in chosen:
-        p = position[:, member]
-        axes.plot(np.hypot(*(p[:, :2] - start).T), p[:, 2], linewidth=0.8)
-    axes.set(title=f"Paths of {len(chosen)} members", xlabel="horizontal distance [m]", ylabel="depth b3 [m], down")
+        code, p = Status(int(result.status[member])), result.position[:, member]
+        distance = np.hypot(*(p[:, :2] - start).T)
+        label = None if code in labelled else code.name.lower()
+        labelled.add(code)
+        axes.plot(distance, p[:, 2], color=LOOKS[code].color, linewidth=0.8, label=label)
+        if code != Status.OK:
+            axes.scatter(distance[-1], p[-1, 2], s=18, zorder=3, **_mark(code))
+    many = f"{len(chosen)} of {result.members:,}" if len(chosen) < result.members else f"{len(chosen)}"
+    axes.set(title=f"Paths of {many} members", xlabel="horizontal distance [m]", ylabel="depth b3 [m], down")
+    if labelled != {Status.OK}:
+        axes.legend(loc="best", fontsize="small")
     axes.invert_yaxis()
 
 
@@ -184,7 +253,7 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None 
     """
     from lgvi_warp.comparison import QUANTITIES
 
-    figure_of = _figure()
+    figure_of = figure_class()
     of = of or found.of
     if not found.measurements:
         raise ValueError("no setting was measured: there is nothing to draw")
@@ -256,7 +325,7 @@ def plot_stability(found: StabilityMap, path: str | os.PathLike[str]) -> Path:
 
     Raises ImportError without matplotlib.
     """
-    figure_of = _figure()
+    figure_of = figure_class()
     n = len(found.methods)
     columns = n if n <= 4 else -(-n // 2)
     rows = -(-n // columns)

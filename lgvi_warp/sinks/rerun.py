@@ -1,4 +1,4 @@
-"""A recording of a fleet for the rerun viewer: bodies that move, a few paths, depth and energy as curves."""
+"""A recording of a fleet for the rerun viewer: bodies that move, a few paths, depth, energy and outcomes as curves."""
 
 from __future__ import annotations
 
@@ -10,6 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp import notation
+from lgvi_warp.errors import MissingExtra, NothingToDraw
+from lgvi_warp.outcomes import outcome_text, outcomes, under_way
+from lgvi_warp.sinks.fleet import LOOKS, Curve, energy_curve, evenly, identity, quantiles, title
+from lgvi_warp.status import Status
 
 if TYPE_CHECKING:
     from lgvi_warp.result import Result
@@ -29,28 +33,46 @@ CURVES = (
 
 
 def log_rerun(result: Result, path: str | os.PathLike[str]) -> Path:
-    """Write the fleet as an .rrd recording. Returns the path.
+    """Write the fleet as an .rrd recording: the file is there whole or not at all.
 
-    At most MOST_BODIES members are shown, spread evenly; members that failed stay where they stopped, in red.
-    Needs all fields. The file is there whole or not at all. Raises ImportError without rerun-sdk (extra: viz), OSError.
+    At most MOST_BODIES members are shown, spread evenly. A member that an event stopped, or that failed, stays where it
+    ended, in the colour of its outcome from then on. Curves are of the members under way at each time. The recording and
+    the application have ids of their own, which the same run always has: the viewer keeps recordings and layouts apart.
+
+    Args:
+        result: With position, attitude, velocity and angular velocity.
+        path: Of the file.
+
+    Returns:
+        The path.
+
+    Raises:
+        ImportError: Without rerun-sdk (extra: viz).
+        NothingToDraw: No member has a finite start.
+        OSError: The file cannot be written.
     """
     try:
         import rerun as rr
-    except ImportError as error:
-        raise ImportError("recordings need rerun-sdk: pip install 'lgvi-warp[viz]'") from error
+    except ModuleNotFoundError as error:
+        raise MissingExtra("recordings", "rerun-sdk", "viz") from error
     target = Path(path)
     part = target.with_name(target.name + ".part")
-    recording = rr.RecordingStream("lgvi_warp", recording_id="fleet")
     finite = np.isfinite(result.position[0]).all(axis=-1) & np.isfinite(result.attitude[0]).all(axis=(-1, -2))
-    shown = np.flatnonzero(finite)
-    shown = shown[np.unique(np.linspace(0, len(shown) - 1, min(MOST_BODIES, len(shown))).astype(int))]
+    if not finite.any():
+        raise NothingToDraw("no member has a finite start: there is nothing to draw; see result.status")
+    shown = evenly(np.flatnonzero(finite), MOST_BODIES)
     position = result.position[:, shown].astype(np.float32)
+    curve, counted = energy_curve(result), under_way(result)
+    name = identity(result)
+    recording = rr.RecordingStream(f"lgvi_warp_{name}", recording_id=name)
     try:
-        recording.save(part, default_blueprint=_blueprint(result.time, position))
-        _world(recording, rr, result, shown, position)
-        _curves(recording, rr, result)
-        text = "```json\n" + json.dumps(result.provenance, indent=2) + "\n```"
-        recording.log("run", rr.TextDocument(text, media_type="text/markdown"), static=True, strict=True)
+        recording.save(part, default_blueprint=_blueprint(result.time, position, curve))
+        recording.send_recording_name(title(result))
+        _world(recording, rr, result, shown, position, counted[:, shown])
+        _fan(recording, rr, result.time, "depth", result.position[..., 2], counted)
+        _fan(recording, rr, result.time, entity_of(curve), curve.values, counted)
+        _members(recording, rr, result, counted)
+        recording.log("run", rr.TextDocument(_text(result), media_type="text/markdown"), static=True, strict=True)
         recording.flush()
         recording.disconnect()
         part.replace(target)
@@ -63,28 +85,55 @@ def log_rerun(result: Result, path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def _world(recording: Any, rr: Any, result: Result, shown: np.ndarray, position: np.ndarray) -> None:
-    """Bodies and trails. x north, y east, z down."""
+def _text(result: Result) -> str:
+    """What became of the members, and everything that the run follows from."""
+    lines = [title(result), "", *(f"- {outcome_text(result, code)}" for code in outcomes(result)), ""]
+    return "\n".join([*lines, "```json", json.dumps(result.provenance, indent=2), "```"])
+
+
+def _world(
+    recording: Any, rr: Any, result: Result, shown: np.ndarray, position: np.ndarray, counted: np.ndarray
+) -> None:
+    """Bodies and trails. x north, y east, z down. counted: which of those shown are under way, at each time."""
     recording.log("world", rr.ViewCoordinates.FRD, static=True, strict=True)
-    failed = np.asarray(result.status)[shown] != 0
     quaternion = notation.quaternion_from_matrix(result.attitude[:, shown])[..., [1, 2, 3, 0]].astype(np.float32)
     size = max(_extent(position)) * 0.02
-    for name, members, color in (("fleet", ~failed, (90, 160, 255)), ("failed", failed, (255, 70, 70))):
-        if not members.any():
-            continue
-        recording.log(f"world/{name}", _body(rr, size, color), static=True, strict=True)
-        for first in range(0, len(result.time), FRAMES):
-            frames = slice(first, first + FRAMES)
-            times = result.time[frames]
-            columns = rr.InstancePoses3D.columns(
-                translations=position[frames, members].reshape(-1, 3),
-                quaternions=quaternion[frames, members].reshape(-1, 4),
-            ).partition([int(members.sum())] * len(times))
-            recording.send_columns(f"world/{name}", [rr.TimeColumn(TIMELINE, duration=times)], columns, strict=True)
-    trails = np.unique(np.linspace(0, len(shown) - 1, min(TRAILS, len(shown))).astype(int))
+    status = np.asarray(result.status)[shown]
+    groups = {"fleet": (Status.OK, counted)}
+    groups |= {code.name.lower(): (code, ~counted & (status == code)) for code in outcomes(result) if code}
+    for name, (code, visible) in groups.items():
+        if visible.any():
+            recording.log(f"world/{name}", _body(rr, size, LOOKS[code].rgb), static=True, strict=True)
+            _poses(recording, rr, f"world/{name}", result.time, position, quaternion, visible)
+    trails = evenly(np.arange(len(shown)), TRAILS)
     strips = position[:, trails].transpose(1, 0, 2)
     lines = rr.LineStrips3D(list(strips), radii=size * 0.05, colors=(130, 150, 160))
     recording.log("world/trails", lines, static=True, strict=True)
+
+
+# A body that is not to be seen is so small, beside one that is: an entity without any pose would show one at the origin.
+UNSEEN = 1e-6
+
+
+def _poses(
+    recording: Any, rr: Any, entity: str, time: np.ndarray, position: np.ndarray, quaternion: np.ndarray,
+    visible: np.ndarray,
+) -> None:  # fmt: skip
+    """Send the poses (k, m) of the bodies that are visible at each time (k, m), some frames at once."""
+    empty = ~visible.any(axis=1)
+    posed = visible.copy()
+    posed[empty, 0] = True
+    for first in range(0, len(time), FRAMES):
+        frames = slice(first, first + FRAMES)
+        at = posed[frames]
+        scales = np.where(visible[frames][at], np.float32(1.0), np.float32(UNSEEN))
+        columns = rr.InstancePoses3D.columns(
+            translations=position[frames][at],
+            quaternions=quaternion[frames][at],
+            # At every time or at none: what is not sent anew holds on.
+            scales=np.repeat(scales[:, None], 3, axis=1) if empty.any() else None,
+        ).partition(at.sum(axis=1))
+        recording.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=time[frames])], columns, strict=True)
 
 
 def _extent(position: np.ndarray) -> np.ndarray:
@@ -113,21 +162,39 @@ def _body(rr: Any, size: float, color: tuple[int, int, int]) -> Any:
     return rr.Mesh3D(vertex_positions=points, triangle_indices=faces, vertex_colors=colors)
 
 
-def _curves(recording: Any, rr: Any, result: Result) -> None:
-    """Smallest, median and largest depth and energy error of the members that did not fail."""
-    good = np.asarray(result.status) == 0
-    if not good.any():
-        return
-    error = result.energy[:, good] - result.energy[:1, good]
-    for name, values in (("depth", result.position[:, good, 2]), ("energy_error", error)):
-        for curve, quantile, color in CURVES:
-            entity = f"{name}/{curve}"
-            recording.log(entity, rr.SeriesLines(names=curve, colors=color, widths=2.0), static=True, strict=True)
-            columns = rr.Scalars.columns(scalars=np.quantile(values.astype(np.float64), quantile, axis=1))
-            recording.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=result.time)], columns, strict=True)
+def entity_of(curve: Curve) -> str:
+    """Where a curve lies in the recording: "energy_error" and so on."""
+    return curve.name.lower().replace(" ", "_")
 
 
-def _blueprint(time: np.ndarray, position: np.ndarray) -> Any:
+def _fan(recording: Any, rr: Any, time: np.ndarray, name: str, values: np.ndarray, counted: np.ndarray) -> None:
+    """Smallest, median and largest of the members that count at each time."""
+    rows = quantiles(values, counted, [quantile for _, quantile, _ in CURVES])
+    for (curve, _, color), row in zip(CURVES, rows, strict=True):
+        _series(recording, rr, f"{name}/{curve}", time, row, curve, color)
+
+
+def _members(recording: Any, rr: Any, result: Result, counted: np.ndarray) -> None:
+    """How many members are under way at each time, and how many ended, by outcome."""
+    status = np.asarray(result.status)
+    numbers = {"under way": (Status.OK, counted.sum(axis=1))}
+    for code in outcomes(result):
+        if code:
+            numbers[code.name.lower()] = code, (~counted & (status == code)).sum(axis=1)
+    for name, (code, row) in numbers.items():
+        _series(recording, rr, f"members/{name.replace(' ', '_')}", result.time, row, name, LOOKS[code].rgb)
+
+
+def _series(
+    recording: Any, rr: Any, entity: str, time: np.ndarray, values: np.ndarray, name: str, color: tuple[int, int, int]
+) -> None:
+    """One curve; where its values are not finite it is broken."""
+    recording.log(entity, rr.SeriesLines(names=name, colors=color, widths=2.0), static=True, strict=True)
+    columns = rr.Scalars.columns(scalars=values.astype(np.float64))
+    recording.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=time)], columns, strict=True)
+
+
+def _blueprint(time: np.ndarray, position: np.ndarray, energy: Curve) -> Any:
     """What is seen first: the fleet from the side and above on the left, the curves and the run's facts on the right."""
     import rerun.blueprint as rrb
 
@@ -149,8 +216,9 @@ def _blueprint(time: np.ndarray, position: np.ndarray) -> Any:
         )
     )
     side = rrb.Vertical(
-        rrb.TimeSeriesView(origin="depth", name="Depth [m]", axis_x=whole),
-        rrb.TimeSeriesView(origin="energy_error", name="Energy error [J]", axis_x=whole),
+        rrb.TimeSeriesView(origin="depth", name="Depth [m] of the members under way", axis_x=whole),
+        rrb.TimeSeriesView(origin=entity_of(energy), name=f"{energy.name} [J] of the members under way", axis_x=whole),
+        rrb.TimeSeriesView(origin="members", name="Members by outcome", axis_x=whole),
         rrb.TextDocumentView(origin="run", name="Run"),
     )
     return rrb.Blueprint(

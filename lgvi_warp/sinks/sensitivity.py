@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp.sinks.plots import figure_class
+
 if TYPE_CHECKING:
     from lgvi_warp.uq import Indices
 
@@ -21,17 +23,14 @@ def plot_sensitivity(found: Indices, path: str | os.PathLike[str]) -> Path:
 
     Raises ImportError without matplotlib (extra: viz), ValueError when there is nothing to draw.
     """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise ImportError("plots need matplotlib: pip install 'lgvi-warp[viz]'") from error
+    figure_of = figure_class()
     shown = [q for q in range(len(found.quantities)) if np.isfinite(getattr(found, found.columns[0])[q]).any()][:MOST]
     if not shown:
         raise ValueError("no quantity varies: there is nothing to draw")
     d = len(found.factors)
     columns = min(len(shown), 3)
     lines = -(-len(shown) // columns)
-    figure = Figure(figsize=(2.5 + 4.5 * columns, 1.4 + lines * (1.2 + 0.35 * d)), layout="constrained")
+    figure = figure_of(figsize=(2.5 + 4.5 * columns, 1.4 + lines * (1.2 + 0.35 * d)), layout="constrained")
     panels = figure.subplots(lines, columns, squeeze=False, sharey=True).reshape(-1)
     for axes, q in zip(panels, shown, strict=False):
         _bars(axes, found, q)

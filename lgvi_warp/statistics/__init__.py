@@ -13,6 +13,7 @@ from lgvi_warp.statistics.counts import Exceedance, FirstPassage, Histogram
 from lgvi_warp.statistics.estimate import Estimate, Estimates
 from lgvi_warp.statistics.moments import Covariance, Mean
 from lgvi_warp.statistics.order import Extremes, Quantiles
+from lgvi_warp.statistics.outcomes import EndTime, Outcome
 from lgvi_warp.statistics.path import PathMaximum, PathMean, PathMinimum, PathRange, PathRms, PathTime
 from lgvi_warp.statistics.quantity import Quantity
 
@@ -20,7 +21,7 @@ TYPES: dict[str, type[Statistic]] = {
     kind.type: kind
     for kind in (
         Mean, Covariance, Extremes, Quantiles, Histogram, Exceedance, FirstPassage, CircularMean, MeanAttitude, PathMaximum,
-        PathMinimum, PathRange, PathMean, PathRms, PathTime,
+        PathMinimum, PathRange, PathMean, PathRms, PathTime, Outcome, EndTime,
     )
 }  # fmt: skip
 
@@ -76,6 +77,7 @@ __all__ = [
     "TYPES",
     "CircularMean",
     "Covariance",
+    "EndTime",
     "Estimate",
     "Estimates",
     "Exceedance",
@@ -84,6 +86,7 @@ __all__ = [
     "Histogram",
     "Mean",
     "MeanAttitude",
+    "Outcome",
     "PathMaximum",
     "PathMean",
     "PathMinimum",

@@ -11,6 +11,7 @@ import numpy as np
 
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.statistics import intervals
+from lgvi_warp.statistics.ends import Ends
 from lgvi_warp.statistics.estimate import Estimate
 from lgvi_warp.statistics.quantity import Quantity, component, quantity
 from lgvi_warp.statistics.tree import Part
@@ -19,7 +20,22 @@ from lgvi_warp.statistics.values import Values
 STOPPED = ("held", "left_out")
 
 
-class Rows:
+class Gatherer:
+    """What gathers a statistic of one block. Abstract."""
+
+    def take(self, values: Values, when: slice) -> None:
+        """Take in the values of these sample times: each time once, in order."""
+        raise TypeError(f"{type(self).__name__} is abstract")
+
+    def end(self, ends: Ends, replicates: int) -> None:
+        """Take in how and when the block's members ended, after the last sample; members are of so many replicates."""
+
+    def close(self) -> Part:
+        """The part of the block."""
+        raise TypeError(f"{type(self).__name__} is abstract")
+
+
+class Rows(Gatherer):
     """Of a block: one row of each array for each sample time, made when the samples come."""
 
     def __init__(self, statistic: Statistic):
@@ -46,6 +62,8 @@ class Statistic:
     (samples, members), or a list of these taken together. name: what the result calls it, by default its type and
     what it is of. confidence: of its intervals. stopped: whether a member that an event stopped counts with the state that
     it stopped in ("held"), or not from then on ("left_out"). Members that failed are left out from their failure on.
+    at: an outcome ("floor", any event's name, "stopped"): the statistic is of the members that ended so, each in the state
+    that it ended in, and has one row.
 
     Raises SceneError naming every fault.
     """
@@ -55,11 +73,16 @@ class Statistic:
     shared: ClassVar[frozenset[str]] = frozenset()
     # What it is of where nothing is said; None: it must be said.
     default: ClassVar[str | None] = None
+    # Whether it is of numbers of members, one for each, whenever they are of.
+    of_numbers: ClassVar[bool] = True
+    # Whether it is of how members end, not of samples.
+    of_ends: ClassVar[bool] = False
 
     of: Any = None
     name: str | None = field(default=None, kw_only=True)
     confidence: float = field(default=0.95, kw_only=True)
     stopped: str = field(default="held", kw_only=True)
+    at: str | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         faults = Faults(f"{self.type}.")
@@ -71,9 +94,13 @@ class Statistic:
         faults.choice("stopped", self.stopped, STOPPED)
         if self.name is not None and not isinstance(self.name, str):
             faults.add("name", self.name, "is not a text", "give a text, or leave it out")
+        if self.at is not None and (not isinstance(self.at, str) or not self.at):
+            faults.add("at", self.at, "is no outcome", 'give "floor", the name of an event, or "stopped"')
+        elif self.at is not None and not self.of_numbers:
+            faults.add("at", self.at, "is one moment, and this is of all times", "leave it out, or ask for a mean")
         if self.of is not None:
             with faults.including():
-                object.__setattr__(self, "_quantity", quantity(f"{self.type}.of", self.of))
+                object.__setattr__(self, "_quantity", self.meant())
         self.check(faults)
         faults.raise_if_any()
 
@@ -83,6 +110,10 @@ class Statistic:
 
     def check(self, faults: Faults) -> None:
         """Note what else is wrong."""
+
+    def meant(self) -> Quantity:
+        """The quantity that `of` means. Raises SceneError."""
+        return quantity(f"{self.type}.of", self.of)
 
     @property
     def quantity(self) -> Quantity:
@@ -97,13 +128,40 @@ class Statistic:
     @property
     def key(self) -> str:
         """What the result calls it."""
-        return self.name or f"{self.type} {self.quantity.name}"
+        return self.name or f"{self.type} {self.quantity.name}{self.at_text}"
+
+    @property
+    def at_text(self) -> str:
+        """What comes last in its name: " at floor"."""
+        return "" if self.at is None else f" at {self.at}"
+
+    @property
+    def at_end(self) -> bool:
+        """Whether it is gathered when it is known how the members of a block ended."""
+        return self.of_ends or self.at is not None
+
+    @property
+    def outcomes(self) -> tuple[str, ...]:
+        """Names of the outcomes that it is of."""
+        return () if self.at is None else (self.at,)
+
+    def at_ends(self, ends: Ends, last: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
+        """Its numbers (1, d, n) at the members' ends, and which count (1, n).
+
+        last: (1, d, n), its quantity at the last sample: where a stopped member stands from its event on.
+        """
+        assert self.at is not None and last is not None
+        return last, ends.are(self.at)[None]
+
+    def over(self, time: np.ndarray) -> Statistic:
+        """The statistic for a run of these sample times (k,) [s], where that makes a difference."""
+        return self
 
     def parts(self) -> tuple[Statistic, ...]:
         """The statistics that its estimates are of: itself, or those of what it makes of each member's path."""
         return (self,)
 
-    def open(self, time: np.ndarray, count: int) -> Any:
+    def open(self, time: np.ndarray, count: int) -> Gatherer:
         """What gathers a block of `count` members over all sample times (k,) [s]."""
         return Rows(self)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Integral
 from typing import Any, ClassVar
 
@@ -11,7 +11,8 @@ import numpy as np
 
 from lgvi_warp.errors import Faults
 from lgvi_warp.statistics import intervals
-from lgvi_warp.statistics.base import Statistic, together
+from lgvi_warp.statistics.base import Gatherer, Statistic, together
+from lgvi_warp.statistics.ends import STOPPED, Ends
 from lgvi_warp.statistics.estimate import Estimate, along
 from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate
 from lgvi_warp.statistics.naming import spelled
@@ -43,8 +44,8 @@ def by_replicates(number: int) -> str:
 class Histogram(Counted):
     """Fraction of members in each bin: value (k, d, bins); counts; below and above the edges (k, d).
 
-    edges: rising; or bins and limits=(low, high) for equal bins. A bin holds its lower edge, the last one its upper edge
-    too. Interval: Wilson's, for each bin.
+    edges: rising; or bins and limits=(low, high) for equal bins; limits="run": from the first to the last sample time, for
+    times (see EndTime). A bin holds its lower edge, the last one its upper edge too. Interval: Wilson's, for each bin.
     """
 
     type: ClassVar[str] = "histogram"
@@ -61,8 +62,12 @@ class Histogram(Counted):
         if (self.edges is None) == (self.bins is None or self.limits is None):
             faults.add("edges", self.edges, "or bins and limits are wanted, one of them", "give edges=(0, 10, 20)")
             return
+        run = isinstance(self.limits, str) and self.limits == "run"
+        if run and self.of is not None:
+            faults.add("limits", self.limits, "is for times alone, as in lw.EndTime", "give limits=(low, high)")
+            return
         if self.edges is None:
-            limits, bins = faults.finite("limits", self.limits, (2,)), self.bins
+            limits, bins = np.array([0.0, 1.0]) if run else faults.finite("limits", self.limits, (2,)), self.bins
             if isinstance(bins, bool) or not isinstance(bins, Integral) or bins < 1:
                 faults.add("bins", bins, "is no whole number above 0", "give 50")
                 return
@@ -73,6 +78,12 @@ class Histogram(Counted):
         if edges is not None and (edges.ndim != 1 or len(edges) < 2 or np.any(np.diff(edges) <= 0.0)):
             faults.add("edges", self.edges if self.edges is not None else self.limits, "do not rise", "sort them")
         object.__setattr__(self, "_edges", edges)
+
+    def over(self, time: np.ndarray) -> Histogram:
+        """With edges."""
+        if not isinstance(self.limits, str):
+            return self
+        return replace(self, edges=np.linspace(time[0], time[-1], (self.bins or 0) + 1), bins=None, limits=None)
 
     def rows(self, values: Values) -> Part:
         """Counts of the block."""
@@ -134,7 +145,7 @@ class Condition(Statistic):
     @property
     def key(self) -> str:
         """What the result calls it: "exceedance depth above 50", "exceedance depth above 1 below 2"."""
-        return self.name or f"{self.type} {self.quantity.name}{self.limits_text}"
+        return self.name or f"{self.type} {self.quantity.name}{self.limits_text}{self.at_text}"
 
     @property
     def limits_text(self) -> str:
@@ -185,16 +196,17 @@ class Exceedance(Condition, Counted):
 PIECES = 8
 
 
-class _Passages:
+class _Passages(Gatherer):
     """Of a block: the first sample at which the condition holds for each member, or the last one that is known of it.
 
     Members are those of the first replicate, then of the next.
     """
 
-    def __init__(self, statistic: FirstPassage, times: int, count: int):
-        self._statistic, self._times = statistic, times
-        self._passed = np.full(count, times, np.int64)
-        self._piece = np.full(count, PIECES - 1, np.int64)
+    def __init__(self, statistic: FirstPassage, time: np.ndarray, count: int):
+        self._statistic, self._time, self._times = statistic, time, len(time)
+        self._passed = np.full(count, len(time), np.int64)
+        # How far between the sample before and the one that sees it.
+        self._share = np.ones(count)
         self._known = np.zeros(count, np.int64)
         self._before: np.ndarray | None = None
         self._replicates = 1
@@ -229,14 +241,22 @@ class _Passages:
         # Into a band over the end that is nearer.
         limit = below if above is None else above if below is None else np.where(before <= above, above, below)
         limit = np.asarray(limit).ravel()
-        share = (limit - before) / (x[at, now] - before)
-        self._piece[now] = np.clip(np.floor(share * PIECES), 0, PIECES - 1)
+        self._share[now] = (limit - before) / (x[at, now] - before)
+
+    def end(self, ends: Ends, replicates: int) -> None:
+        """A member that was stopped between two samples came to its last state when it was stopped, and not at the second."""
+        end = ends.time.reshape(-1, replicates).T.ravel()
+        stopped = ends.are(STOPPED).reshape(-1, replicates).T.ravel()
+        now = np.flatnonzero((self._passed > 0) & (self._passed < self._times) & stopped)
+        before, at = self._time[self._passed[now] - 1], self._time[self._passed[now]]
+        self._share[now] *= np.clip((end[now] - before) / (at - before), 0.0, 1.0)
 
     def close(self) -> Part:
         """How many pass at each time, by parts of the time before it, and how many are lost before without having passed."""
         R, length = self._replicates, self._times + 1
         row = np.repeat(np.arange(R), len(self._passed) // R) * length
-        passed = np.bincount((row + self._passed) * PIECES + self._piece, minlength=R * length * PIECES)
+        piece = np.clip(np.floor(self._share * PIECES), 0, PIECES - 1).astype(np.int64)
+        passed = np.bincount((row + self._passed) * PIECES + piece, minlength=R * length * PIECES)
         open_ = self._passed == self._times
         lost = np.bincount((row + self._known)[open_], minlength=R * length)
         return {"passed": passed.reshape(R, length, PIECES), "lost": lost.reshape(R, length)}
@@ -259,25 +279,24 @@ class FirstPassage(Condition, Counted):
     """
 
     type: ClassVar[str] = "first_passage"
+    of_numbers: ClassVar[bool] = False
 
     levels: Any = (0.05, 0.5, 0.95)
 
     def check(self, faults: Faults) -> None:
         """Of one component."""
         super().check(faults)
-        levels = faults.finite("levels", self.levels)
-        if levels is not None and (levels.ndim != 1 or np.any(levels <= 0.0) or np.any(levels >= 1.0)):
-            faults.add("levels", self.levels, "are no numbers between 0 and 1", "give (0.05, 0.5, 0.95)")
+        check_levels(faults, self.levels)
         if self.of is not None and getattr(self, "_quantity", None) is not None and self.quantity.size != 1:
             faults.add("of", self.of, f"has {self.quantity.size} components", f"give one: {self.quantity.labels[0]!r}")
 
     def open(self, time: np.ndarray, count: int) -> _Passages:
         """What follows the members of a block."""
-        return _Passages(self, len(time), count)
+        return _Passages(self, time, count)
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         """Kaplan & Meier 1958."""
-        curve = _Curve(part)
+        curve = Curve.of(part)
         lower, upper = curve.ends(*intervals.wilson(curve.value, curve.members, self.confidence))
         passed, lost = curve.passed.sum(axis=1), part["lost"][0]
         arrays = {"value": curve.value[:, -1], "lower": lower[:, -1], "upper": upper[:, -1]}
@@ -294,8 +313,8 @@ class FirstPassage(Condition, Counted):
         """The intervals of probabilities from the spread of the replicates' curves."""
         each = self.each_replicate(parts, replicates)
         everything = self.whole(together(each))
-        curve = _Curve(everything)
-        curves = np.stack([_Curve(self.whole(own)).value for own in each])
+        curve = Curve.of(everything)
+        curves = np.stack([Curve.of(self.whole(own)).value for own in each])
         ends = curve.ends(*intervals.probability_of_replicates(curve.value, curves, curve.members, self.confidence))
         found = {name: end[:, -1] for name, end in zip(("lower", "upper"), ends, strict=True)}
         found |= self._times(curve.value, *ends, time)
@@ -324,7 +343,14 @@ class FirstPassage(Condition, Counted):
         return float(time[i - 1] + (time[i] - time[i - 1]) * (piece + (level - low) / (high - low)) / PIECES)
 
 
-class _Curve:
+def check_levels(faults: Faults, levels: Any) -> None:
+    """Fractions of members must lie between 0 and 1."""
+    numbers = faults.finite("levels", levels)
+    if numbers is not None and (numbers.ndim != 1 or np.any(numbers <= 0.0) or np.any(numbers >= 1.0)):
+        faults.add("levels", levels, "are no numbers between 0 and 1", "give (0.05, 0.5, 0.95)")
+
+
+class Curve:
     """Kaplan & Meier's curve at the end of each piece of the times before samples: survival, and value 1 less it, (k, pieces).
 
     passed (k, pieces): members that pass in a piece; risk (k,): members at risk of passing at each sample time; left (k,
@@ -332,10 +358,15 @@ class _Curve:
     in no piece after it. members (k, pieces): of independent ones, as many would be as sure.
     """
 
-    def __init__(self, part: Part):
-        self.passed, lost = part["passed"][0, :-1], part["lost"][0, :-1]
+    @classmethod
+    def of(cls, part: Part) -> Curve:
+        """That of first passages."""
+        return cls(part["passed"][0, :-1], part["lost"][0, :-1], int(part["passed"][0].sum()))
+
+    def __init__(self, passed: np.ndarray, lost: np.ndarray, total: int):
+        """lost (k,): members that are lost before each time; total: all members."""
+        self.passed = passed
         at = self.passed.sum(axis=1)
-        total = int(part["passed"][0].sum())
         self.risk = total - np.cumsum(lost) - (np.cumsum(at) - at)
         n = self.risk[:, None]
         so_far = np.cumsum(self.passed, axis=1)

@@ -37,7 +37,7 @@ class Gathered:
     def open(self, plan: Plan, block: Block, members: Members) -> _BlockStatistics:
         """What gathers those of one block."""
         place = (block.first, block.first // self._size, self._size)
-        return _BlockStatistics(self._statistics, members, place, self.time, self._replicates)
+        return _BlockStatistics(self._statistics, plan, members, place, self.time, self._replicates)
 
     def merge(self, block: Block, part: list[Part]) -> None:
         """Take in a block's part: of each statistic, named arrays."""
@@ -57,13 +57,19 @@ class Gathered:
 
     def said(self, statistic: Statistic, parts: Sequence[Part]) -> list[Estimate]:
         """What one statistic says of the parts of a tree."""
+        time = self.time if statistic.at is None else self.time[-1:]
         if self._replicates > 1:
-            return statistic.estimates_of_replicates(parts, self.time, self._replicates)
-        return statistic.estimates(parts, self.time)
+            return statistic.estimates_of_replicates(parts, time, self._replicates)
+        return statistic.estimates(parts, time)
 
     def result(self) -> Estimates:
         """All of them, by name."""
         return Estimates(self.estimates())
+
+    @property
+    def apart(self) -> set[str]:
+        """Names of estimates that are not of all members on purpose: those of their ends."""
+        return {part.key for one in self._statistics if one.at_end for part in one.parts()}
 
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs to gather blocks: not what was gathered here."""
@@ -85,28 +91,44 @@ class _BlockStatistics:
     def __init__(
         self,
         statistics: Sequence[Statistic],
+        plan: Plan,
         members: Members,
         place: tuple[int, int, int],
         time: np.ndarray,
         replicates: int,
     ):
         self._statistics, self._members, self._place = statistics, members, place
-        self._replicates = replicates
-        self._open = [one.open(time, members.count) for one in statistics]
+        self._plan, self._replicates, self._times = plan, replicates, len(time)
+        # Of those that are of members' ends: the quantity at the last sample.
+        self._last: dict[Statistic, np.ndarray] = {}
+        self._open = [one.open(time if one.at is None else time[-1:], members.count) for one in statistics]
 
     def take(self, when: slice, samples: Fields) -> None:
         """Hand each statistic the values of its quantity; statistics of the same quantity share them."""
         made: dict[Any, Values] = {}
         for statistic, gathers in zip(self._statistics, self._open, strict=True):
+            if statistic.at_end:
+                if when.stop == self._times and not statistic.of_ends:
+                    self._last[statistic] = statistic.quantity(samples.last(), self._members)
+                continue
             quantity = statistic.quantity
             key = (quantity.name, quantity.function, statistic.stopped)
             if key not in made:
                 x = quantity(samples, self._members)
-                good = samples.good(statistic.stopped == "held")
-                alone = self._replicates == 1
-                made[key] = Values(x, good, *self._place) if alone else dealt(x, good, *self._place, self._replicates)
+                made[key] = self._values(x, samples.good(statistic.stopped == "held"))
             gathers.take(made[key], when)
+
+    def _values(self, x: np.ndarray, good: np.ndarray | None) -> Values:
+        """Values of all members, or of each replicate's."""
+        if self._replicates == 1:
+            return Values(x, good, *self._place)
+        return dealt(x, good, *self._place, self._replicates)
 
     def close(self, outcome: Outcome) -> list[Part]:
         """Of each statistic, named arrays."""
+        ends = outcome.ends(self._plan)
+        for statistic, gathers in zip(self._statistics, self._open, strict=True):
+            if statistic.at_end:
+                gathers.take(self._values(*statistic.at_ends(ends, self._last.get(statistic))), slice(0, 1))
+            gathers.end(ends, self._replicates)
         return [one.close() for one in self._open]

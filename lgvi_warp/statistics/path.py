@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from lgvi_warp.errors import Faults
-from lgvi_warp.statistics.base import Statistic
-from lgvi_warp.statistics.counts import Condition, FirstPassage
-from lgvi_warp.statistics.estimate import Estimate
-from lgvi_warp.statistics.moments import Mean
-from lgvi_warp.statistics.quantity import Quantity
+from lgvi_warp.statistics.base import Gatherer
+from lgvi_warp.statistics.counts import Condition
+from lgvi_warp.statistics.then import Then
 from lgvi_warp.statistics.tree import Part
 from lgvi_warp.statistics.values import Values
 
 
-class _Walk:
+class _Walk(Gatherer):
     """Of a block: what each member's path came to so far, sample by sample, and whether all its samples counted."""
 
     def __init__(self, statistic: OfPath, time: np.ndarray):
@@ -54,16 +50,11 @@ class _Walk:
         x = self._statistic.finish(self._state)
         good = None if self._whole is None or self._whole.all() else self._whole
         values = Values(x.astype(np.float32) if self._single else x, good, *self._place)
-        found: Part = {}
-        for i, one in enumerate(self._statistic.then_all):
-            gathered = one.open(self._time[-1:], values.x.shape[2])
-            gathered.take(values, slice(0, 1))
-            found |= {f"{i}/{key}": array for key, array in gathered.close().items()}
-        return found
+        return self._statistic.gather(values, self._time)
 
 
 @dataclass(frozen=True, eq=False)
-class OfPath(Statistic):
+class OfPath(Then):
     """One number for each component of each member's whole path, then statistics of that.
 
     then: a statistic, or a list, without `of`: lw.Mean(), lw.Quantiles(levels=(0.5, 0.99)), lw.Exceedance(above=2.0).
@@ -71,47 +62,9 @@ class OfPath(Statistic):
     path_maximum speed". The time of their one row is that of the end.
     """
 
+    of_numbers: ClassVar[bool] = False
     # Whether the number is one of the samples.
     of_samples: ClassVar[bool] = False
-
-    then: Any = None
-
-    def check(self, faults: Faults) -> None:
-        """What comes after must be statistics over members, and not of something else."""
-        super().check(faults)
-        from lgvi_warp import statistics
-
-        given = [Mean()] if self.then is None else self.then if isinstance(self.then, list | tuple) else [self.then]
-        found: list[Statistic] = []
-        with faults.including():
-            found = list(statistics.from_list(given, f"{self.type}.then", whole=False))
-        for i, one in enumerate(found):
-            if isinstance(one, OfPath | FirstPassage):
-                what = f"is of samples in time, and a {self.type} is one number of each member"
-                faults.add(f"then[{i}].type", one.type, what, "ask for its mean, quantiles, or an exceedance")
-            elif one.of is not None:
-                faults.add(f"then[{i}].of", one.of, "is given already", f"leave it out: it is of the {self.type}")
-        object.__setattr__(self, "then", tuple(found))
-
-    @property
-    def then_all(self) -> tuple[Statistic, ...]:
-        """The statistics of the paths, each knowing what it is of."""
-        inner = self.quantity
-        whole = Quantity(self.key, inner.function, self.unit, inner.fields, self._labels)
-        return tuple(replace(one, of=whole, stopped=self.stopped) for one in self.then)
-
-    @property
-    def unit(self) -> str:
-        """Of what a path comes to."""
-        return self.quantity.unit
-
-    @property
-    def _labels(self) -> tuple[str, ...]:
-        return tuple(f"{self.type} {label}" for label in self.quantity.labels)
-
-    def parts(self) -> tuple[Statistic, ...]:
-        """Those of the paths."""
-        return self.then_all
 
     def open(self, time: np.ndarray, count: int) -> _Walk:
         """What follows the members of a block."""
@@ -130,39 +83,6 @@ class OfPath(Statistic):
     def finish(self, state: np.ndarray) -> np.ndarray:
         """What statistics are of."""
         return state
-
-    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """Each statistic's own."""
-        found: Part = {}
-        for i, one in enumerate(self.then_all):
-            found |= {f"{i}/{key}": a for key, a in one.join(own(left, i), own(right, i), place).items()}
-        return found
-
-    def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
-        """Each statistic's, at the end."""
-        found: list[Estimate] = []
-        for i, one in enumerate(self.then_all):
-            found += one.estimates([own(part, i) for part in parts], time[-1:])
-        return found
-
-    def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
-        """Each statistic's own."""
-        found: Part = {}
-        for i, one in enumerate(self.then_all):
-            found |= {f"{i}/{key}": a for key, a in one.of_replicate(own(part, i), replicate, replicates).items()}
-        return found
-
-    def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
-        """Each statistic's, at the end."""
-        found: list[Estimate] = []
-        for i, one in enumerate(self.then_all):
-            found += one.estimates_of_replicates([own(part, i) for part in parts], time[-1:], replicates)
-        return found
-
-
-def own(part: Part, i: int) -> Part:
-    """The arrays of the i-th."""
-    return {key.removeprefix(f"{i}/"): array for key, array in part.items() if key.startswith(f"{i}/")}
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ def table(estimates: Estimates) -> list[str]:
     found = []
     for one in estimates.values():
         unit = "" if one.unit == "1" or one.unit.startswith("products") else f" {one.unit}"
-        members = one.count[0] if one.settings["type"] == "first_passage" else one.count[-1]
+        members = _MEMBERS.get(one.settings["type"], lambda one: one.count[-1])(one)
         for label, value, lower, upper in _LINES.get(one.settings["type"], _entries)(one):
             ends = f"{lower:.5g} to {upper:.5g}" if np.isfinite(lower) or np.isfinite(upper) else "no interval"
             found.append((label, f"{value:.6g}{unit}", ends, f"{int(members):,} members"))
@@ -29,11 +29,11 @@ Line = tuple[str, float, float, float]
 
 def _labels(one: Estimate) -> list[str]:
     """What each component is called, with the kind of statistic before it unless it has a name of its own."""
-    kind = one.settings["type"]
+    kind, at = one.settings["type"], f" at {one.settings['at']}" if "at" in one.settings else ""
     if one.name != f"{kind} {', '.join(one.name.split(' ', 1)[1:])}" or len(one.coordinates["component"]) == 1:
         names = [one.name] if len(one.coordinates["component"]) == 1 else one.coordinates["component"].tolist()
         return names if len(names) == 1 else [f"{one.name}: {name}" for name in names]
-    return [f"{kind} {name}" for name in one.coordinates["component"]]
+    return [f"{kind} {name}{at}" for name in one.coordinates["component"]]
 
 
 def _entries(one: Estimate) -> Iterator[Line]:
@@ -70,6 +70,16 @@ def _passage(one: Estimate) -> Iterator[Line]:
         yield f"{one.name}: time [s] of {level:g}", float(one["passage_time"][j]), lower, upper
 
 
+def _outcome(one: Estimate) -> Iterator[Line]:
+    yield one.name, one.value[-1], one.lower[-1], one.upper[-1]
+    if one["otherwise"][-1]:
+        lower, upper = (float(one[f"fraction_{end}"][-1]) for end in ("lower", "upper"))
+        yield f"{one.name}: of all members", float(one["fraction"][-1]), lower, upper
+    for j, level in enumerate(one.coordinates["level"]):
+        lower, upper = (float(one[f"end_time_{end}"][j]) for end in ("lower", "upper"))
+        yield f"{one.name}: time [s] of {level:g}", float(one["end_time"][j]), lower, upper
+
+
 def _attitude(one: Estimate) -> Iterator[Line]:
     yield f"{one.name}: dispersion [rad]", one["dispersion"][-1], -np.inf, np.inf
     for i, half in enumerate(one["rotation_half_width"][-1]):
@@ -93,6 +103,13 @@ _LINES: dict[str, Callable[[Estimate], Iterator[Line]]] = {
     "covariance": _covariance,
     "extremes": _extremes,
     "first_passage": _passage,
+    "outcome": _outcome,
     "mean_attitude": _attitude,
     "histogram": _histogram,
+}
+
+# Members that an estimate is of, where that is not its count at the end.
+_MEMBERS: dict[str, Callable[[Estimate], int]] = {
+    "first_passage": lambda one: int(one.count[0]),
+    "outcome": lambda one: int(one.count[0] + one["ended"][0] + one["otherwise"][0]),
 }

@@ -175,7 +175,7 @@ def _entries(one: Statistic) -> dict[str, dict[str, int]]:
     found: dict[str, dict[str, int]] = {one.key: {}}
     for i, label in enumerate(one.quantity.labels):
         index = re.search(r"\[[^\]]*\]", label)
-        found[f"{one.key}{index[0] if index else f'[{i}]'}"] = found[f"{one.type} {label}"] = {
+        found[f"{one.key}{index[0] if index else f'[{i}]'}"] = found[f"{one.type} {label}{one.at_text}"] = {
             "component": i,
             "component_2": i,
         }

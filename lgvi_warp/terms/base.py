@@ -15,6 +15,9 @@ from lgvi_warp.inertia import Frame
 # Own numbers of a term, or all parameters of a scene, by name; leading dimension 1 (shared) or n (one per member).
 Numbers = Mapping[str, np.ndarray]
 
+# What a motion may conserve: energy [J], horizontal linear momentum [N s], vertical angular momentum [N m s].
+CONSERVED = frozenset({"energy", "horizontal_momentum", "vertical_angular_momentum"})
+
 
 @dataclass(frozen=True)
 class Setting:
@@ -122,6 +125,19 @@ class Term:
     def memory(self) -> bool:
         """Whether its device code remembers something from step to step."""
         return False
+
+    @property
+    def conserves(self) -> frozenset[str]:
+        """What of `CONSERVED` a motion keeps where this law alone acts.
+
+        By default energy, of a law whose device code is POTENTIAL and nothing else, if `potential` is defined and does not
+        look at the time; else nothing. A law whose potential depends on depth and on the attitude to the vertical alone
+        conserves all three: it overrides this.
+        """
+        device = self.device
+        follows = getattr(device, "POTENTIAL", False) and type(self).potential is not Term.potential
+        more = self.timed or self.memory or any(hasattr(device, role) for role in ("damping", "flow", "evolve"))
+        return frozenset({"energy"} if follows and not more else ())
 
     def device_in(self, aligned: bool) -> Any:
         """Its device code, where the kernel's axes are the user's (see Setting) and where they are not."""

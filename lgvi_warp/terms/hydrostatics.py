@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from lgvi_warp import vehicle
-from lgvi_warp.terms.base import Numbers, Packed, Setting, Term
+from lgvi_warp.terms.base import CONSERVED, Numbers, Packed, Setting, Term
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -17,6 +17,11 @@ class Weight(Term):
 
     type: ClassVar[str] = "weight"
     device: ClassVar[str] = "weight"
+
+    @property
+    def conserves(self) -> frozenset[str]:
+        """All: its potential depends on depth alone."""
+        return CONSERVED
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
         """(m - rho V) g cancels: formed here in float64, whatever the kernel's precision."""
@@ -33,6 +38,11 @@ class Restoring(Term):
 
     type: ClassVar[str] = "restoring"
     device: ClassVar[str] = "restoring"
+
+    @property
+    def conserves(self) -> frozenset[str]:
+        """All: its potential depends on the attitude to the vertical alone."""
+        return CONSERVED
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
         """B r_b - W r_g about the origin of the forces."""

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.terms.base import Numbers, Packed, Setting, Term, quantity
+from lgvi_warp.terms.base import CONSERVED, Numbers, Packed, Setting, Term, quantity
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -26,6 +26,11 @@ class Stratification(Term):
     def present(self, own: Numbers) -> bool:
         """Whether some member has one."""
         return bool(np.any(own["gradient"]))
+
+    @property
+    def conserves(self) -> frozenset[str]:
+        """All: its potential depends on the depth of the centre of buoyancy alone."""
+        return CONSERVED
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
         """The deviation from B alone: B is the vehicle's weight less buoyancy's."""

@@ -25,6 +25,11 @@ class Tether(Term):
     attachment: Any = quantity((3,), "m", (0.0, 0.0, 0.0))
     rest_length: Any = quantity((), "m", 0.0, least=0.0)
 
+    @property
+    def conserves(self) -> frozenset[str]:
+        """Energy: the anchor takes up momentum."""
+        return frozenset({"energy"})
+
     def packed(self, own: Numbers, setting: Setting) -> Packed:
         """The attachment from the origin of the forces."""
         values = {key: own[key] for key in ("anchor", "stiffness", "rest_length")}

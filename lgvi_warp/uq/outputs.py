@@ -14,7 +14,7 @@ from lgvi_warp.quantities import OfInterest, Quantity, quantities
 from lgvi_warp.saveat import FIELDS, SaveAt
 from lgvi_warp.scene import Scene
 from lgvi_warp.solving import solve
-from lgvi_warp.status import Status
+from lgvi_warp.status import Status, failed
 
 # Members that are run together: what is kept of their paths stays small.
 AT_ONCE = 16_384
@@ -79,8 +79,8 @@ def evaluate(
     finite = np.isfinite(found).all(axis=1)
     names = {Status(int(code)).name.lower(): int((ended == code).sum()) for code in np.unique(ended)}
     counts = names | ({"quantity not finite": int((~finite).sum())} if not finite.all() else {})
-    failed = ((ended != Status.OK) & (ended < Status.SURFACE)) | ~finite
-    return Outputs(found, tuple(labels), failed, counts, provenance | {"ensemble": fleet.to_dict()})
+    failures = failed(ended) | ~finite
+    return Outputs(found, tuple(labels), failures, counts, provenance | {"ensemble": fleet.to_dict()})
 
 
 def _part(progress: Callable[[float], None], done: float, share: float) -> Callable[[float], None]:

@@ -104,6 +104,22 @@ def test_a_term_of_zeros_is_absent():
     assert asked.spec == plain.spec and asked.advance is plain.advance
 
 
+def test_a_polynomial_is_there_only_if_asked_for(tmp_path):
+    plain = CASES["thrusters"].terms[0]
+    numbers = {one.name: getattr(plain, one.name) for one in plain.quantities()}
+    scenes = {
+        name: lw.Scene(VEHICLE, terms=[terms.Thrusters(**numbers | {"polynomial": curve})])
+        for name, curve in (("none", None), ("square", (0.0, 1.0)), ("cubic", (0.0, 0.0, 1.0)))
+    }
+    plans = {name: make_plan(one(scene, **STATE), h=0.01, t1=0.1) for name, scene in scenes.items()}
+    assert plans["none"].spec == plans["square"].spec != plans["cubic"].spec
+    assert plans["none"].advance is plans["square"].advance
+    for name in ("none", "cubic"):
+        (tmp_path / name).mkdir()
+        assert ("polynomial_law" in source(scenes[name], tmp_path / name)) == (name == "cubic")
+    assert "polynomial" not in plain.to_dict()
+
+
 VARIED = {
     "vehicle.mass": lw.Normal(relative=0.01),
     "vehicle.inertia": lw.Normal(relative=0.01),

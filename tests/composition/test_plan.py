@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 
 import lgvi_warp as lw
-from lgvi_kernels.advance import make_advance
+from lgvi_kernels.advance.kernel import make_advance
 from lgvi_kernels.terms import restoring, weight
 from lgvi_warp.blocks import blocks
 from lgvi_warp.method import Method
@@ -42,14 +42,17 @@ def test_an_absent_term_is_no_parameter():
     def names(struct):
         return set(struct.numpy_dtype()["names"])
 
-    assert names(plan_of(scene_of()).advance.Params) == {"unused"}
-    params = plan_of(scene_of(net=1.0)).advance.Params
+    assert names(plan_of(scene_of()).advance.types.Params) == {"unused"}
+    params = plan_of(scene_of(net=1.0)).advance.types.Params
     assert np.zeros(1, params.numpy_dtype())["own"].dtype.names == ("net",)
 
 
 def test_munk_moment_only_for_anisotropic_mass():
     isotropic, diagonal = plan_of(scene_of((2.0, 2.0, 2.0), net=1.0)), plan_of(scene_of((1.0, 2.0, 3.0)))
-    assert isotropic.spec.mass == "isotropic" and "anisotropy" not in isotropic.advance.Inertia.numpy_dtype()["names"]
+    assert (
+        isotropic.spec.mass == "isotropic"
+        and "anisotropy" not in isotropic.advance.types.Inertia.numpy_dtype()["names"]
+    )
     assert {letter for letter, _ in (*isotropic.spec.maps, isotropic.spec.lead)} == {"Ab", "D", "K"}
     assert diagonal.spec.mass == "diagonal" and diagonal.spec.lead == ("T", 0.5)
     assert plan_of(scene_of(TURN @ np.diag((1.0, 2.0, 3.0)) @ TURN.T)).spec.mass == "full"

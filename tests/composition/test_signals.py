@@ -401,7 +401,7 @@ def test_an_interrupt_while_files_are_written_leaves_them_whole(tmp_path, monkey
     there = sorted(path.name for path in tmp_path.iterdir())
     assert there == ["fleet.png", "fleet.rrd", "result.npz"] and lw.Result.load(tmp_path / "result.npz").members == 20
     said = capsys.readouterr().err
-    assert said.startswith("lgvi-warp: interrupted; the run is finished; written: ") and said.count("\n") == 1
+    assert said.startswith("lgvi-warp: interrupted; written: ") and said.count("\n") == 1
     assert all(str(tmp_path / name) in said for name in there)
 
 

@@ -27,6 +27,7 @@ EVERY = [
     lw.PathMinimum("depth"), lw.PathMean("depth", then=[lw.Mean(), lw.Extremes()]), lw.PathRms("speed"),
     lw.PathRange("position"),
     lw.PathTime("depth", above=-0.5, below=0.5), lw.PathTime("depth", above=0.25, then=[lw.Exceedance(above=0.3)]),
+    lw.Outcome("failed"), lw.EndTime("failed"), lw.Mean("depth", at="failed"),
 ]  # fmt: skip
 
 
@@ -209,7 +210,8 @@ def test_intervals_of_dependent_members_are_said_to_be(scene, whole, sampling, w
     sampled = lw.Ensemble(
         scene, 16, 1, {"start.position[0]": lw.Normal(std=1.0), "vehicle.mass": lw.Normal(std=1.0)}, sampling
     )
-    (text,) = observation.notes(whole.statistics, sampled.to_dict(), np.zeros(1003, np.uint8)) or ("",)
+    apart = Gathered(np.zeros(1), 1003, EVERY).apart
+    (text,) = observation.notes(whole.statistics, sampled.to_dict(), np.zeros(1003, np.uint8), apart) or ("",)
     assert words in text and bool(text) == bool(words)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_kernels.advance import make_advance
+from lgvi_kernels.advance.kernel import make_advance
 from lgvi_warp import scenefile, terms
 from tests.tools import TURN, one
 

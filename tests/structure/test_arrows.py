@@ -112,7 +112,12 @@ def closure(module):
 
 
 def test_the_reader_finds_both_packages():
-    assert {"lgvi_warp", "lgvi_warp.plan", "lgvi_warp.reference.rotation", "lgvi_kernels.advance"} <= MODULES.keys()
+    assert {
+        "lgvi_warp",
+        "lgvi_warp.plan",
+        "lgvi_warp.reference.rotation",
+        "lgvi_kernels.advance.kernel",
+    } <= MODULES.keys()
     assert all(part(package) for package in ("lgvi_warp.reference", "lgvi_warp.sinks", "lgvi_kernels.terms"))
 
 

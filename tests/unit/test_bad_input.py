@@ -61,6 +61,13 @@ TERMS = [
     (TETHER | {"stiffness": -5.0}, "tether.stiffness = -5.0", "out of bounds", "from 0 [N/m]"),
     (TETHER | {"rest_length": float("inf")}, "tether.rest_length = inf", "not finite", "[m]"),
     (TETHER | {"anchor": [0.0, 0.0]}, "tether.anchor = [0.0, 0.0]", "shape (2,)", "(3,) [m]"),
+    (
+        {key: value for key, value in THRUSTER.items() if key != "coefficient"},
+        "thrusters.coefficient = None",
+        "is missing",
+        "or a polynomial [N]",
+    ),
+    (THRUSTER | {"polynomial": [[1.0]]}, "thrusters.polynomial = [[1.0]]", "has shape (1, 1)", "give p numbers"),
     (THRUSTER | {"coefficient": [-1.0]}, "thrusters.coefficient = [-1.0]", "out of bounds", "from 0"),
     (THRUSTER | {"time_constant": -0.1}, "thrusters.time_constant", "out of bounds", "from 0 [s]"),
     (HULL | {"diameters": [0.1, -0.1]}, "cross_flow.diameters = [0.1, -0.1]", "out of bounds", "from 0 [m]"),
@@ -346,6 +353,7 @@ STEERED = FIN | {"type": "control_fins", "command": 0.1}
 IDLE = [
     (SCHEDULED, "thrusters.command", "vary thrusters.command_schedule"),
     (THRUSTER, "thrusters.command_schedule", "vary thrusters.command"),
+    (THRUSTER, "thrusters.polynomial", "give thrusters.polynomial in the scene"),
     (THRUSTER, "thrusters.time_constant", "give thrusters.time_constant above 0 [s] in the scene"),
     (STEERED, "control_fins.times", "vary control_fins.command"),
     (STEERED, "control_fins.rate_limit", "give control_fins.rate_limit below 1e+06 rad/s in the scene"),

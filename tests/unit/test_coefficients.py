@@ -7,7 +7,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import coefficients as co
-from lgvi_warp import coefficients_sdf
+from lgvi_warp import coefficients_poses
 
 DIAGONAL = {"X_udot": -0.93, "Y_vdot": -35.5, "Z_wdot": -35.5, "K_pdot": -0.0704, "M_qdot": -4.88, "N_rdot": -4.88}
 PAIRS = {"Y_rdot": 1.93, "N_vdot": 1.93, "Z_qdot": -1.93, "M_wdot": -1.93}
@@ -203,7 +203,7 @@ def test_sdf_pose_turns_the_inertia(pose, attributes):
 
 
 def test_rpy_is_yaw_after_pitch_after_roll():
-    R = coefficients_sdf.rotation_from_rpy(np.array([0.3, -0.4, 0.5]))
+    R = coefficients_poses.rotation_from_rpy(np.array([0.3, -0.4, 0.5]))
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-15)
     np.testing.assert_allclose(R[2], [-np.sin(-0.4), np.cos(-0.4) * np.sin(0.3), np.cos(-0.4) * np.cos(0.3)])
     np.testing.assert_allclose(R[:, 0], [np.cos(0.5) * np.cos(-0.4), np.sin(0.5) * np.cos(-0.4), -np.sin(-0.4)])

@@ -37,7 +37,7 @@ def test_shapes_are_those_of_the_page(scene):
 
 
 def test_there_are_snippets():
-    assert len(snippets("toml")) == 1 and len(snippets("python")) == 5
+    assert len(snippets("toml")) == 1 and len(snippets("python")) == 6
 
 
 def test_every_type_is_on_the_page():

@@ -162,6 +162,37 @@ def test_bluerov2_thrusters_reach_every_motion():
     assert len(t["coefficient"]) == len(t["command"]) == 8
 
 
+def test_bluerov2_thrust_is_the_published_curve():
+    """Eq. 18 of von Benzon et al. 2022; a quarter of the greatest thrust, as of c V|V|, is 46 % of it at V = 0.5."""
+    scene = lw.Scene.from_dict({"vehicle": {"name": "bluerov2_heavy"}})
+    thrusters = next(term for term in scene.terms if term.type == "thrusters")
+    V = np.linspace(-1.0, 1.0, 41)[:, None] * np.ones(8)
+    published = -140.3 * V**9 + 389.9 * V**7 - 404.1 * V**5 + 176.0 * V**3 + 8.9 * V
+    np.testing.assert_allclose(thrusters.thrust(V), published, atol=1e-12)
+    assert thrusters.thrust(np.full(8, 0.5))[0] == pytest.approx(16.594, abs=1e-3)
+    for row in published:
+        np.testing.assert_allclose(thrusters.thrust(thrusters.command_for(row)), row, atol=1e-9)
+    most = thrusters.command_for(np.full(8, 99.0))
+    np.testing.assert_allclose(most, 0.9717, atol=1e-4)
+
+
+def test_commands_for_thrusts():
+    """The inverse of a curve with a dead band, of another shape astern; the least command; 0 for 0; the limit beyond reach."""
+    numbers = {
+        "position": [[0.0, 0.0, 0.0]] * 3,
+        "direction": [[1.0, 0.0, 0.0]] * 3,
+        "dead_band": [0.0, 0.1, 0.1],
+        "limit": 0.9,
+    }
+    square = lw.Thrusters(coefficient=[10.0, 20.0, 0.0], coefficient_astern=[5.0, 10.0, 1.0], **numbers)
+    np.testing.assert_allclose(square.command_for([2.5, -2.5, 1.0]), [0.5, -0.6, 0.0], rtol=1e-12)
+    curved = lw.Thrusters(polynomial=[2.0, 0.0, 40.0], polynomial_astern=[3.0], **numbers)
+    thrust = np.array([5.0, -1.0, 0.0])
+    np.testing.assert_allclose(curved.thrust(curved.command_for(thrust)), thrust, rtol=1e-12)
+    assert curved.command_for([1e3, -1e3, 0.0]).tolist() == [0.9, -0.9, 0.0]
+    np.testing.assert_allclose(curved.coefficient, 1.0)
+
+
 def test_the_sphere_is_exact():
     """Added mass half the displaced mass, isotropic; 2/5 m a^2; neutral."""
     v, rho, a = content("sphere")["vehicle"], content("sphere")["environment"]["water_density"], 0.25

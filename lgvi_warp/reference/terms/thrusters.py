@@ -1,4 +1,4 @@
-"""Thrusters: a quadratic thrust curve with dead band and saturation, after a first-order lag."""
+"""Thrusters: a thrust curve with dead band and saturation, after a first-order lag."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,8 @@ from lgvi_warp.reference.terms.wrench import at_time
 @dataclass(frozen=True)
 class Thrusters(Law):
     """position, direction (n, 3) [m, 1]; forward, backward (n,) [N per command squared]; dead_band, limit (n,);
-    time_constant (n,) [s], 0 for none; times (k,) [s] and command (k, n)."""
+    time_constant (n,) [s], 0 for none; times (k,) [s] and command (k, n); polynomial, polynomial_astern (p,): of the
+    command beyond the dead band, from the first power up, w^2 by default."""
 
     position: Array
     direction: Array
@@ -24,6 +25,8 @@ class Thrusters(Law):
     time_constant: Array
     times: Array
     command: Array
+    polynomial: tuple[float, ...] = (0.0, 1.0)
+    polynomial_astern: tuple[float, ...] = (0.0, 1.0)
 
     @property
     def lagged(self) -> bool:
@@ -47,9 +50,11 @@ class Thrusters(Law):
         return np.asarray(u + np.array(kept) * (view.memory - u))
 
     def wrench(self, view: View) -> tuple[Array, Array]:
-        """c+ max(n - band, 0)^2 - c- max(-n - band, 0)^2 along each."""
+        """c+ f+(max(n - band, 0)) - c- f-(max(-n - band, 0)) along each."""
         n = view.memory if self.lagged else self.commanded(view.t)
         ahead, astern = np.maximum(n - self.dead_band, 0.0), np.maximum(-n - self.dead_band, 0.0)
-        forces = (self.forward * ahead**2 - self.backward * astern**2)[:, None] * self.direction
+        f_ahead = sum(p * ahead ** (i + 1) for i, p in enumerate(self.polynomial))
+        f_astern = sum(p * astern ** (i + 1) for i, p in enumerate(self.polynomial_astern))
+        forces = (self.forward * f_ahead - self.backward * f_astern)[:, None] * self.direction
         torque = sum((cross(r, f) for r, f in zip(self.position, forces, strict=True)), np.zeros(3))
         return forces.sum(axis=0), torque

@@ -1,0 +1,222 @@
+"""The kernel: launches of so many steps, the chunks between two looks, and what is written."""
+
+import functools
+from typing import Any, NamedTuple
+
+import warp as wp
+
+from lgvi_kernels.advance.retry import make_retry
+from lgvi_kernels.advance.spec import CHUNK, Types, make_types
+from lgvi_kernels.advance.stepping import make_stepping
+from lgvi_kernels.advance.watching import make_watching
+from lgvi_kernels.compose import superpose
+from lgvi_kernels.events import FIRST
+from lgvi_kernels.flags import CPU_FLAGS
+from lgvi_kernels.lanes import add, any_positive, div, mul, neg, ones, positive, sub  # noqa: F401
+from lgvi_kernels.packet import failures, renormalise, turned_too_far
+from lgvi_kernels.rows import make_rows, make_sample
+from lgvi_kernels.sums import at_rest, choose
+
+# Where every step is a sample, steps between two looks at the energy: it is then found out so many late.
+SINGLE_LOOKS = 8
+
+
+class Advance(NamedTuple):
+    """A kernel and its types."""
+
+    kernel: Any
+    types: Types
+
+
+@functools.cache
+def make_advance(spec):
+    """Build (without compiling) the kernel for this Spec."""
+    width, real, checked = spec.width, spec.real, spec.checked
+    types, stepping, watching, retry = make_types(spec), make_stepping(spec), make_watching(spec), make_retry(spec)
+    Lane, Ints, Alarm, Monitor = types.Lane, types.Ints, types.Alarm, types.Monitor
+    Constants, DragFlow, Inertia, Params, Events = (
+        types.Constants,
+        types.DragFlow,
+        types.Inertia,
+        types.Params,
+        types.Events,
+    )
+    prepare, at_step, opened = stepping.method.prepare, stepping.at_step, stepping.opened
+    one_step, stepped = stepping.one_step, stepping.stepped
+    begin, note, energy_alarm = watching.begin, watching.note, watching.energy_alarm
+    retried, arrival = retry.retried, retry.arrival
+    watched, dragged, remembers, turned = spec.watched, spec.dragged, spec.memory, spec.turned
+    renormalised, composed, paced, apart = real == wp.float32, spec.composed, spec.paced, spec.explicit is None
+    lead_coefficient = spec.lead[1] if spec.lead is not None else 0.0
+    energetic, substepped, stills, warned = spec.energy, spec.substep, spec.still, bool(spec.looks)
+    looking = warned or energetic
+    per_sample = sum(spec.sample_fields.values())
+    read, write, back_up = make_rows(Lane, types.State, paced, spec.compensated)
+    drifts = superpose(spec.laws, "flow") is not None
+    sample = make_sample(Lane, spec.fields, spec.compensated, stepping.method, drifts, stills)
+
+    @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": CPU_FLAGS})
+    def advance(
+        # vehicles, laws and events, one entry (shared) or one a packet
+        inertia: wp.array(dtype=Inertia),
+        params: wp.array(dtype=Params),
+        events: wp.array(dtype=Events),
+        table: wp.array2d(dtype=Lane),
+        tolerance: real,
+        force_tolerance: real,
+        # method: length of each stage [s], in pairs where it has two halves; of the lead after each, and before the first
+        h: wp.float64,
+        stage_h: wp.array(dtype=real),
+        lead_h: wp.array(dtype=real),
+        # time: this launch makes steps k0 to k1, and writes the samples due after the steps sample_step[s0:]
+        k0: int,
+        k1: int,
+        s0: int,
+        sample_step: wp.array(dtype=int),
+        # in and out
+        state: wp.array2d(dtype=Lane),
+        memory: wp.array2d(dtype=Lane),
+        status: wp.array(dtype=Ints),
+        failed_step: wp.array(dtype=Ints),
+        failed_size: wp.array(dtype=Lane),
+        # what is looked at now and then
+        monitor: Monitor,
+        # out
+        out: wp.array2d(dtype=Lane),
+    ):
+        i = wp.tid()
+        c = Constants()
+        c.inertia = inertia[i % inertia.shape[0]]
+        c.params = params[i % params.shape[0]]
+        c.tolerance = tolerance
+        c.force_tolerance = force_tolerance
+        c.table = table
+        c.memory = memory
+        c.packet = i
+        c.entry = i % table.shape[0]
+        if wp.static(watched):
+            c.events = events[i % events.shape[0]]
+        if wp.static(dragged):
+            c.drag = prepare(DragFlow(), c.params.own, real(h))
+        stages = lead_h.shape[0] - 1
+        first_h = real(1.0) * stage_h[0]
+        opening = real(1.0) * lead_h[stages]
+        if wp.static(not composed):
+            # From the one number that the compiler then keeps for the stage and its leads.
+            opening = real(wp.static(lead_coefficient)) * first_h
+        x = read(state, i)
+        one = ones(x.b.x)
+        zero = one - one
+        frozen = zero
+        any_frozen = bool(False)
+        if wp.static(checked):
+            for j in range(wp.static(width)):
+                frozen[j] = real(status[i][j])
+            any_frozen = any_positive(frozen)
+        kept = x
+        if any_frozen:
+            x = choose(frozen, at_rest(x), x)
+        if k0 == 0:
+            if wp.static(looking):
+                begin(x, c, monitor, h, frozen)
+            x = opened(x, c, opening)
+        k = k0
+        s = s0
+        if wp.static(looking):
+            suspects = zero
+            last = sample_step[sample_step.shape[0] - 2]
+        singles = int(0)
+        while k < k1:
+            n = wp.min(wp.static(CHUNK) - k % wp.static(CHUNK), wp.min(k1, sample_step[s]) - k)
+            if singles > 0:
+                n = 1
+            good = x
+            if wp.static(remembers and checked):
+                back_up(memory, i, 0, 1)
+            x.alarm = Alarm()
+            if wp.static(paced):
+                x.alarm.code = frozen
+            if wp.static(apart):
+                x = stepped(x, c, monitor, k, n, h, stage_h, lead_h, first_h, opening)
+            else:
+                for j in range(n):
+                    x = one_step(x, c, monitor, k + j, h, stage_h, lead_h, first_h, opening)
+            repeat = int(0)
+            if wp.static(checked):
+                if wp.static(turned):
+                    x.alarm = turned_too_far(x.alarm)
+                if wp.static(energetic):
+                    if singles > 0:
+                        # Of a chunk that is made again, only those lanes are looked at that made it necessary.
+                        x.alarm = energy_alarm(x, c, monitor, k + n, h, opening, suspects)
+                    elif n > 1 or (k + n) % wp.static(SINGLE_LOOKS) == 0 or k + n == last:
+                        x.alarm = energy_alarm(x, c, monitor, k + n, h, opening, one - frozen)
+                code = failures(x, frozen)
+                if wp.static(substepped):
+                    if n == 1 and any_positive(code):
+                        was = code
+                        x, code = retried(good, x, was, c, k, h, stage_h, lead_h, opening)
+                        for j in range(wp.static(width)):
+                            if code[j] != was[j]:
+                                monitor.substeps[i][j] = monitor.substeps[i][j] + 1
+                                x.alarm.size[j] = real(0.0)
+                if any_positive(code):
+                    if n > 1:
+                        repeat = n
+                        if wp.static(looking):
+                            suspects = code
+                    else:
+                        landed = good
+                        if wp.static(watched):
+                            # The failed lanes keep their last good state, those that an event stops the state at it.
+                            begun = at_step(good, k, h)
+                            landed, code, part, still = arrival(begun, x, code, c, k, h, stage_h, lead_h, opening)
+                            for j in range(wp.static(width)):
+                                if code[j] >= real(wp.static(float(FIRST))):
+                                    x.alarm.size[j] = part[j] * part[j]
+                                if wp.static(stills):
+                                    if code[j] > real(0.0):
+                                        monitor.still[i, 0][j] = still.x[j]
+                                        monitor.still[i, 1][j] = still.y[j]
+                                        monitor.still[i, 2][j] = still.z[j]
+                            if wp.static(remembers):
+                                # Laws of the other lanes are to remember the whole step.
+                                back_up(memory, i, 1, 0)
+                                begun = one_step(begun, c, monitor, k, h, stage_h, lead_h, first_h, opening)
+                        for j in range(wp.static(width)):
+                            if code[j] > real(0.0):
+                                status[i][j] = int(code[j])
+                                failed_step[i][j] = k
+                                failed_size[i][j] = x.alarm.size[j]
+                        kept = choose(code, landed, kept)
+                        frozen = frozen + code
+                        any_frozen = True
+                if any_frozen:
+                    x = choose(frozen, at_rest(x), x)
+            if repeat > 0:
+                x = good
+                singles = repeat
+                if wp.static(remembers and checked):
+                    back_up(memory, i, 1, 0)
+            else:
+                k += n
+                if singles > 0:
+                    singles -= 1
+                if wp.static(warned):
+                    if k % wp.static(CHUNK) == 0 or k == last:
+                        note(x, c, monitor, k, h, opening, frozen)
+                if wp.static(renormalised):
+                    if k % wp.static(CHUNK) == 0:
+                        x = renormalise(x, tolerance)
+                if k == sample_step[s]:
+                    y = x
+                    if any_frozen:
+                        y = choose(frozen, kept, x)
+                    y = opened(at_step(y, k, h), c, -opening)
+                    sample(out, i, (s - s0) * wp.static(per_sample), y, c, real(h), monitor, frozen)
+                    s += 1
+        if any_frozen:
+            x = choose(frozen, kept, x)
+        write(state, i, x)
+
+    return Advance(advance, types)

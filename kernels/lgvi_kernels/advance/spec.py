@@ -1,0 +1,173 @@
+"""What decides the code of a kernel, and the types that its functions share."""
+
+import functools
+from typing import Any, NamedTuple
+
+import warp as wp
+
+from lgvi_kernels import monitor as monitors
+from lgvi_kernels.compose import params_of
+from lgvi_kernels.lanes import int_lane, lane
+from lgvi_kernels.rows import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS
+from lgvi_kernels.state import alarm_struct, inertia_struct, state_struct, struct, view_struct
+from lgvi_kernels.terms import drag
+
+# Steps between two looks at the alarms. A chunk with an alarm is repeated one step at a time by the same code.
+CHUNK = 128
+
+
+class Spec(NamedTuple):
+    """Everything that decides what code a kernel holds.
+
+    maps: the sub-maps after the leading one, as (letter, coefficient); lead: the sub-map that opens a step and merges with
+    the end of the step before, or None; laws: modules of laws, drag by its exact flow first if it is there; events: modules
+    of events; drag: the parts of drag along the axes (by its exact flow, or as rates), or none; mass: shape of M
+    ("isotropic", "diagonal", "full"); parts: what the inertia holds besides (see inertia_struct); coupling: which of U12,
+    U13, U23 and of the three pitches some member has; flow: "none", "steady" (uniform, the same for ever), "uniform",
+    "varying"; timed: whether a law looks at the time; averages: alpha and beta of (15), (16), or None for conservative
+    maps; composed: more than one stage a step, or one, whose constants then are made once for all steps; paired: a stage is
+    two halves, each with a length of its own; gauss: numbers of a collocation method, or none; lead_time: the part of a step
+    that the lead drifts for; explicit: an explicit method, which has no maps; compensated: sums of two float32 (see sums).
+    looks: rows of warnings (see monitor); energy: whether its growth is a failure; backward: whether drag is looked at for
+    stages that go backward; substep: whether a step that has no solution is divided.
+    """
+
+    width: int
+    real: Any
+    maps: tuple
+    lead: tuple | None
+    laws: tuple
+    mass: str
+    solver: str
+    iterations: int
+    adaptive: bool
+    checked: bool
+    fields: tuple
+    events: tuple = ()
+    drag: tuple = ()
+    parts: tuple = ()
+    coupling: tuple = (False,) * 6
+    flow: str = "none"
+    timed: bool = False
+    memory: bool = False
+    averages: tuple | None = None
+    composed: bool = False
+    paired: bool = False
+    gauss: tuple = ()
+    lead_time: float = 0.0
+    explicit: Any = None
+    compensated: bool = False
+    looks: tuple = ()
+    energy: bool = False
+    backward: bool = False
+    substep: bool = False
+
+    @property
+    def watched(self) -> bool:
+        """Whether events are looked at."""
+        return bool(self.events)
+
+    @property
+    def dragged(self) -> bool:
+        """Whether a sub-map makes drag by its exact flow."""
+        return bool(self.drag) and self.explicit is None
+
+    @property
+    def turned(self) -> bool:
+        """Whether turns about the body's axes are made, whose angle has a limit."""
+        return any(letter[0] == "R" for letter, _ in self.maps)
+
+    @property
+    def paced(self) -> bool:
+        """Whether a packet chooses its steps: it goes on with them in the next launch, and waits for no frozen lane."""
+        return self.explicit is not None and self.explicit.adaptive
+
+    @property
+    def drifted_time(self) -> float:
+        """The part of a step for which the lead has drifted when the step begins; with stages, the part of the first one."""
+        return self.lead_time if self.lead is not None and self.lead[0] in ("Ab", "T", "B") else 0.0
+
+    @property
+    def scaled(self) -> bool:
+        """Whether momenta and inertia are divided by max J: for (24), and where a step is chosen, for its tolerance."""
+        return self.explicit is None or self.explicit.adaptive
+
+    @property
+    def inertial(self) -> bool:
+        """Whether the state holds R p in place of p."""
+        return self.explicit is not None and self.explicit.kind == "inertial"
+
+    @property
+    def still(self) -> bool:
+        """Whether the water that a stopped member was in is kept: it goes on changing."""
+        return self.watched and self.flow in ("uniform", "varying")
+
+    @property
+    def state_fields(self) -> int:
+        """Numbers of a packet's state."""
+        return STATE_FIELDS * (1 + self.compensated) + PACE_FIELDS * self.paced
+
+    @property
+    def sample_fields(self) -> dict[str, int]:
+        """Field -> numbers per sample, in the order they are written; a compensated position is b and then its low part."""
+        numbers = {name: SAMPLE_FIELDS[name] for name in self.fields}
+        if self.compensated and "position" in numbers:
+            numbers["position"] = 6
+        return numbers
+
+
+class Types(NamedTuple):
+    """The types of a kernel: lanes, what a packet carries (see state), and its arguments.
+
+    Constants: what is the same in all steps of a packet. DragFlow: the constants of drag by its exact flow.
+    """
+
+    Lane: Any
+    Ints: Any
+    State: Any
+    Alarm: Any
+    View: Any
+    Constants: Any
+    DragFlow: Any
+    Inertia: Any
+    Params: Any
+    Events: Any
+    Limits: Any
+    Monitor: Any
+
+
+@functools.cache
+def make_types(spec):
+    """The types for this Spec."""
+    width, real = spec.width, spec.real
+    Lane = lane(width, real)
+    Inertia = inertia_struct(width, real, spec.mass, spec.parts)
+    Params, Events = params_of(spec.laws, width, real), params_of(spec.events, width, real)
+    DragFlow = drag.flow_struct(width, real)
+    Constants = struct(
+        "Constants",
+        inertia=Inertia,
+        params=Params,
+        tolerance=real,
+        force_tolerance=real,
+        table=wp.array2d(dtype=Lane),
+        memory=wp.array2d(dtype=Lane),
+        packet=wp.int32,
+        entry=wp.int32,
+        **({"events": Events} if spec.events else {}),
+        **({"drag": DragFlow} if spec.dragged else {}),
+    )
+    return Types(
+        Lane,
+        int_lane(width),
+        state_struct(width, real, spec.compensated),
+        alarm_struct(width, real),
+        view_struct(width, real),
+        Constants,
+        DragFlow,
+        Inertia,
+        Params,
+        Events,
+        monitors.limits_struct(width, real, spec.looks),
+        monitors.monitor_struct(width, real, spec.looks, spec.energy, spec.backward, spec.substep, spec.still),
+    )

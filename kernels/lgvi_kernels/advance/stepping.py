@@ -1,0 +1,97 @@
+"""The step of a method with its lead, and the loop over steps that takes the time of a run."""
+
+import functools
+from typing import Any, NamedTuple
+
+import warp as wp
+
+from lgvi_kernels.advance.spec import make_types
+from lgvi_kernels.events import Watch, make_watch
+from lgvi_kernels.lanes import add, mul  # noqa: F401
+from lgvi_kernels.method import Step, make_method
+from lgvi_kernels.monitor import make_backward, make_drag_rate
+from lgvi_kernels.sums import settled
+from lgvi_kernels.terms import drag_directions
+
+
+class Stepping(NamedTuple):
+    """Functions of a kernel's steps.
+
+    method: see Step; watch: see Watch, None without events. at_step: (x, k, h) -> x that knows the number and the time of
+    step k; opened: (x, c, length) -> x with the lead made; one_step, stepped: one step, and so many.
+    """
+
+    method: Step
+    watch: Watch | None
+    at_step: Any
+    opened: Any
+    one_step: Any
+    stepped: Any
+
+
+@functools.cache
+def make_stepping(spec):
+    """The steps of this Spec."""
+    types, real = make_types(spec), spec.real
+    State, Constants, Monitor = types.State, types.Constants, types.Monitor
+    method = make_method(spec)
+    step, lead = method.step, method.lead
+    timed, has_lead, lead_time = spec.timed, spec.lead is not None, spec.drifted_time
+    composed, paired, compensated = spec.composed, spec.paired, spec.compensated
+    backward, watched = spec.backward, spec.watched
+    watch = make_watch(spec.events, types.View, "origin" in spec.parts, real) if watched else None
+    to_event = watch.alarm if watched else step
+    drag_back = step
+    if backward:
+        rate = make_drag_rate(spec.laws[0] is drag_directions, spec.drag, method.velocities_of_forces, 1.0)
+        drag_back = make_backward(rate)
+
+    @wp.func
+    def at_step(x: State, k: int, h: wp.float64):
+        """The number of step k and the time after its lead, exact: never summed up."""
+        if wp.static(timed):
+            x.time = wp.float64(k) * h + wp.float64(wp.static(lead_time)) * h
+            x.step = k
+        return x
+
+    @wp.func
+    def opened(x: State, c: Constants, length: real):
+        """The lead of the first step; with `length` negative, the state at a step's end without that of the next."""
+        if wp.static(has_lead):
+            x = lead(x, c, length)
+        return x
+
+    @wp.func
+    def one_step(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, stage_h: wp.array(dtype=real),
+                 lead_h: wp.array(dtype=real), first_h: real, opening: real):  # fmt: skip
+        """Step k, and what is looked at in each."""
+        x = at_step(x, k, h)
+        if wp.static(composed):
+            for g in range(lead_h.shape[0] - 1):
+                if wp.static(paired):
+                    x = step(x, c, stage_h[2 * g], stage_h[2 * g + 1])
+                else:
+                    x = step(x, c, stage_h[g])
+                if wp.static(has_lead):
+                    x = lead(x, c, lead_h[g])
+        else:
+            x = step(x, c, first_h)
+            if wp.static(has_lead):
+                x = lead(x, c, opening + opening)
+        if wp.static(compensated):
+            x = settled(x)
+        if wp.static(backward):
+            x = drag_back(x, c, monitor.backward)
+        if wp.static(watched):
+            x = to_event(x, c, real(h))
+        return x
+
+    @wp.func(inline=False)
+    def stepped(x: State, c: Constants, monitor: Monitor, k: int, n: int, h: wp.float64, stage_h: wp.array(dtype=real),
+                lead_h: wp.array(dtype=real), first_h: real, opening: real):  # fmt: skip
+        """The steps k to k + n: the loop that takes the time, apart from all else, which would spoil its schedule."""
+        for j in range(n):
+            x = one_step(x, c, monitor, k + j, h, stage_h, lead_h, first_h, opening)
+        return x
+
+    return Stepping(method, watch, at_step, opened, one_step, stepped)

@@ -1,0 +1,121 @@
+"""Looks at a packet now and then: its energy, and what its motion says against the step.
+
+They are rare: no part of them is to be mixed with the loop over the steps, whose schedule and registers it would spoil (a
+fifth of the speed).
+"""
+
+import functools
+from typing import Any, NamedTuple
+
+import warp as wp
+
+from lgvi_kernels import monitor as monitors
+from lgvi_kernels.advance.spec import make_types
+from lgvi_kernels.advance.stepping import make_stepping
+from lgvi_kernels.compose import superpose
+from lgvi_kernels.lanes import add, any_positive, div, mul, neg, ones, positive, sub  # noqa: F401
+from lgvi_kernels.state import damping_struct
+from lgvi_kernels.terms import drag_directions
+
+
+class Watching(NamedTuple):
+    """begin: the look at the start; note: that after k steps; energy_alarm: after k steps, of lanes whose energy explodes."""
+
+    begin: Any
+    note: Any
+    energy_alarm: Any
+
+
+@functools.cache
+def make_watching(spec):
+    """The looks of this Spec; functions that it does not ask for are called nowhere."""
+    types, stepping, real, width = make_types(spec), make_stepping(spec), spec.real, spec.width
+    Lane, State, Constants, Monitor = types.Lane, types.State, types.Constants, types.Monitor
+    at_step, opened, momentum = stepping.at_step, stepping.opened, stepping.method.momentum
+    energetic, warned = spec.energy, bool(spec.looks)
+    look_at, energies, supplies, growth = _looks(spec, stepping.method)
+
+    @wp.func
+    def closed(x: State, c: Constants, k: int, h: wp.float64, opening: real):
+        """The state after k steps without the lead of the next, with p in body axes."""
+        y = opened(at_step(x, k, h), c, -opening)
+        if wp.static(momentum is not None):
+            y.p = momentum(y)
+        return y
+
+    @wp.func
+    def created(y: State, c: Constants, monitor: Monitor, t: real):
+        """Energy that came from nowhere since the start, over what there was to exchange."""
+        e = monitor.energy
+        return growth(y, c, t, e[c.packet, 0], e[c.packet, 1], e[c.packet, 2])
+
+    @wp.func(inline=False)
+    def energy_alarm(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real, among: Lane):
+        """The alarm after k steps, with that of the lanes, among these, whose energy explodes."""
+        g = created(closed(x, c, k, h, opening), c, monitor, real(wp.float64(k) * h))
+        one = ones(g)
+        over = positive(among, g - real(wp.static(monitors.MOST_ENERGY)) * one, one - one)
+        alarm = x.alarm
+        alarm.size = positive(alarm.code, alarm.size, positive(over, g * g, alarm.size))
+        grew = real(wp.static(float(monitors.ENERGY_GREW))) * one
+        alarm.code = positive(alarm.code, alarm.code, positive(over, grew, one - one))
+        return alarm
+
+    @wp.func
+    def warn(y: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, frozen: Lane):
+        """Note which rows are crossed after k steps; of the most serious one, when it was first so, and its value."""
+        g = frozen
+        if wp.static(energetic):
+            g = created(y, c, monitor, real(wp.float64(k) * h))
+        seen = look_at(y, c, monitor.limits[c.packet % monitor.limits.shape[0]], g)
+        bits = positive(frozen, frozen - frozen, seen.bits)
+        if any_positive(bits):
+            for j in range(wp.static(width)):
+                old = monitor.warned[c.packet][j]
+                new = int(bits[j]) & ~old
+                if new > old:
+                    monitor.warned_step[c.packet][j] = k
+                    monitor.warned_size[c.packet][j] = seen.size[j]
+                monitor.warned[c.packet][j] = old | new
+
+    @wp.func(inline=False)
+    def begin(x: State, c: Constants, monitor: Monitor, h: wp.float64, frozen: Lane):
+        """Look at the start, whose energy later ones are compared with."""
+        y = x
+        if wp.static(momentum is not None):
+            y.p = momentum(x)
+        if wp.static(energetic):
+            T, U = energies(y, c)
+            monitor.energy[c.packet, 0] = T
+            monitor.energy[c.packet, 1] = U
+            monitor.energy[c.packet, 2] = supplies(y, c, T)
+        if wp.static(warned):
+            warn(y, c, monitor, 0, h, frozen)
+
+    @wp.func(inline=False)
+    def note(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real, frozen: Lane):
+        """Look at the state after k steps, without the lead of the next."""
+        warn(closed(x, c, k, h, opening), c, monitor, k, h, frozen)
+
+    return Watching(begin, note, energy_alarm)
+
+
+def _looks(spec, method):
+    """(look_at, energies, supplies, growth) of monitor.py; the step in place of what a Spec does not ask for."""
+    width, real, laws = spec.width, spec.real, spec.laws
+    types = make_types(spec)
+    directions = bool(laws) and laws[0] is drag_directions
+    velocities, of_forces = method.velocities, method.velocities_of_forces
+    look_at, energies, supplies, growth = (method.step,) * 4
+    if spec.looks:
+        rates = []
+        damping = superpose(laws, "damping")
+        if "drag" in spec.looks and spec.drag:
+            rates.append(monitors.make_drag_rate(directions, spec.drag, of_forces, 2.0))
+        if "drag" in spec.looks and damping is not None:
+            rates.append(monitors.make_matrix_rate(types.View, damping_struct(width, real), damping, of_forces))
+        rate = monitors.make_sum(*rates) if len(rates) == 2 else (*rates, None)[0]
+        look_at = monitors.make_look(spec.looks, width, real, velocities, rate)
+    if spec.energy:
+        energies, supplies, growth = monitors.make_energy(laws, real, types.View, velocities, "origin" in spec.parts)
+    return look_at, energies, supplies, growth

@@ -1,0 +1,95 @@
+"""Files that a verb writes at its end: side by side, whole where it is interrupted, and what is said of them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from lgvi_warp.cli.signals import Ended
+from lgvi_warp.errors import MissingExtra, NothingToDraw
+
+# A signal that comes just before the main thread begins to wait is heard so much later [s].
+PERIOD = 0.2
+
+
+@dataclass
+class Written:
+    """Files that were written; what failed; pictures without anything to draw; those that a library is missing for."""
+
+    files: list[Path] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+    empty: list[str] = field(default_factory=list)
+    missing: dict[str, MissingExtra] = field(default_factory=dict)
+
+    def take(self, path: Path, write: Callable[[], Path]) -> None:
+        """Write a file, or note why it is not there."""
+        try:
+            self.files.append(write())
+        except MissingExtra as error:
+            self.missing[path.name] = error
+        except NothingToDraw as error:
+            self.empty.append(f"{path} was not written: {error}")
+        except (OSError, ImportError, ValueError) as error:
+            self.faults.append(f"{path} was not written: {error}")
+
+    def draw(self, plot: Callable[[Any, Path], Path], found: Any, path: Path) -> None:
+        """Draw what was found."""
+        self.take(path, lambda: plot(found, path))
+
+    def note_lines(self) -> list[str]:
+        """A line on the libraries that are not installed, if there are any."""
+        if not self.missing:
+            return []
+        files, errors = ", ".join(self.missing), self.missing.values()
+        extras = ",".join(dict.fromkeys(error.extra for error in errors))
+        libraries = " and ".join(dict.fromkeys(error.library for error in errors))
+        return [
+            f"note        {files}: not made without {libraries}; to have pictures: pip install 'lgvi-warp[{extras}]'"
+        ]
+
+
+def side_by_side(writers: Mapping[Path, Callable[[Path], Path]]) -> dict[Path, Future[Path]]:
+    """Write files, each in a thread of its own.
+
+    Args:
+        writers: Path -> what writes it.
+
+    Returns:
+        Path -> its future, which is done.
+
+    Raises:
+        KeyboardInterrupt: At an interrupt, when what was being written is whole, with a text that names it. A second
+            interrupt does not wait.
+    """
+    if not writers:
+        return {}
+    pool = ThreadPoolExecutor(len(writers))
+    jobs: dict[Path, Future[Path]] = {}
+    begun: list[Path] = []
+    ended: list[Path] = []
+    whole: list[Path] = []
+
+    def make(path: Path) -> Path:
+        begun.append(path)
+        try:
+            whole.append(writers[path](path))
+        finally:
+            ended.append(path)
+        return path
+
+    try:
+        for path in writers:
+            jobs[path] = pool.submit(make, path)
+        while wait(jobs.values(), timeout=PERIOD).not_done:
+            pass
+        pool.shutdown()
+    except KeyboardInterrupt:
+        pool.shutdown(cancel_futures=True)
+        while len(begun) > len(ended):  # the pool does not know of a thread that it was just starting
+            time.sleep(0.01)
+        raise (Ended(f"written: {', '.join(map(str, whole))}") if whole else KeyboardInterrupt()) from None
+    return jobs

@@ -1,0 +1,81 @@
+"""How the members of a block ended, and when: what statistics of outcomes are of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lgvi_warp.errors import Faults, closest
+from lgvi_warp.status import Status, failed, stopped
+
+# Words for several statuses: any event, any failure.
+STOPPED, FAILED = "stopped", "failed"
+
+
+@dataclass(frozen=True)
+class Ends:
+    """The ends of n members.
+
+    Args:
+        status: (n,), of `Status`.
+        event: (n,), number of the event that stopped each member, counted from 1; 0 for none.
+        time: (n,) [s], of the event or of the failure; the end of the run for the others.
+        events: what the events of the scene are called, in their order.
+    """
+
+    status: np.ndarray
+    event: np.ndarray
+    time: np.ndarray
+    events: tuple[str, ...] = ()
+
+    def are(self, outcome: str) -> np.ndarray:
+        """Which members had this outcome.
+
+        Args:
+            outcome: the name of an event of the scene, of a status, or "stopped" or "failed".
+
+        Returns:
+            (n,), true or false.
+        """
+        if outcome in self.events:
+            return np.asarray(self.event == 1 + self.events.index(outcome))
+        if outcome == STOPPED:
+            return stopped(self.status)
+        if outcome == FAILED:
+            return failed(self.status)
+        return np.asarray(self.status == Status[outcome.upper()])
+
+
+def outcomes(events: Iterable[str], statuses: Iterable[Status]) -> list[str]:
+    """Names of the outcomes that members of a scene can have.
+
+    Args:
+        events: what its events are called.
+        statuses: those of its events.
+
+    Returns:
+        The names of events, their statuses and those of failures, "stopped" and "failed".
+    """
+    failures = (one for one in Status if not one.stopped)
+    names = [*events, STOPPED, FAILED, *(one.name.lower() for one in (*statuses, *failures))]
+    return list(dict.fromkeys(names))
+
+
+def check_outcomes(key: str, asked: Sequence[str], known: Sequence[str]) -> None:
+    """Refuse outcomes that no member of a scene can have.
+
+    Args:
+        key: what asks for them.
+        asked: names of outcomes.
+        known: see `outcomes`.
+
+    Raises:
+        SceneError: with every name that is not known.
+    """
+    faults = Faults()
+    for name in asked:
+        if name not in known:
+            faults.add(key, name, "is no outcome of this scene", closest(name, known))
+    faults.raise_if_any()

@@ -1,0 +1,208 @@
+"""Statistics of members' ends against exact counts and the usual estimator of survival, and their coverage."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import lgvi_warp as lw
+from lgvi_warp.statistics import from_list
+from lgvi_warp.statistics.ends import Ends, check_outcomes, outcomes
+from lgvi_warp.statistics.estimate import Estimates
+from lgvi_warp.statistics.table import table
+from lgvi_warp.statistics.tree import Tree
+from lgvi_warp.statistics.values import Values, dealt
+
+FLOOR, SURFACE, OK, FAILED = lw.Status.FLOOR, lw.Status.SURFACE, lw.Status.OK, lw.Status.NON_FINITE
+TIMES = np.linspace(0.0, 10.0, 6)
+EVENTS = ("floor", "top")
+
+
+def ends_of(n, seed=0, rates=(0.1, 0.05, 0.02), step=0.0):
+    """n members with exponential times of floor, surface and failure, whichever is first, until 10 s."""
+    rng = np.random.default_rng(seed)
+    times = np.stack([rng.exponential(1.0 / rate, n) if rate else np.full(n, np.inf) for rate in rates])
+    if step:
+        times = np.maximum(np.ceil(times / step), 1.0) * step
+    first, at = times.min(axis=0), times.argmin(axis=0)
+    over = first <= TIMES[-1]
+    status = np.where(over, np.array([FLOOR, SURFACE, FAILED])[at], OK)
+    event = np.where(over, np.array([1, 2, 0])[at], 0)
+    return Ends(status, event, np.where(over, first, TIMES[-1]), EVENTS)
+
+
+def part_of(ends, at):
+    return Ends(ends.status[at], ends.event[at], ends.time[at], ends.events)
+
+
+def gathered(statistic, ends, block=256, order=None, replicates=1, last=None):
+    """What a statistic says of these ends, block by block; last: (n, d), its quantity at the last sample."""
+    n, tree = len(ends.status), Tree(statistic.join)
+    for i in order if order is not None else range(-(-n // block)):
+        at = slice(i * block, min((i + 1) * block, n))
+        x, good = statistic.at_ends(part_of(ends, at), None if last is None else last[at].T[None])
+        gathers = statistic.open(TIMES if statistic.of_ends else TIMES[-1:], at.stop - at.start)
+        given = (x, good, at.start, i, block)
+        gathers.take(Values(*given) if replicates == 1 else dealt(*given, replicates), slice(0, 1))
+        gathers.end(part_of(ends, at), replicates)
+        tree.add(i, gathers.close())
+    time = TIMES if statistic.of_ends else TIMES[-1:]
+    if replicates == 1:
+        return statistic.estimates(tree.parts(), time)
+    return statistic.estimates_of_replicates(tree.parts(), time, replicates)
+
+
+@pytest.mark.parametrize("step", [0.0, 0.5])
+def test_an_outcome_is_kaplan_and_meiers(step):
+    # With a step many members end at the same times, some of them at sample times.
+    ends = ends_of(1000, step=step)
+    (found,) = gathered(lw.Outcome("floor"), ends)
+    floor = ends.status == FLOOR
+    curve = stats.ecdf(stats.CensoredData.right_censored(ends.time, ~floor)).cdf
+    np.testing.assert_allclose(found.value, curve.evaluate(TIMES), rtol=1e-12)
+    np.testing.assert_array_equal(found["ended"], [(floor & (ends.time <= t)).sum() for t in TIMES])
+    otherwise = (ends.status != OK) & ~floor
+    np.testing.assert_array_equal(found["otherwise"], [(otherwise & (ends.time <= t)).sum() for t in TIMES])
+    np.testing.assert_array_equal(found["fraction"], found["ended"] / 1000)
+    np.testing.assert_array_equal(found.count, 1000 - found["ended"] - found["otherwise"])
+    assert (found.lower <= found.value).all() and (found.value <= found.upper).all()
+    # The time of each level: the first end at which the curve reaches it.
+    for level, time in zip(found.coordinates["level"], found["end_time"], strict=True):
+        reached = curve.quantiles[curve.probabilities >= level]
+        assert time == (reached.min() if len(reached) else np.inf)
+
+
+def test_without_others_an_outcome_is_a_fraction_with_wilsons_interval():
+    ends = ends_of(700, rates=(0.1, 0.0, 0.0))
+    (found,) = gathered(lw.Outcome("floor"), ends)
+    hits = np.array([((ends.status == FLOOR) & (ends.time <= t)).sum() for t in TIMES])
+    np.testing.assert_array_equal(found.value, hits / 700)
+    for hit, low, high in zip(hits, found.lower, found.upper, strict=True):
+        wilson = stats.binomtest(int(hit), 700).proportion_ci(0.95, "wilson")
+        np.testing.assert_allclose((low, high), wilson, rtol=1e-10, atol=1e-15)
+
+
+def test_words_for_outcomes():
+    ends = ends_of(500)
+    for word, members in {
+        "floor": ends.event == 1, "top": ends.event == 2, "surface": ends.status == SURFACE,
+        "non_finite": ends.status == FAILED, "stopped": ends.event > 0, "failed": ends.status == FAILED,
+        "ok": ends.status == OK,
+    }.items():  # fmt: skip
+        np.testing.assert_array_equal(ends.are(word), members)
+    known = outcomes(EVENTS, [FLOOR, SURFACE])
+    check_outcomes("outcome.of", ("top", "surface", "failed", "not_converged"), known)
+    with pytest.raises(lw.SceneError, match="did you mean 'floor'"):
+        check_outcomes("outcome.of", ("flor",), known)
+    with pytest.raises(lw.SceneError, match="is no outcome of this scene"):
+        check_outcomes("mean.at", ("box",), known)
+
+
+def test_end_times_of_those_that_ended_so():
+    ends = ends_of(1000)
+    mean, quantiles, histogram = gathered(lw.EndTime("floor"), ends)
+    time = ends.time[ends.status == FLOOR]
+    assert (mean.name, quantiles.name, histogram.name) == (
+        "mean end_time floor", "quantiles end_time floor", "histogram end_time floor",
+    )  # fmt: skip
+    np.testing.assert_allclose(mean.value, [[time.mean()]], rtol=1e-13)
+    np.testing.assert_allclose(quantiles.value[0, :, 0], np.quantile(time, quantiles.coordinates["level"]), rtol=1e-13)
+    counts, edges = np.histogram(time, 20, (0.0, 10.0))
+    np.testing.assert_array_equal(histogram["counts"][0, 0], counts)
+    np.testing.assert_allclose(histogram.coordinates["edge"], edges)
+    assert mean.count == quantiles.count == histogram.count == len(time) and mean.unit == "s"
+
+
+def test_a_statistic_at_an_outcome_is_of_those_that_had_it():
+    ends, last = ends_of(900), np.random.default_rng(3).normal(size=(900, 3))
+    (mean,) = gathered(lw.Mean("position", at="floor"), ends, last=last)
+    floor = ends.status == FLOOR
+    assert mean.name == "mean position at floor" and mean.count == floor.sum()
+    np.testing.assert_allclose(mean.value[0], last[floor].mean(axis=0), rtol=1e-12)
+    (beyond,) = gathered(lw.Exceedance("position", above=0.5, at="top"), ends, last=last)
+    assert beyond.name == "exceedance position above 0.5 at top"
+    np.testing.assert_allclose(beyond.value[0], (last[ends.event == 2] > 0.5).mean(axis=0))
+    lines = "\n".join(table(Estimates([mean, beyond])))
+    assert "mean position[2] at floor" in lines and f"{floor.sum()} members" in lines
+
+
+OF_ENDS = {"outcome": lw.Outcome("floor"), "end_time": lw.EndTime("floor", [lw.Mean(), lw.Quantiles(size=64)])}
+
+
+@pytest.mark.parametrize("kind", OF_ENDS)
+@pytest.mark.parametrize("replicates", [1, 4])
+def test_blocks_in_any_order_give_the_same_bits(kind, replicates):
+    ends = ends_of(1536)
+    first = gathered(OF_ENDS[kind], ends, replicates=replicates)
+    for seed in range(3):
+        order = np.random.default_rng(seed).permutation(6)
+        again = gathered(OF_ENDS[kind], ends, order=order, replicates=replicates)
+        for one, other in zip(first, again, strict=True):
+            assert all(one[key].tobytes() == other[key].tobytes() for key in one.arrays)
+
+
+def test_replicates_give_the_value_of_all_and_an_interval_of_their_spread():
+    ends = ends_of(4096)
+    (whole,), (found,) = gathered(lw.Outcome("floor"), ends), gathered(lw.Outcome("floor"), ends, replicates=8)
+    np.testing.assert_allclose(found.value, whole.value, rtol=1e-12)
+    np.testing.assert_array_equal(found["ended"], whole["ended"])
+    assert "8 replicates" in found.interval
+    # Student's t with 7 degrees of freedom is 1.2 times wider than the normal's, and a spread of 8 errs by a quarter.
+    ratio = (found.upper - found.lower)[1:] / (whole.upper - whole.lower)[1:]
+    assert (ratio > 0.4).all() and (ratio < 2.5).all()
+
+
+@pytest.mark.parametrize("rates", [(0.1, 0.05, 0.02), (0.01, 0.3, 0.0)])
+def test_coverage(rates):
+    # Of 1,000 intervals of 95 % at the end: 5 standard deviations are 3.4 %, and few at risk make them hold more often.
+    true, hold = -np.expm1(-rates[0] * TIMES[-1]), 0
+    for seed in range(1000):
+        (found,) = gathered(lw.Outcome("floor"), ends_of(100, seed, rates))
+        hold += found.lower[-1] <= true <= found.upper[-1]
+    assert hold / 1000.0 > 0.915
+
+
+def test_nobody():
+    (found,) = gathered(lw.Outcome("floor"), part_of(ends_of(10, rates=(0.0, 0.0, 0.0)), slice(0, 10)))
+    np.testing.assert_array_equal(found.value, 0.0)
+    assert np.isinf(found["end_time"]).all() and (found.upper > 0.1).all()
+    mean, quantiles, _ = gathered(lw.EndTime("top"), ends_of(10, rates=(0.0, 0.0, 0.0)))
+    assert np.isnan(mean.value).all() and np.isnan(quantiles.value).all() and mean.count == 0
+
+
+def test_first_passage_knows_when_a_member_was_stopped():
+    # It sinks at 1 m/s to a floor at 3 m, between the samples at 2 and 4 s: in the second it stands on the floor.
+    statistic = lw.FirstPassage(lw.Quantity("x", lambda s, m: None, "m", (), ("x",)), above=2.5, levels=(0.5,))
+    gathers = statistic.open(TIMES, 4)
+    x = np.minimum(TIMES, 3.0)[:, None, None] * np.ones((1, 1, 4))
+    gathers.take(Values(x[:1]), slice(0, 1))
+    gathers.take(Values(x[1:]), slice(1, 6))
+    gathers.end(Ends(np.full(4, FLOOR), np.ones(4, int), np.full(4, 3.0), EVENTS), 1)
+    (found,) = statistic.estimates([gathers.close()], TIMES)
+    # A piece is 0.25 s.
+    assert found["passage_time"][0] == pytest.approx(2.5, abs=0.25) and found.value.tolist() == [0, 0, 1, 1, 1, 1]
+
+
+def test_from_a_scene_file():
+    tables = [{"type": "outcome", "of": "floor", "levels": [0.5]}, {"type": "end_time", "of": "floor"},
+              {"type": "mean", "of": "depth", "at": "floor"}]  # fmt: skip
+    found = from_list(tables)
+    assert [part.key for one in found for part in one.parts()] == [
+        "outcome floor", "mean end_time floor", "quantiles end_time floor", "histogram end_time floor", "mean depth at floor",
+    ]  # fmt: skip
+    again = from_list([one.to_dict() for one in found])
+    assert [one.to_dict() for one in again] == [one.to_dict() for one in found]
+
+
+@pytest.mark.parametrize(("make", "text"), [
+    (lambda: lw.Outcome(3), "is no outcome"), (lambda: lw.Outcome("floor", levels=(0.0,)), "between 0 and 1"),
+    (lambda: lw.EndTime("floor", lw.FirstPassage(above=1.0)), "one number of each member"),
+    (lambda: lw.EndTime("floor", lw.Mean(at="floor")), "leave it out"),
+    (lambda: lw.FirstPassage("depth", above=1.0, at="floor"), "of all times"),
+    (lambda: lw.PathMean("depth", at="floor"), "of all times"), (lambda: lw.Mean("depth", at=""), "is no outcome"),
+    (lambda: lw.Outcome("floor", at="floor"), "of all times"),
+    (lambda: lw.Histogram("depth", bins=3, limits="run"), "lw.EndTime"),
+])  # fmt: skip
+def test_what_is_refused(make, text):
+    with pytest.raises(lw.SceneError) as error:
+        make()
+    assert text in str(error.value)

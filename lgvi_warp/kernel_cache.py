@@ -30,6 +30,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_warp import durable, warp_setup
+from lgvi_warp.warp_setup import build_lock
 
 # Source, code and header of a kernel are a few 100 kB; Clang's precompiled header is 5 MB.
 ROOM_BYTES, ROOM_FILES = 16_000_000, 16
@@ -38,13 +39,6 @@ BLOCK_DIM = 1
 LOCKS, SCRATCH, SUMS = "lgvi_warp_locks", "lgvi_warp_scratch_", ".sha256"
 # What Warp leaves of a process that is killed while it compiles, and when it is old enough to be of no one [s].
 TORN, OURS, OLD = re.compile(r"(\w+)_p\d+_t\d+"), "wp_make_", 86_400.0
-
-# Warp builds and launches kernels for one thread at a time. A fork waits for it, so that a child finds Warp at rest.
-build_lock = threading.RLock()
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(
-        before=build_lock.acquire, after_in_parent=build_lock.release, after_in_child=build_lock.release
-    )
 
 _loaded: weakref.WeakSet[Any] = weakref.WeakSet()
 

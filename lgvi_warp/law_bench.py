@@ -14,12 +14,12 @@ from lgvi_kernels.examine import COLUMNS, OUT_FIELDS, make_examine
 from lgvi_warp import inertia, kernel_cache, notation, vehicle, warp_setup
 from lgvi_warp.errors import SceneError
 from lgvi_warp.inertia import Frame
-from lgvi_warp.kernel_cache import build_lock
 from lgvi_warp.machine import default_width
 from lgvi_warp.packets import Packets, pack
 from lgvi_warp.scene import Environment, Scene
 from lgvi_warp.terms.base import Setting, Term
 from lgvi_warp.vehicle import Vehicle
+from lgvi_warp.warp_setup import build_lock
 
 # Length [s] and number of the kick that the views are of.
 KICK, STEP = 0.01, 3

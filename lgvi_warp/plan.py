@@ -24,12 +24,12 @@ from lgvi_warp import kernel_cache, limits
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.gauss import gauss
-from lgvi_warp.kernel_cache import build_lock
 from lgvi_warp.machine import DTYPES, default_width
 from lgvi_warp.method import KINDS, Method
 from lgvi_warp.model import Model, make_model
 from lgvi_warp.saveat import TimeGrid
 from lgvi_warp.status import CHECKS, ON_FAILURE
+from lgvi_warp.warp_setup import build_lock
 
 # Sub-maps whose equation may have no solution.
 SOLVING = {"D", "W", "A", "Phi", "Phi*"}

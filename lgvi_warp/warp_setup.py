@@ -8,6 +8,7 @@ import errno
 import functools
 import os
 import sys
+import threading
 from collections.abc import Iterator
 from typing import Any
 
@@ -45,7 +46,15 @@ def _has_cuda_driver() -> bool:
     return False
 
 
-@functools.cache
+# Warp is started, builds and launches kernels for one thread at a time. A fork waits for it, so that a child finds Warp at
+# rest.
+build_lock = threading.RLock()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(
+        before=build_lock.acquire, after_in_parent=build_lock.release, after_in_child=build_lock.release
+    )
+
+
 def start() -> None:
     """Initialise Warp once, quietly: no banner unless the user asked for one, no remark that there is no GPU driver.
 
@@ -54,6 +63,13 @@ def start() -> None:
     Raises:
         OSError: where the folder of Warp's kernel cache cannot be made; it names the folder and WARP_CACHE_PATH.
     """
+    # Two threads that close and open stderr together would leave it closed.
+    with build_lock:
+        _start()
+
+
+@functools.cache
+def _start() -> None:
     if wp.config.log_level == wp.LOG_INFO:
         wp.config.log_level = wp.LOG_WARNING
     chosen = wp.config.kernel_cache_dir

@@ -246,6 +246,23 @@ def test_threads_compile_once(cache, monkeypatch):
     assert len(compiled) == 1 and works()
 
 
+def test_threads_that_start_warp_leave_stderr_as_it_was(monkeypatch):
+    def slow():
+        time.sleep(0.1)
+
+    before = os.fstat(2).st_ino
+    monkeypatch.setattr(wp, "init", slow)
+    monkeypatch.setattr(warp_setup, "_has_cuda_driver", lambda: False)
+    warp_setup._start.cache_clear()
+    threads = [threading.Thread(target=warp_setup.start) for _ in range(3)]
+    for i, thread in enumerate(threads):
+        time.sleep(0.04 * i)
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert os.fstat(2).st_ino == before
+
+
 def run(arguments, cache, **settings):
     env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "WARP_CACHE_PATH": str(cache)}
     return subprocess.run([sys.executable, "-m", "lgvi_warp.cli", *arguments], env=env, cwd=ROOT, capture_output=True,

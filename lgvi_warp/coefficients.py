@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.errors import Faults, SceneError, closest
+from lgvi_warp.reading import MOST_BYTES, MOST_OTHERS, file_text
 from lgvi_warp.vehicle import LITTLE, ROUND_OFF, shortage
 
 FORCES, VELOCITIES = "XYZKMN", "uvwpqr"
@@ -367,8 +368,8 @@ def turned(value: Any, axes: np.ndarray) -> Any:
 def read_text(source: str | os.PathLike[str], is_text: bool, what: str) -> str:
     """The text itself, or that of the file it names."""
     if is_text:
-        return str(source)
-    try:
-        return Path(source).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError, TypeError) as error:
-        raise SceneError([f"{what} {source}: {error}; give the path of a file, or its text"]) from None
+        text = str(source)
+        if len(text) > (most := MOST_BYTES.get(what, MOST_OTHERS)):
+            raise SceneError([f"{what}: a text of {len(text):,} characters; give at most {most:,}"])
+        return text
+    return file_text(source, what)

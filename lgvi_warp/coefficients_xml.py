@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import os
-import stat
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
@@ -13,9 +11,10 @@ from xml.parsers import expat
 import numpy as np
 
 from lgvi_warp.errors import Faults, SceneError, shown
+from lgvi_warp.reading import MOST_OTHERS, UnreadableError, file_bytes
 
 # What one file may hold. The largest robot descriptions are far below: some 1 MB, 20,000 elements, 20 levels.
-MOST_BYTES, MOST_ELEMENTS, MOST_LEVELS = 16 * 2**20, 100_000, 200
+MOST_BYTES, MOST_ELEMENTS, MOST_LEVELS = MOST_OTHERS, 100_000, 200
 # Marks of templates, whose values another program fills in, and what to do with each.
 TEMPLATES = {
     "${": "run xacro on it (xacro FILE > FILE.urdf) and read what it writes",
@@ -86,16 +85,11 @@ def remedy_for(content: bytes) -> str:
 
 
 def read_bytes(source: Any, what: str) -> bytes:
-    """The bytes of a file, up to one more than may be read. Raises SceneError if it is none."""
+    """The bytes of a file. Raises SceneError for what is no regular file of a bounded size."""
     try:
-        path = Path(source)
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise SceneError([f"{what} file {path}: is not a file; give the path of a file, or its text"])
-        with path.open("rb") as stream:
-            return stream.read(MOST_BYTES + 1)
-    except (OSError, TypeError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise SceneError([f"{what} file {shown(source)}: {reason}; give the path of a file, or its text"]) from None
+        return file_bytes(source, f"{what} file")
+    except UnreadableError as error:
+        raise SceneError([f"{what} file {shown(source)}: {error}"]) from None
 
 
 # Values -------------------------------------------------------------------------------------------------------------

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
+from lgvi_warp import yaml_text
 from lgvi_warp.coefficients import (
     HALF_TURN,
     HALF_TURN_6,
@@ -107,15 +107,8 @@ def from_yaml(
 
 def parse_yaml(source: str | os.PathLike[str]) -> Mapping[str, Any]:
     """The map of a YAML text or file."""
-    try:
-        yaml = importlib.import_module("yaml")
-    except ImportError:
-        raise ImportError("reading YAML needs PyYAML: pip install 'lgvi-warp[yaml]'") from None
     text = read_text(source, isinstance(source, str) and ("\n" in source or ": " in source), "YAML file")
-    try:
-        content = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise SceneError([f"YAML: {' '.join(str(error).split())}; mend that line"]) from None
+    content = yaml_text.parsed(text)
     if not isinstance(content, Mapping):
         raise SceneError(["YAML: is not a map; write mass: ..., added_mass: ..."])
     return content
@@ -140,7 +133,8 @@ def by_meaning(faults: Faults, content: Mapping[str, Any], ignore: set[str]) -> 
         elif isinstance(value, Mapping):
             read |= by_meaning(faults, value, ignore)
         else:
-            faults.add(key, value, "is an unknown key", f"{closest(key, meanings)}; or name it in ignore=")
+            remedy = f"{closest(key, meanings)}; or name it in ignore="
+            faults.add(str(key), value, "is an unknown key", remedy)
     return read
 
 

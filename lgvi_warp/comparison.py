@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp import invariants, notation, saveat
+from lgvi_warp.compared import QUANTITIES, Compared, compared_in
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.method import Method
@@ -23,8 +24,6 @@ from lgvi_warp.scene import Scene
 from lgvi_warp.solving import run_plan
 from lgvi_warp.status import failed as failed_members
 
-# What errors are of, with their units. Attitude is the angle between the two.
-QUANTITIES = {"position": "m", "attitude": "rad", "velocity": "m/s", "angular_velocity": "rad/s", "energy": "J"}
 # An error at which a trajectory says nothing any more [m or rad].
 LOST = 1e-2
 ROUND_OFF = {"float64": 2.0**-53, "float32": 2.0**-24}
@@ -150,16 +149,22 @@ def failed(result: Result) -> bool:
     return bool(failed_members(result.status).any())
 
 
-def distances(result: Result, reference: Result) -> dict[str, np.ndarray]:
-    """Quantity -> (k, n), how far apart they are; NaN from where an event stopped a member in either."""
+def distances(result: Result, reference: Result, asked: Compared | None = None) -> dict[str, np.ndarray]:
+    """Quantity -> (k, n), how far apart they are; NaN from where an event stopped a member in either.
+
+    asked: one more than those of QUANTITIES.
+    """
     pairs = {name: (getattr(result, name).astype(np.float64), getattr(reference, name)) for name in FIELDS}
     found = {name: np.linalg.norm(a - b, axis=-1) for name, (a, b) in pairs.items() if name in ("position", "velocity")}
     found["angular_velocity"] = np.linalg.norm(np.subtract(*pairs["angular_velocity"]), axis=-1)
     chord = np.linalg.norm(np.subtract(*pairs["attitude"]), axis=(-2, -1))
     found["attitude"] = 2.0 * np.arcsin(np.minimum(chord / math.sqrt(8.0), 1.0))
     found["energy"] = np.abs(result.energy - reference.energy)
+    found = {name: found[name] for name in QUANTITIES}
+    if asked is not None and asked.name not in found:
+        found[asked.name] = asked.distance(result, reference)
     gone = reference.time[:, None] >= np.minimum(stop_time(result), stop_time(reference))
-    return {name: np.where(gone, np.nan, found[name]) for name in QUANTITIES}
+    return {name: np.where(gone, np.nan, values) for name, values in found.items()}
 
 
 def errors(apart: dict[str, np.ndarray], until: int) -> dict[str, dict[str, float]]:
@@ -180,12 +185,14 @@ class Reference:
     """What errors are measured from: the finer of two runs that share no step, at best no method, and how far they agree.
 
     own: quantity -> (k,), largest difference of the two up to each time, over the members. wall_seconds: what it took.
+    asked: what errors are asked of, where that is none of QUANTITIES.
     """
 
     result: Result
     text: str
     own: dict[str, np.ndarray]
     wall_seconds: float
+    asked: Compared | None = None
 
     def error(self, of: str, until: int = -1) -> float:
         """Its own error up to a sample (the last by default)."""
@@ -209,12 +216,13 @@ def extrapolated(sample: Sample, method: str, m: int) -> Result:
     return replace(runs[-1], samples=samples, compile_seconds=sum(one.compile_seconds for one in runs))
 
 
-def agreement(a: Result, b: Result) -> dict[str, np.ndarray]:
-    """Quantity -> (k,), the largest distance up to each time; infinite where a member failed."""
+def agreement(a: Result, b: Result, asked: Compared | None = None) -> dict[str, np.ndarray]:
+    """Quantity -> (k,), the largest distance up to each time; infinite where a member failed. asked: as of `distances`."""
     if failed(a) or failed(b):
-        return {name: np.where(a.time > 0.0, np.inf, 0.0) for name in QUANTITIES}
+        names = dict.fromkeys([*QUANTITIES, *([asked.name] if asked else [])])
+        return {name: np.where(a.time > 0.0, np.inf, 0.0) for name in names}
     found = {}
-    for name, values in distances(a, b).items():
+    for name, values in distances(a, b, asked).items():
         most = np.max(np.where(np.isnan(values), 0.0, values), axis=1)
         found[name] = np.maximum.accumulate(np.where(np.isfinite(most), most, np.inf))
     return found
@@ -222,7 +230,7 @@ def agreement(a: Result, b: Result) -> dict[str, np.ndarray]:
 
 def make_reference(
     sample: Sample,
-    of: str = "position",
+    of: str | Compared = "position",
     goal: float = 0.0,
     seconds: float = 15.0,
     methods: Sequence[str] | None = None,
@@ -233,6 +241,8 @@ def make_reference(
     seconds: about how long, compiling aside. methods: two names in place of the scene's best ones. Raises SceneError
     where there are none; how well the runs agree is for the caller to judge.
     """
+    asked = compared_in(of)
+    of = asked.name
     names = list(methods or sample.accepted(PRECISE)[0][:2])
     if not names:
         raise SceneError(
@@ -248,12 +258,12 @@ def make_reference(
         finer = max(m + 1, round(1.5 * m))
         with np.errstate(all="ignore"):
             runs = extrapolated(sample, first, m), extrapolated(sample, second, finer)
-            own = agreement(*runs)
+            own = agreement(*runs, asked)
         end = own[of][-1]
         if best is None or end < best.error(of):
             worse = worse + 1 if best and end > 0.5 * best.error(of) and end < LOST else 0
             text = f"{second} at h = {sample.h(finer):.4g} s against {first} at h = {sample.h(m):.4g} s"
-            best = Reference(runs[1], text, own, time.perf_counter() - begun)
+            best = Reference(runs[1], text, own, time.perf_counter() - begun, asked)
         else:
             worse += best.error(of) < LOST
         begun += sum(one.compile_seconds for one in runs)
@@ -305,7 +315,7 @@ def growth(sample: Sample, setting: Setting) -> Growth:
         one = Ensemble.from_states(fleet.scene, states[0], R, *states[1:], varied)
         one.indices, one.seed = fleet.indices, fleet.seed
         runs.append(sample.run(setting, one))
-    apart = distances(*runs)
+    apart = distances(runs[0], runs[1])
     both = np.hypot(apart["position"], apart["attitude"]) / NUDGE
     alive = np.isfinite(both)
     curve = np.sqrt(np.sum(np.where(alive, both, 0.0) ** 2, axis=1) / np.maximum(alive.sum(axis=1), 1))
@@ -333,17 +343,22 @@ def fitted(times: np.ndarray, curve: np.ndarray, t1: float) -> Growth:
     )
 
 
-def statistics(result: Result) -> dict[str, np.ndarray]:
-    """What means and spreads are taken of: (k, n, components). Of the attitude, the vertical in body axes."""
+def statistics(result: Result, asked: Compared | None = None) -> dict[str, np.ndarray]:
+    """What means and spreads are taken of: (k, n, components). Of the attitude, the vertical in body axes.
+
+    asked: one more than those of QUANTITIES, but for angles, which have no such mean.
+    """
     found = {name: getattr(result, name).astype(np.float64) for name in ("position", "velocity", "angular_velocity")}
     found["attitude"] = result.attitude[..., 2, :].astype(np.float64)
     found["energy"] = result.energy[..., None]
     found["linear_momentum"] = invariants.linear_momentum(result)
     found["angular_momentum"] = invariants.angular_momentum(result)
+    if asked is not None and asked.name not in found and asked.unit != "rad":
+        found[asked.name] = asked.values(result)
     return found
 
 
-def biases(result: Result, reference: Result) -> dict[str, float]:
+def biases(result: Result, reference: Result, asked: Compared | None = None) -> dict[str, float]:
     """Name of mean or std -> its difference in standard errors of the sample, rms over components and times after 0.
 
     Two samples that have nothing in common but their law differ by about 1.4. Empty for one member.
@@ -352,7 +367,7 @@ def biases(result: Result, reference: Result) -> dict[str, float]:
     if n < 2 or failed(result):
         return {}
     found = {}
-    mine, theirs = statistics(result), statistics(reference)
+    mine, theirs = statistics(result, asked), statistics(reference, asked)
     for name, b in theirs.items():
         a, b = mine[name][1:], b[1:]
         spread = b.std(axis=1, ddof=1)

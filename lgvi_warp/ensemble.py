@@ -15,7 +15,9 @@ import numpy as np
 from lgvi_warp import machine, notation, variations
 from lgvi_warp import scene as scenes
 from lgvi_warp import vehicle as vehicles
-from lgvi_warp.errors import Faults, closest, shown
+from lgvi_warp.errors import Faults, closest, cut, shown
+from lgvi_warp.labelled import columns_by_name, is_labelled, match
+from lgvi_warp.real_numbers import column_names
 from lgvi_warp.sampling import Sampling
 from lgvi_warp.scene import Scene
 from lgvi_warp.variations import MATRICES, Space, Target, Variation
@@ -107,17 +109,18 @@ class Ensemble:
         attitude: Any,
         velocity: Any,
         angular_velocity: Any,
-        parameters: Mapping[str, Any] | None = None,
+        parameters: Any = None,
     ) -> Ensemble:
         """Members with given states: (n, 3) [m], (n, 3, 3) body to inertial, (n, 3) [m/s, body], (n, 3) [rad/s, body].
 
-        parameters: name -> array of length n ("vehicle.inertia": (n, 3) or (n, 3, 3)), names as in `vary`. States that
-        are not finite are let through: the run gives such a member its status. Raises SceneError for wrong shapes and
-        unphysical values.
+        parameters: name -> array of length n ("vehicle.inertia": (n, 3) or (n, 3, 3)), names as in `vary`, also of single
+        entries ("current.velocity[0]"); or a data frame, a structured array or an xarray Dataset with such names. States
+        that are not finite are let through: the run gives such a member its status. Raises SceneError for what is no real
+        number, wrong shapes and unphysical values.
         """
         faults = Faults()
         states = dict(zip(STATES, (position, attitude, velocity, angular_velocity), strict=True))
-        explicit = {f"start.{key}": _floats(faults, key, value) for key, value in states.items()}
+        explicit = {f"start.{key}": _state(faults, key, value) for key, value in states.items()}
         faults.raise_if_any()
         n = len(explicit["start.position"]) if explicit["start.position"].ndim else 0
         if n == 0:
@@ -126,16 +129,13 @@ class Ensemble:
             shape = (n, 3, 3) if key == "start.attitude" else (n, 3)
             if value.shape != shape:
                 faults.add(key, value, f"has shape {value.shape}", f"give an array of shape {shape}")
-        base = scene.parameters()
-        faults.keys("", parameters or {}, base)
         faults.raise_if_any()
         R = explicit["start.attitude"]
         bad = np.isfinite(R).all(axis=(1, 2)) & ~notation.rotations(R)
         if bad.any():
             what = f"is not a rotation to 1e-9 ({bad.sum()} of {n} members)"
             faults.add(f"attitude of member {bad.argmax()}", R[bad.argmax()], what, "give R^T R = I, det R = 1")
-        for key, value in (parameters or {}).items():
-            explicit[key] = _explicit_parameter(faults, key, value, (n, *base[key].shape))
+        explicit |= _given_parameters(faults, scene.parameters(), parameters, n)
         faults.raise_if_any()
         ensemble = cls.__new__(cls)
         ensemble._setup(scene, scenes.EnsembleSettings(n), explicit)
@@ -181,7 +181,9 @@ class Ensemble:
             (target, *more) = variations.targets(key)
             if more:
                 tables.add(f'"{key}"', "...", "names several numbers", "give each a column of its own")
-            elif variations.known_target(tables, key, "...", target, known, f'; or leave it out: ignore = ["{key}"]'):
+            elif variations.known_target(
+                tables, key, "...", target, known, f'; or leave it out: ignore = ["{cut(key)}"]'
+            ):
                 named.append((key, (target,)))
                 shape = (len(column), *target.of(known[target.name]).shape)
                 name = target.name if target.index is None else key
@@ -333,10 +335,16 @@ class Ensemble:
         own = drawn | {target.name for target, _ in self._columns} | self._explicit.keys()
         return [name for name in self._base if name in own]
 
+    @property
+    def starts_vary(self) -> bool:
+        """Whether members start differently."""
+        names = {target.name for one in self._variations for target in one.targets}
+        return not {*names, *(target.name for target, _ in self._columns), *self._explicit} <= self._base.keys()
+
     def subset(self, indices: Sequence[int] | np.ndarray) -> Ensemble:
         """These members, in this order, as an ensemble of its own with the same numbers. Raises IndexError."""
         chosen = np.asarray(indices)
-        if chosen.ndim != 1 or not len(chosen) or chosen.dtype.kind not in "iu":
+        if chosen.ndim != 1 or not len(chosen) or chosen.dtype.kind not in "iu" or np.ma.is_masked(indices):
             raise IndexError(f"members {shown(indices)}: give a list of one or more whole numbers")
         if chosen.min() < 0 or chosen.max() >= self.members:
             raise IndexError(f"members {chosen.min()} to {chosen.max()} of {self.members}")
@@ -429,13 +437,50 @@ def _vehicle_checks(p: Mapping[str, np.ndarray], varied: set[str], tolerance: fl
     return {key: bad for key, bad in checks.items() if any(name in varied for name in key.split(" + "))}
 
 
-def _floats(faults: Faults, key: str, value: Any) -> np.ndarray:
-    """A float64 copy, which may hold NaN: the caller's later writes to his array do not reach the ensemble."""
-    try:
-        return np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        faults.add(key, value, "is not numeric", "give an array of numbers")
-        return np.empty(0)
+def _state(faults: Faults, key: str, value: Any) -> np.ndarray:
+    """A state's float64 copy, which may hold NaN: the caller's later writes to his array do not reach the ensemble.
+
+    A data frame's columns may be called position[0], position[1], position[2], in any order.
+    """
+    names = column_names(value)
+    if key != "attitude" and names is not None and all(isinstance(name, str) for name in names):
+        columns = columns_by_name(faults, key, value)
+        entries = [f"{key}[{i}]" for i in range(3)]
+        if not columns or not match(faults, key, list(columns), entries):
+            return np.empty(0)
+        value = [columns[entry] for entry in entries]
+        array = faults.real(key, value, "give an array of numbers")
+        return np.empty(0) if array is None else np.ascontiguousarray(array.T)
+    array = faults.real(key, value, "give an array of numbers")
+    return np.empty(0) if array is None else array
+
+
+def _given_parameters(faults: Faults, base: Mapping[str, np.ndarray], given: Any, n: int) -> dict[str, np.ndarray]:
+    """Name -> (n, *shape) of the parameters that are given by name, whole or by their entries."""
+    if given is None or (isinstance(given, Mapping) and not given):
+        return {}
+    if not is_labelled(given):
+        faults.add(
+            "parameters", given, "has no names", 'give {"vehicle.mass": array, ...} or a DataFrame with such names'
+        )
+        return {}
+    found: dict[str, np.ndarray] = {}
+    named = []
+    for key, column in columns_by_name(faults, "parameters", given).items():
+        (target, *more) = variations.targets(key)
+        if more or target.name not in base:
+            faults.keys("", {key: column}, base)
+        elif variations.known_target(faults, key, "...", target, base):
+            named.append((key, (target,)))
+            name = key if target.index is not None else target.name
+            values = _explicit_parameter(faults, name, column, (n, *target.of(base[target.name]).shape))
+            if target.index is None:
+                found[target.name] = values
+            elif values.shape == (n,):
+                found.setdefault(target.name, np.repeat(base[target.name][None], n, axis=0))
+                variations.put(found, target, values)
+    variations.clashes(faults, named)
+    return found
 
 
 def check_names(vary: Mapping[str, Any], parameters: Sequence[str]) -> None:
@@ -445,12 +490,15 @@ def check_names(vary: Mapping[str, Any], parameters: Sequence[str]) -> None:
     for key, law in vary.items():
         for target in variations.targets(key):
             if target.name not in known:
-                faults.add(f'"{key}"', law, "does not name what a scene has", closest(target.name, known))
+                remedy = functools.partial(closest, target.name, known)
+                faults.add(f'"{key}"', law, "does not name what a scene has", remedy)
     faults.raise_if_any()
 
 
 def _explicit_parameter(faults: Faults, key: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    array = _floats(faults, key, value)
+    array = faults.real(key, value, "give an array of numbers")
+    if array is None:
+        return np.empty(0)
     if key in MATRICES and array.shape == shape[:2]:
         return np.where(np.eye(shape[1], dtype=bool), array[:, :, None], 0.0)
     if array.shape != shape:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.errors import Faults, SceneError, closest
+from lgvi_warp.errors import Faults, SceneError, closest, shown
 from lgvi_warp.status import Status
 from lgvi_warp.terms.base import Numbers, Packed, Setting, Term, quantity
 
@@ -104,12 +104,13 @@ TYPES: dict[str, type[Event]] = {kind.type: kind for kind in (Surface, Floor, Bo
 
 def from_list(given: Any) -> tuple[Event, ...]:
     """Events from tables of a scene file or Event objects. Raises SceneError naming every fault."""
-    from lgvi_warp.terms import build
+    from lgvi_warp.terms import build, few_enough
 
     if not isinstance(given, Sequence) or isinstance(given, str):
         raise SceneError(
-            [f"events = {given!r}: is no list; write [[events]] and type = ... below, or events=[lw.Surface()]"]
+            [f"events = {shown(given)}: is no list; write [[events]] and type = ... below, or events=[lw.Surface()]"]
         )
+    few_enough("events", given)
     faults, found = Faults(), list[Event]()
     for i, one in enumerate(given):
         with faults.including():

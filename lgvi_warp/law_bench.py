@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -63,7 +63,8 @@ class Views:
     def told(self, i: int) -> str:
         """One view in words."""
         turn = notation.quaternion_from_matrix(self.attitude[i])
-        return f"at position {short(self.position[i])} m, quaternion {short(turn)}, t = {self.time[i]:.3g} s"
+        where = f"at position {short(self.position[i])} m, quaternion {short(turn)}, t = {self.time[i]:.3g} s"
+        return f"{where}, velocity {sizes(self.velocity[i])} m/s, rate {sizes(self.rate[i])} rad/s"
 
 
 def simple_scene() -> Scene:
@@ -86,7 +87,9 @@ class Bench:
         self.own = {name: self.parameters[f"{term.key}.{name}"] for name in term.parameters()}
         self.count = packets * self.width
         self.seed = seed
-        self.views = random_views(packets, self.width, seed, scene.start.given()["position"])
+        around = scene.start.given()["position"]
+        self.views = random_views(packets, self.width, seed, around)
+        self.corners = tuple(corner_views(packets, self.width, around))
         warp_setup.start()
         self.examine = _built(term, module, self.width)
         self.Params = np.dtype(self.examine.Params.numpy_dtype())
@@ -177,6 +180,29 @@ def random_views(packets: int, width: int, seed: int, around: np.ndarray) -> Vie
     return Views(R, around + 4.0 * position, velocity, rate, np.repeat(rng.uniform(0.0, 10.0, packets), width))
 
 
+def corner_views(packets: int, width: int, around: np.ndarray) -> Iterator[Views]:
+    """Views where a law divides by zero that is careless, as many at a time as a bench has.
+
+    Velocity and rate are zero, along one axis, or of numbers so small that their squares vanish; attitude is none, the
+    position is the scene's start or the origin, and the time is 0.
+    """
+    axes = np.concatenate([np.eye(6), -np.eye(6)])
+    twists = np.concatenate([np.zeros((1, 6)), axes, 1e-200 * axes])
+    places = np.stack([around, np.zeros(3)])
+    position = np.repeat(places, len(twists), axis=0)
+    twists = np.tile(twists, (len(places), 1))
+    k = packets * width
+    for first in range(0, len(twists), k):
+        some = np.arange(first, first + k) % len(twists)
+        R = np.broadcast_to(np.eye(3), (k, 3, 3))
+        yield Views(R, position[some], twists[some, :3], twists[some, 3:], np.zeros(k))
+
+
 def short(values: np.ndarray) -> str:
     """Numbers in a message."""
     return str(np.round(np.asarray(values), 3).tolist())
+
+
+def sizes(values: np.ndarray) -> str:
+    """The same of numbers that may be very small."""
+    return "[" + ", ".join(f"{one:.3g}" for one in values) + "]"

@@ -13,7 +13,7 @@ from lgvi_kernels.terms import LAWS
 from lgvi_warp import model, notation, terms
 from lgvi_warp.errors import SceneError
 from lgvi_warp.events import Event
-from lgvi_warp.law_bench import ORIGIN, TURN, Bank, Bench, Views, short, simple_scene
+from lgvi_warp.law_bench import ORIGIN, TURN, Bank, Bench, Views, short, simple_scene, sizes
 from lgvi_warp.machine import default_width
 from lgvi_warp.scene import Scene
 from lgvi_warp.terms.base import Packed, Setting, Term
@@ -70,7 +70,8 @@ def check_law(
     step [m, rad, s]: of the finite differences. Compiles one small kernel for each new law. What is checked, each where
     the law has it:
 
-    law: finite; blind to velocities, and to the time unless `timed`; with POTENTIAL, the derivatives of potential(),
+    All: finite, at rest and along single axes as well.
+    law: blind to velocities, and to the time unless `timed`; with POTENTIAL, the derivatives of potential(),
     which energy() adds.
     damping: nu.D nu >= 0; where the term says `dissipative = False`, its least value is told and is no fault.
     flow: rate and gradient are the derivatives of velocity, and water() gives the same velocity; FLOW is what it does.
@@ -86,7 +87,8 @@ def check_law(
     bench = Bench(term, module, scene or simple_scene(), max(1, -(-samples // default_width("float64"))), seed)
     checks: list[Check] = []
     for part in (_numbers, _finite, _whole, _potential, _damping, _flow):
-        checks += part(bench, step)
+        with np.errstate(all="ignore"):  # what is not finite is found by its check
+            checks += part(bench, step)
         if part in (_numbers, _finite) and not all(one.ok for one in checks):
             break
     return LawReport(term, tuple(checks))
@@ -102,7 +104,7 @@ def _judged(name: str, difference: np.ndarray, allowed: np.ndarray | float, view
             np.isfinite(worst), np.where(worst <= limit, worst / np.maximum(limit, 1e-300), 1.0 + worst), np.inf
         )
     i, j = np.unravel_index(ratio.argmax(), ratio.shape)
-    good = bool(np.all(worst <= limit))
+    good = bool(np.all(worst <= limit) and np.isfinite(limit).all())
     text = "" if good else f"{views.told(int(i))}; {remedy}"
     return Check(name, float(worst[i, j]), float(limit[i, j]), good, text)
 
@@ -141,13 +143,23 @@ def _numbers(bench: Bench, step: float) -> Iterator[Check]:
 
 
 def _finite(bench: Bench, step: float) -> Iterator[Check]:
-    """Numbers at every view; a law that is zero at all of them is told."""
+    """Numbers at every view, and at rest and along single axes; a law that is zero at all views is told."""
     here = bench.at(bench.views)
-    finite = np.all([np.isfinite(value).all(axis=1) for value in here.values()], axis=0)
-    found = _judged("finite", (~finite).astype(float), 0.0, bench.views, "guard divisions and roots")
+    found = _all_finite("finite", here, bench.views)
+    for views in bench.corners:
+        corner = _all_finite("finite at rest, along axes", bench.at(views), views)
+        if not corner.ok:
+            break
+    yield corner
     asleep = not any(np.any(value) for value in here.values())
     note = "note: zero at every view, so little was checked; give a scene that starts where the law acts"
     yield found._replace(text=note) if asleep else found
+
+
+def _all_finite(name: str, values: dict[str, np.ndarray], views: Views) -> Check:
+    """Whether every role gives numbers at every view."""
+    finite = np.all([np.isfinite(value).all(axis=1) for value in values.values()], axis=0)
+    return _judged(name, (~finite).astype(float), 0.0, views, "guard divisions and roots")
 
 
 def _whole(bench: Bench, step: float) -> Iterator[Check]:
@@ -283,6 +295,12 @@ def _damping(bench: Bench, step: float) -> Iterator[Check]:
     weakest = np.linalg.eigh(D + np.swapaxes(D, 1, 2))[1][:, :, 0]
     tried = [views, *(views.changed(velocity=s * weakest[:, :3], rate=s * weakest[:, 3:]) for s in (1.0, -1.0))]
     power, allowed, twist = (np.concatenate(x) for x in zip(*(_power(bench, one) for one in tried), strict=True))
+    endless = ~(np.isfinite(power) & np.isfinite(allowed))
+    if endless.any():
+        i = int(endless.argmax())
+        where = f"at velocity {sizes(twist[i, :3])} m/s, rate {sizes(twist[i, 3:])} rad/s"
+        yield Check("damping: power", np.inf, 0.0, False, f"power is not finite {where}; bound D")
+        return
     i = int((power + allowed).argmin()) if (power + allowed).min() < 0.0 else int(power.argmin())
     least, limit = float(power[i]), float(allowed[i])
     where = f"least power {least:.3g} W at velocity {short(twist[i, :3])} m/s, rate {short(twist[i, 3:])} rad/s"

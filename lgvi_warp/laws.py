@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar
@@ -12,6 +13,7 @@ import numpy as np
 from lgvi_warp.distributions import Choice, Distribution, LogNormal, Normal, TruncatedNormal, Uniform
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.joint_laws import CorrelatedNormal, PhysicalInertia, PositiveDefinite, RotationNormal, UniformRotation
+from lgvi_warp.real_numbers import real_results
 
 # Name in a scene file -> name in scipy.stats, whose parameters, loc and scale it takes.
 SCIPY = {
@@ -38,9 +40,13 @@ class Frozen(Distribution):
 
     def __post_init__(self) -> None:
         faults = Faults()
-        if not is_frozen(self.distribution):
+        if (unfrozen := name_of_unfrozen(self.distribution)) is not None:
+            faults.add("distribution", f"scipy.stats.{unfrozen}", *without_numbers(self.distribution))
+        elif not is_frozen(self.distribution):
             faults.add("distribution", self.distribution, "is no frozen distribution of scipy.stats",
                        "give one with its numbers, such as scipy.stats.gamma(2.0, scale=3.0)")  # fmt: skip
+        elif not all([faults.finite(name, value) is not None for name, value in self._given_numbers().items()]):
+            pass
         elif not np.all(np.isfinite(self.distribution.ppf(0.5))):
             faults.add(
                 self.name, self._numbers(), "are numbers that scipy.stats refuses", "see its page for their limits"
@@ -58,11 +64,14 @@ class Frozen(Distribution):
         """In scipy.stats."""
         return str(getattr(self.distribution.dist, "name", None) or type(self.distribution.dist).__name__)
 
+    def _given_numbers(self) -> dict[str, Any]:
+        """By their names in scipy.stats, as they were given."""
+        known = [*_shapes(self.distribution.dist), "loc", "scale"]
+        return dict(zip(known, self.distribution.args, strict=False)) | dict(self.distribution.kwds)
+
     def _numbers(self) -> dict[str, Any]:
-        """By their names in scipy.stats."""
-        shapes = (self.distribution.dist.shapes or "").replace(" ", "").split(",")
-        known = [*(name for name in shapes if name), "loc", "scale"]
-        given = dict(zip(known, self.distribution.args, strict=False)) | self.distribution.kwds
+        """The same as lists; of one that was frozen with none, where it lies, so that a file holds a number."""
+        given = self._given_numbers() or {"loc": 0.0}
         return {name: np.asarray(value).tolist() for name, value in given.items()}
 
     def numbers(self) -> list[Any]:
@@ -94,20 +103,21 @@ class Frozen(Distribution):
             )
             faults.raise_if_any()
         assert law is not None
-        shapes = [one for one in (law.shapes or "").replace(" ", "").split(",") if one]
-        known = [*shapes, "loc"] + ["scale"] * isinstance(law, stats.rv_continuous)
+        shapes, known = _shapes(law), _numbers_of(law)
         given = {one: value for one, value in values.items() if kind in SCIPY or one != "name"}
         faults.keys(f"{key}.{kind}", given, known)
         for one in shapes:
             if one not in given:
                 faults.add(f"{key}.{kind}.{one}", None, "is missing", f"scipy.stats.{name} takes {', '.join(known)}")
+        if not given and not shapes:
+            faults.add(f"{key}.{kind}", dict(values), "has no numbers", f"give one or more of {', '.join(known)}")
         for one, value in given.items():
             faults.finite(f"{key}.{kind}.{one}", value)
         faults.raise_if_any()
         try:
             return cls(law(**{one: np.asarray(value)[()] for one, value in given.items()}))
         except SceneError as error:
-            raise SceneError(f"{key}.{kind}: {fault}" for fault in error.faults) from None
+            raise error.prefixed(f"{key}.{kind}: ") from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,10 +164,12 @@ class OwnLaw(Distribution):
 
     def __post_init__(self) -> None:
         faults = Faults()
+        unfrozen = name_of_unfrozen(self.law)
+        if unfrozen is not None:
+            faults.add("law", f"scipy.stats.{unfrozen}", *without_numbers(self.law))
+            faults.raise_if_any()
         try:
-            good = bool(
-                np.all(np.isfinite(np.asarray(quantiles_of(self.law)(np.array([0.25, 0.75])), dtype=np.float64)))
-            )
+            good = bool(np.all(np.isfinite(self._quantiles(np.array([0.25, 0.75])))))
         except Exception:  # whatever a user's object raises
             good = False
         if not good:
@@ -170,7 +182,10 @@ class OwnLaw(Distribution):
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
         """The object's."""
-        return np.asarray(quantiles_of(self.law)(u), dtype=np.float64)
+        return self._quantiles(u)
+
+    def _quantiles(self, u: np.ndarray) -> np.ndarray:
+        return real_results(quantiles_of(self.law)(u)).astype(np.float64)
 
     def to_dict(self) -> dict[str, Any]:
         """What it says of itself, but for its place in memory: that would make each run another one."""
@@ -195,6 +210,32 @@ def is_frozen(value: Any) -> bool:
     return all(hasattr(value, name) for name in ("dist", "args", "kwds", "ppf"))
 
 
+def name_of_unfrozen(value: Any) -> str | None:
+    """The name of what scipy.stats holds as a distribution without numbers, such as scipy.stats.norm; None of all else."""
+    known = sys.modules.get("scipy.stats")
+    name = getattr(value, "name", None)
+    return name if isinstance(name, str) and known is not None and getattr(known, name, None) is value else None
+
+
+def without_numbers(value: Any) -> tuple[str, str]:
+    """(what is wrong, the remedy) with such a one."""
+    numbers = ", ".join(f"{name}=..." for name in _numbers_of(value))
+    return (
+        "is no frozen distribution of scipy.stats: it has no numbers",
+        f"give them: scipy.stats.{value.name}({numbers})",
+    )
+
+
+def _shapes(law: Any) -> list[str]:
+    """Names of the shape parameters of a distribution of scipy.stats."""
+    return [name for name in (law.shapes or "").replace(" ", "").split(",") if name]
+
+
+def _numbers_of(law: Any) -> list[str]:
+    """Names of all of its parameters."""
+    return [*_shapes(law), "loc"] + ["scale"] * hasattr(law, "pdf")
+
+
 def as_law(key: str, value: Any) -> Any:
     """What may stand in `vary` as a law: a table, what scipy.stats has, an object with quantiles; all else as it is.
 
@@ -213,7 +254,10 @@ def as_law(key: str, value: Any) -> Any:
         return Frozen(value)
     if type(value).__name__ == "multivariate_normal_frozen":
         return CorrelatedNormal(covariance=np.asarray(value.cov).tolist(), mean=np.asarray(value.mean).tolist())
-    return OwnLaw(value) if quantiles_of(value) else value
+    try:
+        return OwnLaw(value) if quantiles_of(value) else value
+    except SceneError as error:
+        raise SceneError(f"{key}: {fault}" for fault in error.faults) from None
 
 
 def from_dict(key: str, content: Any) -> Distribution:
@@ -238,4 +282,4 @@ def from_dict(key: str, content: Any) -> Distribution:
     try:
         return KINDS[kind](**values)
     except SceneError as error:
-        raise SceneError(f"{key}: {fault}" for fault in error.faults) from None
+        raise error.prefixed(f"{key}: ") from None

@@ -15,6 +15,7 @@ from lgvi_warp import terms, vehicle
 from lgvi_warp.ensemble import Ensemble, over_members
 from lgvi_warp.errors import Faults, closest
 from lgvi_warp.method import FORCED, Method, Program, divided, merged, simplified, with_hops
+from lgvi_warp.oddities import Oddities
 from lgvi_warp.survey import COUPLINGS, SHAPES_OF_MASS, UNCOUPLED, Survey, survey
 from lgvi_warp.terms.base import Term
 from lgvi_warp.terms.drag import PARTS, Drag
@@ -28,7 +29,7 @@ class Model:
     by its exact flow first where it is used, and `drag` its parts. flow: "none", "steady", "uniform" or "varying".
     coupling: which of U12, U13, U23 and of the pitches are there. program: sub-maps of one stage. averages: alpha and beta
     of (15), (16), or None. conservative: no force creates energy, and the potential of all is known to the kernel.
-    steady: forces never change in inertial axes.
+    steady: forces never change in inertial axes. odd: what the user should know of the members' numbers.
     """
 
     method: Method
@@ -48,6 +49,7 @@ class Model:
     averages: tuple[float, float] | None
     conservative: bool
     steady: bool
+    odd: Oddities
 
 
 def make_model(
@@ -131,6 +133,7 @@ def make_model(
         lead=lead,
         averages=(method.alpha, method.beta) if forced else None,
         conservative=conservative,
+        odd=seen.odd,
         steady=not drag and flow in ("none", "steady") and all(_steady(module) for _, module in acting),
     )
 

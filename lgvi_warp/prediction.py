@@ -18,6 +18,8 @@ import numpy as np
 from lgvi_warp import durable, machine, member_fields
 from lgvi_warp.blocks import SHAPES, Block, Keeper, Work, blocks
 from lgvi_warp.ensemble import Ensemble
+from lgvi_warp.errors import Faults
+from lgvi_warp.executors import check_threads
 from lgvi_warp.executors.threads import Threads
 from lgvi_warp.keepers import Samples
 from lgvi_warp.kept import group_of
@@ -108,6 +110,9 @@ def predict(
     fields = (settings.get("save") or SaveAt()).fields
     plan = make_plan(ensemble, **settings, fields=observed.fields)
     compile_seconds = plan.compile()
+    faults = Faults()
+    check_threads(faults, threads)
+    faults.raise_if_any()
     count = threads or machine.thread_count()
     set_up, step = costs(plan, count, observed)
     asked_store = store if isinstance(store, Store) or store is None else Store(store)

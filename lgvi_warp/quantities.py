@@ -2,114 +2,131 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Sequence
+import inspect
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from lgvi_warp.errors import Faults
+from lgvi_warp.real_numbers import NotReal, real_results
 from lgvi_warp.result import Result
 from lgvi_warp.saveat import FIELDS
+from lgvi_warp.statistics.functional import Functional, functional
+from lgvi_warp.statistics.quantity import Quantity
 
-SHAPES: dict[str, tuple[int, ...]] = {
-    "position": (3,), "attitude": (3, 3), "quaternion_wxyz": (4,), "velocity": (3,), "angular_velocity": (3,), "energy": ()
-}  # fmt: skip
-NEEDS = {"quaternion_wxyz": ("attitude",), "energy": FIELDS}
-OVER_TIME: dict[str, Callable[..., np.ndarray]] = {"max": np.max, "min": np.min, "mean": np.mean, "range": np.ptp}
-FUNCTIONS = (*OVER_TIME, "norm")
-REMEDY = 'write "position[2]", "energy", "norm(velocity)", "max(position[2])", or give a function of a Result'
+REMEDY = 'write "position[2]", "depth", "norm(velocity)", "max(depth)", or give a function of a Result'
 
-OfInterest = str | Callable[[Result], Any]
+OfInterest = str | Quantity | Callable[..., Any]
 
 
 @dataclass(frozen=True)
-class Quantity:
-    """A quantity of interest. fields: the samples that it needs; path: whether it needs the whole path.
+class OfResult:
+    """A quantity of interest: a `Functional`, or a function of a Result.
 
     "position[2]" is that at the end; max(...), min(...), mean(...) and range(...) are over the samples that were kept;
-    norm(...) is the length of a vector.
+    norm(...) is the length of a vector. looks_at_members: whether it may ask for more of the members than their parameters.
     """
 
     label: str
-    of: OfInterest
-    fields: tuple[str, ...] = FIELDS
-    path: bool = False
+    of: Functional | Callable[[Result], Any]
+    looks_at_members: bool = False
 
-    def values(self, result: Result) -> np.ndarray:
-        """(n, m), float64. Raises SceneError for a function's result of another shape."""
-        if isinstance(self.of, str):
-            found = _evaluated(self.of, result)
-            found = found[-1] if not self.path else found
-            return np.asarray(found, dtype=np.float64).reshape(result.members, -1)
-        found = np.asarray(self.of(result), dtype=np.float64)
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """The samples that it needs: all for a function, since what it looks at cannot be told."""
+        return self.of.quantity.fields if isinstance(self.of, Functional) else FIELDS
+
+    @property
+    def over_path(self) -> bool:
+        """Whether it needs the whole path."""
+        return isinstance(self.of, Functional) and self.of.over_path
+
+    @property
+    def is_function(self) -> bool:
+        """Whether it is a function of a Result."""
+        return not isinstance(self.of, Functional)
+
+    def values(self, result: Result, members: Any = None) -> np.ndarray:
+        """Its numbers (n, m), float64.
+
+        Args:
+            result: with the fields that it needs.
+            members: as lw.Ensemble.select gives them, for a Quantity that looks at them; by default the result's own
+                parameters and first samples.
+
+        Raises:
+            SceneError: for a function's result of another shape.
+        """
+        if isinstance(self.of, Functional):
+            found = self.of(*samples_of(result, slice(None) if self.over_path else slice(-1, None), members))
+            return found if self.over_path else found[-1]
+        faults = Faults()
+        try:
+            found = real_results(self.of(result)).astype(np.float64)
+        except NotReal as error:
+            faults.add(self.label, "...", error.what, "return an array of real numbers")
+        faults.raise_if_any()
         if found.ndim not in (1, 2) or len(found) != result.members:
-            faults = Faults()
             remedy = f"return an array of shape ({result.members},) or ({result.members}, m)"
             faults.add(self.label, "...", f"gave an array of shape {found.shape}", remedy)
             faults.raise_if_any()
         return found.reshape(result.members, -1)
 
     def labels(self, count: int) -> list[str]:
-        """One for each of its numbers."""
+        """One for each of its `count` numbers."""
+        if isinstance(self.of, Functional):
+            return list(self.of.labels)
         return [self.label] if count == 1 else [f"{self.label}[{i}]" for i in range(count)]
 
 
-def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[Quantity, ...]:
+class _Samples(dict[str, np.ndarray]):
+    """Samples of a result as functions of (samples, members) see them."""
+
+    def __init__(self, fields: Mapping[str, np.ndarray], time: np.ndarray, terms: Sequence[Any]):
+        super().__init__(fields)
+        self.time, self.terms = time, terms
+
+
+def samples_of(result: Result, when: slice = slice(None), members: Any = None) -> tuple[Any, Any]:
+    """(samples, members) of a result at some of its times, as a Quantity's function takes them."""
+    fields = {name: result.samples[name][when] for name in FIELDS if name in result.samples}
+    start = {name: result.samples[name][0] for name in fields}
+    known = SimpleNamespace(parameters=result.parameters, count=result.members, **start)
+    return _Samples(fields, result.time[when], result.terms), known if members is None else members
+
+
+def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:
     """What is asked for, one or several. Raises SceneError naming every fault."""
     asked = list(of) if isinstance(of, list | tuple) else [of]
     faults = Faults()
-    found = [one for one in (_quantity(faults, one) for one in asked) if one]
+    found: list[OfResult] = []
+    for one in asked:
+        if callable(one) and not isinstance(one, Quantity) and not _of_samples(one):
+            found.append(OfResult(getattr(one, "__name__", type(one).__name__), one))
+        elif isinstance(one, str | Quantity) or callable(one):
+            with faults.including():
+                meant = functional("of", one)
+                found.append(OfResult(meant.label, meant, not isinstance(one, str)))
+        else:
+            faults.add("of", one, "is no quantity", REMEDY)
     if not asked:
         faults.add("of", of, "names nothing", REMEDY)
     faults.raise_if_any()
     return tuple(found)
 
 
-def _quantity(faults: Faults, of: Any) -> Quantity | None:
-    if callable(of):
-        # What it looks at cannot be told: it gets everything.
-        return Quantity(getattr(of, "__name__", type(of).__name__), of)
-    if not isinstance(of, str):
-        faults.add("of", of, "is no quantity", REMEDY)
-        return None
-    functions, name, index = _parts(of)
-    if name not in SHAPES or any(one not in FUNCTIONS for one in functions):
-        faults.add("of", of, "is not known", REMEDY)
-        return None
-    shape = SHAPES[name]
-    if index is not None and (len(index) != len(shape) or any(i >= n for i, n in zip(index, shape, strict=True))):
-        faults.add("of", of, f"is no entry of {name}, of shape {shape}", REMEDY)
-        return None
-    if sum(one in OVER_TIME for one in functions) > 1:
-        faults.add("of", of, "looks over the path twice", "keep one of max, min, mean, range")
-        return None
-    return Quantity(of.replace(" ", ""), of, NEEDS.get(name, (name,)), any(one in OVER_TIME for one in functions))
-
-
-def _parts(of: str) -> tuple[list[str], str, tuple[int, ...] | None]:
-    """The functions, outermost first; the name; the index of an entry."""
-    text, functions = of.replace(" ", ""), []
-    while match := re.fullmatch(r"(\w+)\((.*)\)", text):
-        functions.append(match[1])
-        text = match[2]
-    entry = re.fullmatch(r"(\w+)\[(\d+(?:,\d+)*)\]", text)
-    return (functions, entry[1], tuple(int(i) for i in entry[2].split(","))) if entry else (functions, text, None)
-
-
-def _evaluated(of: str, result: Result) -> np.ndarray:
-    """(k, n, ...), or (n, ...) where it looks over the path."""
-    functions, name, index = _parts(of)
-    values = np.asarray(getattr(result, name), dtype=np.float64)
-    if index is not None:
-        entry: tuple[Any, ...] = (slice(None), slice(None), *index)
-        values = values[entry]
-    leading = 2
-    for function in reversed(functions):
-        if function == "norm":
-            values = np.sqrt(np.sum(values**2, axis=tuple(range(leading, values.ndim))))
-        else:
-            values = np.asarray(OVER_TIME[function](values, axis=0))
-            leading = 1
-    return values
+def _of_samples(function: Callable[..., Any]) -> bool:
+    """Whether a function is one of (samples, members), as statistics take them, and not of a Result."""
+    try:
+        given = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):
+        return False
+    plain = [
+        one
+        for one in given
+        if one.kind in (one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD) and one.default is one.empty
+    ]
+    return len(plain) == 2

@@ -61,7 +61,8 @@ def of_store(provenance: Mapping[str, Any], ensemble: Ensemble) -> dict[str, Any
     if getattr(sampling, "file", None) is not None:
         given = {name: values for name, values in given.items() if name not in arrays}
     elif arrays:
-        told["sampling"] = {sampling.kind: {"columns": sorted(arrays)} if sampling.kind == "table" else {}}
+        left = {name: value for name, value in sampling.to_dict()[sampling.kind].items() if name not in arrays}
+        told["sampling"] = {sampling.kind: {"columns": sorted(arrays)} if sampling.kind == "table" else left}
     return {**provenance, "ensemble": told | ({ARRAYS: _checksum(given)} if given else {})}
 
 
@@ -101,8 +102,8 @@ def ensemble_of(
             ensemble = ensemble.subset(settings["indices"])
     else:
         if explicit and table is None:
-            (kind,) = settings["sampling"]
-            settings["sampling"] = {kind: {"values": explicit} if kind == "table" else explicit}
+            ((kind, left),) = settings["sampling"].items()
+            settings["sampling"] = {kind: {"values": explicit} if kind == "table" else {**left, **explicit}}
         ensemble = Ensemble.from_scene(Scene.from_dict({**scene, "ensemble": settings}))
         ensemble.scene = own
     if noise is not None:

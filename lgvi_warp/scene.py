@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
@@ -11,9 +12,11 @@ import numpy as np
 
 from lgvi_warp import events, laws, notation, terms
 from lgvi_warp import statistics as kinds
-from lgvi_warp.errors import Faults, SceneError, holds_bool
+from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.machine import DTYPES
 from lgvi_warp.method import Method
+from lgvi_warp.names import alike, folded
+from lgvi_warp.real_numbers import holds_words
 from lgvi_warp.sampling import sampling_of
 from lgvi_warp.statistics import until as stopping
 from lgvi_warp.status import CHECKS, ON_FAILURE
@@ -134,7 +137,8 @@ def check_keep(faults: Faults, key: str, keep: Any, members: int | None = None) 
         faults.choice(key, keep, KEEP)
         return
     indices = np.asarray(keep) if isinstance(keep, list | tuple | np.ndarray | range) else np.array(None)
-    if indices.ndim != 1 or indices.size == 0 or indices.dtype.kind not in "iu" or np.any(indices < 0):
+    whole = indices.ndim == 1 and indices.size > 0 and indices.dtype.kind in "iu" and not np.ma.is_masked(keep)
+    if not whole or np.any(indices < 0):
         faults.add(key, keep, "names no members", f"give {', '.join(map(repr, KEEP))}, or a list of indices from 0")
     elif members is not None and np.any(indices >= members):
         faults.add(
@@ -188,7 +192,7 @@ class RunSettings:
                 try:
                     self.method_of(self.method)
                 except SceneError as error:
-                    raise SceneError(f"run.{fault}" for fault in error.faults) from None
+                    raise error.prefixed("run.") from None
         faults.raise_if_any()
 
     def method_of(self, name: str | None = None) -> Method:
@@ -264,12 +268,13 @@ class EnsembleSettings:
 def _whole_numbers(value: Any) -> bool:
     """Whether it is a list of one or more whole numbers from 0."""
     try:
+        if holds_words(value):
+            return False
         array = np.asarray(value)
     except ValueError:
         return False
-    return (
-        array.ndim == 1 and len(array) > 0 and array.dtype.kind in "iu" and not holds_bool(value) and array.min() >= 0
-    )
+    plain = not np.ma.is_masked(value)
+    return bool(array.ndim == 1 and len(array) > 0 and array.dtype.kind in "iu" and plain and array.min() >= 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,10 +302,7 @@ class Scene:
         with faults.including():
             object.__setattr__(self, "events", events.from_list(self.events))
         if not faults:
-            keys = [one.key for one in (*self.terms, *self.events)]
-            for key in sorted({one.key for one in self.events if keys.count(one.key) > 1}):
-                faults.add("events", key, "is the name of two events or of a term too",
-                           f'give each a name of its own: name = "{key}_2"')  # fmt: skip
+            self._check_names(faults)
         if self.controller is not None:
             remedy = "leave it out; a held or scheduled wrench and thrusters' commands are terms"
             faults.add("controller", self.controller, "is not known to this version", remedy)
@@ -308,6 +310,20 @@ class Scene:
             if not isinstance(getattr(self, name), kind):
                 faults.add(name, getattr(self, name), f"is no {kind.__name__}", f"give lw.{kind.__name__}(...)")
         faults.raise_if_any()
+
+    def _check_names(self, faults: Faults) -> None:
+        """Terms and events have different names, on every file system."""
+        keys = [one.key for one in (*self.terms, *self.events)]
+        counts = Counter(keys)
+        for key in sorted({one.key for one in self.events}):
+            if folded(key) in terms.RESERVED:
+                faults.add("events", key, "is the name of a section of the scene", f'write name = "{key}_event"')
+            elif counts[key] > 1:
+                faults.add("events", key, "is the name of two events or of a term too",
+                           f'give each a name of its own: name = "{key}_2"')  # fmt: skip
+        for first, other in alike(keys):
+            what = f"is the same folder as {first!r} on file systems that do not tell capitals apart"
+            faults.add("terms and events", other, what, f'give each a name of its own: name = "{other}_2"')
 
     def parameters(self) -> dict[str, np.ndarray]:
         """Every number that may vary by member, by name: "vehicle.mass", "drag.quadratic", ..., as this scene has it."""

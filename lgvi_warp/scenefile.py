@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import inspect
 import os
 import tomllib
@@ -10,9 +9,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from lgvi_warp.errors import Faults, SceneError
+from lgvi_warp.errors import Faults, SceneError, shown
 from lgvi_warp.laws import from_dict as law_from_dict
+from lgvi_warp.reading import file_text
 from lgvi_warp.scene import EnsembleSettings, Environment, RunSettings, Scene, Start
+from lgvi_warp.toml_text import parsed
 from lgvi_warp.vehicle import Vehicle
 
 SECTIONS = ("vehicle", "environment", "start", "ensemble", "run", "terms", "events", "controller", "source")
@@ -20,11 +21,7 @@ SECTIONS = ("vehicle", "environment", "start", "ensemble", "run", "terms", "even
 
 def load(path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None) -> Scene:
     """Read a scene file; overrides (dotted key -> value) replace what it says. Raises SceneError naming every fault."""
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError, TypeError) as error:
-        what = getattr(error, "strerror", None) or error
-        raise SceneError([f"scene file {path}: {what}; give the path of a TOML file"]) from None
+    text = file_text(path, "scene file")
     return loads(text, overrides, os.fspath(path), Path(path).parent)
 
 
@@ -32,10 +29,7 @@ def loads(
     text: str, overrides: Mapping[str, Any] | None = None, name: str = "scene", folder: Path | None = None
 ) -> Scene:
     """The same from a text. folder: where the files that it names are looked for, by default the current one."""
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError([f"{name} is not TOML: {error}; mend that line"]) from None
+    content = parsed(text, name)
     for key, value in (overrides or {}).items():
         override(content, key, value)
     return from_dict(_files_in(folder, content) if folder else content)
@@ -59,8 +53,7 @@ def _files_in(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
 def override(content: dict[str, Any], key: str, value: Any) -> None:
     """Set a dotted key, such as vehicle.mass or ensemble.members; a text is read as TOML if it is TOML."""
     if isinstance(value, str):
-        with contextlib.suppress(tomllib.TOMLDecodeError):
-            value = tomllib.loads(f"value = {value}")["value"]
+        value = _value_of(key, value)
     section, _, rest = key.partition(".")
     if not rest:
         raise SceneError([f"{key}: is not a dotted key; write section.key=value, such as vehicle.mass=120"])
@@ -70,6 +63,23 @@ def override(content: dict[str, Any], key: str, value: Any) -> None:
     if not isinstance(table, dict):
         raise SceneError([f"{key}: {section} is not a table; write section.key=value"])
     table[rest] = value
+
+
+def _value_of(key: str, text: str) -> Any:
+    """What a text says as a TOML value; itself if it is none. Raises SceneError where it says more than one value."""
+    try:
+        content = parsed(f"value = {text}", key)
+    except SceneError as error:
+        if not isinstance(error.__cause__, tomllib.TOMLDecodeError):
+            raise SceneError((key + one.removeprefix("value") for one in error.faults), error.more) from None
+        if "\n" not in text.strip():
+            return text
+        content = {}
+    if len(content) != 1:
+        raise SceneError(
+            [f"{key} = {shown(text)}: is not one value; write one value on one line, and --set once for each key"]
+        )
+    return content["value"]
 
 
 def from_dict(content: Mapping[str, Any]) -> Scene:

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp import machine, member_fields
+from lgvi_warp import machine, member_fields, plausibility
 from lgvi_warp.blocks import Work, blocks
-from lgvi_warp.ensemble import Ensemble
+from lgvi_warp.ensemble import AT_ONCE, Ensemble
 from lgvi_warp.errors import Faults, Interrupted, MembersFailed, SceneError, shown
 from lgvi_warp.executors import Executor, executor_of
 from lgvi_warp.executors.threads import Threads
@@ -270,13 +270,15 @@ def _in_memory(
     estimates, said = Estimates(), tuple[str, ...]()
     if observing is not None:
         estimates, said = observing.read(told["ensemble"], of_members["status"])
-    found = samples.fields if samples and samples.fields else {}
+    # What lies beyond the last member was never written.
+    kept = samples.fields if samples and samples.fields else {}
+    histories = {name: values[:, :n] for name, values in kept.items()}
     return Result(
         time=plan.grid.times,
-        samples={name: values[:, :n] for name, values in found.items()},
+        samples=histories,
         **Result.per_member(of_members),
         parameters=dict(parameters) if samples is not None else parameters,
-        messages=messages(plan) + said,
+        messages=messages(plan) + said + plausibility.on_the_way(plan.ensemble.scene, histories).messages(n),
         provenance=told
         | {name: float(of_members[name].mean()) for name in ("steps_made", "steps_tried") if name in of_members}
         | ({"members": n} if n < plan.ensemble.members else {}),
@@ -352,7 +354,15 @@ def settled(store: Store, plan: Plan, observed: Observation, fields: Sequence[st
 
 def messages(plan: Plan) -> tuple[str, ...]:
     """What the user should know before the run."""
-    return plan.grid.messages + tuple(plan.ensemble.scene.vehicle.warnings)
+    return plan.grid.messages + tuple(plan.ensemble.scene.vehicle.warnings) + odd_before(plan)
+
+
+def odd_before(plan: Plan) -> tuple[str, ...]:
+    """What is odd of the members' numbers, and of where they start: of a large fleet, of where the first ones do."""
+    ensemble = plan.ensemble
+    varies = ensemble.starts_vary or bool(ensemble.varied() and plausibility.own_flows(ensemble.scene))
+    starts = plausibility.of_start(ensemble.scene, ensemble.select(0, min(AT_ONCE, ensemble.members) if varies else 1))
+    return plan.model.odd.messages(ensemble.members) + starts.messages(ensemble.members, AT_ONCE)
 
 
 def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence[str] | None = None) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp import machine, plan
-from lgvi_warp.comparison import QUANTITIES
+from lgvi_warp.compared import QUANTITIES, compared_in
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.scene import Scene
 from lgvi_warp.solving import provenance
@@ -36,7 +36,7 @@ from lgvi_warp.stability_runs import (
 )
 from lgvi_warp.status import Status, failed, stopped
 from lgvi_warp.tables import write_csv
-from lgvi_warp.tradeoffs import _finite, check_of, chosen_methods
+from lgvi_warp.tradeoffs import _finite, chosen_methods
 
 METHODS = ("psi", "psi_s", "psi_x", "rk4")
 # Maps by name: their two axes.
@@ -98,6 +98,11 @@ class StabilityMap:
     refused: dict[str, str] = field(default_factory=dict)
     messages: tuple[str, ...] = ()
     seconds: float = 0.0
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.unit:  # of what was written before there were others
+            object.__setattr__(self, "unit", QUANTITIES.get(self.of, "1"))
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -211,7 +216,7 @@ def stability_map(
     points: int | tuple[int, int] = 24,
     t1: float | None = None,
     error: float = 1e-2,
-    of: str = "attitude",
+    of: Any = "attitude",
     error_time: float | None = None,
     energy_bound: float = 1.0,
     directions: int = 4,
@@ -229,6 +234,8 @@ def stability_map(
     scene's own and such of velocity and spin turned at random; the worst counts. h: the step [s], where it is on no axis.
     dtype: default the scene's. What the scene's ensemble varies is left out.
 
+    of: any quantity that statistics know ("attitude", "position", "depth", "euler[1]", ...), or a lw.Quantity.
+
     A cell is accurate where the error of `of` stays below `error` [its unit] up to error_time [s] (default: one period of
     the fastest motion at the start), against a reference of fine steps that two runs agree on ten times better; bounded
     where only energy and rotation stay bounded up to t1 [s] (default: ten periods): a conservative scene's energy changes,
@@ -243,9 +250,11 @@ def stability_map(
     dtype = dtype or scene.run.dtype
     names = chosen_methods(methods, METHODS)
     faults = Faults()
+    asked, unit_of_error = None, ""
     with faults.including():
-        check_of(of)
-    for name, value, unit in (("error", error, QUANTITIES.get(of, "")), ("energy_bound", energy_bound, "1"),
+        asked = compared_in(of)
+        unit_of_error = asked.unit
+    for name, value, unit in (("error", error, unit_of_error), ("energy_bound", energy_bound, "1"),
                               *((name, value, "s") for name, value in (("t1", t1), ("error_time", error_time))
                                 if value is not None)):  # fmt: skip
         faults.positive(name, value, unit)
@@ -255,7 +264,7 @@ def stability_map(
         both = (points, points) if isinstance(points, int) else tuple(points)
         grid = Grid(scene, x, y, both, directions, seed, h)
     faults.raise_if_any()
-    assert grid is not None
+    assert grid is not None and asked is not None
     refused = refusals(grid, names, dtype)
     if len(refused) == len(names):
         raise SceneError([f"method {name}: {why}" for name, why in refused.items()])
@@ -267,10 +276,10 @@ def stability_map(
     least = LEAST_DRIVEN if kind == "driven" else 1
     columns = [column(step, members, error_time, t1, least) for step, members in grid.columns()]
     threads = threads or machine.thread_count()
-    text = make_references(grid, columns, of, error, threads, lambda part: report(0.4 * part))
+    text = make_references(grid, columns, asked, error, threads, lambda part: report(0.4 * part))
     found, messages = {}, []
     for i, name in enumerate(names):
-        one, why = run_method(grid, columns, name, dtype, of, kind, threads)
+        one, why = run_method(grid, columns, name, dtype, asked, kind, threads)
         report(0.4 + 0.6 * (i + 1) / len(names))
         found[name] = one
         if why:
@@ -288,7 +297,8 @@ def stability_map(
         energies={name: _worst(grid, one.growth / energy_bound) for name, one in found.items()},
         statuses={name: _worst_status(grid, one.status) for name, one in found.items()},
         ratios=_ratios(grid, list(found)),
-        of=of,
+        of=asked.name,
+        unit=asked.unit,
         error_bound=float(error),
         error_time=float(error_time),
         t1=float(t1),
@@ -353,7 +363,7 @@ def _provenance(grid: Grid, methods: Sequence[str], dtype: str, seed: int, energ
 
 def report_text(found: StabilityMap) -> str:
     """The map in lines for people."""
-    unit = QUANTITIES[found.of]
+    unit = found.unit
     lines = [f"note        {message}" for message in found.messages]
     lines += [
         f"map         {found.x.label} x {found.y.label}: {len(found.x.values)} x {len(found.y.values)} cells, "

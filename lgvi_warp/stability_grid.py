@@ -24,6 +24,8 @@ SPECIAL = {
     "drag_number": ("1/s", "largest drag rate (l + 2 q |v|) / I"),
 }
 ALIASES = {"start.angular_velocity": "angular_velocity", "start.velocity": "speed", "omega": "angular_velocity"}
+# Starts of all cells: some gigabytes.
+MOST_MEMBERS = 10_000_000
 FORM = '"NAME", "NAME=LOW:HIGH" or "NAME=LOW:HIGH:linear", with ":scale" or ":set" at the end for parameters'
 
 
@@ -122,6 +124,9 @@ class Grid:
         for name, value, least in (("points", points, 1), ("directions", (directions,), 1)):
             if any(isinstance(k, bool) or not isinstance(k, int) or k < least for k in value):
                 faults.add(name, value, "is not a whole number above 0", "give how many")
+        if not faults and (members := points[0] * points[1] * directions) > MOST_MEMBERS:
+            what = f"make {members:,} members, more than {MOST_MEMBERS:,}"
+            faults.add("points", points, what, "give fewer points or directions")
         faults.raise_if_any()
         self.scene = _prepared(scene, [one.key for one in axes])
         self.base = Ensemble(self.scene, 1).select(0, 1)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp import comparison, invariants, plan
+from lgvi_warp.compared import Compared, compared_in
 from lgvi_warp.comparison import PRECISE
 from lgvi_warp.errors import SceneError
 from lgvi_warp.method import Method
@@ -118,14 +119,15 @@ def _carried(term: Any, module: Any) -> bool:
 
 
 def make_references(
-    grid: Grid, columns: Sequence[Column], of: str, error: float, threads: int, report: Callable[[float], None]
+    grid: Grid, columns: Sequence[Column], of: Any, error: float, threads: int, report: Callable[[float], None]
 ) -> str:
     """Give every column the states at its error times; says by which methods."""
+    asked = compared_in(of)
     first, second = _precise(grid)
     rates = np.max(list(grid.rates().values()), axis=0)
     done = 0
     with ThreadPoolExecutor(threads) as pool:
-        jobs = [pool.submit(_reference, grid, one, (first, second), rates, of, error / TRUST) for one in columns]
+        jobs = [pool.submit(_reference, grid, one, (first, second), rates, asked, error / TRUST) for one in columns]
         for job in as_completed(jobs):
             job.result()
             done += 1
@@ -151,7 +153,9 @@ def _precise(grid: Grid) -> tuple[str, str]:
     return names[0], names[1] if close else names[0]
 
 
-def _reference(grid: Grid, column: Column, names: tuple[str, str], rates: np.ndarray, of: str, goal: float) -> None:
+def _reference(
+    grid: Grid, column: Column, names: tuple[str, str], rates: np.ndarray, of: Compared, goal: float
+) -> None:
     """Fill in a column's reference: two methods, halving the steps of the members that they do not yet agree on."""
     n = len(column.members)
     column.verified = np.zeros(n, bool)
@@ -163,7 +167,7 @@ def _reference(grid: Grid, column: Column, names: tuple[str, str], rates: np.nda
             with np.errstate(all="ignore"):
                 a, b = (run_plan(plan_of(grid, members, name, column.grid(k, whole=False), "float64"), 1)
                         for name, k in zip(names, (finer, math.ceil(1.5 * finer)), strict=True))  # fmt: skip
-                apart = comparison.distances(a, b)[of]
+                apart = comparison.distances(a, b, of)[of.name]
                 good = ~failed(a.status) & ~failed(b.status) & np.isfinite(b.attitude).all(axis=(0, 2, 3))
                 good &= np.max(np.nan_to_num(apart, posinf=np.inf), axis=0) <= goal
         except SceneError:
@@ -191,7 +195,7 @@ def _joined(whole: Result | None, part: Result, at: np.ndarray) -> Result:
 
 
 def run_method(
-    grid: Grid, columns: Sequence[Column], method: str, dtype: str, of: str, judged: str, threads: int
+    grid: Grid, columns: Sequence[Column], method: str, dtype: str, of: Compared, judged: str, threads: int
 ) -> tuple[Found, str]:  # fmt: skip
     """Run a method over all columns; also the reason where the program refused some."""
     n = len(grid.h)
@@ -222,7 +226,7 @@ def run_method(
     return found, why[0] if why else ""
 
 
-def _judge(result: Result, column: Column, at: np.ndarray, found: Found, of: str, judged: str) -> None:
+def _judge(result: Result, column: Column, at: np.ndarray, found: Found, of: Compared, judged: str) -> None:
     """Note what the run of some members of a column showed."""
     members = column.members[at]
     found.status[members] = np.asarray(result.status)
@@ -232,7 +236,7 @@ def _judge(result: Result, column: Column, at: np.ndarray, found: Found, of: str
     early = np.searchsorted(column.steps, column.error_steps)
     if column.reference is not None:
         reference = comparison.part(column.reference, at.tolist())
-        apart = comparison.distances(_at_times(result, early), reference)[of]
+        apart = comparison.distances(_at_times(result, early), reference, of)[of.name]
         # Beyond an event there is no error; a member that was frozen has none at all.
         stopped = np.isfinite(np.minimum(stop_time(result), stop_time(reference)))
         lost = failed(result.status) | (np.isnan(apart).any(axis=0) & ~stopped)

@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from lgvi_warp import comparison, machine, tradeoffs
+from lgvi_warp import comparison, cost, machine, tradeoffs
 from lgvi_warp.blocks import blocks
-from lgvi_warp.comparison import QUANTITIES, Reference, Sample, Setting
+from lgvi_warp.compared import Compared, compared_in
+from lgvi_warp.comparison import Reference, Sample, Setting
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
+from lgvi_warp.executors import check_threads
 from lgvi_warp.method import Method
 from lgvi_warp.plan import Plan
 from lgvi_warp.result import Result
@@ -22,7 +24,7 @@ from lgvi_warp.saveat import TimeGrid
 from lgvi_warp.scene import Scene
 from lgvi_warp.solving import make_plan, run_plan
 from lgvi_warp.speed import void
-from lgvi_warp.tradeoffs import PRECISIONS, Trial, check_of, chosen_methods, costs, growth_of, growth_text, tried
+from lgvi_warp.tradeoffs import PRECISIONS, Trial, chosen_methods, costs, growth_of, growth_text, tried
 
 # A setting is taken where its error on the sample is below the asked one by this factor.
 SAFETY = 1.15
@@ -34,8 +36,9 @@ CANDIDATES = tuple(name for name in tradeoffs.CANDIDATES if name not in ("phi", 
 CHECKED = 1024
 # Members that a finished run is checked on.
 CONFIRMED = 64
-# Settings of the last comparison of costs.
+# Settings of the last comparison of costs, and readings of each cost.
 FINALISTS = 4
+ROUNDS = 7
 # Bytes of a member besides its samples: state, parameters, status, and the arrays they are made from.
 BYTES_OF_A_MEMBER = 2000
 
@@ -48,7 +51,8 @@ class Suggestion:
     the members checked, all in `unit`; margin = error / expected. us_per_vehicle_second: cost on one core. run_seconds:
     predicted for all members on `threads` cores, without compiling; memory_bytes: predicted for the result and the run.
     members: of the sample that was checked; reference: what against, reference_error: how good that is.
-    rivals: (setting, cost, error) of the next best. worst: members with the largest errors, for the check after the run.
+    rivals: (setting, cost, error) of the next best. worst: members with the largest errors, for the check after the run;
+    asked: what the error is of, for the same. messages: what the user should know.
     """
 
     settings: dict[str, Any]
@@ -67,6 +71,8 @@ class Suggestion:
     reference_error: float
     rivals: tuple[tuple[Setting, float, float], ...] = ()
     worst: tuple[int, ...] = ()
+    asked: Compared | None = field(default=None, repr=False, compare=False)
+    messages: tuple[str, ...] = ()
 
     @property
     def margin(self) -> float:
@@ -76,14 +82,15 @@ class Suggestion:
     def __str__(self) -> str:
         s = self.setting
         lines = [
+            *(f"note        {message}" for message in self.messages),
             f"chosen      {s.name}, {s.dtype}, step {s.h:.6g} s: {self.of} to {self.expected:.1e} {self.unit} up to "
             f"{self.t1:g} s, {self.margin:.2g} times better than asked ({self.members} members checked)",
             f"predicted   {self.run_seconds:.2g} s on {self.threads} thread{'s' * (self.threads > 1)}, "
             f"{self.memory_bytes / 1e6:.2g} MB",
             f"reference   {self.reference}: they agree to {self.reference_error:.1e} {self.unit}",
         ]
-        for rival, cost, error in self.rivals:
-            times = cost / self.us_per_vehicle_second
+        for rival, price, error in self.rivals:
+            times = price / self.us_per_vehicle_second
             lines.append(f"  next best {rival.name}, {rival.dtype}, step {rival.h:.4g} s: {times:.2f} times the time, "
                          f"{self.of} to {error:.1e} {self.unit}")  # fmt: skip
         return "\n".join(lines)
@@ -92,7 +99,7 @@ class Suggestion:
 def suggest(
     fleet: Ensemble | Scene,
     error: float = 1e-3,
-    of: str = "position",
+    of: Any = "position",
     t1: float | None = None,
     methods: Sequence[str] | None = None,
     members: int = 128,
@@ -102,7 +109,8 @@ def suggest(
 ) -> Suggestion:
     """Find the cheapest method, step and precision whose error stays below `error` for every member and time up to t1.
 
-    of: "position" [m], "attitude" [rad], "velocity" [m/s], "angular_velocity" [rad/s] or "energy" [J]. t1: [s], by default
+    of: any quantity that statistics know, "position" [m], "attitude" [rad], "depth" [m], "position[2]", "speed" [m/s],
+    "energy" [J] ..., or a lw.Quantity. t1: [s], by default
     run.duration of the scene. methods: names (default: all that the scene takes). members: of the sample that it searches
     on; what it finds is checked on up to 1024. threads: for the predicted time. seconds: about how long to search,
     compiling aside.
@@ -110,9 +118,11 @@ def suggest(
     Raises SceneError naming every fault; where noise acts; and where the reference cannot be known ten times better than
     the error, since errors grow too fast: it says up to which time they can.
     """
-    check_of(of)
+    asked = compared_in(of)
     faults = Faults()
-    faults.positive("error", error, QUANTITIES[of])
+    faults.positive("error", error, asked.unit)
+    faults.positive("seconds", seconds)
+    check_threads(faults, threads)
     faults.raise_if_any()
     names = chosen_methods(methods, CANDIDATES)
     report = progress or void
@@ -123,26 +133,30 @@ def suggest(
     if sample.noisy(taken[0]):
         what = f"error = {error:g}: noise acts, whose path differs from step to step, so members have no error"
         raise SceneError([f"{what}; use lgvi-warp tradeoff, which compares statistics"])
-    reference = checked_reference(sample, of, error, 0.4 * seconds, taken)
+    reference = checked_reference(sample, asked, error, 0.4 * seconds, taken)
     report(0.3)
     found = search(
         sample,
         taken,
         reference,
-        of,
+        asked,
         error / SAFETY,
         time.perf_counter() + 0.6 * seconds,
         lambda x: report(0.3 + 0.5 * x),
     )
     if not found:
-        what = f"error = {error:g} {QUANTITIES[of]} of {of}: no step of {', '.join(taken)} kept it"
+        what = f"error = {error:g} {asked.unit} of {asked.name}: no step of {', '.join(taken)} kept it"
         raise SceneError([f"{what}; ask for a larger error, a shorter t1, or give more seconds"])
     more = sample.more(CHECKED) if sample.whole.members > sample.members else sample
     if more is not sample:
-        reference = checked_reference(more, of, error, 0.4 * seconds, taken)
-    final = [refined(more, one.setting, reference, of, error / SAFETY**0.5) for one in found[:FINALISTS]]
-    final = [one for one in final if one.error(of) <= error] or final[:1]
-    prices = costs([one.plan for one in final], rounds=7)
+        reference = checked_reference(more, asked, error, 0.4 * seconds, taken)
+    final = [refined(more, one.setting, reference, asked.name, error / SAFETY**0.5) for one in found[:FINALISTS]]
+    final = [one for one in final if one.error(asked.name) <= error] or final[:1]
+    readings = cost.costs([one.plan for one in final], rounds=ROUNDS)
+    prices = [one.us_per_vehicle_second for one in readings]
+    text = cost.disagreement(
+        [(f"{one.setting.name} {one.setting.dtype}", price) for one, price in zip(final, readings, strict=True)]
+    )
     order = sorted(range(len(final)), key=prices.__getitem__)
     best, price = final[order[0]], prices[order[0]]
     whole = sample.whole
@@ -152,9 +166,9 @@ def suggest(
         settings=best.setting.options(),
         setting=best.setting,
         error=float(error),
-        of=of,
-        unit=QUANTITIES[of],
-        expected=best.error(of),
+        of=asked.name,
+        unit=asked.unit,
+        expected=best.error(asked.name),
         us_per_vehicle_second=price,
         run_seconds=seconds_of(whole, best.setting, sample.t1) / used,
         threads=used,
@@ -162,27 +176,29 @@ def suggest(
         members=more.members,
         t1=sample.t1,
         reference=reference.text,
-        reference_error=reference.error(of),
-        rivals=tuple((final[i].setting, prices[i], final[i].error(of)) for i in order[1:]),
-        worst=worst_of(best, reference, of),
+        reference_error=reference.error(asked.name),
+        rivals=tuple((final[i].setting, prices[i], final[i].error(asked.name)) for i in order[1:]),
+        worst=worst_of(best, reference, asked.name),
+        asked=asked,
+        messages=(text,) if text else (),
     )
 
 
 def worst_of(one: Trial, reference: Reference, of: str, members: int = CONFIRMED // 2) -> tuple[int, ...]:
     """The members with the largest errors, the largest first."""
-    apart = comparison.distances(one.result, reference.result)[of]
+    apart = comparison.distances(one.result, reference.result, reference.asked)[of]
     largest = np.max(np.where(np.isnan(apart), 0.0, apart), axis=0)
     return tuple(int(i) for i in np.argsort(-largest)[:members])
 
 
-def checked_reference(sample: Sample, of: str, error: float, seconds: float, taken: Sequence[str]) -> Reference:
+def checked_reference(sample: Sample, of: Compared, error: float, seconds: float, taken: Sequence[str]) -> Reference:
     """A reference ten times better than the error up to t1. Raises SceneError."""
     reference = comparison.make_reference(sample, of, goal=error / 30.0, seconds=seconds)
-    if reference.error(of) > 0.1 * error:
-        until = sample.times[reference.reaches(of, 0.1 * error)]
-        unit = QUANTITIES[of]
-        what = f"error = {error:g} {unit} of {of} up to {sample.t1:g} s cannot be checked: {reference.text} differ by "
-        what += f"{reference.error(of):.1e} {unit}; {growth_text(growth_of(sample, taken, reference))}"
+    if reference.error(of.name) > 0.1 * error:
+        until = sample.times[reference.reaches(of.name, 0.1 * error)]
+        unit = of.unit
+        what = f"error = {error:g} {unit} of {of.name} up to {sample.t1:g} s cannot be checked: {reference.text} differ by "
+        what += f"{reference.error(of.name):.1e} {unit}; {growth_text(growth_of(sample, taken, reference))}"
         remedy = (
             f"ask for t1 (--duration) up to {until:g} s, " if until > 0.0 else "ask for a shorter t1 (--duration), "
         )
@@ -194,7 +210,7 @@ def search(
     sample: Sample,
     methods: Sequence[str],
     reference: Reference,
-    of: str,
+    asked: Compared,
     target: float,
     deadline: float,
     report: Callable[[float], None],
@@ -204,7 +220,7 @@ def search(
     A step is halved until it does, and then lengthened by the slope of the errors; a method ends where it costs 1.5 times
     what another does.
     """
-    size_of = np.abs(getattr(reference.result, of)).max()
+    of, size_of = asked.name, asked.largest(reference.result)
     # What float32 cannot hold is not asked of it.
     dtypes = [name for name in PRECISIONS if target > 4.0 * comparison.ROUND_OFF[name] * size_of]
     ladders = [(name, dtype) for name in methods for dtype in dtypes or ["float64"]]
@@ -216,24 +232,29 @@ def search(
         m, before, worse = sample.coarsest(2.0), math.inf, 0
         plan = sample.plan(sample.setting(method, m, dtype))
         deadline += plan.compile()
-        per_step = costs([plan], 3)[0] * sample.h(m)
-        cheapest = min((cost for cost, _ in found), default=math.inf)
+        per_step = step_cost(plan)
+        cheapest = min((price for price, _ in found), default=math.inf)
         while per_step / sample.h(m) < 2.0 * cheapest:
             one = tried(sample, sample.setting(method, m, dtype), reference)
             deadline += one.result.compile_seconds
             size = one.error(of)
             if size <= target:
                 best = lengthened(sample, one, m, before, reference, of, target)
-                cost = per_step / best.setting.h
-                found.append((cost, best))
+                # Of a step that iterates, a shorter one is less work; one that fails is other work.
+                found.append((step_cost(best.plan) / best.setting.h, best))
                 break
             worse = worse + 1 if size > 0.8 * before and before < 0.1 else 0
             if worse >= 2 or m > 10**7 or time.perf_counter() > deadline:
                 break
             before = size
             m *= 2
-    cheapest = min((cost for cost, _ in found), default=math.inf)
-    return [one for cost, one in sorted(found, key=lambda pair: pair[0]) if cost < 1.5 * cheapest]
+    cheapest = min((price for price, _ in found), default=math.inf)
+    return [one for price, one in sorted(found, key=lambda pair: pair[0]) if price < 1.5 * cheapest]
+
+
+def step_cost(plan: Plan) -> float:
+    """Microseconds of one core for one step of one vehicle."""
+    return costs([plan], ROUNDS)[0] * plan.grid.h
 
 
 def lengthened(
@@ -274,10 +295,11 @@ def refined(sample: Sample, setting: Setting, reference: Reference, of: str, tar
 
 
 def seconds_of(fleet: Ensemble, setting: Setting, t1: float, members: int = 256) -> float:
-    """What all members take on one core, the scene's samples included, from a run of a few of them [s]."""
+    """What all members take on one core, the scene's samples included, from the CPU time of a few of them [s]."""
     n = min(members, fleet.members)
     plan = make_plan(fleet.subset(range(n)), setting.resolved(), setting.h, t1, dtype=setting.dtype)
-    return min(run_plan(plan, 1).run_seconds for _ in range(2)) * fleet.members / n
+    plan.compile()
+    return float(cost.timed([lambda: run_plan(plan, 1)], 2).min()) * fleet.members / n
 
 
 def memory_of(fleet: Ensemble, setting: Setting, t1: float) -> int:
@@ -302,6 +324,6 @@ def verified(fleet: Ensemble, result: Result, found: Suggestion) -> tuple[float,
     # In double precision, so that round-off of the run's own is seen as well.
     half = Plan(part, plan.method, TimeGrid(h / 2.0, 2 * steps, result.time), plan.fields, "float64")
     with np.errstate(all="ignore"):
-        apart = comparison.distances(comparison.part(result, chosen), run_plan(half, 1))
+        apart = comparison.distances(comparison.part(result, chosen), run_plan(half, 1), found.asked)
         size = comparison.errors(apart, len(result.time) - 1)[found.of]["path_max"]
     return size / (1.0 - 2.0**-plan.method.order), len(chosen)

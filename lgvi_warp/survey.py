@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from lgvi_warp import inertia, terms, vehicle
 from lgvi_warp.ensemble import Ensemble, over_members
 from lgvi_warp.inertia import Frame
 from lgvi_warp.method import Method, middle_axis
+from lgvi_warp.oddities import Oddities
+from lgvi_warp.plausibility import of_numbers
 from lgvi_warp.terms.base import Setting
 from lgvi_warp.terms.drag import Drag, has_exact_flow
 
@@ -69,7 +71,7 @@ class Survey:
     origins of the state and of the forces are not the user's; apart: nor the same; couplings: indices among COUPLINGS of
     what U has; left: the largest coupling norm that the method cannot have.
     felt: keys of the terms; drag: parts of the exact flow; rising: keys of currents with a vertical velocity.
-    weightless: no gravity; buoyant: buoyancy.
+    weightless: no gravity; buoyant: buoyancy. odd: what is, of the members' numbers.
     """
 
     turned: bool
@@ -86,11 +88,12 @@ class Survey:
     rising: frozenset[str]
     weightless: bool
     buoyant: bool
+    odd: Oddities
 
     def joined(self, other: Survey) -> Survey:
         """Of the members of both."""
-        pairs = zip(astuple(self), astuple(other), strict=True)
-        return Survey(*(a | b if isinstance(a, frozenset) else max(a, b) for a, b in pairs))
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return Survey(*(a | b if isinstance(a, frozenset | Oddities) else max(a, b) for a, b in pairs))
 
 
 def survey(ensemble: Ensemble, method: Method, h: float) -> Survey:
@@ -129,4 +132,5 @@ def _look(ensemble: Ensemble, method: Method, h: float, first: int, stop: int) -
         ),
         weightless=bool(np.any(p["environment.gravity"] == 0.0)),
         buoyant=bool(np.any(p["vehicle.buoyancy"])),
+        odd=of_numbers(ensemble.scene, p, first, stop),
     )

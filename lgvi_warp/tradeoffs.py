@@ -13,16 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp import comparison, invariants
-from lgvi_warp.comparison import QUANTITIES, Growth, Reference, Sample, Setting
+from lgvi_warp import comparison, cost, invariants
+from lgvi_warp.compared import QUANTITIES, Compared, compared_in
+from lgvi_warp.comparison import Growth, Reference, Sample, Setting
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.method import COMPOSITIONS, PROGRAMS, Method
-from lgvi_warp.packets import Packets
 from lgvi_warp.plan import DTYPES, Plan
 from lgvi_warp.result import Result
 from lgvi_warp.scene import Scene
-from lgvi_warp.speed import interleaved, void
+from lgvi_warp.speed import void
 from lgvi_warp.tables import write_csv
 
 # Tried in this order; a name that this version does not know, or that a scene refuses, is left out.
@@ -39,8 +39,6 @@ COMPENSATED = ("psi_x", "psi_s", "su4(psi_x)", "kl6(psi_x)")
 DECIDING = ("position", "attitude")
 # Errors shown are at least so many times the reference's own.
 TRUST = 10.0
-# A launch that is timed takes about so long [s].
-TIMED = 2e-3
 # A ladder of steps ends where another setting is as good in so many times less time.
 HOPELESS = 10.0
 
@@ -49,7 +47,8 @@ HOPELESS = 10.0
 class Measurement:
     """One setting: cost and errors.
 
-    us_per_vehicle_second: microseconds of one core per vehicle and simulated second, without compiling. compile_seconds:
+    us_per_vehicle_second: microseconds of one core per vehicle and simulated second, without compiling (see cost.py);
+    cost_spread: the median of the readings over the least, which it is. compile_seconds:
     to load its kernel, once a process. errors: quantity -> end_max, end_rms, path_max, path_rms, over the members, in
     comparison.QUANTITIES' units; empty where a member failed or noise acts. energy_drift: largest |E(t) - E(0)| [J], NaN
     where a force of the scene takes or gives energy. biases: see comparison.biases. trusted: whether the reference is ten
@@ -64,6 +63,7 @@ class Measurement:
     biases: dict[str, float]
     order: int
     trusted: dict[str, bool]
+    cost_spread: float = 1.0
 
     def error(self, of: str = "position", kind: str = "path_max") -> float:
         """One error; infinite where there is none."""
@@ -75,7 +75,7 @@ class Tradeoff:
     """Measurements of settings on a sample of an ensemble, from 0 to t1 [s].
 
     until: the errors of members are up to this time [s], as far as the reference is good; biases are up to t1.
-    reference: what it is, in words; reference_error: quantity -> its own largest error up to `until`.
+    reference: what it is, in words; reference_error: quantity -> its own largest error up to `until`. units: of errors.
     growth: how far single trajectories can be predicted. refused: method -> why the scene does not take it.
     messages: what the user should know.
     """
@@ -91,6 +91,7 @@ class Tradeoff:
     refused: dict[str, str] = field(default_factory=dict)
     messages: tuple[str, ...] = ()
     seconds: float = 0.0
+    units: dict[str, str] = field(default_factory=lambda: dict(QUANTITIES))
 
     def shown(self, of: str | None = None, kind: str = "path_max") -> list[Measurement]:
         """Measurements with an error of the quantity that the reference is good for, the cheapest first."""
@@ -108,7 +109,7 @@ class Tradeoff:
 
     def to_dict(self) -> dict[str, Any]:
         """Everything, as JSON holds it."""
-        content = asdict(replace(self, growth=None)) | {"units": QUANTITIES}
+        content = asdict(replace(self, growth=None))
         if self.growth is not None:
             content["growth"] = {key: value.tolist() if isinstance(value, np.ndarray) else value
                                  for key, value in vars(self.growth).items()}  # fmt: skip
@@ -125,8 +126,9 @@ class Tradeoff:
         rows = []
         for one in self.measurements:
             row: dict[str, Any] = asdict(one.setting) | {"order": one.order, "front": one.setting in on_front}
-            row |= {"us_per_vehicle_second": one.us_per_vehicle_second, "compile_seconds": one.compile_seconds}
-            for of in QUANTITIES:
+            row |= {"us_per_vehicle_second": one.us_per_vehicle_second, "cost_spread": one.cost_spread}
+            row |= {"compile_seconds": one.compile_seconds}
+            for of in self.units:
                 row |= {f"{of}_{kind}": one.error(of, kind) for kind in KINDS}
                 row[f"{of}_trusted"] = one.trusted.get(of, False)
             row["energy_drift"] = one.energy_drift
@@ -161,12 +163,13 @@ def _finite(value: Any) -> Any:
 
 @dataclass(eq=False)
 class Trial:
-    """A setting that was run: its plan, its errors, and how long its kernel took to load [s]."""
+    """A setting that was run: its plan, its errors, and the CPU time of the run [s], without compiling."""
 
     setting: Setting
     plan: Plan
     result: Result
     errors: dict[str, dict[str, float]]
+    cpu_seconds: float
 
     def error(self, of: str) -> float:
         """Largest over members and path; infinite where a member failed."""
@@ -176,37 +179,23 @@ class Trial:
 def tried(sample: Sample, setting: Setting, reference: Reference | None, until: int = -1) -> Trial:
     """Run a setting and compare it. Raises SceneError where the scene refuses it."""
     plan = sample.plan(setting)
+    compile_seconds = plan.compile()
     with np.errstate(all="ignore"):
-        result = comparison.run_plan(plan, 1)
+        begun = cost.thread_seconds()
+        result = replace(comparison.run_plan(plan, 1), compile_seconds=compile_seconds)
+        cpu_seconds = cost.thread_seconds() - begun
         found: dict[str, dict[str, float]] = {}
         if reference is not None and not comparison.failed(result):
             until = until % len(sample.times)
-            found = comparison.errors(comparison.distances(result, reference.result), until)
+            found = comparison.errors(comparison.distances(result, reference.result, reference.asked), until)
             if not all(np.isfinite(one["path_max"]) for one in found.values()):
                 found = {}
-    return Trial(setting, plan, result, found)
+    return Trial(setting, plan, result, found, cpu_seconds)
 
 
 def costs(plans: Sequence[Plan], rounds: int = 5) -> list[float]:
-    """Microseconds per vehicle and simulated second of each plan on one core, medians of interleaved rounds."""
-    calls, steps = [], []
-    for plan in plans:
-        packets = Packets(plan, plan.ensemble.select(0, plan.ensemble.members))
-        guess = 10e-9 * len(plan.method.stages) * max(plan.ensemble.members, plan.spec.width)
-        steps.append(int(min(max(TIMED / guess, 10), 100_000)))
-        calls.append(lambda packets=packets, n=steps[-1]: void(packets.advance(0, n)))
-    seconds = interleaved(calls, rounds)
-    return [
-        1e6 * one / (n * plan.grid.h * plan.ensemble.members)
-        for one, n, plan in zip(seconds, steps, plans, strict=True)
-    ]
-
-
-def check_of(of: str) -> None:
-    """Raises SceneError for a quantity that errors are not taken of."""
-    faults = Faults()
-    faults.choice("of", of, QUANTITIES)
-    faults.raise_if_any()
+    """Microseconds of one core per vehicle and simulated second of each plan (see cost.py)."""
+    return [one.us_per_vehicle_second for one in cost.costs(plans, rounds)]
 
 
 def known(name: str) -> bool:
@@ -236,7 +225,7 @@ def chosen_methods(methods: Sequence[str] | None, default: Sequence[str] = CANDI
 def tradeoff(
     fleet: Ensemble | Scene,
     t1: float | None = None,
-    of: str = "position",
+    of: Any = "position",
     methods: Sequence[str] | None = None,
     members: int = 128,
     seconds: float = 45.0,
@@ -244,16 +233,22 @@ def tradeoff(
 ) -> Tradeoff:
     """Measure cost and error of methods, steps, precisions and solvers on the first members of a fleet.
 
-    t1: end [s], by default run.duration of the scene. of: the quantity that decides how far the reference is good enough
-    ("position", "attitude", "velocity", "angular_velocity", "energy"). methods: names (default: all that the scene takes).
-    members: of the sample. seconds: about how long to go on; what is left out then is said in the messages.
+    t1: end [s], by default run.duration of the scene. of: the quantity that decides how far the reference is good enough:
+    any that statistics know ("position", "attitude", "depth", "position[2]", "speed", "euler", ...), or a lw.Quantity; errors
+    of position, attitude, velocity, angular_velocity and energy are measured as well. methods: names (default: all that the
+    scene takes). members: of the sample. seconds: about how long to go on; what is left out then is said in the messages.
     progress: called with the fraction of the work done.
 
+    The cost of a step is CPU time of the thread that runs it, the least of several readings, and one number for all steps of
+    a method; readings that disagree are told in the messages.
     Errors are against a reference that two independent runs agree on to a tenth of the smallest error shown. Where noise
     acts there are no errors of members, and statistics are compared with those of the finest run.
     Raises SceneError naming every fault, and where no reference can be found.
     """
-    check_of(of)
+    asked = compared_in(of)
+    faults = Faults()
+    faults.positive("seconds", seconds)
+    faults.raise_if_any()
     names = chosen_methods(methods)
     begun = time.perf_counter()
     report = progress or void
@@ -267,9 +262,11 @@ def tradeoff(
         messages.append("noise acts, whose path differs from step to step: only statistics are compared")
         finest = tried(sample, sample.setting(taken[0], 32 * sample.coarsest(0.5)), None).result
     else:
-        reference = comparison.make_reference(sample, of, seconds=0.3 * seconds, report=lambda part: report(0.2 * part))
+        reference = comparison.make_reference(
+            sample, asked, seconds=0.3 * seconds, report=lambda part: report(0.2 * part)
+        )
         finest = reference.result
-        until = trusted_until(reference, of)
+        until = trusted_until(reference, asked)
         lost = growth_of(sample, taken, reference)
         if until < len(sample.times) - 1:
             text = (
@@ -282,20 +279,27 @@ def tradeoff(
     )
     if left:
         messages.append(f"no time for {', '.join(left)}: run again, the kernels are compiled now, or give more seconds")
-    measured = measurements(sample, trials, reference, finest, until)
+    measured = measurements(sample, trials, reference, finest, until, asked)
+    prices = [
+        (f"{one.setting.name} {one.setting.dtype}", cost.Cost(one.us_per_vehicle_second, one.cost_spread))
+        for one in measured
+    ]
+    doubt = cost.disagreement(prices)
+    messages += [doubt] if doubt else []
     report(1.0)
     return Tradeoff(
         measurements=tuple(measured),
-        of=of,
+        of=asked.name,
         members=sample.members,
         t1=sample.t1,
         until=float(sample.times[until]),
         reference=reference.text if reference else "the finest run's statistics, since noise acts",
-        reference_error={name: reference.error(name, until) for name in QUANTITIES} if reference else {},
+        reference_error={name: reference.error(name, until) for name in reference.own} if reference else {},
         growth=lost,
         refused=refused,
         messages=tuple(messages),
         seconds=time.perf_counter() - begun,
+        units=QUANTITIES | {asked.name: asked.unit},
     )
 
 
@@ -307,13 +311,13 @@ def growth_of(sample: Sample, taken: Sequence[str], reference: Reference) -> Gro
     return comparison.growth(often, often.setting(method, m))
 
 
-def trusted_until(reference: Reference, of: str) -> int:
+def trusted_until(reference: Reference, of: Compared) -> int:
     """The last sample at which errors below 1e-2 can be measured. Raises SceneError where there is none."""
-    until = reference.reaches(of, comparison.LOST / (TRUST * TRUST))
+    until = reference.reaches(of.name, comparison.LOST / (TRUST * TRUST))
     if until < 1:
-        apart = reference.own[of][1]
+        apart = reference.own[of.name][1]
         end = reference.result.time[1]
-        what = f"no reference: {reference.text} differ by {apart:.2g} {QUANTITIES[of]} after {end:g} s"
+        what = f"no reference: {reference.text} differ by {apart:.2g} {of.unit} after {end:g} s"
         raise SceneError([f"{what}; give a shorter t1 (--duration), or more seconds"])
     return until
 
@@ -360,7 +364,7 @@ def sweep(
             worse = worse + 1 if error > 0.8 * best and best < 0.1 else 0
             best = min(best, error)
             noise = TRUST * max(reference.error(of, until) for of in DECIDING)
-            if worse >= 2 or error < noise or one.result.run_seconds > longest or hopeless(one, trials):
+            if worse >= 2 or error < noise or one.cpu_seconds > longest or hopeless(one, trials):
                 break
     if reference is not None:
         between(sample, trials, reference, until, deadline)
@@ -370,13 +374,13 @@ def sweep(
 def hopeless(one: Trial, trials: Sequence[Trial]) -> bool:
     """Whether another setting was better in much less time."""
     error = max(one.error(of) for of in DECIDING)
-    rivals = (two for two in trials if HOPELESS * two.result.run_seconds < one.result.run_seconds)
+    rivals = (two for two in trials if HOPELESS * two.cpu_seconds < one.cpu_seconds)
     return math.isfinite(error) and any(max(two.error(of) for of in DECIDING) < error for two in rivals)
 
 
 def between(sample: Sample, trials: list[Trial], reference: Reference, until: int, deadline: float) -> None:
     """Near the front, add the steps between those tried."""
-    found = sorted((one.result.run_seconds, one.error(DECIDING[0]), i) for i, one in enumerate(trials))
+    found = sorted((one.cpu_seconds, one.error(DECIDING[0]), i) for i, one in enumerate(trials))
     best, near = math.inf, list[Trial]()
     for _, error, i in found:
         if error < best:
@@ -393,7 +397,12 @@ def between(sample: Sample, trials: list[Trial], reference: Reference, until: in
 
 
 def measurements(
-    sample: Sample, trials: Sequence[Trial], reference: Reference | None, finest: Result, until: int
+    sample: Sample,
+    trials: Sequence[Trial],
+    reference: Reference | None,
+    finest: Result,
+    until: int,
+    asked: Compared | None = None,
 ) -> list[Measurement]:
     """Time the trials and gather what they showed; settings that failed are left out."""
     good = [one for one in trials if not comparison.failed(one.result) and (one.errors or reference is None)]
@@ -402,16 +411,17 @@ def measurements(
         key = one.setting.name, one.setting.dtype
         compiled[key] = max(compiled.get(key, 0.0), one.result.compile_seconds)
     found = []
-    for one, cost in zip(good, costs([trial.plan for trial in good]), strict=True):
-        limits = {of: reference.error(of, until) for of in QUANTITIES} if reference else {}
+    for one, price in zip(good, cost.costs([trial.plan for trial in good]), strict=True):
+        limits = {of: reference.error(of, until) for of in one.errors} if reference else {}
         with np.errstate(all="ignore"):
-            biases = comparison.biases(one.result, finest)
+            biases = comparison.biases(one.result, finest, asked)
             kept = "energy" in invariants.conserved(one.result)
             drift = invariants.drift(one.result)["energy"] if kept else math.nan
         found.append(
             Measurement(
                 setting=one.setting,
-                us_per_vehicle_second=cost,
+                us_per_vehicle_second=price.us_per_vehicle_second,
+                cost_spread=price.spread,
                 compile_seconds=compiled[one.setting.name, one.setting.dtype],
                 errors=one.errors,
                 energy_drift=drift,
@@ -425,7 +435,7 @@ def measurements(
 
 def report_text(found: Tradeoff) -> str:
     """The trade-off in lines for people."""
-    unit = QUANTITIES[found.of]
+    unit = found.units[found.of]
     lines = [f"note        {message}" for message in found.messages]
     lines.append(f"sample      {found.members} members, 0 to {found.t1:g} s, {len(found.measurements)} settings in "
                  f"{found.seconds:.0f} s")  # fmt: skip
@@ -436,6 +446,8 @@ def report_text(found: Tradeoff) -> str:
         lines.append(f"predictable {growth_text(found.growth)}")
     if found.refused:
         lines.append(f"refused     {', '.join(found.refused)} (why: tradeoff.json)")
+    if found.measurements:
+        lines.append(f"costs       {cost.agreement_text([one.cost_spread for one in found.measurements])}")
     front = found.front()
     kept = any(np.isfinite(one.energy_drift) for one in front)
     if front:
@@ -470,15 +482,17 @@ def bias_lines(found: Tradeoff) -> list[str]:
         return []
     name = min(double, key=lambda one: abs(one.order - 2)).setting.name
     chosen = sorted((one for one in double if one.setting.name == name), key=lambda one: -one.setting.h)
-    columns = (
+    columns = [
         "position_mean",
         "position_std",
         "attitude_mean",
         "velocity_mean",
         "energy_mean",
         "angular_momentum_mean",
-    )
-    heads = ("position mean", "position std", "attitude mean", "velocity mean", "energy mean", "ang.mom. mean")
+    ]
+    heads = ["position mean", "position std", "attitude mean", "velocity mean", "energy mean", "ang.mom. mean"]
+    if found.of not in QUANTITIES and any(f"{found.of}_mean" in one.biases for one in chosen):
+        columns, heads = [f"{found.of}_mean", *columns], [f"{found.of} mean", *heads]
     title = f"Bias of statistics up to {found.t1:g} s by {name}, in standard errors of {found.members} members"
     lines = ["", f"{title} (1.4: chance):", "{:>12}".format("step [s]") + "".join(f"{head:>15}" for head in heads)]
     for one in chosen:

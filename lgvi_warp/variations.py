@@ -6,6 +6,7 @@ or of several that one law draws together, "vehicle.mass, vehicle.buoyancy".
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,6 +23,8 @@ from lgvi_warp.joint_laws import PhysicalInertia, PositiveDefinite, RotationNorm
 # Parameters that are symmetric matrices, and stay so when they vary.
 MATRICES = tuple(f"vehicle.{name}" for name in vehicles.SYMMETRIC)
 ATTITUDE = "start.attitude"
+# Characters of a key: a longer one names nothing.
+LONGEST_KEY = 1000
 # Which of them are of a rigid body by itself or may be.
 RIGID = ("vehicle.inertia", "vehicle.rigid_body_mass_matrix")
 
@@ -45,6 +48,8 @@ class Target:
 
 def targets(key: str) -> tuple[Target, ...]:
     """The numbers that a key names: "vehicle.mass", "start.position[2]", or several with commas between."""
+    if len(key) > LONGEST_KEY:
+        return (Target(key),)
     found = []
     for text in re.split(r",(?![^\[]*\])", key):
         match = re.fullmatch(r"([^\[\]]+)\[\s*(\d+(?:\s*,\s*\d+)*)\s*\]", text.strip())
@@ -178,15 +183,21 @@ def put(values: dict[str, np.ndarray], target: Target, drawn: np.ndarray) -> Non
     values[target.name] = whole
 
 
+def _hint(name: str, known: Mapping[str, np.ndarray], also: str) -> str:
+    """How to mend a name that the scene has not."""
+    section = name.split(".")[0]
+    others = [one for one in known if one.split(".")[0] == section]
+    given = section == "start" and others
+    return (f"the scene gives {', '.join(others)}" if given else closest(name, known)) + also
+
+
 def known_target(
     faults: Faults, key: str, law: Any, target: Target, known: Mapping[str, np.ndarray], also: str = ""
 ) -> bool:
     """Whether the scene has a target; notes what is wrong with it if not. also: another remedy for a name it has not."""
     if target.name not in known:
-        others = [name for name in known if name.split(".")[0] == target.name.split(".")[0]]
-        start = target.name.startswith("start.")
-        hint = f"the scene gives {', '.join(others)}" if start and others else closest(target.name, known)
-        faults.add(f'"{key}"', law, "does not name what the scene has", hint + also)
+        remedy = functools.partial(_hint, target.name, known, also)
+        faults.add(f'"{key}"', law, "does not name what the scene has", remedy)
         return False
     shape = known[target.name].shape
     if target.index is not None:

@@ -6,11 +6,12 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-OF = "position, attitude, velocity, angular_velocity or energy"
+OF = 'position, attitude, velocity, angular_velocity, energy, depth, speed, euler, "position[2]", "norm(velocity)" ...'
 
 
 EPILOG = """examples:
   lgvi-warp run examples/paper.toml --out runs/paper
+  lgvi-warp check examples/paper.toml
   lgvi-warp run examples/paper.toml --members 20000 --dtype float32 --set vehicle.mass=120
   lgvi-warp run examples/paper.toml --error 1e-3
   lgvi-warp run examples/paper.toml --members 1000000 --store zarr --out runs/large
@@ -78,6 +79,7 @@ def parser() -> argparse.ArgumentParser:
     there = run.add_mutually_exclusive_group()
     there.add_argument("--overwrite", action="store_true", help="replace a run.zarr that is there")
     there.add_argument("--resume", action="store_true", help="go on with a run.zarr that is there, if it is this run")
+    _add_check(verbs)
     _add_plan(verbs)
     _add_store_verbs(verbs)
     trade = verbs.add_parser(
@@ -114,7 +116,7 @@ def _add_sensitivity(verbs: Any) -> None:
     )
     verb.add_argument("scene", metavar="SCENE", help="scene file (TOML) with [ensemble.vary]")
     verb.add_argument("--of", metavar="Q", action="append", help='quantity of interest: "position[2]" (the default), '
-                      '"norm(velocity)", "max(energy)" ...; may be given several times')  # fmt: skip
+                      'depth, speed, "norm(velocity)", "max(energy)" ...; may be given several times')  # fmt: skip
     verb.add_argument("--out", metavar="DIR", type=Path, help="folder for the files (default: runs/NAME_sensitivity)")
     verb.add_argument("--analysis", choices=("sobol", "morris"), default="sobol", help="default sobol")
     verb.add_argument("--samples", metavar="N", type=int, help="groups of the design (default: sobol 256, morris 64)")
@@ -165,6 +167,22 @@ def _add_executor(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--threads", metavar="N", type=int, help="threads, processes or workers (default: all cores)")
     verb.add_argument("--executor", default="threads", help="threads (default), processes or dask")
     verb.add_argument("--scheduler", metavar="ADDRESS", help="of Dask; without one, a cluster on this machine")
+
+
+def _add_check(verbs: Any) -> None:
+    """The verb check."""
+    verb = verbs.add_parser(
+        "check", help="whether a scene can run, and what is odd about it and most likely a unit; nothing runs"
+    )
+    verb.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
+    verb.add_argument("--method", help="as for run")
+    verb.add_argument("--step", metavar="S", help="time step [s]")
+    verb.add_argument("--dtype", help="as for run")
+    verb.add_argument("--duration", metavar="S", help="end of the run [s]")
+    verb.add_argument("--members", metavar="N", help="number of vehicles")
+    verb.add_argument("--seed", metavar="N", help="seed of what varies")
+    verb.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="replace a key of the scene file")
+    verb.add_argument("--quiet", action="store_true", help="the exit code alone")
 
 
 def _add_plan(verbs: Any) -> None:

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable
 
 from lgvi_warp.cli.arguments import parser
+from lgvi_warp.cli.check import check
 from lgvi_warp.cli.machine import bench, info
 from lgvi_warp.cli.runs import plan, resume, run
 from lgvi_warp.cli.settings import RUN, out_of
@@ -19,6 +20,7 @@ from lgvi_warp.errors import SceneError
 
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
     "run": run,
+    "check": check,
     "resume": resume,
     "plan": plan,
     "merge": merge,
@@ -65,7 +67,7 @@ def code_of(error: BaseException, chosen: argparse.Namespace, signals: Signals) 
 
 def left(chosen: argparse.Namespace) -> str:
     """What an interrupted verb leaves."""
-    if chosen.verb in ("info", "plan", "bench"):
+    if chosen.verb in ("info", "check", "plan", "bench"):
         return "nothing was to be written"
     there = chosen.dir if chosen.verb == "resume" else None
     if chosen.verb == "run" and chosen.store == "zarr" and (out_of(chosen) / RUN).exists():

@@ -48,6 +48,8 @@ def overrides(chosen: argparse.Namespace) -> dict[str, Any]:
 
 def whole(text: str) -> str:
     """1e6 as 1000000: TOML knows no other whole numbers."""
+    if text.strip("+-").isdigit():
+        return text
     try:
         number = float(text)
     except ValueError:
@@ -65,7 +67,9 @@ PLAIN = {"members": whole, "seed": whole, "keep": listed}
 
 def out_of(chosen: argparse.Namespace, suffix: str = "") -> Path:
     """The folder for the files: --out, or one named after the scene."""
-    return chosen.out or Path("runs") / f"{Path(chosen.scene).stem}{suffix}"
+    name = Path(chosen.scene).stem
+    # A file called "...toml" would mean the folder above.
+    return chosen.out or Path("runs") / f"{name if name.strip('.') else 'scene'}{suffix}"
 
 
 def folder(chosen: argparse.Namespace, suffix: str = "") -> Path:

@@ -20,6 +20,8 @@ Advanced = Callable[[Block, int], None]
 NAMES = ("threads", "processes", "dask")
 # Those that start processes of their own.
 STARTING = ("processes", "dask")
+# Threads, processes or workers: of the largest clusters.
+MOST_THREADS = 100_000
 # A block whose worker died this many times is not tried again: the block itself may be what kills them.
 MOST_DEATHS = 3
 
@@ -32,6 +34,17 @@ class Executor(Protocol):
         """Do the work of every block; each block and its result, as they are done. Closing it ends what still runs."""
 
 
+def check_threads(faults: Faults, threads: Any) -> None:
+    """Note what is wrong with a number of threads."""
+    if threads is None:
+        return
+    remedy = "give 1 or more, or leave it out for all cores"
+    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+        faults.add("threads", threads, "is not a whole number above 0", remedy)
+    elif threads > MOST_THREADS:
+        faults.add("threads", threads, f"is more than {MOST_THREADS:,}", remedy)
+
+
 def executor_of(given: Any, threads: int | None = None, scheduler: str | None = None) -> Executor:
     """The executor that a name stands for, with so many threads (default: all cores), or the one given.
 
@@ -39,8 +52,7 @@ def executor_of(given: Any, threads: int | None = None, scheduler: str | None = 
     Raises SceneError, also where no scheduler answers.
     """
     faults = Faults()
-    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
-        faults.add("threads", threads, "is not a whole number above 0", "give 1 or more, or leave it out for all cores")
+    check_threads(faults, threads)
     if not isinstance(given, Executor) and given not in NAMES:
         faults.add("executor", given, "is not known", f"{closest(str(given), NAMES)}; or give an object with run(...)")
     if scheduler is not None and given != "dask":

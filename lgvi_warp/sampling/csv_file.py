@@ -6,6 +6,7 @@ import csv
 import io
 import math
 from array import array
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -15,6 +16,12 @@ from lgvi_warp.errors import Faults
 
 # Of the lines that are wrong so many are told one by one.
 MOST_TOLD = 8
+
+# After so many the rest of the file is not read.
+MOST_COUNTED = 10_000
+
+# Characters of a line: of ten thousands of columns.
+LONGEST_LINE = 1 << 20
 
 # Of the names in the first line, those to be read; notes what is wrong with them.
 Choose = Callable[[Faults, Sequence[str]], list[str]]
@@ -26,10 +33,11 @@ def columns_of(faults: Faults, path: str, content: bytes, choose: Choose) -> dic
     Cells are parted by commas, semicolons or tabs, as the first line has it. Notes every fault, and gives nothing if there
     is one. Raises UnicodeDecodeError for what is not in UTF-8.
     """
-    head = next((line for line in _lines(content) if line.strip()), "")
-    delimiter = next((one for one in "\t;" if one in head), ",")
-    rows = csv.reader(_lines(content), delimiter=delimiter, skipinitialspace=True)
+    rows: Any = csv.reader(())
     try:
+        head = next((line for line in _lines(content) if line.strip()), "")
+        delimiter = next((one for one in "\t;" if one in head), ",")
+        rows = csv.reader(_lines(content), delimiter=delimiter, skipinitialspace=True)
         names = [name.strip() for name in next((row for row in rows if row), [])]
         _check_names(faults, path, rows.line_num, names, delimiter)
         chosen = [] if faults else choose(faults, names)
@@ -42,7 +50,10 @@ def columns_of(faults: Faults, path: str, content: bytes, choose: Choose) -> dic
 
 def _lines(content: bytes) -> Iterator[str]:
     """Every line, so that they are counted as the file has them; of comments and empty ones the end alone."""
-    for line in io.TextIOWrapper(io.BytesIO(content), "utf-8-sig"):
+    text = io.TextIOWrapper(io.BytesIO(content), "utf-8-sig")
+    while line := text.readline(LONGEST_LINE):
+        if len(line) == LONGEST_LINE:
+            raise csv.Error(f"a line of more than {LONGEST_LINE / 1e6:.1f} million characters")
         yield line if line.lstrip()[:1] not in ("", "#") else "\n"
 
 
@@ -63,7 +74,8 @@ def _check_names(faults: Faults, path: str, line: int, names: Sequence[str], del
 
 def _check_chosen(faults: Faults, path: str, line: int, names: Sequence[str], chosen: Sequence[str]) -> None:
     """Note what is wrong with the names to be read."""
-    for name in sorted({name for name in chosen if names.count(name) > 1}):
+    counts = Counter(names)
+    for name in sorted({name for name in chosen if counts[name] > 1}):
         faults.add("file", path, f"names a column twice, {name!r} (line {line})", "give each column a name of its own")
     if "" in chosen:
         what = f"has a column without a name, number {names.index('') + 1} (line {line})"
@@ -72,7 +84,8 @@ def _check_chosen(faults: Faults, path: str, line: int, names: Sequence[str], ch
 
 def _numbers(faults: Faults, path: str, rows: Any, names: Sequence[str], chosen: Sequence[str]) -> np.ndarray:
     """(lines, chosen) numbers of the lines that follow."""
-    places = [names.index(name) for name in chosen]
+    at = {name: place for place, name in enumerate(names)}
+    places = [at[name] for name in chosen]
     found, wrong = array("d"), list[tuple[str, str]]()
     for row in rows:
         if not row:
@@ -85,11 +98,14 @@ def _numbers(faults: Faults, path: str, rows: Any, names: Sequence[str], chosen:
         # A sum is finite where every number is, but for the largest: those are looked at one by one.
         if not cells or not math.isfinite(sum(numbers)):
             wrong += _told(rows.line_num, row, names, chosen, cells)
+            if len(wrong) >= MOST_COUNTED:
+                break
         found.extend(numbers)
     for what, remedy in wrong[:MOST_TOLD]:
         faults.add("file", path, what, remedy)
     if len(wrong) > MOST_TOLD:
-        faults.add("file", path, f"has {len(wrong) - MOST_TOLD} more such faults", "mend them too")
+        more = f"{len(wrong) - MOST_TOLD} more such faults" + " or more" * (len(wrong) >= MOST_COUNTED)
+        faults.add("file", path, f"has {more}", "mend them too")
     if not found and not wrong:
         faults.add("file", path, "has names and no members", "write a line of numbers for each member")
     return np.array(found).reshape(-1, len(chosen)) if not wrong else np.empty((0, 0))

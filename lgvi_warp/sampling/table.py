@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, ClassVar
@@ -13,10 +14,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.errors import Faults, closest
+from lgvi_warp.labelled import columns_by_name, is_labelled
+from lgvi_warp.reading import UnreadableError, file_bytes
 from lgvi_warp.sampling.base import Drawn, Sampling
 from lgvi_warp.sampling.csv_file import columns_of
 from lgvi_warp.sampling.random import Random
 from lgvi_warp.variations import Space
+
+# What files of numpy.save, numpy.savez and archives begin with. None is opened: objects in them could be code.
+BINARY = (b"\x93NUMPY", b"PK\x03\x04", b"\x1f\x8b")
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,9 +31,10 @@ class Table(Sampling):
 
     file: its columns are numbers of the scene or entries of them, "vehicle.mass", "start.position[2]" (quote a name with a
     comma in it), parted by commas, semicolons or tabs; empty lines and those that begin with # are passed over. values:
-    name -> (n,) or (n, *shape), or a pandas DataFrame. columns: those to take; ignore: those to leave out, such as an id.
-    sha256: of the file as it must be, written by `to_dict`. Names of `vary` that the table does not have are drawn at
-    random. The number of members is that of the lines, or less: the first ones; lines may be added.
+    name -> (n,) or (n, *shape), a data frame, a structured array, or an xarray Dataset with such names. columns: those to
+    take; ignore: those to leave out, such as an id. sha256: of the file as it must be, written by `to_dict`. Names of `vary`
+    that the table does not have are drawn at random. The number of members is that of the lines, or less: the first ones;
+    lines may be added.
     Raises SceneError naming every fault.
     """
 
@@ -89,11 +96,13 @@ class Table(Sampling):
 
     def _chosen(self, faults: Faults, names: Sequence[str]) -> list[str]:
         """Which of the columns there are to take."""
+        known = set(names)
         for option in ("columns", "ignore"):
             for name in getattr(self, option) or ():
-                if name not in names:
-                    faults.add(option, name, "is no column of the table", closest(name, names))
-        wanted, unwanted = self.columns or names, self.ignore or ()
+                if name not in known:
+                    remedy = functools.partial(closest, name, names)
+                    faults.add(option, name, "is no column of the table", remedy)
+        wanted, unwanted = set(self.columns or names), set(self.ignore or ())
         chosen = [name for name in names if name in wanted and name not in unwanted]
         if not chosen and not faults:
             faults.add("ignore", self.ignore, "leaves no column", "keep one or more")
@@ -101,10 +110,12 @@ class Table(Sampling):
 
     def _from_values(self, faults: Faults) -> dict[str, np.ndarray]:
         read: dict[str, np.ndarray] = {}
-        given = _columns_by_name(self.values)
-        if not given:
+        if not is_labelled(self.values):
             remedy = 'give a file, {"vehicle.mass": array, ...} or a DataFrame with such names'
             faults.add("values", self.values, "has no names of columns", remedy)
+            return read
+        given = columns_by_name(faults, "values", self.values)
+        if not given:
             return read
         for name in self._chosen(faults, list(given)):
             array = _column(faults, f'"{name}"', given[name])
@@ -117,9 +128,14 @@ class Table(Sampling):
         assert self.file is not None
         path = os.fspath(self.file)
         try:
-            content = Path(path).read_bytes()
-        except OSError as error:
-            faults.add("file", path, f"cannot be read ({error.strerror})", "give a CSV file")
+            content = file_bytes(path, "CSV file")
+        except UnreadableError as error:
+            faults.add("file", path, f"cannot be read ({error.what})", error.remedy)
+            return {}
+        if content.startswith(BINARY):
+            faults.add(
+                "file", path, "is a file of NumPy, or an archive", "give a CSV file, or arrays: lw.Table({name: array})"
+            )
             return {}
         found = hashlib.sha256(content).hexdigest()
         if self.sha256 not in (None, found):
@@ -175,23 +191,16 @@ def moved(file: str, sha256: str | None, beside: Path) -> str:
     for above in beside.absolute().parents:
         for k in range(len(parts)):
             path = above.joinpath(*parts[k:])
-            with contextlib.suppress(OSError):
-                if path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == sha256:
+            with contextlib.suppress(OSError, UnreadableError):
+                if path.is_file() and hashlib.sha256(file_bytes(str(path), "CSV file")).hexdigest() == sha256:
                     return str(path)
     return file
 
 
-def _columns_by_name(values: Any) -> dict[str, Any]:
-    """Columns of a mapping, or of a table such as pandas.DataFrame; none if they have no names."""
-    names = values if isinstance(values, Mapping) else getattr(values, "columns", None)
-    if not isinstance(names, Iterable) or not all(isinstance(name, str) for name in names):
-        return {}
-    return {name: values[name] if isinstance(values, Mapping) else np.asarray(values[name]) for name in names}
-
-
 def _column(faults: Faults, key: str, given: Any) -> np.ndarray | None:
     """A column of finite numbers; None after noting a fault."""
-    if isinstance(given, np.ndarray) and given.dtype.kind == "f" and given.ndim and not np.isfinite(given).all():
+    plain = isinstance(given, np.ndarray) and given.dtype.kind == "f" and given.ndim and not np.ma.is_masked(given)
+    if plain and not np.isfinite(given).all():
         row = int(np.argmin(np.isfinite(given.reshape(len(given), -1)).all(axis=1)))
         faults.add(key, given[row], f"is not finite, of member {row}", "give a number, or drop that member")
         return None

@@ -251,8 +251,6 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None 
     of: "position" and so on, by default what the trade-off was asked for. Returns the path. Raises ImportError without
     matplotlib, ValueError when there is nothing to draw.
     """
-    from lgvi_warp.comparison import QUANTITIES
-
     figure_of = figure_class()
     of = of or found.of
     if not found.measurements:
@@ -284,7 +282,7 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None 
     front = found.front(of)
     left.plot([one.error(of) for one in front], [one.us_per_vehicle_second for one in front], color="black", linewidth=5,
               alpha=0.2, solid_capstyle="round", label="cheapest for each error", zorder=0)  # fmt: skip
-    left.set(xlabel=f"largest error of {of} [{QUANTITIES[of]}], up to {found.until:g} s",
+    left.set(xlabel=f"largest error of {of} [{found.units[of]}], up to {found.until:g} s",
              ylabel="microseconds of one core per vehicle and simulated second", title="Cost of accuracy")  # fmt: skip
     right.set(xlabel="step [s]", ylabel=f"bias / standard error of {found.members} members",
               title=f"Bias of the mean of {of} up to {found.t1:g} s")  # fmt: skip
@@ -347,19 +345,13 @@ def plot_stability(found: StabilityMap, path: str | os.PathLike[str]) -> Path:
     for axes in panels[n:]:
         axes.set_visible(False)
     _legend(figure, drawn)
-    scene = f"accurate: {found.of} to {found.error_bound:g} {_unit_of(found)} up to {found.error_time:.3g} s"
+    scene = f"accurate: {found.of} to {found.error_bound:g} {found.unit} up to {found.error_time:.3g} s"
     figure.suptitle(
         f"{scene}; bounded: energy up to {found.t1:.3g} s; worst of {found.directions} starts", fontsize="medium"
     )
     target = Path(path)
     figure.savefig(target, dpi=110)
     return target
-
-
-def _unit_of(found: StabilityMap) -> str:
-    from lgvi_warp.comparison import QUANTITIES
-
-    return QUANTITIES[found.of]
 
 
 def _edges(line: Line) -> np.ndarray:

@@ -70,7 +70,7 @@ def _one(where: str, given: Any) -> Statistic:
     try:
         return kind(**table)
     except SceneError as error:
-        raise SceneError(f"{where}: {fault}" for fault in error.faults) from None
+        raise error.prefixed(f"{where}: ") from None
 
 
 __all__ = [

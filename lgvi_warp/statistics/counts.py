@@ -120,8 +120,10 @@ class Histogram(Counted):
 
 @dataclass(frozen=True, eq=False)
 class Condition(Statistic):
-    """A quantity above or below a number, or with both between them, above < x < below; with neither, where it is not 0: a
-    function may say true or false."""
+    """A quantity above or below a number, or with both between them, above < x < below.
+
+    With neither, where a function is not 0, which so may say true or false; a quantity by name wants a number.
+    """
 
     above: Any = None
     below: Any = None
@@ -141,6 +143,10 @@ class Condition(Statistic):
         if len(limits) == 2 and not np.all(limits[0] < limits[1]):
             both = self.above, self.below
             faults.add("above and below", both, "leave nothing between them", "give above < below, or one of them")
+        if found is not None and self.above is None and self.below is None and found.needs_limit:
+            unit = f" [{found.unit}]" if found.unit else ""
+            remedy = f"give above=... or below=...{unit}, or a function that says true or false"
+            faults.add("above", None, f"and below are missing: {found.name} is compared with nothing", remedy)
 
     @property
     def key(self) -> str:

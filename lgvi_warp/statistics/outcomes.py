@@ -44,7 +44,7 @@ class OfEnds(Statistic):
         if not isinstance(self.of, str) or not self.of:
             remedy = 'give "floor", the name of an event of the scene, "stopped" or "failed"'
             raise SceneError([f"{self.type}.of = {shown(self.of)}: is no outcome; {remedy}"])
-        return Quantity(self.of, _nothing, "s", (), (self.of,))
+        return Quantity(self.of, _nothing, "s", (), (self.of,), needs_limit=True)
 
     @property
     def outcomes(self) -> tuple[str, ...]:

@@ -187,6 +187,11 @@ class PathTime(OfPath, Condition):
         return "s"
 
     @property
+    def needs_limit(self) -> bool:
+        """Without one, whether it ever holds."""
+        return False
+
+    @property
     def _labels(self) -> tuple[str, ...]:
         return tuple(f"{label}{self.limits_text}" for label in super()._labels)
 

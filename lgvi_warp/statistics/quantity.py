@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp import invariants
+from lgvi_warp import invariants, notation
 from lgvi_warp.errors import SceneError, closest, shown
+from lgvi_warp.real_numbers import NotReal, real_results
 from lgvi_warp.saveat import FIELDS
 
 if TYPE_CHECKING:
@@ -27,8 +28,9 @@ class Quantity:
     """A function of a block's samples, (k times, n members): numbers (k, n), or (k, n, d) for d components.
 
     function(samples, members): samples["position"] (k, n, 3) and so on, samples.time (k,) [s], samples.terms; members
-    as lw.Ensemble.select gives them. fields: the samples that it needs. labels: names of the components. What is not
-    finite leaves its member out at that time.
+    as lw.Ensemble.select gives them. fields: the samples that it needs. labels: names of the components. needs_limit:
+    whether it is never true or false, so that a condition on it wants a number. What is not finite leaves its member out at
+    that time.
     """
 
     name: str
@@ -36,6 +38,7 @@ class Quantity:
     unit: str = ""
     fields: tuple[str, ...] = FIELDS
     labels: tuple[str, ...] = ()
+    needs_limit: bool = False
 
     def __post_init__(self) -> None:
         if not self.labels:
@@ -48,7 +51,10 @@ class Quantity:
 
     def __call__(self, samples: Fields, members: Members) -> np.ndarray:
         """Its numbers (k, d, n), contiguous: float32 where they are numbers of such a run as they stand, else float64."""
-        values = np.asarray(self.function(samples, members))
+        try:
+            values = real_results(self.function(samples, members))
+        except NotReal as error:
+            raise ValueError(f"quantity {self.name}: {error.what}; real numbers, true or false are wanted") from None
         k, n = len(samples.time), members.count
         if values.shape not in ((k, n), (k, n, self.size)) or (values.ndim == 2 and self.size != 1):
             wanted = f"({k}, {n})" if self.size == 1 else f"({k}, {n}, {self.size})"
@@ -69,6 +75,10 @@ def _speed(samples: Fields, members: Members) -> np.ndarray:
 def _velocity_inertial(samples: Fields, members: Members) -> np.ndarray:
     R, v = samples["attitude"], samples["velocity"].astype(np.float64, copy=False)
     return R[..., 0] * v[..., :1] + R[..., 1] * v[..., 1:2] + R[..., 2] * v[..., 2:]
+
+
+def _quaternion_wxyz(samples: Fields, members: Members) -> np.ndarray:
+    return notation.quaternion_from_matrix(samples["attitude"].astype(np.float64, copy=False))
 
 
 def _euler(samples: Fields, members: Members) -> np.ndarray:
@@ -95,7 +105,7 @@ def _labels(name: str, *shape: int) -> tuple[str, ...]:
 
 
 KNOWN: dict[str, Quantity] = {
-    one.name: one
+    one.name: replace(one, needs_limit=True)
     for one in (
         Quantity("position", _field("position"), "m", ("position",), _labels("position", 3)),
         Quantity("depth", lambda samples, members: samples["position"][..., 2], "m", ("position",)),
@@ -106,6 +116,7 @@ KNOWN: dict[str, Quantity] = {
             "angular_velocity", _field("angular_velocity"), "rad/s", ("angular_velocity",), _labels("angular_velocity", 3)
         ),
         Quantity("attitude", _field("attitude"), "1", ("attitude",), _labels("attitude", 3, 3)),
+        Quantity("quaternion_wxyz", _quaternion_wxyz, "1", ("attitude",), _labels("quaternion_wxyz", 4)),
         Quantity("euler", _euler, "rad", ("attitude",), _labels("euler", 3)),
         Quantity("energy", _energy, "J"),
     )
@@ -120,7 +131,11 @@ def quantity(key: str, of: Any) -> Quantity:
     if isinstance(of, Quantity):
         return of
     if isinstance(of, str):
-        return _named(key, of)
+        if "(" in of:
+            from lgvi_warp.statistics.functional import functional
+
+            return functional(key, of).at_each_time()
+        return named(key, of)
     if callable(of):
         return Quantity(str(getattr(of, "__name__", type(of).__name__)), of)
     if isinstance(of, Sequence) and len(of):
@@ -129,7 +144,8 @@ def quantity(key: str, of: Any) -> Quantity:
     raise SceneError([f"{key} = {shown(of)}: is no quantity; {remedy}"])
 
 
-def _named(key: str, text: str) -> Quantity:
+def named(key: str, text: str) -> Quantity:
+    """The quantity of a name, or one component of it. Raises SceneError naming `key`."""
     found = re.fullmatch(r"(\w+)(\[[\d, ]+\])?", text.strip())
     base = KNOWN.get(found[1]) if found else None
     if base is None:
@@ -163,4 +179,5 @@ def _joined(parts: Sequence[Quantity]) -> Quantity:
     fields = tuple(name for name in FIELDS if any(name in part.fields for part in parts))
     units: Mapping[str, None] = dict.fromkeys(part.unit for part in parts)
     labels = tuple(label for part in parts for label in part.labels)
-    return Quantity(", ".join(part.name for part in parts), function, ", ".join(units), fields, labels)
+    needs_limit = any(part.needs_limit for part in parts)
+    return Quantity(", ".join(part.name for part in parts), function, ", ".join(units), fields, labels, needs_limit)

@@ -45,6 +45,9 @@ class Then(Statistic):
             elif one.at is not None:
                 faults.add(f"then[{i}].at", one.at, f"says when, and a {self.type} has no time", "leave it out")
         object.__setattr__(self, "then", tuple(found))
+        if self.of is not None and not faults:
+            with faults.including():  # a limit that is missing is told now, and not by the run
+                self.parts()
 
     def then_default(self) -> Sequence[Statistic]:
         """What comes after where nothing is said."""
@@ -53,13 +56,18 @@ class Then(Statistic):
     def then_of(self, time: np.ndarray) -> tuple[Statistic, ...]:
         """The statistics, each knowing what it is of; time: (k,) [s], of all samples."""
         inner = self.quantity
-        whole = Quantity(self.key, inner.function, self.unit, inner.fields, self._labels)
+        whole = Quantity(self.key, inner.function, self.unit, inner.fields, self._labels, self.needs_limit)
         return tuple(replace(one.over(time), of=whole, stopped=self.stopped) for one in self.then)
 
     @property
     def unit(self) -> str:
         """Of the number."""
         return self.quantity.unit
+
+    @property
+    def needs_limit(self) -> bool:
+        """Whether a condition on the number wants a limit."""
+        return self.quantity.needs_limit
 
     @property
     def _labels(self) -> tuple[str, ...]:

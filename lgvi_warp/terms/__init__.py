@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
-from lgvi_warp.errors import Faults, SceneError, closest, ragged
+from lgvi_warp.errors import Faults, SceneError, closest, ragged, shown
+from lgvi_warp.names import folded
 from lgvi_warp.terms.base import Packed, Setting, Term, quantity
 from lgvi_warp.terms.control_fins import ControlFins
 from lgvi_warp.terms.cross_flow import CrossFlow
@@ -31,6 +33,8 @@ TYPES: dict[str, type[Term]] = {}
 
 # Would mix a term's numbers with those of the scene.
 RESERVED = ("vehicle", "environment", "start")
+# Of a scene, and so many events: each is code of the kernel.
+MOST_TERMS = 1000
 
 # Follow from the vehicle; refused in a list of terms.
 IMPLIED: tuple[Term, ...] = (Weight(), Restoring())
@@ -69,23 +73,30 @@ for _kind in (
     TYPES[_kind.type] = _kind
 
 
+def few_enough(what: str, given: Sequence[Any]) -> None:
+    """Refuse a list of more terms or events than any scene has. Raises SceneError."""
+    if len(given) > MOST_TERMS:
+        raise SceneError([f"{what}: are {len(given):,}; give at most {MOST_TERMS:,}"])
+
+
 def from_list(given: Any) -> tuple[Term, ...]:
     """Terms from tables of a scene file or Term objects. Raises SceneError naming every fault."""
     faults = Faults()
     if not isinstance(given, Sequence) or isinstance(given, str):
         raise SceneError(
-            [f"terms = {given!r}: is no list; write [[terms]] and type = ... below, or terms=[lw.Drag(...)]"]
+            [f"terms = {shown(given)}: is no list; write [[terms]] and type = ... below, or terms=[lw.Drag(...)]"]
         )
+    few_enough("terms", given)
     terms: list[Term] = []
     for i, one in enumerate(given):
         with faults.including():
             terms.append(_allowed(f"terms[{i}]", one) if isinstance(one, Term) else _from_table(f"terms[{i}]", one))
-    keys = [term.key for term in terms]
-    for key in sorted({key for key in keys if key in RESERVED}):
+    counts = Counter(term.key for term in terms)
+    for key in sorted(key for key in counts if folded(key) in RESERVED):
         faults.add("terms", key, "is the name of a section of the scene", f'give another name: name = "{key}_term"')
-    for key in sorted({key for key in keys if keys.count(key) > 1}):
+    for key in sorted(key for key, count in counts.items() if count > 1):
         faults.add(
-            "terms", key, f"is the name of {keys.count(key)} terms", f'give each a name of its own: name = "{key}_2"'
+            "terms", key, f"is the name of {counts[key]} terms", f'give each a name of its own: name = "{key}_2"'
         )
     faults.raise_if_any()
     return tuple(terms)
@@ -105,13 +116,13 @@ def _allowed(where: str, one: Term) -> Term:
 def _from_table(where: str, table: Any) -> Term:
     if not isinstance(table, Mapping):
         remedy = "write a table with type = ..., or give a term such as lw.Drag(quadratic=...)"
-        raise SceneError([f"{where} = {table!r}: is no term; {remedy}"])
+        raise SceneError([f"{where} = {shown(table)}: is no term; {remedy}"])
     word = table.get("type", "")
     kind = TYPES.get(word) if isinstance(word, str) else None
     if kind is None:
         implied = word in ("weight", "restoring", "buoyancy")
         remedy = "leave it out: it follows from the vehicle" if implied else closest(word, TYPES)
-        raise SceneError([f"{where}.type = {word!r}: is not known; {remedy}"])
+        raise SceneError([f"{where}.type = {shown(word)}: is not known; {remedy}"])
     return build(where, kind, table)
 
 

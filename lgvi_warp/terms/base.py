@@ -9,6 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from lgvi_warp import names
 from lgvi_warp.errors import Faults
 from lgvi_warp.inertia import Frame
 
@@ -82,6 +83,8 @@ class Term:
         faults = Faults(f"{self.key}.")
         if not isinstance(self.name, str):
             faults.add("name", self.name, "is not a text", "give a name, or leave it out")
+        elif self.key and (wrong := names.wrong_with(self.key)):
+            faults.add("name" if self.name else "type", self.key, *wrong)
         lengths: dict[str, int] = {}
         for one in self.quantities():
             value = getattr(self, one.name)

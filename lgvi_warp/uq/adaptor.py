@@ -12,42 +12,49 @@ from lgvi_warp import sampling as samplings
 from lgvi_warp import variations
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
+from lgvi_warp.labelled import columns_by_name, is_labelled
 from lgvi_warp.quantities import OfInterest, quantities
 from lgvi_warp.scene import Scene
+from lgvi_warp.uq.columns import as_given, columns_of, names_of, stacked, whole_columns
 from lgvi_warp.uq.outputs import FailedMembers, evaluate
 
 
 class Model:
     """A scene as a function of what varies, for SALib, scipy and other libraries; see `model`.
 
-    names (d,): of the columns. problem: SALib's description. distributions (d,): each with `ppf`, for scipy.
+    names (d,): of the columns, in the order of `vary`. problem: SALib's description. distributions (d,): each with `ppf`,
+    for scipy.
     """
 
     def __init__(self, scene: Scene, vary: Any, of: Any, levels: bool, failed: str, settings: Mapping[str, Any]):
         self.scene, self.of, self.levels, self.failed, self._settings = scene, of, levels, failed, dict(settings)
-        quantities(of)
         faults = Faults()
+        with faults.including():
+            quantities(of)
         faults.choice("failed", failed, ("refuse", "nan"))
-        faults.raise_if_any()
         self.vary = dict(vary) if isinstance(vary, Mapping) else None
+        names = () if self.vary is not None else names_of(faults, vary)
+        faults.raise_if_any()
         if self.vary is None and levels:
             raise SceneError([f"vary = {vary!r}: names no laws that levels could be of; map names to distributions"])
         self._fleet = Ensemble(scene, 1, 0, self.vary)
-        joint = [one.key for one in self._fleet._variations if one.law.joint]
+        self._variations = as_given(self._fleet)
+        joint = [one.key for one in self._variations if one.law.joint]
         if joint and not levels:
             raise SceneError([f"vary.\"{key}\": is a joint law, whose values are no numbers by themselves; use levels=True"
                               for key in joint])  # fmt: skip
+        # Which column of the ensemble's cube, whose keys are sorted, each column of X is.
+        self._columns = [column for one in self._variations for column in columns_of(self._fleet.space, one.key)]
         if self.vary is None:
-            self.names = tuple(str(name) for name in vary)
-            self._run(np.array([[float(self._scene_value(name)) for name in self.names]]), dry=True)
-        elif levels:
-            self.names = tuple(samplings.salib_problem(self._fleet.space)["names"])
+            self.names = names
+            self._run(np.array([[float(self._scene_value(name)) for name in names]]), dry=True)
         else:
-            self.names = tuple(label for label, _ in self._fleet.space.factors)
+            cube = samplings.salib_problem(self._fleet.space)
+            self.names = tuple(cube["names"][column] for column in self._columns)
 
     def _scene_value(self, name: str) -> Any:
         (target,) = variations.targets(name)
-        known = self.scene.parameters() | {f"start.{key}": value for key, value in self.scene.start.given().items()}
+        known = self._scene_numbers()
         faults = Faults("vary.")
         if variations.known_target(faults, name, "...", target, known) and target.of(known[target.name]).ndim:
             faults.add(f'"{name}"', "...", "is no single number", f'name its entries, such as "{name}[0]"')
@@ -58,10 +65,13 @@ class Model:
     def problem(self) -> dict[str, Any]:
         """For SALib.sample: with levels, the unit cube. Otherwise laws that SALib knows too. Raises SceneError."""
         if self.levels:
-            return samplings.salib_problem(self._fleet.space)
+            cube = samplings.salib_problem(self._fleet.space)
+            by_column = {key: [cube[key][column] for column in self._columns] for key in ("names", "bounds", "groups")
+                         if key in cube}  # fmt: skip
+            return cube | by_column
         faults = Faults("vary.")
         bounds, kinds = [], []
-        for one in self._fleet._variations:
+        for one in self._variations:
             for law in self._single_laws(one):
                 described = _salib_law(*law)
                 if described is None:
@@ -69,7 +79,7 @@ class Model:
                     break
                 kinds.append(described[0])
                 bounds.append(described[1])
-        if not self._fleet._variations:
+        if not self._variations:
             faults.add("names", list(self.names), "have no laws", "map names to distributions")
         faults.raise_if_any()
         return {"num_vars": len(self.names), "names": list(self.names), "bounds": bounds, "dists": kinds}
@@ -86,27 +96,64 @@ class Model:
     @property
     def distributions(self) -> list[Any]:
         """One for each column, with `ppf`: for scipy.stats.sobol_indices(dists=...)."""
-        if not self._fleet._variations:
+        if not self._variations:
             raise SceneError(["vary: names without laws have no distributions; map names to distributions"])
-        columns = range(len(self.names))
-        return [_Levels() for _ in columns] if self.levels else [_Column(self._fleet, column) for column in columns]
+        return [_Levels() if self.levels else _Column(self._fleet, column) for column in self._columns]
 
     def __call__(self, X: Any) -> np.ndarray:
-        """SALib's shape: X (n, d) -> Y (n,), or (n, m) of several numbers. Raises SceneError, and FailedMembers."""
-        Y = self._run(np.asarray(X, dtype=np.float64))
+        """The quantities of members with these numbers.
+
+        Args:
+            X: (n, d), columns in the order of `names`; or by name, in any order: a data frame, a mapping of columns, a
+                structured array, an xarray Dataset. By name a whole vector may be given, "current.velocity": (n, 3).
+
+        Returns:
+            Y (n,), or (n, m) of several numbers: SALib's shape.
+
+        Raises:
+            SceneError: for labels that are missing, unknown or doubled, and for what is no real number.
+            FailedMembers: with failed="refuse", where members failed.
+        """
+        Y = self._run(self._numbers(X))
         return Y[:, 0] if Y.shape[1] == 1 else Y
 
     def scipy(self, X: Any) -> np.ndarray:
-        """scipy's shape: X (d, n) -> Y (n,), or (m, n) of several numbers. Raises SceneError, and FailedMembers."""
-        return np.ascontiguousarray(self(np.asarray(X, dtype=np.float64).T).T)
+        """As when called, in scipy's shape: X (d, n), or by name -> Y (n,), or (m, n) of several numbers."""
+        if is_labelled(X):
+            return np.ascontiguousarray(self(X).T)
+        faults = Faults()
+        array = faults.real("X", X, f"give an array of shape ({len(self.names)}, n)")
+        faults.raise_if_any()
+        return np.ascontiguousarray(self(np.asarray(array).T).T)
+
+    def _numbers(self, X: Any) -> np.ndarray:
+        """(n, d), the columns in the order of the names."""
+        faults = Faults()
+        shape = f"give an array of shape (n, {len(self.names)}), columns {', '.join(self.names)}"
+        if is_labelled(X):
+            columns = whole_columns(faults, self.names, self._scene_numbers(), columns_by_name(faults, "X", X))
+            array = stacked(faults, "X", self.names, columns) if columns else None
+        else:
+            array = faults.real("X", X, shape)
+            if array is not None and (array.ndim != 2 or array.shape[1] != len(self.names)):
+                faults.add("X", "...", f"has shape {array.shape}", shape)
+        if array is not None and self.levels and not np.all((array >= 0.0) & (array <= 1.0)):
+            odd = array[~((array >= 0.0) & (array <= 1.0))][0]
+            faults.add(
+                "X", odd, "is no level between 0 and 1", "give levels, or leave out levels=True to give the numbers"
+            )
+        faults.raise_if_any()
+        assert array is not None
+        return array
+
+    def _scene_numbers(self) -> dict[str, np.ndarray]:
+        """Every number that may vary, by name."""
+        return self.scene.parameters() | {f"start.{key}": value for key, value in self.scene.start.given().items()}
 
     def _run(self, X: np.ndarray, dry: bool = False) -> np.ndarray:
-        faults = Faults()
-        if X.ndim != 2 or X.shape[1] != len(self.names):
-            faults.add("X", "...", f"has shape {X.shape}", f"give an array of shape (n, {len(self.names)})")
-        faults.raise_if_any()
         if self.levels:
-            inside = np.clip(X, 2.0**-53, 1.0 - 2.0**-53)
+            inside = np.empty_like(X)
+            inside[:, self._columns] = np.clip(X, 2.0**-53, 1.0 - 2.0**-53)
             fleet = Ensemble(self.scene, None, 0, self.vary, samplings.Levels(inside))
         else:
             fleet = Ensemble(self.scene, None, 0, None, samplings.Table(values=dict(zip(self.names, X.T, strict=True))))
@@ -180,8 +227,9 @@ def model(
 ) -> Model:
     """A scene as a function: f(X), X (n, d) -> Y (n,) or (n, m), for SALib; f.scipy(X), X (d, n), for scipy's sobol_indices.
 
-    vary: name -> distribution, or names alone. X holds the numbers themselves, of the entries that `names` lists; with levels,
-    numbers in (0, 1) that the laws turn into values, which any law can be. of, settings: as of `sobol`. failed: "refuse", or
-    "nan" for NaN in their place. Raises SceneError naming every fault.
+    vary: name -> distribution, or names alone. X holds the numbers themselves, of the entries that `names` lists, in the
+    order of `vary`; with levels, numbers in (0, 1) that the laws turn into values, which any law can be. A data frame, a
+    mapping, a structured array or an xarray Dataset is read by its names, in whatever order. of, settings: as of `sobol`.
+    failed: "refuse", or "nan" for NaN in their place. Raises SceneError naming every fault.
     """
     return Model(scene, vary, of, levels, failed, settings)

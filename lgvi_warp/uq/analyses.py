@@ -37,8 +37,8 @@ def sobol(
     """Sobol indices of quantities of interest, by Saltelli's design and SALib's estimates.
 
     scene: a Scene, with what varies in its ensemble or in `vary`; or an Ensemble, for its scene, vary and seed. of:
-    "position[2]" (at the end), "max(energy)" (over the path), a function of a Result to (n,) or (n, m), or several (see
-    `Quantity`). samples: N, a power of two is best; N (2 d + 2) members are run for d factors, N (d + 2) without
+    "position[2]" or "depth" (at the end), "max(energy)" (over the path), a lw.Quantity, a function of a Result to (n,) or
+    (n, m), or several. samples: N, a power of two is best; N (2 d + 2) members are run for d factors, N (d + 2) without
     second_order. confidence, resamples: of the bootstrap's intervals. failed: "refuse", or "drop" to use the groups without
     a failed member only.
     settings: those of `lw.solve` (method, h, t1, save, dtype, threads, progress) and of `evaluate`.

@@ -10,7 +10,7 @@ import numpy as np
 
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
-from lgvi_warp.quantities import OfInterest, Quantity, quantities
+from lgvi_warp.quantities import OfInterest, OfResult, quantities
 from lgvi_warp.saveat import FIELDS, SaveAt
 from lgvi_warp.scene import Scene
 from lgvi_warp.solving import solve
@@ -53,7 +53,7 @@ def evaluate(
 ) -> Outputs:
     """Run an ensemble, some thousands of members at a time, and keep the quantities of interest only.
 
-    of: one or several, see `Quantity`. common_noise: whether laws with noise act on every member alike. save and settings:
+    of: one or several, see `OfResult`. common_noise: whether laws with noise act on every member alike. save and settings:
     those of `lw.solve`. A member failed if its status says so or a quantity of it is not finite; stopped by an event it is
     as good as any. Raises SceneError.
     """
@@ -62,15 +62,16 @@ def evaluate(
     if common_noise:
         fleet = fleet.subset(np.arange(fleet.members))
         fleet.indices = np.zeros(fleet.members, dtype=np.int64)
+    looks_at_members = any(one.looks_at_members for one in asked)
     values, status, provenance = [], [], {}
     for first in range(0, fleet.members, AT_ONCE):
         chosen = np.arange(first, min(first + AT_ONCE, fleet.members))
         part = progress and _part(progress, first / fleet.members, len(chosen) / fleet.members)
         # What the scene keeps of its own runs, and when those end, is no matter of a design that must be whole.
-        result = solve(
-            fleet.subset(chosen), save=save, progress=part, statistics=(), keep="all", until=False, **settings
-        )
-        values.append([one.values(result) for one in asked])
+        group = fleet.subset(chosen)
+        result = solve(group, save=save, progress=part, statistics=(), keep="all", until=False, **settings)
+        members = group.select(0, len(chosen)) if looks_at_members else None
+        values.append([one.values(result, members) for one in asked])
         status.append(np.asarray(result.status))
         provenance = result.provenance
     found = np.concatenate([np.concatenate(one, axis=1) for one in values])
@@ -87,12 +88,12 @@ def _part(progress: Callable[[float], None], done: float, share: float) -> Calla
     return lambda fraction: progress(done + share * fraction)
 
 
-def _samples(scene: Scene, asked: Sequence[Quantity], save: SaveAt | None) -> SaveAt:
+def _samples(scene: Scene, asked: Sequence[OfResult], save: SaveAt | None) -> SaveAt:
     """Which samples the quantities need. Raises SceneError where a path is asked for and none is kept."""
     if save is not None:
         return save
     fields = tuple(name for name in FIELDS if any(name in one.fields for one in asked))
-    paths = [one.label for one in asked if one.path]
+    paths = [one.label for one in asked if one.over_path]
     if paths and scene.run.save_every is None:
         faults = Faults()
         faults.add(
@@ -102,5 +103,5 @@ def _samples(scene: Scene, asked: Sequence[Quantity], save: SaveAt | None) -> Sa
             "give save=lw.SaveAt(every=...) or [run] save_every",
         )
         faults.raise_if_any()
-    given = any(callable(one.of) for one in asked)
+    given = any(one.is_function for one in asked)
     return SaveAt(every=scene.run.save_every if paths or given else None, fields=fields)

@@ -262,3 +262,20 @@ def test_a_bad_argument_is_refused_with_the_remedy(arguments, words, tmp_path, c
     assert cli.main(["stability", PAPER, "--out", str(tmp_path / "out"), *arguments]) == 2
     text = capsys.readouterr().err
     assert all(word in text for word in words) and "Traceback" not in text
+
+
+def test_a_map_of_whatever_statistics_know(scene):
+    """A depth's error is that of the position at most: where the position is accurate, it is."""
+    axes = ("h", 0.02, 0.5), ("angular_velocity", 0.5, 5.0)
+    asked = {"points": 3, "t1": 4.0, "error_time": 2.0, "directions": 2, "error": 1e-4}
+    depth, position = (lw.stability_map(scene, *axes, ["psi_x"], of=of, **asked) for of in ("depth", "position"))
+    assert (depth.of, depth.unit) == ("depth", "m") and "accurate    depth to 0.0001 m" in report_text(depth)
+    assert (depth.errors["psi_x"] <= position.errors["psi_x"] * (1.0 + 1e-9)).all() and (
+        depth.errors["psi_x"] > 0.0
+    ).all()
+    good = position.classes["psi_x"] == Cell.ACCURATE
+    assert good.any() and (depth.classes["psi_x"][good] == Cell.ACCURATE).all()
+    back = StabilityMap.from_dict(depth.to_dict())
+    assert back.unit == "m" and "error_depth" in back.rows()[0]
+    old = {name: value for name, value in position.to_dict().items() if name != "unit"}
+    assert StabilityMap.from_dict(old).unit == "m"

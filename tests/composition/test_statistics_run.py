@@ -289,13 +289,13 @@ def test_members_that_fail_are_left_out_from_then_on(spinning):
 
 def test_paths_of_members_that_fail_are_left_out(spinning):
     settings = {"h": 0.1, "t1": 4.0, "save": lw.SaveAt(every=0.5)}
-    kinds = (lw.PathMean, lw.PathRms, lw.PathRange, lw.PathTime)
-    r = lw.solve(spinning, **settings, statistics=[kind("depth") for kind in kinds])
+    asked = [*(kind("depth") for kind in (lw.PathMean, lw.PathRms, lw.PathRange)), lw.PathTime("depth", above=0.0)]
+    r = lw.solve(spinning, **settings, statistics=asked)
     whole, depth = r.status == 0, r.position[..., 2]
     assert 0 < whole.sum() < 600
-    truths = [depth.mean(axis=0), depth.mean(axis=0), 0.0 * depth[0], 4.0 * (depth[0] != 0.0)]  # none moves
-    for kind, truth in zip(kinds, truths, strict=True):
-        found = r.statistics[f"mean {kind.type} depth"]
+    truths = [depth.mean(axis=0), depth.mean(axis=0), 0.0 * depth[0], 4.0 * (depth[0] > 0.0)]  # none moves
+    for statistic, truth in zip(asked, truths, strict=True):
+        found = r.statistics[f"mean {statistic.key}"]
         assert found.count.tolist() == [whole.sum()]
         assert found.value[0, 0] == pytest.approx(truth[whole].mean(), rel=1e-12)
 

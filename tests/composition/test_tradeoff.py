@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import cli, comparison, machine, suggestion, tradeoffs
+from lgvi_warp import cli, comparison, cost, machine, suggestion, tradeoffs
 from lgvi_warp.comparison import Sample
 from tests.conftest import ROOT
 from tests.random_scenes import judged, random_scene
@@ -87,6 +87,39 @@ def test_a_reference_that_agrees_with_itself_less_hides_more(scene):
         assert all(m.trusted["position"] is shown for m in measured)
 
 
+def test_one_cost_a_step_for_each_kernel(found):
+    by_kernel = {}
+    for one in found.measurements:
+        by_kernel.setdefault((one.setting.name, one.setting.dtype), []).append(
+            one.us_per_vehicle_second * one.setting.h
+        )
+    assert len(by_kernel) == 2 * len(METHODS) + len(set(METHODS) & set(tradeoffs.COMPENSATED))
+    assert all(np.ptp(steps) <= 1e-12 * max(steps) for steps in by_kernel.values())
+    assert any(len(steps) > 3 for steps in by_kernel.values())
+    doubtful = [one for one in found.measurements if one.cost_spread > cost.DISAGREE]
+    assert bool(doubtful) == any("readings of cost disagree" in message for message in found.messages)
+
+
+def test_errors_of_whatever_statistics_know(scene, tmp_path):
+    of = "depth"
+    fleet = lw.Ensemble(scene, 24, 1, scene.ensemble_settings.vary)
+    found = lw.tradeoff(fleet, 4.0, of, methods=["psi_x"], seconds=4.0)
+    assert found.of == of and found.units[of] == "m" and len(found.front()) > 2
+    for one in found.measurements:
+        assert one.error(of) <= one.error("position") * (1.0 + 1e-9)
+    assert (
+        f"{of}_path_max" in found.rows()[0]
+        and json.loads(found.to_json())["units"][of]
+        and of in tradeoffs.report_text(found)
+    )
+    assert lw.plot_tradeoff(found, tmp_path / "of.png").stat().st_size > 10_000
+    suggested = lw.suggest(fleet, 1e-4, of, t1=4.0, methods=["psi_x"], seconds=5.0)
+    assert suggested.of == of and suggested.margin >= 1.0
+    times = lw.SaveAt(at=list(Sample(fleet, 4.0).times[1:]))
+    result = lw.solve(fleet, t1=4.0, save=times, threads=1, **suggested.settings)
+    assert suggestion.verified(fleet, result, suggested)[0] <= 1.05e-4
+
+
 def test_growth_of_exponential_and_power():
     t = np.linspace(0.0, 50.0, 21)
     grown = comparison.fitted(t, np.exp(0.3 * t), 50.0)
@@ -156,7 +189,9 @@ def test_suggestions_for_twenty_scenes():
     ("arguments", "words"),
     [
         ({"error": -1.0}, ["error = -1.0", "above 0 [m]"]),
-        ({"of": "speed"}, ["of = 'speed'", "known: position"]),
+        ({"of": "spead"}, ["of = 'spead'", "did you mean 'speed'"]),
+        ({"of": "max(depth)"}, ["of = 'max(depth)'", "give 'depth'"]),
+        ({"of": ["depth", "speed"]}, ["of = ['depth', 'speed']", "one of them"]),
         ({"methods": ["psi_z"]}, ["methods = 'psi_z'", "psi_x"]),
         ({"methods": []}, ["methods = []", "name one"]),
         ({"t1": 0.0}, ["t1 = 0.0"]),

@@ -168,12 +168,13 @@ def test_parts_of_the_variance_of_a_sinking_vehicle(sinking):
 
 def test_an_adaptor_gives_the_numbers_themselves(sinking):
     f = uq.model(sinking, LAWS, "position[2]", **SINK)
-    assert f.names == ("start.velocity[2]", "vehicle.buoyancy", "vehicle.mass")
-    X = np.array([[0.1, 1215.8, 123.8], [0.2, 1210.0, 125.0], [-0.1, 1216.0, 123.0]])
-    exact = depth(X[:, 2], X[:, 1], X[:, 0])
+    assert f.names == tuple(LAWS) == ("vehicle.mass", "vehicle.buoyancy", "start.velocity[2]")
+    X = np.array([[123.8, 1215.8, 0.1], [125.0, 1210.0, 0.2], [123.0, 1216.0, -0.1]])
+    exact = depth(X[:, 0], X[:, 1], X[:, 2])
     # Constant force: every step is exact, 100 of them round off some 1e-16 each.
     np.testing.assert_allclose(f(X), exact, rtol=0, atol=1e-13)
     np.testing.assert_array_equal(f.scipy(X.T), f(X))
+    np.testing.assert_array_equal(f({name: X[:, f.names.index(name)] for name in sorted(f.names)}), f(X))
     two = uq.model(sinking, list(f.names), ["position[2]", "norm(velocity)"], **SINK)
     assert two(X).shape == (3, 2) and two.scipy(X.T).shape == (2, 3)
     np.testing.assert_array_equal(two(X)[:, 0], f(X))
@@ -201,8 +202,8 @@ def test_laws_in_salibs_words(sinking):
     vary = {"vehicle.mass": lw.Uniform(relative=0.1), "vehicle.buoyancy": lw.LogNormal(sigma=0.1),
             "vehicle.center_of_buoyancy": lw.Uniform(low=(0, 0, -0.1), high=(0.1, 0.2, 0.1))}  # fmt: skip
     problem = uq.model(sinking, vary, "position", **SINK).problem
-    assert problem["dists"] == ["lognorm", "unif", "unif", "unif", "unif"]
-    expected = [[np.log(1215.8), 0.1], [0.0, 0.1], [0.0, 0.2], [-0.1, 0.1], [111.42, 136.18]]
+    assert problem["dists"] == ["unif", "lognorm", "unif", "unif", "unif"]
+    expected = [[111.42, 136.18], [np.log(1215.8), 0.1], [0.0, 0.1], [0.0, 0.2], [-0.1, 0.1]]
     np.testing.assert_allclose(problem["bounds"], expected, rtol=1e-12)
     other = uq.model(sinking, {"vehicle.mass": stats.gamma(400.0, scale=0.3)}, "position", **SINK)
     assert "levels=True" in fault(lambda: other.problem)
@@ -337,17 +338,39 @@ def test_quantities_of_a_path(scene):
         ("range( position )", np.ptp(b, axis=0)), ("norm(velocity)", speed[-1]), ("min(norm(velocity))", speed.min(axis=0)),
         ("norm(max(velocity))", np.linalg.norm(v.max(axis=0), axis=-1)), ("attitude[0,1]", result.attitude[-1, :, 0, 1]),
         ("energy", result.energy[-1]), ("mean(energy)", result.energy.mean(axis=0)),
-        ("quaternion_wxyz[3]", result.quaternion_wxyz[-1, :, 3]),
+        ("quaternion_wxyz[3]", result.quaternion_wxyz[-1, :, 3]), ("depth", b[-1, :, 2]), ("speed", speed[-1]),
+        ("max(depth)", b[:, :, 2].max(axis=0)), ("max(speed)", speed.max(axis=0)),
+        ("max(position)[2]", b[:, :, 2].max(axis=0)),
+        ("euler[1]", -np.arcsin(result.attitude[-1, :, 2, 0])),
+        ("velocity_inertial", np.einsum("nij,nj->ni", result.attitude[-1], v[-1])),
+        (lw.Quantity("sunk", lambda samples, members: samples["position"][..., 2] - 10.0), b[-1, :, 2] - 10.0),
+        (lambda samples, members: samples["velocity"][..., 0] ** 2, v[-1, :, 0] ** 2),
     ):  # fmt: skip
         (one,) = quantities.quantities(text)
-        np.testing.assert_allclose(one.values(result), np.reshape(exact, (5, -1)), rtol=1e-15, err_msg=text)
+        np.testing.assert_allclose(one.values(result), np.reshape(exact, (5, -1)), rtol=1e-15, err_msg=str(text))
     labels = [one.labels(3)[2] for one in quantities.quantities(["max(position)"])]
     assert labels == ["max(position)[2]"]
+    # Each label may be asked for.
+    for text in ("position", "max(position)", "attitude", "euler", "norm(velocity)"):
+        (whole,) = quantities.quantities(text)
+        labels = whole.labels(whole.values(result).shape[1])
+        alone = [quantities.quantities(label)[0].values(result) for label in labels]
+        np.testing.assert_array_equal(np.concatenate(alone, axis=1), whole.values(result))
+
+
+def test_a_quantity_of_the_users_sees_what_members_start_from(sinking):
+    fallen = lw.Quantity("fallen", lambda samples, members: samples["position"][..., 2] - members.position[None, :, 2],
+                         fields=("position",))  # fmt: skip
+    vary = {"start.position[2]": lw.Uniform(half_width=5.0), "start.velocity[2]": lw.Normal(std=0.01)}
+    X = np.array([[3.0, 0.1], [9.0, 0.2]])
+    f = uq.model(sinking, vary, [fallen, "depth"], **SINK)
+    np.testing.assert_allclose(f(X)[:, 0], depth(123.8, 1215.8, X[:, 1]), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(f(X)[:, 1], X[:, 0] + depth(123.8, 1215.8, X[:, 1]), rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize(
     "of",
-    ["depth", "position[3]", "attitude[0]", "energy[0]", "median(energy)", "max(min(energy))", 3, [], "max(energy"],
+    ["deph", "position[3]", "attitude[0]", "energy[0]", "median(energy)", "max(min(energy))", 3, [], "max(energy"],
 )
 def test_bad_quantities(scene, of):
     assert "of = " in fault(uq.sobol, scene, of, vary=BOX, **RUN)

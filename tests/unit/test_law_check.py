@@ -10,7 +10,7 @@ import pytest
 import warp as wp
 
 import lgvi_warp as lw
-from lgvi_kernels.lanes import add, cross, div, lane, mul, ones, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes import add, cross, div, dot, lane, mul, ones, sub, vec3  # noqa: F401
 from lgvi_kernels.state import struct
 from lgvi_kernels.terms import restoring, tether
 from lgvi_kernels.view import to_body
@@ -226,6 +226,62 @@ class MixingDevice:
 def test_what_a_law_must_not_do(device, expected):
     term = type("Bad", (Stirred,), {"device": device, "__annotations__": {}})(strength=0.3)
     assert expected <= set(names_of_failed(lw.check_law(term)))
+
+
+@wp.func
+def resisting_damping(D: Any, view: Any, p: Any):
+    """Along x alone, of one number."""
+    zero = p.strength - p.strength
+    D.force_velocity.row0 = D.force_velocity.row0 + vec3(p.strength, zero, zero)
+    return D
+
+
+@wp.func
+def constant_damping(D: Any, view: Any, p: Any):
+    """A force of one size against the velocity: divides by the speed squared."""
+    zero = p.strength - p.strength
+    D.force_velocity.row0 = D.force_velocity.row0 + vec3(div(p.strength, dot(view.nu, view.nu)), zero, zero)
+    return D
+
+
+@wp.func
+def slender_damping(D: Any, view: Any, p: Any):
+    """Divides by the square of one velocity."""
+    zero = p.strength - p.strength
+    D.force_velocity.row0 = D.force_velocity.row0 + vec3(div(p.strength, view.nu.y * view.nu.y), zero, zero)
+    return D
+
+
+@wp.func
+def heading_law(w: Any, view: Any, p: Any):
+    """Away from the origin: divides by the distance squared."""
+    w.force = w.force + to_body(view, div(p.strength, dot(view.b, view.b)) * view.b)
+    return w
+
+
+def device_of(role, function):
+    return type("Device", (), {"params": staticmethod(stirred_params), role: function})
+
+
+@pytest.mark.parametrize(
+    ("device", "strength", "failed", "words"),
+    [
+        (device_of("damping", constant_damping), 0.3, "finite at rest, along axes", "velocity [0, 0, 0] m/s"),
+        (device_of("damping", slender_damping), 0.3, "finite at rest, along axes", "velocity [0, 0, 0] m/s"),
+        (device_of("law", heading_law), 0.3, "finite at rest, along axes", "at position [0.0, 0.0, 0.0] m"),
+        (device_of("damping", resisting_damping), 1e308, "damping: power", "power is not finite at velocity"),
+    ],
+    ids=["no number at rest", "no number along an axis", "no number at the origin", "infinite power"],
+)
+def test_a_law_that_is_no_number_where_vehicles_are(device, strength, failed, words):
+    kind = type("Bad", (Stirred,), {"device": device, "__annotations__": {}})
+    report = lw.check_law(kind(strength=strength))
+    assert failed in names_of_failed(report) and words in str(report)
+
+
+def test_damping_along_one_axis_is_right():
+    kind = type("Good", (Stirred,), {"device": device_of("damping", resisting_damping), "__annotations__": {}})
+    assert "finite at rest, along axes" not in names_of_failed(lw.check_law(kind(strength=0.3)))
 
 
 def test_numbers_that_do_not_fit():

@@ -1,0 +1,43 @@
+"""The verb check."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from typing import Any
+
+from lgvi_warp.cli.settings import overrides
+
+
+def check(chosen: argparse.Namespace) -> int:
+    """lgvi-warp check: 0 for a scene that can run, whatever is odd about it. Raises SceneError for one that cannot."""
+    from lgvi_warp import plausibility
+    from lgvi_warp.ensemble import Ensemble
+    from lgvi_warp.scene import Scene
+
+    scene = Scene.load(chosen.scene, overrides(chosen))
+    ensemble = Ensemble.from_scene(scene)
+    head, messages = _settings(ensemble)
+    messages += (*scene.vehicle.warnings, *plausibility.of_ensemble(ensemble).messages(ensemble.members))
+    if not chosen.quiet:
+        print(f"scene       {chosen.scene}, {head}")
+        for message in messages:
+            print(f"note        {message}")
+        print("result      can run, with notes: nothing is refused for them" if messages else "result      can run")
+    return 0
+
+
+def _settings(ensemble: Any) -> tuple[str, tuple[str, ...]]:
+    """The run in a few words, and what is to be said of its settings. Raises SceneError for what a run would refuse."""
+    from lgvi_warp.solving import make_plan
+
+    run = ensemble.scene.run
+    members = f"members {ensemble.members:,}"
+    missing = [f"run.{name}" for name in ("step", "duration") if getattr(run, name) is None]
+    if missing:
+        return members, (f"{' and '.join(missing)}: not given, so the method was not looked at; a run wants it",)
+    method = run.method_of(run.method)
+    if method.iterations == "auto":  # is found by a run
+        method = replace(method, iterations=None)
+    plan = make_plan(ensemble, method)
+    return f"{members}, {method.name}, step {plan.grid.h:g} s, {plan.grid.steps:,} steps", plan.grid.messages

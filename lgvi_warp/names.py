@@ -1,0 +1,73 @@
+"""Names that a scene gives to its terms and events: each becomes part of a folder's name in a store, on any file system."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Iterable
+
+# A folder is called "name.field": with the longest field it stays well below the 255 bytes of file systems.
+MOST_NAME_BYTES = 100
+# What Windows takes for devices, in folders' names too, whatever follows a point.
+DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(10))}
+BESIDE = " _-."
+RULE = "give letters, digits, _, - and points"
+
+
+def wrong_with(name: str) -> tuple[str, str] | None:
+    """What is wrong with a name, and the remedy.
+
+    Args:
+        name: Of a term or an event.
+
+    Returns:
+        (what is wrong, the remedy), None for a good name.
+    """
+    if not name:
+        return "is empty", RULE
+    bad = next((one for one in name if not (one.isalnum() or one in BESIDE)), None)
+    if bad is not None:
+        return f"has {shown_character(bad)}, which no folder's name may have everywhere", RULE
+    if len(name.encode()) > MOST_NAME_BYTES:
+        return f"has {len(name.encode()):,} bytes", f"give at most {MOST_NAME_BYTES}"
+    if not name[0].isalnum() and name[0] != "_":
+        return f"begins with {shown_character(name[0])}", "begin with a letter, a digit or _"
+    if name[-1] in " .":
+        return f"ends with {shown_character(name[-1])}, which some file systems drop", "end with a letter or a digit"
+    if folded(name.split(".")[0].strip()) in DEVICES:
+        return "is the name of a device on Windows", "give another name"
+    return None
+
+
+def shown_character(one: str) -> str:
+    """A character in a message."""
+    return {" ": "a space", ".": "a point"}.get(one, ascii(one) if not one.isprintable() else repr(one))
+
+
+def folded(name: str) -> str:
+    """A name as file systems compare it that know no capitals, or that write accents in two ways.
+
+    Args:
+        name: Of a term or an event.
+
+    Returns:
+        The same text for names that such a file system takes for one.
+    """
+    return unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", name).casefold())
+
+
+def alike(names: Iterable[str]) -> list[tuple[str, str]]:
+    """Names that are different texts, and one name on some file system.
+
+    Args:
+        names: Of terms and events.
+
+    Returns:
+        Pairs (first, other), in the order of the names.
+    """
+    first: dict[str, str] = {}
+    pairs: list[tuple[str, str]] = []
+    for name in names:
+        other = first.setdefault(folded(name), name)
+        if other != name and (other, name) not in pairs:
+            pairs.append((other, name))
+    return pairs

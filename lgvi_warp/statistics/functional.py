@@ -1,0 +1,121 @@
+"""The little language of quantities: a name, an entry of it, a length, and what a whole path comes to.
+
+"position[2]", "norm(velocity)" are numbers of each member at each time; "max(depth)", "range(norm(velocity))" are one of
+each member, over its path. Statistics, sensitivity, trade-offs and stability maps all read it here.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.errors import Faults, SceneError, closest, shown
+from lgvi_warp.statistics.quantity import KNOWN, Quantity, named, quantity
+
+if TYPE_CHECKING:
+    from lgvi_warp.blocks import Fields
+    from lgvi_warp.ensemble import Members
+
+OVER_TIME: dict[str, Callable[..., np.ndarray]] = {"max": np.max, "min": np.min, "mean": np.mean, "range": np.ptp}
+FUNCTIONS = (*OVER_TIME, "norm")
+
+
+@dataclass(frozen=True)
+class Functional:
+    """A quantity of each member at each time, and what is made of it: functions, the innermost first.
+
+    label: as it was written, without spaces. entry: the component of what comes out that is meant; None: all.
+    """
+
+    label: str
+    quantity: Quantity
+    functions: tuple[str, ...] = ()
+    entry: int | None = None
+
+    @property
+    def over_path(self) -> bool:
+        """Whether it looks over the path: one row for each member, and none for each time."""
+        return any(name in OVER_TIME for name in self.functions)
+
+    @property
+    def unit(self) -> str:
+        """Of its numbers."""
+        return self.quantity.unit
+
+    @property
+    def size(self) -> int:
+        """Numbers of each member (at each time)."""
+        return 1 if self.entry is not None or "norm" in self.functions else self.quantity.size
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """One for each of its numbers: each may be asked for by its label."""
+        if self.size == 1:
+            return (self.label,)
+        plain = not self.functions
+        return tuple(label.replace(" ", "") if plain else f"{self.label}[{i}]"
+                     for i, label in enumerate(self.quantity.labels))  # fmt: skip
+
+    def __call__(self, samples: Fields, members: Members) -> np.ndarray:
+        """Its numbers, float64: (k, n, size), or (n, size) of what looks over the path."""
+        values = np.moveaxis(self.quantity(samples, members).astype(np.float64, copy=False), 1, 2)
+        for name in self.functions:
+            if name == "norm":
+                values = np.sqrt(np.sum(values**2, axis=-1, keepdims=True))
+            else:
+                values = np.asarray(OVER_TIME[name](values, axis=0))
+        return values if self.entry is None else values[..., self.entry : self.entry + 1]
+
+    def at_each_time(self) -> Quantity:
+        """The same as a Quantity. Raises SceneError for what looks over the path."""
+        if self.over_path:
+            remedy = f"ask for {self.quantity.name}, or for lw.PathMaximum({self.quantity.name!r}) and the like"
+            raise SceneError([f"{self.label}: looks over the path, and has no number at each time; {remedy}"])
+        if not self.functions and self.entry is None:
+            return self.quantity
+        return replace(self.quantity, name=self.label, labels=self.labels, function=self)
+
+
+def functional(key: str, of: Any) -> Functional:
+    """What `of` means: a text of the little language, a Quantity, or what `quantity` takes for one.
+
+    Raises SceneError naming `key` and what is known.
+    """
+    if isinstance(of, Functional):
+        return of
+    if not isinstance(of, str):
+        found = quantity(key, of)
+        return Functional(found.name, found)
+    text = of.replace(" ", "")
+    outer, entry = text, None
+    if match := re.fullmatch(r"(\w+\(.*\))\[(\d+)\]", text):
+        outer, entry = match[1], int(match[2])
+    names, inner = _nested(outer)
+    faults = Faults()
+    for name in names:
+        if name not in FUNCTIONS:
+            faults.add(key, of, f"has a function {name!r} that is not known", closest(name, FUNCTIONS))
+    if sum(name in OVER_TIME for name in names) > 1:
+        faults.add(key, of, "looks over the path twice", f"keep one of {', '.join(OVER_TIME)}")
+    faults.raise_if_any()
+    if not re.fullmatch(r"\w+(\[[\d,]+\])?", inner):
+        form = 'write "position[2]", "depth", "norm(velocity)" or "max(depth)"'
+        raise SceneError([f"{key} = {shown(of)}: is no quantity; {form}, of {', '.join(KNOWN)}"])
+    base = Functional(text, named(key, inner), tuple(reversed(names)))
+    if entry is not None and (base.size == 1 or entry >= base.size):
+        raise SceneError([f"{key} = {shown(of)}: {outer} has {base.size} component{'s' * (base.size > 1)}; "
+                          f"give one of them from 0, or {outer} alone"])  # fmt: skip
+    return replace(base, entry=entry)
+
+
+def _nested(text: str) -> tuple[list[str], str]:
+    """The functions around a name, the outermost first; what they are of."""
+    functions = []
+    while match := re.fullmatch(r"(\w+)\((.*)\)", text):
+        functions.append(match[1])
+        text = match[2]
+    return functions, text

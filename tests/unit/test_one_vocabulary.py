@@ -1,0 +1,151 @@
+"""One vocabulary for quantities: what one door knows, all do, by the same words and with the same numbers."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp import notation
+from lgvi_warp.compared import QUANTITIES, compared_in
+from lgvi_warp.quantities import quantities
+from lgvi_warp.statistics.functional import functional
+from lgvi_warp.statistics.quantity import KNOWN, quantity
+
+K, N = 4, 3
+AT_EACH_TIME = [
+    *KNOWN,
+    "position[2]",
+    "attitude[0,1]",
+    "attitude[0, 1]",
+    "norm(velocity)",
+    "norm(position)",
+    "euler[2]",
+]
+OVER_PATH = [
+    "max(depth)",
+    "range(position)",
+    "norm(max(velocity))",
+    "max(norm(velocity))",
+    "max(position)[2]",
+    "mean(energy)",
+]
+UNKNOWN = ["deph", "position[3]", "attitude[0]", "median(speed)", "speed[0]", "max(speed", "norm()", "", "a b"]
+
+
+@pytest.fixture(scope="module")
+def result(scene):
+    """Made-up samples, as a run has them."""
+    random = np.random.default_rng(1)
+    R = notation.matrix_from_rotation_vector(random.normal(size=(K, N, 3)))
+    samples = {"position": random.normal(size=(K, N, 3)), "attitude": R, "velocity": random.normal(size=(K, N, 3)),
+               "angular_velocity": random.normal(size=(K, N, 3))}  # fmt: skip
+    none = np.full(N, np.nan)
+    status = np.zeros(N, np.uint8)
+    parameters = {name: value[None] for name, value in scene.parameters().items()}
+    return lw.Result(np.arange(float(K)), samples, status, none, none, status, none, none, status, parameters, (), {})
+
+
+def refused(make, *arguments):
+    with pytest.raises(lw.SceneError) as caught:
+        make(*arguments)
+    return str(caught.value)
+
+
+def other(result, change):
+    """The same with its samples changed."""
+    import dataclasses
+
+    return dataclasses.replace(result, samples={**result.samples, **change})
+
+
+@pytest.mark.parametrize("text", AT_EACH_TIME)
+def test_every_door_knows_what_has_a_number_at_each_time(result, text):
+    assert lw.Mean(text).quantity.size == functional("of", text).size
+    (at_end,) = quantities(text)
+    assert at_end.values(result).shape == (N, functional("of", text).size)
+    asked = compared_in(text)
+    assert asked.distance(result, result).shape == (K, N) and not asked.distance(result, result).any()
+    assert asked.name == text.replace(" ", "") and asked.unit
+
+
+@pytest.mark.parametrize("text", OVER_PATH)
+def test_what_looks_over_the_path(result, text):
+    (found,) = quantities(text)
+    assert found.over_path and len(found.values(result)) == N
+    message = refused(compared_in, text)
+    assert "looks over the path" in message and "largest error over the path" in message
+    message = refused(lw.Mean, text)
+    assert "looks over the path" in message and "lw.PathMaximum" in message
+
+
+@pytest.mark.parametrize("text", UNKNOWN)
+def test_what_is_not_known_is_known_nowhere(text):
+    for make in (compared_in, quantities, lw.Mean, lambda of: functional("of", of)):
+        message = refused(make, text)
+        assert "of = " in message and (
+            "give" in message or "write" in message or "did you" in message or "known" in message
+        )
+
+
+def test_statistics_and_sensitivity_have_the_same_numbers(result):
+    members = SimpleNamespace(parameters=result.parameters, count=N)
+    samples = type("Samples", (dict,), {"time": result.time, "terms": ()})(result.samples)
+    for text in AT_EACH_TIME:
+        values = quantity("of", text)(samples, members)
+        np.testing.assert_array_equal(quantities(text)[0].values(result), values[-1].T, err_msg=text)
+
+
+def test_numbers_of_the_language(result):
+    v, b = result.velocity, result.position
+    speed = np.sqrt((v**2).sum(axis=-1))
+    for text, exact in {
+        "norm(velocity)": speed[-1:].T, "max(norm(velocity))": speed.max(axis=0)[:, None],
+        "norm(max(velocity))": np.sqrt((v.max(axis=0) ** 2).sum(axis=-1))[:, None],
+        "range(depth)": np.ptp(b[..., 2], axis=0)[:, None],
+        "max(position)[1]": b[..., 1].max(axis=0)[:, None], "speed": speed[-1:].T,
+    }.items():  # fmt: skip
+        np.testing.assert_allclose(quantities(text)[0].values(result), exact, rtol=1e-15, err_msg=text)
+
+
+def test_distances_of_what_is_asked(result):
+    moved = other(result, {"position": result.position + np.array([3.0, 4.0, -12.0])})
+    for text, exact in {
+        "depth": 12.0,
+        "position[2]": 12.0,
+        "position": 13.0,
+        "norm(position)": None,
+        "speed": 0.0,
+    }.items():
+        apart = compared_in(text).distance(moved, result)
+        exact = (
+            np.linalg.norm(moved.position, axis=-1) - np.linalg.norm(result.position, axis=-1)
+            if exact is None
+            else exact
+        )
+        np.testing.assert_allclose(apart, np.abs(exact) * np.ones((K, N)), rtol=1e-13, atol=1e-13, err_msg=text)
+
+
+def test_angles_go_the_short_way_round(result):
+    yaw = np.deg2rad(179.9)
+    there, here = (notation.matrix_from_rotation_vector(np.broadcast_to([0.0, 0.0, a], (K, N, 3))) for a in (yaw, -yaw))
+    a, b = other(result, {"attitude": there}), other(result, {"attitude": here})
+    for text in ("euler", "euler[2]"):
+        np.testing.assert_allclose(compared_in(text).distance(a, b), np.deg2rad(0.2), rtol=1e-9)
+
+
+def test_the_five_keep_their_own_distances():
+    for name, unit in QUANTITIES.items():
+        assert (compared_in(name).unit, compared_in(name).functional) == (unit, None)
+
+
+def test_a_quantity_of_the_users_may_be_asked_for_everywhere(result):
+    own = lw.Quantity(
+        "sunk", lambda samples, members: samples["position"][..., 2] - members.position[None, :, 2], "m", ("position",)
+    )
+    sunk = result.position[..., 2] - result.position[0, :, 2]
+    np.testing.assert_array_equal(quantities(own)[0].values(result)[:, 0], sunk[-1])
+    asked = compared_in(own)
+    assert (asked.name, asked.unit) == ("sunk", "m")
+    np.testing.assert_array_equal(asked.values(result)[..., 0], sunk)
+    assert lw.Mean(own).quantity is own

@@ -1,0 +1,314 @@
+"""What is odd and most likely a unit is said: on both sides of each limit, by members, and never of what is right."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from benchmarks import scenes as benchmarks
+from lgvi_warp import ensemble as ensembles
+from lgvi_warp import plausibility
+from lgvi_warp.cli import main
+from lgvi_warp.plausibility import LIMITS
+from tests.conftest import ROOT
+
+BODY = {"mass": 30.0, "inertia": [0.2, 3.0, 3.0], "buoyancy": 290.0}
+POINT, AHEAD, ACROSS = [[-0.6, 0.0, 0.0]], [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]
+RUDDER = {"type": "control_fins", "position": POINT, "chord": AHEAD, "normal": ACROSS, "area": 0.01, "lift_slope": 3.0,
+          "drag": 0.02}  # fmt: skip
+# The hull of the vehicle above: 1.6 m long, 0.2 m wide. Its inertia may be 30 (1.6^2 + 0.2^2)/4 = 19.5 kg m2.
+HULL = {"type": "cross_flow", "stations": [-0.8, 0.0, 0.8], "diameters": [0.1, 0.2, 0.1], "drag_coefficient": 1.1}
+WEIGHT = 30.0 * 9.80665
+HOT = 1.0 + 1e-6
+
+
+def scene(body=None, **sections):
+    return lw.Scene.from_dict({"vehicle": BODY | (body or {}), **sections})
+
+
+def said(fleet):
+    ensemble = fleet if isinstance(fleet, lw.Ensemble) else lw.Ensemble.from_scene(fleet)
+    return plausibility.of_ensemble(ensemble).messages(ensemble.members)
+
+
+def term(**table):
+    return {"terms": [table]}
+
+
+def full(largest):
+    """The same vehicle by 6x6 matrices, with this largest inertia about its centre of gravity, 0.1 m ahead."""
+    rigid = np.diag([30.0, 30.0, 30.0, 0.2, largest + 0.3, largest + 0.3])
+    rigid[1, 5] = rigid[5, 1] = 3.0
+    rigid[2, 4] = rigid[4, 2] = -3.0
+    return {"rigid_body_mass_matrix": rigid.tolist(), "mass": None, "inertia": None}
+
+
+def carried(inertia):
+    """6x6 with this added inertia, of 40 kg of added mass across."""
+    return full(3.0) | {"added_mass_matrix": np.diag([1.0, 40.0, 40.0, 0.0, inertia, inertia]).tolist()}
+
+
+LARGEST = 30.0 * (1.6**2 + 0.2**2) / 4.0
+STRIPS = 40.0 * (0.8**2 + 0.2**2 / 4.0)
+
+# What is at its limit, what is beyond, and words of the message.
+LOOKS = {
+    "net weight down": (
+        scene({"buoyancy": 0.5 * WEIGHT * HOT}),
+        scene({"buoyancy": 0.5 * WEIGHT / HOT}),
+        ("vehicle.buoyancy", "N down", "half the weight"),
+    ),
+    "net weight up": (
+        scene({"buoyancy": 1.5 * WEIGHT / HOT}),
+        scene({"buoyancy": 1.5 * WEIGHT * HOT}),
+        ("vehicle.buoyancy", "N up"),
+    ),
+    "no buoyancy": (scene(), scene({"buoyancy": 0.0}), ("vehicle.buoyancy", "left out")),
+    "light water": (
+        scene(environment={"water_density": 100.0}),
+        scene(environment={"water_density": 99.9}),
+        ("environment.water_density", "99.9 kg/m3"),
+    ),
+    "heavy water": (
+        scene(environment={"water_density": 3000.0}),
+        scene(environment={"water_density": 3000.1}),
+        ("environment.water_density", "3000.1 kg/m3"),
+    ),
+    "current": (
+        scene(**term(type="current", velocity=[3.0, 4.0, 0.0])),
+        scene(**term(type="current", velocity=[3.0, 4.0, 0.1])),
+        ("current.velocity", "m/s"),
+    ),
+    "profile": (
+        scene(**term(type="current_profile", depths=[0.0, 9.0], velocities=[[0.0, 0.0, 0.0], [0.0, 5.0, 0.0]])),
+        scene(**term(type="current_profile", depths=[0.0, 9.0], velocities=[[0.0, 0.0, 0.0], [0.0, 5.1, 0.0]])),
+        ("current_profile.velocities", "5.1 m/s"),
+    ),
+    "tide": (
+        scene(**term(type="current_harmonics", amplitudes=[[5.0, 0.0, 0.0]], periods=[9.0])),
+        scene(**term(type="current_harmonics", amplitudes=[[0.0, -5.1, 0.0]], periods=[9.0])),
+        ("current_harmonics.amplitudes", "5.1 m/s"),
+    ),
+    "wandering current": (
+        scene(**term(type="gauss_markov_current", standard_deviation=[5.0, 0.0, 0.0], time_constant=9.0)),
+        scene(**term(type="gauss_markov_current", standard_deviation=[5.1, 0.0, 0.0], time_constant=9.0)),
+        ("gauss_markov_current.standard_deviation",),
+    ),
+    "fin's limit": (
+        scene(**term(**RUDDER, limit=math.pi / 2.0)),
+        scene(**term(**RUDDER, limit=20.0)),
+        ("control_fins.limit", "20 rad", "degrees"),
+    ),
+    "fin's command": (
+        scene(**term(**RUDDER, command=[-math.pi / 2.0])),
+        scene(**term(**RUDDER, command=[-1.6])),
+        ("control_fins.command:", "1.6 rad"),
+    ),
+    "fin's schedule": (
+        scene(**term(**RUDDER, times=[0.0, 1.0], command_schedule=[[0.0], [1.5]])),
+        scene(**term(**RUDDER, times=[0.0, 1.0], command_schedule=[[0.0], [15.0]])),
+        ("control_fins.command_schedule", "15 rad"),
+    ),
+    "speed": (
+        scene(start={"velocity": [18.0, 24.0, 0.0]}),
+        scene(start={"velocity": [18.0, 24.0, 1.0]}),
+        ("start.velocity", "30.02 m/s"),
+    ),
+    "inertial speed": (
+        scene(start={"velocity_inertial": [0.0, 30.0, 0.0], "euler_deg": [0.0, 0.0, 0.0]}),
+        scene(start={"velocity_inertial": [0.0, 30.1, 0.0], "euler_deg": [10.0, 20.0, 30.0]}),
+        ("start.velocity", "30.1 m/s"),
+    ),
+    "depth": (
+        scene(start={"position": [0.0, 0.0, 0.0]}),
+        scene(start={"position": [0.0, 0.0, -0.1]}),
+        ("start.position", "-0.1 m", "positive down"),
+    ),
+    "floor": (
+        scene(events=[{"type": "floor", "depth": 0.0}]),
+        scene(events=[{"type": "floor", "depth": -26.0}]),
+        ("floor.depth", "-26 m"),
+    ),
+    "heights for depths": (
+        scene(**term(type="current_profile", depths=[-1.0, 9.0], velocities=[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])),
+        scene(**term(type="current_profile", depths=[-9.0, 0.0], velocities=[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])),
+        ("current_profile.depths", "-9 m"),
+    ),
+    "inertia": (
+        scene({"inertia": [0.2, LARGEST / HOT, 3.0]}, terms=[HULL]),
+        scene({"inertia": [0.2, LARGEST * HOT, 3.0]}, terms=[HULL]),
+        ("vehicle.inertia", "kg m2", "1.6 m"),
+    ),
+    "inertia with added": (
+        scene({"inertia": [0.2, LARGEST + STRIPS / HOT, 3.0], "added_mass": [1.0, 40.0, 40.0]}, terms=[HULL]),
+        scene({"inertia": [0.2, LARGEST + STRIPS * HOT, 3.0], "added_mass": [1.0, 40.0, 40.0]}, terms=[HULL]),
+        ("vehicle.inertia",),
+    ),
+    "rigid body's inertia": (
+        scene(full(LARGEST / HOT), terms=[HULL]),
+        scene(full(LARGEST * HOT), terms=[HULL]),
+        ("vehicle.rigid_body_mass_matrix",),
+    ),
+    "added inertia": (
+        scene(carried(STRIPS / HOT), terms=[HULL]),
+        scene(carried(STRIPS * HOT), terms=[HULL]),
+        ("vehicle.added_mass_matrix",),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LOOKS)
+def test_beyond_a_limit_is_said_and_at_it_is_not(name):
+    usual, odd, words = LOOKS[name]
+    assert said(usual) == ()
+    (message,) = said(odd)
+    assert all(word in message for word in words), message
+
+
+def test_without_a_stated_length_any_inertia_is_possible():
+    assert said(scene({"inertia": [2e6, 3e6, 3e6]})) == ()
+
+
+def test_a_vehicle_without_weight_has_none_to_compare():
+    assert said(scene({"buoyancy": 0.0}, environment={"gravity": 0.0})) == ()
+
+
+@pytest.mark.parametrize(
+    "event", [{"type": "surface"}, {"type": "box", "lower": [-9.0, -9.0, 0.0], "upper": [9.0, 9.0, 9.0]}]
+)
+def test_an_event_at_the_surface_knows_what_is_above(event):
+    above = {"start": {"position": [0.0, 0.0, -0.1]}}
+    assert said(scene(**above, events=[event])) == ()
+    below = {"type": "box", "lower": [-9.0, -9.0, -9.0], "upper": [9.0, 9.0, 9.0]}
+    assert len(said(scene(**above, events=[below]))) == 1
+
+
+def test_members_are_counted_and_the_first_is_named(monkeypatch):
+    buoyancy = np.full(1000, 290.0)
+    buoyancy[5:817] = 3.0
+    states = [np.zeros((1000, 3)), np.tile(np.eye(3), (1000, 1, 1)), np.zeros((1000, 3)), np.zeros((1000, 3))]
+    states[0][-1, 2] = -4.0
+    fleet = lw.Ensemble.from_states(scene(), *states, {"vehicle.buoyancy": buoyancy})
+    expected = said(fleet)
+    assert "812 of 1,000 members; first: member 5)" in expected[0] and "291.2 N" in expected[0]
+    assert "(1 of 1,000 members; first: member 999)" in expected[1]
+    for at_once in (7, 111, 1000):  # the last of them alone, too
+        monkeypatch.setattr(ensembles, "AT_ONCE", at_once)
+        assert said(fleet) == expected
+
+
+def test_what_all_share_is_said_of_all():
+    fleet = lw.Ensemble(
+        scene(environment={"water_density": 1.025}), 1000, 1, {"vehicle.mass": lw.Normal(relative=1e-3)}
+    )
+    (message,) = said(fleet)
+    assert message.endswith("(all 1,000 members)")
+
+
+class Gale(lw.Current):
+    """A user's own law of the water."""
+
+    type = "gale"
+
+
+def test_the_water_of_a_law_of_the_user_is_looked_at():
+    assert said(lw.Scene(lw.Vehicle(**BODY), terms=[Gale(velocity=[5.0, 0.0, 0.0])])) == ()
+    (message,) = said(lw.Scene(lw.Vehicle(**BODY), terms=[Gale(velocity=[0.0, 6.0, 0.0])]))
+    assert message.startswith("gale: a current of 6 m/s")
+
+
+def samples(**fields):
+    return {name: np.array(values, dtype=float) for name, values in fields.items()}
+
+
+def test_what_becomes_odd_on_the_way_is_said():
+    z = [[[0, 0, 1.0], [0, 0, 0.0], [0, 0, -2.0]], [[0, 0, -0.5], [0, 0, -3.0], [0, 0, -3.0]], [[0, 0, 2.0]] * 3]
+    v = [[[29.0, 0, 0]] * 3, [[0, 31.0, 0], [np.nan, 0, 0], [0, 0, 30.0]], [[1.0, 0, 0]] * 3]
+    found = plausibility.on_the_way(scene(), samples(position=z, velocity=v)).messages(3)
+    # Members that begin at the surface, or above it as is said already, say nothing of where they mean it to be.
+    assert len(found) == 2 and "31 m/s" in found[0] and "rises 0.5 m" in found[1] and "lw.Surface()" in found[1]
+    assert all("(1 of 3 members; first: member 0)" in text for text in found)
+    assert len(plausibility.on_the_way(scene(events=[{"type": "surface"}]), samples(position=z)).messages(3)) == 0
+    assert plausibility.on_the_way(scene(), samples(position=z)).messages(3) == found[1:]
+    assert plausibility.on_the_way(scene(), {}).messages(3) == ()
+
+
+def test_of_very_many_samples_the_last_are_looked_at(monkeypatch):
+    monkeypatch.setattr(plausibility, "MOST_SAMPLES", 5)
+    v = [[[0.0, 0.0, 0.0]], [[50.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]]]
+    assert plausibility.on_the_way(scene(), samples(velocity=v)).messages(1) == ()
+    assert len(plausibility.on_the_way(scene(), samples(velocity=v[:2])).messages(1)) == 1
+
+
+def test_a_result_says_what_is_odd():
+    fleet = lw.Ensemble(
+        lw.Scene(lw.Vehicle(10.0, [1.0, 2.0, 2.5], buoyancy=200.0), start=lw.Start([0.0, 0.0, 1.0])),
+        20,
+        vary={"start.velocity": lw.Uniform(low=[0.0, 0.0, 0.0], high=[60.0, 0.1, 0.1])},
+    )
+    texts = lw.solve(fleet, h=0.01, t1=1.0).messages
+    assert [text.split(":")[0] for text in texts] == ["vehicle.buoyancy", "start.velocity", "position"]
+    assert "(all 20 members)" in texts[0] and " of 20 members; first: member " in texts[1]
+
+
+NAMED = {name: lw.Scene.named(name) for name in lw.vehicles()}
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_no_named_vehicle_is_odd(name):
+    assert said(NAMED[name]) == ()
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "examples").rglob("*.toml")), ids=lambda path: path.name)
+def test_no_example_is_odd(path):
+    assert said(lw.Scene.load(path)) == ()
+
+
+def test_no_scene_of_the_benchmarks_is_odd():
+    for name, one in {**benchmarks.each_term(), **benchmarks.coupled(), "all": benchmarks.all_terms()}.items():
+        assert said(one) == (), name
+
+
+def test_every_limit_has_its_reason_and_is_on_the_page():
+    page = (ROOT / "docs" / "plausibility.md").read_text()
+    for name, limit in LIMITS.items():
+        assert f"| {name} |" in page and limit.reason in page, name
+
+
+# The verb check.
+
+
+def written(tmp_path: Path, text: str) -> str:
+    (tmp_path / "scene.toml").write_text(text)
+    return str(tmp_path / "scene.toml")
+
+
+PLAIN = "[vehicle]\nmass = 30.0\ninertia = [0.2, 3.0, 3.0]\nbuoyancy = 290.0\n[run]\nstep = 0.01\nduration = 1.0\n"
+
+
+def test_check_says_that_a_scene_can_run(tmp_path, capsys):
+    assert main(["check", written(tmp_path, PLAIN)]) == 0
+    out = capsys.readouterr().out
+    assert out.splitlines()[-1] == "result      can run" and "psi_s, step 0.01 s, 100 steps" in out
+    assert main(["check", written(tmp_path, PLAIN), "--quiet"]) == 0 and capsys.readouterr().out == ""
+
+
+def test_check_says_what_is_odd_and_refuses_nothing_for_it(tmp_path, capsys):
+    options = ["--set", "environment.water_density=1.025", "--members", "5", "--step", "0.003"]
+    assert main(["check", written(tmp_path, PLAIN), *options]) == 0
+    notes = [line for line in capsys.readouterr().out.splitlines() if line.startswith("note")]
+    assert len(notes) == 2 and "shortened" in notes[0] and "(all 5 members)" in notes[1]
+
+
+def test_check_refuses_what_run_refuses(tmp_path, capsys):
+    assert main(["check", written(tmp_path, PLAIN), "--set", "vehicle.mass=-3"]) == 2
+    assert "vehicle.mass = -3: is not positive" in capsys.readouterr().err
+    assert main(["check", written(tmp_path, PLAIN), "--method", "psi_s", "--set", "run.duration=1e9"]) == 2
+    assert "step" in capsys.readouterr().err
+
+
+def test_check_of_a_scene_without_a_step_looks_at_the_rest(tmp_path, capsys):
+    assert main(["check", written(tmp_path, PLAIN.split("[run]")[0])]) == 0
+    assert "run.step and run.duration: not given" in capsys.readouterr().out

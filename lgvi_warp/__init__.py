@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 from lgvi_warp.distributions import Choice, LogNormal, Normal, TruncatedNormal, Uniform
 from lgvi_warp.ensemble import Ensemble
-from lgvi_warp.errors import MembersFailed, SceneError
+from lgvi_warp.errors import Interrupted, MembersFailed, SceneError
 from lgvi_warp.events import Box, Event, Floor, StopTime, Surface
 from lgvi_warp.joint_laws import CorrelatedNormal, PhysicalInertia, PositiveDefinite, RotationNormal, UniformRotation
 from lgvi_warp.laws import Frozen
@@ -140,6 +140,7 @@ __all__ = [
     "Grid",
     "Halton",
     "Histogram",
+    "Interrupted",
     "LatinHypercube",
     "Levels",
     "LogNormal",

@@ -42,6 +42,17 @@ def _syncs() -> ThreadPoolExecutor:
 _room = threading.BoundedSemaphore(MOST_WAITING)
 
 
+def _renew() -> None:
+    """In a child after a fork, where none of the threads lives on."""
+    global _room
+    _syncs.cache_clear()
+    _room = threading.BoundedSemaphore(MOST_WAITING)
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_renew)
+
+
 def sync_file(beside: Path, target: Path) -> None:
     """Wait until a file is on the disk: where it lies, and what it will be called."""
     descriptor = os.open(beside, os.O_RDONLY)
@@ -275,6 +286,11 @@ def locked(path: Path, wait: bool = False) -> Iterator[bool]:
             return
         except OSError:  # a file system without locks
             pass
-        yield True
+        try:
+            yield True
+        finally:
+            # A child that was forked meanwhile holds the same lock: to close it here alone would not release it.
+            with contextlib.suppress(OSError):
+                fcntl.flock(descriptor, fcntl.LOCK_UN)
     finally:
         os.close(descriptor)

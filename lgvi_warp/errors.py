@@ -56,6 +56,14 @@ class MembersFailed(RuntimeError):  # noqa: N818
         self.result = result
 
 
+class Interrupted(KeyboardInterrupt):
+    """A run in memory was interrupted. `result` holds the members that were finished: nothing of them is lost."""
+
+    def __init__(self, text: str, result: Any):
+        super().__init__(text)
+        self.result = result
+
+
 class NothingToDraw(ValueError):  # noqa: N818
     """A picture that would be empty: the message says why."""
 

@@ -11,15 +11,15 @@ import numpy as np
 import warp as wp
 
 from lgvi_kernels.examine import COLUMNS, OUT_FIELDS, make_examine
-from lgvi_warp import inertia, notation, vehicle, warp_setup
+from lgvi_warp import inertia, kernel_cache, notation, vehicle, warp_setup
 from lgvi_warp.errors import SceneError
 from lgvi_warp.inertia import Frame
 from lgvi_warp.machine import default_width
 from lgvi_warp.packets import Packets, pack
-from lgvi_warp.plan import build_lock
 from lgvi_warp.scene import Environment, Scene
 from lgvi_warp.terms.base import Setting, Term
 from lgvi_warp.vehicle import Vehicle
+from lgvi_warp.warp_setup import build_lock
 
 # Length [s] and number of the kick that the views are of.
 KICK, STEP = 0.01, 3
@@ -162,8 +162,9 @@ def _built(term: Term, module: Any, width: int) -> Any:
     )
     try:
         examine = make_examine(module, width, wp.float64)
-        with build_lock:
-            wp.load_module(examine.kernel.module, device="cpu")
+        kernel_cache.load(examine.kernel.module)
+    except OSError:  # of the kernel cache
+        raise
     except Exception as error:
         words = " ".join(str(error).split())
         raise SceneError([f"{term.key}.device = {module!r}: does not compile: {words}; {remedy}"]) from error

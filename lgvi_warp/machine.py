@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import platform
 import time
@@ -10,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from lgvi_warp import container
 
 # What a run's dtype may be -> the type of the kernel's numbers. Compensated: a state of sums of two numbers.
 DTYPES = {"float64": "float64", "float32": "float32", "float32_compensated": "float32"}
@@ -36,9 +39,17 @@ def default_width(dtype: str, *, chained: bool = False) -> int:
     return registers * REGISTER_BYTES[simd()] // np.dtype(DTYPES[dtype]).itemsize
 
 
-def thread_count() -> int:
-    """Cores that this process may use."""
+def affinity() -> int:
+    """Cores that this process may run on, as os.process_cpu_count has it from Python 3.13 on."""
+    if hasattr(os, "process_cpu_count"):
+        return os.process_cpu_count() or 1
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def thread_count() -> int:
+    """Threads that a run has by default: a core each, and no more than a container's quota of CPU time keeps busy."""
+    quota = container.cpu_quota()
+    return affinity() if quota is None else max(1, min(affinity(), math.ceil(quota)))
 
 
 def cpu_name() -> str:
@@ -51,12 +62,18 @@ def cpu_name() -> str:
     return platform.processor() or platform.machine()
 
 
-def memory_bytes() -> int | None:
-    """Physical memory, or None where the system does not tell."""
+def physical_memory() -> int | None:
+    """Of the machine [bytes]; None where the system does not tell."""
     try:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):
         return None
+
+
+def memory_bytes() -> int | None:
+    """Memory that there is for this process: of the machine, or what a container leaves of it; None if neither tells."""
+    known = [size for size in (physical_memory(), container.memory_limit()) if size is not None]
+    return min(known, default=None)
 
 
 def versions() -> dict[str, str]:
@@ -80,7 +97,7 @@ def fma_peak(dtype: str = "float64", width: int | None = None, rounds: int = 5, 
     import warp as wp
 
     from lgvi_kernels.peak import CHAINS, make_peak
-    from lgvi_warp import warp_setup
+    from lgvi_warp import kernel_cache, warp_setup
 
     warp_setup.start()
     real = wp.float64 if dtype == "float64" else wp.float32
@@ -88,6 +105,7 @@ def fma_peak(dtype: str = "float64", width: int | None = None, rounds: int = 5, 
     kernel, Lane = make_peak(width, real)
     values = np.full((CHAINS + 3, width), 0.5, dtype=dtype)
     data = wp.array(values, dtype=Lane, device="cpu")
+    kernel_cache.load(kernel.module)
     command = wp.launch(kernel, dim=1, inputs=[data, loops], device="cpu", record_cmd=True)
     best = 0.0
     for _ in range(rounds):

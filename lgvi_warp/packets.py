@@ -19,11 +19,12 @@ from lgvi_warp import inertia, limits, modified_inertia, notation, vehicle
 from lgvi_warp.ensemble import Ensemble, Members
 from lgvi_warp.events import Event
 from lgvi_warp.machine import DTYPES
-from lgvi_warp.plan import Plan, build_lock
+from lgvi_warp.plan import Plan
 from lgvi_warp.statistics.ends import Ends
 from lgvi_warp.survey import frame_of
 from lgvi_warp.terms.base import Packed, Setting
 from lgvi_warp.terms.drag import Drag
+from lgvi_warp.warp_setup import build_lock
 
 
 @dataclass

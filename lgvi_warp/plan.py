@@ -5,11 +5,9 @@ from __future__ import annotations
 import contextlib
 import copy
 import functools
-import threading
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,7 +20,7 @@ from lgvi_kernels.lanes import WIDTHS
 from lgvi_kernels.rows import SAMPLE_FIELDS
 from lgvi_kernels.stops import STOPS
 from lgvi_kernels.terms import LAWS
-from lgvi_warp import durable, limits, warp_setup
+from lgvi_warp import kernel_cache, limits
 from lgvi_warp.ensemble import Ensemble
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.gauss import gauss
@@ -31,6 +29,7 @@ from lgvi_warp.method import KINDS, Method
 from lgvi_warp.model import Model, make_model
 from lgvi_warp.saveat import TimeGrid
 from lgvi_warp.status import CHECKS, ON_FAILURE
+from lgvi_warp.warp_setup import build_lock
 
 # Sub-maps whose equation may have no solution.
 SOLVING = {"D", "W", "A", "Phi", "Phi*"}
@@ -39,28 +38,6 @@ SOLVING = {"D", "W", "A", "Phi", "Phi*"}
 # buffer that samples pass through stays small, however long the run is.
 SEGMENT_VEHICLE_STEPS = 20_000_000
 SEGMENT_SAMPLE_BYTES = 16_000_000
-
-# Warp builds and launches kernels for one thread at a time.
-build_lock = threading.Lock()
-
-
-@contextlib.contextmanager
-def _one_at_a_time(kernel: str) -> Iterator[None]:
-    """Let one process compile a kernel while others that want the same one wait for what it puts into Warp's cache.
-
-    kernel: its hash. Without this each would compile it: that is safe, since Warp renames finished folders into their
-    places, but slow. Other kernels wait for nothing, unless the first two digits of their hashes are the same: so there are
-    at most 256 files to lock.
-    """
-    path = Path(wp.config.kernel_cache_dir) / "lgvi_warp_locks" / kernel[:2]
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.touch()
-    except OSError:  # a cache that is only read
-        yield
-        return
-    with durable.locked(path, wait=True):
-        yield
 
 
 @dataclass(frozen=True)
@@ -118,7 +95,7 @@ class Plan:
 
     def _choose_kernel(self) -> None:
         object.__setattr__(self, "spec", self._spec())
-        with self._laws_compile():
+        with build_lock, self._laws_compile():
             object.__setattr__(self, "advance", make_advance(self.spec))
 
     def _check_substep(self) -> None:
@@ -224,6 +201,8 @@ class Plan:
         """Where a scene has laws of a user, what does not compile is theirs. Raises SceneError for it."""
         try:
             yield
+        except OSError:  # of the kernel cache
+            raise
         except Exception as error:
             known = (*LAWS.values(), *STOPS.values())
             own = [term.key for term, module in (*self.model.laws, *self.model.events) if module not in known]
@@ -250,9 +229,8 @@ class Plan:
     def compile(self) -> float:
         """Load the kernel, compiling it if Warp's cache has none. Returns the seconds it took."""
         start = time.perf_counter()
-        warp_setup.start()
-        with build_lock, self._laws_compile(), _one_at_a_time(self.kernel_hash):
-            wp.load_module(self.advance.kernel.module, device="cpu")
+        with self._laws_compile():
+            kernel_cache.load(self.advance.kernel.module)
         _ = self.dtypes, self.times  # made here, before threads ask for them
         return time.perf_counter() - start
 

@@ -6,6 +6,7 @@ import dataclasses
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from lgvi_warp.ensemble import STATES, Ensemble
 from lgvi_warp.errors import Faults, SceneError
 from lgvi_warp.method import Method
+from lgvi_warp.sampling.table import Table, moved
 from lgvi_warp.saveat import TimeGrid
 from lgvi_warp.scene import Scene
 
@@ -50,15 +52,18 @@ ARRAYS = "arrays_sha256"
 
 
 def of_store(provenance: Mapping[str, Any], ensemble: Ensemble) -> dict[str, Any]:
-    """Provenance as a store keeps it: of what was given as arrays the checksum alone, and of a table the names."""
+    """Provenance as a store keeps it: of what was given as arrays the checksum alone, and of a table the names.
+
+    A table of a file is told by its name and the checksum that it has already.
+    """
     given, sampling = ensemble.explicit(), ensemble.sampling
-    if not given:
-        return dict(provenance)
-    told = dict(provenance["ensemble"])
-    if arrays := sampling.arrays():
+    arrays, told = sampling.arrays(), dict(provenance["ensemble"])
+    if getattr(sampling, "file", None) is not None:
+        given = {name: values for name, values in given.items() if name not in arrays}
+    elif arrays:
         left = {name: value for name, value in sampling.to_dict()[sampling.kind].items() if name not in arrays}
         told["sampling"] = {sampling.kind: {"columns": sorted(arrays)} if sampling.kind == "table" else left}
-    return {**provenance, "ensemble": told | {ARRAYS: _checksum(given)}}
+    return {**provenance, "ensemble": told | ({ARRAYS: _checksum(given)} if given else {})}
 
 
 def _checksum(arrays: Mapping[str, np.ndarray]) -> str:
@@ -75,11 +80,20 @@ def ensemble_of(
     settings: Mapping[str, Any],
     explicit: Mapping[str, np.ndarray],
     noise: np.ndarray | None,
+    store: Path,
 ) -> Ensemble:
-    """The ensemble that provenance tells of; explicit: its arrays; noise: `indices` where they were set. Raises SceneError."""
+    """The ensemble that provenance tells of; explicit: its arrays; noise: `indices` where they were set. Raises SceneError.
+
+    store: the folder that the provenance is of, beside which a table's file is looked for.
+    """
     _check_table(settings.get("sampling"))
-    own = Scene.from_dict(scene)
     settings = {key: value for key, value in settings.items() if key != ARRAYS}
+    table = _table(settings, explicit, store)
+    if table is not None:
+        settings["sampling"] = table
+        if "ensemble" in scene:
+            scene = {**scene, "ensemble": {**scene["ensemble"], "sampling": table}}
+    own = Scene.from_dict(scene)
     if "explicit" in settings:
         states = {name: explicit[f"start.{name}"] for name in STATES}
         parameters = {name: value for name, value in explicit.items() if not name.startswith("start.")}
@@ -88,7 +102,7 @@ def ensemble_of(
         if "indices" in settings:
             ensemble = ensemble.subset(settings["indices"])
     else:
-        if explicit:
+        if explicit and table is None:
             ((kind, left),) = settings["sampling"].items()
             settings["sampling"] = {kind: {"values": explicit} if kind == "table" else {**left, **explicit}}
         ensemble = Ensemble.from_scene(Scene.from_dict({**scene, "ensemble": settings}))
@@ -107,6 +121,17 @@ def _check_table(sampling: Any) -> None:
         faults.raise_if_any()
 
 
+def _table(settings: Mapping[str, Any], explicit: Mapping[str, np.ndarray], store: Path) -> Any:
+    """The table of a file that an ensemble was drawn from, from its numbers in the store, or read again; None without."""
+    sampling = settings.get("sampling")
+    told = sampling.get("table") if isinstance(sampling, Mapping) else None
+    if not isinstance(told, Mapping) or "file" not in told:
+        return None
+    if explicit:
+        return Table.kept(told, explicit)
+    return Table(**{**told, "file": moved(told["file"], told.get("sha256"), store)})
+
+
 def same_run(
     stored: Mapping[str, Any], now: Mapping[str, Any], name: str = "the store", other: str | None = None
 ) -> list[str]:
@@ -121,12 +146,22 @@ def same_run(
 
 
 def _comparable(provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """Without what changes no bit: the number of threads, the version of Python, the scene's own [ensemble] and [run]."""
+    """Without what changes no bit: threads, the version of Python, the scene's own [ensemble] and [run], a file's place."""
     content = dict(provenance)
     content["scene"] = {key: value for key, value in content["scene"].items() if key not in ("ensemble", "run")}
     content["machine"] = {key: value for key, value in content["machine"].items() if key in ("cpu", "simd")}
     content["versions"] = {key: value for key, value in content["versions"].items() if key != "python"}
+    content["ensemble"] = _without_place(content["ensemble"])
     return content
+
+
+def _without_place(ensemble: Mapping[str, Any]) -> dict[str, Any]:
+    """Of a table of a file what its numbers depend on: its checksum, and not where it lies."""
+    sampling = ensemble.get("sampling")
+    told = sampling.get("table") if isinstance(sampling, Mapping) else None
+    if not isinstance(told, Mapping) or told.get("sha256") is None:
+        return dict(ensemble)
+    return {**ensemble, "sampling": {"table": {key: value for key, value in told.items() if key != "file"}}}
 
 
 def differences(there: Any, here: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:

@@ -55,6 +55,14 @@ class Progress:
             self._report(self._sum / self._total)
 
 
+@dataclass
+class Merged:
+    """Where the members end that keepers have begun to take, and have taken."""
+
+    begun: int = 0
+    done: int = 0
+
+
 def run_blocks(
     work: Work,
     runs: Sequence[Block],
@@ -62,20 +70,26 @@ def run_blocks(
     advanced: Callable[[Block, int], None],
     left: Sequence[Block] | None = None,
     enough: Callable[[int], bool] = lambda members: False,
+    merged: Merged | None = None,
 ) -> int:
     """Run blocks and hand their parts to the keepers in order. Returns where the members end that were merged.
+
+    merged: is told so after each block, for when an exception is what ends the run.
 
     left: those of the blocks that the store of the work has not, by default all. enough: asked after each block, with the
     members so far: the first yes ends the run, and blocks that are ahead of it are lost or of no account.
     """
     fresh = set(left or ())
+    merged = merged or Merged()
     with contextlib.closing(_in_turn(work, runs, runs if left is None else left, executor, advanced)) as done:
         for block, parts in done:
+            merged.begun = block.stop
             # Parts that come from the store may be somebody else's.
             old = work.sink if left is not None and block not in fresh else None
             with understood(old.root / old.parts_key(block)) if old else nullcontext():
                 for keeper, part in zip(work.keepers, parts, strict=True):
                     keeper.merge(block, part)
+            merged.done = block.stop
             if enough(block.stop):
                 return block.stop
     return runs[-1].stop

@@ -13,7 +13,7 @@ import numpy as np
 from lgvi_warp import machine, member_fields, plausibility
 from lgvi_warp.blocks import Work, blocks
 from lgvi_warp.ensemble import AT_ONCE, Ensemble
-from lgvi_warp.errors import Faults, MembersFailed, SceneError, shown
+from lgvi_warp.errors import Faults, Interrupted, MembersFailed, SceneError, shown
 from lgvi_warp.executors import Executor, executor_of
 from lgvi_warp.executors.threads import Threads
 from lgvi_warp.keepers import Outcomes, Samples
@@ -24,9 +24,10 @@ from lgvi_warp.outcomes import failure_text
 from lgvi_warp.plan import Plan
 from lgvi_warp.recipe import of_store
 from lgvi_warp.result import Drawn, Result
-from lgvi_warp.running import Progress, Stored, run_blocks
+from lgvi_warp.running import Merged, Progress, Stored, run_blocks
 from lgvi_warp.saveat import FIELDS, SaveAt, time_grid
 from lgvi_warp.scene import Scene
+from lgvi_warp.statistics.estimate import Estimates
 from lgvi_warp.status import Status
 from lgvi_warp.store import Folder, Store
 from lgvi_warp.stored import result_of
@@ -79,7 +80,8 @@ def solve(
     (the last may ask for more than there are): the result then is of their members.
 
     Raises SceneError naming every fault of the arguments, MembersFailed as asked. Prints nothing. The same inputs give the
-    same bits for any number of threads, on one type of machine.
+    same bits for any number of threads, on one type of machine. A run in memory that Ctrl-C interrupts raises Interrupted, a
+    KeyboardInterrupt whose `result` has the members that were finished.
     """
     if not isinstance(fleet, Ensemble | Scene):
         raise SceneError(
@@ -103,7 +105,8 @@ def solve(
     )
     asked, count = (save or SaveAt()).fields, threads or machine.thread_count()
     if store is None:
-        return finished(run_plan(plan, count, progress, observed, asked, runner), plan, observed, asked, count)
+        result = run_plan(plan, count, progress, observed, asked, runner, partial=True)
+        return finished(result, plan, observed, asked, count)
     only = blocks_there(only, plan)
     into = store if isinstance(store, Store) else Store(store)
     result = run_stored(plan, into, runner, progress, only, observed, asked)
@@ -212,11 +215,12 @@ def run_plan(
     observed: Observation | None = None,
     fields: Sequence[str] | None = None,
     executor: Executor | None = None,
+    partial: bool = False,
 ) -> Result:
     """Run every block of the plan, or as many as its statistics need, and gather the result in memory.
 
     observed: what is kept, by default the samples of all members; fields: which of them, by default all of the plan.
-    executor: by default so many threads.
+    executor: by default so many threads. partial: an interrupt raises Interrupted with the members that were finished.
     """
     observed = observed or Observation()
     compile_seconds = plan.compile()
@@ -226,14 +230,46 @@ def run_plan(
     keepers = (outcomes, *((samples,) if samples else ()), *observing.keepers)
     made = Progress(total * plan.grid.steps, progress)
     start = time.perf_counter()
-    n = run_blocks(Work(plan, keepers), blocks(total), executor or Threads(threads), made.at, enough=observing.enough)
+    merged = Merged()
+
+    def ended(n: int, whole: bool = True) -> Result:
+        return _in_memory(
+            plan, n, observed, outcomes, samples, observing if whole else None, fields,
+            compile_seconds, time.perf_counter() - start,
+        )  # fmt: skip
+
+    try:
+        n = run_blocks(Work(plan, keepers), blocks(total), executor or Threads(threads), made.at, enough=observing.enough,
+                       merged=merged)  # fmt: skip
+    except KeyboardInterrupt as stop:
+        if not (partial and merged.done):
+            raise
+        result = ended(merged.done, merged.begun == merged.done)
+        text = f"interrupted: the first {merged.done:,} of {total:,} members were finished"
+        raise Interrupted(text, replace(result, messages=(*result.messages, text))) from stop
     if progress and n < total:
         progress(1.0)
-    run_seconds = time.perf_counter() - start
+    return ended(n)
+
+
+def _in_memory(
+    plan: Plan,
+    n: int,
+    observed: Observation,
+    outcomes: Outcomes,
+    samples: Samples | None,
+    observing: Observing | None,
+    fields: Sequence[str] | None,
+    compile_seconds: float,
+    run_seconds: float,
+) -> Result:
+    """The result of the first n members; observing: their statistics, None where some are of others as well."""
     told = provenance(plan, observed, fields)
     parameters = Drawn(plan.ensemble, n)
     of_members = {name: values[:n] for name, values in member_fields.of(plan, outcomes.all).items()}
-    estimates, said = observing.read(told["ensemble"], of_members["status"])
+    estimates, said = Estimates(), tuple[str, ...]()
+    if observing is not None:
+        estimates, said = observing.read(told["ensemble"], of_members["status"])
     # What lies beyond the last member was never written.
     kept = samples.fields if samples and samples.fields else {}
     histories = {name: values[:, :n] for name, values in kept.items()}
@@ -245,7 +281,7 @@ def run_plan(
         messages=messages(plan) + said + plausibility.on_the_way(plan.ensemble.scene, histories).messages(n),
         provenance=told
         | {name: float(of_members[name].mean()) for name in ("steps_made", "steps_tried") if name in of_members}
-        | ({"members": n} if n < total else {}),
+        | ({"members": n} if n < plan.ensemble.members else {}),
         terms=tuple(plan.ensemble.scene.terms),
         statistics=estimates,
         compile_seconds=compile_seconds,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field, replace
@@ -38,8 +37,6 @@ SKEWED = 0.1
 REFUSED = 255
 # One step so short that no method refuses it for its length.
 SHORTEST = TimeGrid(1e-9, np.array([0, 1]), np.array([0.0, 1e-9]))
-# Kernels are made by one thread at a time.
-_plans = threading.Lock()
 
 
 @dataclass
@@ -80,8 +77,7 @@ def column(h: float, members: np.ndarray, error_time: float, t1: float, least: i
 def plan_of(grid: Grid, members: np.ndarray, method: str, times: TimeGrid, dtype: str) -> Plan:
     """A run of some members. Raises SceneError where the method cannot do it."""
     checks = "all" if "all" in plan.CHECKS else "safe"
-    with _plans:
-        return Plan(grid.fleet(members), Method(method), times, FIELDS, dtype, checks=checks)
+    return Plan(grid.fleet(members), Method(method), times, FIELDS, dtype, checks=checks)
 
 
 def refusals(grid: Grid, names: Sequence[str], dtype: str) -> dict[str, str]:

@@ -378,7 +378,7 @@ class Folder:
         with understood(self.path / ROOT):
             if ensemble is None:
                 noise = given.pop("indices", None)
-                ensemble = ensemble_of(self.provenance["scene"], self.provenance["ensemble"], given, noise)
+                ensemble = ensemble_of(self.provenance["scene"], self.provenance["ensemble"], given, noise, self.path)
             return plan_of(self.recipe, ensemble, steps, times)
 
     def damage(self) -> list[str]:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import errno
 import functools
 import os
 import sys
+import threading
 from collections.abc import Iterator
+from typing import Any
 
 import warp as wp
+import warp._src.context as context
 
 
 @contextlib.contextmanager
@@ -42,16 +46,77 @@ def _has_cuda_driver() -> bool:
     return False
 
 
-@functools.cache
+# Warp is started, builds and launches kernels for one thread at a time. A fork waits for it, so that a child finds Warp at
+# rest.
+build_lock = threading.RLock()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(
+        before=build_lock.acquire, after_in_parent=build_lock.release, after_in_child=build_lock.release
+    )
+
+
 def start() -> None:
     """Initialise Warp once, quietly: no banner unless the user asked for one, no remark that there is no GPU driver.
 
     Warp's native code writes that remark to the file descriptor itself, whatever its log level, so it is caught there.
+
+    Raises:
+        OSError: where the folder of Warp's kernel cache cannot be made; it names the folder and WARP_CACHE_PATH.
     """
+    # Two threads that close and open stderr together would leave it closed.
+    with build_lock:
+        _start()
+
+
+@functools.cache
+def _start() -> None:
     if wp.config.log_level == wp.LOG_INFO:
         wp.config.log_level = wp.LOG_WARNING
-    if _has_cuda_driver():
-        wp.init()
-        return
-    with _native_stderr_closed():
-        wp.init()
+    chosen = wp.config.kernel_cache_dir
+    try:
+        with contextlib.nullcontext() if _has_cuda_driver() else _native_stderr_closed():
+            wp.init()
+    except OSError as error:
+        cache, wp.config.kernel_cache_dir = wp.config.kernel_cache_dir, chosen
+        if error.errno is None or cache is None:
+            raise  # one of Warp's libraries
+        raise unusable(cache, error) from error
+
+
+def unusable(cache: str | os.PathLike[str], error: OSError) -> OSError:
+    """What went wrong with the kernel cache, and the remedy.
+
+    Args:
+        cache: its folder.
+        error: what the system said.
+
+    Returns:
+        An error of the same number that names the folder and WARP_CACHE_PATH.
+    """
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    what = "has no room for a new kernel" if full else "cannot be written"
+    remedy = f"{'make room, or ' if full else ''}set WARP_CACHE_PATH to another folder"
+    return OSError(error.errno, f"the kernel cache {what} ({error.strerror}); {remedy}", os.fspath(cache))
+
+
+def header_folders() -> dict[int, Any]:
+    """Temporary folders of Clang's precompiled headers, by thread; empty where Warp keeps them otherwise."""
+    return getattr(context.runtime, "_pch_dirs", {})
+
+
+def end() -> None:
+    """Remove the temporary folders, in a process that ends without Python's own cleaning up."""
+    for folder in header_folders().values():
+        folder.cleanup()
+    header_folders().clear()
+
+
+def _forget() -> None:
+    """In a child after a fork: the temporary folders are the parent's, to read, to write and to remove."""
+    for folder in header_folders().values():
+        folder._finalizer.detach()
+    header_folders().clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget)

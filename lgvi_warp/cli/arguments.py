@@ -22,7 +22,8 @@ EPILOG = """examples:
   lgvi-warp info
 
 exit codes: 0 done; 1 members, files or the disk failed, or info or merge found a run that is not whole; 2 refused: a scene,
-an argument, or what lies in a folder; 130 interrupted. Results go to stdout, progress and faults to stderr.
+an argument, or what lies in a folder; 130 interrupted, 143 by SIGTERM, 129 by SIGHUP (a second one ends at once). Results
+go to stdout, progress and faults to stderr.
 """
 
 

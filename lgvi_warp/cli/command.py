@@ -13,6 +13,7 @@ from lgvi_warp.cli.check import check
 from lgvi_warp.cli.machine import bench, info
 from lgvi_warp.cli.runs import plan, resume, run
 from lgvi_warp.cli.settings import RUN, out_of
+from lgvi_warp.cli.signals import Ended, Signals, Streams
 from lgvi_warp.cli.stores import export, merge
 from lgvi_warp.cli.studies import sensitivity, stability, tradeoff
 from lgvi_warp.errors import SceneError
@@ -34,22 +35,34 @@ VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command. Returns its exit code, see arguments.EPILOG."""
-    chosen = parser().parse_args(arguments)
-    try:
-        return VERBS[chosen.verb](chosen)
-    except SceneError as error:
-        print(f"lgvi-warp: {error}", file=sys.stderr)
-        return 2
-    except OSError as error:
+    with Streams():
+        chosen = parser().parse_args(arguments)
+        with Signals(lambda: left(chosen)) as signals:
+            try:
+                code = VERBS[chosen.verb](chosen)
+                sys.stdout.flush()
+                return code
+            except BaseException as error:
+                return code_of(error, chosen, signals)
+
+
+def code_of(error: BaseException, chosen: argparse.Namespace, signals: Signals) -> int:
+    """Say on stderr what ended a verb. Returns the exit code; raises what is no fault of the user's or of the system's."""
+    # What libraries make of an interrupt while they are imported may be any exception.
+    if isinstance(error, KeyboardInterrupt) or signals.number is not None:
+        text, code = f"{signals.text}; {error if isinstance(error, Ended) else left(chosen)}", signals.exit_code
+    elif isinstance(error, SceneError):
+        text, code = str(error), 2
+    elif isinstance(error, OSError):
         where = f"{error.filename}: " if error.filename else ""
-        print(f"lgvi-warp: {where}{error.strerror or error}", file=sys.stderr)
-        return 1
-    except MemoryError as error:
-        print(f"lgvi-warp: {error or 'out of memory'}; run fewer members or keep fewer samples", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt as interrupt:
-        print(f"lgvi-warp: interrupted; {str(interrupt) or left(chosen)}", file=sys.stderr)
-        return 130
+        text, code = f"{where}{error.strerror or error}", 1
+    elif isinstance(error, MemoryError):
+        text, code = f"{error or 'out of memory'}; run fewer members or keep fewer samples", 1
+    else:
+        raise error
+    signals.said = True
+    print(f"lgvi-warp: {text}", file=sys.stderr)
+    return code
 
 
 def left(chosen: argparse.Namespace) -> str:
@@ -71,7 +84,15 @@ def entry() -> None:
     libraries' taking-down at the end, when every file is closed already.
     """
     gc.disable()
-    code = main()
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for descriptor in range(3):  # one that is closed would become that of a file
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+    try:
+        code = main()
+    except SystemExit as end:  # of the parser
+        code = end.code if isinstance(end.code, int) else 0
+    if warp_setup := sys.modules.get("lgvi_warp.warp_setup"):
+        warp_setup.end()
     os._exit(code)

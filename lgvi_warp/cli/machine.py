@@ -13,10 +13,10 @@ def info(chosen: argparse.Namespace) -> int:
         return info_of_run(chosen.dir)
     from lgvi_warp import machine
 
-    described, memory = machine.describe(), machine.memory_bytes()
-    print(f"cpu         {described['cpu']}, {described['simd']}, {described['threads']} threads")
-    if memory:
-        print(f"memory      {memory / 2**30:.1f} GiB")
+    described = machine.describe()
+    print(f"cpu         {described['cpu']}, {described['simd']}, {described['threads']} threads{_of_quota()}")
+    if memory := machine.memory_bytes():
+        print(f"memory      {memory / 2**30:.1f} GiB{_of_limit(memory)}")
     print("versions    " + ", ".join(f"{name} {version}" for name, version in machine.versions().items()))
     for dtype in ("float64", "float32"):
         peak = machine.fma_peak(dtype)
@@ -24,6 +24,26 @@ def info(chosen: argparse.Namespace) -> int:
             f"{dtype}     {machine.default_width(dtype)} vehicles per packet; one core's peak {peak / 1e9:.1f} GFMA/s"
         )
     return 0
+
+
+def _of_quota() -> str:
+    """What a container's quota leaves of the cores, where it does."""
+    from lgvi_warp import container, machine
+
+    quota, cores = container.cpu_quota(), machine.affinity()
+    if quota is None or quota >= cores:
+        return ""
+    return f" (a quota of {quota:g} CPUs; {cores} cores)"
+
+
+def _of_limit(memory: int) -> str:
+    """What a container's limit leaves of the memory, where it does."""
+    from lgvi_warp import machine
+
+    physical = machine.physical_memory()
+    if physical is None or physical <= memory:
+        return ""
+    return f" (the container's limit; {physical / 2**30:.1f} GiB in the machine)"
 
 
 def bench(chosen: argparse.Namespace) -> int:

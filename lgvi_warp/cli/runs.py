@@ -5,12 +5,17 @@ from __future__ import annotations
 import argparse
 import threading
 import time
+from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.report import report, told
 from lgvi_warp.cli.settings import block_range, folder, overrides, store_settings
-from lgvi_warp.errors import MembersFailed, SceneError
+from lgvi_warp.cli.signals import Ended
+from lgvi_warp.errors import Interrupted, MembersFailed, SceneError
+
+# The file of a result in memory, and that of a part of one where such a file is there.
+RESULT, PART = "result.npz", "result_part.npz"
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -35,11 +40,35 @@ def run(chosen: argparse.Namespace) -> int:
             )  # fmt: skip
         except MembersFailed as error:
             result, failures = error.result, [str(error)]
-    warm.join()
-    faults = report(result, out, chosen.quiet, begun) + failures
+        except Interrupted as error:
+            raise Ended(rescued(error.result, out)) from error
+    try:
+        warm.join()
+        faults = report(result, out, chosen.quiet, begun) + failures
+    except KeyboardInterrupt as error:
+        if str(out / RESULT) in str(error):
+            raise  # it is written
+        raise Ended(rescued(result, out)) from error
     if suggested:
         faults += check_error(scene, result, suggested, chosen.quiet)
     return 1 if told(faults) or all_failed(result) else 0
+
+
+def rescued(result: Any, out: Path) -> str:
+    """Save what an interrupted run in memory has, but for its pictures. Returns what is left, and how to go on."""
+    if result.store is not None:
+        return f"the run is finished: its pictures are made by lgvi-warp resume {result.store.parent}"
+    # The result of another run that is there stays.
+    path = next(path for path in (out / RESULT, out / PART) if path.name == PART or not path.exists())
+    n, whole = result.members, result.provenance["ensemble"]["members"]
+    members = (
+        f"the first {n:,} of {whole:,} members are" if n < whole else f"the run is finished: its {n:,} members are"
+    )
+    try:
+        result.save(path)
+    except OSError as error:
+        return f"{members} lost: {path}: {error.strerror or error}"
+    return f"{members} saved in {path}" + ("; a run with --store zarr can go on where it stopped" if n < whole else "")
 
 
 def all_failed(result: Any) -> bool:

@@ -8,6 +8,7 @@ from typing import Any
 from lgvi_warp.cli.progress import part_of, shown
 from lgvi_warp.cli.report import told
 from lgvi_warp.cli.settings import folder, overrides
+from lgvi_warp.cli.signals import Ended
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.errors import SceneError
 
@@ -89,10 +90,15 @@ def stability(chosen: argparse.Namespace) -> int:
     written, texts = Written(), []
     with shown(chosen.quiet) as progress:
         for i, (name, (x, y)) in enumerate(maps.items()):
-            found = stability_map(
-                scene, x, y, methods, points=chosen.points, t1=t1, error=chosen.error, of=chosen.of, seed=seed,
-                progress=part_of(progress, i, len(maps)),
-            )  # fmt: skip
+            try:
+                found = stability_map(
+                    scene, x, y, methods, points=chosen.points, t1=t1, error=chosen.error, of=chosen.of, seed=seed,
+                    progress=part_of(progress, i, len(maps)),
+                )  # fmt: skip
+            except KeyboardInterrupt as error:
+                if not written.files:
+                    raise
+                raise Ended(f"{i} of {len(maps)} maps are finished, in {out}") from error
             written.files += found.save(out, name)
             texts.append(report_text(found))
             written.draw(plot_stability, found, out / f"{name}.png")

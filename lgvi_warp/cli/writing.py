@@ -9,7 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from lgvi_warp.cli.signals import Ended
 from lgvi_warp.errors import MissingExtra, NothingToDraw
+
+# A signal that comes just before the main thread begins to wait is heard so much later [s].
+PERIOD = 0.2
 
 
 @dataclass
@@ -80,11 +84,12 @@ def side_by_side(writers: Mapping[Path, Callable[[Path], Path]]) -> dict[Path, F
     try:
         for path in writers:
             jobs[path] = pool.submit(make, path)
-        wait(jobs.values())
+        while wait(jobs.values(), timeout=PERIOD).not_done:
+            pass
         pool.shutdown()
     except KeyboardInterrupt:
         pool.shutdown(cancel_futures=True)
         while len(begun) > len(ended):  # the pool does not know of a thread that it was just starting
             time.sleep(0.01)
-        raise KeyboardInterrupt(f"written: {', '.join(map(str, whole))}" if whole else "") from None
+        raise (Ended(f"written: {', '.join(map(str, whole))}") if whole else KeyboardInterrupt()) from None
     return jobs

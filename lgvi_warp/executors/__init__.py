@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import multiprocessing
 import pickle
 import signal
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from concurrent.futures import Future
 from typing import Any, Protocol, runtime_checkable
 
 from lgvi_warp import machine
@@ -16,6 +18,8 @@ from lgvi_warp.errors import Faults, SceneError, closest
 Advanced = Callable[[Block, int], None]
 
 NAMES = ("threads", "processes", "dask")
+# Those that start processes of their own.
+STARTING = ("processes", "dask")
 # Threads, processes or workers: of the largest clusters.
 MOST_THREADS = 100_000
 # A block whose worker died this many times is not tried again: the block itself may be what kills them.
@@ -53,6 +57,9 @@ def executor_of(given: Any, threads: int | None = None, scheduler: str | None = 
         faults.add("executor", given, "is not known", f"{closest(str(given), NAMES)}; or give an object with run(...)")
     if scheduler is not None and given != "dask":
         faults.add("scheduler", scheduler, "is for the executor dask alone", 'give executor="dask", or leave it out')
+    if given in STARTING and scheduler is None and multiprocessing.current_process().daemon:
+        what = "starts processes, which a worker of multiprocessing or Celery may not"
+        faults.add("executor", given, what, 'use executor="threads" in it, or run outside of it')
     faults.raise_if_any()
     if isinstance(given, Executor):
         return given
@@ -72,18 +79,28 @@ def executor_of(given: Any, threads: int | None = None, scheduler: str | None = 
     return Threads(count)
 
 
+def ended(futures: Mapping[Future[Any], Block]) -> Iterator[tuple[Block, Any]]:
+    """Blocks that came to their end, of those whose run was interrupted."""
+    for future, block in futures.items():
+        if future.done() and not future.cancelled() and future.exception() is None and future.result() is not None:
+            yield block, future.result()
+
+
 @contextlib.contextmanager
 def deaf() -> Iterator[None]:
-    """Processes that are started inside leave interrupts from the keyboard to this one, from their first moment on."""
+    """Processes that are started inside leave what a terminal sends to all of them to this one, from their first moment."""
+    before: dict[int, Any] = {}
     try:
-        before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    except ValueError:  # not in the main thread, where no interrupt is heard
+        for number in (getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(signal, name)):
+            before[number] = signal.signal(number, signal.SIG_IGN)
+    except ValueError:  # not in the main thread, where no signal is heard
         yield
         return
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before or signal.SIG_DFL)
+        for number, handler in before.items():
+            signal.signal(number, handler or signal.SIG_DFL)
 
 
 def sent(work: Work, name: str) -> bytes:

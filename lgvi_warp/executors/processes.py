@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from lgvi_warp.blocks import Block, Work
-from lgvi_warp.executors import MOST_DEATHS, Advanced, deaf, received, sent
+from lgvi_warp.executors import MOST_DEATHS, Advanced, deaf, ended, received, sent
 
 # How often progress is looked at [s].
 PERIOD = 0.2
@@ -50,9 +50,10 @@ class Processes:
         context = multiprocessing.get_context("spawn")
         # Steps made of each block, and a word to all. Without a lock: a process that is killed holds none.
         made = context.RawArray("q", max(left) + 2)
-        pool = ProcessPoolExecutor(
-            min(self.workers, len(left)), mp_context=context, initializer=_begin, initargs=(data, made)
-        )
+        with deaf():  # Python's tracker of resources is a process too
+            pool = ProcessPoolExecutor(
+                min(self.workers, len(left)), mp_context=context, initializer=_begin, initargs=(data, made)
+            )
         waiting: dict[Future[Any], int] = {}
         try:
             with deaf():
@@ -73,6 +74,11 @@ class Processes:
                     yield left.pop(i), future.result()
                 else:
                     deaths[i] += 1
+        except KeyboardInterrupt:
+            made[HALT] = 1
+            pool.shutdown(wait=True, cancel_futures=True)
+            yield from ended({future: left[i] for future, i in waiting.items()})
+            raise
         finally:
             made[HALT] = 1
             pool.shutdown(wait=True, cancel_futures=True)
@@ -83,7 +89,9 @@ _state: dict[str, Any] = {}
 
 def _begin(data: bytes, made: Any) -> None:
     """In a new process: take the work, leave interrupts to the parent, and end when it ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for name in ("SIGINT", "SIGHUP"):  # by SIGTERM a broken pool ends what is left of it
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     _state["made"] = made
     try:

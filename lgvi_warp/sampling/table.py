@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -60,6 +62,25 @@ class Table(Sampling):
             faults.add("values", sorted(lengths), "are the columns' lengths", "give columns of one length, 1 or more")
         faults.raise_if_any()
         object.__setattr__(self, "_own", read)
+
+    @classmethod
+    def kept(cls, told: Mapping[str, Any], values: Mapping[str, np.ndarray]) -> Table:
+        """A table whose file was read when a store was made of it: the store has its numbers.
+
+        Args:
+            told: what `to_dict` says of the file, by key.
+            values: columns by name, (n,) or (n, *shape).
+
+        Returns:
+            The table, whether the file is still there or not.
+
+        Raises:
+            SceneError: where the values are no columns of one length.
+        """
+        table = cls(values=values)
+        for item in fields(cls):
+            object.__setattr__(table, item.name, told.get(item.name))
+        return table
 
     def _check_options(self, faults: Faults) -> None:
         for name in ("columns", "ignore"):
@@ -133,8 +154,8 @@ class Table(Sampling):
         return dict(self._own)  # type: ignore[attr-defined]
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Columns that no file has."""
-        return {} if self.file is not None else self.own_values()
+        """Columns: also those of a file, which may be moved or changed."""
+        return self.own_values()
 
     def own_members(self, space: Space) -> int:
         """Lines."""
@@ -150,6 +171,30 @@ class Table(Sampling):
             return {self.kind: {"values": {name: column.tolist() for name, column in self.own_values().items()}}}
         chosen = {name: getattr(self, name) for name in ("columns", "ignore") if getattr(self, name) is not None}
         return {self.kind: {"file": os.path.abspath(self.file), "sha256": self.sha256, **chosen}}
+
+
+def moved(file: str, sha256: str | None, beside: Path) -> str:
+    """Where a table lies now, if it and a store were moved together.
+
+    Args:
+        file: where it lay, absolute.
+        sha256: its checksum, which tells it from any other.
+        beside: the store.
+
+    Returns:
+        The path with its last parts below a folder above the store, as far as a file with that checksum is there; else
+        where it lay.
+    """
+    parts = Path(file).parts[1:]
+    if sha256 is None or Path(file).exists():
+        return file
+    for above in beside.absolute().parents:
+        for k in range(len(parts)):
+            path = above.joinpath(*parts[k:])
+            with contextlib.suppress(OSError, UnreadableError):
+                if path.is_file() and hashlib.sha256(file_bytes(str(path), "CSV file")).hexdigest() == sha256:
+                    return str(path)
+    return file
 
 
 def _column(faults: Faults, key: str, given: Any) -> np.ndarray | None:

@@ -20,7 +20,7 @@ from lgvi_warp.blocks import Block, Work, blocks
 from lgvi_warp.executors import executor_of, received, sent
 from lgvi_warp.executors.processes import Processes
 from lgvi_warp.keepers import Outcomes, Samples
-from lgvi_warp.plan import _one_at_a_time
+from lgvi_warp.kernel_cache import one_at_a_time
 from lgvi_warp.solving import make_plan
 from tests.conftest import ROOT
 from tests.stores import SETTINGS, STATISTICS, UNTIL, bits, differing, fleet, markers
@@ -393,11 +393,11 @@ def test_a_kernel_waits_for_who_compiles_it_and_for_no_other(tmp_path, monkeypat
 
     def ask():
         for kernel in ("02cd", "01ab"):
-            with _one_at_a_time(kernel):
+            with one_at_a_time(kernel):
                 order.put(kernel)
 
     other = threading.Thread(target=ask)
-    with _one_at_a_time("01ab"):
+    with one_at_a_time("01ab"):
         other.start()
         assert order.get(timeout=10.0) == "02cd"
         with pytest.raises(queue.Empty):

@@ -449,7 +449,7 @@ def test_a_library_that_is_broken_is_a_fault(mixed, tmp_path, monkeypatch):
 
 
 def test_an_interrupt_while_drawing_leaves_whole_files(mixed, tmp_path, monkeypatch):
-    def interrupted(jobs):
+    def interrupted(jobs, timeout):
         next(iter(jobs)).result()
         raise KeyboardInterrupt
 
@@ -465,14 +465,17 @@ def test_an_interrupt_while_drawing_leaves_whole_files(mixed, tmp_path, monkeypa
 
 def test_the_command_says_in_a_line_what_an_interrupt_left(scene_file, monkeypatch, capsys):
     from lgvi_warp.cli import runs
+    from lgvi_warp.cli.signals import Ended
+
+    out = scene_file.parent / "out"
 
     def interrupted(*arguments):
-        raise KeyboardInterrupt("written: out/result.npz")
+        raise Ended(f"written: {out / 'result.npz'}")
 
     monkeypatch.setattr(runs, "report", interrupted)
     monkeypatch.setattr(sys, "stderr", io.StringIO())
-    assert cli.main(["run", str(scene_file), "--out", str(scene_file.parent / "out"), "--quiet"]) == 130
-    assert sys.stderr.getvalue() == "lgvi-warp: interrupted; written: out/result.npz\n"
+    assert cli.main(["run", str(scene_file), "--out", str(out), "--quiet"]) == 130
+    assert sys.stderr.getvalue() == f"lgvi-warp: interrupted; written: {out / 'result.npz'}\n"
 
 
 def test_keep_failed_keeps_no_outcome(mixed):

@@ -1,0 +1,162 @@
+"""What ends the command from outside: Ctrl-C, SIGTERM, SIGHUP, and a terminal that is no longer there."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from types import FrameType
+from typing import Any, TextIO
+
+NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
+# What the system says of a terminal or a pipe that nobody reads any more.
+GONE = {errno.EPIPE, errno.EIO, errno.ESHUTDOWN}
+
+
+class Ended(KeyboardInterrupt):
+    """An interrupt whose text says what is left."""
+
+
+class Signals:
+    """A context in which the first signal raises KeyboardInterrupt, and the second ends the process at once, in a line.
+
+    The second is heard by a thread: the main one may be in a long call of native code. Signals that are ignored stay so;
+    what was done about the others is done again afterwards. Outside of the main thread it does nothing.
+
+    Args:
+        left: says what the process leaves when it ends at once.
+    """
+
+    def __init__(self, left: Callable[[], str]):
+        self._left = left
+        self._before: dict[int, Any] = {}
+        # The first signal heard; None without.
+        self.number: int | None = None
+        # Whether a line has said so.
+        self.said = False
+        # Of the signals that come, the one that ends the process at once.
+        self._last = 2
+
+    def __enter__(self) -> Signals:
+        if threading.current_thread() is not threading.main_thread():
+            return self
+        for number in (getattr(signal, name) for name in NAMES if hasattr(signal, name)):
+            before = signal.getsignal(number)
+            if before is not signal.SIG_IGN:
+                self._before[number] = before
+                signal.signal(number, self._hear)
+        reader, self._writer = os.pipe()
+        os.set_blocking(self._writer, False)
+        self._wakeup = signal.set_wakeup_fd(self._writer, warn_on_full_buffer=False)
+        self._unraisable, sys.unraisablehook = sys.unraisablehook, self._again
+        threading.Thread(target=self._listen, args=(reader,), name="lgvi_warp_signals", daemon=True).start()
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        if not self._before:
+            return
+        for number, before in self._before.items():
+            signal.signal(number, before or signal.SIG_DFL)
+        signal.set_wakeup_fd(self._wakeup)
+        sys.unraisablehook = self._unraisable
+        os.close(self._writer)
+
+    @property
+    def exit_code(self) -> int:
+        """128 and the signal's number, as shells have it; that of Ctrl-C without one."""
+        return 128 + (self.number or signal.SIGINT)
+
+    @property
+    def text(self) -> str:
+        """What happened."""
+        if self.number in (None, signal.SIGINT):
+            return "interrupted"
+        return f"interrupted by {signal.Signals(self.number).name}"
+
+    def _hear(self, number: int, frame: FrameType | None) -> None:
+        """In the main thread, as soon as it is in Python's code."""
+        if self.number is None:
+            self.number = number
+            raise KeyboardInterrupt
+
+    def _listen(self, reader: int) -> None:
+        """In a thread: the numbers of signals, as they come."""
+        heard = 0
+        with open(reader, "rb", buffering=0) as file:
+            while data := file.read(1):
+                heard += data[0] in self._before
+                if heard == self._last:
+                    self.number = self.number or data[0]
+                    self._end()
+
+    def _end(self) -> None:
+        """End the process in a line, without waiting for anything."""
+        try:
+            if not self.said:
+                os.write(2, f"lgvi-warp: {self.text} twice, ended at once; {self._left()}\n".encode())
+        finally:
+            os._exit(self.exit_code)
+
+    def _again(self, lost: Any) -> None:
+        """An interrupt where no exception can be raised, as while an object is removed, comes again a moment later."""
+        if isinstance(lost.exc_value, KeyboardInterrupt) and self.number is not None:
+            number, self.number = self.number, None
+            self._last += 1
+            threading.Timer(0.01, os.kill, (os.getpid(), number)).start()
+        else:
+            self._unraisable(lost)
+
+
+class Lasting:
+    """A stream that is written to as long as somebody reads it: a run goes on without its terminal.
+
+    Args:
+        stream: what is written to; None, as Python has it for one that was closed before it began, is written to no more.
+    """
+
+    def __init__(self, stream: TextIO | None):
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write, if somebody reads. Raises OSError for all else, such as a full disk."""
+        self._unless_gone(lambda stream: stream.write(text))
+        return len(text)
+
+    def flush(self) -> None:
+        """Flush likewise."""
+        self._unless_gone(lambda stream: stream.flush())
+
+    def isatty(self) -> bool:
+        """Whether it is a terminal."""
+        return self._stream is not None and self._stream.isatty()
+
+    def _unless_gone(self, act: Callable[[TextIO], Any]) -> None:
+        if self._stream is None:
+            return
+        try:
+            act(self._stream)
+        except OSError as error:
+            if error.errno not in GONE:
+                raise
+            self._stream = None
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+class Streams:
+    """A context in which standard output and error are Lasting."""
+
+    def __enter__(self) -> Streams:
+        self._before = sys.stdout, sys.stderr
+        sys.stdout, sys.stderr = (Lasting(stream) for stream in self._before)
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        with contextlib.suppress(OSError):
+            sys.stdout.flush()
+        sys.stdout, sys.stderr = self._before

@@ -1,0 +1,302 @@
+"""A kernel cache that is damaged, full, unwritable or left torn: compiled anew, or told; never loaded."""
+
+import errno
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+import pytest
+import warp as wp
+
+from lgvi_warp import durable, kernel_cache, warp_setup
+from tests.conftest import ROOT
+
+
+@wp.kernel(module="unique", enable_backward=False)
+def doubled(values: wp.array(dtype=wp.float64)):
+    i = wp.tid()
+    values[i] = values[i] + values[i]
+
+
+MODULE = doubled.module
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    """An empty cache, and a process that has loaded nothing."""
+    warp_setup.start()
+    folder = tmp_path / "cache"
+    folder.mkdir()
+    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(folder))
+    forget()
+    yield folder
+    forget()
+
+
+def forget():
+    """As a new process."""
+    kernel_cache._loaded.discard(MODULE)
+    MODULE.unload()
+
+
+def works():
+    """Load the kernel and run it."""
+    kernel_cache.load(MODULE)
+    values = wp.array([1.5, 2.5], dtype=wp.float64, device="cpu")
+    wp.launch(doubled, dim=2, inputs=[values], device="cpu")
+    return values.numpy().tolist() == [3.0, 5.0]
+
+
+def only(cache, end):
+    (path,) = cache.glob(f"wp_*/*{end}")
+    return path
+
+
+def truncated(cache):
+    os.truncate(only(cache, ".o"), 200)
+
+
+def emptied(cache):
+    os.truncate(only(cache, ".o"), 0)
+
+
+def flipped(cache):
+    data = bytearray(only(cache, ".o").read_bytes())
+    data[len(data) // 2] ^= 0x55
+    only(cache, ".o").write_bytes(data)
+
+
+def without_code(cache):
+    only(cache, ".o").unlink()
+
+
+def without_sums(cache):
+    only(cache, ".sha256").unlink()
+
+
+def torn_sums(cache):
+    os.truncate(only(cache, ".sha256"), 20)
+
+
+def sums_of_nothing(cache):
+    only(cache, ".sha256").write_text("{}")
+
+
+def torn_meta(cache):
+    os.truncate(only(cache, ".meta"), 1)
+
+
+def without_meta(cache):
+    only(cache, ".meta").unlink()
+
+
+def a_file_for_a_folder(cache):
+    (folder,) = cache.glob("wp_*")
+    for path in folder.iterdir():
+        path.unlink()
+    folder.rmdir()
+    folder.write_text("")
+
+
+DAMAGES = [truncated, emptied, flipped, without_code, without_sums, torn_sums, sums_of_nothing, torn_meta, without_meta,
+           a_file_for_a_folder]  # fmt: skip
+
+
+@pytest.mark.parametrize("damage", DAMAGES, ids=lambda damage: damage.__name__)
+def test_what_is_damaged_is_compiled_anew(cache, damage):
+    assert works()
+    code, whole = only(cache, ".o"), only(cache, ".o").read_bytes()
+    damage(cache)
+    assert not kernel_cache.is_whole(code)
+    forget()
+    assert works() and code.read_bytes() == whole and kernel_cache.is_whole(code)
+    assert sorted(path.name for path in cache.iterdir()) == sorted([kernel_cache.LOCKS, code.parent.name])
+
+
+def test_what_is_whole_is_not_compiled(cache):
+    assert works()
+    written = only(cache, ".o").stat().st_mtime_ns
+    forget()
+    assert works() and only(cache, ".o").stat().st_mtime_ns == written
+
+
+def test_code_of_other_processors_stays(cache):
+    assert works()
+    other = only(cache, ".o").with_name("other.cpu12345678.o")
+    other.write_bytes(b"code")
+    (own,) = (path for path in cache.glob("wp_*/*.o") if path != other)
+    os.truncate(own, 10)
+    forget()
+    assert works() and other.read_bytes() == b"code"
+
+
+def test_a_full_disk_is_told_before_llvm_ends_the_process(cache):
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, hard))
+    try:
+        with pytest.raises(OSError, match=r"has no room for a new kernel.*WARP_CACHE_PATH") as caught:
+            works()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert caught.value.errno == errno.EFBIG and caught.value.filename == str(cache)
+    assert [path.name for path in cache.iterdir()] == [kernel_cache.LOCKS]
+    # In the same process, when there is room again.
+    assert works()
+
+
+def test_no_files_left_is_no_room(tmp_path, monkeypatch):
+    system = os.statvfs(tmp_path)
+    for files, left, full in ((1000, 3, True), (1000, 900, False), (0, 0, False)):
+        fields = list(system)[:10]
+        fields[5], fields[7] = files, left
+        monkeypatch.setattr(os, "statvfs", lambda path, found=os.statvfs_result(fields): found)
+        if full:
+            with pytest.raises(OSError, match="No files left"):
+                kernel_cache.seek_room(tmp_path)
+        else:
+            kernel_cache.seek_room(tmp_path)
+
+
+def test_room_is_looked_for_by_writing_where_nothing_else_tells(tmp_path, monkeypatch):
+    def unknown(*arguments):
+        raise OSError(errno.EOPNOTSUPP, "not supported")
+
+    monkeypatch.setattr(os, "posix_fallocate", unknown)
+    kernel_cache.seek_room(tmp_path, 1000)
+    monkeypatch.setattr(durable, "write_all", lambda file, view: unknown())
+    with pytest.raises(OSError, match="not supported"):
+        kernel_cache.seek_room(tmp_path, 1000)
+    monkeypatch.delattr(os, "posix_fallocate")
+    with pytest.raises(OSError, match="not supported"):
+        kernel_cache.seek_room(tmp_path, 1000)
+
+
+def test_an_unwritable_cache_is_named(cache, monkeypatch):
+    (cache / "file").write_text("")
+    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(cache / "file"))
+    with pytest.raises(OSError, match=r"cannot be written.*WARP_CACHE_PATH to another folder") as caught:
+        works()
+    assert caught.value.filename == str(cache / "file")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root writes anywhere")
+def test_a_cache_that_is_only_read_serves_what_it_has(cache):
+    assert works()
+    only(cache, ".o").parent.chmod(0o500)
+    cache.chmod(0o500)
+    forget()
+    assert works()
+
+
+def test_a_temporary_folder_without_room_is_not_needed(cache, monkeypatch, capfd):
+    """Clang writes its precompiled header there, and would say on stderr that it cannot."""
+    folders = warp_setup.header_folders()
+    monkeypatch.setattr(warp_setup, "header_folders", lambda: folders)
+    before = dict(folders)
+    folders.clear()
+    monkeypatch.setattr(kernel_cache, "_temporary_room", lambda: False)
+    made = []
+    load_module = wp.load_module
+    monkeypatch.setattr(wp, "load_module", lambda *given, **named: made.append(
+        [folder.name for folder in folders.values()]) or load_module(*given, **named))  # fmt: skip
+    assert works() and capfd.readouterr() == ("", "")
+    ((folder,),) = made
+    assert folder.startswith(f"{cache}/{kernel_cache.SCRATCH}") and not folders
+    folders.update(before)
+
+
+def test_the_temporary_folder_is_looked_at(tmp_path, monkeypatch):
+    assert kernel_cache._temporary_room()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    assert not kernel_cache._temporary_room()
+
+
+def test_what_killed_processes_left_is_swept(cache):
+    assert works()
+    name = only(cache, ".o").parent.name
+    dead, mine = cache / f"{name}_p4_t5", cache / f"{kernel_cache.SCRATCH}dead"
+    old, new, users = (cache / f"wp_{name}_p4_t5" for name in ("make_old_1", "make_new_1", "of_a_user"))
+    for path in (dead, mine, old, new, users):
+        path.mkdir()
+        (path / "some.cpp").write_text("")
+    then = time.time() - 2.0 * kernel_cache.OLD
+    for path in (old, users):
+        os.utime(path, (then, then))
+    truncated(cache)
+    forget()
+    with kernel_cache._scratch(cache) as alive:
+        assert works()
+        assert [path.exists() for path in (dead, mine, old, new, users, alive)] == [False] * 3 + [True] * 3
+    assert not alive.exists()
+
+
+def test_threads_compile_once(cache, monkeypatch):
+    compiled = []
+    compile_it = kernel_cache._compile
+    monkeypatch.setattr(kernel_cache, "_compile", lambda *given: (compiled.append(given), compile_it(*given)))
+    threads = [threading.Thread(target=kernel_cache.load, args=(MODULE,)) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(compiled) == 1 and works()
+
+
+def test_threads_that_start_warp_leave_stderr_as_it_was(monkeypatch):
+    def slow():
+        time.sleep(0.1)
+
+    before = os.fstat(2).st_ino
+    monkeypatch.setattr(wp, "init", slow)
+    monkeypatch.setattr(warp_setup, "_has_cuda_driver", lambda: False)
+    warp_setup._start.cache_clear()
+    threads = [threading.Thread(target=warp_setup.start) for _ in range(3)]
+    for i, thread in enumerate(threads):
+        time.sleep(0.04 * i)
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert os.fstat(2).st_ino == before
+
+
+def run(arguments, cache, **settings):
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "WARP_CACHE_PATH": str(cache)}
+    return subprocess.run([sys.executable, "-m", "lgvi_warp.cli", *arguments], env=env, cwd=ROOT, capture_output=True,
+                          text=True, timeout=120, **settings)  # fmt: skip
+
+
+def test_the_command_names_a_cache_that_it_cannot_write(tmp_path):
+    (tmp_path / "file").write_text("")
+    done = run(["info"], tmp_path / "file")
+    assert done.returncode == 1 and done.stderr.count("\n") == 1
+    assert str(tmp_path / "file") in done.stderr and "WARP_CACHE_PATH" in done.stderr
+
+
+@pytest.mark.slow
+def test_the_command_leaves_a_full_disk_as_it_was(tmp_path):
+    done = run(["info"], tmp_path, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000)))
+    assert done.returncode == 1 and done.stderr.count("\n") == 1 and "WARP_CACHE_PATH" in done.stderr
+    assert not list(tmp_path.rglob("wp_*")) and not list(tmp_path.rglob(f"{kernel_cache.SCRATCH}*"))
+
+
+@pytest.mark.slow
+def test_one_that_is_killed_while_it_compiles_leaves_nothing_for_long(tmp_path):
+    code = (
+        "import lgvi_warp as lw; from lgvi_warp import speed; lw.solve(lw.Ensemble(speed.example(), 4), h=0.01, t1=0.1)"
+    )
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "WARP_CACHE_PATH": str(tmp_path)}
+    process = subprocess.Popen([sys.executable, "-c", code], env=env)
+    while not list(tmp_path.rglob("*.cpp")):
+        time.sleep(0.01)
+    process.kill()
+    process.wait()
+    assert list(tmp_path.rglob(f"{kernel_cache.SCRATCH}*"))
+    subprocess.run([sys.executable, "-c", code], env=env, check=True, timeout=120)
+    (cache,) = tmp_path.iterdir()
+    names = {path.name for path in cache.iterdir()}
+    assert len(names) == 2 and kernel_cache.LOCKS in names
+    assert [kernel_cache.is_whole(path) for path in cache.rglob("*.o")] == [True]

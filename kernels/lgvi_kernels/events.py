@@ -27,11 +27,13 @@ EPSILON = {wp.float64: 2.0**-52, wp.float32: 2.0**-23}
 class Watch(NamedTuple):
     """Functions of a scene's events.
 
-    alarm: (x, c, h) -> x with the alarm of the lanes that have reached an event; nearest: (x, c, h) -> (distance with
-    twice the margin, margin, status) of the event that is nearest in each lane.
+    alarm: (x, c, h) -> x with the alarm of the lanes that have reached an event; spacing: (good, x, c, h) -> what the
+    position between two states is known to, about each axis; nearest: (x, c, h, spacing) -> (distance with twice the margin,
+    margin, status) of the event that is nearest in each lane.
     """
 
     alarm: Any
+    spacing: Any
     nearest: Any
 
 
@@ -58,21 +60,36 @@ def make_watch(events, View, shifted, real):
         return x
 
     @wp.func
-    def nearest(x: Any, c: Any, h: Any):
-        """A position is known to a spacing of its numbers: a distance of it is zero or below for sure beyond that margin."""
-        view = see(x, c, h)
-        size = absolute(x.b.x) + absolute(x.b.y) + absolute(x.b.z)
-        size = size + absolute(view.b.x) + absolute(view.b.y) + absolute(view.b.z)
-        return least_of(view, c.events, real(wp.static(EPSILON[real])) * size)
+    def sizes(x: Any, c: Any, h: Any):
+        """Of the numbers that the position is made of."""
+        b = see(x, c, h).b
+        size = vec3(absolute(x.b.x), absolute(x.b.y), absolute(x.b.z))
+        return size + vec3(absolute(b.x), absolute(b.y), absolute(b.z))
 
-    return Watch(alarm, nearest)
+    @wp.func
+    def spacing(good: Any, x: Any, c: Any, h: Any):
+        """A position is known to the spacing of its numbers along the step."""
+        return real(wp.static(EPSILON[real])) * (sizes(good, c, h) + sizes(x, c, h))
+
+    @wp.func
+    def nearest(x: Any, c: Any, h: Any, between: Any):
+        """The margin of a distance is its change by a spacing of the position, along each axis."""
+        return least_of(see(x, c, h), c.events, between)
+
+    return Watch(alarm, spacing, nearest)
+
+
+@wp.func
+def displaced(view: Any, d: Any):
+    """The view from a place d away."""
+    view.b = view.b + d
+    return view
 
 
 @functools.cache
 def _chain(events, number):
     """(reached, least_of): the first event that is reached as a status (0: none); the least distance of all."""
     distance = events[0].distance
-    placed = getattr(events[0], "PLACED", True)
     more = len(events) > 1
     reached_next, least_of_next = _chain(events[1:], number + 1) if more else (None, None)
 
@@ -85,16 +102,17 @@ def _chain(events, number):
         return positive(d, other, view.h.dtype(wp.static(float(FIRST + number))) * ones(d))
 
     @wp.func
-    def least_of(view: Any, p: Any, margin: Any):
+    def least_of(view: Any, p: Any, spacing: Any):
         """(distance + 2 margins, margin, status)."""
         d = distance(view, p.own)
-        room = margin - margin
-        if wp.static(placed):
-            room = margin
+        none = d - d
+        room = absolute(distance(displaced(view, vec3(spacing.x, none, none)), p.own) - d)
+        room = room + absolute(distance(displaced(view, vec3(none, spacing.y, none)), p.own) - d)
+        room = room + absolute(distance(displaced(view, vec3(none, none, spacing.z)), p.own) - d)
         d = d + room + room
         code = view.h.dtype(wp.static(float(FIRST + number))) * ones(d)
         if wp.static(more):
-            other, other_room, other_code = least_of_next(view, p.rest, margin)
+            other, other_room, other_code = least_of_next(view, p.rest, spacing)
             ahead = d - other
             d = positive(ahead, other, d)
             room = positive(ahead, other_room, room)
@@ -104,16 +122,16 @@ def _chain(events, number):
     return reached, least_of
 
 
-def make_arrival(nearest, part_step, choose, water_velocity, real, width, most_parts):
+def make_arrival(watch, part_step, choose, water_velocity, real, width, most_parts):
     """What makes the last step of members that reach an event: the part of it that ends there.
 
-    nearest: see Watch; part_step: (x, c, k, h, part, parts, ...) -> the state after `parts` equal steps of part h from step
+    watch: see Watch; part_step: (x, c, k, h, part, parts, ...) -> the state after `parts` equal steps of part h from step
     k on; choose: see sums; water_velocity: (x, c, h) -> R^T u, or None where a sample tells it later too; most_parts: into
     how many a part without a solution may be divided.
     """
     # Parts of a step nearer to each other than this are one.
     spacing = 4.0 * EPSILON[real]
-    moving = water_velocity is not None
+    moving, spacing_of, nearest = water_velocity is not None, watch.spacing, watch.nearest
 
     @wp.func(inline=False)
     def arrival(good: Any, x: Any, code: Any, c: Any, k: int, h: wp.float64, stage_h: Any, lead_h: Any, opening: real):
@@ -124,8 +142,9 @@ def make_arrival(nearest, part_step, choose, water_velocity, real, width, most_p
         margin beyond the event, so that the samples, whose round-off is less, lie beyond it too.
         """
         stopped = good
-        begin, begin_room, begin_code = nearest(good, c, real(h))
-        end, end_room, end_code = nearest(x, c, real(h))
+        between = spacing_of(good, x, c, real(h))
+        begin, begin_room, begin_code = nearest(good, c, real(h), between)
+        end, end_room, end_code = nearest(x, c, real(h), between)
         parts_made = begin - begin
         still = vec3(parts_made, parts_made, parts_made)
         end_still = still
@@ -170,7 +189,7 @@ def make_arrival(nearest, part_step, choose, water_velocity, real, width, most_p
                                 tried = low + (high - low) * low_distance / (low_distance - high_distance)
                                 tried = wp.clamp(tried, low + real(wp.static(spacing)), high - real(wp.static(spacing)))
                         y = part_step(good, c, k, h, tried / real(parts), parts, stage_h, lead_h, opening, lane)
-                        distance, room, status = nearest(y, c, real(h))
+                        distance, room, status = nearest(y, c, real(h), between)
                         failed = y.alarm.code[j] > real(0.0)
                         if failed and parts < wp.static(most_parts):
                             parts = 2 * parts

@@ -135,9 +135,10 @@ def test_events_stop_where_they_do():
     assert 10 < stopped.sum() < n
     np.testing.assert_array_equal(result.status == lw.Status.SURFACE, stopped)
     np.testing.assert_allclose(result.failure_time[stopped], time[stopped], atol=2e-5)
-    # Both parts of a stopped member's position are kept: it is where it was in the step before.
-    at = np.where(stopped, np.floor(time / 1e-3) * 1e-3, 6.0)
-    np.testing.assert_allclose(result.position[-1, :, 0], 1e7 + at, atol=2e-3)
+    # Both parts of a stopped member's position are kept: it is where it was at the event, whatever its place in the north.
+    at = np.where(stopped, time, 6.0)
+    np.testing.assert_allclose(result.position[-1, :, 0], 1e7 + at, atol=2e-5)
+    np.testing.assert_allclose(result.position[-1, stopped, 2], 0.0, atol=1e-6)
     # Those that go on make the same steps as where the event is far away.
     far = lw.Scene(STRAIGHT.vehicle, STRAIGHT.environment, events=[lw.Surface(depth=-1e6)])
     alone = run(one(far, np.array([1e7, 0.0, 5.0]), nu=nu), h=1e-3, t1=6.0)

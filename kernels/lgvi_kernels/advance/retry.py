@@ -102,5 +102,5 @@ def make_retry(spec):
     arrival = step
     if watched:
         water = method.water_velocity if spec.still else None
-        arrival = make_arrival(watch.nearest, in_parts, choose, water, real, width, MOST_PARTS if spec.substep else 1)
+        arrival = make_arrival(watch, in_parts, choose, water, real, width, MOST_PARTS if spec.substep else 1)
     return Retry(retried, arrival)

@@ -8,9 +8,6 @@ import warp as wp
 from lgvi_kernels.lanes import lane, mul, ones, sub  # noqa: F401
 from lgvi_kernels.state import struct
 
-# The distance does not look at the position, whose round-off needs a margin.
-PLACED = False
-
 
 @functools.cache
 def params(width, real):

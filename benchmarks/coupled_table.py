@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import root
 
 import lgvi_warp as lw
-from lgvi_warp import invariants
+from lgvi_warp.physics import energy as invariants
 from lgvi_warp.reference import coupled, rotation
 from tests.tools import difference, random_states, slope
 from tests.verification import test_coupled_reference as case

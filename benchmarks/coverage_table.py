@@ -18,12 +18,12 @@ from scipy.special import ive, ndtr, ndtri
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import lgvi_warp as lw
-from lgvi_warp.notation import matrix_from_rotation_vector
-from lgvi_warp.sampling import sampling_of
+from lgvi_warp.physics.notation import matrix_from_rotation_vector
+from lgvi_warp.sampling.designs import sampling_of
+from lgvi_warp.sampling.designs.space import Space
 from lgvi_warp.statistics.tree import Tree
 from lgvi_warp.statistics.until import Watch
 from lgvi_warp.statistics.values import Values, dealt
-from lgvi_warp.variations import Space
 
 BLOCK = 256
 # Members of the first table's intervals.

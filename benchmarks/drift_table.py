@@ -11,8 +11,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import lgvi_warp as lw
-from lgvi_warp import machine, notation, speed, terms, warp_setup
-from lgvi_warp.solving import make_plan
+from lgvi_warp.common import machine, warp_setup
+from lgvi_warp.physics import notation, terms
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.studies import speed
 
 TARGET = Path(__file__).resolve().parent.parent / "docs" / "long_runs.md"
 STEP, STEPS, MEMBERS, SAMPLES = 0.05, 1_000_000, 64, 1000

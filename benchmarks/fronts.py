@@ -11,7 +11,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import lgvi_warp as lw
-from lgvi_warp import machine, warp_setup
+from lgvi_warp.common import machine, warp_setup
 
 ROOT = Path(__file__).resolve().parent.parent
 TARGET = ROOT / "docs" / "accuracy_and_speed.md"

@@ -16,7 +16,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import lgvi_warp as lw
 from benchmarks.scenes import peak_memory
-from lgvi_warp import machine, speed
+from lgvi_warp.common import machine
+from lgvi_warp.studies import speed
 
 TARGET = Path(__file__).resolve().parent.parent / "docs" / "large_ensembles.md"
 SETTINGS = {"method": "psi_s", "h": 0.01, "t1": 10.0, "save": lw.SaveAt(every=1.0)}

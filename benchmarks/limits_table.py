@@ -17,8 +17,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 import numpy as np
 
 import lgvi_warp as lw
-from lgvi_warp import notation
-from lgvi_warp.stability_limits import LIMITS
+from lgvi_warp.physics import notation
+from lgvi_warp.studies.stability.limits import LIMITS
 
 TARGET = Path(__file__).resolve().parent.parent / "docs" / "where_it_breaks.md"
 BEGIN, END = "<!-- limits: begin -->", "<!-- limits: end -->"

@@ -10,7 +10,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from benchmarks.cases.methods import case
-from lgvi_warp import machine, warp_setup
+from lgvi_warp.common import machine, warp_setup
 
 TARGET = Path(__file__).resolve().parent.parent / "docs" / "methods.md"
 SOUND = 1.5

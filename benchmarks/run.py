@@ -14,7 +14,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from benchmarks import cases
-from lgvi_warp import machine, warp_setup
+from lgvi_warp.common import machine, warp_setup
 
 
 def main():

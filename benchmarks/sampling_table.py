@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 import lgvi_warp as lw
-from lgvi_warp import machine
+from lgvi_warp.common import machine
 
 ROOT = Path(__file__).parent.parent
 SAMPLINGS: dict[str, Any] = {

@@ -9,7 +9,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from benchmarks.cases.solvers import case
-from lgvi_warp import machine, warp_setup
+from lgvi_warp.common import machine, warp_setup
 
 TARGET = Path(__file__).resolve().parent.parent / "docs" / "solvers.md"
 

@@ -17,8 +17,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import lgvi_warp as lw
-from lgvi_warp import notation
-from lgvi_warp.method import COMPOSITIONS, EXPLICIT, GAUSS, HALVES, PROGRAMS, TWO_PART
+from lgvi_warp.methods.method import COMPOSITIONS, EXPLICIT, GAUSS, HALVES, PROGRAMS, TWO_PART
+from lgvi_warp.physics import notation
 
 ANGLE = 0.3
 LARGEST = 1.0

@@ -2,40 +2,11 @@
 
 from typing import TYPE_CHECKING, Any
 
-from lgvi_warp.distributions import Choice, LogNormal, Normal, TruncatedNormal, Uniform
-from lgvi_warp.ensemble import Ensemble
-from lgvi_warp.errors import Interrupted, MembersFailed, SceneError
-from lgvi_warp.events import Box, Event, Floor, StopTime, Surface
-from lgvi_warp.joint_laws import CorrelatedNormal, PhysicalInertia, PositiveDefinite, RotationNormal, UniformRotation
-from lgvi_warp.laws import Frozen
-from lgvi_warp.method import Method
-from lgvi_warp.result import Result
-from lgvi_warp.sampling import Grid, Halton, LatinHypercube, Levels, Morris, Random, Saltelli, Sobol, Table
-from lgvi_warp.saveat import SaveAt
-from lgvi_warp.scene import Environment, Scene, Start
-from lgvi_warp.statistics import (
-    CircularMean,
-    Covariance,
-    EndTime,
-    Exceedance,
-    Extremes,
-    FirstPassage,
-    Histogram,
-    Mean,
-    MeanAttitude,
-    Outcome,
-    PathMaximum,
-    PathMean,
-    PathMinimum,
-    PathRange,
-    PathRms,
-    PathTime,
-    Quantiles,
-    Quantity,
-)
-from lgvi_warp.statistics.until import Until
-from lgvi_warp.status import Status, Warnings
-from lgvi_warp.terms import (
+from lgvi_warp.common.errors import Interrupted, MembersFailed, SceneError
+from lgvi_warp.common.status import Status, Warnings
+from lgvi_warp.methods.method import Method
+from lgvi_warp.methods.saveat import SaveAt
+from lgvi_warp.physics.terms import (
     BodyLift,
     ControlFins,
     CrossFlow,
@@ -61,55 +32,92 @@ from lgvi_warp.terms import (
     quantity,
     register,
 )
-from lgvi_warp.vehicle import Vehicle
+from lgvi_warp.physics.terms.events import Box, Event, Floor, StopTime, Surface
+from lgvi_warp.physics.vehicle import Vehicle
+from lgvi_warp.runs.result import Result
+from lgvi_warp.sampling.designs import Grid, Halton, LatinHypercube, Levels, Morris, Random, Saltelli, Sobol, Table
+from lgvi_warp.sampling.distributions.basic import Choice, LogNormal, Normal, TruncatedNormal, Uniform
+from lgvi_warp.sampling.distributions.joint import (
+    CorrelatedNormal,
+    PhysicalInertia,
+    PositiveDefinite,
+    RotationNormal,
+    UniformRotation,
+)
+from lgvi_warp.sampling.distributions.named import Frozen
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.scene.start import Environment, Start
+from lgvi_warp.statistics import (
+    CircularMean,
+    Covariance,
+    EndTime,
+    Exceedance,
+    Extremes,
+    FirstPassage,
+    Histogram,
+    Mean,
+    MeanAttitude,
+    Outcome,
+    PathMaximum,
+    PathMean,
+    PathMinimum,
+    PathRange,
+    PathRms,
+    PathTime,
+    Quantiles,
+    Quantity,
+)
+from lgvi_warp.statistics.until import Until
 
 if TYPE_CHECKING:
-    from lgvi_warp import uq
-    from lgvi_warp.coefficients import from_fossen, vehicles
-    from lgvi_warp.coefficients_sdf import from_sdf
-    from lgvi_warp.coefficients_yaml import from_yaml
-    from lgvi_warp.exporting import export
-    from lgvi_warp.law_check import check_law
-    from lgvi_warp.plan import Plan
-    from lgvi_warp.prediction import predict
-    from lgvi_warp.resuming import merge, resume
-    from lgvi_warp.sinks.plots import plot, plot_stability, plot_statistics, plot_tradeoff
-    from lgvi_warp.sinks.rerun import log_rerun
-    from lgvi_warp.sinks.sensitivity import plot_sensitivity
-    from lgvi_warp.solving import solve
-    from lgvi_warp.stability import StabilityMap, stability_map
-    from lgvi_warp.store import Store
-    from lgvi_warp.stored import open_run
-    from lgvi_warp.suggestion import suggest
-    from lgvi_warp.tradeoffs import tradeoff
+    from lgvi_warp.engine.laws.check import check_law
+    from lgvi_warp.engine.plan import Plan
+    from lgvi_warp.runs.predict import predict
+    from lgvi_warp.runs.solve import solve
+    from lgvi_warp.runs.store.export import export
+    from lgvi_warp.runs.store.merge import merge
+    from lgvi_warp.runs.store.open import open_run
+    from lgvi_warp.runs.store.resume import resume
+    from lgvi_warp.runs.store.settings import Store
+    from lgvi_warp.scene.vehicles.fossen import from_fossen, vehicles
+    from lgvi_warp.scene.vehicles.sdf import from_sdf
+    from lgvi_warp.scene.vehicles.yaml import from_yaml
+    from lgvi_warp.studies import sensitivity as uq
+    from lgvi_warp.studies.stability.map import StabilityMap, stability_map
+    from lgvi_warp.studies.suggest import suggest
+    from lgvi_warp.studies.tradeoff import tradeoff
+    from lgvi_warp.views.plots import plot, plot_stability, plot_statistics, plot_tradeoff
+    from lgvi_warp.views.rerun import log_rerun
+    from lgvi_warp.views.sensitivity import plot_sensitivity
 
 __version__ = "0.1.0"
 
 # Loaded when first used: Warp takes a second to import, and a scene can be read and checked without it.
 _LAZY = {
-    "solve": "lgvi_warp.solving",
-    "Store": "lgvi_warp.store",
-    "open_run": "lgvi_warp.stored",
-    "resume": "lgvi_warp.resuming",
-    "merge": "lgvi_warp.resuming",
-    "export": "lgvi_warp.exporting",
-    "predict": "lgvi_warp.prediction",
-    "suggest": "lgvi_warp.suggestion",
-    "tradeoff": "lgvi_warp.tradeoffs",
-    "Plan": "lgvi_warp.plan",
-    "plot": "lgvi_warp.sinks.plots",
-    "plot_statistics": "lgvi_warp.sinks.plots",
-    "plot_stability": "lgvi_warp.sinks.plots",
-    "plot_tradeoff": "lgvi_warp.sinks.plots",
-    "plot_sensitivity": "lgvi_warp.sinks.sensitivity",
-    "StabilityMap": "lgvi_warp.stability",
-    "stability_map": "lgvi_warp.stability",
-    "log_rerun": "lgvi_warp.sinks.rerun",
-    "check_law": "lgvi_warp.law_check",
-    "from_fossen": "lgvi_warp.coefficients",
-    "from_sdf": "lgvi_warp.coefficients_sdf",
-    "from_yaml": "lgvi_warp.coefficients_yaml",
-    "vehicles": "lgvi_warp.coefficients",
+    "solve": "lgvi_warp.runs.solve",
+    "Store": "lgvi_warp.runs.store.settings",
+    "open_run": "lgvi_warp.runs.store.open",
+    "resume": "lgvi_warp.runs.store.resume",
+    "merge": "lgvi_warp.runs.store.merge",
+    "export": "lgvi_warp.runs.store.export",
+    "predict": "lgvi_warp.runs.predict",
+    "suggest": "lgvi_warp.studies.suggest",
+    "tradeoff": "lgvi_warp.studies.tradeoff",
+    "Plan": "lgvi_warp.engine.plan",
+    "plot": "lgvi_warp.views.plots",
+    "plot_statistics": "lgvi_warp.views.plots",
+    "plot_stability": "lgvi_warp.views.plots",
+    "plot_tradeoff": "lgvi_warp.views.plots",
+    "plot_sensitivity": "lgvi_warp.views.sensitivity",
+    "StabilityMap": "lgvi_warp.studies.stability.map",
+    "stability_map": "lgvi_warp.studies.stability.map",
+    "log_rerun": "lgvi_warp.views.rerun",
+    "check_law": "lgvi_warp.engine.laws.check",
+    "from_fossen": "lgvi_warp.scene.vehicles.fossen",
+    "from_sdf": "lgvi_warp.scene.vehicles.sdf",
+    "from_yaml": "lgvi_warp.scene.vehicles.yaml",
+    "vehicles": "lgvi_warp.scene.vehicles.fossen",
 }
 
 __all__ = [
@@ -221,11 +229,22 @@ __all__ = [
 ]
 
 
+# Modules by a name of their own.
+_MODULES = {
+    "uq": "lgvi_warp.studies.sensitivity",
+    "notation": "lgvi_warp.physics.notation",
+    "terms": "lgvi_warp.physics.terms",
+}
+
+
 def __getattr__(name: str) -> Any:
-    if name != "uq" and name not in _LAZY:
-        raise AttributeError(f"module 'lgvi_warp' has no attribute {name!r}")
     from importlib import import_module
 
-    value = import_module("lgvi_warp.uq") if name == "uq" else getattr(import_module(_LAZY[name]), name)
+    if name in _MODULES:
+        value: Any = import_module(_MODULES[name])
+    elif name in _LAZY:
+        value = getattr(import_module(_LAZY[name]), name)
+    else:
+        raise AttributeError(f"module 'lgvi_warp' has no attribute {name!r}")
     globals()[name] = value
     return value

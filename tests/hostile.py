@@ -9,7 +9,8 @@ import zipfile
 
 import numpy as np
 
-from lgvi_warp import store
+from lgvi_warp.runs.store import folder as store
+from lgvi_warp.runs.store.sink import marker, read_marker
 
 ROOT = "zarr.json"
 TEXTS = ("provenance", "recipe", "messages", "shared")
@@ -82,7 +83,7 @@ def marks(key, size=6, crc=0, file="blocks/000000000.json"):
     """A marker, or the list of the frame's files, names another file too, and its checksum fits."""
 
     def harm(path, home):
-        sums = store.read_marker(path, file)
+        sums = read_marker(path, file)
         name = key.format(home=home)
         target = path / name if "\0" not in name else home / "notes.txt"
         if crc is None and target.is_file():
@@ -90,7 +91,7 @@ def marks(key, size=6, crc=0, file="blocks/000000000.json"):
             sums[name] = [len(data), store.durable.checksum(data)]
         else:
             sums[name] = [size, crc]
-        (path / file).write_bytes(store.marker(sums))
+        (path / file).write_bytes(marker(sums))
 
     return harm
 
@@ -160,9 +161,9 @@ def parts(data):
         found = data(home) if callable(data) else data
         (path / "parts" / "000000000.npy").write_bytes(found)
         marker = path / "blocks" / "000000000.json"
-        sums = store.read_marker(path, "blocks/000000000.json")
+        sums = read_marker(path, "blocks/000000000.json")
         sums["parts/000000000.npy"] = [len(found), store.durable.checksum(found)]
-        marker.write_bytes(store.marker(sums))
+        marker.write_bytes(marker(sums))
 
     return harm
 
@@ -176,9 +177,9 @@ def chunk(name, values):
         data += store.durable.checksum(data).to_bytes(4, "little")
         file.write_bytes(data)
         marker = path / "blocks" / "000000000.json"
-        sums = store.read_marker(path, "blocks/000000000.json")
+        sums = read_marker(path, "blocks/000000000.json")
         sums[f"{name}/{file.name}"] = [len(data), store.durable.checksum(data)]
-        marker.write_bytes(store.marker(sums))
+        marker.write_bytes(marker(sums))
 
     return harm
 
@@ -256,7 +257,7 @@ STORES = {
     "marker names the root": (marks("zarr.json", crc=None), "is no file of it"),
     "marker names the terminal": (marks("\x1b[2Jstatus"), "is no file of it"),
     "marker has a huge size": (marks("status/c.0", 10**15), "bytes in the marker, not"),
-    "marker is a list": (content("blocks/000000000.json", store.marker({})[:0] + b"[]\n00000000\n"), "not complete"),
+    "marker is a list": (content("blocks/000000000.json", marker({})[:0] + b"[]\n00000000\n"), "not complete"),
     # Links and what is no file.
     "a chunk is a link": (link("status/c.0", "secret"), "is a link"),
     "a chunk is a link to zeros": (link("status/c.0", "/dev/zero"), "is a link"),

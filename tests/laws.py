@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lgvi_warp import terms
+from lgvi_warp.physics import terms
 from lgvi_warp.reference.terms.current import Current, CurrentProfile
 from lgvi_warp.reference.terms.drag import Drag, DragMatrix
 from lgvi_warp.reference.terms.tether import Tether

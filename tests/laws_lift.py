@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lgvi_warp import terms
+from lgvi_warp.physics import terms
 from lgvi_warp.reference.terms.control_fins import ControlFins
 from lgvi_warp.reference.terms.cross_flow import CrossFlow
 from lgvi_warp.reference.terms.fins import Fins

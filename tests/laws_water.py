@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from lgvi_warp import terms
+from lgvi_warp.physics import terms
+from lgvi_warp.physics.terms.wrench_noise import channel
 from lgvi_warp.reference.terms.current_harmonics import CurrentHarmonics
 from lgvi_warp.reference.terms.gauss_markov_current import GaussMarkovCurrent
 from lgvi_warp.reference.terms.stratification import Stratification
 from lgvi_warp.reference.terms.waves import Waves
 from lgvi_warp.reference.terms.wrench_noise import WrenchNoise
-from lgvi_warp.terms.wrench_noise import channel
 from tests.laws import Case, case
 
 # The vehicle and gravity of tests/parity/test_terms.py.

@@ -3,7 +3,9 @@
 import numpy as np
 
 import lgvi_warp as lw
-from lgvi_warp import comparison, suggestion, tradeoffs
+from lgvi_warp.studies import comparison
+from lgvi_warp.studies import suggest as suggestion
+from lgvi_warp.studies import tradeoff as tradeoffs
 
 
 def random_scene(seed):

@@ -8,7 +8,7 @@ import pytest
 import warp as wp
 
 import lgvi_warp as lw
-import lgvi_warp.notation
+import lgvi_warp.physics.notation
 from lgvi_warp.reference.submaps import Body, State
 from lgvi_warp.reference.terms.restoring import Restoring
 from lgvi_warp.reference.terms.weight import Weight

@@ -10,11 +10,11 @@ import numpy as np
 import warp as wp
 
 from benchmarks.peers.problem import End, Problem, Run, Runs
-from lgvi_warp.blocks import unpacked
-from lgvi_warp.method import Method
-from lgvi_warp.packets import Packets
-from lgvi_warp.saveat import SaveAt
-from lgvi_warp.solving import make_plan
+from lgvi_warp.engine.packets import Packets
+from lgvi_warp.engine.work import unpacked
+from lgvi_warp.methods.method import Method
+from lgvi_warp.methods.saveat import SaveAt
+from lgvi_warp.runs.settle import make_plan
 
 # What is measured: a method, its precision, and its steps a second.
 METHODS: tuple[tuple[str | Method, str, tuple[float, ...]], ...] = (

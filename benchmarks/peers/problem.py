@@ -13,10 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp import notation, speed
-from lgvi_warp.ensemble import Ensemble
-from lgvi_warp.scene import Environment, Scene
-from lgvi_warp.vehicle import Vehicle
+from lgvi_warp.physics import notation
+from lgvi_warp.physics.vehicle import Vehicle
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.scene.start import Environment
+from lgvi_warp.studies import speed
 
 SIZE = 13
 GRAVITY = 9.8

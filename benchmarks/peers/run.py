@@ -69,7 +69,8 @@ def measure(names: list[str], quick: bool, threads: int, rounds: int) -> Iterato
     """One record for the machine, each problem's reference, each peer that is missing, and each setting."""
     from benchmarks.peers import problem as problems
     from benchmarks.peers import reference
-    from lgvi_warp import machine, speed, warp_setup
+    from lgvi_warp.common import machine, warp_setup
+    from lgvi_warp.studies import speed
 
     warp_setup.start()
     yield {"machine": machine.describe(), "versions": machine.versions(), "threads": threads, "quick": quick}

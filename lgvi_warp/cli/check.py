@@ -11,9 +11,9 @@ from lgvi_warp.cli.settings import overrides
 
 def check(chosen: argparse.Namespace) -> int:
     """lgvi-warp check: 0 for a scene that can run, whatever is odd about it. Raises SceneError for one that cannot."""
-    from lgvi_warp import plausibility
-    from lgvi_warp.ensemble import Ensemble
-    from lgvi_warp.scene import Scene
+    from lgvi_warp.scene import plausibility
+    from lgvi_warp.scene.ensemble import Ensemble
+    from lgvi_warp.scene.scene import Scene
 
     scene = Scene.load(chosen.scene, overrides(chosen))
     ensemble = Ensemble.from_scene(scene)
@@ -29,7 +29,7 @@ def check(chosen: argparse.Namespace) -> int:
 
 def _settings(ensemble: Any) -> tuple[str, tuple[str, ...]]:
     """The run in a few words, and what is to be said of its settings. Raises SceneError for what a run would refuse."""
-    from lgvi_warp.solving import make_plan
+    from lgvi_warp.runs.settle import make_plan
 
     run = ensemble.scene.run
     members = f"members {ensemble.members:,}"

@@ -16,7 +16,7 @@ from lgvi_warp.cli.settings import RUN, out_of
 from lgvi_warp.cli.signals import Ended, Signals, Streams
 from lgvi_warp.cli.stores import export, merge
 from lgvi_warp.cli.studies import sensitivity, stability, tradeoff
-from lgvi_warp.errors import SceneError
+from lgvi_warp.common.errors import SceneError
 
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
     "run": run,
@@ -93,6 +93,6 @@ def entry() -> None:
         code = main()
     except SystemExit as end:  # of the parser
         code = end.code if isinstance(end.code, int) else 0
-    if warp_setup := sys.modules.get("lgvi_warp.warp_setup"):
+    if warp_setup := sys.modules.get("lgvi_warp.common.warp_setup"):
         warp_setup.end()
     os._exit(code)

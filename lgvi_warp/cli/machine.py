@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 
 from lgvi_warp.cli.stores import info_of_run
+from lgvi_warp.engine.peak import fma_peak
 
 
 def info(chosen: argparse.Namespace) -> int:
     """lgvi-warp info."""
     if chosen.dir is not None:
         return info_of_run(chosen.dir)
-    from lgvi_warp import machine
+    from lgvi_warp.common import machine
 
     described = machine.describe()
     print(f"cpu         {described['cpu']}, {described['simd']}, {described['threads']} threads{_of_quota()}")
@@ -19,7 +20,7 @@ def info(chosen: argparse.Namespace) -> int:
         print(f"memory      {memory / 2**30:.1f} GiB{_of_limit(memory)}")
     print("versions    " + ", ".join(f"{name} {version}" for name, version in machine.versions().items()))
     for dtype in ("float64", "float32"):
-        peak = machine.fma_peak(dtype)
+        peak = fma_peak(dtype)
         print(
             f"{dtype}     {machine.default_width(dtype)} vehicles per packet; one core's peak {peak / 1e9:.1f} GFMA/s"
         )
@@ -28,7 +29,7 @@ def info(chosen: argparse.Namespace) -> int:
 
 def _of_quota() -> str:
     """What a container's quota leaves of the cores, where it does."""
-    from lgvi_warp import container, machine
+    from lgvi_warp.common import container, machine
 
     quota, cores = container.cpu_quota(), machine.affinity()
     if quota is None or quota >= cores:
@@ -38,7 +39,7 @@ def _of_quota() -> str:
 
 def _of_limit(memory: int) -> str:
     """What a container's limit leaves of the memory, where it does."""
-    from lgvi_warp import machine
+    from lgvi_warp.common import machine
 
     physical = machine.physical_memory()
     if physical is None or physical <= memory:
@@ -48,7 +49,7 @@ def _of_limit(memory: int) -> str:
 
 def bench(chosen: argparse.Namespace) -> int:
     """lgvi-warp bench."""
-    from lgvi_warp.speed import measure
+    from lgvi_warp.studies.speed import measure
 
     for line in measure(chosen.members, chosen.steps):
         print(line, flush=True)

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli.writing import Written, side_by_side
-from lgvi_warp.safe_files import size_below
-from lgvi_warp.write_lock import write_lock
+from lgvi_warp.common.safe_files import size_below
+from lgvi_warp.common.write_lock import write_lock
 
 
 def report(result: Any, out: Path, quiet: bool, begun: float) -> list[str]:
@@ -38,7 +38,7 @@ def told(faults: list[str]) -> list[str]:
 
 def complete(result: Any) -> bool:
     """Whether a store holds the whole run."""
-    from lgvi_warp.store import Folder
+    from lgvi_warp.runs.store.folder import Folder
 
     return Folder(result.store).complete
 
@@ -53,7 +53,7 @@ def shown_members(result: Any) -> Any:
         return result.kept and shown_members(result.kept)
     if result.store is None:
         return result
-    from lgvi_warp.stored import chosen
+    from lgvi_warp.runs.store.open import chosen
 
     most = max(1, MOST_DRAWN // (18 * len(result.time)))
     return chosen(result, range(min(most, result.members)))
@@ -70,8 +70,8 @@ def write(result: Any, drawn: Any, out: Path) -> Written:
     Returns:
         What was written.
     """
-    from lgvi_warp.sinks.plots import drawable, plot, plot_statistics
-    from lgvi_warp.sinks.rerun import log_rerun
+    from lgvi_warp.views.plots import drawable, plot, plot_statistics
+    from lgvi_warp.views.rerun import log_rerun
 
     written = Written([result.store] if result.store else [])
     writers: dict[str, Callable[[Path], Path]] = {} if result.store else {"result.npz": result.save}
@@ -97,9 +97,9 @@ def _in_turn(out: Path) -> Iterator[None]:
 
 def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
     """The run in a few lines."""
-    from lgvi_warp.outcomes import outcome_text, outcomes
+    from lgvi_warp.common.status import Status
+    from lgvi_warp.runs.outcomes import outcome_text, outcomes
     from lgvi_warp.statistics.table import table
-    from lgvi_warp.status import Status
 
     settings = result.provenance
     steps = settings["steps"]
@@ -143,7 +143,7 @@ def _energy_lines(result: Any, drawn: Any) -> list[str]:
     """How far what the scene conserves drifts, or how much energy changed where forces do work; none if all failed."""
     import math
 
-    from lgvi_warp import invariants
+    from lgvi_warp.physics import energy as invariants
 
     drift, conserved = invariants.drift(drawn), invariants.conserved(drawn)
     if math.isnan(drift["energy"]):
@@ -158,7 +158,7 @@ def _energy_lines(result: Any, drawn: Any) -> list[str]:
 
 def _warning_lines(result: Any) -> list[str]:
     """Members by warning, and of each warning what it says and who had it first as the most serious one."""
-    from lgvi_warp.status import Warnings
+    from lgvi_warp.common.status import Warnings
 
     counts = result.warnings.counts()
     if not counts:

@@ -12,7 +12,7 @@ from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.report import report, told
 from lgvi_warp.cli.settings import block_range, folder, overrides, store_settings
 from lgvi_warp.cli.signals import Ended
-from lgvi_warp.errors import Interrupted, MembersFailed, SceneError
+from lgvi_warp.common.errors import Interrupted, MembersFailed, SceneError
 
 # The file of a result in memory, and that of a part of one where such a file is there.
 RESULT, PART = "result.npz", "result_part.npz"
@@ -20,14 +20,14 @@ RESULT, PART = "result.npz", "result_part.npz"
 
 def run(chosen: argparse.Namespace) -> int:
     """lgvi-warp run."""
-    from lgvi_warp.scene import Scene
+    from lgvi_warp.scene.scene import Scene
 
     begun = time.perf_counter()
     scene = Scene.load(chosen.scene, overrides(chosen))
     store, only = store_settings(chosen), block_range(chosen)
     out = folder(chosen)
     warm = _import_in_background()
-    from lgvi_warp.solving import solve
+    from lgvi_warp.runs.solve import solve
 
     suggested = suggestion(scene, chosen)
     settings = suggested.settings if suggested else {}
@@ -73,7 +73,7 @@ def rescued(result: Any, out: Path) -> str:
 
 def all_failed(result: Any) -> bool:
     """Whether no member got to its end, or to the event that ended it."""
-    from lgvi_warp.status import failed
+    from lgvi_warp.common.status import failed
 
     return bool(failed(result.status).all())
 
@@ -92,7 +92,7 @@ def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:
         if getattr(chosen, name) is not None:
             text = f"--{name} {getattr(chosen, name)}: is what --error chooses"
             raise SceneError([f"{text}; leave out --{name} or --error"])
-    from lgvi_warp.suggestion import suggest
+    from lgvi_warp.studies.suggest import suggest
 
     methods = [chosen.method] if chosen.method else None
     of = chosen.of or "position"
@@ -105,8 +105,8 @@ def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:
 
 def check_error(scene: Any, result: Any, suggested: Any, quiet: bool) -> list[str]:
     """Say what error the run has, by some members at half its step; a fault where it is above what was asked."""
-    from lgvi_warp.ensemble import Ensemble
-    from lgvi_warp.suggestion import verified
+    from lgvi_warp.scene.ensemble import Ensemble
+    from lgvi_warp.studies.suggest import verified
 
     found, members = verified(Ensemble.from_scene(scene), result, suggested)
     text = (
@@ -139,7 +139,7 @@ def _import_in_background() -> threading.Thread:
 
 def resume(chosen: argparse.Namespace) -> int:
     """lgvi-warp resume."""
-    from lgvi_warp.resuming import resume as go_on
+    from lgvi_warp.runs.store.resume import resume as go_on
 
     begun = time.perf_counter()
     failures = []
@@ -158,8 +158,8 @@ def resume(chosen: argparse.Namespace) -> int:
 
 def plan(chosen: argparse.Namespace) -> int:
     """lgvi-warp plan."""
-    from lgvi_warp.prediction import predict
-    from lgvi_warp.scene import Scene
+    from lgvi_warp.runs.predict import predict
+    from lgvi_warp.scene.scene import Scene
 
     scene = Scene.load(chosen.scene, overrides(chosen))
     print(predict(scene, threads=chosen.threads, store=store_settings(chosen)))

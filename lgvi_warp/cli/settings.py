@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from lgvi_warp.errors import SceneError
+from lgvi_warp.common.errors import SceneError
 
 # The store in a run's folder.
 RUN = "run.zarr"
@@ -97,7 +97,7 @@ def store_settings(chosen: argparse.Namespace) -> Any:
         if given:
             raise SceneError([f"{' and '.join(given)}: is for runs in a store; add --store zarr, or leave it out"])
         return None
-    from lgvi_warp.store import Store
+    from lgvi_warp.runs.store.settings import Store
 
     existing = next((name for name in ("overwrite", "resume") if getattr(chosen, name, False)), "refuse")
     return Store(out_of(chosen) / RUN, chosen.store_dtype, existing=existing)

@@ -10,7 +10,7 @@ from lgvi_warp.cli.report import size_of, told
 
 def merge(chosen: argparse.Namespace) -> int:
     """lgvi-warp merge."""
-    from lgvi_warp.resuming import merge as put_together
+    from lgvi_warp.runs.store.merge import merge as put_together
 
     folder = put_together(chosen.dirs, chosen.out, chosen.overwrite)
     if not folder.complete:
@@ -27,7 +27,7 @@ def merge(chosen: argparse.Namespace) -> int:
 
 def export(chosen: argparse.Namespace) -> int:
     """lgvi-warp export."""
-    from lgvi_warp.exporting import export as write_as
+    from lgvi_warp.runs.store.export import export as write_as
 
     path = write_as(chosen.dir, chosen.to, chosen.out)
     print(f"file        {path} ({size_of(path) / 1e6:.1f} MB)")
@@ -40,7 +40,7 @@ MOST_SAID = 20
 
 def info_of_run(path: Path) -> int:
     """What a store holds. Returns 0 if it is complete and whole, else 1."""
-    from lgvi_warp.resuming import state
+    from lgvi_warp.runs.store.state import state
 
     found = state(path)
     own = found["provenance"]

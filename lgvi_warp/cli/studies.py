@@ -10,7 +10,7 @@ from lgvi_warp.cli.report import told
 from lgvi_warp.cli.settings import folder, overrides
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.cli.writing import Written
-from lgvi_warp.errors import SceneError
+from lgvi_warp.common.errors import SceneError
 
 
 def finish(written: Written, report: str, quiet: bool) -> int:
@@ -24,14 +24,14 @@ def finish(written: Written, report: str, quiet: bool) -> int:
 
 def tradeoff(chosen: argparse.Namespace) -> int:
     """lgvi-warp tradeoff."""
-    from lgvi_warp.scene import Scene
+    from lgvi_warp.scene.scene import Scene
 
     scene = Scene.load(chosen.scene, overrides(chosen))
     out = folder(chosen, "_tradeoff")
     methods = None if chosen.methods is None else [name.strip() for name in chosen.methods.split(",")]
-    from lgvi_warp.sinks.plots import plot_tradeoff
-    from lgvi_warp.tradeoffs import report_text
-    from lgvi_warp.tradeoffs import tradeoff as measure
+    from lgvi_warp.studies.tradeoff import report_text
+    from lgvi_warp.studies.tradeoff import tradeoff as measure
+    from lgvi_warp.views.plots import plot_tradeoff
 
     with shown(chosen.quiet) as progress:
         found = measure(scene, of=chosen.of, methods=methods, seconds=chosen.seconds, progress=progress)
@@ -42,9 +42,9 @@ def tradeoff(chosen: argparse.Namespace) -> int:
 
 def sensitivity(chosen: argparse.Namespace) -> int:
     """lgvi-warp sensitivity."""
-    from lgvi_warp import uq
-    from lgvi_warp.scene import Scene
-    from lgvi_warp.sinks.sensitivity import plot_sensitivity
+    from lgvi_warp.scene.scene import Scene
+    from lgvi_warp.studies import sensitivity as uq
+    from lgvi_warp.views.sensitivity import plot_sensitivity
 
     scene = Scene.load(chosen.scene, overrides(chosen))
     out = folder(chosen, "_sensitivity")
@@ -67,7 +67,7 @@ def sensitivity(chosen: argparse.Namespace) -> int:
 
 def stability(chosen: argparse.Namespace) -> int:
     """lgvi-warp stability."""
-    from lgvi_warp.scene import Scene
+    from lgvi_warp.scene.scene import Scene
 
     if chosen.grid is not None and (chosen.x is not None or chosen.y is not None):
         raise SceneError(
@@ -78,8 +78,8 @@ def stability(chosen: argparse.Namespace) -> int:
     # Of the random directions: all that the scene's ensemble has to say here.
     seed = scene.ensemble_settings.seed if scene.ensemble_settings else 0
     out = folder(chosen, "_stability")
-    from lgvi_warp.sinks.plots import plot_stability
-    from lgvi_warp.stability import GRIDS, report_text, stability_map
+    from lgvi_warp.studies.stability.map import GRIDS, report_text, stability_map
+    from lgvi_warp.views.plots import plot_stability
 
     maps = {"stability": (chosen.x or "h", chosen.y or "angular_velocity")}
     if chosen.grid:

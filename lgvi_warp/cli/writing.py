@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli.signals import Ended
-from lgvi_warp.errors import MissingExtra, NothingToDraw
+from lgvi_warp.common.errors import MissingExtra, NothingToDraw
 
 # A signal that comes just before the main thread begins to wait is heard so much later [s].
 PERIOD = 0.2

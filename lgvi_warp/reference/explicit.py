@@ -18,7 +18,7 @@ Row = tuple[float, ...]
 
 
 class Tableau(Protocol):
-    """What lgvi_warp.tableaux holds: a, b, c; rows of error estimates, which go as h to the power `estimate`."""
+    """What lgvi_warp.methods.tableaux holds: a, b, c; rows of error estimates, which go as h to the power `estimate`."""
 
     @property
     def a(self) -> tuple[Row, ...]:

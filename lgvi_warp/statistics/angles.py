@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from lgvi_warp.errors import Faults
+from lgvi_warp.common.errors import Faults
 from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.estimate import Estimate, along

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from functools import reduce
 from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.errors import Faults, SceneError
+from lgvi_warp.common.errors import Faults, SceneError, closest, shown
 from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.ends import Ends
 from lgvi_warp.statistics.estimate import Estimate
-from lgvi_warp.statistics.quantity import Quantity, component, quantity
+from lgvi_warp.statistics.functional import quantity
+from lgvi_warp.statistics.quantity import Quantity, component
 from lgvi_warp.statistics.tree import Part
 from lgvi_warp.statistics.values import Values
 
 STOPPED = ("held", "left_out")
+
+# The types of a scene file.
+TYPES: dict[str, type[Statistic]] = {}
 
 
 class Gatherer:
@@ -83,6 +88,11 @@ class Statistic:
     confidence: float = field(default=0.95, kw_only=True)
     stopped: str = field(default="held", kw_only=True)
     at: str | None = field(default=None, kw_only=True)
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if cls.type and cls.__module__.startswith(__package__):
+            TYPES[cls.type] = cls
 
     def __post_init__(self) -> None:
         faults = Faults(f"{self.type}.")
@@ -243,3 +253,50 @@ def plain(value: Any) -> Any:
     if isinstance(value, Quantity):
         return value.name
     return getattr(value, "__name__", type(value).__name__) if callable(value) else value
+
+
+def from_list(given: Any, key: str = "statistics", *, whole: bool = True) -> tuple[Statistic, ...]:
+    """Statistics from tables of a scene file or Statistic objects. Raises SceneError naming every fault.
+
+    whole: each must say what it is of, and have a name of its own.
+    """
+    if isinstance(given, str | Mapping | Statistic) or not isinstance(given, Sequence):
+        example = 'write [[run.statistics]] and type = "mean" below, or statistics=[lw.Mean("position")]'
+        raise SceneError([f"{key} = {shown(given)}: is no list; {example}"])
+    faults, found = Faults(), list[Statistic]()
+    for i, one in enumerate(given):
+        with faults.including():
+            found.append(_one(f"{key}[{i}]", one))
+    if whole and not faults:
+        names: list[str] = []
+        for one in found:
+            with faults.including():
+                names += [part.key for part in one.parts()]
+        for name in sorted({name for name in names if names.count(name) > 1}):
+            faults.add(
+                key, name, f"is the name of {names.count(name)} statistics", "give each a name of its own: name=..."
+            )
+    faults.raise_if_any()
+    return tuple(found)
+
+
+def _one(where: str, given: Any) -> Statistic:
+    """A statistic from its table, or as it is. Raises SceneError naming every fault."""
+    if isinstance(given, Statistic):
+        return given
+    if not isinstance(given, Mapping):
+        raise SceneError(
+            [f'{where} = {shown(given)}: is no statistic; write type = "mean", or give lw.Mean("position")']
+        )
+    word = given.get("type", "")
+    kind = TYPES.get(word) if isinstance(word, str) else None
+    if kind is None:
+        raise SceneError([f"{where}.type = {shown(word)}: is not known; {closest(str(word), TYPES)}"])
+    faults = Faults()
+    table = {name: value for name, value in given.items() if name != "type"}
+    faults.keys(where, table, [one.name for one in dataclasses.fields(kind)])
+    faults.raise_if_any()
+    try:
+        return kind(**table)
+    except SceneError as error:
+        raise error.prefixed(f"{where}: ") from None

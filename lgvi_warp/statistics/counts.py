@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.errors import Faults
+from lgvi_warp.common.errors import Faults
 from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.base import Gatherer, Statistic, together
 from lgvi_warp.statistics.ends import STOPPED, Ends

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lgvi_warp.errors import Faults, closest
-from lgvi_warp.status import Status, failed, stopped
+from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.common.status import Status, failed, stopped
 
 # Words for several statuses: any event, any failure.
 STOPPED, FAILED = "stopped", "failed"

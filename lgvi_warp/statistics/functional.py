@@ -7,18 +7,18 @@ each member, over its path. Statistics, sensitivity, trade-offs and stability ma
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp.errors import Faults, SceneError, closest, shown
-from lgvi_warp.statistics.quantity import KNOWN, Quantity, named, quantity
+from lgvi_warp.common.errors import Faults, SceneError, closest, shown
+from lgvi_warp.statistics.quantity import KNOWN, Quantity, joined, named
 
 if TYPE_CHECKING:
-    from lgvi_warp.blocks import Fields
-    from lgvi_warp.ensemble import Members
+    from lgvi_warp.sampling.members import Members
+    from lgvi_warp.statistics.samples import Fields
 
 OVER_TIME: dict[str, Callable[..., np.ndarray]] = {"max": np.max, "min": np.min, "mean": np.mean, "range": np.ptp}
 FUNCTIONS = (*OVER_TIME, "norm")
@@ -119,3 +119,22 @@ def _nested(text: str) -> tuple[list[str], str]:
         functions.append(match[1])
         text = match[2]
     return functions, text
+
+
+def quantity(key: str, of: Any) -> Quantity:
+    """The quantity that `of` means: a name, a name with an index, a Quantity, a function, or a list of these, as one.
+
+    Raises SceneError naming `key` where it means none.
+    """
+    if isinstance(of, Quantity):
+        return of
+    if isinstance(of, str):
+        if "(" in of:
+            return functional(key, of).at_each_time()
+        return named(key, of)
+    if callable(of):
+        return Quantity(str(getattr(of, "__name__", type(of).__name__)), of)
+    if isinstance(of, Sequence) and len(of):
+        return joined([quantity(f"{key}[{i}]", one) for i, one in enumerate(of)])
+    remedy = f"give one of {', '.join(KNOWN)}, one component as in 'position[2]', or a function of (samples, members)"
+    raise SceneError([f"{key} = {shown(of)}: is no quantity; {remedy}"])

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.errors import Faults, SceneError, shown
+from lgvi_warp.common.errors import Faults, SceneError, shown
 from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.base import Gatherer, Statistic
 from lgvi_warp.statistics.counts import Curve, Histogram, by_replicates, check_levels

@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp import invariants, notation
-from lgvi_warp.errors import SceneError, closest, shown
-from lgvi_warp.real_numbers import NotReal, real_results
-from lgvi_warp.saveat import FIELDS
+from lgvi_warp.common.errors import SceneError, closest, shown
+from lgvi_warp.common.real_numbers import NotReal, real_results
+from lgvi_warp.methods.saveat import FIELDS
+from lgvi_warp.physics import energy as invariants
+from lgvi_warp.physics import notation
 
 if TYPE_CHECKING:
-    from lgvi_warp.blocks import Fields
-    from lgvi_warp.ensemble import Members
-    from lgvi_warp.terms import Term
+    from lgvi_warp.physics.terms import Term
+    from lgvi_warp.sampling.members import Members
+    from lgvi_warp.statistics.samples import Fields
 
 Function = Callable[["Fields", "Members"], np.ndarray]
 
@@ -123,27 +124,6 @@ KNOWN: dict[str, Quantity] = {
 }  # fmt: skip
 
 
-def quantity(key: str, of: Any) -> Quantity:
-    """The quantity that `of` means: a name, a name with an index, a Quantity, a function, or a list of these, as one.
-
-    Raises SceneError naming `key` where it means none.
-    """
-    if isinstance(of, Quantity):
-        return of
-    if isinstance(of, str):
-        if "(" in of:
-            from lgvi_warp.statistics.functional import functional
-
-            return functional(key, of).at_each_time()
-        return named(key, of)
-    if callable(of):
-        return Quantity(str(getattr(of, "__name__", type(of).__name__)), of)
-    if isinstance(of, Sequence) and len(of):
-        return _joined([quantity(f"{key}[{i}]", one) for i, one in enumerate(of)])
-    remedy = f"give one of {', '.join(KNOWN)}, one component as in 'position[2]', or a function of (samples, members)"
-    raise SceneError([f"{key} = {shown(of)}: is no quantity; {remedy}"])
-
-
 def named(key: str, text: str) -> Quantity:
     """The quantity of a name, or one component of it. Raises SceneError naming `key`."""
     found = re.fullmatch(r"(\w+)(\[[\d, ]+\])?", text.strip())
@@ -168,7 +148,7 @@ def component(base: Quantity, i: int) -> Quantity:
     return replace(base, name=base.labels[i], labels=(base.labels[i],), function=lambda s, m: inner(s, m)[..., i])
 
 
-def _joined(parts: Sequence[Quantity]) -> Quantity:
+def joined(parts: Sequence[Quantity]) -> Quantity:
     """Several as one: their components side by side."""
     if len(parts) == 1:
         return parts[0]

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.errors import Faults
-from lgvi_warp.statistics.base import Statistic
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.statistics.base import Statistic, from_list
 from lgvi_warp.statistics.estimate import Estimate
 from lgvi_warp.statistics.moments import Mean
 from lgvi_warp.statistics.quantity import Quantity
@@ -29,13 +29,12 @@ class Then(Statistic):
     def check(self, faults: Faults) -> None:
         """What comes after must be statistics over members, and not of something else."""
         super().check(faults)
-        from lgvi_warp import statistics
 
         given = self.then_default() if self.then is None else self.then
         given = given if isinstance(given, list | tuple) else [given]
         found: list[Statistic] = []
         with faults.including():
-            found = list(statistics.from_list(given, f"{self.type}.then", whole=False))
+            found = list(from_list(given, f"{self.type}.then", whole=False))
         for i, one in enumerate(found):
             if not one.of_numbers:
                 what = f"is of samples in time, and a {self.type} is one number of each member"

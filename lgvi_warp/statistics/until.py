@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.errors import Faults, SceneError, closest
+from lgvi_warp.common.errors import Faults, SceneError, closest
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.estimate import Estimate
 from lgvi_warp.statistics.moments import Covariance, Mean

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import terms
-from lgvi_warp.solving import make_plan
+from lgvi_warp.physics import terms
+from lgvi_warp.runs.settle import make_plan
 from tests.laws import CASES
 from tests.parity.test_terms import STATE, VEHICLE, scene_of
 from tests.tools import generated, one

@@ -11,9 +11,9 @@ import warp as wp
 import lgvi_warp as lw
 from lgvi_kernels.lanes import lane, sub  # noqa: F401
 from lgvi_kernels.state import struct
-from lgvi_warp import events
-from lgvi_warp.inertia import moved
-from lgvi_warp.method import PROGRAMS
+from lgvi_warp.methods.method import PROGRAMS
+from lgvi_warp.physics.inertia import moved
+from lgvi_warp.physics.terms import events
 from lgvi_warp.reference import advance
 from tests.tools import (
     TURN,

@@ -15,13 +15,16 @@ import pytest
 import warp as wp
 
 import lgvi_warp as lw
-from lgvi_warp import cli, speed
-from lgvi_warp.blocks import Block, Work, blocks
-from lgvi_warp.executors import executor_of, received, sent
-from lgvi_warp.executors.processes import Processes
-from lgvi_warp.keepers import Outcomes, Samples
-from lgvi_warp.kernel_cache import one_at_a_time
-from lgvi_warp.solving import make_plan
+from lgvi_warp import cli
+from lgvi_warp.engine.block import Block, blocks
+from lgvi_warp.engine.executors import executor_of
+from lgvi_warp.engine.executors.base import received, sent
+from lgvi_warp.engine.executors.processes import Processes
+from lgvi_warp.engine.keepers.memory import Outcomes, Samples
+from lgvi_warp.engine.kernel_cache import one_at_a_time
+from lgvi_warp.engine.work import Work
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.studies import speed
 from tests.conftest import ROOT
 from tests.stores import SETTINGS, STATISTICS, UNTIL, bits, differing, fleet, markers
 from tests.toy_work import STEPS, Traced
@@ -132,7 +135,7 @@ def test_a_killed_process_costs_what_is_at_work(tmp_path):
 
 
 def test_a_killed_dask_worker_costs_the_block_it_is_at(client, tmp_path):
-    from lgvi_warp.executors.dask import Dask
+    from lgvi_warp.engine.executors.dask import Dask
 
     work = Traced(tmp_path)
     times = check_run_and_kill(work, *run_and_kill(Dask(client), work))
@@ -160,7 +163,7 @@ def test_a_killed_process_in_memory(whole):
 
 
 def test_dask(client, memory, tmp_path):
-    from lgvi_warp.executors.dask import Dask
+    from lgvi_warp.engine.executors.dask import Dask
 
     shown = []
     result = lw.solve(fleet(), **SETTINGS, executor=Dask(client), progress=shown.append)
@@ -173,7 +176,7 @@ def test_dask(client, memory, tmp_path):
 @pytest.mark.slow
 def test_statistics_on_dask_end_with_the_run(client, tmp_path):
     """Blocks that are at work when there are members enough leave nothing in the store."""
-    from lgvi_warp.executors.dask import Dask
+    from lgvi_warp.engine.executors.dask import Dask
 
     settings = {**SETTINGS, "statistics": STATISTICS, "until": UNTIL}
     lw.solve(fleet(), **settings, threads=1, store=tmp_path / "one.zarr")
@@ -184,7 +187,7 @@ def test_statistics_on_dask_end_with_the_run(client, tmp_path):
 
 
 def test_a_killed_dask_worker_costs_its_block_only(client, tmp_path, whole):
-    from lgvi_warp.executors.dask import Dask
+    from lgvi_warp.engine.executors.dask import Dask
 
     pids = list(client.run(os.getpid).values())
     killer = Killer(lambda: pids, tmp_path / "run.zarr")
@@ -194,7 +197,7 @@ def test_a_killed_dask_worker_costs_its_block_only(client, tmp_path, whole):
 
 @pytest.mark.slow
 def test_a_killed_dask_worker_in_memory(client, whole):
-    from lgvi_warp.executors.dask import Dask
+    from lgvi_warp.engine.executors.dask import Dask
 
     pids = list(client.run(os.getpid).values())
     killer = Killer(lambda: pids)
@@ -203,8 +206,8 @@ def test_a_killed_dask_worker_in_memory(client, whole):
 
 
 def test_a_worker_of_another_kind_is_refused(client, monkeypatch):
-    from lgvi_warp import machine
-    from lgvi_warp.executors.dask import Dask
+    from lgvi_warp.common import machine
+    from lgvi_warp.engine.executors.dask import Dask
 
     monkeypatch.setattr(machine, "cpu_name", lambda: "abacus")
     with pytest.raises(lw.SceneError, match=r"is not of the kind of the machine that asks.*abacus"):
@@ -233,7 +236,7 @@ def test_threads_ask_numpy_to_read_no_types(memory, monkeypatch):
 
 
 def test_unknown_executors_are_refused(monkeypatch, tmp_path):
-    from lgvi_warp.executors import dask
+    from lgvi_warp.engine.executors import dask
 
     monkeypatch.setattr(dask, "TIMEOUT", 0.3)
     for arguments, word in (
@@ -301,7 +304,7 @@ def test_work_that_cannot_be_read_is_refused_with_the_reason():
     data = sent(Work(plan, (Samples(plan), Outcomes(plan))), "processes")
     assert isinstance(received(data, "processes").plan.ensemble, lw.Ensemble)
     with pytest.raises(lw.SceneError, match=r"cannot be read by other processes.*ModuleNotFoundError"):
-        received(data.replace(b"lgvi_warp.keepers", b"lgvi_warp.kiipers"), "processes")
+        received(data.replace(b"lgvi_warp.engine.keepers.memory", b"lgvi_warp.kiipers"), "processes")
 
 
 def test_samples_are_not_sent():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import terms
-from lgvi_warp.status import Status
+from lgvi_warp.common.status import Status
+from lgvi_warp.physics import terms
 from tests.tools import one, random_states, scene_of
 
 FIELDS = ("position", "attitude", "velocity", "angular_velocity")

@@ -14,8 +14,11 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import cli, durable, safe_files, scratch, store, write_lock
+from lgvi_warp import cli
 from lgvi_warp.cli import report
+from lgvi_warp.common import files as durable
+from lgvi_warp.common import safe_files, scratch, write_lock
+from lgvi_warp.runs.store import folder as store
 from tests import hostile
 from tests.conftest import ROOT
 from tests.stores import MEMBERS, SETTINGS, differing, fleet, tree
@@ -142,7 +145,7 @@ def test_a_lock_ends_with_its_process(tmp_path):
     code = """
 import sys, time
 from pathlib import Path
-from lgvi_warp.write_lock import write_lock
+from lgvi_warp.common.write_lock import write_lock
 with write_lock(Path(sys.argv[1])):
     Path(sys.argv[2]).touch()
     time.sleep(60)

@@ -14,7 +14,10 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import cli, resuming, safe_files, store
+from lgvi_warp import cli
+from lgvi_warp.common import safe_files
+from lgvi_warp.runs.store import folder as store
+from lgvi_warp.runs.store.state import state
 from tests import hostile
 from tests.stores import SETTINGS, STATISTICS, differing, fleet
 
@@ -179,7 +182,7 @@ def test_any_value_of_its_metadata_may_be_another(seed, good, home, tmp_path):
         if not isinstance(content["attributes"], dict):
             continue
         hostile.say(path, content)
-        for look in (lw.open_run, resuming.state, lambda path: store.Folder(path).plan()):
+        for look in (lw.open_run, state, lambda path: store.Folder(path).plan()):
             with contextlib.suppress(lw.SceneError, OSError):
                 look(path)
     assert snapshot(home) == before and "evil_module" not in sys.modules

@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import cli, resuming, stored
-from lgvi_warp.solving import make_plan
-from lgvi_warp.status import Status
-from lgvi_warp.store import Folder
+from lgvi_warp import cli
+from lgvi_warp.common.status import Status
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.runs.store import open as stored
+from lgvi_warp.runs.store.folder import Folder
+from lgvi_warp.runs.store.state import state
 from tests.composition.test_store import FIELDS, flip, remove, tear
 from tests.stores import MEMBERS, SETTINGS, differing, fleet, tree
 
@@ -100,7 +102,7 @@ def test_a_part_is_sent_as_what_it_is():
 def test_no_failures_leave_no_group(tmp_path):
     result = lw.solve(fleet(), **SETTINGS, keep="failed", store=tmp_path / "run.zarr")
     assert result.kept is None and not (tmp_path / "run.zarr" / "kept").exists()
-    assert lw.open_run(tmp_path).kept is None and resuming.state(tmp_path)["complete"]
+    assert lw.open_run(tmp_path).kept is None and state(tmp_path)["complete"]
 
 
 DAMAGED = (

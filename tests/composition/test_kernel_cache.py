@@ -12,7 +12,9 @@ import time
 import pytest
 import warp as wp
 
-from lgvi_warp import durable, kernel_cache, warp_setup
+from lgvi_warp.common import files as durable
+from lgvi_warp.common import warp_setup
+from lgvi_warp.engine import kernel_cache
 from tests.conftest import ROOT
 
 

@@ -11,11 +11,13 @@ from matplotlib.image import imread
 from rerun.chunk import RrdReader
 
 import lgvi_warp as lw
-from lgvi_warp import cli, invariants, outcomes
+from lgvi_warp import cli
 from lgvi_warp.cli import report
-from lgvi_warp.sinks import fleet as looks
-from lgvi_warp.sinks import plots
-from lgvi_warp.status import Status, StatusArray, failed, stopped
+from lgvi_warp.common.status import Status, StatusArray, failed, stopped
+from lgvi_warp.physics import energy as invariants
+from lgvi_warp.runs import outcomes
+from lgvi_warp.views import fleet as looks
+from lgvi_warp.views import plots
 from tests import laws
 
 GRAVITY = 10.0
@@ -444,7 +446,7 @@ def test_a_library_that_is_broken_is_a_fault(mixed, tmp_path, monkeypatch):
     def broken(result, path):
         raise ImportError("libpng16.so: wrong version")
 
-    monkeypatch.setattr("lgvi_warp.sinks.plots.plot", broken)
+    monkeypatch.setattr("lgvi_warp.views.plots.plot", broken)
     assert "libpng16.so" in report.write(mixed, mixed, tmp_path).faults[0]
 
 
@@ -479,7 +481,7 @@ def test_the_command_says_in_a_line_what_an_interrupt_left(scene_file, monkeypat
 
 
 def test_keep_failed_keeps_no_outcome(mixed):
-    from lgvi_warp.observation import Observation
+    from lgvi_warp.engine.keepers.observation import Observation
 
     codes = np.array([0, 1, 16, 17, 18, 19, 20, 5])
     assert Observation(keep="failed").again(codes).tolist() == [1, 7]

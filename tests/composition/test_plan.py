@@ -9,12 +9,12 @@ import warp as wp
 import lgvi_warp as lw
 from lgvi_kernels.advance.kernel import make_advance
 from lgvi_kernels.terms import restoring, weight
-from lgvi_warp.blocks import blocks
-from lgvi_warp.method import Method
-from lgvi_warp.packets import pack
-from lgvi_warp.plan import SEGMENT_SAMPLE_BYTES
-from lgvi_warp.solving import make_plan
-from lgvi_warp.survey import shape_of_mass
+from lgvi_warp.engine.block import blocks
+from lgvi_warp.engine.packets import pack
+from lgvi_warp.engine.plan import SEGMENT_SAMPLE_BYTES
+from lgvi_warp.engine.survey import shape_of_mass
+from lgvi_warp.methods.method import Method
+from lgvi_warp.runs.settle import make_plan
 from tests.tools import TURN, generated, one, scene_of
 
 
@@ -128,8 +128,8 @@ def test_segments_are_contiguous_and_their_buffer_is_bounded(scene):
 def test_segments_change_no_bit(scene, monkeypatch):
     fleet = lw.Ensemble(scene, 16, vary={"start.angular_velocity": lw.Normal(std=0.1)})
     whole = lw.solve(fleet, h=0.01, t1=2.0, save=lw.SaveAt(every=0.5))
-    monkeypatch.setattr("lgvi_warp.plan.SEGMENT_VEHICLE_STEPS", 16 * 48)
-    monkeypatch.setattr("lgvi_warp.plan.SEGMENT_SAMPLE_BYTES", 1)
+    monkeypatch.setattr("lgvi_warp.engine.plan.SEGMENT_VEHICLE_STEPS", 16 * 48)
+    monkeypatch.setattr("lgvi_warp.engine.plan.SEGMENT_SAMPLE_BYTES", 1)
     pieces = lw.solve(fleet, h=0.01, t1=2.0, save=lw.SaveAt(every=0.5))
     assert whole.position.tobytes() == pieces.position.tobytes()
 

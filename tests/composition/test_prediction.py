@@ -7,12 +7,15 @@ import sys
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import cli, member_fields, prediction
-from lgvi_warp.observation import observe
-from lgvi_warp.solving import make_plan
-from lgvi_warp.statistics.keeper import Gathered
-from lgvi_warp.statistics.sizes import sizes
-from lgvi_warp.store import Folder, Sink
+from lgvi_warp import cli
+from lgvi_warp.engine.keepers.observation import observe
+from lgvi_warp.engine.keepers.statistics import Gathered
+from lgvi_warp.runs import member_fields
+from lgvi_warp.runs import predict as prediction
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.runs.sizes import sizes
+from lgvi_warp.runs.store.folder import Folder
+from lgvi_warp.runs.store.sink import Sink
 from tests.conftest import ROOT
 from tests.stores import SETTINGS, STATISTICS, fleet, tree
 

@@ -14,10 +14,10 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
-from lgvi_warp.blocks import blocks
 from lgvi_warp.cli import command, progress, runs
 from lgvi_warp.cli.signals import Lasting, Signals
-from lgvi_warp.executors.threads import Threads
+from lgvi_warp.engine.block import blocks
+from lgvi_warp.engine.executors.threads import Threads
 from tests.conftest import ROOT
 from tests.stores import SETTINGS, bits, differing, fleet
 
@@ -386,7 +386,7 @@ def test_an_interrupt_among_the_pictures_saves_the_result(there, tmp_path, monke
 
 
 def test_an_interrupt_while_files_are_written_leaves_them_whole(tmp_path, monkeypatch, capsys):
-    from lgvi_warp.sinks import plots
+    from lgvi_warp.views import plots
 
     plot = plots.plot
 

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import cli, invariants, limits, stability
-from lgvi_warp.stability import Cell, StabilityMap, report_text
-from lgvi_warp.stability_grid import Grid
-from lgvi_warp.stability_runs import column, judged, make_references
+from lgvi_warp import cli
+from lgvi_warp.engine.step_warnings import COARSE
+from lgvi_warp.physics import energy as invariants
+from lgvi_warp.studies.stability import map as stability
+from lgvi_warp.studies.stability.grid import Grid
+from lgvi_warp.studies.stability.map import Cell, StabilityMap, report_text
+from lgvi_warp.studies.stability.runs import column, judged, make_references
 from tests.conftest import ROOT
 
 PAPER = str(ROOT / "examples" / "paper.toml")
@@ -170,7 +173,7 @@ def test_exact_drag_has_no_limit_and_explicit_drag_has(scene):
     one = lw.stability_map(scene, *axes, ["psi_s", "rk4", "kl8(psi_x)"], points=8, t1=10.0, error_time=2.0)
     drag = one.x.values * one.y.values[:, None]
     # Half a second is coarse for the Munk oscillation, which is said of its cells whatever the drag; 2 is its limit.
-    resolved = 2.0 * one.ratios["psi_s"]["munk"] <= limits.COARSE
+    resolved = 2.0 * one.ratios["psi_s"]["munk"] <= COARSE
     assert np.all(resolved[:, :-1]) and not np.any(resolved[:, -1])
     assert one.judged == "dissipative" and np.all(one.classes["psi_s"][resolved] <= Cell.BOUNDED)
     assert np.all(one.classes["psi_s"][~resolved] == Cell.FLAGGED) and np.all(one.statuses["psi_s"] == lw.Status.OK)
@@ -214,7 +217,7 @@ def panels(picture, n):
 def test_the_picture_shows_every_class(found, tmp_path):
     from matplotlib.image import imread
 
-    from lgvi_warp.sinks.plots import CELLS
+    from lgvi_warp.views.plots import CELLS
 
     path = lw.plot_stability(found, tmp_path / "map.png")
     picture = imread(path)[..., :3]

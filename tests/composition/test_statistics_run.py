@@ -10,12 +10,15 @@ import pytest
 from scipy.special import ndtr, ndtri
 
 import lgvi_warp as lw
-from lgvi_warp import cli, observation, scenefile
-from lgvi_warp.blocks import Block, blocks
-from lgvi_warp.saveat import FIELDS
-from lgvi_warp.solving import make_plan
+from lgvi_warp import cli
+from lgvi_warp.engine.block import Block, blocks
+from lgvi_warp.engine.keepers import observation
+from lgvi_warp.engine.keepers.statistics import Gathered
+from lgvi_warp.methods.saveat import FIELDS
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.scene import scene as scenes
+from lgvi_warp.scene.scene import from_dict
 from lgvi_warp.statistics import TYPES
-from lgvi_warp.statistics.keeper import Gathered
 from tests.conftest import ROOT
 from tests.tools import one, random_states, scene_of
 
@@ -167,7 +170,7 @@ def test_the_order_in_which_blocks_finish_changes_no_bit(fleet, whole, order):
 
 
 def test_segments_change_no_bit(fleet, whole, monkeypatch):
-    monkeypatch.setattr("lgvi_warp.plan.SEGMENT_SAMPLE_BYTES", 1)
+    monkeypatch.setattr("lgvi_warp.engine.plan.SEGMENT_SAMPLE_BYTES", 1)
     assert same(lw.solve(fleet, **SETTINGS, statistics=EVERY, keep="none").statistics, whole.statistics)
 
 
@@ -180,7 +183,7 @@ def test_parts_pass_through_files(fleet, whole, tmp_path):
         pickle.loads(pickle.dumps(Gathered(plan.grid.times, plan.ensemble.members, statistics))),
         Gathered(plan.grid.times, plan.ensemble.members, statistics),
     )
-    from lgvi_warp.blocks import run_block
+    from lgvi_warp.engine.work import run_block
 
     plan.compile()
     for i in (2, 0, 3, 1):
@@ -642,7 +645,7 @@ def test_scene_files(path):
     assert [one.type for one in scene.run.statistics] == ["mean", "quantiles", "path_maximum", "path_time"]
     assert scene.run.keep == "none" and scene.run.until == lw.Until("mean position[2]", 1.0)
     content = scene.to_dict()
-    assert scenefile.from_dict(content).to_dict() == content
+    assert from_dict(content).to_dict() == content
     assert content["run"]["until"] == tomllib.loads(TABLES.replace("run.", ""))["until"]
     assert "statistics" not in lw.Scene.load(ROOT / "examples" / "paper.toml").to_dict()["run"]
 
@@ -665,7 +668,7 @@ size = 7
 statistic = "mean depth"
 """
     with pytest.raises(lw.SceneError) as caught:
-        scenefile.loads("[vehicle]\nmass = 10.0\ninertia = [1.0, 2.0, 2.5]\n" + text)
+        scenes.loads("[vehicle]\nmass = 10.0\ninertia = [1.0, 2.0, 2.5]\n" + text)
     faults = caught.value.faults
     assert len(faults) == 6 and all(f.startswith(("run.", "until.")) for f in faults)
     for i, word in enumerate(

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.method import PROGRAMS
+from lgvi_warp.common.status import Status
+from lgvi_warp.methods.method import PROGRAMS
+from lgvi_warp.methods.saveat import FIELDS
 from lgvi_warp.reference import advance as twin
 from lgvi_warp.reference import rotation
-from lgvi_warp.status import Status
 from tests.tools import METHODS, PAIRS, body_of, one, random_states, scene_of, to_state
 
 SOLVES_HALF = ("psi", "psi_s")
@@ -82,7 +83,7 @@ def test_failure_on_the_way(scene):
     good = lw.solve(fleet, "psi_s", h=h, t1=t)
     k = int(np.searchsorted(result.time, t - 0.5 * h))
     assert good.status.counts() == {"ok": 1}
-    for name in lw.saveat.FIELDS:
+    for name in FIELDS:
         frozen = getattr(result, name)
         np.testing.assert_array_equal(frozen[k], getattr(good, name)[-1])
         np.testing.assert_array_equal(frozen[k:], np.broadcast_to(frozen[k], frozen[k:].shape))

@@ -13,11 +13,19 @@ import pytest
 import zarr
 
 import lgvi_warp as lw
-from lgvi_warp import cli, durable, machine, member_fields, resuming, safe_files, store, store_layout
-from lgvi_warp.blocks import blocks
-from lgvi_warp.executors.threads import Threads
-from lgvi_warp.running import Stored
-from lgvi_warp.solving import make_plan, messages, provenance
+from lgvi_warp import cli
+from lgvi_warp.common import files as durable
+from lgvi_warp.common import machine, safe_files
+from lgvi_warp.engine.block import blocks
+from lgvi_warp.engine.executors.threads import Threads
+from lgvi_warp.runs import member_fields
+from lgvi_warp.runs.provenance import messages, provenance
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.runs.store import folder as store
+from lgvi_warp.runs.store import layout as store_layout
+from lgvi_warp.runs.store.run import Stored
+from lgvi_warp.runs.store.sink import packed, unpacked
+from lgvi_warp.runs.store.state import state
 from tests.conftest import ROOT
 from tests.stores import MEMBERS, SETTINGS, differing, fleet, markers, tree
 from tests.toy_keeper import DepthSum
@@ -287,7 +295,7 @@ def test_a_full_disk_is_told_by_an_export(whole, tmp_path, to, capsys):
 
 def test_a_damaged_marker_runs_its_block_again(copy, whole):
     flip(copy / "blocks" / "000000256.json")
-    assert resuming.state(copy)["finished"] == 3
+    assert state(copy)["finished"] == 3
     lw.resume(copy)
     assert differing(whole, copy) == []
 
@@ -403,7 +411,7 @@ def test_values_given_as_arrays_lie_in_the_store_as_arrays(kind, tmp_path):
         lw.solve(ensemble, **SETTINGS, store=tmp_path / f"{name}b.zarr", only=range(0, 1))
         lw.resume(tmp_path / f"{name}b.zarr")
         assert differing(tmp_path / f"{name}.zarr", tmp_path / f"{name}b.zarr") == []
-        assert resuming.state(tmp_path / f"{name}b.zarr")["complete"]
+        assert state(tmp_path / f"{name}b.zarr")["complete"]
         np.testing.assert_array_equal(stored.position, whole.position[:, ensemble.indices])
     given = store.Folder(tmp_path / "a.zarr").group()["explicit"]
     assert {name: array.shape[0] for name, array in given.arrays()} == dict.fromkeys(members(RANDOM).explicit(), 600)
@@ -446,7 +454,7 @@ def test_a_law_of_your_own_goes_on_with_its_ensemble(tmp_path):
         lw.resume(tmp_path / "b.zarr")
     assert lw.resume(tmp_path / "b.zarr", own).energy.tobytes() == whole.energy.tobytes()
     assert differing(tmp_path / "a.zarr", tmp_path / "b.zarr") == []
-    assert resuming.state(tmp_path / "b.zarr")["complete"]
+    assert state(tmp_path / "b.zarr")["complete"]
 
 
 def test_another_version_or_machine_is_refused_unless_forced(copy, monkeypatch):
@@ -482,7 +490,7 @@ def test_a_full_disk_keeps_what_is_finished(tmp_path, whole, monkeypatch, capsys
         OSError, match=r"No space left on device: the blocks that were finished are kept.*lgvi-warp resume"
     ):
         lw.solve(fleet(), **SETTINGS, store=path, threads=1)
-    assert not list(path.rglob(f"*{durable.UNFINISHED}")) and resuming.state(path)["damage"] == []
+    assert not list(path.rglob(f"*{durable.UNFINISHED}")) and state(path)["damage"] == []
     monkeypatch.undo()
     lw.resume(path)
     assert differing(whole, path) == []
@@ -500,8 +508,8 @@ def test_a_disk_that_is_full_when_a_block_was_written_already(tmp_path, whole, m
     path = tmp_path / "run.zarr"
     with pytest.raises(OSError, match=r"No space left on device: the blocks that were finished are kept"):
         lw.solve(fleet(), **SETTINGS, store=path, threads=1)
-    assert resuming.state(path)["damage"] == [] and 1 <= resuming.state(path)["finished"] <= 3
-    assert not list(path.rglob(f"*{durable.UNFINISHED}")) and not resuming.state(path)["complete"]
+    assert state(path)["damage"] == [] and 1 <= state(path)["finished"] <= 3
+    assert not list(path.rglob(f"*{durable.UNFINISHED}")) and not state(path)["complete"]
     monkeypatch.undo()
     lw.resume(path)
     assert differing(whole, path) == []
@@ -515,7 +523,7 @@ def test_an_interrupted_run_keeps_the_blocks_that_were_written(tmp_path, whole):
     path = tmp_path / "run.zarr"
     with pytest.raises(KeyboardInterrupt):
         lw.solve(fleet(), **SETTINGS, store=path, threads=1, progress=interrupted)
-    assert resuming.state(path)["finished"] == 3 and not list(path.rglob(f"*{durable.UNFINISHED}"))
+    assert state(path)["finished"] == 3 and not list(path.rglob(f"*{durable.UNFINISHED}"))
     lw.resume(path)
     assert differing(whole, path) == []
 
@@ -608,7 +616,7 @@ def test_parts_of_keepers_lie_in_the_store(tmp_path, memory):
         lw.resume(tmp_path / "b.zarr")
     path = tmp_path / "b.zarr" / "parts" / "000000512.npy"
     flip(path)
-    assert any("000000512.npy has changed" in text for text in resuming.state(tmp_path / "b.zarr")["damage"])
+    assert any("000000512.npy has changed" in text for text in state(tmp_path / "b.zarr")["damage"])
     assert run("b.zarr", existing="resume").sums.tobytes() == one.sums.tobytes()
     assert differing(tmp_path / "a.zarr", tmp_path / "b.zarr") == []
 
@@ -620,10 +628,10 @@ def test_parts_of_several_keepers_lie_in_one_file(tmp_path):
     for keeper, name in zip(several, ("second", "a third", "first"), strict=True):
         keeper.name = name
     path = tmp_path / "000000000.npy"
-    path.write_bytes(store.packed(several, given))
-    found = store.unpacked(several[::-1], tmp_path, path.name)
+    path.write_bytes(packed(several, given))
+    found = unpacked(several[::-1], tmp_path, path.name)
     assert [one.tobytes() for one in found] == [one.tobytes() for one in given[::-1]]
-    assert [one.tobytes() for one in store.unpacked(several[1:2], tmp_path, path.name)] == [b""]
+    assert [one.tobytes() for one in unpacked(several[1:2], tmp_path, path.name)] == [b""]
 
 
 def test_keepers_that_cannot_be_stored_are_refused(tmp_path):
@@ -665,7 +673,7 @@ def test_parquet(whole, memory, tmp_path):
 
 
 def test_what_is_no_run_is_named(tmp_path):
-    for call in (lw.open_run, lw.resume, resuming.state):
+    for call in (lw.open_run, lw.resume, state):
         with pytest.raises(lw.SceneError, match=r"holds no store; give the folder of a run made with --store zarr"):
             call(tmp_path)
     with pytest.raises(lw.SceneError, match="is not there"):

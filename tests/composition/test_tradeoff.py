@@ -9,8 +9,12 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import cli, comparison, cost, machine, suggestion, tradeoffs
-from lgvi_warp.comparison import Sample
+from lgvi_warp import cli
+from lgvi_warp.common import machine
+from lgvi_warp.studies import comparison, cost
+from lgvi_warp.studies import suggest as suggestion
+from lgvi_warp.studies import tradeoff as tradeoffs
+from lgvi_warp.studies.comparison import Sample
 from tests.conftest import ROOT
 from tests.random_scenes import judged, random_scene
 

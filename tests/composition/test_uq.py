@@ -13,7 +13,10 @@ import pytest
 from scipy import stats
 
 import lgvi_warp as lw
-from lgvi_warp import cli, quantities, uq
+from lgvi_warp import cli
+from lgvi_warp.runs import quantities
+from lgvi_warp.scene.settings import RunSettings
+from lgvi_warp.studies import sensitivity as uq
 from tests.conftest import ROOT
 
 FIVE = 5.0 / 1.96
@@ -383,7 +386,7 @@ def test_all_bad_arguments_come_at_once(scene):
     assert "4 faults" in message
     assert "has nothing that varies" in fault(uq.sobol, scene, "energy", vary={}, **RUN)
     assert "neither a Scene" in fault(uq.sobol, 3, "energy", **RUN)
-    short = dataclasses.replace(scene, run=lw.scene.RunSettings(step=0.01, duration=1.0))
+    short = dataclasses.replace(scene, run=RunSettings(step=0.01, duration=1.0))
     assert "looks over the path" in fault(uq.sobol, short, "max(energy)", samples=2, vary=BOX)
     assert "return an array" in fault(uq.sobol, scene, lambda result: np.zeros(3), samples=2, vary=BOX, **RUN)
 

@@ -11,7 +11,8 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_kernels.advance.kernel import make_advance
-from lgvi_warp import scenefile, terms
+from lgvi_warp.physics import terms
+from lgvi_warp.scene import scene as scenes
 from tests.tools import TURN, one
 
 ROOT = Path(__file__).parents[2]
@@ -144,7 +145,7 @@ members = 3
 
 
 def test_a_scene_file_may_name_them(registered):
-    scene = scenefile.loads(SCENE)
+    scene = scenes.loads(SCENE)
     assert [type(term) for term in scene.terms] == [own_law.Dock, own_law.Mud]
     assert scene.terms[1].key == "silt" and {"dock.reach", "silt.height"} <= scene.parameters().keys()
     result = lw.solve(lw.Ensemble.from_scene(scene), h=0.05, t1=0.5)
@@ -153,7 +154,7 @@ def test_a_scene_file_may_name_them(registered):
 
 def test_a_scene_file_without_them_is_refused():
     with pytest.raises(lw.SceneError, match="is not known"):
-        scenefile.loads(SCENE)
+        scenes.loads(SCENE)
 
 
 def test_a_type_is_taken_once(registered):

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import limits, terms
-from lgvi_warp.method import Method
-from lgvi_warp.solving import make_plan
-from lgvi_warp.status import Status, Warnings
-from lgvi_warp.survey import frame_of
-from lgvi_warp.terms import hydrostatics
+from lgvi_warp.common.status import Status, Warnings
+from lgvi_warp.engine.step_warnings import COARSE, PRECISION
+from lgvi_warp.engine.survey import frame_of
+from lgvi_warp.methods import limits
+from lgvi_warp.methods.method import Method
+from lgvi_warp.physics import terms
+from lgvi_warp.physics.terms import hydrostatics
+from lgvi_warp.runs.settle import make_plan
 from tests.tools import one, random_states, scene_of
 
 BELOW, ABOVE = 0.95, 1.05
@@ -116,7 +118,7 @@ def test_stiff_drag_of_explicit_methods(method, law):
 @pytest.mark.parametrize("checks", ["safe", "all"])
 def test_precision_far_from_the_origin(checks):
     h, v = 0.01, 1.0
-    far = limits.PRECISION * h * v / np.finfo(np.float32).eps
+    far = PRECISION * h * v / np.finfo(np.float32).eps
     b = np.outer(far * BOTH, [0.0, 0.0, 1.0])
     fleet = one(scene_of((2.0, 2.0, 2.0)), b=b, nu=[v, 0.0, 0.0])
     assert warned(lw.solve(fleet, h=h, t1=h, dtype="float32", checks=checks), Warnings.PRECISION_LOSS) == [False, True]
@@ -130,7 +132,7 @@ def test_precision_far_from_the_origin(checks):
 
 def test_precision_on_the_way():
     h, v = 0.01, 1.0
-    far = limits.PRECISION * h * v / np.finfo(np.float32).eps
+    far = PRECISION * h * v / np.finfo(np.float32).eps
     fleet = one(scene_of((2.0, 2.0, 2.0)), b=[far - 3.0, 0.0, 0.0], nu=[v, 0.0, 0.0])
     result = lw.solve(fleet, h=h, t1=8.0, dtype="float32", checks="all")
     assert warned(result, Warnings.PRECISION_LOSS) == [True]
@@ -343,7 +345,7 @@ def test_bits_and_codes_are_those_of_the_kernel():
 
 
 def test_every_method_has_its_limits():
-    from lgvi_warp.method import COMPOSITIONS, EXPLICIT, GAUSS, HALVES, PROGRAMS, TWO_PART
+    from lgvi_warp.methods.method import COMPOSITIONS, EXPLICIT, GAUSS, HALVES, PROGRAMS, TWO_PART
 
     composed = [f"{name}({base})" for name in COMPOSITIONS | HALVES for base in ("psi_s", "psi_x", "psi_1", "psi")]
     for name in (*PROGRAMS, *EXPLICIT, *TWO_PART, *GAUSS, *composed):
@@ -352,7 +354,7 @@ def test_every_method_has_its_limits():
         except lw.SceneError:
             continue
         for table in (limits.MUNK, limits.RESTORING):
-            assert limits.oscillation_limit(method, table) > limits.COARSE / limits.longest_stage(method)
+            assert limits.oscillation_limit(method, table) > COARSE / limits.longest_stage(method)
 
 
 def test_a_result_keeps_its_warnings(tmp_path):

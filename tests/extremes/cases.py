@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import lgvi_warp as lw
-from lgvi_warp.status import Status
+from lgvi_warp.common.status import Status
 from tests.extremes import extended
 
 OK, TOO_LARGE, NOT_CONVERGED, NON_FINITE = (

@@ -21,10 +21,13 @@ from pathlib import Path
 import numpy as np
 
 import lgvi_warp as lw
-from lgvi_warp import cli, events, terms
-from lgvi_warp import scene as scenes
-from lgvi_warp.scenefile import SECTIONS
-from lgvi_warp.solving import make_plan, run_plan
+from lgvi_warp import cli
+from lgvi_warp.physics import terms
+from lgvi_warp.physics.terms import events
+from lgvi_warp.runs.run import run_plan
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.scene import settings
+from lgvi_warp.scene.scene import SECTIONS
 
 ROOT = Path(__file__).parents[2]
 
@@ -61,7 +64,7 @@ WORDS = [
 @functools.cache
 def sources():
     """The texts that are broken: the examples, the vehicles, and one scene for each term, all terms and all events."""
-    files = sorted([*(ROOT / "examples").glob("*.toml"), *(ROOT / "lgvi_warp" / "vehicles").glob("*.toml")])
+    files = sorted([*(ROOT / "examples").glob("*.toml"), *(ROOT / "lgvi_warp" / "scene" / "vehicles").glob("*.toml")])
     texts = [path.read_text(encoding="utf-8") for path in files]
     start = "[start]\nposition = [0.0, 0.0, 10.0]\neuler_deg = [1.0, 2.0, 3.0]\nvelocity = [0.5, 0.1, 0.0]\n"
     small = (
@@ -239,7 +242,7 @@ def judged_set(seed):
 def work(kind, first, stop, most):
     """Judge these cases, a line of JSON for each."""
     resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
-    scenes.MOST_MEMBERS = MOST_READ
+    settings.MOST_MEMBERS = MOST_READ
     kernels = {make_plan(lw.Ensemble.from_scene(lw.Scene.load(ROOT / "examples" / "paper.toml"))).spec}
     for seed in range(first, stop):
         faulthandler.dump_traceback_later(SECONDS, exit=True)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lgvi_warp import machine, warp_setup
-from lgvi_warp.status import Status
+from lgvi_warp.common import machine, warp_setup
+from lgvi_warp.common.status import Status
 from tests.extremes import cases
 from tests.extremes.cases import DTYPES, GROUPS, METHODS, OK
 

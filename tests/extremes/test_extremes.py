@@ -4,7 +4,7 @@ import functools
 
 import pytest
 
-from lgvi_warp.status import Status
+from lgvi_warp.common.status import Status
 from tests.extremes import cases
 from tests.extremes.cases import DTYPES, GROUPS, METHODS, OK
 

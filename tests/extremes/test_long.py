@@ -5,8 +5,8 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_kernels.dissipation import GAMMA
-from lgvi_warp import invariants
-from lgvi_warp.status import Status
+from lgvi_warp.common.status import Status
+from lgvi_warp.physics import energy as invariants
 from tests.extremes import extended
 from tests.extremes.cases import DTYPES, UNIT, Case, Group, ensemble, oblique, twin
 from tests.tools import random_states

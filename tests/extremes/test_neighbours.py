@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.status import Status
+from lgvi_warp.common.status import Status
 from tests.extremes import cases
 from tests.tools import random_states, scene_of
 

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 import lgvi_warp as lw
-from lgvi_warp import invariants
+from lgvi_warp.common.status import Status
+from lgvi_warp.physics import energy as invariants
 from lgvi_warp.reference import rotation
-from lgvi_warp.status import Status
 from tests.extremes import extended
 from tests.extremes.cases import UNIT, Case, Group, ensemble, twin
 

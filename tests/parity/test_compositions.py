@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.method import COMPOSITIONS, HALVES, PROGRAMS, TWO_PART
-from lgvi_warp.modified_inertia import series
+from lgvi_warp.methods.method import COMPOSITIONS, HALVES, PROGRAMS, TWO_PART
+from lgvi_warp.methods.modified_inertia import series
 from lgvi_warp.reference import advance, coupled, near_integrable, rotation
 from lgvi_warp.reference.coupled import Direction
 from tests.parity.test_coupled import INERTIA

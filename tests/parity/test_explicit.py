@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp.engine.survey import frame_of
+from lgvi_warp.methods.tableaux import DOP853, DOPRI5, RK4
 from lgvi_warp.reference import explicit, munthe_kaas
 from lgvi_warp.reference.submaps import look, start, water
-from lgvi_warp.solving import make_plan
-from lgvi_warp.survey import frame_of
-from lgvi_warp.tableaux import DOP853, DOPRI5, RK4
+from lgvi_warp.runs.settle import make_plan
 from tests.laws import CASES, Case
 from tests.parity import test_coupled, test_terms
 from tests.parity.test_terms import STATE

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.gauss import gauss
-from lgvi_warp.method import GAUSS
+from lgvi_warp.common.status import Status
+from lgvi_warp.methods.gauss import gauss
+from lgvi_warp.methods.method import GAUSS
 from lgvi_warp.reference import collocation
 from lgvi_warp.reference.terms.wrench import Wrench
-from lgvi_warp.status import Status
 from tests.parity.test_kernel_and_twin import SHAPES, STATE
 from tests.tools import body_of, difference, expected, from_state, last, one, scene_of, slope, to_state
 

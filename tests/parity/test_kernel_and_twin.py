@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.method import PROGRAMS
+from lgvi_warp.methods.method import PROGRAMS
 from lgvi_warp.reference import advance, rotation
 from tests.tools import (
     METHODS,

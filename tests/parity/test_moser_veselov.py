@@ -5,8 +5,8 @@ import pytest
 
 import lgvi_warp as lw
 from benchmarks.cases.solvers import case
+from lgvi_warp.common.status import Status
 from lgvi_warp.reference import riccati, rotation
-from lgvi_warp.status import Status
 from tests.parity.test_kernel_and_twin import both
 from tests.tools import difference
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.blocks import blocks
+from lgvi_warp.engine.block import blocks
 from tests.tools import random_states, scene_of
 
 FIELDS = ("position", "attitude", "velocity", "angular_velocity")

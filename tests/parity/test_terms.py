@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.method import FORCED, PROGRAMS
+from lgvi_warp.methods.method import FORCED, PROGRAMS
 from lgvi_warp.reference import advance
 from lgvi_warp.reference.submaps import Body, look, start, water
 from lgvi_warp.reference.terms.current import Current

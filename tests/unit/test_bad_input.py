@@ -12,8 +12,9 @@ import warp as wp
 import lgvi_warp as lw
 from lgvi_kernels.lanes import add, lane, mul  # noqa: F401
 from lgvi_kernels.state import struct
-from lgvi_warp import scenefile
-from lgvi_warp.solving import make_plan
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.scene import scene as scenes
+from lgvi_warp.scene.scene import from_dict
 
 NAN = float("nan")
 BODY = {"mass": 10.0, "inertia": [1.0, 2.0, 2.5]}
@@ -41,7 +42,7 @@ def refused(make, *arguments, **named):
 
 
 def from_table(table, section="terms"):
-    return scenefile.from_dict({"vehicle": BODY, section: [table]})
+    return from_dict({"vehicle": BODY, section: [table]})
 
 
 # Tables of terms, what is changed in them -> words of the message.
@@ -240,7 +241,7 @@ def test_fossens_coefficients(given, words):
 
 def test_fossens_drag_that_creates_energy():
     made = lw.from_fossen({"X_u": -1.0, "X_v": -100.0, "Y_v": -1.0}, **BODY)
-    (fault,) = refused(scenefile.from_dict, made)
+    (fault,) = refused(from_dict, made)
     assert "drag_matrix.linear" in fault and "creates energy" in fault and "minus Fossen's" in fault
 
 
@@ -306,7 +307,7 @@ def test_all_faults_of_a_scene_file_at_once():
     lower = [1, 1, 1]
     upper = [0, 0, 0]
     """
-    found = refused(scenefile.loads, text)
+    found = refused(scenes.loads, text)
     keys = ("vehicle.mass = -10", "run.method = 'psi_q'", "drag.linear", "terms[1].type = 'spring'", "box.upper")
     assert len(found) == len(keys)
     assert all(any(one.startswith(key) for one in found) for key in keys)

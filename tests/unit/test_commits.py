@@ -7,8 +7,10 @@ import threading
 
 import pytest
 
-from lgvi_warp import commits, durable, safe_files
-from lgvi_warp.commits import Commits
+from lgvi_warp.common import files as durable
+from lgvi_warp.common import safe_files
+from lgvi_warp.runs.store import commits
+from lgvi_warp.runs.store.commits import Commits
 
 
 @pytest.fixture

@@ -4,7 +4,8 @@ import os
 
 import pytest
 
-from lgvi_warp import cli, container, machine
+from lgvi_warp import cli
+from lgvi_warp.common import container, machine
 
 NONE_V1 = 9223372036854771712
 
@@ -98,7 +99,7 @@ def test_memory(physical, limit, memory, monkeypatch):
 
 
 def test_info_tells_what_a_container_leaves(monkeypatch, capsys):
-    monkeypatch.setattr(machine, "fma_peak", lambda dtype: 1e9)
+    monkeypatch.setattr("lgvi_warp.cli.machine.fma_peak", lambda dtype: 1e9)
     monkeypatch.setattr(machine, "affinity", lambda: 64)
     monkeypatch.setattr(machine, "physical_memory", lambda: 256 * 2**30)
     for quota, limit, words in (

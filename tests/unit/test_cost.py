@@ -7,10 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lgvi_warp import cost, tradeoffs
-from lgvi_warp.comparison import Sample, Setting
-from lgvi_warp.cost import Cost, Kind, of_steps
-from lgvi_warp.tradeoffs import Measurement, Tradeoff, report_text
+from lgvi_warp.studies import cost
+from lgvi_warp.studies import tradeoff as tradeoffs
+from lgvi_warp.studies.comparison import Sample, Setting
+from lgvi_warp.studies.cost import Cost, Kind, of_steps
+from lgvi_warp.studies.tradeoff import Measurement, Tradeoff, report_text
 
 STEPS = [1.0, 0.5, 0.25, 0.125]
 TRUE = {"cheap": 10e-9, "dear": 40e-9}

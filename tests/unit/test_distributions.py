@@ -9,8 +9,8 @@ import pytest
 from scipy import stats
 
 import lgvi_warp as lw
-from lgvi_warp.distributions import uniforms
-from lgvi_warp.laws import from_dict
+from lgvi_warp.common.random import uniforms
+from lgvi_warp.sampling.distributions.named import from_dict
 
 LEVELS = np.array([1e-12, 1e-6, 0.02, 0.3, 0.5, 0.77, 0.999, 1.0 - 1e-9])
 N = 200_000

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import notation
+from lgvi_warp.physics import notation
 
 FULL = np.array([[5.0, 0.3, 0.1], [0.3, 6.0, -0.2], [0.1, -0.2, 7.0]])
 EVERYTHING = {

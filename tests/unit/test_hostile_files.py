@@ -16,9 +16,10 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import errors, reading, scenefile
 from lgvi_warp.cli import main
 from lgvi_warp.cli.settings import out_of
+from lgvi_warp.common import errors, reading
+from lgvi_warp.scene.scene import from_dict
 from tests.conftest import ROOT
 
 BODY = "[vehicle]\nmass = 30.0\ninertia = [0.2, 3.0, 3.0]\nbuoyancy = 290.0\n"
@@ -457,5 +458,5 @@ def test_lists_without_end_are_not_numeric():
     for _ in range(100_000):
         deep = [deep]
     for value in (deep, [10**400, 1.0], ["1", 2.0, 3.0], [1 + 2j], [None]):
-        refused(scenefile.from_dict, {"vehicle": {"mass": 1.0, "inertia": [1, 1, 1]}, "start": {"position": value}},
+        refused(from_dict, {"vehicle": {"mass": 1.0, "inertia": [1, 1, 1]}, "start": {"position": value}},
                 words=("start.position", "not numeric"))  # fmt: skip

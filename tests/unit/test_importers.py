@@ -11,8 +11,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import lgvi_warp as lw
-from lgvi_warp import coefficients_xml
-from lgvi_warp.solving import make_plan, messages
+from lgvi_warp.runs.provenance import messages
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.scene.vehicles import robot_xml as coefficients_xml
 from tests import righting
 from tests.tools import one
 

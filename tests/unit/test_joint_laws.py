@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from scipy import stats
 
 import lgvi_warp as lw
-from lgvi_warp import joint_laws, notation
-from lgvi_warp.distributions import uniforms, uniforms_of
-from lgvi_warp.laws import from_dict
+from lgvi_warp.common.random import uniforms, uniforms_of
+from lgvi_warp.physics import notation
+from lgvi_warp.sampling.distributions import joint as joint_laws
+from lgvi_warp.sampling.distributions.named import from_dict
 
 N = 100_000
 ERRORS = 5.0
@@ -246,7 +247,7 @@ def test_a_rigid_body_of_six_dimensions_keeps_its_centre():
 
 
 def notation_hat(r):
-    from lgvi_warp.inertia import hat
+    from lgvi_warp.physics.inertia import hat
 
     return hat(r)
 

@@ -6,7 +6,7 @@ import pytest
 import xarray as xr
 
 import lgvi_warp as lw
-from lgvi_warp import uq
+from lgvi_warp.studies import sensitivity as uq
 
 MASS, BUOYANCY, DENSITY = "vehicle.mass", "vehicle.buoyancy", "environment.water_density"
 VARY = {MASS: lw.Normal(std=0.1), BUOYANCY: lw.Normal(std=1.0), "current.velocity": lw.Uniform(half_width=0.5)}

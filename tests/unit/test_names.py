@@ -3,10 +3,11 @@
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import names, scenefile
-from lgvi_warp.errors import one_line
-from lgvi_warp.solving import make_plan
-from lgvi_warp.store_layout import columns
+from lgvi_warp.common import names
+from lgvi_warp.common.errors import one_line
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.runs.store.layout import columns
+from lgvi_warp.scene.scene import from_dict
 
 BODY = {"mass": 10.0, "inertia": [1.0, 2.0, 2.5], "buoyancy": 98.0}
 DRAG = {"type": "drag", "linear": [1.0] * 6}
@@ -54,7 +55,7 @@ BAD = [
 def test_a_name_that_is_no_folder_everywhere_is_refused(name, words, section):
     table = DRAG if section == "terms" else {"type": "floor", "depth": 9.0}
     with pytest.raises(lw.SceneError) as caught:
-        scenefile.from_dict({"vehicle": BODY, section: [table | {"name": name}]})
+        from_dict({"vehicle": BODY, section: [table | {"name": name}]})
     (fault,) = caught.value.faults
     assert fault.isprintable() and ".name = " in fault and "; " in fault
     assert one_line(words) in fault
@@ -65,7 +66,7 @@ GOOD = ["drag_2", "half of 1.0", "_", "2nd", "bow-thruster", "Strömung", "流�
 
 @pytest.mark.parametrize("name", GOOD)
 def test_a_name_that_is_a_folder_everywhere_is_taken(name):
-    scene = scenefile.from_dict({"vehicle": BODY, "terms": [DRAG | {"name": name}]})
+    scene = from_dict({"vehicle": BODY, "terms": [DRAG | {"name": name}]})
     assert f"{name}.linear" in scene.parameters()
 
 
@@ -80,7 +81,7 @@ def test_a_type_of_the_user_is_a_name_too():
 def test_names_that_are_one_folder_on_some_systems_are_refused(first, second):
     tables = {"terms": [DRAG | {"name": first}], "events": [{"type": "floor", "depth": 9.0, "name": second}]}
     with pytest.raises(lw.SceneError, match="is the same folder as"):
-        scenefile.from_dict({"vehicle": BODY, **tables})
+        from_dict({"vehicle": BODY, **tables})
     assert names.folded(first) == names.folded(second)
 
 
@@ -89,11 +90,11 @@ def test_names_that_are_one_folder_on_some_systems_are_refused(first, second):
 def test_a_section_of_the_scene_is_no_name(name, section):
     table = DRAG if section == "terms" else {"type": "floor", "depth": 9.0}
     with pytest.raises(lw.SceneError, match="name of a section"):
-        scenefile.from_dict({"vehicle": BODY, section: [table | {"name": name}]})
+        from_dict({"vehicle": BODY, section: [table | {"name": name}]})
 
 
 def test_the_longest_name_leaves_room_for_every_field_within_255_bytes():
-    scene = scenefile.from_dict({"vehicle": BODY, "terms": [DRAG | {"name": "a" * names.MOST_NAME_BYTES}]})
+    scene = from_dict({"vehicle": BODY, "terms": [DRAG | {"name": "a" * names.MOST_NAME_BYTES}]})
     vary = {f"{'a' * names.MOST_NAME_BYTES}.linear": lw.Uniform(relative=0.1)}
     plan = make_plan(lw.Ensemble(scene, 4, vary=vary), "psi_s", 0.01, 0.1)
     found = [one.name for one in columns(plan, lw.Store("anywhere.zarr"))]

@@ -7,7 +7,8 @@ import pytest
 from scipy import stats
 
 import lgvi_warp as lw
-from lgvi_warp.real_numbers import NotReal, real_numbers
+from lgvi_warp.common.real_numbers import NotReal, real_numbers
+from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
 
 N = 3
 R = np.array([np.eye(3)] * N)
@@ -110,8 +111,8 @@ def test_no_door_takes_what_is_no_number(door, odd):
 
 def test_members_that_are_masked():
     members = np.ma.array([0, 1, 2], mask=[False, True, False])
-    assert "names no members" in refused(lw.scene.RunSettings, keep=members)
-    assert "no list of whole numbers" in refused(lw.scene.EnsembleSettings, indices=members)
+    assert "names no members" in refused(RunSettings, keep=members)
+    assert "no list of whole numbers" in refused(EnsembleSettings, indices=members)
 
 
 def test_a_mask_says_how_many_and_where():
@@ -126,7 +127,7 @@ def test_a_mask_says_how_many_and_where():
 def test_a_law_without_its_numbers_is_refused(scene, name):
     law = getattr(stats, name)
     for make in (lambda: lw.Ensemble(scene, 4, 0, {"vehicle.mass": law}), lambda: lw.Frozen(law),
-                 lambda: lw.scene.EnsembleSettings(4, 0, {"vehicle.mass": law}),
+                 lambda: EnsembleSettings(4, 0, {"vehicle.mass": law}),
                  lambda: lw.uq.model(scene, {"vehicle.mass": law}, "depth", h=0.01, t1=0.1),
                  lambda: lw.uq.sobol(scene, "depth", vary={"vehicle.mass": law}, h=0.01, t1=0.1)):  # fmt: skip
         message = refused(make)
@@ -145,7 +146,7 @@ def test_laws_with_all_their_numbers_are_taken(scene):
     histogram = stats.rv_histogram((np.array([1.0, 2.0]), np.array([120.0, 121.0, 122.0])))
     for law in (stats.norm(120.0, 1.0), stats.norm(), histogram, stats.rv_discrete(values=((120, 121), (0.5, 0.5))),
                 Wedge(name="wedge"), stats.Normal(mu=120.0, sigma=1.0)):  # fmt: skip
-        settings = lw.scene.EnsembleSettings(4, 0, {"vehicle.buoyancy": law})
+        settings = EnsembleSettings(4, 0, {"vehicle.buoyancy": law})
         assert np.isfinite(settings.vary["vehicle.buoyancy"].quantile(np.array([0.25, 0.75]), np.array(1215.0))).all()
 
 
@@ -158,7 +159,7 @@ def test_a_table_of_a_law_without_numbers_is_refused(scene, table):
 
 def test_what_was_frozen_without_numbers_is_read_again():
     law = lw.Frozen(stats.norm())
-    settings = lw.scene.EnsembleSettings(4, 0, {"vehicle.mass": law.to_dict()})
+    settings = EnsembleSettings(4, 0, {"vehicle.mass": law.to_dict()})
     levels = np.array([0.2, 0.7])
     np.testing.assert_array_equal(settings.vary["vehicle.mass"].quantile(levels, 0.0), stats.norm().ppf(levels))
 
@@ -176,8 +177,8 @@ def test_what_a_law_of_the_users_gives():
 
     for odd in (lambda u: u + 0j, lambda u: np.ma.masked_greater(u, 0.5), lambda u: u.astype(str)):
         with pytest.raises(lw.SceneError, match="gives no numbers"):
-            lw.scene.EnsembleSettings(4, 0, {"vehicle.mass": Law(odd)})
-    late = lw.scene.EnsembleSettings(4, 0, {"vehicle.mass": Law(lambda u: np.ma.masked_greater(120.0 + u, 120.9))})
+            EnsembleSettings(4, 0, {"vehicle.mass": Law(odd)})
+    late = EnsembleSettings(4, 0, {"vehicle.mass": Law(lambda u: np.ma.masked_greater(120.0 + u, 120.9))})
     drawn = late.vary["vehicle.mass"].quantile(np.array([0.5, 0.95]), 0.0)
     np.testing.assert_array_equal(drawn, [120.5, np.nan])
 
@@ -195,7 +196,7 @@ def test_what_a_quantity_of_the_users_gives():
 
 
 def test_what_a_function_of_a_result_gives():
-    from lgvi_warp.quantities import quantities
+    from lgvi_warp.runs.quantities import quantities
 
     result = type("Result", (), {"members": 3})()
     (one,) = quantities(lambda result: np.ma.array([1.0, 2.0, 3.0], mask=[0, 1, 0]))
@@ -226,7 +227,7 @@ def test_a_condition_wants_a_number(make, of):
 @pytest.mark.parametrize("type_", ["exceedance", "first_passage", "path_time"])
 def test_a_condition_of_a_scene_file_wants_a_number(type_):
     tables = [{"type": type_, "of": "depth"}]
-    assert "compared with nothing" in refused(lw.scene.RunSettings, statistics=tables)
+    assert "compared with nothing" in refused(RunSettings, statistics=tables)
 
 
 def below(samples, members):

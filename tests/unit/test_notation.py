@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lgvi_warp import notation
+from lgvi_warp.physics import notation
 
 ROUND = 2e-15
 EYE = np.eye(3)

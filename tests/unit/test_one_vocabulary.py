@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import notation
-from lgvi_warp.compared import QUANTITIES, compared_in
-from lgvi_warp.quantities import quantities
-from lgvi_warp.statistics.functional import functional
-from lgvi_warp.statistics.quantity import KNOWN, quantity
+from lgvi_warp.physics import notation
+from lgvi_warp.runs.quantities import quantities
+from lgvi_warp.statistics.functional import functional, quantity
+from lgvi_warp.statistics.quantity import KNOWN
+from lgvi_warp.studies.compared import QUANTITIES, compared_in
 
 K, N = 4, 3
 AT_EACH_TIME = [

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 import lgvi_warp as lw
-from lgvi_warp.statistics import from_list
+from lgvi_warp.statistics.base import from_list
 from lgvi_warp.statistics.ends import Ends, check_outcomes, outcomes
 from lgvi_warp.statistics.estimate import Estimates
 from lgvi_warp.statistics.table import table

@@ -8,10 +8,10 @@ import pytest
 
 import lgvi_warp as lw
 from benchmarks import scenes as benchmarks
-from lgvi_warp import ensemble as ensembles
-from lgvi_warp import plausibility
 from lgvi_warp.cli import main
-from lgvi_warp.plausibility import LIMITS
+from lgvi_warp.scene import ensemble as ensembles
+from lgvi_warp.scene import plausibility
+from lgvi_warp.scene.plausibility import LIMITS
 from tests.conftest import ROOT
 
 BODY = {"mass": 30.0, "inertia": [0.2, 3.0, 3.0], "buoyancy": 290.0}

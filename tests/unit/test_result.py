@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import invariants
+from lgvi_warp.methods.saveat import FIELDS
+from lgvi_warp.physics import energy as invariants
 from lgvi_warp.reference import energy
 from tests.tools import TURN, body_of, one, random_states, scene_of, to_state
 
@@ -33,7 +34,7 @@ def test_energy_and_momenta(result):
     r, body = result
     P, L = invariants.linear_momentum(r), invariants.angular_momentum(r)
     for k, member in ((0, 0), (4, 2)):
-        x = to_state(body, *(getattr(r, name)[k, member] for name in lw.saveat.FIELDS))
+        x = to_state(body, *(getattr(r, name)[k, member] for name in FIELDS))
         assert r.energy[k, member] == pytest.approx(energy.energy(x, body), rel=1e-13)
         np.testing.assert_allclose(P[k, member], energy.linear_momentum(x), rtol=1e-13)
         np.testing.assert_allclose(L[k, member], energy.angular_momentum(x), rtol=1e-12)
@@ -52,7 +53,7 @@ def test_save_and_load(result, tmp_path):
     r, _ = result
     path = r.save(tmp_path / "result.npz")
     again = lw.Result.load(path)
-    for name in (*lw.saveat.FIELDS, "energy", "quaternion_wxyz", "status", "failure_time", "failure_value", "time"):
+    for name in (*FIELDS, "energy", "quaternion_wxyz", "status", "failure_time", "failure_value", "time"):
         np.testing.assert_array_equal(getattr(again, name), getattr(r, name))
     assert again.provenance == json.loads(json.dumps(r.provenance)) and again.messages == r.messages
     assert again.status.counts() == r.status.counts()

@@ -11,9 +11,10 @@ from scipy import stats
 from scipy.stats import qmc
 
 import lgvi_warp as lw
-from lgvi_warp import sampling
-from lgvi_warp.scene import MOST_MEMBERS
-from lgvi_warp.variations import Space, targets
+from lgvi_warp.sampling import designs as sampling
+from lgvi_warp.sampling.designs.space import Space
+from lgvi_warp.scene.settings import MOST_MEMBERS
+from lgvi_warp.scene.variations import targets
 from tests.unit.test_ensemble import assert_same, faults
 
 KOLMOGOROV = 2.5

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.saveat import time_grid
+from lgvi_warp.methods.saveat import time_grid
 
 
 def test_a_step_that_fits_is_kept():

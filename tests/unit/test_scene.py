@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import notation
-from lgvi_warp.scene import EnsembleSettings, RunSettings
+from lgvi_warp.physics import notation
+from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
 
 VEHICLE = lw.Vehicle(mass=10.0, inertia=(1.0, 2.0, 2.5))
 

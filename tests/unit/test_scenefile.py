@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import notation, scenefile
+from lgvi_warp.physics import notation
+from lgvi_warp.scene import scene as scenes
+from lgvi_warp.scene.scene import from_dict
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
 SMALL = "[vehicle]\nmass = 10.0\ninertia = [1.0, 2.0, 2.5]\n"
@@ -15,7 +17,7 @@ SMALL = "[vehicle]\nmass = 10.0\ninertia = [1.0, 2.0, 2.5]\n"
 
 def faults(text, overrides=None):
     with pytest.raises(lw.SceneError) as caught:
-        scenefile.loads(text, overrides)
+        scenes.loads(text, overrides)
     return caught.value.faults
 
 
@@ -53,7 +55,7 @@ def test_the_papers_start(example):
 
 def test_round_trip():
     content = lw.Scene.load(PAPER).to_dict()
-    assert scenefile.from_dict(content).to_dict() == content
+    assert from_dict(content).to_dict() == content
     printed = tomllib.loads(PAPER.read_text())
     # The file leaves one default out; all else is as it was written.
     assert content["environment"].pop("water_density") == 1025.0
@@ -61,9 +63,9 @@ def test_round_trip():
 
 
 def test_a_small_scene_needs_a_vehicle_only():
-    scene = scenefile.loads(SMALL)
+    scene = scenes.loads(SMALL)
     assert scene.ensemble_settings is None and scene.run.step is None and scene.run.method == "psi_s"
-    assert scenefile.from_dict(scene.to_dict()).to_dict() == scene.to_dict()
+    assert from_dict(scene.to_dict()).to_dict() == scene.to_dict()
     assert lw.Ensemble.from_scene(scene).members == 1
 
 
@@ -210,14 +212,14 @@ inertia = [1.0, 1.0, 1.0]
 
 def test_solver_settings_of_a_run():
     text = SOLVING + 'method = "rk8"\nrtol = 1e-9\natol = 1e-10\nchecks = "all"\non_failure = "raise"'
-    run = scenefile.loads(text).run
+    run = scenes.loads(text).run
     assert run.method_of() == lw.Method("rk8", rtol=1e-9, atol=1e-10)
     assert (run.checks, run.on_failure) == ("all", "raise")
     assert run.to_dict() == {"method": "rk8", "dtype": "float64", "rtol": 1e-9, "atol": 1e-10, "checks": "all",
                              "on_failure": "raise"}  # fmt: skip
     text = SOLVING + 'solver = "cayley"\niterations = 2\ntolerance = 1e-9'
-    assert scenefile.loads(text).run.method_of() == lw.Method("psi_s", "cayley", 2, 1e-9)
-    assert scenefile.loads(SOLVING + 'iterations = "auto"').run.method_of().iterations == "auto"
+    assert scenes.loads(text).run.method_of() == lw.Method("psi_s", "cayley", 2, 1e-9)
+    assert scenes.loads(SOLVING + 'iterations = "auto"').run.method_of().iterations == "auto"
     # Another method, named later, does not inherit what was said of this one.
     assert run.method_of("psi_s") == lw.Method("psi_s")
 
@@ -230,4 +232,4 @@ def test_solver_settings_of_a_run():
 ])  # fmt: skip
 def test_solver_settings_are_refused(text, fault):
     with pytest.raises(lw.SceneError, match=fault):
-        scenefile.loads(SOLVING + text)
+        scenes.loads(SOLVING + text)

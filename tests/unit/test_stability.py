@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import vehicle
-from lgvi_warp.stability import Cell, StabilityMap, cells_of
-from lgvi_warp.stability_grid import Axis, Grid, Line
-from lgvi_warp.stability_limits import drag_limit, drag_rate, oscillation_limit, rates, rotation_limit
-from lgvi_warp.stability_runs import REFUSED, Found
-from lgvi_warp.status import Status
+from lgvi_warp.common.status import Status
+from lgvi_warp.physics import vehicle
+from lgvi_warp.scene.settings import RunSettings
+from lgvi_warp.studies.stability.grid import Axis, Grid, Line
+from lgvi_warp.studies.stability.limits import drag_limit, drag_rate, oscillation_limit, rates, rotation_limit
+from lgvi_warp.studies.stability.map import Cell, StabilityMap, cells_of
+from lgvi_warp.studies.stability.runs import REFUSED, Found
 
 
 def grid_of(scene, x="h", y="angular_velocity", points=(3, 4), directions=2, h=None):
@@ -67,7 +68,7 @@ def test_other_starts_keep_their_size(scene):
 
 
 def test_a_start_at_rest_is_given_a_direction():
-    scene = lw.Scene(lw.Vehicle(1.0, (1.0, 1.0, 1.0)), run=lw.scene.RunSettings(step=0.1))
+    scene = lw.Scene(lw.Vehicle(1.0, (1.0, 1.0, 1.0)), run=RunSettings(step=0.1))
     grid = grid_of(scene, ("speed", 1.0, 4.0), ("angular_velocity", 0.5, 4.0), h=0.1)
     assert np.allclose(
         np.linalg.norm(by_cell(grid, grid.state["velocity"]), axis=-1), np.array([1, 2, 4])[None, :, None]
@@ -143,7 +144,7 @@ def test_all_faults_at_once(scene):
 )
 def test_bad_axes_are_refused(scene, x, y, words):
     with pytest.raises(lw.SceneError, match=words):
-        grid_of(dataclasses.replace(scene, run=lw.scene.RunSettings()), x, y)
+        grid_of(dataclasses.replace(scene, run=RunSettings()), x, y)
 
 
 def test_drag_that_is_zero_at_the_start_cannot_be_scaled():

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import ensemble as ensembles
-from lgvi_warp import machine
-from lgvi_warp.method import Method
-from lgvi_warp.solving import make_plan
-from lgvi_warp.survey import COUPLINGS, SHAPES_OF_MASS, survey
+from lgvi_warp.common import machine
+from lgvi_warp.engine.survey import COUPLINGS, SHAPES_OF_MASS, survey
+from lgvi_warp.methods.method import Method
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.scene import ensemble as ensembles
 from tests.tools import scene_of
 
 PLAIN = {"start.position": np.zeros((9, 3)), "start.attitude": np.broadcast_to(np.eye(3), (9, 3, 3))}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import notation
+from lgvi_warp.physics import notation
 
 GOOD = {"mass": 123.8, "added_mass": (65.0, 70.0, 75.0), "inertia": (5.46, 5.29, 5.72), "buoyancy": 1215.8}
 

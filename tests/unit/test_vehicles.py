@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import coefficients as co
+from lgvi_warp.scene.vehicles import fossen as co
 
 NAMES = co.vehicles()
 SIMPLE = [name for name in NAMES if name != "remus_100"]

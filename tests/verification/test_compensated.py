@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import plan, terms
-from lgvi_warp.inertia import moved
+from lgvi_warp.engine import plan
+from lgvi_warp.physics import terms
+from lgvi_warp.physics.inertia import moved
 from tests.tools import difference, last, one, random_states, scene_of
 
 # Each method of another program is a kernel of its own to compile.

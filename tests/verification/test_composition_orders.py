@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.method import COMPOSITIONS, HALVES, TWO_PART
-from lgvi_warp.status import Status
+from lgvi_warp.common.status import Status
+from lgvi_warp.methods.method import COMPOSITIONS, HALVES, TWO_PART
 from tests.parity.test_coupled import scene_of as coupled_scene_of
 from tests.tools import difference, expected, last, one, scene_of, slope
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import terms
+from lgvi_warp.physics import terms
 from tests.tools import one, slope
 
 GRAVITY = 10.0

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.method import ORDERS
-from lgvi_warp.status import Status
+from lgvi_warp.common.status import Status
+from lgvi_warp.methods.method import ORDERS
+from lgvi_warp.physics.inertia import hat
 from tests.laws import CASES
 from tests.parity import test_terms
 from tests.tools import difference, expected, last, one, slope
@@ -128,7 +129,7 @@ def test_narrow_packets(width, dtype, run, example):
 
 def test_water_is_taken_at_the_users_origin():
     # A center of gravity beside the origin: every method but psi_x moves its own origin away from the user's.
-    arm = lw.inertia.hat(np.array([0.0, 0.0, 0.3]))
+    arm = hat(np.array([0.0, 0.0, 0.3]))
     rigid = np.block([[20.0 * np.eye(3), -20.0 * arm], [20.0 * arm, np.diag([1.5, 4.0, 4.5]) - 20.0 * arm @ arm]])
     vehicle = lw.Vehicle(
         rigid_body_mass_matrix=rigid, added_mass_matrix=np.zeros((6, 6)), weight=196.0, buoyancy=198.0,

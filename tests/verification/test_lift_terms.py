@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import coefficients, terms
-from lgvi_warp.packets import Packets
+from lgvi_warp.engine.packets import Packets
+from lgvi_warp.physics import terms
 from lgvi_warp.reference.terms import View
 from lgvi_warp.reference.terms.cross_flow import CrossFlow
-from lgvi_warp.solving import make_plan
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.scene.vehicles import fossen as coefficients
 from tests.laws_lift import CASES, DENSITY, FINS, HULL, LIFT, arrays
 from tests.parity.test_terms import STATE, VEHICLE, both
 from tests.tools import difference, last, one, random_states, slope

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from lgvi_warp import tableaux
-from lgvi_warp.method import PROGRAMS
+from lgvi_warp.methods import tableaux
+from lgvi_warp.methods.method import PROGRAMS
 from lgvi_warp.reference import advance, collocation, energy, explicit, munthe_kaas, near_integrable, riccati, rotation
 from lgvi_warp.reference.submaps import Body, State, T, start
 from lgvi_warp.reference.terms.current import CurrentProfile

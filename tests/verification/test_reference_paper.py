@@ -5,7 +5,7 @@ import functools
 import numpy as np
 import pytest
 
-from lgvi_warp.method import COMPOSITIONS, PROGRAMS
+from lgvi_warp.methods.method import COMPOSITIONS, PROGRAMS
 from lgvi_warp.reference import advance, classical, energy, paper, rotation
 from lgvi_warp.reference.submaps import Body
 from lgvi_warp.reference.terms.restoring import Restoring

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lgvi_warp.method import PROGRAMS
+from lgvi_warp.methods.method import PROGRAMS
 from lgvi_warp.reference import advance, energy, rotation
 from lgvi_warp.reference.submaps import Body, State
 from lgvi_warp.reference.terms.restoring import Restoring

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import invariants
+from lgvi_warp.physics import energy as invariants
 from tests.tools import METHODS, difference, last, one, random_states, scene_of, slope
 
 FREE = {"general": scene_of((1.0, 2.0, 3.0)), "isotropic": scene_of((2.0, 2.0, 2.0))}

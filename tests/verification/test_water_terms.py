@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import terms
+from lgvi_warp.physics import terms
 from lgvi_warp.reference import random
 from lgvi_warp.reference.terms import View
 from lgvi_warp.reference.terms.current_harmonics import CurrentHarmonics

@@ -9,7 +9,8 @@ import warp as wp
 from lgvi_kernels.flags import CPU_FLAGS
 from lgvi_kernels.lanes import _native, add, cross, div, dot, lane, lane3, mul, neg, ones, sub, vec3  # noqa: F401
 from lgvi_kernels.rotation import quartic_rotation, quartic_series, rotation_struct, transpose_apply
-from lgvi_warp import notation, speed
+from lgvi_warp.physics import notation
+from lgvi_warp.studies import speed
 
 WIDTH, REAL = 8, wp.float64
 Lane, Lane3, Rotation = lane(WIDTH, REAL), lane3(WIDTH, REAL), rotation_struct(WIDTH, REAL)

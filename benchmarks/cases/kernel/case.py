@@ -1,15 +1,16 @@
 """ns per vehicle and step of every method, dtype and width on one core, beside the core's peak."""
 
 from lgvi_kernels.lanes import WIDTHS
-from lgvi_warp import machine, speed
-from lgvi_warp.method import PROGRAMS
-from lgvi_warp.solving import make_plan
+from lgvi_warp.engine.peak import fma_peak
+from lgvi_warp.methods.method import PROGRAMS
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.studies import speed
 
 
 def run(quick):
     members, steps = (512, 100) if quick else (4096, 400)
     for dtype in ("float64", "float32"):
-        peak = machine.fma_peak(dtype)
+        peak = fma_peak(dtype)
         for width in WIDTHS if dtype == "float32" else WIDTHS[:-1]:
             fleet = speed.fleet(members)
             plans = [make_plan(fleet, name, h=0.01, t1=0.01 * steps, dtype=dtype, width=width) for name in PROGRAMS]

@@ -2,8 +2,10 @@
 
 import time
 
-from lgvi_warp import machine, speed
-from lgvi_warp.solving import make_plan, run_plan
+from lgvi_warp.common import machine
+from lgvi_warp.runs.run import run_plan
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.studies import speed
 
 
 def run(quick):

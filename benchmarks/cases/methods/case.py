@@ -1,15 +1,16 @@
 """Every method in every precision and at every width, on one core: ns per vehicle and step, and how far off its operations.
 
 A method makes the same operations at every width. A core makes them at a rate that it shows with fused multiply-adds
-alone, at that width (machine.fma_peak). `off` is time times that rate, over the same at the default width: 1 where a
+alone, at that width (fma_peak). `off` is time times that rate, over the same at the default width: 1 where a
 width is used as well as the default is, and 10 where vectorisation fell off a cliff.
 """
 
 from lgvi_kernels.lanes import WIDTHS
-from lgvi_warp import machine, speed
-from lgvi_warp.errors import SceneError
-from lgvi_warp.method import Method
-from lgvi_warp.solving import make_plan
+from lgvi_warp.common.errors import SceneError
+from lgvi_warp.engine.peak import fma_peak
+from lgvi_warp.methods.method import Method
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.studies import speed
 
 METHODS = (
     "phi", "phi_adjoint", "psi", "psi_s", "psi_1", "psi_x", "psi_x8", "psi_w", "tj4(psi_s)", "su4(psi_s)", "su4(psi_x)",
@@ -43,7 +44,7 @@ def rates_of(real, widths):
     Within one register of 128 bits they go as the width: of chains one lane wide the compiler makes pairs, which it does not
     of a method's, and chains of four float32 it halves, as it halves a method's.
     """
-    rates = {width: machine.fma_peak(real, width) for width in widths}
+    rates = {width: fma_peak(real, width) for width in widths}
     for width in widths:
         if width * (8 if real == "float64" else 4) <= 16:
             rates[width] = 0.5 * width * rates[2]

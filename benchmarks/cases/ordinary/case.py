@@ -3,8 +3,9 @@
 import numpy as np
 
 from benchmarks.cases.ordinary.kernel import command
-from lgvi_warp import machine, speed
-from lgvi_warp.solving import make_plan
+from lgvi_warp.engine.peak import fma_peak
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.studies import speed
 
 
 def run(quick):
@@ -21,9 +22,7 @@ def run(quick):
             ordinary()
             plan = make_plan(fleet, method, h=0.01, t1=0.01 * steps, dtype=dtype)
             slow, fast = speed.interleaved([ordinary, speed.stepper(plan)])
-            record = speed.record(
-                plan.method, dtype, plan.spec.width, fast / (members * steps), machine.fma_peak(dtype)
-            )
+            record = speed.record(plan.method, dtype, plan.spec.width, fast / (members * steps), fma_peak(dtype))
             yield record | {
                 "ordinary_ns_per_vehicle_step": round(1e9 * slow / (members * steps), 1),
                 "times_faster": round(float(np.divide(slow, fast)), 1),

@@ -2,10 +2,10 @@
 
 from benchmarks import scenes
 from benchmarks.cases.ordinary_terms.kernel import command
-from lgvi_warp import speed
-from lgvi_warp.distributions import Normal
-from lgvi_warp.ensemble import Ensemble
-from lgvi_warp.solving import make_plan
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.sampling.distributions.basic import Normal
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.studies import speed
 
 STEP = 0.01
 

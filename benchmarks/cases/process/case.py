@@ -8,10 +8,11 @@ import time
 from pathlib import Path
 from statistics import median
 
-from lgvi_warp import machine
-from lgvi_warp.ensemble import Ensemble
-from lgvi_warp.scene import Scene
-from lgvi_warp.solving import make_plan, run_plan
+from lgvi_warp.common import machine
+from lgvi_warp.runs.run import run_plan
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
 
 ROOT = Path(__file__).resolve().parents[3]
 BARE = "import warp, matplotlib.figure, rerun"

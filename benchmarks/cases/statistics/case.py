@@ -13,9 +13,11 @@ from pathlib import Path
 from statistics import median
 
 import lgvi_warp as lw
-from lgvi_warp import machine, speed
-from lgvi_warp.observation import Observation
-from lgvi_warp.solving import make_plan, run_plan
+from lgvi_warp.common import machine
+from lgvi_warp.engine.keepers.observation import Observation
+from lgvi_warp.runs.run import run_plan
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.studies import speed
 
 ROOT = Path(__file__).resolve().parents[3]
 MEMORY = """

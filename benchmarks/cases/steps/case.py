@@ -7,7 +7,7 @@ import sys
 SCRIPT = """
 import json, resource
 from lgvi_warp import speed
-from lgvi_warp.solving import make_plan, run_plan
+from lgvi_warp.runs.solve import make_plan, run_plan
 plan = make_plan(speed.fleet({members}), "psi_s", h=0.01, t1=0.01 * {steps})
 result = run_plan(plan, 1)
 peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

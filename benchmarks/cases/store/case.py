@@ -16,16 +16,23 @@ from statistics import median
 import numpy as np
 
 from benchmarks.cases.statistics.case import statistics
-from lgvi_warp import machine, speed
-from lgvi_warp.blocks import Work, blocks
-from lgvi_warp.executors.threads import Threads
-from lgvi_warp.observation import Observation, Observing
-from lgvi_warp.packets import Outcome
-from lgvi_warp.running import Progress, Stored, run_blocks
-from lgvi_warp.saveat import SaveAt
-from lgvi_warp.solving import make_plan, messages, provenance, run_plan
-from lgvi_warp.store import Sink, Store, create
-from lgvi_warp.store_layout import columns
+from lgvi_warp.common import machine
+from lgvi_warp.engine.block import blocks
+from lgvi_warp.engine.executors.threads import Threads
+from lgvi_warp.engine.keepers.observation import Observation, Observing
+from lgvi_warp.engine.loop import Progress, run_blocks
+from lgvi_warp.engine.outcome import Outcome
+from lgvi_warp.engine.work import Work
+from lgvi_warp.methods.saveat import SaveAt
+from lgvi_warp.runs.provenance import messages, provenance
+from lgvi_warp.runs.run import run_plan
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.runs.store.create import create
+from lgvi_warp.runs.store.layout import columns
+from lgvi_warp.runs.store.run import Stored
+from lgvi_warp.runs.store.settings import Store
+from lgvi_warp.runs.store.sink import Sink
+from lgvi_warp.studies import speed
 from tests.toy_keeper import DepthSum
 
 

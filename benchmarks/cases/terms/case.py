@@ -5,10 +5,10 @@ restoring moment alone; `over_none` is the ratio to it.
 """
 
 from benchmarks import scenes
-from lgvi_warp import speed
-from lgvi_warp.distributions import Normal
-from lgvi_warp.ensemble import Ensemble
-from lgvi_warp.solving import make_plan
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.sampling.distributions.basic import Normal
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.studies import speed
 
 STEP = 0.01
 SPREAD = {"start.angular_velocity": Normal(relative=0.1)}

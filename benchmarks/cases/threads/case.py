@@ -1,7 +1,9 @@
 """Thread scaling on 10^5 members: time of one thread over time of n threads and n, the whole solve, start and end kept."""
 
-from lgvi_warp import machine, speed
-from lgvi_warp.solving import make_plan, run_plan
+from lgvi_warp.common import machine
+from lgvi_warp.runs.run import run_plan
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.studies import speed
 
 
 def run(quick):

@@ -1,0 +1,94 @@
+"""Columns by name out of what a user has: a mapping, a data frame, a structured array, an xarray Dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.common.real_numbers import column_names
+
+
+def is_labelled(value: Any) -> bool:
+    """Whether its columns have labels, which say what is what whatever their order."""
+    return _labels(value) is not None
+
+
+def columns_by_name(faults: Faults, key: str, value: Any) -> dict[str, Any]:
+    """Label -> column of a labelled value, in its order; nothing after noting a fault.
+
+    Args:
+        faults: takes what is wrong: labels that are no texts, or that are there twice.
+        key: what a fault calls the value.
+        value: a mapping, a data frame (pandas, polars, pyarrow, or another with `columns` and table[name]), a structured
+            array, an xarray Dataset, or a DataArray with labels along its second dimension.
+    """
+    labels = _labels(value)
+    if labels is None or not labels:
+        faults.add(key, value, "has no names of columns", 'name them: {"vehicle.mass": ...}')
+        return {}
+    odd = [label for label in labels if not isinstance(label, str)]
+    if odd:
+        what = f"has no names of columns: they are called {', '.join(map(repr, odd[:6]))}{', ...' * (len(odd) > 6)}"
+        faults.add(key, "...", what, "name the columns: table.columns = [...], or give .to_numpy() in the right order")
+        return {}
+    doubled = sorted({label for label in labels if labels.count(label) > 1})
+    if doubled:
+        faults.add(key, "...", f"has columns of one name ({', '.join(doubled)})", "give each a name of its own")
+        return {}
+    return _read(value, labels)
+
+
+def match(faults: Faults, key: str, given: Sequence[str], wanted: Sequence[str]) -> bool:
+    """Whether labels are those that are wanted, in any order; notes each that is missing, and each that is none of them."""
+    missing = [name for name in wanted if name not in given]
+    for label in given:
+        if label not in wanted:
+            faults.add(f'{key}["{label}"]', "...", "is not one of its columns", closest(label, missing or wanted))
+    for name in missing:
+        faults.add(f'{key}["{name}"]', None, "is missing", f"give a column for each of {', '.join(wanted)}")
+    return not missing and len(given) == len(wanted)
+
+
+def _labels(value: Any) -> list[Any] | None:
+    if isinstance(value, Mapping):
+        return list(value)
+    if isinstance(value, np.ndarray):
+        return None if value.dtype.names is None else list(value.dtype.names)
+    along = _labelled_dimension(value)
+    return column_names(value) if along is None else np.asarray(value.coords[along]).tolist()
+
+
+def _labelled_dimension(value: Any) -> str | None:
+    """The second dimension of an xarray DataArray whose coordinate is texts."""
+    dims = getattr(value, "dims", ())
+    if not hasattr(value, "coords") or not isinstance(dims, tuple) or len(dims) != 2 or dims[1] not in value.coords:
+        return None
+    return str(dims[1]) if np.asarray(value.coords[dims[1]]).dtype.kind in "UOT" else None
+
+
+def _read(value: Any, labels: Sequence[str]) -> dict[str, Any]:
+    along = _labelled_dimension(value)
+    if along is not None:
+        return {label: np.asarray(value)[:, i] for i, label in enumerate(labels)}
+    columns = {label: value[label] for label in labels}
+    if all(hasattr(column, "dims") and hasattr(column, "transpose") for column in columns.values()):
+        return {label: np.asarray(column) for label, column in _members_first(columns).items()}
+    return {label: column if isinstance(column, np.ndarray | list | tuple) else _plain(column)
+            for label, column in columns.items()}  # fmt: skip
+
+
+def _members_first(columns: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The variables of a Dataset with the dimension that all of them share in front."""
+    dims = [column.dims for column in columns.values()]
+    shared = [dim for dim in dims[0] if all(dim in other for other in dims)]
+    if len(shared) != 1:
+        return columns
+    return {label: column.transpose(shared[0], ...) for label, column in columns.items()}
+
+
+def _plain(column: Any) -> Any:
+    """A frame's column as an array; what is none as it is."""
+    return np.asarray(column) if hasattr(column, "__array__") or hasattr(column, "__array_interface__") else column

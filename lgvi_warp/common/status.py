@@ -1,0 +1,224 @@
+"""What became of each member, and what to do about it."""
+
+from __future__ import annotations
+
+from enum import IntEnum, IntFlag
+from typing import Any
+
+import numpy as np
+
+# What solve and [run] may ask for (see solve).
+CHECKS = ("none", "safe", "all")
+ON_FAILURE = ("freeze", "raise", "substep")
+
+
+class Status(IntEnum):
+    """Outcome of one member. A member that failed stays at its last good state; no other member notices."""
+
+    OK = 0
+    STEP_TOO_LARGE = 1
+    NOT_CONVERGED = 2
+    NON_FINITE = 3
+    FORCES_NOT_CONVERGED = 4
+    STEP_TOO_SMALL = 5
+    ENERGY_GREW = 6
+    BACKWARD_DRAG = 7
+    SURFACE = 16
+    FLOOR = 17
+    BOX = 18
+    TIME = 19
+    CONDITION = 20
+
+    @property
+    def stopped(self) -> bool:
+        """Whether an event of the scene stopped the member: an outcome, no failure."""
+        return self >= Status.SURFACE
+
+    @property
+    def text(self) -> str:
+        """What happened and the remedy, in a sentence."""
+        return _TEXT[self]
+
+
+_TEXT = {
+    Status.OK: "ran to the end",
+    Status.STEP_TOO_LARGE: "the step is too large: |J^-1 a| reached 1, where equation (24) may have no solution, or half the "
+    "angle of a turn of psi_x did; shorten the step below 1 / |angular velocity| (psi and psi_s: below 2 / |angular "
+    "velocity|; rkn*: a quarter turn in a part; psi_x: below 4 / |angular velocity|, and shorter for slender bodies, whose "
+    "turns about their length it splits off: there psi_s is better)",
+    Status.NOT_CONVERGED: "the solve of the implicit rotation (equation (24); psi_w: its coupled form; gauss*: the stages) "
+    "kept a residual above the tolerance; give a shorter step, more iterations or a larger tolerance "
+    '(for slender bodies, whose inertias are 100 times apart and more: solver="cayley")',
+    Status.FORCES_NOT_CONVERGED: "the iteration for nonconservative forces in Phi* did not settle: they are stiff; "
+    "shorten the step, or use psi_s or psi_x, which treat drag implicitly",
+    Status.STEP_TOO_SMALL: "the steps that the tolerance asks for became too small, or too many (100,000 within one h); "
+    "loosen rtol or atol (float32 reaches about 1e-6), or look for forces that jump or are stiff",
+    Status.ENERGY_GREW: "energy came from nowhere, more than 100 times what there was to exchange, though no force of the "
+    "scene creates any: the method is unstable at this step; shorten it (result.warnings tells what is too fast)",
+    Status.BACKWARD_DRAG: "drag became too strong for the stages of the composition that go backward: their drag number, "
+    "(back) (l + q|v|) / I, passed 0.5, and at 1 drag has no past; use the method that is composed, or shorten the step",
+    Status.SURFACE: "stopped by an event: rose to the surface",
+    Status.FLOOR: "stopped by an event: sank to the sea floor",
+    Status.BOX: "stopped by an event: left the box",
+    Status.TIME: "stopped by an event: its time was over",
+    Status.CONDITION: "stopped by an event: a condition of the user",
+    Status.NON_FINITE: "a number of the state is not finite; check the start state, the parameters and the step",
+}
+
+
+class StatusArray(np.ndarray):
+    """Status of each member, shape (n,), uint8: compares with `Status` members; `counts()` sums up."""
+
+    @property
+    def failed(self) -> np.ndarray:
+        """(n,), which members failed: neither got to the end nor were stopped by an event."""
+        return failed(self)
+
+    @property
+    def stopped(self) -> np.ndarray:
+        """(n,), which members an event of the scene stopped: an outcome, no failure."""
+        return stopped(self)
+
+    def counts(self) -> dict[str, int]:
+        """Members by status name, those that occur, the most serious last."""
+        values, numbers = np.unique(np.asarray(self), return_counts=True)
+        return {Status(v).name.lower(): int(n) for v, n in zip(values, numbers, strict=True)}
+
+
+class Warnings(IntFlag):
+    """What a member's numbers or its motion say against the step, the precision or the numbers themselves.
+
+    A warning stops nothing. Of two, the higher is the more serious.
+    """
+
+    INERTIA = 1
+    PRECISION_LOSS = 2
+    ORTHOGONALITY = 4
+    MUNK_COARSE = 8
+    RESTORING_COARSE = 16
+    ROTATION = 32
+    DRAG_STIFF = 64
+    MUNK_UNSTABLE = 128
+    RESTORING_UNSTABLE = 256
+    ENERGY = 512
+
+    @property
+    def text(self) -> str:
+        """What was seen and the remedy, in a sentence. Of several warnings, of each."""
+        return "; ".join(_WARNING_TEXT[one] for one in Warnings if one in self)
+
+    @property
+    def value_name(self) -> str:
+        """What `result.warning_value` is where this warning is a member's most serious one."""
+        return _WARNING_VALUE[Warnings(1 << (int(self).bit_length() - 1))] if self else ""
+
+
+_WARNING_TEXT = {
+    Warnings.INERTIA: "two principal moments of inertia sum to less than the third, which no rigid body has; right only if "
+    "added inertia makes the difference",
+    Warnings.PRECISION_LOSS: "the position loses what a step adds to it: eps |b| > 0.05 h |v|; use float64 or "
+    "float32_compensated, or an origin nearer to the vehicle",
+    Warnings.ORTHOGONALITY: "the attitude left the rotations: |R^T R - I| > 1e-10 (float64) or 1e-4 (float32), of rk4, rk5 "
+    "and rk8 1e-3; shorten the step, or use a method that stays on the group (psi_s, psi_x)",
+    Warnings.MUNK_COARSE: "the Munk moment's oscillation is coarsely resolved: h w > 0.5 in a stage; shorten the step, or do "
+    "not trust attitudes",
+    Warnings.RESTORING_COARSE: "the restoring moment's oscillation is coarsely resolved: h sqrt(B|r|/J) > 0.5 in a stage; "
+    "shorten the step, or do not trust attitudes",
+    Warnings.ROTATION: "the rotation in one step is too large: h |Omega| passed the stability limit of the explicit method "
+    "(psi_x: 1, beyond which its turns are inaccurate); shorten the step",
+    Warnings.DRAG_STIFF: "drag is stiff for a method that treats it explicitly: h (l + 2 q|v|) / I > 1; shorten the step, or "
+    "use psi_s or psi_x, which treat drag exactly or implicitly",
+    Warnings.MUNK_UNSTABLE: "the Munk moment's oscillation is too fast for this method and step: h w passed the measured "
+    "limit of stability; shorten the step",
+    Warnings.RESTORING_UNSTABLE: "the restoring moment's oscillation is too fast for this method and step: h sqrt(B|r|/J) "
+    "passed the measured limit of stability; shorten the step",
+    Warnings.ENERGY: "energy came from nowhere, more than half of what there was to exchange, though no force of the scene "
+    "creates any; shorten the step",
+}
+
+_WARNING_VALUE = {
+    Warnings.INERTIA: "largest principal moment over the sum of the others",
+    Warnings.PRECISION_LOSS: "eps |b| / (h |v|)",
+    Warnings.ORTHOGONALITY: "|R^T R - I|",
+    Warnings.MUNK_COARSE: "h w",
+    Warnings.RESTORING_COARSE: "h sqrt(B|r|/J)",
+    Warnings.ROTATION: "h |Omega|",
+    Warnings.DRAG_STIFF: "h (l + 2 q|v|) / I",
+    Warnings.MUNK_UNSTABLE: "h w",
+    Warnings.RESTORING_UNSTABLE: "h sqrt(B|r|/J)",
+    Warnings.ENERGY: "energy created over what there was to exchange",
+}
+
+
+def stopped(status: Any) -> np.ndarray:
+    """Which members an event of the scene stopped: an outcome, no failure.
+
+    Args:
+        status: (n,), codes of `Status`.
+
+    Returns:
+        (n,), bool.
+    """
+    return np.isin(np.asarray(status), [code for code in Status if code.stopped])
+
+
+def failed(status: Any) -> np.ndarray:
+    """Which members failed: neither got to the end nor were stopped by an event.
+
+    Args:
+        status: (n,), codes of `Status`.
+
+    Returns:
+        (n,), bool.
+    """
+    return np.asarray((np.asarray(status) != Status.OK) & ~stopped(status))
+
+
+class WarningArray(np.ndarray):
+    """Warnings of each member, shape (n,), uint16: bits of `Warnings`; `counts()` sums up."""
+
+    def counts(self) -> dict[str, int]:
+        """Members by warning, those that occur, the most serious last; a member counts for each that it has."""
+        bits = np.asarray(self)
+        numbers = {one.name.lower(): int(np.count_nonzero(bits & one)) for one in Warnings if one.name}
+        return {name: n for name, n in numbers.items() if n}
+
+    def has(self, warning: Warnings) -> np.ndarray:
+        """(n,), which members have it, or any of several."""
+        return (np.asarray(self) & int(warning)) != 0
+
+    def worst(self) -> np.ndarray:
+        """(n,), each member's most serious warning, 0 where it has none."""
+        bits = np.asarray(self, dtype=np.uint16)
+        found = np.zeros_like(bits)
+        for one in Warnings:
+            found = np.where(bits & one, np.uint16(one), found)
+        return found
+
+
+def under_way(result: Any) -> np.ndarray:
+    """Which members were under way at each sample: not stopped by an event, and not failed.
+
+    Args:
+        result: Of a run, with k samples of n members.
+
+    Returns:
+        (k, n), bool.
+    """
+    return np.asarray(result.time[:, None] <= stop_time(result) * (1.0 + ROUNDING))
+
+
+def stop_time(result: Any) -> np.ndarray:
+    """When each member stopped: the time of its event, or of its last good state where it failed.
+
+    Args:
+        result: Of a run.
+
+    Returns:
+        (n,) [s]; infinite where the member went to the end of the run.
+    """
+    return np.where(np.asarray(result.status) != Status.OK, np.asarray(result.failure_time), np.inf)
+
+
+# A sample at a member's last time counts as its own, whatever the two were rounded to.
+ROUNDING = 1e-12

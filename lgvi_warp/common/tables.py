@@ -1,0 +1,22 @@
+"""Tables for other programs."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from lgvi_warp.common import files as durable
+
+
+def write_csv(rows: Sequence[Mapping[str, Any]], path: str | os.PathLike[str]) -> Path:
+    """Write records to a CSV file, a column for every key that some record has. Returns its path. Raises OSError."""
+    target = Path(path)
+    names = list(dict.fromkeys(key for row in rows for key in row))
+    with durable.placed(target) as beside, beside.open("x", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, names)
+        writer.writeheader()
+        writer.writerows(rows)
+    return target

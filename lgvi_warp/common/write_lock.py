@@ -1,0 +1,165 @@
+"""A lock beside a file or folder: one writer at a time, from before it looks at what is there to its end.
+
+The lock is the system's own on an open file (flock), which ends with the process however that ends; the file names its
+holder for who is refused. Libraries of locks keep the file or name nobody.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import os
+import stat
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from lgvi_warp.common import scratch
+from lgvi_warp.common.errors import SceneError
+
+# What a file system without locks says.
+WITHOUT_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL}
+KEYS = {"pid", "host", "since"}
+# Descriptors of locks that this process holds.
+_held: set[int] = set()
+
+
+def _let_go() -> None:
+    """In a process that was forked: its copies of the descriptors must not outlive the holder's."""
+    for descriptor in _held:
+        with contextlib.suppress(OSError):
+            os.close(descriptor)
+    _held.clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_let_go)
+
+
+def lock_file(target: Path) -> Path:
+    """Where the lock of a file or folder lies: one for all the ways that lead to it."""
+    place = Path(os.path.realpath(target))
+    return place.with_name(f".{place.name}.lock")
+
+
+@contextlib.contextmanager
+def write_lock(target: Path, wait: bool = False) -> Iterator[None]:
+    """Keep other writers out of a file or folder that may not be there yet; its parent folder is made.
+
+    wait: until another writer has ended. Raises SceneError naming the writer that holds it, or where the lock's place is
+    taken by another file, OSError where none can be made.
+    """
+    path = lock_file(target)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    descriptor, holder = _taken(path, target, wait), os.getpid()
+    _held.add(descriptor)
+    try:
+        yield
+    finally:
+        if os.getpid() == holder:
+            _held.discard(descriptor)
+            _release(path, descriptor)
+
+
+def _taken(path: Path, target: Path, wait: bool) -> int:
+    """A descriptor of the lock's file, locked. Raises SceneError."""
+    while True:
+        descriptor = _opened(path)
+        try:
+            if not _locked(descriptor, wait):
+                raise SceneError(
+                    [f"{target}: another run is writing into it{_told(descriptor)}; wait for it, or end it"]
+                )
+            # Who held it before may have removed the file that was opened here.
+            if _is_still(path, descriptor):
+                _sign(descriptor)
+                return descriptor
+        except BaseException:
+            os.close(descriptor)
+            raise
+        os.close(descriptor)
+
+
+def _opened(path: Path) -> int:
+    """The lock's file, made if it is not there. Raises SceneError where another file has its name."""
+    try:
+        flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+        descriptor = os.open(path, flags | getattr(os, "O_CLOEXEC", 0), 0o666)
+    except OSError as error:
+        if error.errno in (errno.ELOOP, errno.EISDIR, errno.ENXIO):
+            raise _no_lock(path) from None
+        raise
+    if stat.S_ISREG(os.fstat(descriptor).st_mode) and _holder(descriptor) is not None:
+        return descriptor
+    os.close(descriptor)
+    raise _no_lock(path)
+
+
+def _no_lock(path: Path) -> SceneError:
+    return SceneError([f"{path}: is no lock of lgvi-warp, but has its name; move it away"])
+
+
+def _locked(descriptor: int, wait: bool) -> bool:
+    """Lock an open file; False where another has it. Without locks, whether the process that it names runs no more."""
+    try:
+        import fcntl
+
+        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except BlockingIOError:
+        return False
+    except ImportError:
+        return True
+    except OSError as error:
+        if error.errno not in WITHOUT_LOCKS:
+            raise
+        holder = _holder(descriptor) or {}
+        return holder.get("host") != scratch.host() or not scratch.is_alive(int(holder["pid"]))
+    return True
+
+
+def _is_still(path: Path, descriptor: int) -> bool:
+    """Whether the path leads to the open file."""
+    try:
+        return os.path.samestat(os.lstat(path), os.fstat(descriptor))
+    except FileNotFoundError:
+        return False
+
+
+def _holder(descriptor: int) -> dict[str, Any] | None:
+    """What the file says of who holds it, nothing if that has only begun; None if it is no lock's file."""
+    os.lseek(descriptor, 0, os.SEEK_SET)
+    text = os.read(descriptor, 1000)
+    try:
+        content = json.loads(text or b"{}")
+    except ValueError:
+        return None
+    return content if isinstance(content, dict) and content.keys() in (KEYS, set()) else None
+
+
+def _told(descriptor: int) -> str:
+    """Who holds it, in words."""
+    for _ in range(10):
+        holder = _holder(descriptor)
+        if holder:
+            return f" (process {holder['pid']} on {holder['host'].rpartition('-')[0]}, since {holder['since']})"
+        time.sleep(0.01)
+    return ""
+
+
+def _sign(descriptor: int) -> None:
+    """Say who holds it. On a full disk the lock holds all the same."""
+    holder = {"pid": os.getpid(), "host": scratch.host(), "since": time.strftime("%Y-%m-%d %H:%M:%S")}
+    with contextlib.suppress(OSError):
+        os.ftruncate(descriptor, 0)
+        os.lseek(descriptor, 0, os.SEEK_SET)
+        os.write(descriptor, json.dumps(holder).encode())
+
+
+def _release(path: Path, descriptor: int) -> None:
+    """Remove the file while it is locked, so that nobody else's is, and let go."""
+    with contextlib.suppress(OSError):
+        if _is_still(path, descriptor):
+            path.unlink()
+    os.close(descriptor)

@@ -1,0 +1,156 @@
+"""YAML from anybody: no objects, no bombs of aliases, and no number that two versions of YAML read differently."""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import re
+from typing import Any
+
+from lgvi_warp.common.errors import Faults, SceneError
+
+# Values after every alias is written out: coefficients of a vehicle are some hundreds.
+MOST_VALUES = 20_000
+# YAML 1.1 reads these as octal, and in base 60; YAML 1.2 as 10 and as a text.
+OCTAL = re.compile(r"[-+]?0[0-9_]+")
+SIXTIES = re.compile(r"[-+]?[0-9][0-9_]*(:[0-5]?[0-9])+(\.[0-9_]*)?")
+# What YAML 1.2 reads as a number, and 1.1 as a text: without a point, or without a sign after the e.
+EXPONENT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)[eE][-+]?[0-9]+")
+# Brackets within brackets.
+DEEPEST = 50
+DEEP = "YAML: is nested too deep; write mass: ..., added_mass: ..."
+PLAIN = {f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "int", "float", "str", "seq", "map")}
+
+
+def parsed(text: str) -> Any:
+    """What a YAML text says, in plain tables, lists, texts and numbers.
+
+    Args:
+        text: In YAML 1.1, or in 1.2 where the two agree.
+
+    Returns:
+        Its only document.
+
+    Raises:
+        SceneError: It is not YAML, or holds what is refused; every fault of its values is named.
+        ImportError: PyYAML is not installed.
+    """
+    try:
+        yaml = importlib.import_module("yaml")
+    except ImportError:
+        raise ImportError("reading YAML needs PyYAML: pip install 'lgvi-warp[yaml]'") from None
+    if _depth(text) > DEEPEST:
+        raise SceneError([DEEP])
+    try:
+        loader = _loader(yaml)(text)
+        node = loader.get_single_node()
+        faults = Faults("YAML: ")
+        if node is not None:
+            _look(yaml, faults, node)
+        faults.raise_if_any()
+        return None if node is None else loader.construct_document(node)
+    except SceneError:
+        raise
+    except RecursionError:
+        raise SceneError([DEEP]) from None
+    except yaml.YAMLError as error:
+        raise SceneError([f"YAML: {' '.join(str(error).split())}; mend that line"]) from None
+    except Exception as error:  # PyYAML lets through whatever int(), float() and dates raise
+        raise SceneError([f"YAML: has a value that is none ({type(error).__name__}: {error}); mend it"]) from None
+
+
+def _depth(text: str) -> int:
+    """How deep brackets are open in a text, those within its words as well: PyYAML's time grows with it."""
+    depth = deepest = 0
+    for bracket in re.finditer(r"[\[\]{}]", text):
+        depth += 1 if bracket[0] in "[{" else -1
+        deepest = max(deepest, depth)
+    return deepest
+
+
+@functools.cache
+def _loader(yaml: Any) -> Any:
+    """PyYAML's safe loader, in Python: the one in C calls itself as deep as a text is, and crashes."""
+
+    class Loader(yaml.SafeLoader):
+        """With numbers such as 1e3, which YAML 1.2 has."""
+
+    Loader.add_implicit_resolver("tag:yaml.org,2002:float", EXPONENT, list("-+.0123456789"))
+    return Loader
+
+
+def _look(yaml: Any, faults: Faults, root: Any) -> None:
+    """Note what is refused of a tree of nodes, before anything is made of it."""
+    sizes: dict[int, int] = {}
+    _size(yaml, root, sizes, set())
+    if sizes[id(root)] > MOST_VALUES:
+        what = f"are {sizes[id(root)]:,} with every alias (*name) written out"
+        faults.add("values", "...", what, f"give at most {MOST_VALUES:,}")
+        return
+    seen: set[int] = set()
+    waiting = [root]
+    while waiting:
+        node = waiting.pop()
+        if id(node) in seen:
+            continue
+        seen.add(id(node))
+        if isinstance(node, yaml.MappingNode):
+            _check_keys(yaml, faults, node)
+            waiting += [child for pair in reversed(node.value) for child in reversed(pair)]
+        elif isinstance(node, yaml.SequenceNode):
+            waiting += reversed(node.value)
+        else:
+            _check_scalar(faults, node)
+        if node.tag not in PLAIN and not _is_merge(node):
+            faults.add(_line(node), node.tag, "is a type that is not read", "give numbers, texts, lists and maps")
+
+
+def _size(yaml: Any, node: Any, sizes: dict[int, int], above: set[int]) -> int:
+    """How many values a node has, aliases written out. Raises SceneError where one holds itself."""
+    if id(node) in above:
+        raise SceneError([f"YAML: {_line(node)}: holds itself by an alias; write it out"])
+    if id(node) not in sizes:
+        above.add(id(node))
+        children: list[Any] = []
+        if isinstance(node, yaml.MappingNode):
+            children = [child for pair in node.value for child in pair]
+        elif isinstance(node, yaml.SequenceNode):
+            children = node.value
+        sizes[id(node)] = 1 + sum(_size(yaml, child, sizes, above) for child in children)
+        above.discard(id(node))
+    return sizes[id(node)]
+
+
+def _check_keys(yaml: Any, faults: Faults, node: Any) -> None:
+    """Note keys that are no texts, and doubled ones, of which PyYAML keeps the last."""
+    first: dict[str, Any] = {}
+    for key, _ in node.value:
+        if not isinstance(key, yaml.ScalarNode):
+            faults.add(_line(key), "...", "is a key that is no text", "write key: value")
+        elif _is_merge(key):
+            continue
+        elif key.value in first:
+            faults.add(_line(key), key.value, f"is there already, in {_line(first[key.value])}", "keep one of them")
+        else:
+            first[key.value] = key
+
+
+def _check_scalar(faults: Faults, node: Any) -> None:
+    """Note a number that versions of YAML read differently."""
+    number = node.style is None and node.tag.endswith((":int", ":float"))
+    text = node.value
+    if number and OCTAL.fullmatch(text):
+        meant = text.replace("_", "").lstrip("+-0") or "0"
+        faults.add(_line(node), text, "is octal in YAML 1.1 and decimal in YAML 1.2", f"write {meant} if that is meant")
+    elif number and SIXTIES.fullmatch(text):
+        remedy = "write the number, or the text in quotes"
+        faults.add(_line(node), text, "is a number in base 60 in YAML 1.1 and a text in YAML 1.2", remedy)
+
+
+def _is_merge(node: Any) -> bool:
+    """Whether it is the key of a merge, <<."""
+    return bool(node.tag == "tag:yaml.org,2002:merge")
+
+
+def _line(node: Any) -> str:
+    return f"line {node.start_mark.line + 1}"

@@ -1,0 +1,61 @@
+"""Where blocks run: threads of this process, processes of this machine, or workers of a Dask cluster."""
+
+from __future__ import annotations
+
+import multiprocessing
+from typing import Any
+
+from lgvi_warp.common import machine
+from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.engine.executors.base import Executor
+
+NAMES = ("threads", "processes", "dask")
+# Those that start processes of their own.
+STARTING = ("processes", "dask")
+# Threads, processes or workers: of the largest clusters.
+MOST_THREADS = 100_000
+
+
+def check_threads(faults: Faults, threads: Any) -> None:
+    """Note what is wrong with a number of threads."""
+    if threads is None:
+        return
+    remedy = "give 1 or more, or leave it out for all cores"
+    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+        faults.add("threads", threads, "is not a whole number above 0", remedy)
+    elif threads > MOST_THREADS:
+        faults.add("threads", threads, f"is more than {MOST_THREADS:,}", remedy)
+
+
+def executor_of(given: Any, threads: int | None = None, scheduler: str | None = None) -> Executor:
+    """The executor that a name stands for, with so many threads (default: all cores), or the one given.
+
+    scheduler: the address of a Dask scheduler; without one, "dask" starts a cluster on this machine.
+    Raises SceneError, also where no scheduler answers.
+    """
+    faults = Faults()
+    check_threads(faults, threads)
+    if not isinstance(given, Executor) and given not in NAMES:
+        faults.add("executor", given, "is not known", f"{closest(str(given), NAMES)}; or give an object with run(...)")
+    if scheduler is not None and given != "dask":
+        faults.add("scheduler", scheduler, "is for the executor dask alone", 'give executor="dask", or leave it out')
+    if given in STARTING and scheduler is None and multiprocessing.current_process().daemon:
+        what = "starts processes, which a worker of multiprocessing or Celery may not"
+        faults.add("executor", given, what, 'use executor="threads" in it, or run outside of it')
+    faults.raise_if_any()
+    if isinstance(given, Executor):
+        return given
+    count = threads or machine.thread_count()
+    if given == "processes":
+        from lgvi_warp.engine.executors.processes import Processes
+
+        return Processes(count)
+    if given == "dask":
+        from lgvi_warp.engine.executors.dask import Dask
+
+        cluster = Dask(scheduler, count)
+        cluster.check()
+        return cluster
+    from lgvi_warp.engine.executors.threads import Threads
+
+    return Threads(count)

@@ -1,0 +1,66 @@
+"""Blocks on the cores of one machine: a kernel launch releases the interpreter's lock, so threads are enough."""
+
+from __future__ import annotations
+
+import functools
+import queue
+import threading
+from collections.abc import Generator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+from lgvi_warp.engine.block import Block
+from lgvi_warp.engine.executors.base import Advanced, ended
+from lgvi_warp.engine.work import Work
+
+# A signal that comes just before the main thread begins to wait is heard so much later [s].
+PERIOD = 0.2
+
+
+@dataclass(frozen=True)
+class Threads:
+    """So many threads of this process."""
+
+    threads: int
+
+    def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
+        """Each block and its result, as they are done.
+
+        The first exception halts what runs; blocks that have not begun are dropped, and the exception is raised. After an
+        interrupt from the keyboard those come first that ended nevertheless: a launch is made to its end.
+        """
+        stop = threading.Event()
+
+        def one(block: Block) -> Any:
+            return work(block, stop.is_set, functools.partial(advanced, block))
+
+        # The main thread waits, so that it hears an interrupt at once.
+        if self.threads == 1 and threading.current_thread() is not threading.main_thread():
+            for block in blocks:
+                yield block, one(block)
+            return
+        with ThreadPoolExecutor(self.threads, thread_name_prefix="lgvi_warp") as pool:
+            futures: dict[Future[Any], Block] = {}
+            done: queue.SimpleQueue[Future[Any]] = queue.SimpleQueue()
+            try:
+                for block in blocks:
+                    future = pool.submit(one, block)
+                    futures[future] = block
+                    future.add_done_callback(done.put)
+                while futures:
+                    try:
+                        future = done.get(timeout=PERIOD)
+                    except queue.Empty:
+                        continue
+                    value = future.result()
+                    yield futures.pop(future), value
+            except KeyboardInterrupt:
+                stop.set()
+                pool.shutdown(wait=True, cancel_futures=True)
+                yield from ended(futures)
+                raise
+            except BaseException:
+                stop.set()
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise

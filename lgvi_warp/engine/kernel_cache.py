@@ -1,0 +1,239 @@
+"""Kernels from Warp's cache: compiled once for all processes, and loaded only as they were compiled.
+
+    CACHE/wp_NAME_HASH/NAME.cpuTARGET.o          code of one kind of processor
+    CACHE/wp_NAME_HASH/NAME.cpuTARGET.o.sha256   checksums of that file and of its .meta, written last
+    CACHE/lgvi_warp_locks/                       who compiles
+    CACHE/lgvi_warp_scratch_RANDOM/              a kernel on its way, locked by the process that compiles it
+
+Damaged code would end the process when it is loaded or run, so nothing is loaded whose checksums do not fit. LLVM ends
+the process when it cannot write, so room is looked for before it begins.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import hashlib
+import json
+import os
+import re
+import shutil
+import tempfile
+import threading
+import time
+import weakref
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import warp as wp
+
+from lgvi_warp.common import files as durable
+from lgvi_warp.common import warp_setup
+from lgvi_warp.common.warp_setup import build_lock
+
+# Source, code and header of a kernel are a few 100 kB; Clang's precompiled header is 5 MB.
+ROOM_BYTES, ROOM_FILES = 16_000_000, 16
+# CPU kernels are launched with one thread a block: a variant of the module of its own.
+BLOCK_DIM = 1
+LOCKS, SCRATCH, SUMS = "lgvi_warp_locks", "lgvi_warp_scratch_", ".sha256"
+# What Warp leaves of a process that is killed while it compiles, and when it is old enough to be of no one [s].
+TORN, OURS, OLD = re.compile(r"(\w+)_p\d+_t\d+"), "wp_make_", 86_400.0
+
+_loaded: weakref.WeakSet[Any] = weakref.WeakSet()
+
+
+def load(module: Any) -> None:
+    """Load a kernel's code, compiling it where the cache has none that is whole.
+
+    Args:
+        module: Warp's module of the kernel.
+
+    Raises:
+        OSError: where the cache has no such kernel and takes none; it names the folder and WARP_CACHE_PATH.
+    """
+    warp_setup.start()
+    with build_lock:
+        if module in _loaded:
+            return
+        cache = Path(wp.config.kernel_cache_dir)
+        folder = cache / module.get_module_identifier(BLOCK_DIM)
+        code = folder / module._get_compile_output_name(wp.get_device("cpu"), block_dim=BLOCK_DIM)
+        with one_at_a_time(module.get_module_hash().hex()):
+            if is_whole(code):
+                wp.load_module(module, device="cpu")
+            else:
+                _compile(module, cache, code)
+        _loaded.add(module)
+
+
+@contextlib.contextmanager
+def one_at_a_time(kernel: str) -> Iterator[None]:
+    """Let one process compile a kernel while others that want the same one wait for what it puts into the cache.
+
+    Other kernels wait for nothing, unless the first two digits of their hashes are the same: so there are at most 256
+    files to lock.
+
+    Args:
+        kernel: its hash.
+    """
+    path = Path(wp.config.kernel_cache_dir) / LOCKS / kernel[:2]
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+    except OSError:  # a cache that is only read
+        yield
+        return
+    with durable.locked(path, wait=True):
+        yield
+
+
+def is_whole(code: Path) -> bool:
+    """Whether a kernel's code and all that its checksums name are as they were compiled."""
+    try:
+        sums = json.loads(code.with_name(code.name + SUMS).read_bytes())
+        return code.name in sums and all(_sha256(code.with_name(name)) == value for name, value in sums.items())
+    except (OSError, ValueError, TypeError):
+        return False
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _compile(module: Any, cache: Path, code: Path) -> None:
+    """Compile and load a kernel in a scratch folder, then put its files into the cache, checksums last."""
+    with _explained(cache):
+        sweep(cache, code.parent)
+        seek_room(cache)
+        with _scratch(cache) as scratch, _clang_headers(scratch):
+            wp.config.kernel_cache_dir = str(scratch)
+            try:
+                wp.load_module(module, device="cpu")
+            except BaseException:
+                module.mark_modified()  # Warp would repeat the error without trying again
+                raise
+            finally:
+                wp.config.kernel_cache_dir = str(cache)
+            _move(scratch / code.parent.name, code)
+
+
+def _move(made: Path, code: Path) -> None:
+    """Put a compiled kernel's files into their places: what lies there is damaged, or of other processors."""
+    names = [code.name, *(path.name for path in made.glob("*.meta"))]
+    (made / (code.name + SUMS)).write_text(json.dumps({name: _sha256(made / name) for name in names}))
+    if code.parent.exists() and not code.parent.is_dir():
+        code.parent.unlink()
+    code.parent.mkdir(exist_ok=True)
+    last = code.name + SUMS
+    code.with_name(last).unlink(missing_ok=True)
+    for path in sorted(made.iterdir(), key=lambda path: path.name == last):
+        path.replace(code.with_name(path.name))
+
+
+@contextlib.contextmanager
+def _scratch(cache: Path) -> Iterator[Path]:
+    """A folder of this process's own, which `sweep` leaves alone while it lives."""
+    with contextlib.ExitStack() as stack:
+        with one_at_a_time(SCRATCH):
+            path = Path(tempfile.mkdtemp(prefix=SCRATCH, dir=cache))
+            stack.callback(shutil.rmtree, path, ignore_errors=True)
+            stack.enter_context(durable.locked(path))
+        yield path
+
+
+@contextlib.contextmanager
+def _clang_headers(scratch: Path) -> Iterator[None]:
+    """Let Clang keep its precompiled header in the scratch folder where the system's temporary folder has no room."""
+    folders, thread = warp_setup.header_folders(), threading.get_ident()
+    if thread in folders or _temporary_room():
+        yield
+        return
+    with tempfile.TemporaryDirectory(prefix="wp_pch_", dir=scratch) as folder:
+        folders[thread] = SimpleNamespace(name=folder, cleanup=lambda: None)
+        try:
+            yield
+        finally:
+            del folders[thread]
+
+
+def _temporary_room() -> bool:
+    try:
+        seek_room(Path(tempfile.gettempdir()))
+    except OSError:
+        return False
+    return True
+
+
+def seek_room(folder: Path, wanted: int = ROOM_BYTES) -> None:
+    """See that a folder takes so many bytes and some files, by a trial: quotas and limits are told by nothing else.
+
+    Args:
+        folder: where to look.
+        wanted: bytes [1].
+
+    Raises:
+        OSError: ENOSPC and the like, where it does not take them.
+    """
+    if hasattr(os, "statvfs"):
+        system = os.statvfs(folder)
+        # A system that has no fixed number of files says 0.
+        if system.f_files and system.f_favail < ROOM_FILES:
+            raise OSError(errno.ENOSPC, "No files left on device")
+    with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
+        try:
+            os.posix_fallocate(file.fileno(), 0, wanted)
+        except (AttributeError, OSError) as error:
+            if getattr(error, "errno", None) not in (None, errno.EINVAL, errno.EOPNOTSUPP, errno.ENOSYS):
+                raise
+            durable.write_all(file, memoryview(bytes(wanted)))
+
+
+def sweep(cache: Path, folder: Path) -> None:
+    """Remove what killed processes left in the cache: their scratch folders, and what Warp left of this kernel or of old.
+
+    Args:
+        cache: Warp's kernel cache.
+        folder: that of a kernel which this process alone may compile.
+    """
+    with one_at_a_time(SCRATCH):
+        for path in cache.glob(f"{SCRATCH}*"):
+            if _is_abandoned(path):
+                shutil.rmtree(path, ignore_errors=True)
+    for path in cache.glob("wp_*_p*_t*"):
+        torn = TORN.fullmatch(path.name)
+        if torn and (torn[1] == folder.name or (torn[1].startswith(OURS) and _is_old(path))):
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def _is_old(path: Path) -> bool:
+    try:
+        return time.time() - path.stat().st_mtime > OLD
+    except OSError:
+        return False
+
+
+def _is_abandoned(path: Path) -> bool:
+    """Whether no process holds a scratch folder; False also where the file system knows no locks."""
+    try:
+        import fcntl
+
+        descriptor = os.open(path, os.O_RDONLY)
+    except (ImportError, OSError):
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    finally:
+        os.close(descriptor)
+    return True
+
+
+@contextlib.contextmanager
+def _explained(cache: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise warp_setup.unusable(cache, error) from error

@@ -1,0 +1,211 @@
+"""A law alone, its numbers packed as for a run, at random views: what law_check looks at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from lgvi_kernels.examine import COLUMNS, OUT_FIELDS, make_examine
+from lgvi_warp.common import warp_setup
+from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.machine import default_width
+from lgvi_warp.common.warp_setup import build_lock
+from lgvi_warp.engine import kernel_cache
+from lgvi_warp.engine.packets import Packets, pack
+from lgvi_warp.physics import inertia, notation, vehicle
+from lgvi_warp.physics.inertia import Frame
+from lgvi_warp.physics.terms.base import Setting, Term
+from lgvi_warp.physics.vehicle import Vehicle
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.scene.start import Environment
+
+# Length [s] and number of the kick that the views are of.
+KICK, STEP = 0.01, 3
+# Other axes and another origin [m] that a method might choose: what a law does must not depend on them.
+TURN = notation.matrix_from_rotation_vector(np.array([0.4, -0.7, 1.2]))
+ORIGIN = np.array([0.1, -0.2, 0.15])
+
+
+@dataclass(frozen=True)
+class Views:
+    """k views: attitude (k, 3, 3), position (k, 3) [m], velocity and rate (k, 3), time (k,) [s], one for a packet."""
+
+    attitude: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    rate: np.ndarray
+    time: np.ndarray
+
+    def changed(self, **new: Any) -> Views:
+        """The same views but for what is named."""
+        return Views(**(vars(self) | new))
+
+    def moved(self, axis: int, by: float) -> Views:
+        """Every position moved along an inertial axis [m]."""
+        return self.changed(position=self.position + by * np.eye(3)[axis])
+
+    def turned(self, axis: int, by: float) -> Views:
+        """Every attitude turned about its own body axis [rad]."""
+        return self.changed(attitude=self.attitude @ notation.matrix_from_rotation_vector(by * np.eye(3)[axis]))
+
+    def elsewhere(self) -> Views:
+        """The same views of the axes TURN at ORIGIN."""
+        return Views(
+            self.attitude @ TURN,
+            self.position + notation.rotate_out(self.attitude, ORIGIN[None]),
+            (self.velocity + np.cross(self.rate, ORIGIN)) @ TURN,
+            self.rate @ TURN,
+            self.time,
+        )
+
+    def told(self, i: int) -> str:
+        """One view in words."""
+        turn = notation.quaternion_from_matrix(self.attitude[i])
+        where = f"at position {short(self.position[i])} m, quaternion {short(turn)}, t = {self.time[i]:.3g} s"
+        return f"{where}, velocity {sizes(self.velocity[i])} m/s, rate {sizes(self.rate[i])} rad/s"
+
+
+def simple_scene() -> Scene:
+    """A vehicle of 20 kg whose numbers all differ, a little heavy, its centre of buoyancy off all axes."""
+    body = Vehicle(20.0, (5.0, 22.0, 25.0), (1.5, 4.0, 4.5), 190.0, (0.01, 0.005, -0.02))
+    return Scene(body, Environment())
+
+
+class Bench:
+    """A term with its numbers packed as for a run, ready to be evaluated at views."""
+
+    packets: Bank
+
+    def __init__(self, term: Term, module: Any, scene: Scene, packets: int, seed: int):
+        self.term, self.module, self.width = term, module, default_width("float64")
+        self.noisy = bool(getattr(module, "NOISE", False))
+        self.roles = tuple(role for role in COLUMNS if hasattr(module, role))
+        given = scene.parameters() | {f"{term.key}.{name}": value for name, value in term.parameters().items()}
+        self.parameters = {name: np.asarray(value)[None] for name, value in given.items()}
+        self.own = {name: self.parameters[f"{term.key}.{name}"] for name in term.parameters()}
+        self.count = packets * self.width
+        self.seed = seed
+        around = scene.start.given()["position"]
+        self.views = random_views(packets, self.width, seed, around)
+        self.corners = tuple(corner_views(packets, self.width, around))
+        warp_setup.start()
+        self.examine = _built(term, module, self.width)
+        self.Params = np.dtype(self.examine.Params.numpy_dtype())
+
+    def setting(self, parameters: Mapping[str, np.ndarray], elsewhere: bool = False) -> Setting:
+        """What packed() may look at: the kernel's axes are the user's, or TURN at ORIGIN."""
+        I6 = vehicle.inertia6(parameters)
+        n, none = len(I6), np.zeros((len(I6), 3, 3))
+        Q = np.broadcast_to(TURN if elsewhere else np.eye(3), (n, 3, 3))
+        origin = np.broadcast_to(ORIGIN if elsewhere else np.zeros(3), (n, 3))
+        M, _, Js = inertia.schur(I6)
+        M, Js = (np.swapaxes(Q, 1, 2) @ A @ Q for A in (M, Js))
+        frame = Frame(Q, origin, origin, M, np.einsum("nii->ni", Js), none, none)
+        return Setting(parameters, frame, np.arange(self.count), self.seed, KICK)
+
+    def at(self, views: Views) -> dict[str, np.ndarray]:
+        """What every role of the law gives at k views, by role: (k, numbers)."""
+        return self.packets.evaluate(views)
+
+
+class Bank(Packets):
+    """A term's parameters, table and memory as Packets makes them for a run, without a run's kernel."""
+
+    def __init__(self, bench: Bench, setting: Setting, views: Views):
+        # What Packets asks of a Plan and of Members to pack laws.
+        plan: Any = SimpleNamespace(
+            model=SimpleNamespace(laws=((bench.term, bench.module),)),
+            spec=SimpleNamespace(width=bench.width, drag=(), gauss=()),
+            dtypes=(None, bench.Params, None),
+            dtype="float64",
+        )
+        members: Any = SimpleNamespace(count=bench.count, parameters=setting.parameters, indices=setting.members)
+        self.plan, self.members, self.frame, self.bench = plan, members, setting.frame, bench
+        self.count = bench.count // bench.width
+        params, table, memory = self._laws(setting)
+        Lane = bench.examine.Lane
+        self.params = wp.array(params, dtype=bench.examine.Params, device="cpu")
+        self.table, self.memory = (wp.array(x, dtype=Lane, shape=x.shape[:2], device="cpu") for x in (table, memory))
+        self._launch(views, 0)
+
+    def evaluate(self, views: Views) -> dict[str, np.ndarray]:
+        """What the law gives at views as many as the bench has, by role: (k, numbers)."""
+        out = self._launch(views, -1)
+        roles = (*self.bench.roles, *["energy"] * hasattr(self.bench.module, "energy"))
+        return {role: out[:, COLUMNS[role][0] : sum(COLUMNS[role])] for role in roles}
+
+    def _launch(self, views: Views, second: int) -> np.ndarray:
+        width, Lane = self.bench.width, self.bench.examine.Lane
+        flat = [views.attitude.reshape(-1, 9), views.position, views.velocity, views.rate]
+        rows = pack(np.concatenate(flat, axis=1), width)
+        given = wp.array(rows, dtype=Lane, shape=rows.shape[:2], device="cpu")
+        times = wp.array(views.time[::width], dtype=wp.float64, device="cpu")
+        out = wp.zeros((self.count, OUT_FIELDS), dtype=Lane, device="cpu")
+        inputs = [self.params, self.table, given, times, wp.float64(KICK), STEP, second, self.memory, out]
+        with build_lock:
+            wp.launch(self.bench.examine.kernel, dim=self.count, inputs=inputs, device="cpu")
+        return np.asarray(out.numpy().transpose(0, 2, 1).reshape(-1, OUT_FIELDS))
+
+
+def _built(term: Term, module: Any, width: int) -> Any:
+    """The kernel, compiled. Raises SceneError with Warp's words where it cannot be."""
+    try:
+        hash(module)
+    except TypeError:
+        remedy = "give a module, or a class that holds the functions"
+        raise SceneError([f"{term.key}.device = {module!r}: cannot be a key of the kernels made; {remedy}"]) from None
+    remedy = (
+        "return what the role adds to (w, D, f, state); name fields as the View and params() do; import the operators of "
+        "lanes that are used; no `if` on a lane, no plain number times a lane: docs/add_a_law.md"
+    )
+    try:
+        examine = make_examine(module, width, wp.float64)
+        kernel_cache.load(examine.kernel.module)
+    except OSError:  # of the kernel cache
+        raise
+    except Exception as error:
+        words = " ".join(str(error).split())
+        raise SceneError([f"{term.key}.device = {module!r}: does not compile: {words}; {remedy}"]) from error
+    return examine
+
+
+def random_views(packets: int, width: int, seed: int, around: np.ndarray) -> Views:
+    """Random views some metres around a position, the lanes of a packet at one time."""
+    rng = np.random.default_rng(seed)
+    k = packets * width
+    quaternion, position, velocity, rate = rng.normal(size=(k, 4)), *rng.normal(size=(3, k, 3))
+    R = notation.matrix_from_quaternion(quaternion)
+    return Views(R, around + 4.0 * position, velocity, rate, np.repeat(rng.uniform(0.0, 10.0, packets), width))
+
+
+def corner_views(packets: int, width: int, around: np.ndarray) -> Iterator[Views]:
+    """Views where a law divides by zero that is careless, as many at a time as a bench has.
+
+    Velocity and rate are zero, along one axis, or of numbers so small that their squares vanish; attitude is none, the
+    position is the scene's start or the origin, and the time is 0.
+    """
+    axes = np.concatenate([np.eye(6), -np.eye(6)])
+    twists = np.concatenate([np.zeros((1, 6)), axes, 1e-200 * axes])
+    places = np.stack([around, np.zeros(3)])
+    position = np.repeat(places, len(twists), axis=0)
+    twists = np.tile(twists, (len(places), 1))
+    k = packets * width
+    for first in range(0, len(twists), k):
+        some = np.arange(first, first + k) % len(twists)
+        R = np.broadcast_to(np.eye(3), (k, 3, 3))
+        yield Views(R, position[some], twists[some, :3], twists[some, 3:], np.zeros(k))
+
+
+def short(values: np.ndarray) -> str:
+    """Numbers in a message."""
+    return str(np.round(np.asarray(values), 3).tolist())
+
+
+def sizes(values: np.ndarray) -> str:
+    """The same of numbers that may be very small."""
+    return "[" + ", ".join(f"{one:.3g}" for one in values) + "]"

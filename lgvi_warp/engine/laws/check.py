@@ -1,0 +1,371 @@
+"""Is a law right? Its device code at random views, against finite differences and linear algebra."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lgvi_kernels.stops import STOPS
+from lgvi_kernels.terms import LAWS
+from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.machine import default_width
+from lgvi_warp.engine import model
+from lgvi_warp.engine.laws.bench import ORIGIN, TURN, Bank, Bench, Views, short, simple_scene, sizes
+from lgvi_warp.physics import notation, terms
+from lgvi_warp.physics.terms.base import Packed, Setting, Term
+from lgvi_warp.physics.terms.events import Event
+from lgvi_warp.scene.scene import Scene
+
+EPS = float(np.finfo(np.float64).eps)
+# How many roundings of a law's largest number may add up in it.
+ROUNDINGS = 64.0
+FLOWS = ("steady", "uniform", "varying")
+
+
+class Check(NamedTuple):
+    """One thing that was checked: the worst value found, what is allowed there, and where it was found, or a remedy."""
+
+    name: str
+    worst: float
+    allowed: float
+    ok: bool
+    text: str
+
+
+@dataclass(frozen=True)
+class LawReport:
+    """What check_law found about a term. `ok`: whether every check passed; print it for a table."""
+
+    term: Term
+    checks: tuple[Check, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether every check passed."""
+        return all(one.ok for one in self.checks)
+
+    def __str__(self) -> str:
+        head = f"{type(self.term).__name__} ({self.term.key}): {'ok' if self.ok else 'WRONG'}"
+        rows = [
+            (one.name, f"{one.worst:.2e}", f"{one.allowed:.2e}", "ok" if one.ok else "WRONG", one.text)
+            for one in self.checks
+        ]
+        rows = [("check", "worst", "allowed", "", ""), *rows]
+        widths = [max(len(row[i]) for row in rows) for i in range(4)]
+        lines = (
+            "  ".join([*(text.ljust(n) for text, n in zip(row, widths, strict=False)), row[4]]).rstrip() for row in rows
+        )
+        return "\n  ".join([head, *lines])
+
+
+def check_law(
+    term: Term, *, scene: Scene | None = None, samples: int = 64, seed: int = 0, step: float = 1e-5
+) -> LawReport:
+    """Check the device code of a term, built-in or the user's, against its own host code, at random views.
+
+    scene: whose vehicle and environment the law gets (a simple vehicle by default). samples: how many views: any attitude,
+    positions some metres around the scene's start, velocities and rates of order 1, times from 0 to 10 s.
+    step [m, rad, s]: of the finite differences. Compiles one small kernel for each new law. What is checked, each where
+    the law has it:
+
+    All: finite, at rest and along single axes as well.
+    law: blind to velocities, and to the time unless `timed`; with POTENTIAL, the derivatives of potential(),
+    which energy() adds.
+    damping: nu.D nu >= 0; where the term says `dissipative = False`, its least value is told and is no fault.
+    flow: rate and gradient are the derivatives of velocity, and water() gives the same velocity; FLOW is what it does.
+    All: lanes do not mix; numbers that vary by member give what shared ones do; packed() fills what params() names, and
+    gives the same law whatever axes and origin of the body the method works in.
+
+    Raises SceneError where the device code lacks something, has a wrong signature or does not compile.
+    """
+    if not isinstance(term, Term):
+        raise SceneError([f"term = {term!r}: is no term; give an object such as lw.Drag(...), not its class"])
+    known, roles = (STOPS, ("distance",)) if isinstance(term, Event) else (LAWS, model.ROLES)
+    module = model._module(term, term.device_in(False), known, *roles)
+    bench = Bench(term, module, scene or simple_scene(), max(1, -(-samples // default_width("float64"))), seed)
+    checks: list[Check] = []
+    for part in (_numbers, _finite, _whole, _potential, _damping, _flow):
+        with np.errstate(all="ignore"):  # what is not finite is found by its check
+            checks += part(bench, step)
+        if part in (_numbers, _finite) and not all(one.ok for one in checks):
+            break
+    return LawReport(term, tuple(checks))
+
+
+def _judged(name: str, difference: np.ndarray, allowed: np.ndarray | float, views: Views, remedy: str) -> Check:
+    """A Check of differences (k,) or (k, d): the one that is worst beside what is allowed, and where, if it is too large."""
+    k = len(difference)
+    worst = np.abs(difference).reshape(k, -1)
+    limit = np.broadcast_to(np.reshape(allowed, (-1, 1)) if np.ndim(allowed) == 1 else allowed, worst.shape)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(
+            np.isfinite(worst), np.where(worst <= limit, worst / np.maximum(limit, 1e-300), 1.0 + worst), np.inf
+        )
+    i, j = np.unravel_index(ratio.argmax(), ratio.shape)
+    good = bool(np.all(worst <= limit) and np.isfinite(limit).all())
+    text = "" if good else f"{views.told(int(i))}; {remedy}"
+    return Check(name, float(worst[i, j]), float(limit[i, j]), good, text)
+
+
+def _numbers(bench: Bench, step: float) -> Iterator[Check]:
+    """Whether packed() fills what params() names; then packs, and lets the law remember once."""
+    term, setting = bench.term, bench.setting(bench.parameters)
+    try:
+        packed = term.packed(bench.own, setting)
+    except Exception as error:
+        packed = f"fails: {type(error).__name__}: {error}"  # type: ignore[assignment]
+    if not isinstance(packed, Packed):
+        text = packed if isinstance(packed, str) else f"returns {packed!r:.60}"
+        remedy = "write packed(self, own, setting) that returns lw.Packed({name: numbers}), names as in params()"
+        yield Check("packed", 1.0, 0.0, False, f"packed() {text}; {remedy}")
+        return
+    given = set(packed.values) | ({"first"} if packed.rows is not None else set())
+    given |= {"memory"} if packed.memory is not None else set()
+    given |= {"work"} if packed.work else set()
+    wanted = set(bench.Params["own"].names or ()) - {"unused"}
+    wrong = [f"{name} is not in packed().values" for name in sorted(wanted - given)]
+    wrong += [f"{name} is no field of params()" for name in sorted(given - wanted - {"first", "memory", "work"})]
+    yield Check("numbers", len(wrong), 0.0, not wrong, "; ".join(wrong))
+    remembers = packed.memory is not None and packed.memory.size > 0
+    good = remembers == bool(term.memory)
+    text = "" if good else f"{type(term).__name__}.memory must say whether packed() gives memory"
+    yield Check("memory", float(not good), 0.0, good, text)
+    if good and not wrong:
+        packets = _attempt(lambda: Bank(bench, setting, bench.views), "with shared numbers")
+        if isinstance(packets, str):
+            yield Check(
+                "packed", 1.0, 0.0, False, f"{packets}; give arrays (1,), (1, 3) or (n,), (n, 3), and whole numbers"
+            )
+        else:
+            bench.packets = packets
+
+
+def _finite(bench: Bench, step: float) -> Iterator[Check]:
+    """Numbers at every view, and at rest and along single axes; a law that is zero at all views is told."""
+    here = bench.at(bench.views)
+    found = _all_finite("finite", here, bench.views)
+    for views in bench.corners:
+        corner = _all_finite("finite at rest, along axes", bench.at(views), views)
+        if not corner.ok:
+            break
+    yield corner
+    asleep = not any(np.any(value) for value in here.values())
+    note = "note: zero at every view, so little was checked; give a scene that starts where the law acts"
+    yield found._replace(text=note) if asleep else found
+
+
+def _all_finite(name: str, values: dict[str, np.ndarray], views: Views) -> Check:
+    """Whether every role gives numbers at every view."""
+    finite = np.all([np.isfinite(value).all(axis=1) for value in values.values()], axis=0)
+    return _judged(name, (~finite).astype(float), 0.0, views, "guard divisions and roots")
+
+
+def _whole(bench: Bench, step: float) -> Iterator[Check]:
+    """What holds for every law: blind to what it must not look at, lanes apart, varied as shared."""
+    views, kind, here = bench.views, type(bench.term).__name__, bench.at(bench.views)
+    faster = bench.at(views.changed(velocity=2.0 * views.velocity + 1.0, rate=1.0 - views.rate))
+    later = bench.at(views.changed(time=views.time + 3.7))
+    for role, value in here.items():
+        if role != "damping":
+            remedy = "only damping(D, view, p) may look at view.nu and view.Om"
+            yield _judged(f"{role}: blind to velocity", faster[role] - value, 0.0, views, remedy)
+        if not bench.term.timed and not bench.noisy:
+            remedy = f"write timed = True in {kind}, or it gets no time"
+            yield _judged(f"{role}: blind to time", later[role] - value, 0.0, views, remedy)
+    if not bench.noisy:
+        yield from _packing(bench, here)
+
+
+def _packing(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
+    """The same law whatever lane it is in, however its numbers are given, in whatever axes."""
+    views = bench.views
+    back = np.arange(bench.count).reshape(-1, bench.width)[:, ::-1].reshape(-1)
+    mixed = bench.at(Views(**{name: value[back] for name, value in vars(views).items()}))
+    each = {name: np.repeat(value, bench.count, axis=0) for name, value in bench.parameters.items()}
+    varied = _tried(bench, bench.setting(each), views, "where numbers have one entry a member")
+    for role, value in here.items():
+        yield _judged(f"{role}: lanes apart", mixed[role][back] - value, 0.0, views, "a lane must not look at others")
+        if isinstance(varied, str):
+            yield Check(f"{role}: varied numbers", np.inf, 0.0, False, varied)
+        else:
+            limit = ROUNDINGS * EPS * np.abs(value).max()
+            remedy = "packed() must give n entries where its numbers have n"
+            yield _judged(f"{role}: varied numbers", varied[role] - value, limit, views, remedy)
+    # Weight and restoring moment keep their promise together, not each.
+    if not any(isinstance(bench.term, type(one)) for one in terms.IMPLIED):
+        yield from _axes(bench, here)
+
+
+def _tried(bench: Bench, setting: Setting, views: Views, where: str) -> dict[str, np.ndarray] | str:
+    """What the law gives in another setting; words where packed() fails in it."""
+    return _attempt(lambda: Bank(bench, setting, views).evaluate(views), where)
+
+
+def _attempt(make: Callable[[], Any], where: str) -> Any:
+    """What `make` gives; words where it fails."""
+    try:
+        return make()
+    except Exception as error:
+        return f"packed() fails {where}: {type(error).__name__}: {error}"
+
+
+def _axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
+    """The same wrench from a frame with other axes and origin."""
+    views, other = bench.views, bench.views.elsewhere()
+    there = _tried(bench, bench.setting(bench.parameters, True), other, "in other axes of the body")
+    for role in set(here) & {"law", "damping"}:
+        if isinstance(there, str):
+            yield Check(f"{role}: any axes", np.inf, 0.0, False, there)
+            continue
+        mine, its = _wrench(role, here[role], views), _wrench(role, there[role], other)
+        force = its[:, :3] @ TURN.T
+        torque = its[:, 3:] @ TURN.T + np.cross(ORIGIN, force)
+        difference = np.concatenate([force, torque], axis=1) - mine
+        # Moving the origin and turning add up numbers as large as these.
+        limit = ROUNDINGS * EPS * max(np.abs(here[role]).max(), np.abs(there[role]).max(), np.abs(mine).max()) * 100.0
+        remedy = "turn vectors by setting.frame.vector(), points by .point(), torques by .torque() in packed()"
+        yield _judged(f"{role}: any axes", difference, limit, views, remedy)
+
+
+def _wrench(role: str, value: np.ndarray, views: Views) -> np.ndarray:
+    """(force; torque) (k, 6) of a law, or of a damping matrix at the views' velocities."""
+    if role == "law":
+        return value
+    twist = np.concatenate([views.velocity, views.rate], axis=1)
+    return np.asarray(-np.einsum("kij,kj->ki", value.reshape(-1, 6, 6), twist))
+
+
+class Slope(NamedTuple):
+    """A central difference (k, ...) and how far it may be wrong: by its step, seen at twice the step, and by rounding."""
+
+    value: np.ndarray
+    allowed: np.ndarray
+
+
+def _slope(values: Any, step: float, reach: np.ndarray) -> Slope:
+    """From values(by) at by = +-step, +-2 step. reach (k,): the size of what is stepped in, whose rounding shows."""
+    near, far = [(np.asarray(values(by)), np.asarray(values(-by))) for by in (step, 2.0 * step)]
+    first, second = (near[0] - near[1]) / (2.0 * step), (far[0] - far[1]) / (4.0 * step)
+    size = np.maximum.reduce([np.abs(value) for value in (*near, *far)])
+    rounded = ROUNDINGS * EPS * (size + reach.reshape(-1, *(1,) * (size.ndim - 1)) * np.abs(first)) / step
+    # The error of the step is a third of the difference; where the slope jumps nearby, as much as that.
+    return Slope(first, 2.0 * np.abs(second - first) + rounded)
+
+
+def _potential(bench: Bench, step: float) -> Iterator[Check]:
+    """force = -R^T dU/db, torque = -dU/dR, left-trivialised."""
+    if "law" not in bench.roles or not getattr(bench.module, "POTENTIAL", False):
+        return
+    views, term = bench.views, bench.term
+    reach = np.linalg.norm(views.position, axis=1) + 1.0
+
+    def U(at: Views) -> np.ndarray:
+        value = term.potential(bench.own, at.position[:, None], at.attitude[:, None], bench.parameters)
+        return np.broadcast_to(value, (len(at.position), 1))[:, 0]
+
+    moves, turns = (
+        [_slope(lambda by, f=f, i=i: U(f(i, by)), step, reach) for i in range(3)] for f in (views.moved, views.turned)
+    )
+    R = views.attitude
+    force = -notation.rotate_into(R, np.stack([one.value for one in moves], axis=1))
+    allowed = np.linalg.norm([one.allowed for one in moves], axis=0)
+    torque = -np.stack([one.value for one in turns], axis=1)
+    wrench = bench.at(views)["law"]
+    remedy = "is it the gradient of potential()?"
+    if not np.any(U(views)):
+        remedy = "potential() gives 0 everywhere: write it, or drop POTENTIAL"
+    yield _judged("law: force = -R^T dU/db", wrench[:, :3] - force, allowed, views, remedy)
+    limits = np.stack([one.allowed for one in turns], axis=1)
+    yield _judged("law: torque = -dU/dR", wrench[:, 3:] - torque, limits, views, remedy)
+    if hasattr(bench.module, "energy"):
+        known, told = U(views), bench.at(views)["energy"][:, 0]
+        round_off = 100.0 * ROUNDINGS * EPS * max(np.abs(known).max(), np.abs(told).max())
+        difference = (told - told[0]) - (known - known[0])
+        yield _judged("energy: as potential()", difference, round_off, views, "is it u + U, with u as given?")
+
+
+def _damping(bench: Bench, step: float) -> Iterator[Check]:
+    """nu.D nu >= 0 at the views' velocities, and at those that the D found there would speed up most."""
+    if "damping" not in bench.roles:
+        return
+    views = bench.views
+    D = bench.at(views)["damping"].reshape(-1, 6, 6)
+    weakest = np.linalg.eigh(D + np.swapaxes(D, 1, 2))[1][:, :, 0]
+    tried = [views, *(views.changed(velocity=s * weakest[:, :3], rate=s * weakest[:, 3:]) for s in (1.0, -1.0))]
+    power, allowed, twist = (np.concatenate(x) for x in zip(*(_power(bench, one) for one in tried), strict=True))
+    endless = ~(np.isfinite(power) & np.isfinite(allowed))
+    if endless.any():
+        i = int(endless.argmax())
+        where = f"at velocity {sizes(twist[i, :3])} m/s, rate {sizes(twist[i, 3:])} rad/s"
+        yield Check("damping: power", np.inf, 0.0, False, f"power is not finite {where}; bound D")
+        return
+    i = int((power + allowed).argmin()) if (power + allowed).min() < 0.0 else int(power.argmin())
+    least, limit = float(power[i]), float(allowed[i])
+    where = f"least power {least:.3g} W at velocity {short(twist[i, :3])} m/s, rate {short(twist[i, 3:])} rad/s"
+    if not bench.term.dissipative:
+        yield Check("damping: power", max(0.0, -least), np.inf, True, f"note: {where} (dissipative = False)")
+        return
+    good = bool(np.all(power >= -allowed))
+    text = where if good else f"{where}; D creates energy: write dissipative = False if it may"
+    yield Check("damping: power >= 0", max(0.0, -least), limit, good, text)
+
+
+def _power(bench: Bench, views: Views) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """nu.D nu (k,) [W], what rounding may make of it, and the velocities (k, 6)."""
+    D = bench.at(views)["damping"].reshape(-1, 6, 6)
+    twist = np.concatenate([views.velocity, views.rate], axis=1)
+    power = np.einsum("ki,kij,kj->k", twist, D, twist)
+    return power, ROUNDINGS * EPS * np.einsum("ki,kij,kj->k", np.abs(twist), np.abs(D), np.abs(twist)), twist
+
+
+def _flow(bench: Bench, step: float) -> Iterator[Check]:
+    """du/dt and du/db are the derivatives of u; the host's water() is the same; FLOW says what u does."""
+    if "flow" not in bench.roles or bench.noisy:
+        return
+    views, kind = bench.views, getattr(bench.module, "FLOW", None)
+    found = bench.at(views)["flow"]
+
+    def u(at: Views) -> np.ndarray:
+        return bench.at(at)["flow"][:, :3]
+
+    reach = np.linalg.norm(views.position, axis=1) + 1.0
+    moves = [_slope(lambda by, i=i: u(views.moved(i, by)), step, reach) for i in range(3)]
+    passes = _slope(lambda by: u(views.changed(time=views.time + by)), step, views.time + 1.0)
+    yield _judged("flow: rate = du/dt", found[:, 3:6] - passes.value, passes.allowed, views, "add it to f.rate")
+    for i, name in enumerate(("by_north", "by_east", "by_depth")):
+        got = found[:, 6 + 3 * i : 9 + 3 * i]
+        yield _judged(
+            f"flow: {name} = du/db{i + 1}", got - moves[i].value, moves[i].allowed, views, f"add it to f.{name}"
+        )
+    yield _flow_kind(kind, moves, passes)
+    yield _water(bench, u, sum(reach * np.abs(one.value).max(axis=1) for one in moves))
+
+
+def _water(bench: Bench, u: Callable[[Views], np.ndarray], rounded: np.ndarray) -> Check:
+    """water(), or water_at_start() at t = 0, is what flow() gives. rounded (k,): what a position's rounding moves."""
+    term, views = bench.term, bench.views
+    given = term.water(bench.own, views.position[:, None], views.time, bench.parameters)
+    if given is None and type(term).water_at_start is Term.water_at_start:
+        text = f"write water(own, position, time, parameters) in {type(term).__name__}: start and energy need it"
+        return Check("flow: water()", np.inf, 0.0, False, text)
+    if given is None:
+        views = views.changed(time=0.0 * views.time)
+        host = term.water_at_start(bench.own, views.position, bench.setting(bench.parameters))
+    else:
+        host = given[:, 0]
+    limit = ROUNDINGS * EPS * (max(np.abs(host).max(), 1e-300) + rounded)
+    return _judged("flow: water()", u(views) - host, limit, views, "the host's water() must be what flow() gives")
+
+
+def _flow_kind(kind: Any, moves: list[Slope], passes: Slope) -> Check:
+    """Whether FLOW allows what the velocity does."""
+    varies = any(np.any(np.abs(one.value) > one.allowed) for one in moves)
+    changes = bool(np.any(np.abs(passes.value) > passes.allowed))
+    least = "varying" if varies else "uniform" if changes else "steady"
+    good = kind in FLOWS and FLOWS.index(kind) >= FLOWS.index(least)
+    return Check(
+        "flow: FLOW", float(not good), 0.0, good, f"FLOW = {kind!r}" + ("" if good else f": write FLOW = {least!r}")
+    )

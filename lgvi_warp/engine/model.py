@@ -1,0 +1,282 @@
+"""What a scene needs of a kernel: the laws that act and how each enters, the method's program for them.
+
+Decided once for a run, from what a survey of all members says; their own numbers come later, block by block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.engine.survey import COUPLINGS, SHAPES_OF_MASS, UNCOUPLED, Survey, survey
+from lgvi_warp.methods.method import FORCED, Method, Program, divided, merged, simplified, with_hops
+from lgvi_warp.physics import terms, vehicle
+from lgvi_warp.physics.terms.base import Term
+from lgvi_warp.physics.terms.drag import PARTS, Drag
+from lgvi_warp.scene.ensemble import Ensemble, over_members
+from lgvi_warp.scene.oddities import Oddities
+
+
+@dataclass(frozen=True)
+class Model:
+    """The choices for one run.
+
+    aligned: as Setting's; moved: whether the state's origin is not the user's. laws: (term, module of its device code); drag
+    by its exact flow first where it is used, and `drag` its parts. flow: "none", "steady", "uniform" or "varying".
+    coupling: which of U12, U13, U23 and of the pitches are there. program: sub-maps of one stage. averages: alpha and beta
+    of (15), (16), or None. conservative: no force creates energy, and the potential of all is known to the kernel.
+    steady: forces never change in inertial axes. odd: what the user should know of the members' numbers.
+    """
+
+    method: Method
+    aligned: bool
+    moved: bool
+    laws: tuple[tuple[Term, Any], ...]
+    events: tuple[tuple[Term, Any], ...]
+    mass: str
+    drag: tuple[str, ...]
+    flow: str
+    parts: tuple[str, ...]
+    coupling: tuple[bool, ...]
+    timed: bool
+    memory: bool
+    program: Program
+    lead: tuple[str, float] | None
+    averages: tuple[float, float] | None
+    conservative: bool
+    steady: bool
+    odd: Oddities
+
+
+def make_model(
+    ensemble: Ensemble,
+    method: Method,
+    h: float,
+    laws: Mapping[str, Any],
+    stops: Mapping[str, Any],
+    checked: bool = True,
+) -> Model:
+    """Decide. laws, stops: name -> module of device code. Raises SceneError where a method cannot do what a scene asks.
+
+    checked: whether energy is watched where the scene conserves it or loses it.
+    """
+    seen = survey(ensemble, method, h)
+    explicit = method.tableau is not None
+    acting = _acting(ensemble, seen, laws)
+    events = tuple((one, _module(one, one.device, stops, "distance")) for one in ensemble.scene.events)
+    damping = any(hasattr(module, "damping") for term, module in acting if not isinstance(term, Drag))
+    flow = _flow([module for _, module in acting])
+    drags = [(term, module) for term, module in acting if isinstance(term, Drag)]
+    nonconservative = any(
+        not getattr(module, "POTENTIAL", False) and module is not laws["current"] for _, module in acting
+    )
+    forced = method.base in FORCED and nonconservative
+    if explicit:
+        # Along the kernel's axes drag is six numbers and no matrix.
+        exact = len(drags) == 1 and not seen.bent
+    else:
+        exact = len(drags) == 1 and not damping and flow != "varying" and not forced
+    drag: tuple[str, ...] = ()
+    if exact:
+        term = drags[0][0]
+        assert isinstance(term, Drag)
+        drag = tuple(part for part in PARTS if part in seen.drag)
+        module = laws["drag_directions" if seen.bent else "drag"]
+        acting = [(term, module), *((t, m) for t, m in acting if t is not term)]
+        _check_backward_drag(ensemble, method, term, h)
+    dense = damping or (bool(drags) and not exact) or flow == "varying"
+    memory = any(term.memory for term, _ in acting)
+    _check(method, seen, dense=dense, flow=flow, memory=memory, acting=acting)
+    mass, coupled = SHAPES_OF_MASS[seen.mass], seen.coupled
+    program = FORCED[method.base] if forced else simplified(method.program, mass == "isotropic" and not coupled)
+    if not acting:
+        program = tuple((letter, coefficient) for letter, coefficient in program if letter != "K")
+    if method.turns and coupled:
+        program = with_hops(program)
+    if method.halved and (drag or flow != "none"):
+        program = divided(program)  # then K is symmetric but no flow: one of its own for each half
+    lead, maps = merged(program) if program else (None, ())
+    # A kick that cannot be undone must not be divided between two steps, nor what events look at.
+    undone = all(getattr(module, "POTENTIAL", False) for _, module in acting)
+    if method.two_part:
+        # B joins that of the next step exactly, A as far as its order goes.
+        lead, maps = method.program[0], method.program[1:]
+        if events:
+            lead, maps = None, method.program
+    elif events or (lead is not None and lead[0] == "K" and not undone):
+        lead, maps = None, program
+    conservative = checked and _conservative(seen, acting, laws)
+    # Events, water and the potential are where the user or the forces have their origin.
+    elsewhere = bool(events) or flow != "none" or (conservative and seen.apart)
+    asked = {"rates": explicit,
+             "turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
+             "modified": method.two_part, "dense": dense, "water": flow in ("uniform", "varying"),
+             "origin": bool(elsewhere and (seen.moved or seen.forces_moved))}  # fmt: skip
+    return Model(
+        method=method,
+        aligned=not seen.turned,
+        moved=seen.moved,
+        laws=tuple(acting),
+        events=events,
+        mass="full" if coupled and mass == "isotropic" else mass,
+        drag=drag,
+        flow=flow,
+        parts=tuple(name for name, wanted in asked.items() if wanted),
+        coupling=tuple(i in seen.couplings for i in range(len(COUPLINGS))),
+        timed=any(one.timed for one, _ in (*acting, *events)),
+        memory=memory or method.gauss > 0,
+        program=maps,
+        lead=lead,
+        averages=(method.alpha, method.beta) if forced else None,
+        conservative=conservative,
+        odd=seen.odd,
+        steady=not drag and flow in ("none", "steady") and all(_steady(module) for _, module in acting),
+    )
+
+
+def _steady(module: Any) -> bool:
+    """Whether what a law pushes with never changes in inertial axes."""
+    return hasattr(module, "steady_force") or not any(hasattr(module, role) for role in ("law", "damping", "evolve"))
+
+
+def _conservative(seen: Survey, acting: list[tuple[Term, Any]], laws: Mapping[str, Any]) -> bool:
+    """Whether no law creates energy, kinetic energy relative to the water, and each potential's device code tells it."""
+    tethered = any(module is laws["tether"] for _, module in acting)
+    for term, module in acting:
+        if module is laws["current"]:
+            # A uniform current carries the vehicle past an anchor, or along the vertical that weight acts on.
+            passive = not tethered and term.key not in seen.rising
+        else:
+            dissipates = term.dissipative or not hasattr(module, "damping")
+            bounded = hasattr(module, "supply") or hasattr(module, "push")
+            told = getattr(module, "POTENTIAL", False) and hasattr(module, "energy") and bounded
+            passive = not hasattr(module, "flow") and dissipates and (told or not hasattr(module, "law"))
+        if not passive:
+            return False
+    return True
+
+
+# A stage that goes backward speeds a damped vehicle up, and at a drag number of 1 without end.
+MOST_BACKWARD_DRAG = 0.5
+
+
+def _check_backward_drag(ensemble: Ensemble, method: Method, term: Drag, h: float) -> None:
+    """Refuse drag that is too strong for the stages of a composition that go backward, by the members' starts."""
+    back = -h * min(0.0, *method.stages)
+    if back == 0.0:
+        return
+
+    def largest(first: int, stop: int) -> float:
+        members = ensemble.select(first, stop)
+        own = ensemble.own(term, members.parameters)
+        speeds = np.abs(np.concatenate([members.velocity, members.angular_velocity], axis=1))
+        # What an axis of the user's gives way with to a force along it, the other axes free.
+        mobilities = np.einsum("nii->ni", np.linalg.inv(vehicle.inertia6(members.parameters)))
+        return float((back * (own["linear"] + own["quadratic"] * speeds) * mobilities).max())
+
+    number = max(over_members(largest, ensemble.members))
+    if number > MOST_BACKWARD_DRAG:
+        faults = Faults()
+        what = f"goes backward by {back:.3g} s, where {term.key} has a drag number up to {number:.3g}"
+        remedy = f"use {method.base}, or a step {number / MOST_BACKWARD_DRAG:.2g} times shorter"
+        faults.add("method", method.name, what, remedy)
+        faults.raise_if_any()
+
+
+def _module(term: Term, device: Any, known: Mapping[str, Any], *roles: str) -> Any:
+    """The device code of a term. Raises SceneError where it lacks what it must have."""
+    module = known.get(device) if isinstance(device, str) else device
+    faults = Faults()
+    if module is None:
+        faults.add(f"{term.key}.device", device, "is not known", "give a module, or the name of a built-in one")
+    elif not callable(getattr(module, "params", None)):
+        faults.add(f"{term.key}.device", module, "has no params(width, real)", "see docs/add_a_law.md")
+    elif not any(hasattr(module, role) for role in roles):
+        faults.add(f"{term.key}.device", module, f"has none of {', '.join(roles)}", "see docs/add_a_law.md")
+    else:
+        for role in roles:
+            _check_signature(faults, term, module, role)
+        flow = getattr(module, "FLOW", "none")
+        if flow not in FLOWS:
+            faults.add(f"{term.key}.FLOW", flow, "is not known", closest(str(flow), FLOWS))
+    faults.raise_if_any()
+    return module
+
+
+def _check_signature(faults: Faults, term: Term, module: Any, role: str) -> None:
+    """A law must be a Warp function of the arguments that it is called with."""
+    function = getattr(module, role, None)
+    if function is None:
+        return
+    wanted = 2 if role == "distance" else 3
+    names = list(getattr(function, "input_types", {}))
+    if not names:
+        faults.add(f"{term.key}.{role}", function, "is not a Warp function", "decorate it with @wp.func")
+    elif len(names) != wanted:
+        given = "(view, p)" if wanted == 2 else "(w, view, p)"
+        faults.add(
+            f"{term.key}.{role}", f"({', '.join(names)})", f"takes {len(names)} arguments", f"write {role}{given}"
+        )
+
+
+ROLES = ("law", "damping", "flow", "evolve")
+# How water may move, the least first.
+FLOWS = ("none", "steady", "uniform", "varying")
+
+
+def _acting(ensemble: Ensemble, seen: Survey, laws: Mapping[str, Any]) -> list[tuple[Term, Any]]:
+    """The terms that some member feels, with their device code, in a fixed order."""
+    acting = [(term, laws[term.device]) for term in terms.IMPLIED]
+    acting += [(term, _module(term, term.device_in(not seen.turned), laws, *ROLES)) for term in ensemble.scene.terms]
+    return [(term, module) for term, module in acting if term.key in seen.felt]
+
+
+def _flow(modules: list[Any]) -> str:
+    """How the water moves, by the law that says most."""
+    return max((getattr(module, "FLOW", "none") for module in modules), key=FLOWS.index, default="none")
+
+
+def _check(
+    method: Method,
+    seen: Survey,
+    *,
+    dense: bool,
+    flow: str,
+    memory: bool,
+    acting: list[tuple[Term, Any]],
+) -> None:
+    """Refuse what a method cannot do, with the reason."""
+    faults = Faults()
+    if seen.left > UNCOUPLED:
+        k = f"coupling norm up to {seen.left:.3g} at the best origin"
+        remedy = "use psi_x, psi_x8 or psi_w, which take any 6x6 inertia"
+        faults.add("method", method.name, f"cannot couple velocities and rates ({k})", remedy)
+    composed = len(method.stages) > 1
+    noisy = any(getattr(module, "NOISE", False) for _, module in acting)
+    if composed and not method.two_part and (dense or flow in ("uniform", "varying") or memory or noisy):
+        what = "a damping matrix" if dense else "water that varies" if flow != "none" else "a term that remembers"
+        faults.add("method", method.name, f"keeps its order only for maps that undo themselves, which {what} does not",
+                   f"use {method.base}")  # fmt: skip
+    for term, module in acting:
+        if method.two_part and not getattr(module, "SEPARABLE", False):
+            faults.add("method", method.name, f"wants potentials of position plus such of attitude, which {term.key} is not",
+                       "use ss6_13(psi_x), or bm6(psi_x)")  # fmt: skip
+        if method.gauss and ("law" not in (roles := [role for role in ROLES if hasattr(module, role)]) or len(roles) > 1
+                             or isinstance(term, Drag) or getattr(module, "NOISE", False)):  # fmt: skip
+            faults.add(
+                "method", method.name, f"takes forces of position and time only, which {term.key} is not", "use psi_s"
+            )
+    if method.tableau and (memory or noisy):
+        why = "noise, which has no rate" if noisy else "a term that remembers, which is kept once a step"
+        faults.add("method", method.name, f"cannot advance {why}", "use psi_s, psi_x or psi_w")
+    kicks = sum(letter in ("K", "Phi", "Phi*") for letter, _ in method.program)
+    if noisy and not composed and not method.tableau and kicks != 1:
+        faults.add("method", method.name, "would draw noise more than once a step", "use psi_s, psi_x or psi_w")
+    if flow in ("uniform", "varying") and seen.weightless and seen.buoyant:
+        faults.add("environment.gravity", 0.0, "leaves the displaced mass unknown, which water that accelerates pushes",
+                   "give gravity, or buoyancy = 0")  # fmt: skip
+    faults.raise_if_any()

@@ -1,0 +1,33 @@
+"""To be said in one sentence."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from lgvi_warp.common.machine import default_width
+
+
+def fma_peak(dtype: str = "float64", width: int | None = None, rounds: int = 5, loops: int = 1_000_000) -> float:
+    """Fused multiply-adds per second of one core [1/s], the best of several rounds of a loop of nothing else."""
+    import warp as wp
+
+    from lgvi_kernels.peak import CHAINS, make_peak
+    from lgvi_warp.common import warp_setup
+    from lgvi_warp.engine import kernel_cache
+
+    warp_setup.start()
+    real = wp.float64 if dtype == "float64" else wp.float32
+    width = width or default_width(dtype)
+    kernel, Lane = make_peak(width, real)
+    values = np.full((CHAINS + 3, width), 0.5, dtype=dtype)
+    data = wp.array(values, dtype=Lane, device="cpu")
+    kernel_cache.load(kernel.module)
+    command = wp.launch(kernel, dim=1, inputs=[data, loops], device="cpu", record_cmd=True)
+    best = 0.0
+    for _ in range(rounds):
+        start = time.perf_counter()
+        command.launch()
+        best = max(best, CHAINS * width * loops / (time.perf_counter() - start))
+    return best

@@ -1,0 +1,143 @@
+"""To be said in one sentence."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from lgvi_warp.common.status import Warnings
+from lgvi_warp.methods.limits import MUNK, RESTORING, longest_stage, oscillation_limit, rotation_limit
+from lgvi_warp.methods.method import Method
+from lgvi_warp.methods.saveat import TimeGrid
+from lgvi_warp.physics.inertia import Frame
+from lgvi_warp.physics.terms import hydrostatics
+
+if TYPE_CHECKING:
+    from lgvi_warp.sampling.members import Members
+
+
+class Watched(Protocol):
+    """What is asked of a plan: see Plan, which has it."""
+
+    @property
+    def method(self) -> Method:
+        """The method."""
+
+    @property
+    def grid(self) -> TimeGrid:
+        """Steps and samples."""
+
+    @property
+    def dtype(self) -> str:
+        """Of the kernel."""
+
+    @property
+    def model(self) -> Any:
+        """What the kernel contains."""
+
+    @property
+    def spec(self) -> Any:
+        """What decides the kernel's code."""
+
+
+# h w beyond which an oscillation is coarsely resolved, in the longest stage.
+COARSE = 0.5
+
+
+# Largest h (l + 2 q|v|) / I of drag that is treated explicitly.
+DRAG_NUMBER = 1.0
+
+
+# Least part of a step's way that the spacing of numbers at the position may be.
+PRECISION = 0.05
+
+
+ORTHOGONAL = {"float64": 1e-10, "float32": 1e-4}
+
+
+# The same of methods whose R leaves the rotations by their error: there it says no more than that.
+ORTHOGONAL_TO_ERROR = 1e-3
+
+
+# Energy created over what there was to exchange.
+ENERGY = 0.5
+
+
+def watched(plan: Watched) -> tuple[str, ...]:
+    """The rows of lgvi_kernels.monitor that a run with checks="all" looks at: those that its method and scene can cross."""
+    method, model = plan.method, plan.model
+    rows = ["precision"] * (plan.dtype == "float32") + ["orthogonality"]
+    if not method.adaptive:
+        munk = model.mass != "isotropic"
+        dragged = bool(model.drag) or any(hasattr(module, "damping") for _, module in model.laws)
+        rows += ["munk_coarse"] * munk
+        rows += ["rotation"] * (method.turns or method.tableau is not None)
+        rows += ["drag"] * (dragged and (method.tableau is not None or model.averages is not None))
+        rows += ["munk_unstable"] * munk
+    return (*rows, *["energy"] * model.conservative)
+
+
+def orthogonality_limit(plan: Watched) -> float:
+    """Of |R^T R - I|."""
+    if plan.spec.explicit is not None and plan.spec.explicit.kind in ("vector", "inertial"):
+        return ORTHOGONAL_TO_ERROR
+    return ORTHOGONAL["float64" if plan.dtype == "float64" else "float32"]
+
+
+def row_limits(plan: Watched) -> dict[str, float]:
+    """The limit of each row that is watched."""
+    method = plan.method
+    known = {
+        "precision": PRECISION,
+        "orthogonality": orthogonality_limit(plan),
+        "munk_coarse": COARSE / longest_stage(method),
+        "rotation": rotation_limit(method),
+        "drag": DRAG_NUMBER,
+        "munk_unstable": oscillation_limit(method, MUNK),
+        "energy": ENERGY,
+    }
+    return {row: known[row] for row in plan.spec.looks}
+
+
+def munk_factor(frame: Frame) -> np.ndarray:
+    """(1 or n,) [1/(kg^2 m^2)]: w^2 of the Munk moment's fastest oscillation, per |p|^2."""
+    M = np.linalg.eigvalsh(frame.M) if np.any(frame.M[:, ~np.eye(3, dtype=bool)]) else np.einsum("nii->ni", frame.M)
+    return np.asarray((1.0 / M.min(axis=1) - 1.0 / M.max(axis=1)) / frame.J.min(axis=1))
+
+
+def at_start(plan: Watched, members: Members, frame: Frame, momentum: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(bits, value) of every member (m,): warnings that its numbers and its start give, and the most serious one's value.
+
+    momentum: (m, 3) [N s], linear, relative to the water.
+    """
+    m, h, method = members.count, plan.grid.h, plan.method
+    bits, value = np.zeros(m, np.uint16), np.full(m, np.nan)
+
+    def note(warning: Warnings, size: Any, limit: float) -> None:
+        over = np.broadcast_to(np.asarray(size) > limit, m)
+        bits[over] |= np.uint16(warning)
+        value[over] = np.broadcast_to(size, m)[over]
+
+    small, middle, large = np.sort(frame.J, axis=1).T
+    note(Warnings.INERTIA, large / (small + middle), 1.0 + 1e-9)
+    if plan.dtype != "float32_compensated":
+        way, place = h * _size(members.velocity), np.finfo(plan.dtype).eps * _size(members.position)
+        note(Warnings.PRECISION_LOSS, np.divide(place, way, out=np.zeros(m), where=way > 0.0), PRECISION)
+    if method.adaptive:
+        return bits, value
+    coarse = COARSE / longest_stage(method)
+    munk = h * np.sqrt(munk_factor(frame)) * _size(momentum)
+    arm = hydrostatics.moment(members.parameters) + hydrostatics.net(members.parameters)[:, None] * frame.forces
+    swing = h * np.sqrt(_size(arm) / frame.J.min(axis=1))
+    note(Warnings.MUNK_COARSE, munk, coarse)
+    note(Warnings.RESTORING_COARSE, swing, coarse)
+    note(Warnings.ROTATION, h * _size(members.angular_velocity), rotation_limit(method))
+    note(Warnings.MUNK_UNSTABLE, munk, oscillation_limit(method, MUNK))
+    note(Warnings.RESTORING_UNSTABLE, swing, oscillation_limit(method, RESTORING))
+    return bits, value
+
+
+def _size(vectors: np.ndarray) -> np.ndarray:
+    """Lengths of (n, 3)."""
+    return np.sqrt(np.einsum("ni,ni->n", vectors, vectors))

@@ -1,0 +1,417 @@
+"""Methods as data: a program of sub-maps with coefficients, composed with itself by stage coefficients.
+
+Sub-maps (mathematics in the README's table): T and K the flows of kinetic energy p.M^-1 p / 2 and of the potential, D the
+discrete Moser-Veselov rotation of equation (24), Ab and Ap the two halves of T. The leftmost is applied first.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.methods.tableaux import CG3, DOP853, DOPRI5, RK4, Tableau
+
+Program = tuple[tuple[str, float], ...]
+
+# Phi: (10)-(14), Phi*: (19)-(23), Psi_h = Phi*_{h/2} after Phi_{h/2}, all of Nordkvist & Sanyal 2010 (conservative scenes).
+# Psi's two Ap(h/2) meet in the middle and act as one, since Ap changes neither p nor R.
+# psi_s, psi_1: symmetric splittings into symplectic flows, with two and with one solve of equation (24).
+PROGRAMS: dict[str, Program] = {
+    "phi": (("Ab", 1.0), ("D", 1.0), ("K", 1.0), ("Ap", 1.0)),
+    "phi_adjoint": (("Ap", 1.0), ("K", 1.0), ("D", 1.0), ("Ab", 1.0)),
+    "psi": (("Ab", 0.5), ("D", 0.5), ("K", 0.5), ("Ap", 1.0), ("K", 0.5), ("D", 0.5), ("Ab", 0.5)),
+    "psi_s": (("T", 0.5), ("D", 0.5), ("K", 1.0), ("D", 0.5), ("T", 0.5)),
+    "psi_1": (("K", 0.5), ("T", 0.5), ("D", 1.0), ("T", 0.5), ("K", 0.5)),
+    # Turns about the axes instead of D, which solves no equation; R2 twice as often for slender bodies (psi_x8).
+    "psi_x": (("T", 0.5), ("R1", 0.5), ("R2", 0.5), ("R3", 0.5), ("K", 1.0), ("R3", 0.5), ("R2", 0.5), ("R1", 0.5),
+              ("T", 0.5)),
+    "psi_x8": (("T", 0.5), ("R1", 0.5), ("R2", 0.25), ("R3", 0.5), ("R2", 0.25), ("K", 1.0), ("R2", 0.25), ("R3", 0.5),
+               ("R2", 0.25), ("R1", 0.5), ("T", 0.5)),
+    # The coupled Moser-Veselov rotation W: as D, for M and J coupled.
+    "psi_w": (("T", 0.5), ("W", 0.5), ("K", 1.0), ("W", 0.5), ("T", 0.5)),
+}  # fmt: skip
+# With nonconservative forces the paper's own maps, whole: equations (15), (16).
+FORCED: dict[str, Program] = {
+    "phi": (("Phi", 1.0),),
+    "phi_adjoint": (("Phi*", 1.0),),
+    "psi": (("Phi", 0.5), ("Phi*", 0.5)),
+}
+# Explicit methods, which know no sub-maps. KINDS: those that keep R on the group (see lgvi_kernels.explicit).
+EXPLICIT: dict[str, Tableau] = {"rk4": RK4, "rk5": DOPRI5, "rk8": DOP853, "cg3": CG3, "rkmk4": RK4}
+KINDS = {"cg3": "group", "rkmk4": "munthe_kaas"}
+ORDERS = {"phi": 1, "phi_adjoint": 1, "psi": 2, "psi_s": 2, "psi_1": 2, "psi_x": 2, "psi_x8": 2, "psi_w": 2} | {
+    name: tableau.order for name, tableau in EXPLICIT.items()
+}
+
+# Two-part splittings: A = free rotation (modified Moser-Veselov, order 8) and the kick of U_b(b), B = T and the kick of
+# U_R(R). Blanes & Moan (2002), J. Comput. Appl. Math. 142, 313, table 3: SRKN_6^b, SRKN_11^b, SRKN_14^a, whose printed
+# coefficients are given here: name -> (order, first part, half of the palindrome without its last number of each part).
+TWO_PART: dict[str, tuple[int, str, tuple[float, ...]]] = {
+    "rkn4_6": (
+        4, "B",
+        (0.0829844064174052, 0.245298957184271, 0.396309801498368, 0.604872665711080, -0.0390563049223486),
+    ),
+    "rkn6_11": (
+        6, "B",
+        (0.0414649985182624, 0.123229775946271, 0.198128671918067, 0.290553797799558, -0.0400061921041533,
+         -0.127049212625417, 0.0752539843015807, -0.246331761062075, -0.0115113874206879, 0.357208872795928),
+    ),
+    "rkn6_14": (
+        6, "A",
+        (0.03785931984061157, 0.09171915262446165, 0.102635633102435, 0.183983170005006, -0.02586788826655869,
+         -0.05653436583288827, 0.314241403071447, 0.004914688774712854, -0.130144459517415, 0.143761127168358,
+         0.106417700369543, 0.328567693746804, -0.008794243128510581),
+    ),
+}  # fmt: skip
+PARTS: dict[str, Program] = {"A": (("A", 1.0), ("B", 1.0)), "B": (("B", 1.0), ("A", 1.0))}
+
+# Gauss collocation, which solves for all of the state at once: name -> stages; the order is twice as many.
+GAUSS = {"gauss4": 2, "gauss6": 3, "gauss8": 4, "gauss10": 5, "gauss12": 6}
+
+# One sub-map of the letter may be divided in two, or two joined: each is the flow of something.
+FLOWS = ("T", "K", "Ab", "Ap")
+
+SOLVERS = ("quartic", "cayley", "newton", "moser_veselov")
+
+
+def _palindrome(*outer: float) -> tuple[float, ...]:
+    return (*outer, 1.0 - 2.0 * sum(outer), *reversed(outer))
+
+
+_G3 = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))
+_G5 = 1.0 / (4.0 - 4.0 ** (1.0 / 3.0))
+
+# name -> (order, stage coefficients), for a symmetric base of order 2. Hairer, Lubich & Wanner, Geometric Numerical
+# Integration, 2nd ed., II.4 (triple jump, Suzuki) and V.3.2 (Kahan & Li 1997). yo6: Yoshida (1990), Phys. Lett. A 150,
+# 262, solution A. su8_15: Suzuki & Umeno (1993), the coefficients of McLachlan (1995), SIAM J. Sci. Comput. 16, 151.
+# ss*: Sofroniou & Spaletta (2005), Optim. Methods Softw. 20, 597.
+COMPOSITIONS: dict[str, tuple[int, tuple[float, ...]]] = {
+    "tj4": (4, _palindrome(_G3)),
+    "su4": (4, _palindrome(_G5, _G5)),
+    "kl6": (
+        6,
+        _palindrome(0.39216144400731413928, 0.33259913678935943860, -0.70624617255763935981, 0.08221359629355080023),
+    ),
+    "kl8": (
+        8,
+        _palindrome(
+            0.13020248308889008088,
+            0.56116298177510838456,
+            -0.38947496264484728641,
+            0.15884190655515560090,
+            -0.39590389413323757734,
+            0.18453964097831570709,
+            0.25837438768632204729,
+            0.29501172360931029887,
+        ),
+    ),
+    "yo6": (6, _palindrome(0.78451361047755726381949763, 0.23557321335935813368479318, -1.17767998417887100694641568)),
+    "ss6_11": (
+        6,
+        _palindrome(
+            0.21375583945878254555518066964857,
+            0.18329381407425713911385974425217,
+            0.17692819473098943794898811709929,
+            -0.44329082681170215849622829626258,
+            0.11728560432865935385403585669136,
+        ),
+    ),
+    "ss6_13": (
+        6,
+        _palindrome(
+            0.13861930854051695245808013042625,
+            0.13346562851074760407046858832209,
+            0.13070531011449225190542755785015,
+            0.12961893756907034772505366537091,
+            -0.35000324893920896516170830911323,
+            0.11805530653002387170273438954049,
+        ),
+    ),
+    "su8_15": (
+        8,
+        _palindrome(
+            0.74167036435061295344822780,
+            -0.40910082580003159399730010,
+            0.19075471029623837995387626,
+            -0.57386247111608226665638773,
+            0.29906418130365592384446354,
+            0.33462491824529818378495798,
+            0.31529309239676659663205666,
+        ),
+    ),
+    "ss8_21": (
+        8,
+        _palindrome(
+            0.10647728984550031823931967854896,
+            0.10837408645835726397433410591546,
+            0.35337821052654342419534541324080,
+            -0.23341414023165082198780281128319,
+            -0.24445266791528841269462171413216,
+            0.11317848435755633314700952515599,
+            0.11892905625000350062692972283951,
+            0.12603912321825988140305670268365,
+            0.12581718736176041804392391641587,
+            0.11699135019217642180722881433533,
+        ),
+    ),
+}
+
+# name -> (order, first half of a palindrome a_1, a_2, ...). A base Psi_h = chi*_{h/2} after chi_{h/2} gives way to its
+# halves: chi over a_1 h, its adjoint chi* over a_2 h, chi over a_3 h, ... Blanes & Moan (2002), table 2: S_6 and S_10.
+HALVES: dict[str, tuple[int, tuple[float, ...]]] = {
+    "bm4": (
+        4,
+        (0.0792036964311957, 0.1303114101821663, 0.2228614958676077, -0.3667132690474257, 0.3246481886897062,
+         0.1096884778767498),
+    ),
+    "bm6": (
+        6,
+        (0.0502627644003922, 0.0985536835006498, 0.3149606169276942, -0.4473464826954782, 0.4924263724898759,
+         -0.4251187677976909, 0.2370639139781219, 0.1956024886000531, 0.3463581898507269, -0.3627627792543449),
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method by name, and how equation (24) is solved inside it.
+
+    name: "phi", "phi_adjoint", "psi" (the paper's), "psi_s" (default), "psi_1", or a composition of a symmetric one:
+    "tj4(psi_s)", "su4(psi_s)", "kl6(psi_1)", "kl8(psi_s)", ...; "bm4(psi_x)", "bm6(psi_x)" of its two halves;
+    "rkn4_6", "rkn6_11", "rkn6_14" of two parts, for weight and restoring moment; "gauss4" to "gauss12", Gauss collocation
+    with a fixed-point iteration to the tolerance, or of so many iterations, for forces of position and time.
+    solver: "quartic" (default), "cayley", "newton" (the paper's, on the exponential map) or "moser_veselov" (explicit).
+    iterations: Newton steps of every solve, a whole number >= 0; None iterates each vehicle to the tolerance; "auto" finds
+    out, before the run, how many serve every member's start at twice the step, and makes so many (a solve that needed
+    more later on gives its member the status NOT_CONVERGED).
+    alpha, beta: weight of the old configuration in the averages of equations (15) and (16), 0 to 1, for nonconservative
+    forces and torques in phi, phi_adjoint and psi (their conservative forces, and the other methods, have no such choice).
+    The name may also be of an explicit method: "rk4", "rk5" (Dormand & Prince), "rk8" (DOP853's), with R as two rows, or
+    on the rotation group "cg3" (Crouch & Grossman) and "rkmk4" (Munthe-Kaas).
+    rtol, atol: with both, rk5 and rk8 choose their steps: the error estimated for each step stays below
+    atol + rtol |y| (in the mean square over y = (b, R, p, pi), momenta divided by the largest J). The worst vehicle of a
+    packet decides for it. h then is the longest step: where samples, events and statuses may be.
+    tolerance: relative residual of equation (24) above which a solve is not converged (default 1e-14 in float64 and
+    1e-6 in float32 when iterating to it; 1e-12 and 1e-5 for a fixed number of iterations).
+
+    Raises SceneError (a ValueError) naming every fault.
+    """
+
+    name: str = "psi_s"
+    solver: str = "quartic"
+    iterations: int | str | None = None
+    tolerance: float | None = None
+    alpha: float = 0.5
+    beta: float = 0.5
+    rtol: float | None = None
+    atol: float | None = None
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        base, composition = self._split()
+        faults.choice("method", base, PROGRAMS | EXPLICIT | TWO_PART | GAUSS)
+        if composition is not None:
+            faults.choice("method composition", composition, COMPOSITIONS | HALVES)
+            if ORDERS.get(base) == 1 or base in EXPLICIT:
+                faults.add("method", self.name, "is a composition of a method that is not symmetric", "compose psi_s")
+            elif base in TWO_PART or base in GAUSS:
+                faults.add("method", self.name, "composes what is not of order 2", f"use {base}, or compose psi_s")
+            elif composition in HALVES and base in PROGRAMS and not divisible(PROGRAMS[base]):
+                middle = PROGRAMS[base][len(PROGRAMS[base]) // 2][0]
+                faults.add("method", self.name, f"would divide {middle}, the middle of {base}, which is no flow",
+                           f"use {composition}(psi_s)")  # fmt: skip
+        faults.choice("solver", self.solver, SOLVERS)
+        n = self.iterations
+        if n not in (None, "auto") and (isinstance(n, bool) or not isinstance(n, int) or not 0 <= n <= 100):
+            remedy = 'give one, "auto", or None for the tolerance'
+            faults.add("iterations", n, "is not a whole number from 0 to 100", remedy)
+        for name in ("alpha", "beta"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1.0:
+                faults.add(name, value, "is not a number from 0 to 1", "give the weight of the old configuration")
+        if self.tolerance is not None and not 0.0 < self.tolerance < 1.0:
+            faults.add("tolerance", self.tolerance, "is not between 0 and 1", "give a relative residual such as 1e-12")
+        self._check_steps(faults)
+        faults.raise_if_any()
+
+    def _check_steps(self, faults: Faults) -> None:
+        """Both tolerances or none, and only for a method that estimates its error."""
+        given = {name: value for name in ("rtol", "atol") if (value := getattr(self, name)) is not None}
+        for name, value in given.items():
+            if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < 1.0:
+                faults.add(name, value, "is not between 0 and 1", "give a tolerance such as 1e-9")
+        if len(given) == 1:
+            faults.add(*given.popitem(), "has no counterpart", "give both rtol and atol, or none for a fixed step")
+        elif given and self.name in ORDERS and not (self.tableau and self.tableau.errors):
+            able = " or ".join(name for name, tableau in EXPLICIT.items() if tableau.errors)
+            faults.add("rtol, atol", self.name, "estimates no error", f"use {able}, or leave them out")
+
+    def _split(self) -> tuple[str, str | None]:
+        match = re.fullmatch(r"(\w+)\((\w+)\)", str(self.name))
+        return (match[2], match[1]) if match else (str(self.name), None)
+
+    @property
+    def base(self) -> str:
+        """The method that is composed, or that this is."""
+        return self._split()[0]
+
+    @property
+    def program(self) -> Program:
+        """The sub-maps of one stage, the first applied first."""
+        if self.gauss:
+            return (("G", 1.0),)
+        return PARTS[TWO_PART[self.base][1]] if self.two_part else PROGRAMS.get(self.base, ())
+
+    @property
+    def two_part(self) -> bool:
+        """Whether it splits into the parts A and B."""
+        return self.base in TWO_PART
+
+    @property
+    def gauss(self) -> int:
+        """Stages of Gauss collocation; 0 for other methods."""
+        return GAUSS.get(self.base, 0)
+
+    @property
+    def halved(self) -> bool:
+        """Whether each stage is two halves of different length."""
+        return self._split()[1] in HALVES
+
+    @property
+    def tableau(self) -> Tableau | None:
+        """The numbers of an explicit method."""
+        return EXPLICIT.get(self.name)
+
+    @property
+    def adaptive(self) -> bool:
+        """Whether each packet chooses its steps."""
+        return self.rtol is not None
+
+    @property
+    def turns(self) -> bool:
+        """Whether it turns about the axes one after the other, instead of solving equation (24)."""
+        return any(letter[0] == "R" for letter, _ in self.program)
+
+    @property
+    def stages(self) -> tuple[float, ...]:
+        """The stage coefficients g_i: one step is the program with g_1 h, then with g_2 h, ...
+
+        Of two halves, or of two parts, these are the numbers of both in turn.
+        """
+        composition = self._split()[1]
+        if self.two_part:
+            return palindrome_of_parts(TWO_PART[self.base][2])
+        if composition is None:
+            return (1.0,)
+        if composition in HALVES:
+            half = HALVES[composition][1]
+            return (*half, *reversed(half))
+        return COMPOSITIONS[composition][1]
+
+    def lengths(self, lead: float | None) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """What the stages are given, and the lead after each of them and, at the end, before the first; in steps.
+
+        lead: the coefficient of the lead, or None without one. Halves and parts have two lengths a stage; where one of
+        two parts leads, the stages have the other's. Psi_h is its halves over h/2: a half over a is told as 2 a.
+        """
+        c, g = lead or 0.0, self.stages
+        if self.two_part:
+            # From `first` in turn, and back to it: its last number has no other after it.
+            first, second = g[0::2], g[1::2]
+            if lead is None:
+                return (*g, 0.0), (0.0,) * (len(first) + 1)
+            return second, (*first[1:-1], first[-1] + first[0], first[0])
+        if self.halved:
+            doubled = tuple(2.0 * a for a in g)
+            first, second = doubled[0::2], doubled[1::2]
+        else:
+            doubled, first, second = g, g, g
+        following = (*first[1:], first[0])
+        return doubled, (*(c * (b + a) for b, a in zip(second, following, strict=True)), c * first[0])
+
+    @property
+    def order(self) -> int:
+        """Order of convergence."""
+        base, composition = self._split()
+        if self.two_part:
+            return TWO_PART[base][0]
+        if self.gauss:
+            return 2 * self.gauss
+        return ORDERS[base] if composition is None else (COMPOSITIONS | HALVES)[composition][0]
+
+    def force_tolerance(self, dtype: str) -> float:
+        """Relative change of the momenta below which the iteration for the forces of Phi* has settled."""
+        return 1e-14 if dtype == "float64" else 1e-6
+
+    def tolerances(self, dtype: str) -> tuple[float, float]:
+        """The two tolerances that a kernel gets: of (24) and of the forces of Phi*, or rtol and atol of the steps."""
+        if self.rtol is not None and self.atol is not None:
+            return self.rtol, self.atol
+        return self.residual_tolerance(dtype), self.force_tolerance(dtype)
+
+    def residual_tolerance(self, dtype: str) -> float:
+        """The tolerance in force for this dtype."""
+        if self.tolerance is not None:
+            return self.tolerance
+        if self.iterations is None:
+            return 1e-14 if dtype == "float64" else 1e-6
+        return 1e-12 if dtype == "float64" else 1e-5
+
+
+def merged(program: Program) -> tuple[tuple[str, float] | None, Program]:
+    """(lead, maps): a flow that both opens and closes the program joins that of the next step; lead is its half."""
+    first, last = program[0], program[-1]
+    if len(program) > 1 and first == last and first[0] in FLOWS:
+        return first, program[1:-1]
+    return None, program
+
+
+def palindrome_of_parts(printed: tuple[float, ...]) -> tuple[float, ...]:
+    """All numbers of two parts in turn, from the printed ones: those of each part sum to one, which gives the last two."""
+    c, n = list(printed), len(printed)
+    c.append(0.5 - sum(c[n % 2 :: 2]))
+    c.append(1.0 - 2.0 * sum(c[(n + 1) % 2 :: 2]))
+    return (*c, *reversed(c[:-1]))
+
+
+def divisible(program: Program) -> bool:
+    """Whether a symmetric program is a map and its adjoint: its middle, if it has one, is a flow."""
+    return len(program) % 2 == 0 or program[len(program) // 2][0] in FLOWS
+
+
+def divided(program: Program) -> Program:
+    """With two halves of the middle in its place, where it is symmetric but no flow."""
+    n = len(program) // 2
+    if len(program) % 2 == 0:
+        return program
+    letter, c = program[n]
+    return (*program[:n], (letter, 0.5 * c), (letter, 0.5 * c), *program[n + 1 :])
+
+
+def with_hops(program: Program) -> Program:
+    """With the hops between the origins of the axes, where inertia is coupled: each turn is about its own."""
+    hopped: list[tuple[str, float]] = []
+    here = 1
+    for letter, coefficient in program:
+        if letter[0] == "R":
+            there = int(letter[1])
+            while here != there:
+                step = 1 if there > here else -1
+                hopped.append((f"h{here}{here + step}", 1.0))
+                here += step
+        hopped.append((letter, coefficient))
+    return tuple(hopped)
+
+
+def middle_axis(program: Program) -> int:
+    """The axis (1 to 3) at whose origin a program of turns kicks: that of the turn before K."""
+    letters = [letter for letter, _ in program]
+    return int(letters[letters.index("K") - 1][1])
+
+
+def simplified(program: Program, isotropic: bool) -> Program:
+    """Without the Munk moment when M = m I: it is zero, and computing it would be pure round-off torque."""
+    if not isotropic:
+        return program
+    return tuple(("Ab" if letter == "T" else letter, c) for letter, c in program if letter != "Ap")

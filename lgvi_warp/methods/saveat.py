@@ -1,0 +1,117 @@
+"""When to keep a sample, and the uniform grid of steps that meets every such time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+
+FIELDS = ("position", "attitude", "velocity", "angular_velocity")
+
+# A step more than this many times shorter than the one asked for is refused, not silently taken.
+MOST_SHORTENING = 20
+# Samples that a run keeps at most: of one member they are 1.4 GB.
+MOST_SAMPLES = 10_000_000
+
+
+@dataclass(frozen=True)
+class SaveAt:
+    """Which samples to keep: every so many seconds, or at given times [s]; t = 0 and the end are always kept.
+
+    fields: any of "position", "attitude", "velocity", "angular_velocity" (all by default); what is left out is not
+    written and takes no memory. Raises SceneError naming every fault.
+    """
+
+    every: float | None = None
+    at: Sequence[float] | None = None
+    fields: tuple[str, ...] = FIELDS
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        if self.every is not None and self.at is not None:
+            faults.add("save", "every and at", "are both given", "give one of them")
+        if self.every is not None:
+            faults.positive("save.every", self.every)
+        if self.at is not None:
+            times = faults.finite("save.at", self.at)
+            if times is not None and (times.ndim != 1 or np.any(times < 0.0) or np.any(np.diff(times) <= 0.0)):
+                faults.add("save.at", self.at, "is not a rising list of times >= 0", "sort it and drop repetitions")
+        for name in self.fields:
+            faults.choice("save.fields", name, FIELDS)
+        faults.raise_if_any()
+
+
+@dataclass(frozen=True)
+class TimeGrid:
+    """Uniform steps of h [s]; samples after `sample_steps` steps, at `times` [s], both starting with 0."""
+
+    h: float
+    sample_steps: np.ndarray
+    times: np.ndarray
+    messages: tuple[str, ...] = ()
+
+    @property
+    def steps(self) -> int:
+        """Steps from start to end."""
+        return int(self.sample_steps[-1])
+
+
+def _exact(x: float) -> Fraction:
+    """The number that was meant: 0.1 + 0.2 is 3/10, 0.3333333333333333 is 1/3, 1e-12 is itself."""
+    simple = Fraction(repr(float(x))).limit_denominator(10**6)
+    return simple if abs(float(simple) - x) <= 1e-15 * abs(x) else Fraction(f"{x:.15g}")
+
+
+def time_grid(h: float, t1: float, save: SaveAt) -> TimeGrid:
+    """The steps and samples for a step of h [s] until t1 [s]. The step is shortened until it divides every sample time.
+
+    Raises SceneError if h or t1 is not positive, a sample lies beyond t1, or the step would have to shrink more than
+    MOST_SHORTENING times.
+    """
+    faults = Faults()
+    faults.positive("step", h)
+    faults.positive("duration", t1)
+    if save.at is not None and len(save.at) and t1 > 0 and max(save.at) > t1 * (1 + 1e-12):
+        faults.add("save.at", max(save.at), f"lies beyond the end, {t1} s", "drop it or run longer")
+    if save.every is not None and t1 > 0 and save.every > t1 * (1 + 1e-12):
+        faults.add("save.every", save.every, f"is longer than the run, {t1} s", "save more often or run longer")
+    if save.every is not None and t1 > 0 and 0 < save.every < t1 / MOST_SAMPLES:
+        faults.add(
+            "save.every", save.every, f"asks for more than {MOST_SAMPLES} samples", "save less often, or run in parts"
+        )
+    faults.raise_if_any()
+    end, meant = _exact(t1), _exact(h)
+    every = end if save.every is None else _exact(save.every)
+    regular = int(end / every)
+    rest = sorted({_exact(t) for t in save.at or ()} | {Fraction(0), end})
+    spacing = every
+    for t in rest:
+        spacing = Fraction(
+            math.gcd(spacing.numerator * t.denominator, t.numerator * spacing.denominator),
+            spacing.denominator * t.denominator,
+        )
+    step = spacing / math.ceil(spacing / meant)
+    if meant / step > MOST_SHORTENING:
+        faults.add(
+            "step",
+            h,
+            f"would have to shrink to {float(step):.3g} s to meet every sample time and the end",
+            "choose sample times and a duration that are multiples of the step",
+        )
+    if end / step >= 2**31 - 1:
+        faults.add(
+            "step", h, f"needs {int(end / step)} steps", "at most 2,147,483,646 steps can be made: use a longer step"
+        )
+    faults.raise_if_any()
+    messages: tuple[str, ...] = ()
+    if step != meant:
+        messages = (f"step shortened from {h} s to {float(step):.9g} s, so that it divides every sample time",)
+    steps = np.union1d(np.arange(regular + 1) * int(every / step), [int(t / step) for t in rest])
+    # Whole numbers divided: the nearest number to each time, however many there are.
+    times = [k * step.numerator / step.denominator for k in steps.tolist()]
+    return TimeGrid(float(step), steps.astype(np.int64), np.array(times), messages)

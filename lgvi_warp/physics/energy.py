@@ -1,0 +1,179 @@
+"""Energy and momenta of a result's samples, in float64."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+
+from lgvi_warp.common.status import failed, under_way
+from lgvi_warp.physics import terms, vehicle
+from lgvi_warp.physics.terms.base import CONSERVED, Term
+
+
+class Sampled(Protocol):
+    """Samples (k times, n members, ...) of some members: a Result, or a block of one."""
+
+    @property
+    def time(self) -> np.ndarray:
+        """(k,) [s]."""
+
+    @property
+    def position(self) -> np.ndarray:
+        """(k, n, 3) [m]."""
+
+    @property
+    def attitude(self) -> np.ndarray:
+        """(k, n, 3, 3)."""
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """(k, n, 3) [m/s]."""
+
+    @property
+    def angular_velocity(self) -> np.ndarray:
+        """(k, n, 3) [rad/s]."""
+
+    @property
+    def energy(self) -> np.ndarray:
+        """(k, n) [J]."""
+
+    @property
+    def status(self) -> np.ndarray:
+        """(n,)."""
+
+    @property
+    def members(self) -> int:
+        """n."""
+
+    @property
+    def parameters(self) -> Mapping[str, np.ndarray]:
+        """Numbers by name."""
+
+    @property
+    def terms(self) -> Sequence[Term]:
+        """Those of the scene."""
+
+    def own(self, term: Term) -> dict[str, np.ndarray]:
+        """A term's numbers."""
+
+
+def _times(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Matrices (1 or n, 3, 3) or (k, n, 3, 3) times vectors (k, n, 3)."""
+    diagonal = matrix.ndim == 3 and not np.any(matrix[:, ~np.eye(3, dtype=bool)])
+    if diagonal:
+        return np.einsum("nii->ni", matrix) * vectors
+    rows = (sum(matrix[..., i, j] * vectors[..., j] for j in range(3)) for i in range(3))
+    return np.stack(list(rows), axis=-1)
+
+
+def _relative(result: Sampled) -> np.ndarray:
+    """(nu, Om) relative to the water, (k, n, 6), body axes about the user's origin."""
+    nu = result.velocity.astype(np.float64)
+    position, time = result.position.astype(np.float64), result.time
+    for term in result.terms:
+        water = term.water(result.own(term), position, time, result.parameters)
+        if water is not None:
+            nu = nu - _times(np.swapaxes(result.attitude.astype(np.float64), -1, -2), water)
+    return np.concatenate([nu, result.angular_velocity.astype(np.float64)], axis=-1)
+
+
+def _momenta(result: Sampled) -> np.ndarray:
+    """(p, pi) about the user's origin, (k, n, 6)."""
+    return np.einsum("nij,knj->kni", *_broadcast(vehicle.inertia6(result.parameters), _relative(result)))
+
+
+def _broadcast(matrices: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return np.broadcast_to(matrices, (vectors.shape[1], *matrices.shape[1:])), vectors
+
+
+def kinetic_energy(result: Sampled) -> np.ndarray:
+    """Kinetic energy relative to the water, (nu, Om).I6 (nu, Om) / 2, (k, n) [J]."""
+    return np.asarray(0.5 * np.sum(_relative(result) * _momenta(result), axis=-1))
+
+
+def energy(result: Sampled) -> np.ndarray:
+    """Kinetic energy and the potential of every term, (k, n) [J]."""
+    total = kinetic_energy(result)
+    position, attitude = result.position.astype(np.float64), result.attitude.astype(np.float64)
+    for term in (*terms.IMPLIED, *result.terms):
+        total = total + term.potential(result.own(term), position, attitude, result.parameters)
+    return np.asarray(total)
+
+
+def linear_momentum(result: Sampled) -> np.ndarray:
+    """R p in inertial axes, (k, n, 3) [N s]. Without a potential it is conserved."""
+    return _times(result.attitude.astype(np.float64), _momenta(result)[..., :3])
+
+
+def angular_momentum(result: Sampled) -> np.ndarray:
+    """R pi + b x R p about the inertial origin, (k, n, 3) [N m s]. Without a potential it is conserved."""
+    spin = _momenta(result)[..., 3:]
+    b, P = (np.moveaxis(x, -1, 0) for x in (result.position.astype(np.float64), linear_momentum(result)))
+    orbit = np.stack([b[1] * P[2] - b[2] * P[1], b[2] * P[0] - b[0] * P[2], b[0] * P[1] - b[1] * P[0]], axis=-1)
+    return _times(result.attitude.astype(np.float64), spin) + orbit
+
+
+def energy_growth(result: Sampled, *, dissipative: bool = False) -> np.ndarray:
+    """Largest change of energy (n,), or where it is dissipative largest growth, over what members could hold.
+
+    That is |p|^2 / (2 M_min) + |pi|^2 / (2 J_min) of the start and, up to each time, the largest change of the potential:
+    a bounded motion stays below about 1, whatever it exchanges.
+    """
+    kinetic, total = kinetic_energy(result), result.energy
+    potential = total - kinetic
+    momenta = _momenta(result)[0]
+    I6 = np.broadcast_to(vehicle.inertia6(result.parameters), (result.members, 6, 6))
+    held = sum(0.5 * np.sum(momenta[:, part] ** 2, axis=1) / np.linalg.eigvalsh(I6[:, part, part])[:, 0]
+               for part in (slice(0, 3), slice(3, 6)))  # fmt: skip
+    given = np.maximum.accumulate(np.abs(potential - potential[:1]), axis=0)
+    change = total - total[:1]
+    growth = np.max((change if dissipative else np.abs(change)) / np.maximum(held + given, 1e-300), axis=0)
+    return np.where(np.isfinite(total).all(axis=0), growth, np.inf)
+
+
+def _present(result: Sampled) -> tuple[Term, ...]:
+    """The terms that some member of a result feels."""
+    return (*terms.IMPLIED, *(term for term in result.terms if term.present(result.own(term))))
+
+
+def conserved(result: Sampled) -> frozenset[str]:
+    """What the laws of a result's scene conserve, as each term says itself (`Term.conserves`).
+
+    Args:
+        result: Of a run; its parameters say which terms are felt.
+
+    Returns:
+        Those of "energy", "horizontal_momentum" and "vertical_angular_momentum" that every term keeps.
+    """
+    return CONSERVED.intersection(*(term.conserves for term in _present(result)))
+
+
+def at_work(result: Sampled) -> tuple[str, ...]:
+    """Keys of the terms that give or take energy: drag, thrust, noise, moving water and the like; () where none does."""
+    return tuple(term.key for term in _present(result) if "energy" not in term.conserves)
+
+
+def drift(result: Sampled) -> dict[str, float]:
+    """Largest change of energy and momenta, over the times that each member was under way.
+
+    What of it is an error, and what the work of forces, `conserved` tells.
+
+    Args:
+        result: Of a run, with all four fields of the state.
+
+    Returns:
+        energy [J], horizontal_momentum [N s] and vertical_angular_momentum [N m s]: the largest over times and members.
+        Members that failed are left out; NaN where none is left.
+    """
+    good = ~failed(result.status)
+    if not good.any():
+        return dict.fromkeys(sorted(CONSERVED), np.nan)
+    changes = {
+        "energy": result.energy,
+        "horizontal_momentum": linear_momentum(result)[..., :2],
+        "vertical_angular_momentum": angular_momentum(result)[..., 2],
+    }
+    counted = under_way(result)[:, good]
+    return {name: float(np.abs(values - values[:1])[:, good][counted].max()) for name, values in changes.items()}

@@ -1,0 +1,197 @@
+"""The inertia of a vehicle about the origins and in the axes that a method wants.
+
+I6 = [[M, C], [C^T, J]], linear first. E = M^-1 C, Js = J - C^T M^-1 C. Arrays have a leading dimension of 1 (shared by all
+members) or n. A shift of the origin by d (body axes) leaves M and Js and adds hat(d) to E.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lgvi_warp.physics import notation
+
+# A coupling below this fraction of what it could be is the round-off of turning and shifting.
+ROUND_OFF = 1e-12
+
+
+def hat(a: np.ndarray) -> np.ndarray:
+    """Skew matrices (..., 3, 3) with hat(a) x = a x x."""
+    zero = np.zeros(a.shape[:-1])
+    rows = [[zero, -a[..., 2], a[..., 1]], [a[..., 2], zero, -a[..., 0]], [-a[..., 1], a[..., 0], zero]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def vee(A: np.ndarray) -> np.ndarray:
+    """The vector of the skew part of (..., 3, 3)."""
+    return 0.5 * np.stack(
+        [A[..., 2, 1] - A[..., 1, 2], A[..., 0, 2] - A[..., 2, 0], A[..., 1, 0] - A[..., 0, 1]], axis=-1
+    )
+
+
+def blocks(I6: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """M, C, J of I6 (n, 6, 6)."""
+    return I6[:, :3, :3], I6[:, :3, 3:], I6[:, 3:, 3:]
+
+
+def joined(M: np.ndarray, C: np.ndarray, J: np.ndarray) -> np.ndarray:
+    """I6 (n, 6, 6)."""
+    I6 = np.empty((len(M), 6, 6))
+    I6[:, :3, :3], I6[:, :3, 3:], I6[:, 3:, :3], I6[:, 3:, 3:] = M, C, np.swapaxes(C, -1, -2), J
+    return I6
+
+
+def motion_from(origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
+    """X (n, 6, 6): (nu, Om) at another origin and in axes Q -> the same motion at the user's, in the user's axes."""
+    zero = np.zeros(np.broadcast_shapes(Q.shape, hat(origin).shape))
+    turned = zero + Q
+    return np.block([[turned, hat(origin) @ Q], [zero, turned]])
+
+
+def moved(I6: np.ndarray, origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
+    """I6 about another origin (n, 3), from the user's in the user's axes, and in the axes Q (n, 3, 3)."""
+    X = motion_from(origin, Q)
+    return np.swapaxes(X, -1, -2) @ I6 @ X
+
+
+def coupling(I6: np.ndarray) -> np.ndarray:
+    """The coupling norm k (n,), 0 to 1: the largest singular value of M^-1/2 C J^-1/2.
+
+    Infinite where round-off or overflow leaves no definite matrix.
+    """
+    M, C, J = blocks(I6)
+    try:
+        Lm, Lj = np.linalg.cholesky(M), np.linalg.cholesky(J)
+        scaled = np.linalg.solve(Lm, C) @ np.linalg.inv(np.swapaxes(Lj, -1, -2))
+    except np.linalg.LinAlgError:
+        return np.full(len(I6), np.inf)
+    finite = np.asarray(np.isfinite(scaled).all(axis=(-2, -1)))
+    norms = np.linalg.norm(np.where(finite[:, None, None], scaled, 0.0), ord=2, axis=(-2, -1))
+    return np.where(finite, norms, np.inf)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where and in which axes a kernel keeps a vehicle. Leading dimension 1 or n.
+
+    Q: (., 3, 3), the kernel's body axes in the user's. origin: (., 3) [m], of the state, from the user's in his axes;
+    forces: that of the forces. M: (., 3, 3) and J: (., 3), mass matrix and diagonal (Schur) inertia in the axes Q.
+    E, E_forces: (., 3, 3) [m], M^-1 C at both origins, zero without coupling.
+    """
+
+    Q: np.ndarray
+    origin: np.ndarray
+    forces: np.ndarray
+    M: np.ndarray
+    J: np.ndarray
+    E: np.ndarray
+    E_forces: np.ndarray
+
+    @property
+    def aligned(self) -> bool:
+        """Whether the axes of every member are the user's, in any order or sense, and the origin of the forces his."""
+        Q = np.abs(self.Q)
+        return bool(np.all((Q == 0.0) | (Q == 1.0)) and not np.any(self.forces))
+
+    @property
+    def coupled(self) -> bool:
+        """Whether the velocities of some member are coupled at either origin."""
+        return bool(np.any(self.E) or np.any(self.E_forces))
+
+    def inertia_at(self, E: np.ndarray) -> np.ndarray:
+        """I6 in these axes where M^-1 C is E: J = Js + E^T M E."""
+        J = self.J[:, :, None] * np.eye(3)
+        return joined(self.M + 0.0 * E, self.M @ E, J + np.swapaxes(E, -1, -2) @ self.M @ E)
+
+    def vector(self, v: np.ndarray) -> np.ndarray:
+        """Body vectors (n, ..., 3) in these axes."""
+        return np.einsum("nji,n...j->n...i", *_broadcast(self.Q, v))
+
+    def point(self, r: np.ndarray) -> np.ndarray:
+        """Points (n, ..., 3) [m], from the origin of the forces in these axes."""
+        return self.vector(r - _expanded(self.forces, r))
+
+    def torque(self, torque: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Torques (n, ..., 3) [N m] about the origin of the forces, of wrenches about the user's; in these axes.
+
+        The angular part of a twist that measures a velocity moves in the same way.
+        """
+        arm, torque, force = np.broadcast_arrays(_expanded(self.forces, force), torque, force)
+        return self.vector(torque - np.cross(arm, force))
+
+
+def _expanded(origin: np.ndarray, like: np.ndarray) -> np.ndarray:
+    """(n, 3) with as many dimensions as (n, ..., 3)."""
+    return origin.reshape(len(origin), *(1,) * (like.ndim - 2), 3)
+
+
+def _broadcast(Q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    n = max(len(Q), len(v))
+    return np.broadcast_to(Q, (n, 3, 3)), np.broadcast_to(v, (n, *v.shape[1:]))
+
+
+def schur(I6: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """M, E = M^-1 C, and Js = J - C^T E."""
+    M, C, J = blocks(I6)
+    some = np.any(C, axis=(-2, -1))
+    if not some.any():
+        return M, np.zeros_like(C), J
+    E, Js = np.zeros_like(C), J.copy()
+    E[some] = np.linalg.solve(M[some], C[some])
+    Js[some] -= np.swapaxes(C[some], -1, -2) @ E[some]
+    return M, E, Js
+
+
+def uncoupled_frame(I6: np.ndarray) -> tuple[Frame, np.ndarray]:
+    """The frame at the origin where M and J are not coupled, J diagonal; and the coupling norm (n,) that is left there.
+
+    The coupling vanishes there if and only if E is skew; its largest remaining value tells whether it does.
+    """
+    M, E, Js = schur(I6)
+    origin = -vee(E)
+    Q, J = notation.principal_axes(Js)
+    some, left = np.any(E, axis=(-2, -1)), np.zeros(len(E))
+    if some.any():
+        left[some] = coupling(moved(I6[some], origin[some], Q[some]))
+    none = np.zeros_like(M)
+    # Mass does not depend on the origin.
+    return Frame(Q, origin, origin, np.swapaxes(Q, -1, -2) @ M @ Q, J, none, none), left
+
+
+def ascending(Q: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Axes by rising J, still right-handed."""
+    order = np.argsort(J, axis=1, kind="stable")
+    Q = np.take_along_axis(Q, order[:, None, :], axis=2)
+    Q = Q * np.where(np.arange(3) == 2, np.sign(np.linalg.det(Q))[:, None], 1.0)[:, None, :]
+    return Q, np.take_along_axis(J, order, axis=1)
+
+
+def turns_frame(I6: np.ndarray, middle: int = 3) -> tuple[Frame, np.ndarray]:
+    """The frame of psi_x, and U (n, 3, 3): the state at axis 1's origin, the forces at that of axis `middle`."""
+    M, E, Js = schur(I6)
+    Q, J = ascending(*notation.principal_axes(Js))
+    turned = np.swapaxes(Q, -1, -2)
+    EQ = turned @ E @ Q
+    size = np.abs(EQ).max(axis=(-2, -1), keepdims=True)
+    d = np.stack([-EQ[:, 2, 1], EQ[:, 2, 0], -EQ[:, 1, 0]], axis=-1)
+    U = np.triu(EQ + hat(d))
+    U = np.where(np.abs(U) > ROUND_OFF * size, U, 0.0)
+    zero = np.zeros(len(U))
+    lines = {
+        2: np.stack([zero, zero, U[:, 0, 1]], axis=-1),
+        3: np.stack([U[:, 1, 2], -U[:, 0, 2], U[:, 0, 1]], axis=-1),
+    }
+    a = lines[middle]
+    M = turned @ M @ Q
+    return Frame(Q, notation.rotate_out(Q, d), notation.rotate_out(Q, d + a), M, J, U, U + hat(a)), U
+
+
+def symmetric_frame(I6: np.ndarray) -> Frame:
+    """The frame of psi_w: at the origin where E = S is symmetric, in the principal axes of Js."""
+    M, E, Js = schur(I6)
+    origin = -vee(E)
+    Q, J = notation.principal_axes(Js)
+    turned = np.swapaxes(Q, -1, -2)
+    S = turned @ (0.5 * (E + np.swapaxes(E, -1, -2))) @ Q
+    return Frame(Q, origin, origin, turned @ M @ Q, J, S, S)

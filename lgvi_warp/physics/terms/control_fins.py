@@ -1,0 +1,90 @@
+"""Control fins: fins that turn about their span to a command."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, knots, quantity
+from lgvi_warp.physics.terms.fins import Fins, fin_rows, side_by_side
+from lgvi_warp.physics.terms.wrench import commands, first_row, not_rising, refuse_idle, rising
+
+# rad/s: from here on a limit of the rate is none.
+UNLIMITED = 1e6
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ControlFins(Fins):
+    """Fins that are turned about their span by a deflection, positive where the flow from ahead then lifts along +normal.
+
+    As Fins, with limit: (n,) [rad] of the deflection either way; rate_limit: (n,) [rad/s], by default none; command: (n,)
+    [rad], held, or with times (k,) [s], rising: command_schedule (k, n), linear between. The deflection is the command
+    within its limit, followed no faster than the rate limit; at t = 0 it is there.
+    """
+
+    type: ClassVar[str] = "control_fins"
+    device: ClassVar[str] = "control_fins"
+    timed: ClassVar[bool] = True
+
+    limit: Any = quantity(("n",), "rad", 0.35, least=0.0)
+    rate_limit: Any = quantity(("n",), "rad/s", UNLIMITED, least=0.0)
+    command: Any = quantity(("n",), "rad", None)
+    times: Any = quantity(("k",), "s", None)
+    command_schedule: Any = quantity(("k", "n"), "rad", None)
+
+    def __post_init__(self) -> None:
+        first = first_row(self.command_schedule)
+        given = self.command is not None and self.command_schedule is not None
+        object.__setattr__(self, "_both", given and not np.array_equal(first, self.command))
+        if self.command is None:
+            object.__setattr__(self, "command", first)
+        self.repeat("limit", "rate_limit", "command")
+        if self.command_schedule is None:
+            object.__setattr__(self, "command_schedule", [self.command])
+            object.__setattr__(self, "times", [0.0] if self.times is None else self.times)
+        super().__post_init__()
+
+    def check(self, faults: Faults) -> None:
+        """Also, times must rise and a command is given in one way."""
+        super().check(faults)
+        rising(faults, "times", self.times)
+        if self.__dict__["_both"]:
+            faults.add("command", self.command, "is given beside command_schedule", "keep one of them")
+
+    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+        """Also times that do not rise. Raises SceneError for numbers that would not act."""
+        bad = super().unphysical(own)
+        bad["times"] = bad["times"] | not_rising(own["times"])
+        remedy = f"give {self.key}.rate_limit below {UNLIMITED:g} rad/s in the scene as well"
+        refuse_idle(self, own, "rate_limit", own["rate_limit"] < UNLIMITED, remedy)
+        return bad
+
+    @property
+    def memory(self) -> bool:
+        """Whether some fin's rate is limited."""
+        return bool(np.any(self.rate_limit < UNLIMITED))
+
+    def packed(self, own: Numbers, setting: Setting) -> Packed:
+        """Rows as the device code has them: each fin's, then each one's commands."""
+        fins = side_by_side([fin_rows(own, setting), own["limit"][..., None], own["rate_limit"][..., None]])
+        times, schedule = commands(own)
+        count = schedule.shape[2]
+        tables = [knots(times, schedule[:, :, i : i + 1]) for i in range(count)]
+        rows = side_by_side([fins.reshape(len(fins), -1), *tables])
+        values = {"count": count, "knots": times.shape[1] - 1, "limited": int(self.memory), "memory": 0}
+        if not self.memory:
+            return Packed(values, rows, work=2 * count)
+        start = np.clip(_at_start(times, schedule), -own["limit"], own["limit"])
+        return Packed(values, rows, start, 2 * count)
+
+
+def _at_start(times: np.ndarray, schedule: np.ndarray) -> np.ndarray:
+    """The commands (n, fins) at t = 0."""
+    n = max(len(times), len(schedule))
+    times, schedule = (np.broadcast_to(one, (n, *one.shape[1:])) for one in (times, schedule))
+    return np.array(
+        [[np.interp(0.0, t, column) for column in commands.T] for t, commands in zip(times, schedule, strict=True)]
+    )

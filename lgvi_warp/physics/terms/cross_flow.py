@@ -1,0 +1,69 @@
+"""Cross-flow drag of a slender hull, by strips."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantity
+from lgvi_warp.physics.terms.fins import side_by_side, twist
+from lgvi_warp.physics.terms.wrench import not_rising, rising
+
+# Gauss' two points of a segment from 0 to 1.
+GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
+ACROSS = (np.array([[0.0, 1.0, 0.0]]), np.array([[0.0, 0.0, 1.0]]))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CrossFlow(Term):
+    """Force per length -rho/2 Cd D |w| w, w the flow across the hull at its station (Hoerner 1965; Fossen 2021, 8).
+
+    stations: (k,) [m] along the body's x axis, rising; diameters: (k,) [m], the hull's breadth across the flow;
+    drag_coefficient: (k,), or one number. Between stations the product Cd D is linear.
+    """
+
+    type: ClassVar[str] = "cross_flow"
+    device: ClassVar[str] = "cross_flow"
+
+    stations: Any = quantity(("k",), "m")
+    diameters: Any = quantity(("k",), "m", least=0.0)
+    drag_coefficient: Any = quantity(("k",), "1", least=0.0)
+
+    def __post_init__(self) -> None:
+        if np.ndim(np.asarray(self.drag_coefficient, dtype=object)) == 0:
+            count = len(np.atleast_1d(np.asarray(self.stations, dtype=object)))
+            object.__setattr__(self, "drag_coefficient", np.array([self.drag_coefficient] * count))
+        super().__post_init__()
+
+    def check(self, faults: Faults) -> None:
+        """Stations must rise, and enclose a hull."""
+        rising(faults, "stations", self.stations)
+        if len(self.stations) < 2:
+            faults.add("stations", self.stations, "has one station", "give two or more, from stern to bow")
+
+    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+        """Also where a member's stations do not rise."""
+        bad = super().unphysical(own)
+        bad["stations"] = bad["stations"] | not_rising(own["stations"])
+        return bad
+
+    def present(self, own: Numbers) -> bool:
+        """Whether some member has a hull that resists."""
+        return bool(np.any(own["diameters"]) and np.any(own["drag_coefficient"]))
+
+    def packed(self, own: Numbers, setting: Setting) -> Packed:
+        """The directions across, and two strips a segment: station and rho/2 Cd D times length."""
+        a, b = (twist(setting.frame, np.zeros((1, 3)), direction) for direction in ACROSS)
+        values: dict[str, Any] = {"a": a[:, :3], "a_arm": a[:, 3:], "b": b[:, :3], "b_arm": b[:, 3:]}
+        stations, strength = own["stations"], own["drag_coefficient"] * own["diameters"]
+        half_length = 0.5 * np.diff(stations)
+        half_density = 0.5 * setting.parameters["environment.water_density"][:, None]
+        strips = []
+        for part in GAUSS:
+            x, c = (one[:, :-1] + part * np.diff(one) for one in (stations, strength))
+            strips.append(side_by_side([x[..., None], (half_density * half_length * c)[..., None]]))
+        rows = side_by_side(strips)
+        return Packed(values | {"count": 2 * half_length.shape[1]}, rows.reshape(len(rows), -1))

@@ -1,0 +1,128 @@
+"""Events: conditions that stop a member, with a status of their own and the time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, SceneError, closest, shown
+from lgvi_warp.common.status import Status
+from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, build, few_enough, quantity
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Event(Term):
+    """A condition with a distance that is positive while a member goes on; it stops where the distance is 0 or below.
+
+    device: the name of a module of lgvi_kernels.stops, or any object with `params(width, real)` and
+    `distance(view, p)`. status: what a member that stopped has.
+    """
+
+    status: ClassVar[Status] = Status.CONDITION
+    kinds: ClassVar[dict[str, Any]] = {}
+    acts: ClassVar[bool] = False
+
+    def packed(self, own: Numbers, setting: Setting) -> Packed:
+        """Its numbers as they are: events look at the position of the body's origin, in inertial axes."""
+        return Packed(dict(own))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Surface(Event):
+    """The body's origin rises to a depth.
+
+    depth [m], 0 at the surface.
+    """
+
+    type: ClassVar[str] = "surface"
+    device: ClassVar[str] = "surface"
+    status: ClassVar[Status] = Status.SURFACE
+
+    depth: Any = quantity((), "m", 0.0)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Floor(Event):
+    """The body's origin sinks to the sea floor.
+
+    depth [m].
+    """
+
+    type: ClassVar[str] = "floor"
+    device: ClassVar[str] = "floor"
+    status: ClassVar[Status] = Status.FLOOR
+
+    depth: Any = quantity((), "m")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Box(Event):
+    """The body's origin leaves a box.
+
+    lower, upper: (3,) [m], inertial corners.
+    """
+
+    type: ClassVar[str] = "box"
+    device: ClassVar[str] = "box"
+    status: ClassVar[Status] = Status.BOX
+
+    lower: Any = quantity((3,), "m")
+    upper: Any = quantity((3,), "m")
+
+    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+        """Also where a member's corners span no box."""
+        bad = super().unphysical(own)
+        crossed = np.any(own["upper"] <= own["lower"], axis=1)
+        return {"lower": bad["lower"] | crossed, "upper": bad["upper"] | crossed}
+
+    def check(self, faults: Faults) -> None:
+        """The corners must span a box."""
+        if np.any(self.upper <= self.lower):
+            faults.add(
+                "upper", self.upper, f"is not above lower = {self.lower.tolist()}", "give upper > lower on each axis"
+            )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StopTime(Event):
+    """A time after which a member stops.
+
+    at [s].
+    """
+
+    type: ClassVar[str] = "time"
+    device: ClassVar[str] = "time"
+    status: ClassVar[Status] = Status.TIME
+    timed: ClassVar[bool] = True
+
+    at: Any = quantity((), "s", least=0.0)
+
+
+TYPES = Event.kinds
+TYPES.update({kind.type: kind for kind in (Surface, Floor, Box, StopTime)})
+
+
+def from_list(given: Any) -> tuple[Event, ...]:
+    """Events from tables of a scene file or Event objects. Raises SceneError naming every fault."""
+    if not isinstance(given, Sequence) or isinstance(given, str):
+        raise SceneError(
+            [f"events = {shown(given)}: is no list; write [[events]] and type = ... below, or events=[lw.Surface()]"]
+        )
+    few_enough("events", given)
+    faults, found = Faults(), list[Event]()
+    for i, one in enumerate(given):
+        with faults.including():
+            if isinstance(one, Event):
+                found.append(one)
+                continue
+            word = one.get("type", "") if isinstance(one, Mapping) else one
+            kind = TYPES.get(word) if isinstance(one, Mapping) and isinstance(word, str) else None
+            if kind is None:
+                faults.add(f"events[{i}].type", word, "is not known", closest(str(word), TYPES))
+            else:
+                found.append(build(f"events[{i}]", kind, one))
+    faults.raise_if_any()
+    return tuple(found)

@@ -1,0 +1,114 @@
+"""Fixed fins: lift and drag of small wings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.physics.inertia import Frame
+from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantity
+
+# A normal that differs from the chord by a smaller sine has no direction of its own.
+PARALLEL = 1e-6
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Fins(Term):
+    """n fins, each with lift rho A/2 lift_slope sin(a) cos(a) V^2 and drag rho A/2 (drag + drag_normal sin^2 a) V^2.
+
+    position: (n, 3) [m] from the body's origin; chord: (n, 3), ahead, and normal: (n, 3), of any length but 0, the normal
+    made orthogonal to the chord; area: (n,) [m2]; lift_slope: (n,) [1/rad]; drag, drag_normal: (n,), the latter 0 by
+    default. One number stands for n equal ones. V and a are those of the flow in the plane of chord and normal.
+    """
+
+    type: ClassVar[str] = "fins"
+    device: ClassVar[str] = "fins"
+
+    position: Any = quantity(("n", 3), "m")
+    chord: Any = quantity(("n", 3), "1")
+    normal: Any = quantity(("n", 3), "1")
+    area: Any = quantity(("n",), "m2", least=0.0)
+    lift_slope: Any = quantity(("n",), "1/rad", least=0.0)
+    drag: Any = quantity(("n",), "1", least=0.0)
+    drag_normal: Any = quantity(("n",), "1", 0.0, least=0.0)
+
+    def __post_init__(self) -> None:
+        self.repeat("area", "lift_slope", "drag", "drag_normal")
+        super().__post_init__()
+
+    def repeat(self, *names: str) -> None:
+        """One number for every fin, where one is given for all."""
+        count = len(np.atleast_1d(np.asarray(self.position, dtype=object)))
+        for name in names:
+            value = getattr(self, name)
+            if value is not None and np.ndim(np.asarray(value, dtype=object)) == 0:
+                object.__setattr__(self, name, np.array([value] * count))
+
+    def check(self, faults: Faults) -> None:
+        """Chord and normal need directions, not the same one."""
+        for i, (chord, normal) in enumerate(zip(self.chord, self.normal, strict=True)):
+            if not np.any(chord):
+                remedy = "give the direction from trailing to leading edge, such as [1, 0, 0]"
+                faults.add(f"chord[{i}]", chord, "has zero length", remedy)
+            elif not np.any(normal):
+                faults.add(f"normal[{i}]", normal, "has zero length", "give a direction across the fin's plane")
+            elif _degenerate(chord, normal):
+                faults.add(f"normal[{i}]", normal, "is along the chord", "give a direction across the fin's plane")
+
+    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+        """Also where a member's chord and normal leave no plane."""
+        bad = super().unphysical(own)
+        chord, normal = np.nan_to_num(own["chord"]), np.nan_to_num(own["normal"])
+        bad["chord"] = bad["chord"] | ~np.all(np.any(chord, axis=-1), axis=-1)
+        bad["normal"] = bad["normal"] | np.any(_degenerate(chord, normal), axis=-1)
+        return bad
+
+    def packed(self, own: Numbers, setting: Setting) -> Packed:
+        """Rows as the device code has them."""
+        rows = fin_rows(own, setting)
+        count = rows.shape[1]
+        return Packed({"count": count}, rows.reshape(len(rows), -1), work=2 * count)
+
+
+def _degenerate(chord: np.ndarray, normal: np.ndarray) -> Any:
+    """Whether (..., 3) normals have no direction apart from their chords."""
+    size = np.linalg.norm(chord, axis=-1) * np.linalg.norm(normal, axis=-1)
+    return np.linalg.norm(np.cross(chord, normal), axis=-1) <= PARALLEL * size
+
+
+def fin_rows(own: Numbers, setting: Setting) -> np.ndarray:
+    """(n, fins, 51): the twists along chord and normal, rho A/2 times lift slope and the drag coefficients, S and W.
+
+    S = c c^T + n n^T and W = n c^T - c n^T of these twists c and n, block by block (kernels: terms/fins.py).
+    """
+    chord = own["chord"] / np.linalg.norm(own["chord"], axis=-1, keepdims=True)
+    normal = own["normal"] - np.sum(own["normal"] * chord, axis=-1, keepdims=True) * chord
+    normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    half = 0.5 * setting.parameters["environment.water_density"][:, None] * own["area"]
+    sizes = [half * own[name] for name in ("lift_slope", "drag", "drag_normal")]
+    c, n = (twist(setting.frame, own["position"], direction) for direction in (chord, normal))
+    cc, nn, nc = (a[..., :, None] * b[..., None, :] for a, b in ((c, c), (n, n), (n, c)))
+    S, W = cc + nn, nc - np.swapaxes(nc, -1, -2)
+    off = ([1, 2, 0], [2, 0, 1])
+    blocks: list[np.ndarray] = []
+    for part in (slice(0, 3), slice(3, 6)):
+        s, w = S[..., part, part], W[..., part, part]
+        blocks.append(np.concatenate([np.diagonal(s, axis1=-2, axis2=-1), s[..., *off], w[..., *off]], axis=-1))
+    between = [one[..., :3, 3:].reshape(*one.shape[:-2], 9) for one in (S, W)]
+    return side_by_side([c, n, *(size[..., None] for size in sizes), blocks[0], *between, blocks[1]])
+
+
+def twist(frame: Frame, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """(n, ..., 6): what measures the velocity of a point along a unit vector, and the wrench of a unit force there."""
+    n = max(len(frame.Q), len(frame.forces), len(point), len(direction))
+    point, direction = (np.broadcast_to(one, (n, *one.shape[1:])) for one in (point, direction))
+    return np.concatenate([frame.vector(direction), frame.torque(np.cross(point, direction), direction)], axis=-1)
+
+
+def side_by_side(parts: list[np.ndarray]) -> np.ndarray:
+    """(1 or n, k, d) joined along d."""
+    n = max(len(part) for part in parts)
+    return np.concatenate([np.broadcast_to(part, (n, *part.shape[1:])) for part in parts], axis=-1)

@@ -1,0 +1,37 @@
+"""Lift of a hull in proportion to its speed ahead."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.physics.inertia import motion_from
+from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantity
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BodyLift(Term):
+    """force_i = -u sum_j matrix_ij v_j, forces and torques, velocities and rates; u the speed along the body's x axis.
+
+    matrix: (6, 6) [kg/m, kg, kg m]: minus Prestero's Y_uv, Z_uw, M_uw, N_uv ... (2001). Any is taken: an empirical law
+    may speed the vehicle up.
+    """
+
+    type: ClassVar[str] = "body_lift"
+    device: ClassVar[str] = "lift"
+    dissipative: ClassVar[bool] = False
+
+    matrix: Any = quantity((6, 6), "kg/m, kg, kg m")
+
+    def present(self, own: Numbers) -> bool:
+        """Whether some coefficient is not zero."""
+        return bool(np.any(own["matrix"]))
+
+    def packed(self, own: Numbers, setting: Setting) -> Packed:
+        """Rows: what measures u (6), and the matrix (36), in the axes and about the origin of the forces."""
+        X = motion_from(setting.frame.forces, setting.frame.Q)
+        matrix = np.swapaxes(X, 1, 2) @ own["matrix"] @ X
+        ahead = np.broadcast_to(X[:, 0, :], (len(matrix), 6))
+        return Packed({}, np.concatenate([ahead, matrix.reshape(-1, 36)], axis=1))

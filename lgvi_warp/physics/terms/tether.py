@@ -1,0 +1,42 @@
+"""Tether: a spring between a fixed anchor and a point of the vehicle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantity
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Tether(Term):
+    """Tension stiffness (length - rest_length) from anchor to attachment, slack when shorter.
+
+    anchor: (3,) [m, inertial]; stiffness [N/m]; attachment: (3,) [m] from the body's origin; rest_length [m].
+    """
+
+    type: ClassVar[str] = "tether"
+    device: ClassVar[str] = "tether"
+
+    anchor: Any = quantity((3,), "m")
+    stiffness: Any = quantity((), "N/m", least=0.0)
+    attachment: Any = quantity((3,), "m", (0.0, 0.0, 0.0))
+    rest_length: Any = quantity((), "m", 0.0, least=0.0)
+
+    @property
+    def conserves(self) -> frozenset[str]:
+        """Energy: the anchor takes up momentum."""
+        return frozenset({"energy"})
+
+    def packed(self, own: Numbers, setting: Setting) -> Packed:
+        """The attachment from the origin of the forces."""
+        values = {key: own[key] for key in ("anchor", "stiffness", "rest_length")}
+        return Packed(values | {"attachment": setting.frame.point(own["attachment"])})
+
+    def potential(self, own: Numbers, position: np.ndarray, attitude: np.ndarray, setting: Numbers) -> np.ndarray:
+        """U = k max(length - L0, 0)^2 / 2."""
+        end = position + np.einsum("knij,nj->kni", attitude, np.broadcast_to(own["attachment"], position.shape[1:]))
+        stretch = np.maximum(np.linalg.norm(end - own["anchor"], axis=-1) - own["rest_length"], 0.0)
+        return 0.5 * own["stiffness"] * stretch**2

@@ -1,0 +1,234 @@
+"""Thrusters with a thrust curve (quadratic, or a polynomial), dead band, saturation and first-order lag."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, knots, quantity
+from lgvi_warp.physics.terms.wrench import commands, first_row, not_rising, refuse_idle, rising
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Thrusters(Term):
+    """n thrusters, each with thrust = c+ f+(max(u - band, 0)) - c- f-(max(-u - band, 0)) along its direction (Fossen 2021, 9).
+
+    f+(w) = polynomial_1 w + polynomial_2 w^2 + ..., by default w^2; f-: polynomial_astern, by default f+.
+    position: (n, 3) [m] from the body's origin; direction: (n, 3), any length but 0; coefficient: (n,) [N per unit of f]
+    ahead, 1 by default where a polynomial [N] is given; coefficient_astern: (n,), the same by default; polynomial,
+    polynomial_astern: (p,), of all thrusters, from the first power up; dead_band, limit: (n,) of the command;
+    time_constant: (n,) [s] of the first-order lag from command to u, 0 for none; command: (n,), held, or with times (k,)
+    [s], rising: command_schedule (k, n), linear between. The unit of command is the user's: 1, V or rad/s.
+    """
+
+    type: ClassVar[str] = "thrusters"
+    device: ClassVar[str] = "thrusters"
+    timed: ClassVar[bool] = True
+
+    position: Any = quantity(("n", 3), "m")
+    direction: Any = quantity(("n", 3), "1")
+    coefficient: Any = quantity(("n",), "N per unit^2", None, least=0.0)
+    coefficient_astern: Any = quantity(("n",), "N per unit^2", None, least=0.0)
+    polynomial: Any = quantity(("p",), "1 per unit, 1 per unit^2 ...", None)
+    polynomial_astern: Any = quantity(("q",), "1 per unit, 1 per unit^2 ...", None)
+    dead_band: Any = quantity(("n",), "unit", None, least=0.0)
+    limit: Any = quantity(("n",), "unit", None, least=0.0)
+    time_constant: Any = quantity(("n",), "s", None, least=0.0)
+    command: Any = quantity(("n",), "unit", None)
+    times: Any = quantity(("k",), "s", None)
+    command_schedule: Any = quantity(("k", "n"), "unit", None)
+
+    def __post_init__(self) -> None:
+        if self.coefficient is None:
+            self._check_polynomial_given()
+            object.__setattr__(
+                self, "coefficient", np.ones(len(np.atleast_1d(np.asarray(self.position, dtype=object))))
+            )
+        for name, value in (("polynomial", SQUARE), ("polynomial_astern", self.polynomial)):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, SQUARE if value is None else value)
+        n = len(np.atleast_1d(np.asarray(self.coefficient, dtype=object)))
+        defaults = {"coefficient_astern": self.coefficient, "dead_band": np.zeros(n), "limit": np.full(n, 1e6),
+                    "time_constant": np.zeros(n)}  # fmt: skip
+        scheduled = self.command_schedule is not None
+        first = first_row(self.command_schedule)
+        both = scheduled and self.command is not None and not np.array_equal(self.command, first)
+        if scheduled:
+            defaults["command"] = first
+        else:
+            held = 0.0 if self.command is None else self.command
+            held = np.full(n, held) if np.ndim(np.asarray(held, dtype=object)) == 0 else held
+            defaults |= {"command": held, "times": [0.0], "command_schedule": [held]}
+        for name, value in defaults.items():
+            if getattr(self, name) is None:
+                alone = np.ndim(np.asarray(value, dtype=object)) == 0
+                object.__setattr__(self, name, np.full(n, value) if alone else value)
+            elif np.ndim(np.asarray(getattr(self, name), dtype=object)) == 0 and name != "command_schedule":
+                object.__setattr__(self, name, np.full(n, getattr(self, name)))
+        object.__setattr__(self, "_both", both)
+        super().__post_init__()
+
+    def _check_polynomial_given(self) -> None:
+        """Raises SceneError if neither coefficient nor polynomial says what the thrust is."""
+        if self.polynomial is None:
+            faults = Faults(f"{self.key}.")
+            faults.add("coefficient", None, "is missing", "give (n,) [N per unit^2], or a polynomial [N]")
+            faults.raise_if_any()
+
+    @property
+    def is_square(self) -> bool:
+        """Whether both curves are w^2."""
+        return all(np.array_equal(curve, SQUARE) for curve in (self.polynomial, self.polynomial_astern))
+
+    def device_in(self, aligned: bool) -> str:
+        """Code that evaluates polynomials only where one is given."""
+        return self.device if self.is_square else "thrusters_polynomial"
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in a scene file: polynomials only where they are not w^2."""
+        content = super().to_dict()
+        return {key: value for key, value in content.items() if not (self.is_square and key.startswith("polynomial"))}
+
+    def thrust(self, command: Any) -> np.ndarray:
+        """Thrust (n,) or (k, n) [N] at commands (n,) or (k, n), within their limits, after the lag."""
+        u = np.clip(np.asarray(command, dtype=np.float64), -self.limit, self.limit)
+        ahead = evaluate(self.polynomial, np.maximum(u - self.dead_band, 0.0))
+        astern = evaluate(self.polynomial_astern, np.maximum(-u - self.dead_band, 0.0))
+        return np.asarray(self.coefficient * ahead - self.coefficient_astern * astern)
+
+    def command_for(self, thrust: Any) -> np.ndarray:
+        """The least commands (n,) for thrusts (n,) [N]; where a curve does not reach one, that of its greatest thrust."""
+        found = np.zeros(len(self.coefficient))
+        for i, wanted in enumerate(np.broadcast_to(np.asarray(thrust, dtype=np.float64), found.shape)):
+            side = 1.0 if wanted > 0.0 else -1.0
+            curve, gain = (
+                (self.polynomial, self.coefficient) if side > 0.0 else (self.polynomial_astern, self.coefficient_astern)
+            )
+            if wanted and gain[i] > 0.0:
+                reach = max(self.limit[i] - self.dead_band[i], 0.0)
+                found[i] = side * (self.dead_band[i] + solve(curve, abs(wanted) / gain[i], reach))
+        return np.clip(found, -self.limit, self.limit)
+
+    def check(self, faults: Faults) -> None:
+        """Directions need a length, times must rise, a command is given in one way."""
+        zero = np.flatnonzero(np.linalg.norm(self.direction, axis=1) == 0.0)
+        if len(zero):
+            remedy = "give the direction that the thrust pushes the vehicle, such as [1, 0, 0]"
+            faults.add(f"direction[{zero[0]}]", self.direction[zero[0]], "has zero length", remedy)
+        rising(faults, "times", self.times)
+        if self.__dict__["_both"]:
+            faults.add("command", self.command, "differs from the first of command_schedule", "keep one of them")
+
+    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+        """Also a direction without length and times that do not rise. Raises SceneError for numbers that would not act."""
+        bad = super().unphysical(own)
+        bad["direction"] = bad["direction"] | np.any(~np.any(own["direction"], axis=-1), axis=-1)
+        bad["times"] = bad["times"] | not_rising(own["times"])
+        remedy = f"give {self.key}.time_constant above 0 [s] in the scene as well"
+        refuse_idle(self, own, "time_constant", own["time_constant"] > 0.0, remedy)
+        self._refuse_idle_polynomial(own)
+        return bad
+
+    def _refuse_idle_polynomial(self, own: Numbers) -> None:
+        """Refuse members' polynomials in a scene that has none: its code does not look at them."""
+        faults = Faults(f"{self.key}.")
+        for name in ("polynomial", "polynomial_astern"):
+            if self.is_square and not np.all(own[name] == SQUARE):
+                what = "does not act: the scene has none"
+                faults.add(name, own[name][0], what, f"give {self.key}.{name} in the scene as well")
+        faults.raise_if_any()
+
+    @property
+    def memory(self) -> bool:
+        """Whether some thruster lags."""
+        return bool(np.any(self.time_constant > 0.0))
+
+    def packed(self, own: Numbers, setting: Setting) -> Packed:
+        """Rows as the device code has them: each thruster's, then each one's commands."""
+        direction = own["direction"] / np.linalg.norm(own["direction"], axis=-1, keepdims=True)
+        arms = np.cross(own["position"] + 0.0 * direction, direction + 0.0 * own["position"])
+        force, torque = setting.frame.vector(direction), setting.frame.torque(arms, direction + 0.0 * arms)
+        with np.errstate(divide="ignore"):
+            rate = np.where(own["time_constant"] > 0.0, 1.0 / own["time_constant"], FAST)
+        numbers = [own[key] for key in ("coefficient", "coefficient_astern", "dead_band", "limit")]
+        parts = [force, torque, *(x[..., None] for x in (*numbers, rate))]
+        times, schedule = commands(own)
+        n = max(*(len(part) for part in parts), len(times), len(schedule))
+        whole = [np.broadcast_to(part, (n, *part.shape[1:])) for part in parts]
+        rows = [np.concatenate(whole, axis=2).reshape(n, -1)]
+        for i in range(schedule.shape[2]):
+            table = knots(times, schedule[:, :, i : i + 1])
+            rows.append(np.broadcast_to(table, (n, table.shape[1])))
+        count = schedule.shape[2]
+        powers = 0
+        if not self.is_square:
+            curves, powers = side_by_side(own["polynomial"], own["polynomial_astern"])
+            rows.append(curves)
+            n = max(len(part) for part in rows)
+            rows = [np.broadcast_to(part, (n, part.shape[1])) for part in rows]
+        values = {"count": count, "knots": times.shape[1] - 1, "lagged": int(self.memory)}
+        values |= {} if self.is_square else {"powers": powers}
+        if not self.memory:
+            return Packed(values | {"memory": 0}, np.concatenate(rows, axis=1))
+        first = np.stack([np.interp(0.0, t, c) for t, c in _columns(times, schedule)])
+        start = np.clip(first.reshape(-1, count), -own["limit"], own["limit"])
+        return Packed(values, np.concatenate(rows, axis=1), start)
+
+
+# 1 / time constant of a thruster without a lag, among others that have one: faster than any step, and within float32.
+FAST = 1e20
+
+
+# w^2, from the first power up.
+SQUARE = (0.0, 1.0)
+
+
+def evaluate(polynomial: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """p_1 w + p_2 w^2 + ..., of the shape of w."""
+    value = np.zeros_like(w)
+    for coefficient in polynomial[::-1]:
+        value = (value + coefficient) * w
+    return value
+
+
+def solve(polynomial: np.ndarray, wanted: float, reach: float) -> float:
+    """The least w in 0 ... reach at which a polynomial has that value; where it has not, that of its greatest value."""
+    powers = np.concatenate([[-wanted], polynomial])
+    slope = np.polynomial.polynomial.polyder(powers)
+    turns = _within(np.polynomial.polynomial.polyroots(slope), reach)
+    places = np.array([0.0, *turns, reach])
+    values = evaluate(polynomial, places)
+    if values.max() <= wanted:
+        return float(places[values.argmax()])
+    # Monotonic between its turns: the first stretch on whose end it is above what is wanted holds the root.
+    i = int((values >= wanted).argmax())
+    low, high = places[i - 1], places[i]
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        if evaluate(polynomial, np.array(middle)) < wanted:
+            low = middle
+        else:
+            high = middle
+    return float(high)
+
+
+def _within(roots: np.ndarray, reach: float) -> np.ndarray:
+    """The real roots between 0 and reach, sorted."""
+    real = roots.real[np.abs(roots.imag) <= 1e-9 * (1.0 + np.abs(roots))]
+    return np.sort(real[(real > 0.0) & (real < reach)])
+
+
+def side_by_side(ahead: np.ndarray, astern: np.ndarray) -> tuple[np.ndarray, int]:
+    """Two polynomials (n, p), (n, q) as rows of one length (n, 2 powers), and how many powers."""
+    powers, n = max(ahead.shape[1], astern.shape[1]), max(len(ahead), len(astern))
+    padded = [np.pad(curve, ((0, 0), (0, powers - curve.shape[1]))) for curve in (ahead, astern)]
+    return np.concatenate([np.broadcast_to(curve, (n, powers)) for curve in padded], axis=1), powers
+
+
+def _columns(times: np.ndarray, schedule: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """(times, commands) of each thruster of each member."""
+    n = max(len(times), len(schedule))
+    return [(times[i % len(times)], column) for i in range(n) for column in schedule[i % len(schedule)].T]

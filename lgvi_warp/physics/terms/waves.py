@@ -1,0 +1,80 @@
+"""Linear waves in deep water."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantity
+from lgvi_warp.physics.terms.current_harmonics import above_zero, not_above_zero, zeros_like_first
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Waves(Term):
+    """A sum of linear waves in deep water: wavenumber (2 pi / period)^2 / environment.gravity.
+
+    amplitudes: (k,) [m] of the surface; periods: (k,) [s], above 0; headings_deg: (k,) [deg] from north, where the waves
+    travel to; phases: (k,) [rad].
+    """
+
+    type: ClassVar[str] = "waves"
+    device: ClassVar[str] = "waves"
+    timed: ClassVar[bool] = True
+
+    amplitudes: Any = quantity(("k",), "m", least=0.0)
+    periods: Any = quantity(("k",), "s")
+    headings_deg: Any = quantity(("k",), "deg")
+    phases: Any = quantity(("k",), "rad", None)
+
+    def __post_init__(self) -> None:
+        if self.phases is None:
+            object.__setattr__(self, "phases", zeros_like_first(self.amplitudes))
+        super().__post_init__()
+
+    def check(self, faults: Faults) -> None:
+        """Periods must be positive."""
+        above_zero(faults, "periods", self.periods, "s")
+
+    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+        """Periods must be positive."""
+        bad = super().unphysical(own)
+        return bad | {"periods": bad["periods"] | not_above_zero(own["periods"])}
+
+    def present(self, own: Numbers) -> bool:
+        """Whether some member has one."""
+        return bool(np.any(own["amplitudes"]))
+
+    def packed(self, own: Numbers, setting: Setting) -> Packed:
+        """The table, component by component. Raises SceneError without gravity."""
+        g = setting.parameters["environment.gravity"]
+        if np.any(g <= 0.0):
+            faults = Faults()
+            what = f"leaves the length of {self.key} unknown (wavenumber = omega^2 / gravity)"
+            faults.add("environment.gravity", float(g.min()), what, f"give gravity above 0, or leave {self.key} out")
+            faults.raise_if_any()
+        rows = np.stack(np.broadcast_arrays(*_components(own, g)), axis=-1)
+        return Packed({"count": rows.shape[1]}, rows.reshape(len(rows), -1))
+
+    def water(self, own: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
+        """Velocity of the water (k, n, 3) [m/s]."""
+        gravity = parameters["environment.gravity"]
+        total = np.zeros(position.shape)
+        x, y, depth = np.moveaxis(position, -1, 0)
+        for j in range(own["periods"].shape[1]):
+            north, east, k, omega, phase, *speed = (part[:, j] for part in _components(own, gravity))
+            theta = north * x + east * y + (phase - omega * time[:, None])
+            e = np.exp(-k * np.maximum(depth, 0.0))
+            cosine, sine = e * np.cos(theta), e * np.sin(theta)
+            total = total + np.stack([cosine * speed[0], cosine * speed[1], -sine * speed[2]], axis=-1)
+        return total
+
+
+def _components(own: Numbers, gravity: np.ndarray) -> tuple[np.ndarray, ...]:
+    """What the device's table has of each component, each (n, k) with n 1 or that of the members."""
+    omega, heading = 2.0 * np.pi / own["periods"], np.radians(own["headings_deg"])
+    k = omega**2 / gravity[:, None]
+    speed, along, across = own["amplitudes"] * omega, np.cos(heading), np.sin(heading)
+    return k * along, k * across, k, omega, own["phases"], speed * along, speed * across, speed

@@ -1,0 +1,118 @@
+"""A wrench that is held, or follows a schedule, in body axes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, knots, quantity
+
+SHAPES = ("linear", "steps")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Wrench(Term):
+    """Constant force and torque in body axes, about the body's origin.
+
+    force: (3,) [N]; torque: (3,) [N m].
+    """
+
+    type: ClassVar[str] = "wrench"
+    device: ClassVar[str] = "wrench"
+
+    force: Any = quantity((3,), "N", (0.0, 0.0, 0.0))
+    torque: Any = quantity((3,), "N m", (0.0, 0.0, 0.0))
+
+    def present(self, own: Numbers) -> bool:
+        """Whether some member has one."""
+        return bool(np.any(own["force"]) or np.any(own["torque"]))
+
+    def packed(self, own: Numbers, setting: Setting) -> Packed:
+        """About the origin of the forces."""
+        force, torque = own["force"], own["torque"]
+        return Packed({"force": setting.frame.vector(force), "torque": setting.frame.torque(torque, force)})
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class WrenchSchedule(Term):
+    """Force and torque in body axes from a table over time.
+
+    times: (k,) [s], rising; force: (k, 3) [N]; torque: (k, 3) [N m]. interpolation: "linear" between the times, or
+    "steps", each value held until the next time; constant before the first and after the last.
+    """
+
+    type: ClassVar[str] = "wrench_schedule"
+    device: ClassVar[str] = "wrench_schedule"
+    timed: ClassVar[bool] = True
+
+    times: Any = quantity(("k",), "s")
+    force: Any = quantity(("k", 3), "N")
+    torque: Any = quantity(("k", 3), "N m", None)
+    interpolation: str = "linear"
+
+    def __post_init__(self) -> None:
+        if self.torque is None:
+            object.__setattr__(self, "torque", np.zeros(np.shape(self.force)))
+        super().__post_init__()
+
+    def check(self, faults: Faults) -> None:
+        """Times must rise."""
+        rising(faults, "times", self.times)
+        faults.choice("interpolation", self.interpolation, SHAPES)
+
+    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+        """Also where a member's times do not rise."""
+        bad = super().unphysical(own)
+        return bad | {"times": bad["times"] | not_rising(own["times"])}
+
+    def packed(self, own: Numbers, setting: Setting) -> Packed:
+        """Two tables, of the force and of the torque about the origin of the forces."""
+        force = setting.frame.vector(own["force"])
+        torque = setting.frame.torque(own["torque"] + 0.0 * own["force"], own["force"] + 0.0 * own["torque"])
+        tables = [knots(own["times"], values, self.interpolation == "steps") for values in (force, torque)]
+        n = max(len(table) for table in tables)
+        rows = np.concatenate([np.broadcast_to(table, (n, table.shape[1])) for table in tables], axis=1)
+        return Packed({"count": own["times"].shape[1] - 1}, rows)
+
+
+def not_rising(values: np.ndarray) -> np.ndarray:
+    """Which members' tables (n, k) have places that do not rise."""
+    return np.any(np.diff(np.nan_to_num(values)) <= 0.0, axis=1)
+
+
+def first_row(schedule: Any) -> Any:
+    """The commands at the schedule's first time; 0 where there is none, or none that could be read."""
+    try:
+        return np.atleast_2d(np.array(schedule, dtype=np.float64))[0] if schedule is not None else 0.0
+    except (TypeError, ValueError, IndexError):
+        return 0.0
+
+
+def commands(own: Numbers) -> tuple[np.ndarray, np.ndarray]:
+    """Times (n, k) [s] and commands (n, k, units); a command that is held is the schedule's only row."""
+    schedule = own["command_schedule"]
+    return own["times"], own["command"][:, None, :] if schedule.shape[1] == 1 else schedule
+
+
+def refuse_idle(term: Any, own: Numbers, rate: str, remembers: np.ndarray, remedy: str) -> None:
+    """Refuse members' numbers that would do nothing: of the command or of its schedule, and of a memory that is not kept."""
+    faults = Faults(f"{term.key}.")
+    held = len(term.command_schedule) == 1
+    acts, idle = ("command", ("times", "command_schedule")) if held else ("command_schedule", ("command",))
+    found = {name: (own[name] != getattr(term, name), f"a {acts}", f"vary {term.key}.{acts}") for name in idle}
+    if not term.memory:
+        found[rate] = (remembers, "none", remedy)
+    for name, (bad, there, what_to_do) in found.items():
+        if np.any(bad):
+            i = int(bad.reshape(len(bad), -1).any(axis=1).argmax())
+            faults.add(f"{name} of member {i}", own[name][i], f"does not act: the scene has {there}", what_to_do)
+    faults.raise_if_any()
+
+
+def rising(faults: Faults, key: str, values: np.ndarray) -> None:
+    """Note a table whose places do not rise."""
+    if np.any(np.diff(values) <= 0.0):
+        faults.add(key, values, "is not rising", "sort the table and drop repetitions")

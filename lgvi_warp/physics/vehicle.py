@@ -1,0 +1,299 @@
+"""The vehicle: a rigid body with added mass, weight and buoyancy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.physics import inertia as inertias
+
+Numbers = Mapping[str, np.ndarray]
+
+# The two ways to say what the inertia is: about the centre of gravity, uncoupled; or 6x6 about any origin.
+SIMPLE = {"mass": (), "added_mass": (3, 3), "inertia": (3, 3), "buoyancy": (), "center_of_buoyancy": (3,)}
+FULL = {
+    "rigid_body_mass_matrix": (6, 6),
+    "added_mass_matrix": (6, 6),
+    "weight": (),
+    "center_of_gravity": (3,),
+    "buoyancy": (),
+    "center_of_buoyancy": (3,),
+}
+UNITS = {
+    "mass": "kg",
+    "added_mass": "kg",
+    "inertia": "kg m2",
+    "rigid_body_mass_matrix": "kg, kg m, kg m2",
+    "added_mass_matrix": "kg, kg m, kg m2",
+    "weight": "N",
+    "buoyancy": "N",
+    "center_of_gravity": "m",
+    "center_of_buoyancy": "m",
+}
+# The least mass or inertia: what is smaller has no inverse in float64.
+LEAST = float(np.finfo(np.float64).tiny)
+# By what part of the third two principal inertias of a rigid body may sum to less than it: round-off; and as far as
+# published ones miss it (those of the ECA A9 by 0.126).
+ROUND_OFF, LITTLE = 1e-6, 0.15
+SYMMETRIC = ("added_mass", "inertia", "rigid_body_mass_matrix", "added_mass_matrix")
+
+
+class Seen(str):
+    """A warning that a vehicle found in its own numbers: found anew where it is made again from another's fields."""
+
+
+@dataclass(frozen=True, eq=False)
+class Vehicle:
+    """A rigid body in water, in body axes (x ahead, y to starboard, z down), said in one of two ways.
+
+    About its centre of gravity: mass, dry [kg]; inertia, (3,) or (3, 3) [kg m2], added inertia included; added_mass, (3,)
+    or symmetric (3, 3) [kg]. Or about any origin of the body: rigid_body_mass_matrix and added_mass_matrix, (6, 6),
+    linear first [kg, kg m, kg m2], added mass positive (minus Fossen's X_udot ...); weight [N], which acts at
+    center_of_gravity (3,) [m] from the origin (by default where the rigid body's matrix has it).
+
+    inertia_tolerance: by what part of the largest the other two principal inertias may sum to less than it, in the 6x6
+    form; 0 by default, where a matrix that no rigid body has is refused. Importers set it for published numbers.
+
+    buoyancy: weight of the displaced water [N], at center_of_buoyancy (3,) [m] from the origin. Matrices are kept in
+    full. `warnings` holds what is unusual but allowed: texts given here, as an importer does, and what is found. They are
+    among the messages of a run.
+
+    Raises SceneError naming every fault: not positive, not finite, wrong shape, not symmetric, not positive definite.
+    """
+
+    mass: float | None = None
+    inertia: Any = None
+    added_mass: Any = None
+    buoyancy: float = 0.0
+    center_of_buoyancy: Any = (0.0, 0.0, 0.0)
+    rigid_body_mass_matrix: Any = None
+    added_mass_matrix: Any = None
+    weight: float | None = None
+    center_of_gravity: Any = None
+    inertia_tolerance: float = 0.0
+    warnings: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        faults = Faults("vehicle.")
+        values: dict[str, Any] = {
+            "buoyancy": faults.number("buoyancy", self.buoyancy, "N", least=0.0),
+            "center_of_buoyancy": faults.finite("center_of_buoyancy", self.center_of_buoyancy, (3,), "m"),
+        }
+        given = _texts(faults, self.warnings)
+        tolerance = faults.number("inertia_tolerance", self.inertia_tolerance, "1", least=0.0)
+        object.__setattr__(self, "inertia_tolerance", tolerance or 0.0)
+        values |= self._full(faults) if self.full else self._simple(faults)
+        values["warnings"] = (*given, *map(Seen, values["warnings"]))
+        faults.raise_if_any()
+        for name, value in values.items():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    @property
+    def full(self) -> bool:
+        """Whether the inertia is said by 6x6 matrices."""
+        return self.rigid_body_mass_matrix is not None or self.added_mass_matrix is not None
+
+    def _simple(self, faults: Faults) -> dict[str, Any]:
+        for name in ("weight", "center_of_gravity"):
+            if getattr(self, name) is not None:
+                faults.add(name, getattr(self, name), "belongs to the 6x6 form", "give rigid_body_mass_matrix as well")
+        for name in ("mass", "inertia"):
+            if getattr(self, name) is None:
+                faults.add(name, None, "is missing", f"give it [{UNITS[name]}]")
+        mass = None if self.mass is None else faults.positive("mass", self.mass, "kg")
+        given = (0.0, 0.0, 0.0) if self.added_mass is None else self.added_mass
+        if mass is not None and mass < LEAST:
+            faults.add("mass", self.mass, "has no inverse in float64", f"give a mass from {LEAST:.3g} kg")
+        added = faults.symmetric("added_mass", given, "kg")
+        inertia = None if self.inertia is None else faults.symmetric("inertia", self.inertia, "kg m2")
+        if inertia is not None and not _definite(inertia):
+            faults.add("inertia", self.inertia, "is not positive definite", "give principal inertias above 0 [kg m2]")
+        if mass is not None and added is not None and not _definite(added, mass * np.eye(3)):
+            faults.add("added_mass", given, "with the mass is not positive definite", SIGN)
+        warnings = unusual("inertia", inertia) if inertia is not None else ()
+        return {"mass": mass, "added_mass": added, "inertia": inertia, "warnings": warnings}
+
+    def _full(self, faults: Faults) -> dict[str, Any]:
+        for name in ("mass", "inertia", "added_mass"):
+            if getattr(self, name) is not None:
+                faults.add(
+                    name, getattr(self, name), "says again what the 6x6 matrices say", "keep one of the two forms"
+                )
+        unit = UNITS["rigid_body_mass_matrix"]
+        rigid: np.ndarray | None = None
+        if self.rigid_body_mass_matrix is None:
+            faults.add("rigid_body_mass_matrix", None, "is missing", f"give it beside added_mass_matrix [{unit}]")
+        else:
+            rigid = faults.symmetric("rigid_body_mass_matrix", self.rigid_body_mass_matrix, unit, 6)
+        zeros = np.zeros((6, 6))
+        given = zeros if self.added_mass_matrix is None else self.added_mass_matrix
+        added = faults.symmetric("added_mass_matrix", given, unit, 6)
+        weight = None if self.weight is None else faults.number("weight", self.weight, "N", least=0.0)
+        center: np.ndarray | None = None
+        warnings: tuple[str, ...] = ()
+        if self.center_of_gravity is not None:
+            center = faults.finite("center_of_gravity", self.center_of_gravity, (3,), "m")
+        if rigid is not None:
+            center, warnings = self._rigid(faults, rigid, center)
+            if _definite(rigid):
+                warnings += self._triangle(faults, rigid)
+        if rigid is not None and added is not None and _definite(rigid) and not _definite(added, rigid):
+            faults.add("added_mass_matrix", given, "with the rigid body's is not positive definite", SIGN)
+        values = {"rigid_body_mass_matrix": rigid, "added_mass_matrix": added, "weight": weight}
+        return values | {"center_of_gravity": center, "warnings": warnings}
+
+    def _triangle(self, faults: Faults, rigid: np.ndarray) -> tuple[str, ...]:
+        """Refuse principal inertias that no rigid body has; warn of those that the tolerance allows."""
+        short = float(shortage(rigid[None])[0])
+        if short <= ROUND_OFF:
+            return ()
+        moments = ", ".join(f"{one:.6g}" for one in np.linalg.eigvalsh(about_center(rigid[None])[0]))
+        what = f"has principal inertias {moments} kg m2, two of which sum to less than the third"
+        by = f"by {100.0 * short:.2g} % of it"
+        if short <= self.inertia_tolerance:
+            return (f"vehicle.rigid_body_mass_matrix: {what}, {by}: no rigid body has; taken as it is",)
+        remedy = "give the rigid body's own inertia here, and added inertia in added_mass_matrix"
+        remedy += f"; or allow it: inertia_tolerance = {short * 1.01:.2g}" if short <= LITTLE else ""
+        faults.add("rigid_body_mass_matrix", rigid[3:, 3:], f"{what}: no rigid body has", f"it misses {by}; {remedy}")
+        return ()
+
+    def _rigid(self, faults: Faults, rigid: np.ndarray, center: Any) -> tuple[np.ndarray | None, tuple[str, ...]]:
+        """Check that the matrix is that of a rigid body: m I, -m hat(r), a positive inertia. Returns r, warnings."""
+        remedy = "give [[m I, -m hat(r_g)], [m hat(r_g), inertia about the origin]]"
+        m = rigid[0, 0]
+        if not _definite(rigid):
+            faults.add("rigid_body_mass_matrix", rigid, "is not positive definite", remedy)
+            return None, ()
+        implied = -inertias.vee(rigid[:3, 3:]) / m
+        size = np.abs(rigid).max()
+        if np.abs(rigid[:3, :3] - m * np.eye(3)).max() > 1e-6 * size:
+            faults.add("rigid_body_mass_matrix", rigid[:3, :3], "has no m I in its first block", remedy)
+        if np.abs(rigid[:3, 3:] + m * inertias.hat(implied)).max() > 1e-6 * size:
+            faults.add("rigid_body_mass_matrix", rigid[:3, 3:], "has no -m hat(r_g) in its second block", remedy)
+        if center is None:
+            return implied, ()
+        if np.abs(center - implied).max() > 1e-3 * max(np.abs(center).max(), np.sqrt(np.trace(rigid[3:, 3:]) / m)):
+            text = (
+                f"center_of_gravity {center.tolist()} m, where the rigid body's matrix has it at {implied.tolist()} m"
+            )
+            return center, (f"vehicle.{text}: weight acts at the first, inertia at the second",)
+        return center, ()
+
+    @property
+    def mass_matrix(self) -> np.ndarray:
+        """Mass and added mass of translation, (3, 3) [kg]."""
+        if self.full:
+            return np.asarray(self.rigid_body_mass_matrix + self.added_mass_matrix)[:3, :3]
+        return np.asarray(np.asarray(self.mass) * np.eye(3) + self.added_mass)
+
+    def parameters(self) -> dict[str, np.ndarray]:
+        """What may vary by member, by name. The weight of a 6x6 vehicle is there only if it was given."""
+        names = [name for name in (FULL if self.full else SIMPLE) if getattr(self, name) is not None]
+        return {name: np.asarray(getattr(self, name), dtype=np.float64) for name in names}
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in a scene file: diagonal matrices as their diagonal."""
+        content = {}
+        for name, value in self.parameters().items():
+            full = name in ("rigid_body_mass_matrix", "added_mass_matrix")
+            content[name] = compact(value) if value.shape == (3, 3) and not full else value.tolist()
+        given = [text for text in self.warnings if not isinstance(text, Seen)]
+        content |= {"inertia_tolerance": self.inertia_tolerance} if self.inertia_tolerance else {}
+        return content | ({"warnings": given} if given else {})
+
+
+def _texts(faults: Faults, given: Any) -> tuple[str, ...]:
+    """The texts given as warnings, without those that a vehicle found itself; none after noting a fault."""
+    if isinstance(given, list | tuple) and all(isinstance(text, str) for text in given):
+        return tuple(text for text in given if not isinstance(text, Seen))
+    faults.add("warnings", given, "is not a list of texts", 'give ["..."], or leave it out')
+    return ()
+
+
+SIGN = "added mass is positive here: minus Fossen's X_udot, Y_vdot, Z_wdot ..."
+
+
+def _definite(matrix: np.ndarray, other: Any = 0.0) -> bool:
+    """Whether the sum is positive definite; False where it overflows."""
+    with np.errstate(over="ignore"):
+        total = matrix + other
+    return bool(np.isfinite(total).all() and np.linalg.eigvalsh(total)[0] >= LEAST)
+
+
+def compact(matrix: np.ndarray) -> list[Any]:
+    """A diagonal matrix as its 3 numbers, another as nested lists."""
+    diagonal = np.diag(matrix)
+    return (diagonal if np.array_equal(matrix, np.diag(diagonal)) else matrix).tolist()
+
+
+def unusual(name: str, inertia: Any) -> tuple[str, ...]:
+    """Warns of principal inertias that no rigid body has (J_i + J_j < J_k); added inertia can have them."""
+    small, middle, large = np.linalg.eigvalsh(inertia)
+    if small >= large * (1.0 - 1e-12) - middle:
+        return ()
+    text = f"vehicle.{name}: principal inertias {small:.6g} + {middle:.6g} < {large:.6g} [kg m2]"
+    return (text + ": no rigid body has these; that is right only if added inertia makes the difference",)
+
+
+def about_center(rigid: np.ndarray) -> np.ndarray:
+    """Inertia (n, 3, 3) [kg m2] about the centre of gravity, from rigid bodies' matrices (n, 6, 6)."""
+    m = rigid[:, :1, :1]
+    H = inertias.hat(-inertias.vee(rigid[:, :3, 3:]) / m[:, 0])
+    return np.asarray(rigid[:, 3:, 3:] + m * (H @ H))
+
+
+def shortage(rigid: np.ndarray) -> np.ndarray:
+    """By what part of the largest the other two principal inertias of matrices (n, 6, 6) sum to less than it; or below 0."""
+    small, middle, large = np.linalg.eigvalsh(about_center(rigid)).T
+    return np.asarray(1.0 - (small + middle) / large)
+
+
+def impossible(rigid: np.ndarray, tolerance: float = 0.0) -> np.ndarray:
+    """Which matrices (n, 6, 6) no rigid body has: two principal inertias sum to less than the third by more."""
+    return shortage(rigid) > max(tolerance, ROUND_OFF)
+
+
+def inertia6(p: Numbers) -> np.ndarray:
+    """I6 (n, 6, 6) about the user's origin, added inertia included, from the parameters of a scene."""
+    if "vehicle.rigid_body_mass_matrix" in p:
+        return np.asarray(p["vehicle.rigid_body_mass_matrix"] + p["vehicle.added_mass_matrix"])
+    M = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
+    J = p["vehicle.inertia"]
+    n = max(len(M), len(J))
+    M, J = np.broadcast_to(M, (n, 3, 3)), np.broadcast_to(J, (n, 3, 3))
+    return inertias.joined(M, np.zeros((n, 3, 3)), J)
+
+
+def dry_mass(p: Numbers) -> np.ndarray:
+    """Mass of the rigid body (n,) [kg]."""
+    if "vehicle.rigid_body_mass_matrix" in p:
+        return np.asarray(p["vehicle.rigid_body_mass_matrix"][:, 0, 0])
+    return np.asarray(p["vehicle.mass"])
+
+
+def weight(p: Numbers) -> np.ndarray:
+    """Weight (n,) [N]: as given, or mass times gravity."""
+    if "vehicle.weight" in p:
+        return np.asarray(p["vehicle.weight"])
+    return dry_mass(p) * p["environment.gravity"]
+
+
+def displaced_mass(p: Numbers) -> np.ndarray:
+    """Mass of the displaced water (n,) [kg]: buoyancy over gravity; without gravity, the mass of a neutral vehicle."""
+    g = p["environment.gravity"]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(g > 0.0, p["vehicle.buoyancy"] / g, dry_mass(p))
+
+
+def center_of_mass(p: Numbers) -> np.ndarray:
+    """Where the rigid body's mass is (n, 3) [m], from the user's origin."""
+    if "vehicle.rigid_body_mass_matrix" in p:
+        rigid = p["vehicle.rigid_body_mass_matrix"]
+        return np.asarray(-inertias.vee(rigid[:, :3, 3:]) / rigid[:, 0, 0, None])
+    return np.zeros((1, 3))

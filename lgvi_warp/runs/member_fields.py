@@ -1,0 +1,92 @@
+"""What a run says of each member besides its samples: one line a field, for memory, files and stores alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common.status import Status, Warnings, stopped
+
+if TYPE_CHECKING:
+    from lgvi_warp.engine.outcome import Outcome
+    from lgvi_warp.engine.plan import Plan
+
+
+@dataclass(frozen=True)
+class MemberField:
+    """One number of each member: its name, NumPy's type, CF attributes, and how an outcome gives it, (n,).
+
+    when: whether a plan has it.
+    """
+
+    name: str
+    dtype: str
+    attributes: dict[str, Any]
+    of: Callable[[Plan, Outcome], np.ndarray]
+    when: Callable[[Plan], bool] = lambda plan: True
+
+
+def _failure_time(plan: Plan, outcome: Outcome) -> np.ndarray:
+    """The time of the last good state, for an event its own; NaN where there was neither."""
+    return np.where(outcome.status != 0, outcome.end_time(plan), np.nan)
+
+
+def _failure_value(plan: Plan, outcome: Outcome) -> np.ndarray:
+    """What crossed its limit; 0 for an event."""
+    size = np.where(stopped(outcome.status), 0.0, outcome.failed_size)
+    return np.where(outcome.status != 0, size, np.nan)
+
+
+def _warning_time(plan: Plan, outcome: Outcome) -> np.ndarray:
+    """When the most serious warning was first seen."""
+    return np.where(outcome.warnings != 0, outcome.warning_step * plan.grid.h, np.nan)
+
+
+def _warning_value(plan: Plan, outcome: Outcome) -> np.ndarray:
+    """What was seen then."""
+    return np.where(outcome.warnings != 0, outcome.warning_value, np.nan)
+
+
+def _adaptive(plan: Plan) -> bool:
+    return plan.method.adaptive
+
+
+STATUS = {
+    "long_name": "outcome of the member",
+    "flag_values": [int(one) for one in Status],
+    "flag_meanings": " ".join(one.name.lower() for one in Status),
+}
+WARNINGS = {
+    "long_name": "bits of lgvi_warp.Warnings",
+    "flag_masks": [int(one) for one in Warnings],
+    "flag_meanings": " ".join(str(one.name).lower() for one in Warnings),
+}
+FIELDS = (
+    MemberField("status", "|u1", STATUS, lambda plan, outcome: outcome.status),
+    MemberField("failure_time", "<f8", {"long_name": "time of the last good state of a member that failed or of its event",
+                                        "units": "s"}, _failure_time),
+    MemberField("failure_value", "<f8", {"long_name": "size that crossed its limit", "units": "1"}, _failure_value),
+    MemberField("warnings", "<u2", WARNINGS, lambda plan, outcome: outcome.warnings),
+    MemberField("warning_time", "<f8", {"long_name": "first crossing of the most serious warning", "units": "s"},
+                _warning_time),
+    MemberField("warning_value", "<f8", {"long_name": "value at that crossing", "units": "1"}, _warning_value),
+    MemberField("substeps", "<i8", {"long_name": "steps that were divided", "units": "1"},
+                lambda plan, outcome: outcome.substeps),
+    MemberField("steps_made", "<i8", {"long_name": "steps made", "units": "1"},
+                lambda plan, outcome: outcome.chosen[:, 0], _adaptive),
+    MemberField("steps_tried", "<i8", {"long_name": "steps tried", "units": "1"},
+                lambda plan, outcome: outcome.chosen[:, 1], _adaptive),
+)  # fmt: skip
+
+
+def present(plan: Plan) -> tuple[MemberField, ...]:
+    """The fields that a run of this plan has."""
+    return tuple(one for one in FIELDS if one.when(plan))
+
+
+def of(plan: Plan, outcome: Outcome) -> dict[str, np.ndarray]:
+    """The fields of these members, by name."""
+    return {one.name: one.of(plan, outcome).astype(one.dtype, copy=False) for one in present(plan)}

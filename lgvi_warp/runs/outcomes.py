@@ -1,0 +1,42 @@
+"""What became of a run's members: until when each was under way, and a sentence for each outcome."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lgvi_warp.common.status import Status, stop_time
+
+if TYPE_CHECKING:
+    from lgvi_warp.runs.result import Result
+
+
+def outcomes(result: Result) -> list[Status]:
+    """The statuses that occur, those that ran to the end first."""
+    return [Status(int(code)) for code in np.unique(np.asarray(result.status))]
+
+
+def outcome_text(result: Result, code: Status) -> str:
+    """How many members have a status, the first of them in time, and what it means.
+
+    Args:
+        result: Of a run.
+        code: A status that some member has.
+
+    Returns:
+        One line; of a failure with the value that passed its limit, and the remedy.
+    """
+    members = np.flatnonzero(np.asarray(result.status) == code)
+    many = f"{code.name.lower()}, {len(members):,} of {result.members:,} members"
+    if code == Status.OK:
+        return f"{many}: {code.text}"
+    first = int(members[stop_time(result)[members].argmin()])
+    value = "" if code.stopped else f", value {result.failure_value[first]:.4g}"
+    return f"{many} (first: member {first} at {stop_time(result)[first]:g} s{value}): {code.text}"
+
+
+def failure_text(result: Result) -> str:
+    """A line for each kind of failure, with the remedy; "" where no member failed."""
+    failures = [code for code in outcomes(result) if code != Status.OK and not code.stopped]
+    return "\n".join(outcome_text(result, code) for code in failures)

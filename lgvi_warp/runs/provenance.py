@@ -1,0 +1,59 @@
+"""To be said in one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from lgvi_warp.common import machine
+from lgvi_warp.engine.keepers.observation import Observation
+from lgvi_warp.engine.plan import Plan
+from lgvi_warp.scene import plausibility
+from lgvi_warp.scene.ensemble import AT_ONCE
+
+
+def messages(plan: Plan) -> tuple[str, ...]:
+    """What the user should know before the run."""
+    return plan.grid.messages + tuple(plan.ensemble.scene.vehicle.warnings) + odd_before(plan)
+
+
+def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence[str] | None = None) -> dict[str, Any]:
+    """Everything that the result follows from: scene, ensemble, settings, versions, machine.
+
+    observed: what is kept of it, told where that is not all; fields: of the samples that are.
+    """
+    content = {
+        "scene": plan.ensemble.scene.to_dict(),
+        "ensemble": plan.ensemble.to_dict(),
+        "method": {
+            "name": plan.method.name,
+            "solver": plan.method.solver,
+            "iterations": plan.method.iterations,
+            "tolerance": plan.method.residual_tolerance(plan.dtype),
+        }
+        | ({"alpha": plan.method.alpha, "beta": plan.method.beta} if plan.spec.averages else {})
+        | ({"rtol": plan.method.rtol, "atol": plan.method.atol} if plan.method.adaptive else {}),
+        "step": plan.grid.h,
+        "steps": plan.grid.steps,
+        "dtype": plan.dtype,
+        "width": plan.spec.width,
+        "checks": plan.checks,
+        "on_failure": plan.on_failure,
+        "terms": [term.type for term, _ in plan.model.laws],
+        "kernel": plan.kernel_hash,
+        "versions": machine.versions(),
+        "machine": machine.describe(),
+    }
+    if observed is not None and observed != Observation():
+        content["observed"] = observed.to_dict() | (
+            {} if observed.samples else {"fields": list(plan.fields if fields is None else fields)}
+        )
+    return content
+
+
+def odd_before(plan: Plan) -> tuple[str, ...]:
+    """What is odd of the members' numbers, and of where they start: of a large fleet, of where the first ones do."""
+    ensemble = plan.ensemble
+    varies = ensemble.starts_vary or bool(ensemble.varied() and plausibility.own_flows(ensemble.scene))
+    starts = plausibility.of_start(ensemble.scene, ensemble.select(0, min(AT_ONCE, ensemble.members) if varies else 1))
+    return plan.model.odd.messages(ensemble.members) + starts.messages(ensemble.members, AT_ONCE)

@@ -1,0 +1,73 @@
+"""What the arrays of a result.npz must be, so that one that was damaged or made by somebody else is refused in a line."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.safe_files import parsed
+from lgvi_warp.runs import member_fields
+
+# Of the samples, by name: the shape of one member's at one time.
+SHAPES: dict[str, tuple[int, ...]] = {
+    "position": (3,), "attitude": (3, 3), "quaternion_wxyz": (4,), "velocity": (3,), "angular_velocity": (3,), "energy": (),
+}  # fmt: skip
+TEXTS = ("messages", "provenance", "statistics")
+
+
+@contextlib.contextmanager
+def understood(path: str | os.PathLike[str]) -> Iterator[None]:
+    """What fails while a result is read is a fault of its file. Raises SceneError."""
+    try:
+        yield
+    except SceneError as error:
+        raise SceneError(f"{os.fspath(path)}: {text}" for text in error.faults) from error
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError, ArithmeticError, RecursionError) as error:
+        what = " ".join(str(error).split())[:200] or type(error).__name__
+        remedy = "run the scene again, or ask for the file anew"
+        raise SceneError([f"{os.fspath(path)}: is damaged, or no result of lgvi-warp: {what}; {remedy}"]) from error
+
+
+def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """The texts of a result whose arrays fit each other. Raises ValueError naming what does not."""
+    if missing := [name for name in ("time", "status", *TEXTS[:2]) if name not in content]:
+        raise ValueError(f"it has no {', '.join(missing)}")
+    of_members = {one.name: np.dtype(one.dtype) for one in member_fields.FIELDS}
+    k, n = content["time"].size, content["status"].size
+    m = content["kept/members"].size if "kept/members" in content else 0
+    for name, array in content.items():
+        base = name.removeprefix("kept/")
+        if base in SHAPES:
+            good = array.shape == (k, n if base == name else m, *SHAPES[base]) and array.dtype.kind == "f"
+        elif name in TEXTS:
+            good = array.dtype.kind == "U" and array.shape == ()
+        elif name == "time":
+            good = array.shape == (k,) and array.dtype == np.float64
+        elif name in of_members:
+            good = array.shape == (n,) and array.dtype == of_members[name]
+        elif name == "kept/members":
+            good = array.shape == (m,) and array.dtype.kind == "i" and (not m or 0 <= array.min() <= array.max() < n)
+        elif name.startswith(("parameters/", "kept/parameters/")):
+            lengths = (1, m if name.startswith("kept/") else n)
+            good = array.dtype.kind == "f" and array.ndim > 0 and len(array) in lengths
+        else:
+            good = name.startswith("statistics/") and array.dtype.kind in "biufU"
+        if not good:
+            raise ValueError(f"{name[:100]!r} has the type {array.dtype} and shape {array.shape}")
+    texts = {name: parsed(str(content[name])) for name in TEXTS[:2]}
+    if not isinstance(texts["messages"], list) or not all(isinstance(one, str) for one in texts["messages"]):
+        raise ValueError("its messages are no texts")
+    _provenance(texts["provenance"])
+    return texts
+
+
+def _provenance(told: Any) -> None:
+    """What the summary and the pictures ask of it. Raises ValueError."""
+    good = isinstance(told, dict) and isinstance(told.get("scene"), dict) and isinstance(told.get("method"), dict)
+    if not good or not isinstance(told["method"].get("name"), str) or not isinstance(told.get("step"), int | float):
+        raise ValueError("its provenance tells no scene, method or step")

@@ -1,0 +1,108 @@
+"""What statistics will take on disk and in memory, told by a block's parts of a few sample times."""
+
+from __future__ import annotations
+
+import tracemalloc
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.engine.block import blocks
+from lgvi_warp.engine.keepers.statistics import Gathered
+from lgvi_warp.engine.work import at_start, samples_of
+from lgvi_warp.runs.store.sink import packed
+from lgvi_warp.statistics.base import Statistic
+from lgvi_warp.statistics.order import SORTED_AT_ONCE
+from lgvi_warp.statistics.tree import Part
+
+if TYPE_CHECKING:
+    from lgvi_warp.engine.plan import Plan
+
+# Sample times of the two small runs that tell what all take: arrays have a row for each time, or none.
+FEW, MORE = 2, 4
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Bytes. file, part: of a block's parts in a file and in memory; joined: of all parts that a run has joined, at most.
+
+    estimates: of what is read from them; taking: what a block needs beside while it gathers, reading: what is needed while
+    they are read.
+    """
+
+    file: int = 0
+    part: int = 0
+    joined: int = 0
+    estimates: int = 0
+    taking: int = 0
+    reading: int = 0
+
+
+def sizes(plan: Plan, statistics: Sequence[Statistic]) -> Sizes:
+    """Of these statistics in a run of the plan, which is compiled."""
+    times, runs = len(plan.grid.times), blocks(plan.ensemble.members)
+    if not statistics:
+        return Sizes()
+    few, more = (_of_times(plan, statistics, min(count, times)) for count in (FEW, MORE))
+
+    def at(name: str, count: int) -> int:
+        slope = (getattr(more, name) - getattr(few, name)) / (min(MORE, times) - FEW) if times > FEW else 0.0
+        return round(getattr(few, name) + slope * (count - FEW))
+
+    found = {name: at(name, times) for name in ("file", "part", "joined", "estimates")}
+    # Samples come a launch at a time, and sketches are read so many numbers at a time.
+    launch = max(s1 - s0 for s0, s1 in (plan.due(*one) for one in plan.segments(runs[0].count)))
+    at_once = max(1, SORTED_AT_ONCE * times * 8 // max(found["joined"], 1))
+    return Sizes(**found, taking=at("taking", launch), reading=at("reading", min(times, at_once)))
+
+
+def _of_times(plan: Plan, statistics: Sequence[Statistic], count: int) -> Sizes:
+    """The sizes if there were so many sample times, of members that stay as they start."""
+    from lgvi_warp.engine.packets import Packets
+
+    block, *others = blocks(plan.ensemble.members)
+    when, time = slice(0, count), plan.grid.times[:count]
+    members = plan.ensemble.select(block.first, block.stop)
+    start = {name: np.repeat(values, count, axis=0) for name, values in at_start(plan, members).items()}
+    packets = Packets(plan, members)
+    keeper = Gathered(time, plan.ensemble.members, statistics, plan.ensemble.replicates)
+    gathers = keeper.open(plan, block, members)
+    _, taking = _peak(lambda: gathers.take(when, samples_of(plan, when, start, packets.ended)))
+    part = gathers.close(packets.outcome())
+    file = len(packed([keeper], [part]))
+    joined, reading, estimates = 0, 0, 0
+    with np.errstate(all="ignore"):
+        for statistic, one in zip(statistics, part, strict=True):
+            tree = _fullest(statistic, one, 1 + len(others))
+            read, more = _peak(lambda: keeper.said(statistic, tree))  # noqa: B023
+            joined, reading = joined + sum(map(_bytes, tree)), max(reading, more)
+            estimates += sum(_bytes(one.arrays) for one in read)
+    return Sizes(file, sum(map(_bytes, part)), joined, estimates, taking, reading)
+
+
+def _fullest(statistic: Statistic, part: Part, count: int) -> list[Part]:
+    """A tree of so many blocks' parts at its fullest: one of each level, the largest first."""
+    tree = [part]
+    for level in range(1, count.bit_length()):
+        tree.append(statistic.join(tree[-1], tree[-1], (level, 0)))
+    return tree[::-1]
+
+
+def _bytes(arrays: Any) -> int:
+    return sum(array.nbytes for array in arrays.values())
+
+
+def _peak(action: Callable[[], Any]) -> tuple[Any, int]:
+    """(what an action gives, bytes of memory that it took at most)."""
+    mine = not tracemalloc.is_tracing()
+    if mine:
+        tracemalloc.start()
+    tracemalloc.reset_peak()
+    before = tracemalloc.get_traced_memory()[0]
+    try:
+        return action(), tracemalloc.get_traced_memory()[1] - before
+    finally:
+        if mine:
+            tracemalloc.stop()

@@ -1,0 +1,167 @@
+"""A run in a store as one NetCDF file or as Parquet, for programs that read those; piece by piece, whatever its size."""
+
+from __future__ import annotations
+
+import errno
+import itertools
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common import files as durable
+from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.engine.block import Block
+from lgvi_warp.methods.saveat import FIELDS
+from lgvi_warp.runs.store.folder import KEPT, Folder
+from lgvi_warp.runs.store.layout import KEPT_MEMBER, MEMBER
+from lgvi_warp.runs.store.open import folder_of, open_run
+from lgvi_warp.runs.store.state import state
+
+if TYPE_CHECKING:
+    import zarr
+
+FORMATS = {"netcdf": ".nc", "parquet": ".parquet"}
+MEMBERS = (MEMBER, KEPT_MEMBER)
+
+
+def export(path: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | None = None) -> Path:
+    """Write a complete run as "netcdf" (one NetCDF-4 file) or "parquet" (one file, a row for each member and time).
+
+    NetCDF has the members that the run keeps after all in the group "kept", and its statistics in "statistics". Parquet
+    has one table: of all samples, else of those of the kept members, else a row for each member without time.
+    path: a store, or a folder with one. out: the file, default beside the store; one that is there is replaced. Returns
+    its path. Raises SceneError, or OSError.
+    """
+    faults = Faults()
+    faults.choice("to", to, FORMATS)
+    faults.raise_if_any()
+    folder = Folder(folder_of(path))
+    if not folder.complete:
+        raise SceneError([f"{folder.path}: is not complete; go on with `lgvi-warp resume {folder.path.parent}` first"])
+    target = Path(out) if out is not None else folder.path.with_suffix(FORMATS[to])
+    if target.is_dir():
+        raise SceneError([f"out = {target}: is a folder; give the name of a file"])
+    check_whole(folder)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        with durable.placed(target) as beside:
+            {"netcdf": _netcdf, "parquet": _parquet}[to](folder, beside)
+    except ImportError as error:
+        raise SceneError([f"to = {to!r}: {error}; install it: pip install 'lgvi-warp[export]'"]) from error
+    except (OSError, RuntimeError) as error:
+        # Neither library names the file, and netCDF4 not what the system said.
+        what = getattr(error, "strerror", None) or f"was not written ({error}); is the disk full?"
+        raise OSError(getattr(error, "errno", None) or errno.EIO, what, str(target)) from error
+    return target
+
+
+def check_whole(folder: Folder) -> None:
+    """Every file must be as it was written: one that is missing would be exported as NaN. Raises SceneError."""
+    found = state(folder.path)
+    if not found["complete"]:
+        damage = found["damage"][:5] or [f"{found['blocks'] - found['finished']} blocks are not marked as finished"]
+        raise SceneError(f"{folder.path}: {text}; `lgvi-warp resume {folder.path}` mends it" for text in damage)
+
+
+def _netcdf(folder: Folder, target: Path) -> None:
+    """The run, and in groups of their own the kept members and the statistics, where it has them."""
+    import netCDF4
+
+    with netCDF4.Dataset(target, "w") as file:
+        _netcdf_group(folder, file)
+        if (kept := folder.kept()) is not None:
+            _netcdf_group(kept, file.createGroup(KEPT))
+    if statistics := open_run(folder.path).statistics:
+        statistics.dataset.to_netcdf(target, mode="a", group="statistics", engine="netcdf4")
+
+
+def _netcdf_group(folder: Folder, file: Any) -> None:
+    """Every array with its attributes, a block of members at a time."""
+    group = folder.group()
+    for name, value in group.attrs.asdict().items():
+        file.setncattr(name, np.int8(value) if isinstance(value, bool) else value)
+    for name, array in dict(group.arrays()).items():
+        dims = array.metadata.dimension_names
+        shape = [folder.members if dim in MEMBERS else size for dim, size in zip(dims, array.shape, strict=True)]
+        for dim, size in zip(dims, shape, strict=True):
+            if dim not in file.dimensions:
+                file.createDimension(dim, size)
+        chunks = [min(c, size) for c, size in zip(array.chunks, shape, strict=True)]
+        variable = file.createVariable(name, array.dtype.name, dims, chunksizes=chunks, fill_value=False)
+        for key, value in array.attrs.asdict().items():
+            variable.setncattr(key, np.asarray(value, array.dtype) if key in ("flag_values", "flag_masks") else value)
+        for at in _pieces(array, folder.runs):
+            variable[at] = array[at]
+
+
+def _pieces(array: zarr.Array[Any], runs: list[Block]) -> Iterator[tuple[slice, ...]]:
+    """Slices that cover an array, a block of members at a time, all of it where it has none."""
+    axis = next((i for i, dim in enumerate(array.metadata.dimension_names) if dim in MEMBERS), None)
+    if axis is None:
+        yield (slice(None),) * array.ndim
+        return
+    for run in runs:
+        yield (*(slice(None),) * axis, slice(run.first, run.stop), *(slice(None),) * (array.ndim - axis - 1))
+
+
+def _parquet(folder: Folder, target: Path) -> None:
+    """A row for each member and time that there are samples of, or for each member where there are none.
+
+    A row group a block. Columns realization, time, each component of the samples and of what varies, status,
+    failure_time; units in the metadata of columns, and for pandas in its `attrs`.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    if not _timed(folder.group()):
+        folder = folder.kept() or folder
+    group = folder.group()
+    units = {name: str(array.attrs["units"]) for name, array in group.arrays() if "units" in array.attrs}
+    writer = None
+    try:
+        for run in folder.runs:
+            rows = _rows(group, run)
+            of = {name: units[array] for name, (array, _) in rows.items() if array in units}
+            table = pa.table({name: values for name, (_, values) in rows.items()})
+            fields = [one.with_metadata({"units": of[one.name]}) if one.name in of else one for one in table.schema]
+            content = {name: str(group.attrs[name]) for name in ("Conventions", "source", "provenance")}
+            table = table.cast(pa.schema(fields, content | {"PANDAS_ATTRS": json.dumps({"units": of})}))
+            writer = writer or pq.ParquetWriter(target, table.schema)
+            writer.write_table(table)
+    finally:
+        if writer is not None:
+            writer.close()
+
+
+def _timed(group: Any) -> list[str]:
+    """Names of the samples."""
+    return [name for name in FIELDS if name in group]
+
+
+def _rows(group: Any, run: Block) -> dict[str, tuple[str, np.ndarray]]:
+    """A block's columns, member by member: by name the array that each is of, and its numbers."""
+    at, timed = np.arange(run.first, run.stop), _timed(group)
+    if "chosen" in group:
+        at = at[group["chosen"][run.first : run.stop] == 1]
+    time = group["time"][:] if timed else np.zeros(1)
+    columns = {"realization": ("realization", np.repeat(group["realization"].oindex[at], len(time)))}
+    if timed:
+        columns["time"] = ("time", np.tile(time, len(at)))
+    for name in timed:
+        columns |= _components(name, np.swapaxes(group[name].oindex[:, at], 0, 1).reshape(-1, *group[name].shape[2:]))
+    for name in (name for name, _ in group.arrays() if "." in name):
+        columns |= _components(name, np.repeat(group[name].oindex[at], len(time), axis=0))
+    return columns | {name: (name, np.repeat(group[name].oindex[at], len(time))) for name in ("status", "failure_time")}
+
+
+def _components(name: str, values: np.ndarray) -> dict[str, tuple[str, np.ndarray]]:
+    """Rows (n, ...) of an array, a column for each component: position_0, attitude_12, vehicle.mass."""
+    if values.ndim == 1:
+        return {name: (name, values)}
+    places = itertools.product(*map(range, values.shape[1:]))
+    flat = values.reshape(len(values), -1).T
+    return {f"{name}_{''.join(map(str, at))}": (name, column.copy()) for at, column in zip(places, flat, strict=True)}

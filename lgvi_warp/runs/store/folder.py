@@ -1,0 +1,258 @@
+"""A run on disk: a zarr v3 group, written block by block, each block marked when all of it is safe.
+
+    run.zarr/zarr.json            attributes: provenance, recipe, messages, complete
+    run.zarr/position/c.0.3.0     chunk: times 0, block 3 (see store_layout)
+    run.zarr/parts/000000768.npy  what keepers closed the block with
+    run.zarr/blocks/000000768.json   the block that begins with member 768 is finished: its files, sizes, checksums
+    run.zarr/kept/                a group like the run's own, of members that were run again for their samples (see kept)
+
+Nothing in it tells the time of day: the same run leaves the same bytes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections.abc import Container, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common import files as durable
+from lgvi_warp.common import machine, safe_files, scratch
+from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.safe_files import parsed
+from lgvi_warp.common.write_lock import write_lock
+from lgvi_warp.engine.block import Block, blocks
+from lgvi_warp.runs.store import layout_check as store_check
+from lgvi_warp.runs.store import texts as store_texts
+from lgvi_warp.runs.store.layout import Column
+from lgvi_warp.runs.store.layout_check import understood
+from lgvi_warp.runs.store.recipe import ensemble_of, plan_of
+from lgvi_warp.runs.store.settings import needed
+from lgvi_warp.runs.store.sink import Sink, name_of, read_marker
+
+if TYPE_CHECKING:
+    from lgvi_warp.engine.plan import Plan
+    from lgvi_warp.scene.ensemble import Ensemble
+
+FORMAT = 2
+ROOT, CREATED, KEPT = "zarr.json", "created.json", "kept"
+
+
+class Folder:
+    """A store that exists, maybe somebody else's: what it says is checked before it is used. Its folder may be a link.
+
+    within: the run that it is a group of. Raises SceneError where there is none, or its metadata is damaged.
+    """
+
+    def __init__(self, path: Path, within: Path | None = None):
+        self.path, self.within = path, within or path
+        needed()
+        try:
+            content = self._root()
+            self.attributes: dict[str, Any] = content["attributes"]
+            texts = [self.attributes[name] for name in ("provenance", "recipe", "messages", "shared")]
+            good = self.attributes["format"] == FORMAT and self.attributes["crc32c"] == checksum_of(texts)
+        except FileNotFoundError:
+            raise SceneError([f"{path}: holds no run; give a folder that `lgvi-warp run --store zarr` made"]) from None
+        except SceneError:
+            raise
+        except (ValueError, KeyError, TypeError, AttributeError):
+            good = False
+        if not good:
+            raise SceneError(
+                [f"{path / ROOT}: is damaged, or of another version of the format; run again (--overwrite)"]
+            )
+        with understood(path / ROOT):
+            self.provenance, self.recipe, messages, self.shared = (parsed(text) for text in texts)
+            store_texts.check(self.attributes, self.provenance, self.recipe, messages, self.shared)
+            self.messages: tuple[str, ...] = tuple(messages)
+            self.layout = store_check.layout_of(content, int(self.recipe["members"]))
+        # What this process did: blocks that it found whole, those that it ran, and those of kept members that it ran.
+        self.found, self.ran, self.ran_kept = 0, 0, 0
+
+    def _root(self) -> Any:
+        """The root's metadata. Raises ValueError, SceneError, OSError."""
+        if not self.path.is_dir():
+            raise FileNotFoundError
+        return safe_files.read_json(self.within, (self.path / ROOT).relative_to(self.within).as_posix())
+
+    def kept(self) -> Folder | None:
+        """The group of its kept members; None where there is none. Raises SceneError where it is damaged."""
+        return Folder(self.path / KEPT, self.path) if os.path.lexists(self.path / KEPT) else None
+
+    @property
+    def complete(self) -> bool:
+        """Whether every block was finished when the run ended."""
+        return bool(self.attributes["complete"])
+
+    @property
+    def members(self) -> int:
+        """n; fewer than the ensemble has where the run ended because there were enough."""
+        return int(self.attributes.get("members", self.recipe["members"]))
+
+    @property
+    def runs(self) -> list[Block]:
+        """The blocks of these members, in order."""
+        return [block for block in blocks(int(self.recipe["members"])) if block.first < self.members]
+
+    @property
+    def sink(self) -> Sink:
+        """What knows its blocks and their files."""
+        return Sink(self.path, self.layout.columns)
+
+    def checked(self) -> Any:
+        """What zarr and xarray read it through."""
+        from lgvi_warp.runs.store.zarr_access import checked_store
+
+        own = {name: value for name, value in self.attributes.items() if value is not None}
+        return checked_store(self.path, self.layout, self.layout.root(own))
+
+    def group(self) -> Any:
+        """The zarr group, for reading."""
+        import zarr
+
+        return zarr.open_group(self.checked(), mode="r", zarr_format=3)
+
+    def refuse_too_large(self) -> None:
+        """Raise SceneError where what is read at once, numbers of members without times, is more than the memory."""
+        each = sum(one.bytes for one in self.layout.columns if not one.times) * len(self.runs)
+        memory = machine.memory_bytes() or 2**40
+        if each > memory:
+            what = f"has {self.members:,} members, of which {each / 1e9:.0f} GB are read at once, and the memory is"
+            raise SceneError(
+                [f"{self.path}: {what} {memory / 1e9:.0f} GB; read it on a larger machine, or run it again"]
+            )
+
+    def unfinished(self) -> list[Block]:
+        """Blocks without a marker."""
+        sink, marked = self.sink, safe_files.names(self.path, "blocks")
+        return [block for block in self.runs if f"{name_of(block)}.json" not in marked or sink.sums(block) is None]
+
+    def plan(self, ensemble: Ensemble | None = None) -> Plan:
+        """The run's plan, made again; ensemble: where a scene file cannot tell it (laws of your own). Raises SceneError."""
+        try:
+            # A chunk that is missing reads as NaN or 0.
+            lost = [text for text in self.damage() if text.startswith(("time/", "step/", "explicit/"))]
+            group = self.group()
+            steps, times = group["step"][:].astype(np.int64), group["time"][:]
+            given = {name: np.asarray(array[:]) for name, array in group["explicit"].arrays()}
+            if lost or not np.isfinite(times).all():
+                raise ValueError("times are missing")
+        except (ValueError, OSError, KeyError) as error:
+            remedy = "run the same scene again with --store zarr --resume, which mends it"
+            raise SceneError([f"{self.path}: {'; '.join(self.damage()) or error}; {remedy}"]) from error
+        with understood(self.path / ROOT):
+            if ensemble is None:
+                noise = given.pop("indices", None)
+                ensemble = ensemble_of(self.provenance["scene"], self.provenance["ensemble"], given, noise, self.path)
+            return plan_of(self.recipe, ensemble, steps, times)
+
+    def damage(self) -> list[str]:
+        """What is wrong with the files that do not belong to a block."""
+        sums, wanted = read_marker(self.path, CREATED), self.layout.frame()
+        if sums is None:
+            return [f"{CREATED} is damaged"]
+        if sums.keys() != wanted.keys() or any(size not in (None, sums[key][0]) for key, size in wanted.items()):
+            return [f"{CREATED} does not fit the arrays in {ROOT}"]
+        found = {key: text for key, one in sums.items() if (text := durable.fault(self.path, key, *one))}
+        return [f"{key} {text}" for key, text in found.items()] + self._unlike(found)
+
+    def _unlike(self, damaged: Container[str]) -> list[str]:
+        """Arrays whose own metadata is whole and says something else than that of the root."""
+        unlike = []
+        for name, array in self.layout.arrays.items():
+            key = f"{name}/{ROOT}"
+            if key not in damaged and safe_files.read_json(self.path, key) != array.metadata():
+                unlike.append(f"{key} says something else than {ROOT}")
+        return unlike
+
+    def finish(self, members: int | None = None) -> None:
+        """Say that the run is complete; members: with so many, where it ended before the last of the ensemble."""
+        if not self.complete:
+            self._say({"complete": True} | ({} if members is None else {"members": members}), below(self.path / KEPT))
+
+    def take_layout(self, other: Path) -> None:
+        """Say of the arrays what the root's metadata of another folder of the same run says; then it is not complete."""
+        content, right = self._root(), safe_files.read_json(other, ROOT)
+        if Folder(other).layout != self.layout:
+            right["attributes"] = content["attributes"] | {"complete": False}
+            durable.write_whole(self.path / ROOT, json.dumps(right, indent=2).encode())
+
+    def reopen(self) -> None:
+        """Say that the run is not complete."""
+        if self.complete:
+            self._say({"complete": False}, {})
+
+    def _say(self, said: dict[str, Any], kept: dict[str, Any]) -> None:
+        """Write attributes of the run, and what lies in the group of its kept members."""
+        content = self._root()
+        content["attributes"] |= said
+        arrays = content["consolidated_metadata"]["metadata"]
+        own = {name: one for name, one in arrays.items() if name.partition("/")[0] != KEPT}
+        content["consolidated_metadata"]["metadata"] = own | kept
+        durable.write_whole(self.path / ROOT, json.dumps(content, indent=2).encode())
+        self.attributes |= said
+
+
+def below(path: Path) -> dict[str, Any]:
+    """Metadata of a group and its arrays, as that of the group it lies in has them; none of one that is not there."""
+    if not path.exists():
+        return {}
+    own = safe_files.read_json(path.parent, f"{path.name}/{ROOT}")
+    arrays = own["consolidated_metadata"]["metadata"]
+    own["consolidated_metadata"] = {**own["consolidated_metadata"], "metadata": {}}
+    return {path.name: own} | {f"{path.name}/{name}": one for name, one in arrays.items()}
+
+
+def checksum_of(texts: Sequence[str]) -> int:
+    """Of several texts."""
+    return durable.checksum("\0".join(texts).encode())
+
+
+def check_names(found: Sequence[Column]) -> None:
+    """Each array's name becomes that of a folder. Raises SceneError."""
+    faults = Faults("store.")
+    for name in (one.name for one in found if not store_check.is_name(one.name)):
+        remedy = 'give the term or event another name, without / \\ : * ? " < > | and of 200 bytes at most'
+        faults.add("fields", name, "cannot be the name of a folder", remedy)
+    faults.raise_if_any()
+
+
+@contextlib.contextmanager
+def held(path: Path) -> Iterator[None]:
+    """Keep other runs out of a store that is there or will be, from before the look at it; mend what a killed one left.
+
+    Raises SceneError naming the run that is at work in it, OSError.
+    """
+    with write_lock(path):
+        place = Path(os.path.realpath(path))
+        durable.restored(place)
+        for beside in scratch.left_behind(place):
+            if beside.suffix in (scratch.NEW, scratch.OLD) and not foreign(beside):
+                scratch.remove_folder(beside)
+        yield
+
+
+def foreign(path: Path) -> str | None:
+    """What no run has written of a folder, or why it is none of a run; None where all of it is a run's."""
+    if path.is_symlink() or not path.is_dir():
+        return "is no folder of a run"
+    names = []
+    for name, entry in safe_files.entries(path):
+        folder = entry.is_dir(follow_symlinks=False)
+        if not folder and not (entry.is_file(follow_symlinks=False) and store_check.is_file_of_store(name)):
+            return f"holds {name}, which no run wrote"
+        names += [] if folder else [name]
+    if names and not {ROOT, CREATED} & set(names) and not any(scratch.is_unfinished(one) for one in names):
+        return f"holds {names[0]}, and nothing that says that it is a run"
+    return None
+
+
+def refuse_foreign(path: Path) -> None:
+    """Raise SceneError where a folder that is to be replaced holds what no run wrote."""
+    if os.path.lexists(path) and (what := foreign(Path(os.path.realpath(path)))):
+        raise SceneError([f"{path}: {what}; it is not overwritten: move it away, or give another folder"])

@@ -1,0 +1,121 @@
+"""To be said in one sentence."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from lgvi_warp.common import files as durable
+from lgvi_warp.common import safe_files, scratch
+from lgvi_warp.common.errors import MembersFailed, SceneError
+from lgvi_warp.engine.block import Block
+from lgvi_warp.runs.store.commits import Commits
+from lgvi_warp.runs.store.folder import CREATED, ROOT, Folder, held, refuse_foreign
+from lgvi_warp.runs.store.kept import keep_of, members_kept
+from lgvi_warp.runs.store.open import folder_of
+from lgvi_warp.runs.store.recipe import same_run
+from lgvi_warp.runs.store.resume import resume
+from lgvi_warp.runs.store.run import explained
+from lgvi_warp.runs.store.sink import marker
+
+
+def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], overwrite: bool = False) -> Folder:
+    """Put the blocks of several stores of one run (`run --blocks`) into a new one. Returns it, complete or not.
+
+    Every file is compared with its checksum on the way. Members that the run keeps (keep="failed" or indices) are run
+    again here when all blocks are there, as `resume` does; a run that only its own ensemble can resume is not complete
+    before that. Raises SceneError where they are not of one run, OSError.
+    """
+    parts = [Folder(folder_of(path)) for path in paths]
+    first = parts[0]
+    for other in parts[1:]:
+        found = same_run(other.provenance, first.provenance, str(other.path), str(first.path))
+        if found or other.recipe != first.recipe:
+            found = found or ["another recipe"]
+            raise SceneError(f"{text}: these are parts of different runs; merge parts of one run" for text in found)
+    target = Path(out)
+    target = target if target.suffix == ".zarr" else target / first.path.name
+    try:
+        with held(target):
+            if os.path.lexists(target) and not overwrite:
+                raise SceneError([f"{target}: holds a run already; give --overwrite, or another folder"])
+            refuse_foreign(target)
+            again = _put_together(parts, Path(os.path.realpath(target)))
+    except OSError as error:
+        raise explained(error, target) from error
+    if again:
+        # Another machine, or laws of a user's own: then it waits for lw.resume.
+        with contextlib.suppress(SceneError, MembersFailed):
+            resume(target)
+    return Folder(target)
+
+
+def _undamaged(parts: Sequence[Folder]) -> Folder:
+    """The first of them that is whole but for its blocks. Raises SceneError where none is."""
+    damage = []
+    for part in parts:
+        if not (found := part.damage()):
+            return part
+        damage += [f"{part.path}: {text}; `lgvi-warp resume {part.path}` first" for text in found]
+    raise SceneError(damage)
+
+
+def _copy_frame(part: Folder, target: Path) -> None:
+    """All of a store that belongs to no block: what was made with it. Raises SceneError, OSError."""
+    files = durable.Files(target)
+    for name in ("blocks", "parts"):
+        (target / name).mkdir(parents=True)
+    for key, size in (part.layout.frame() | {CREATED: None, ROOT: None}).items():
+        (target / key).parent.mkdir(parents=True, exist_ok=True)
+        files.write(key, safe_files.read(part.path, key, size or safe_files.MOST_JSON))
+    files.finish()
+
+
+def _copy_block(parts: Sequence[Folder], block: Block, target: Path, commits: Commits) -> None:
+    """A block from the first of the stores that has it whole. Raises SceneError where each has it damaged."""
+    damage = []
+    for part in parts:
+        sink = part.sink
+        sums = sink.sums(block)
+        if sums is None:
+            continue
+        if unfit := sink.unfit(block, sums, part.layout.times, part.recipe["keepers"]):
+            damage += [f"{part.path}: {text}; `lgvi-warp resume {part.path}` first" for text in unfit]
+            continue
+        files = durable.Files(target)
+        for key, wanted in sums.items():
+            try:
+                files.write(key, safe_files.read(part.path, key, wanted[0]))
+            except FileNotFoundError:
+                files.write(key, b"")
+            if files.sums[key] != wanted:
+                damage.append(f"{part.path / key}: is torn, missing or changed; `lgvi-warp resume {part.path}` first")
+                files.drop()
+                break
+        else:
+            commits.add(files, target / "blocks" / sink.marker(block).name, marker(sums))
+            return
+    if damage:
+        raise SceneError(damage)
+
+
+def _put_together(parts: Sequence[Folder], target: Path) -> bool:
+    """Copy frame and blocks into a new store in the place of the target. Whether members are to be run again for it."""
+    beside = scratch.beside(target, scratch.NEW)
+    try:
+        _copy_frame(_undamaged(parts), beside)
+        made = Folder(beside)
+        made.reopen()
+        with Commits() as commits:
+            for block in parts[0].runs:
+                _copy_block(parts, block, beside, commits)
+        whole = not made.unfinished()
+        again = whole and len(members_kept(keep_of(made.provenance), made)) > 0
+        if whole and not again:
+            made.finish()
+        durable.put_folder(beside, target)
+    finally:
+        scratch.remove_folder(beside)
+    return again

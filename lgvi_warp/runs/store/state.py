@@ -1,0 +1,69 @@
+"""To be said in one sentence."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from lgvi_warp.common import safe_files
+from lgvi_warp.common.errors import SceneError
+from lgvi_warp.runs.store.folder import KEPT, ROOT, Folder
+from lgvi_warp.runs.store.kept import keep_of, members_kept
+from lgvi_warp.runs.store.open import folder_of
+from lgvi_warp.runs.store.settings import Store
+from lgvi_warp.runs.store.sink import check, name_of
+
+
+def store_of(folder: Folder, force: bool = False) -> Store:
+    """The settings that a folder was made with, to go on with."""
+    own = folder.recipe["store"]
+    fields = None if own["fields"] is None else tuple(own["fields"])
+    return Store(folder.path, own["dtype"], fields, "resume", force, own["chunk_bytes"])
+
+
+def state(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """What a store holds: members, samples, blocks finished and in all, members kept, complete, bytes, damage as texts.
+
+    Every file is read. Raises SceneError where there is no run.
+    """
+    folder = Folder(folder_of(path))
+    runs = folder.runs
+    damage = folder.damage()
+    samples, finished = folder.layout.times, 0
+    for _, faults in check(folder.sink, runs, samples, folder.recipe["keepers"]):
+        if faults != ["is not finished"]:
+            finished += not faults
+            damage += faults
+    kept, faults = kept_state(folder, sound=not damage and finished == len(runs))
+    damage += faults
+    return {
+        "path": folder.path,
+        "members": folder.members,
+        "samples": samples,
+        "fields": list(folder.recipe["fields"] if (own := folder.recipe["store"]["fields"]) is None else own),
+        "keepers": list(folder.recipe["keepers"]),
+        "blocks": len(runs),
+        "finished": finished,
+        "kept": kept,
+        "complete": folder.complete and finished == len(runs) and not damage,
+        "bytes": safe_files.size_below(folder.path),
+        "damage": damage,
+        "provenance": folder.provenance,
+    }
+
+
+def kept_state(folder: Folder, sound: bool) -> tuple[int, list[str]]:
+    """(members kept, what is wrong with their files); sound: nothing is wrong with those of the run."""
+    wanted = len(members_kept(keep_of(folder.provenance), folder)) if folder.complete and sound else 0
+    try:
+        group = folder.kept()
+    except SceneError:
+        return wanted, [f"{KEPT}/{ROOT} is damaged"] if folder.complete else []
+    if group is None:
+        return wanted, [f"{KEPT} is missing"] if wanted else []
+    damage = group.damage()
+    for block, faults in check(group.sink, group.runs, group.layout.times):
+        if faults == ["is not finished"]:
+            faults = [f"blocks/{name_of(block)}.json is missing or damaged"] if folder.complete else []
+        damage += faults
+    return wanted, [f"{KEPT}/{text}" for text in damage]

@@ -1,0 +1,88 @@
+"""One block on its way into a store: samples gather in chunks, full chunks go to the disk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common.files import Files
+from lgvi_warp.engine.block import Block
+from lgvi_warp.runs import member_fields
+from lgvi_warp.runs.store.layout import MEMBER, Column
+
+if TYPE_CHECKING:
+    from lgvi_warp.engine.outcome import Outcome
+    from lgvi_warp.engine.plan import Plan
+    from lgvi_warp.sampling.members import Members
+
+
+class Room(list[dict[str, np.ndarray]]):
+    """Chunks that no block uses at the moment: fresh memory costs more than what is written into it."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Each process has its own."""
+        return Room, ()
+
+    @staticmethod
+    def made(columns: tuple[Column, ...]) -> dict[str, np.ndarray]:
+        """A chunk of each field, with anything in it."""
+        return {one.name: np.empty(one.chunk, one.dtype) for one in columns if one.times}
+
+
+class BlockWriter:
+    """The keeper of one block of a store."""
+
+    def __init__(self, root: Path, columns: tuple[Column, ...], room: Room, plan: Plan, block: Block, members: Members):
+        self._plan, self._block, self._members = plan, block, members
+        self._columns = columns
+        self._samples = len(plan.grid.times)
+        self._files = Files(root)
+        self._room = room
+        try:
+            self._chunks = room.pop()
+        except IndexError:
+            self._chunks = room.made(columns)
+        if block.count < columns[0].length:
+            for one in columns:
+                if one.times:
+                    self._chunks[one.name][:, block.count :] = one.fill
+
+    def take(self, when: slice, samples: dict[str, np.ndarray]) -> None:
+        """Put samples into their chunks, and write the chunks that are full."""
+        for column in self._columns:
+            if column.times:
+                self._take(column, when, samples[column.name])
+
+    def _take(self, column: Column, when: slice, values: np.ndarray) -> None:
+        chunk = self._chunks[column.name]
+        t = when.start
+        while t < when.stop:
+            number, place = divmod(t, column.times)
+            stop = min((number + 1) * column.times, when.stop)
+            chunk[place : place + stop - t, : self._block.count] = values[t - when.start : stop - when.start]
+            if stop == self._samples:
+                chunk[place + stop - t :] = column.fill
+            if stop in ((number + 1) * column.times, self._samples):
+                self._write(column, number, chunk)
+            t = stop
+
+    def _write(self, column: Column, number: int, chunk: np.ndarray) -> None:
+        self._files.write(column.key(self._block, number), chunk, checked=True)
+
+    def close(self, outcome: Outcome) -> Files:
+        """Write what is known of each member. Returns the files, which are not durable yet."""
+        values = {MEMBER: self._members.indices} | self._members.parameters
+        values |= member_fields.of(self._plan, outcome)
+        for column in self._columns:
+            if not column.times:
+                chunk = _empty(column)
+                chunk[: self._block.count] = values[column.name]
+                self._write(column, 0, chunk)
+        self._room.append(self._chunks)
+        return self._files
+
+
+def _empty(column: Column) -> np.ndarray:
+    return np.full(column.chunk, column.fill, column.dtype)

@@ -1,0 +1,85 @@
+"""Every combination of the values of some names."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.sampling.designs.base import Drawn, Sampling
+from lgvi_warp.sampling.designs.random import Random
+from lgvi_warp.sampling.designs.space import Space
+from lgvi_warp.sampling.distributions.basic import Choice
+
+
+@dataclass(frozen=True, eq=False)
+class Grid(Sampling):
+    """A full grid: every combination of the values of each name, the last name (in their order) fastest.
+
+    axes: name -> a list of values (of an entry such as "start.position[2]", or of the whole quantity), or a number of levels:
+    the middles of so many equal parts of the name's law in `vary`, for each of its entries. Names of `vary` that the grid does
+    not have are drawn at random. The number of members follows. Raises SceneError naming every fault.
+    """
+
+    axes: Mapping[str, Any] = field(default_factory=dict)
+    kind: ClassVar[str] = "grid"
+
+    def __post_init__(self) -> None:
+        faults = Faults("ensemble.sampling.grid.")
+        if not isinstance(self.axes, Mapping) or not self.axes:
+            faults.add("axes", self.axes, "names nothing", 'write grid = { "vehicle.mass" = [100.0, 110.0] }')
+            faults.raise_if_any()
+        for name, axis in self.axes.items():
+            if isinstance(axis, int | np.integer) and not isinstance(axis, bool):
+                if axis < 1:
+                    faults.add(f'"{name}"', axis, "is not a whole number from 1", "give a number of levels, or values")
+                continue
+            values = faults.finite(f'"{name}"', axis)
+            if values is not None and (values.ndim == 0 or not len(values)):
+                faults.add(f'"{name}"', axis, "is no list of values", "give [value, value, ...] or a number of levels")
+        faults.raise_if_any()
+
+    def laws(self) -> dict[str, Any]:
+        """A choice among the values of each name that has them."""
+        return {name: Choice(axis) for name, axis in self.axes.items() if not isinstance(axis, int | np.integer)}
+
+    def _radices(self, space: Space) -> tuple[Space, list[int]]:
+        """The cube's part that is a grid, and the levels of each of its columns."""
+        inner = space.of(self.axes)
+        numbers = []
+        for key, size in zip(inner.keys, inner.sizes, strict=True):
+            axis = self.axes[key]
+            numbers += [int(axis) if isinstance(axis, int | np.integer) else len(axis)] * size
+        return inner, numbers
+
+    def own_members(self, space: Space) -> int:
+        """Of all combinations."""
+        return math.prod(self._radices(space)[1])
+
+    def check(self, faults: Faults, space: Space, members: int) -> None:
+        """Every axis must vary something."""
+        for name in self.axes:
+            if name not in space.keys:
+                what = "is a number of levels of what has no law"
+                faults.add(
+                    f'sampling.grid."{name}"', self.axes[name], what, "give it a law in vary, or a list of values"
+                )
+        super().check(faults, space, members)
+
+    def draw(self, space: Space, members: np.ndarray) -> Drawn:
+        """The member's index as a number with these radices."""
+        inner, numbers = self._radices(space)
+        radices = np.array(numbers, dtype=np.int64)
+        places = np.ones(len(radices), dtype=np.int64)
+        places[:-1] = np.cumprod(radices[:0:-1])[::-1]
+        digits = members[:, None] // places % radices
+        others = [key for key in space.keys if key not in self.axes]
+        return inner.split((digits + 0.5) / radices) | Random().draw(space.of(others), members)
+
+    def to_dict(self) -> Any:
+        """As in a scene file."""
+        return {self.kind: {name: np.asarray(axis).tolist() for name, axis in self.axes.items()}}

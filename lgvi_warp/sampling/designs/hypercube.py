@@ -1,0 +1,69 @@
+"""Latin hypercubes."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.random import seed_words
+from lgvi_warp.sampling.designs.base import Drawn, Replicated, inside
+from lgvi_warp.sampling.designs.space import Space
+
+LARGEST_GROUP = 2**20
+
+
+@dataclass(frozen=True)
+class LatinHypercube(Replicated):
+    """Groups of `group` members, each a full Latin hypercube: every column has one member in each of `group` equal parts.
+
+    Members are added group by group, and names may be added. group: 2 to 2^20; members must be a multiple of it. With
+    replicates, as many groups are filled at once, a member of each in turn. McKay, Beckman & Conover (1979);
+    scipy.stats.qmc.LatinHypercube.
+    """
+
+    group: int = 0
+    kind: ClassVar[str] = "latin_hypercube"
+
+    def check_own(self, faults: Faults) -> None:
+        """The group must be stated."""
+        group = self.group
+        if isinstance(group, bool) or not isinstance(group, int | np.integer) or not 2 <= group <= LARGEST_GROUP:
+            faults.add("group", group, f"is not a whole number from 2 to {LARGEST_GROUP}",
+                       "give how many members make a hypercube: group = 256")  # fmt: skip
+        else:
+            object.__setattr__(self, "group", int(group))
+
+    def group_size(self, space: Space) -> int:
+        """A hypercube for each replicate."""
+        return self.group * self.replicates
+
+    def draw(self, space: Space, members: np.ndarray) -> Drawn:
+        """From the hypercube of each member's group; names by themselves, so that others do not change them."""
+        R = self.replicates
+        group, place = np.divmod(members, self.group * R)
+        found = {}
+        for key, size in zip(space.keys, space.sizes, strict=True):
+            found[key] = np.empty((len(members), size))
+            for g in np.unique(group):
+                mine = group == g
+                cubes = _hypercubes(space.seed, key, int(g) * R, R, self.group, size)
+                found[key][mine] = cubes[place[mine]]
+        return found
+
+
+# A block of members lies in few groups: these are kept from one block to the next.
+@functools.lru_cache(maxsize=64)
+def _hypercubes(seed: int, key: str, first: int, number: int, size: int, columns: int) -> np.ndarray:
+    """So many hypercubes from the first on, a point of each in turn: (size * number, columns)."""
+    from scipy.stats import qmc
+
+    cubes = np.empty((size, number, columns))
+    for i in range(number):
+        words = [*seed_words(seed, f"latin {key}"), first + i]
+        rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(words)))
+        cubes[:, i] = qmc.LatinHypercube(columns, rng=rng).random(size)
+    return inside(cubes.reshape(size * number, columns))

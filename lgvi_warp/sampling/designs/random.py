@@ -1,0 +1,25 @@
+"""Every number by itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.random import uniforms_of
+from lgvi_warp.sampling.designs.base import Drawn, Sampling
+from lgvi_warp.sampling.designs.space import Space
+
+
+@dataclass(frozen=True)
+class Random(Sampling):
+    """Every number by itself, from the seed, the member's index and the name. Members and names may be added."""
+
+    kind: ClassVar[str] = "random"
+
+    def draw(self, space: Space, members: np.ndarray) -> Drawn:
+        """Philox counters keyed by seed and name, at the member's place."""
+        return {
+            key: uniforms_of(space.seed, key, members, size) for key, size in zip(space.keys, space.sizes, strict=True)
+        }

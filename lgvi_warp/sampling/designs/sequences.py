@@ -1,0 +1,107 @@
+"""Scrambled sequences of low discrepancy, any point of which is found from its index: Sobol's and Halton's."""
+
+from __future__ import annotations
+
+import copy
+import functools
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.random import seed_words
+from lgvi_warp.sampling.designs.base import MOST_REPLICATES, Drawn, Replicated, inside
+from lgvi_warp.sampling.designs.space import Space
+
+# Of a Sobol sequence: a point is at the middle of one of 2^32 parts of each side, so that no level is 0 or 1. It has as
+# many points, more than an ensemble has members.
+SOBOL_BITS = 32
+
+
+@dataclass(frozen=True)
+class Sobol(Replicated):
+    """A scrambled Sobol sequence (linear matrix scramble and digital shift, scipy.stats.qmc.Sobol): member i is point i.
+
+    Members may be added: powers of two are balanced. What varies is part of the design: another name, another sequence.
+    replicates: so many sequences, scrambled independently, a member of each in turn.
+    """
+
+    kind: ClassVar[str] = "sobol"
+
+    def draw(self, space: Space, members: np.ndarray) -> Drawn:
+        """Points by their indices."""
+        found = np.empty((len(members), space.dimensions))
+        for replicate, own, points in self.dealt(members):
+            found[own] = sobol_points(space.seed, self.name(replicate), space.dimensions, points)
+        return space.split(found)
+
+
+def sobol_points(seed: int, name: str, dimensions: int, indices: np.ndarray, scramble: bool = True) -> np.ndarray:
+    """Points of a Sobol sequence in (0, 1), (n, dimensions), by their indices.
+
+    A point is the exclusive or of one number for each bit of its index (and the first point): so any is had at once.
+    """
+    if not dimensions:
+        return np.empty((len(indices), 0))
+    bits = max(int(indices.max()).bit_length(), 1)
+    bits = -(-bits // 4) * 4  # few distinct tables, however many members there come to be
+    basis = _sobol_basis(seed, name, dimensions, min(bits, SOBOL_BITS), scramble)
+    points = np.broadcast_to(basis[0], (len(indices), dimensions)).copy()
+    for bit in range(min(bits, SOBOL_BITS)):
+        points ^= np.where((indices >> bit & 1)[:, None] == 1, basis[bit + 1], np.uint64(0))
+    return np.asarray((points.astype(np.float64) + 0.5) * 2.0**-SOBOL_BITS)
+
+
+# Of every replicate, for a few numbers of bits.
+@functools.lru_cache(maxsize=8 * MOST_REPLICATES)
+def _sobol_basis(seed: int, name: str, dimensions: int, bits: int, scramble: bool) -> np.ndarray:
+    """Point 0, and what each bit of an index changes in it: (bits + 1, dimensions), as whole numbers."""
+    from scipy.stats import qmc
+
+    rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed_words(seed, name))))
+    engine = qmc.Sobol(dimensions, scramble=scramble, bits=SOBOL_BITS, rng=rng)
+    points, made = [], 0
+    for index in (0, *(1 << bit for bit in range(bits))):
+        if index > made:
+            engine.fast_forward(index - made)
+        points.append(engine.random(1)[0])
+        made = index + 1
+    whole = (np.array(points) * 2.0**SOBOL_BITS).astype(np.uint64)
+    whole[1:] ^= whole[0]
+    return whole
+
+
+@dataclass(frozen=True)
+class Halton(Replicated):
+    """A scrambled Halton sequence (random permutations of digits, scipy.stats.qmc.Halton): member i is point i.
+
+    Members may be added, any number of them. What varies is part of the design: another name, another sequence.
+    replicates: so many sequences, scrambled independently, a member of each in turn.
+    """
+
+    kind: ClassVar[str] = "halton"
+
+    def draw(self, space: Space, members: np.ndarray) -> Drawn:
+        """Points by their indices, neighbours together."""
+        found = np.empty((len(members), space.dimensions))
+        for replicate, own, wanted in self.dealt(members):
+            ascending, place = np.unique(wanted, return_inverse=True)
+            runs = np.split(ascending, np.flatnonzero(np.diff(ascending) > 1) + 1)
+            points = np.concatenate([self._run(space, replicate, int(run[0]), len(run)) for run in runs])
+            found[own] = inside(points)[place.reshape(-1)]
+        return space.split(found)
+
+    def _run(self, space: Space, replicate: int, first: int, count: int) -> np.ndarray:
+        if not space.dimensions:
+            return np.empty((count, 0))
+        engine = copy.copy(_halton(space.seed, self.name(replicate), space.dimensions))
+        engine.num_generated = first
+        return np.asarray(engine.random(count))
+
+
+@functools.lru_cache(maxsize=2 * MOST_REPLICATES)
+def _halton(seed: int, name: str, dimensions: int) -> Any:
+    from scipy.stats import qmc
+
+    rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed_words(seed, name))))
+    return qmc.Halton(dimensions, scramble=True, rng=rng)

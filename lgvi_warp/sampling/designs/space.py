@@ -1,0 +1,41 @@
+"""To be said in one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Space:
+    """The unit cube that a sampling fills: `keys` in the order of their names, each with so many columns.
+
+    factors: (label, columns) of what varies by itself: an entry, or all that one joint law draws.
+    """
+
+    seed: int
+    keys: tuple[str, ...]
+    sizes: tuple[int, ...]
+    factors: tuple[tuple[str, tuple[int, ...]], ...]
+
+    @property
+    def dimensions(self) -> int:
+        """Columns in all."""
+        return sum(self.sizes)
+
+    def split(self, cube: np.ndarray) -> dict[str, np.ndarray]:
+        """Points (n, dimensions) as (n, size) by key."""
+        parts = np.split(cube, np.cumsum(self.sizes)[:-1], axis=1) if self.keys else []
+        return dict(zip(self.keys, parts, strict=True))
+
+    def of(self, keys: Iterable[str]) -> Space:
+        """The same with these keys only."""
+        wanted = set(keys)
+        starts = np.cumsum([0, *self.sizes])
+        kept = [i for i, key in enumerate(self.keys) if key in wanted]
+        old = [int(c) for i in kept for c in range(starts[i], starts[i + 1])]
+        new = {column: place for place, column in enumerate(old)}
+        factors = [(label, tuple(new[c] for c in columns)) for label, columns in self.factors if columns[0] in new]
+        return Space(self.seed, tuple(self.keys[i] for i in kept), tuple(self.sizes[i] for i in kept), tuple(factors))

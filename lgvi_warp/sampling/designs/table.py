@@ -1,0 +1,211 @@
+"""Members' own values, from a file or from arrays."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.common.labelled import columns_by_name, is_labelled
+from lgvi_warp.common.reading import UnreadableError, file_bytes
+from lgvi_warp.sampling.designs.base import Drawn, Sampling
+from lgvi_warp.sampling.designs.csv_file import columns_of
+from lgvi_warp.sampling.designs.random import Random
+from lgvi_warp.sampling.designs.space import Space
+
+# What files of numpy.save, numpy.savez and archives begin with. None is opened: objects in them could be code.
+BINARY = (b"\x93NUMPY", b"PK\x03\x04", b"\x1f\x8b")
+
+
+@dataclass(frozen=True, eq=False)
+class Table(Sampling):
+    """Members' own values: from a CSV file whose first line names the columns, or from arrays by name.
+
+    file: its columns are numbers of the scene or entries of them, "vehicle.mass", "start.position[2]" (quote a name with a
+    comma in it), parted by commas, semicolons or tabs; empty lines and those that begin with # are passed over. values:
+    name -> (n,) or (n, *shape), a data frame, a structured array, or an xarray Dataset with such names. columns: those to
+    take; ignore: those to leave out, such as an id. sha256: of the file as it must be, written by `to_dict`. Names of `vary`
+    that the table does not have are drawn at random. The number of members is that of the lines, or less: the first ones;
+    lines may be added.
+    Raises SceneError naming every fault.
+    """
+
+    file: str | os.PathLike[str] | None = None
+    values: Mapping[str, Any] | None = None
+    sha256: str | None = None
+    columns: Sequence[str] | None = None
+    ignore: Sequence[str] | None = None
+    kind: ClassVar[str] = "table"
+    fewer: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        faults = Faults("ensemble.sampling.table.")
+        if self.values is None and not isinstance(self.file, str | os.PathLike | None):  # Table({...})
+            object.__setattr__(self, "values", self.file)
+            object.__setattr__(self, "file", None)
+        if (self.file is None) == (self.values is None):
+            what = "has no values beside it" if self.file is None else "is given beside values"
+            faults.add("file", self.file, what, "give one of file and values")
+        self._check_options(faults)
+        faults.raise_if_any()
+        read = self._from_file(faults) if self.file is not None else self._from_values(faults)
+        lengths = {len(column) for column in read.values()}
+        if not faults and (len(lengths) != 1 or 0 in lengths):
+            faults.add("values", sorted(lengths), "are the columns' lengths", "give columns of one length, 1 or more")
+        faults.raise_if_any()
+        object.__setattr__(self, "_own", read)
+
+    @classmethod
+    def kept(cls, told: Mapping[str, Any], values: Mapping[str, np.ndarray]) -> Table:
+        """A table whose file was read when a store was made of it: the store has its numbers.
+
+        Args:
+            told: what `to_dict` says of the file, by key.
+            values: columns by name, (n,) or (n, *shape).
+
+        Returns:
+            The table, whether the file is still there or not.
+
+        Raises:
+            SceneError: where the values are no columns of one length.
+        """
+        table = cls(values=values)
+        for item in fields(cls):
+            object.__setattr__(table, item.name, told.get(item.name))
+        return table
+
+    def _check_options(self, faults: Faults) -> None:
+        for name in ("columns", "ignore"):
+            given = getattr(self, name)
+            if given is None:
+                continue
+            if not isinstance(given, list | tuple) or not given or not all(isinstance(one, str) for one in given):
+                faults.add(name, given, "is no list of names", f'write {name} = ["vehicle.mass"]')
+            else:
+                object.__setattr__(self, name, list(given))
+        if self.columns is not None and self.ignore is not None:
+            faults.add("ignore", self.ignore, "is given beside columns", "keep one of them")
+
+    def _chosen(self, faults: Faults, names: Sequence[str]) -> list[str]:
+        """Which of the columns there are to take."""
+        known = set(names)
+        for option in ("columns", "ignore"):
+            for name in getattr(self, option) or ():
+                if name not in known:
+                    remedy = functools.partial(closest, name, names)
+                    faults.add(option, name, "is no column of the table", remedy)
+        wanted, unwanted = set(self.columns or names), set(self.ignore or ())
+        chosen = [name for name in names if name in wanted and name not in unwanted]
+        if not chosen and not faults:
+            faults.add("ignore", self.ignore, "leaves no column", "keep one or more")
+        return chosen
+
+    def _from_values(self, faults: Faults) -> dict[str, np.ndarray]:
+        read: dict[str, np.ndarray] = {}
+        if not is_labelled(self.values):
+            remedy = 'give a file, {"vehicle.mass": array, ...} or a DataFrame with such names'
+            faults.add("values", self.values, "has no names of columns", remedy)
+            return read
+        given = columns_by_name(faults, "values", self.values)
+        if not given:
+            return read
+        for name in self._chosen(faults, list(given)):
+            array = _column(faults, f'"{name}"', given[name])
+            if array is not None:
+                read[name] = array
+        object.__setattr__(self, "values", read)
+        return read
+
+    def _from_file(self, faults: Faults) -> dict[str, np.ndarray]:
+        assert self.file is not None
+        path = os.fspath(self.file)
+        try:
+            content = file_bytes(path, "CSV file")
+        except UnreadableError as error:
+            faults.add("file", path, f"cannot be read ({error.what})", error.remedy)
+            return {}
+        if content.startswith(BINARY):
+            faults.add(
+                "file", path, "is a file of NumPy, or an archive", "give a CSV file, or arrays: lw.Table({name: array})"
+            )
+            return {}
+        found = hashlib.sha256(content).hexdigest()
+        if self.sha256 not in (None, found):
+            what = f"is not that of {path}, which has changed"
+            faults.add("sha256", self.sha256, what, "leave sha256 out to take it")
+            return {}
+        object.__setattr__(self, "sha256", found)
+        try:
+            return columns_of(faults, path, content, self._chosen)
+        except UnicodeDecodeError:
+            faults.add("file", path, "is no text in UTF-8", "save it as CSV in UTF-8")
+            return {}
+
+    def own_values(self) -> dict[str, np.ndarray]:
+        """As read."""
+        return dict(self._own)  # type: ignore[attr-defined]
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Columns: also those of a file, which may be moved or changed."""
+        return self.own_values()
+
+    def own_members(self, space: Space) -> int:
+        """Lines."""
+        return len(next(iter(self.own_values().values())))
+
+    def draw(self, space: Space, members: np.ndarray) -> Drawn:
+        """At random, of what the table does not have."""
+        return Random().draw(space, members)
+
+    def to_dict(self) -> Any:
+        """As in a scene file."""
+        if self.file is None:
+            return {self.kind: {"values": {name: column.tolist() for name, column in self.own_values().items()}}}
+        chosen = {name: getattr(self, name) for name in ("columns", "ignore") if getattr(self, name) is not None}
+        return {self.kind: {"file": os.path.abspath(self.file), "sha256": self.sha256, **chosen}}
+
+
+def moved(file: str, sha256: str | None, beside: Path) -> str:
+    """Where a table lies now, if it and a store were moved together.
+
+    Args:
+        file: where it lay, absolute.
+        sha256: its checksum, which tells it from any other.
+        beside: the store.
+
+    Returns:
+        The path with its last parts below a folder above the store, as far as a file with that checksum is there; else
+        where it lay.
+    """
+    parts = Path(file).parts[1:]
+    if sha256 is None or Path(file).exists():
+        return file
+    for above in beside.absolute().parents:
+        for k in range(len(parts)):
+            path = above.joinpath(*parts[k:])
+            with contextlib.suppress(OSError, UnreadableError):
+                if path.is_file() and hashlib.sha256(file_bytes(str(path), "CSV file")).hexdigest() == sha256:
+                    return str(path)
+    return file
+
+
+def _column(faults: Faults, key: str, given: Any) -> np.ndarray | None:
+    """A column of finite numbers; None after noting a fault."""
+    plain = isinstance(given, np.ndarray) and given.dtype.kind == "f" and given.ndim and not np.ma.is_masked(given)
+    if plain and not np.isfinite(given).all():
+        row = int(np.argmin(np.isfinite(given.reshape(len(given), -1)).all(axis=1)))
+        faults.add(key, given[row], f"is not finite, of member {row}", "give a number, or drop that member")
+        return None
+    array = faults.finite(key, given)
+    if array is not None and array.ndim == 0:
+        faults.add(key, given, "is no column", "give one value for each member")
+        return None
+    return array

@@ -1,0 +1,363 @@
+"""Laws of a quantity as a whole, or of several together: correlated normals, rotations, matrices that stay physical."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.physics import inertia, notation
+from lgvi_warp.sampling.distributions.basic import Distribution, Spread
+
+# Of a matrix's largest entry: what a negative eigenvalue of it may be by round-off.
+ROUND_OFF = 1e-12
+# What a negative eigenvalue of a correlation matrix may be: of one that was written with six digits.
+SIX_DIGITS = 1e-5
+
+
+def normals(u: np.ndarray) -> np.ndarray:
+    """Standard normal numbers at the levels u."""
+    from scipy.special import ndtri
+
+    return np.asarray(ndtri(u))
+
+
+def combined(matrix: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """matrix (d, d) times each row of z (n, d).
+
+    Written out: the sum's order, and so the bits, must not depend on how many rows there are.
+    """
+    total = z[:, :1] * matrix[:, 0]
+    for k in range(1, z.shape[1]):
+        total = total + z[:, k : k + 1] * matrix[:, k]
+    return total
+
+
+def correlation(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """std (d,) and correlation (d, d) of a covariance; 1 on the diagonal where the variance is 0.
+
+    Units and sizes of the entries play no part in it: metres beside newtons are judged alike.
+    """
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    scale = np.where(std > 0.0, std, 1.0)
+    return std, covariance / np.outer(scale, scale) + np.diag(np.where(std > 0.0, 0.0, 1.0))
+
+
+def root_of_covariance(covariance: np.ndarray) -> np.ndarray:
+    """L (d, d) with L L^T = covariance, from the correlation's."""
+    std, C = correlation(covariance)
+    return np.asarray(std[:, None] * root(C))
+
+
+def root(matrix: np.ndarray) -> np.ndarray:
+    """L (d, d) with L L^T = matrix, positive semidefinite: Cholesky's factor, or where that has none the symmetric root."""
+    try:
+        return np.linalg.cholesky(matrix)
+    except np.linalg.LinAlgError:
+        values, axes = np.linalg.eigh(matrix)
+        return np.asarray((axes * np.sqrt(np.maximum(values, 0.0))) @ axes.T)
+
+
+def _covariance(faults: Faults, law: Any, size: int | None) -> np.ndarray | None:
+    """The covariance that a law was given, or that follows from std and correlation; None after noting a fault."""
+    given = {name for name in ("covariance", "std", "correlation") if getattr(law, name, None) is not None}
+    if ("covariance" in given) == ("std" in given) or given == {"covariance", "correlation"}:
+        what = f"{' and '.join(sorted(given)) or 'nothing'} given"
+        faults.add("covariance", "...", what, "give covariance, or std (and correlation)")
+        return None
+    name = "correlation" if "correlation" in given else next(iter(given))
+    matrix = np.asarray(faults.finite(name, getattr(law, name)), dtype=np.float64)
+    if matrix.dtype == object or np.any(np.isnan(matrix)):
+        return None
+    if name != "std" and not (
+        matrix.ndim == 2 and matrix.shape[0] == matrix.shape[1] and np.allclose(matrix, matrix.T)
+    ):
+        faults.add(name, matrix, "is no symmetric matrix", "give n x n numbers, the same on both sides of the diagonal")
+        return None
+    if name != "covariance":
+        std = faults.finite("std", law.std)
+        n = size or (len(matrix) if name == "correlation" else max(1, matrix.size))
+        if std is None or std.ndim > 1 or std.size not in (1, n):
+            faults.add("std", law.std, f"does not fit {n} components", f"give one number or {n}")
+            return None
+        if np.any(std < 0.0):
+            faults.add("std", law.std, "is negative", "give a spread from 0")
+            return None
+        std = np.broadcast_to(std, n)
+        if name == "correlation" and np.any(np.abs(np.diag(matrix) - 1.0) > SIX_DIGITS):
+            faults.add(name, matrix, "has a diagonal that is not 1", "give 1 on the diagonal, or a covariance")
+            return None
+        matrix = np.outer(std, std) * (correlation(matrix)[1] if name == "correlation" else np.eye(n))
+    matrix = 0.5 * (matrix + matrix.T)
+    if np.any(np.diag(matrix) < 0.0):
+        faults.add(name, getattr(law, name), "has a negative variance on its diagonal", "give variances from 0")
+        return None
+    std, C = correlation(matrix)
+    least = -np.inf if np.any(matrix[std == 0.0]) else float(np.linalg.eigvalsh(C)[0])
+    if least < -SIX_DIGITS:
+        faults.add(name, getattr(law, name), f"is not positive semidefinite (eigenvalue {least:.3g} of the correlation)",
+                   "give what some numbers can have: no correlation beyond 1, and such that agree")  # fmt: skip
+        return None
+    return matrix
+
+
+def components(shapes: Sequence[tuple[int, ...]]) -> int:
+    """Numbers in quantities of these shapes."""
+    return sum(int(np.prod(shape)) for shape in shapes)
+
+
+@dataclass(frozen=True)
+class JointLaw(Distribution):
+    """A law of whole quantities: `size` uniform numbers give all of their entries."""
+
+    @property
+    def joint(self) -> bool:
+        """Always."""
+        return True
+
+    def size(self, bases: Sequence[np.ndarray]) -> int:
+        """Uniform numbers that a draw of quantities with these scene values takes."""
+        raise TypeError(f"{type(self).__name__} is abstract")
+
+    def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Values (n, *shape) of each quantity at the levels u (n, size)."""
+        raise TypeError(f"{type(self).__name__} is abstract")
+
+
+@dataclass(frozen=True)
+class CorrelatedNormal(JointLaw):
+    """Normal numbers with a covariance between the entries of one quantity or of several, named "a, b" in `vary`.
+
+    covariance (d, d), in the units of the entries, in the order of the names; or std, one or (d,), with correlation (d, d).
+    mean (d,): default the scene's values. The covariance may be singular. Of a symmetric matrix the entries are those on and
+    above the diagonal (of a diagonal one, those on it). Raises SceneError naming every fault.
+    """
+
+    covariance: Any = None
+    std: Spread | None = None
+    correlation: Any = None
+    mean: Spread | None = None
+    kind: ClassVar[str] = "correlated_normal"
+
+    def __post_init__(self) -> None:
+        faults = Faults(f"{self.kind}.")
+        matrix = _covariance(faults, self, None)
+        if self.mean is not None:
+            faults.finite("mean", self.mean)
+        faults.raise_if_any()
+        assert matrix is not None
+        object.__setattr__(self, "_root", root_of_covariance(matrix))
+
+    def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
+        """As many rows as there are entries, unless one std serves all."""
+        d, rows = components(shapes), len(self._root)  # type: ignore[attr-defined]
+        if rows != d and not (rows == 1 and self.covariance is None and self.correlation is None):
+            return f"is of {rows} components, {d} are named", f"give {d} x {d} numbers, in the order of the names"
+        if self.mean is not None and np.size(self.mean) not in (1, d):
+            return f"has {np.size(self.mean)} means for {d} components", f"give {d}, or leave mean out"
+        return None
+
+    def size(self, bases: Sequence[np.ndarray]) -> int:
+        """One for each entry."""
+        return components([base.shape for base in bases])
+
+    def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """mean + L Phi^-1(u), L L^T the covariance."""
+        L: np.ndarray = self._root  # type: ignore[attr-defined]
+        if len(L) != u.shape[1]:
+            L = L[0, 0] * np.eye(u.shape[1])
+        scene = np.concatenate([np.reshape(base, -1) for base in bases])
+        drawn = (scene if self.mean is None else np.asarray(self.mean)) + combined(L, normals(u))
+        ends = np.cumsum([base.size for base in bases])[:-1]
+        return [
+            part.reshape(len(u), *base.shape) for part, base in zip(np.split(drawn, ends, axis=1), bases, strict=True)
+        ]
+
+
+@dataclass(frozen=True)
+class RotationNormal(JointLaw):
+    """A concentrated normal law of an attitude: R = R0 exp(hat(v)), v normal about 0, in body axes; for "start.attitude".
+
+    R0: the scene's attitude. std [rad], one or (3,), about the body's axes; or covariance (3, 3) [rad^2]. Barfoot & Furgale
+    (2014), Associating uncertainty with three-dimensional poses, with the perturbation on the body's side.
+    Raises SceneError naming every fault.
+    """
+
+    std: Spread | None = None
+    covariance: Any = None
+    kind: ClassVar[str] = "rotation_normal"
+
+    def __post_init__(self) -> None:
+        faults = Faults(f"{self.kind}.")
+        matrix = _covariance(faults, self, 3)
+        if matrix is not None and matrix.shape != (3, 3):
+            faults.add("covariance", self.covariance, "is not 3 x 3", "give 3 x 3 numbers [rad^2], body axes")
+        faults.raise_if_any()
+        assert matrix is not None
+        object.__setattr__(self, "_root", root_of_covariance(matrix))
+
+    def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
+        """The ensemble gives it attitudes only."""
+        return None
+
+    def size(self, bases: Sequence[np.ndarray]) -> int:
+        """Three turns."""
+        return 3
+
+    def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """R0 exp(hat(L Phi^-1(u)))."""
+        v = combined(self._root, normals(u))  # type: ignore[attr-defined]
+        return [bases[0] @ notation.matrix_from_rotation_vector(v)]
+
+
+@dataclass(frozen=True)
+class UniformRotation(JointLaw):
+    """Every attitude alike: Haar's measure on SO(3), whatever the scene's attitude is; for "start.attitude".
+
+    Shoemake (1992), Uniform random rotations, in Graphics Gems III.
+    """
+
+    kind: ClassVar[str] = "uniform_rotation"
+
+    def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
+        """The ensemble gives it attitudes only."""
+        return None
+
+    def size(self, bases: Sequence[np.ndarray]) -> int:
+        """Three: a length and two angles."""
+        return 3
+
+    def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """The rotation of a unit quaternion that is uniform on its sphere."""
+        a, b = np.sqrt(1.0 - u[:, 0]), np.sqrt(u[:, 0])
+        s, t = 2.0 * np.pi * u[:, 1], 2.0 * np.pi * u[:, 2]
+        q = np.stack([a * np.sin(s), a * np.cos(s), b * np.sin(t), b * np.cos(t)], axis=1)
+        return [notation.matrix_from_quaternion(q)]
+
+
+@dataclass(frozen=True)
+class PositiveDefinite(JointLaw):
+    """A symmetric matrix that stays positive definite: A = L T T^T L^T, L L^T the scene's matrix, T lower triangular.
+
+    The diagonal of T is exp(sigma z / 2), below it are off_diagonal z (default 0), z standard normal: the logarithm of each
+    entry of a diagonal matrix varies with standard deviation sigma, its median the scene's. sigma: one or (d,). What is zero
+    in the scene, such as an added mass that is not there, stays so. After the log-Cholesky coordinates of Lin (2019),
+    Riemannian geometry of symmetric positive definite matrices via Cholesky decomposition.
+    """
+
+    sigma: Spread | None = None
+    off_diagonal: float | None = None
+    kind: ClassVar[str] = "positive_definite"
+    widths: ClassVar[tuple[str, ...]] = ("sigma",)
+
+    def _check_more(self, faults: Faults) -> None:
+        if self.off_diagonal is not None and np.ndim(self.off_diagonal) > 0:
+            faults.add("off_diagonal", self.off_diagonal, "is not one number", "give one number from 0")
+        if self.sigma is not None and np.ndim(self.sigma) > 1:
+            faults.add("sigma", self.sigma, "is a matrix", "give one number, or one for each axis")
+
+    def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
+        """One sigma, or one for each row."""
+        d = shapes[0][0]
+        if np.asarray(self.sigma).size in (1, d):
+            return None
+        return f"has {np.asarray(self.sigma).size} sigmas for a {d} x {d} matrix", f"give one number or {d}"
+
+    def unusable(self, base: np.ndarray) -> tuple[str, str] | None:
+        """(what is wrong, the remedy) with the scene's matrix; None if the law can start from it."""
+        if np.linalg.eigvalsh(base)[0] >= -ROUND_OFF * np.abs(base).max():
+            return None
+        return "varies a matrix that is not positive in the scene", "give the scene a positive semidefinite matrix"
+
+    def size(self, bases: Sequence[np.ndarray]) -> int:
+        """The diagonal of T, and what is below it."""
+        d = len(bases[0])
+        return d + (d * (d - 1) // 2 if self.off_diagonal else 0)
+
+    def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """L T T^T L^T."""
+        return [self._around(bases[0], u)]
+
+    def _around(self, base: np.ndarray, u: np.ndarray) -> np.ndarray:
+        d = len(base)
+        z = normals(u)
+        T = np.zeros((len(u), d, d))
+        diagonal = np.arange(d)
+        with np.errstate(over="ignore", invalid="ignore"):  # the ensemble refuses what is too large
+            T[:, diagonal, diagonal] = np.exp(0.5 * np.asarray(self.sigma) * z[:, :d])
+            if self.off_diagonal:
+                rows, columns = np.tril_indices(d, -1)
+                T[:, rows, columns] = self.off_diagonal * z[:, d:]
+            A = root(base) @ T
+            S = A @ np.swapaxes(A, 1, 2)
+        return np.asarray(0.5 * (S + np.swapaxes(S, 1, 2)))
+
+
+@dataclass(frozen=True)
+class PhysicalInertia(PositiveDefinite):
+    """The inertia of a rigid body that stays one of a rigid body: positive, and no principal inertia above the sum of the
+    other two.
+
+    `PositiveDefinite` for the second moments of mass S = tr(J) / 2 - J, then J = tr(S) - S: an inertia is that of a
+    distribution of mass exactly where S is positive definite (Wensing, Kim & Slotine 2018, Linear matrix inequalities for
+    physically consistent inertial parameter identification). sigma: of the logarithm of the principal second moments.
+    For "vehicle.inertia", whose scene value must itself be that of a rigid body, and "vehicle.rigid_body_mass_matrix":
+    there S is about the centre of gravity, which stays where it is, and mass_sigma is that of the mass (default 0).
+    """
+
+    mass_sigma: float | None = None
+    kind: ClassVar[str] = "physical_inertia"
+
+    def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
+        """One sigma, or one for each axis; mass_sigma only where there is a mass."""
+        if shapes[0] == (3, 3) and self.mass_sigma is not None:
+            return "gives mass_sigma to a matrix without mass", 'vary "vehicle.mass"'
+        return super().fault([(3, 3)])
+
+    def unusable(self, base: np.ndarray) -> tuple[str, str] | None:
+        """The scene's second moments must be positive."""
+        S = second_moments(_about_center(base)[0])
+        if np.linalg.eigvalsh(S)[0] > ROUND_OFF * np.trace(S):
+            return None
+        return ("varies an inertia that no rigid body has (one principal inertia is not below the sum of the others)",
+                "use PositiveDefinite, which keeps it positive")  # fmt: skip
+
+    def size(self, bases: Sequence[np.ndarray]) -> int:
+        """That of S, and one for the mass of a 6x6 matrix."""
+        return 3 + 3 * bool(self.off_diagonal) + (len(bases[0]) == 6)
+
+    def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """tr(S) - S, moved back to the scene's origin with the mass of a 6x6 matrix."""
+        J, mass, center = _about_center(bases[0])
+        moments = 3 + 3 * bool(self.off_diagonal)
+        S = self._around(second_moments(J), u[:, :moments])
+        drawn = _trace(S) * np.eye(3) - S
+        if len(bases[0]) == 3:
+            return [drawn]
+        with np.errstate(over="ignore"):
+            m = mass * np.exp((self.mass_sigma or 0.0) * normals(u[:, moments]))
+        H = inertia.hat(center)
+        C = -m[:, None, None] * H
+        return [inertia.joined(m[:, None, None] * np.eye(3), C, drawn + C @ H)]
+
+
+def _trace(matrices: np.ndarray) -> np.ndarray:
+    return (matrices[..., 0, 0] + matrices[..., 1, 1] + matrices[..., 2, 2])[..., None, None]
+
+
+def second_moments(J: np.ndarray) -> np.ndarray:
+    """S = tr(J) / 2 - J (..., 3, 3) [kg m2]: the integral of r r^T over the mass."""
+    return np.asarray(0.5 * _trace(J) * np.eye(3) - J)
+
+
+def _about_center(base: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
+    """Inertia about the centre of gravity, mass and centre of a rigid body's 3x3 or 6x6 matrix."""
+    if len(base) == 3:
+        return base, 0.0, np.zeros(3)
+    mass = float(base[0, 0])
+    center = -inertia.vee(base[:3, 3:]) / mass
+    H = inertia.hat(center)
+    return base[3:, 3:] + mass * H @ H, mass, center

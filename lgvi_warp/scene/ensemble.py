@@ -1,0 +1,503 @@
+"""What varies from member to member, and the members' numbers, block by block."""
+
+from __future__ import annotations
+
+import copy
+import functools
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from lgvi_warp.common import machine
+from lgvi_warp.common.errors import Faults, closest, cut, shown
+from lgvi_warp.common.labelled import columns_by_name, is_labelled, match
+from lgvi_warp.common.real_numbers import column_names
+from lgvi_warp.physics import notation
+from lgvi_warp.physics import vehicle as vehicles
+from lgvi_warp.sampling.designs import Sampling
+from lgvi_warp.sampling.designs.space import Space
+from lgvi_warp.sampling.members import STATES, Members
+from lgvi_warp.scene import variations
+from lgvi_warp.scene.like import SceneLike
+from lgvi_warp.scene.settings import MOST_MEMBERS, EnsembleSettings
+from lgvi_warp.scene.start import ATTITUDES, SHAPES, resolve_attitude
+from lgvi_warp.scene.variations import MATRICES, Target, Variation
+
+
+class Ensemble:
+    """A scene and what varies in it.
+
+    scene: the Scene. members: how many, >= 1 (default: as many as the sampling has, else 1). seed: whole number >= 0.
+    vary: name -> distribution, of lgvi_warp or a frozen one of scipy.stats; names are every number that the scene has:
+    "vehicle.mass", "drag.quadratic", "current.velocity" (a term's name or type, and its field), ... (`scene.parameters()`
+    lists them), and what the scene's start gives ("start.position", "start.angular_velocity", ...) and "start.attitude";
+    an entry of one, "start.position[2]"; several that one law draws together, "vehicle.mass, vehicle.buoyancy".
+    One law varies every entry; of a symmetric matrix, the entries on and above the diagonal (of a diagonal one, those on
+    it). sampling: "random" (a draw depends on the seed, the member's index and the name only), "sobol", "halton",
+    "saltelli", lw.LatinHypercube(...), lw.Grid(...), lw.Table(...) and others, or a table as in a scene file. A member is
+    the same in whatever block, subset or order it is drawn.
+
+    Raises SceneError naming every fault; members that would be unphysical are counted and the first is shown.
+    """
+
+    def __init__(
+        self,
+        scene: SceneLike,
+        members: int | None = None,
+        seed: int = 0,
+        vary: Mapping[Any, Any] | None = None,
+        sampling: Any = "random",
+    ):
+        faults = Faults()
+        if not isinstance(scene, SceneLike):
+            faults.add("scene", scene, "is no Scene", "give lw.Scene(...) or lw.Scene.load(path)")
+        if vary is not None and not (isinstance(vary, Mapping) and all(_is_name(name) for name in vary)):
+            faults.add("vary", vary, "does not map names to distributions", 'give {"vehicle.mass": lw.Normal(...)}')
+        faults.raise_if_any()
+        self._setup(scene, EnsembleSettings(members, seed, dict(vary or {}), sampling), {})
+
+    @classmethod
+    def of(cls, scene: SceneLike, settings: EnsembleSettings) -> Ensemble:
+        """The ensemble that settings describe; only their `indices` of it where they name some."""
+        ensemble = cls.__new__(cls)
+        # A scene file's own ensemble was looked at when the file was read.
+        ensemble._setup(scene, settings, {}, checked=vars(scene).get("_checked") is settings)
+        if scene.ensemble_settings is settings:
+            object.__setattr__(scene, "_checked", settings)
+        if settings.indices is None:
+            return ensemble
+        most = int(np.max(settings.indices))
+        if most >= ensemble.members:
+            faults = Faults("ensemble.")
+            faults.add("indices", most, f"is no member of {ensemble.members}", f"give 0 to {ensemble.members - 1}")
+            faults.raise_if_any()
+        return ensemble.subset(settings.indices)
+
+    @classmethod
+    def from_scene(cls, scene: SceneLike) -> Ensemble:
+        """The ensemble that the scene file describes; one member if it describes none."""
+        return cls.of(scene, scene.ensemble_settings or EnsembleSettings())
+
+    @classmethod
+    def from_states(
+        cls,
+        scene: SceneLike,
+        position: Any,
+        attitude: Any,
+        velocity: Any,
+        angular_velocity: Any,
+        parameters: Any = None,
+    ) -> Ensemble:
+        """Members with given states: (n, 3) [m], (n, 3, 3) body to inertial, (n, 3) [m/s, body], (n, 3) [rad/s, body].
+
+        parameters: name -> array of length n ("vehicle.inertia": (n, 3) or (n, 3, 3)), names as in `vary`, also of single
+        entries ("current.velocity[0]"); or a data frame, a structured array or an xarray Dataset with such names. States
+        that are not finite are let through: the run gives such a member its status. Raises SceneError for what is no real
+        number, wrong shapes and unphysical values.
+        """
+        faults = Faults()
+        states = dict(zip(STATES, (position, attitude, velocity, angular_velocity), strict=True))
+        explicit = {f"start.{key}": _state(faults, key, value) for key, value in states.items()}
+        faults.raise_if_any()
+        n = len(explicit["start.position"]) if explicit["start.position"].ndim else 0
+        if n == 0:
+            faults.add("position", position, "holds no member", "give arrays of length 1 or more")
+        for key, value in explicit.items():
+            shape = (n, 3, 3) if key == "start.attitude" else (n, 3)
+            if value.shape != shape:
+                faults.add(key, value, f"has shape {value.shape}", f"give an array of shape {shape}")
+        faults.raise_if_any()
+        R = explicit["start.attitude"]
+        bad = np.isfinite(R).all(axis=(1, 2)) & ~notation.rotations(R)
+        if bad.any():
+            what = f"is not a rotation to 1e-9 ({bad.sum()} of {n} members)"
+            faults.add(f"attitude of member {bad.argmax()}", R[bad.argmax()], what, "give R^T R = I, det R = 1")
+        explicit |= _given_parameters(faults, scene.parameters(), parameters, n)
+        faults.raise_if_any()
+        ensemble = cls.__new__(cls)
+        ensemble._setup(scene, EnsembleSettings(n), explicit)
+        return ensemble
+
+    def _setup(
+        self, scene: SceneLike, settings: EnsembleSettings, explicit: dict[str, np.ndarray], checked: bool = False
+    ) -> None:
+        self.scene, self.seed = scene, int(settings.seed)
+        self.vary: dict[str, Any] = dict(settings.vary)
+        self.sampling: Sampling = settings.sampling
+        self._explicit = explicit
+        self._start = {f"start.{key}": value for key, value in scene.start.given().items()}
+        if explicit:
+            self._start = {key: value for key, value in explicit.items() if key.startswith("start.")}
+        self._base = scene.parameters()
+        # Which members of the whole it holds, and by which indices their noise is keyed; None for all, by their own.
+        self._places: np.ndarray | None = None
+        self._indices: np.ndarray | None = None
+        self._variations = self._described()
+        self.space: Space = variations.space(self.seed, self._variations)
+        self._whole = self._counted(settings)
+        self.members = self._whole
+        if not checked:
+            self._check_physical()
+
+    def _described(self) -> list[Variation]:
+        """What varies, by law; notes every name and law that does not fit the scene."""
+        faults = Faults("ensemble.vary.")
+        columns = self.sampling.own_values()
+        self._turn_by_matrix(faults, columns)
+        known = {**self._base, **({} if self._explicit else self._start)}
+        laws = {**self.sampling.laws(), **self.vary}
+        for key in self.sampling.laws().keys() & self.vary.keys():
+            faults.add(
+                f'"{key}"', self.vary[key], f"varies what the {self.sampling.kind} gives values", "drop one of them"
+            )
+        found = [variations.variation(faults, key, law, known) for key, law in sorted(laws.items())]
+        named = [(one.key, one.targets) for one in found if one]
+        self._columns: list[tuple[Target, np.ndarray]] = []
+        tables = Faults("ensemble.sampling.table.")
+        for key, column in columns.items():
+            (target, *more) = variations.targets(key)
+            if more:
+                tables.add(f'"{key}"', "...", "names several numbers", "give each a column of its own")
+            elif variations.known_target(
+                tables, key, "...", target, known, f'; or leave it out: ignore = ["{cut(key)}"]'
+            ):
+                named.append((key, (target,)))
+                shape = (len(column), *target.of(known[target.name]).shape)
+                name = target.name if target.index is None else key
+                self._columns.append((target, _explicit_parameter(tables, name, column, shape)))
+                if (
+                    target.name == variations.ATTITUDE
+                    and column.shape == shape
+                    and not notation.rotations(column).all()
+                ):
+                    tables.add(
+                        f'"{key}"', "...", "holds a matrix that is no rotation to 1e-9", "give R^T R = I, det R = 1"
+                    )
+        variations.clashes(faults, named)
+        with faults.including():
+            tables.raise_if_any()
+        faults.raise_if_any()
+        return [one for one in found if one]
+
+    def _turn_by_matrix(self, faults: Faults, columns: Mapping[str, Any]) -> None:
+        """Where the attitude itself varies, the scene's attitude is a matrix, however the scene gives it."""
+        keys = [*self.vary, *self.sampling.laws(), *columns]
+        names = {target.name for key in keys for target in variations.targets(key)}
+        if variations.ATTITUDE not in names or self._explicit:
+            return
+        ways = {f"start.{way}" for way in ATTITUDES} - {variations.ATTITUDE}
+        for way in sorted(ways & names):
+            faults.add(f'"{way}"', "...", f'varies beside "{variations.ATTITUDE}"', "keep one of them")
+        faults.raise_if_any()
+        given = {way: self._start.pop(f"start.{way}") for way in ATTITUDES if f"start.{way}" in self._start}
+        R = resolve_attitude({way: np.asarray(value)[None] for way, value in given.items()})
+        self._start[variations.ATTITUDE] = R[0]
+
+    def _counted(self, settings: EnsembleSettings) -> int:
+        """How many members there are; refuses a number that the sampling cannot have."""
+        faults = Faults("ensemble.")
+        own, group = self.sampling.own_members(self.space), self.sampling.group_size(self.space)
+        members = int(settings.members or own or group)
+        if members > MOST_MEMBERS:
+            what = f"are more members than the {MOST_MEMBERS} that there can be"
+            faults.add(f"sampling.{self.sampling.kind}", members, what, "give fewer values, of fewer names")
+        else:
+            self.sampling.check(faults, self.space, members)
+        faults.raise_if_any()
+        return members
+
+    @property
+    def indices(self) -> np.ndarray:
+        """(members,), which members of the whole they are: what their noise is keyed by."""
+        if self._indices is not None:
+            return self._indices
+        return np.arange(self.members) if self._places is None else self._places
+
+    @indices.setter
+    def indices(self, indices: np.ndarray) -> None:
+        self._indices = indices
+
+    def indices_of(self, first: int, stop: int) -> np.ndarray:
+        """The same of the members first to stop alone."""
+        return np.arange(first, stop) if self._indices is self._places is None else self.indices[first:stop]
+
+    def _check_physical(self) -> None:
+        """Refuse members that are unphysical: all are looked at, so many at a time that memory stays small."""
+        targets = [target for one in self._variations for target in one.targets] + [one for one, _ in self._columns]
+        varied = {name for name in (*(target.name for target in targets), *self._explicit) if name in self._base}
+        found: dict[str, _Unphysical] = {}
+        for part in over_members(functools.partial(self._look_at, varied), self.members if varied else 0):
+            for key, one in part.items():
+                if key not in found:
+                    found[key] = one
+                elif not one.shared:
+                    found[key].count += one.count
+        faults = Faults()
+        for key, one in found.items():
+            drawn = any(name in {t.name for v in self._variations for t in v.targets} for name in key.split(" + "))
+            remedy = "use a smaller spread, TruncatedNormal or LogNormal" if drawn else "give finite, physical values"
+            what = f"is unphysical ({one.count} of {one.of if one.shared else self.members} members)"
+            faults.add(f"{key} of member {one.first}", one.value, what, remedy)
+        faults.raise_if_any()
+
+    def _look_at(self, varied: set[str], first: int, stop: int) -> dict[str, _Unphysical]:
+        with np.errstate(over="ignore", invalid="ignore"):
+            p = self.parameters(first, stop)
+            checks = _vehicle_checks(p, varied, self.scene.vehicle.inertia_tolerance)
+            for one in (*self.scene.terms, *self.scene.events):
+                own = self.own(one, p)
+                if any(f"{one.key}.{name}" in varied for name in own):
+                    checks |= {f"{one.key}.{name}": bad for name, bad in one.unphysical(own).items()}
+        found = {}
+        for key, bad in checks.items():
+            bad = np.atleast_1d(bad)
+            if np.any(bad):
+                names = key.split(" + ")
+                i = int(np.argmax(bad))
+                value = sum(p[name][i % len(p[name])] for name in names if p[name].ndim == p[names[-1]].ndim)
+                shared = len(bad) == 1 and stop - first > 1
+                found[key] = _Unphysical(first + i, value, shared, len(bad), int(bad.sum()))
+        return found
+
+    @staticmethod
+    def own(term: Any, parameters: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """A term's own numbers, by field, out of all parameters."""
+        return {name: parameters[f"{term.key}.{name}"] for name in term.parameters()}
+
+    def _values(self, first: int, stop: int, start: bool = True) -> dict[str, np.ndarray]:
+        """Numbers of the members first to stop by name, shared ones with a leading dimension of 1; with the start or not."""
+        whole = self._base | (self._start if start and not self._explicit else {})
+        values = {name: np.asarray(value)[None] for name, value in whole.items()}
+        if self._explicit:
+            rows = slice(first, stop) if self._places is None else self._places[first:stop]
+            values |= {name: column[rows] for name, column in self._explicit.items() if start or name in self._base}
+        wanted = [one for one in self._variations if start or any(target.name in self._base for target in one.targets)]
+        if not (wanted or self._columns):
+            return values
+        members = np.arange(first, stop) if self._places is None else self._places[first:stop]
+        space = self.space.of([one.key for one in wanted]) if self.sampling.kind == "random" else self.space
+        levels = self.sampling.draw(space, members) if wanted else {}
+        drawn = [(target, column[members]) for target, column in self._columns]
+        for one in wanted:
+            drawn += one.values(levels[one.key])
+        for target, column in drawn:
+            if target.name in values:
+                variations.put(values, target, column)
+        return values
+
+    def parameters(self, first: int, stop: int) -> dict[str, np.ndarray]:
+        """Parameters of the members first to stop, shared ones with a leading dimension of 1."""
+        return self._values(first, stop, start=False)
+
+    def select(self, first: int, stop: int) -> Members:
+        """The numbers of the members first to stop (not included). Raises IndexError where there are none."""
+        if not 0 <= first < stop <= self.members:
+            raise IndexError(f"members {first} to {stop} of {self.members}")
+        m = stop - first
+        values = self._values(first, stop)
+        start = {key.removeprefix("start."): values.pop(key) for key in self._start}
+        R = np.broadcast_to(resolve_attitude(start), (m, 3, 3))
+        if "velocity_inertial" in start:
+            # Written out: the sum's order, and so the bits, must not depend on how many members are asked for.
+            v = start["velocity_inertial"]
+            nu = R[:, 0] * v[:, :1] + R[:, 1] * v[:, 1:2] + R[:, 2] * v[:, 2:]
+        else:
+            nu = start["velocity"]
+        position, nu, Om = (np.broadcast_to(x, (m, 3)) for x in (start["position"], nu, start["angular_velocity"]))
+        return Members(values, position, R, nu, Om, self.indices_of(first, stop), self.seed)
+
+    def varied(self) -> list[str]:
+        """Names of the parameters that have a number for each member."""
+        drawn = {target.name for one in self._variations for target in one.targets}
+        own = drawn | {target.name for target, _ in self._columns} | self._explicit.keys()
+        return [name for name in self._base if name in own]
+
+    @property
+    def starts_vary(self) -> bool:
+        """Whether members start differently."""
+        names = {target.name for one in self._variations for target in one.targets}
+        return not {*names, *(target.name for target, _ in self._columns), *self._explicit} <= self._base.keys()
+
+    def subset(self, indices: Sequence[int] | np.ndarray) -> Ensemble:
+        """These members, in this order, as an ensemble of its own with the same numbers. Raises IndexError."""
+        chosen = np.asarray(indices)
+        if chosen.ndim != 1 or not len(chosen) or chosen.dtype.kind not in "iu" or np.ma.is_masked(indices):
+            raise IndexError(f"members {shown(indices)}: give a list of one or more whole numbers")
+        if chosen.min() < 0 or chosen.max() >= self.members:
+            raise IndexError(f"members {chosen.min()} to {chosen.max()} of {self.members}")
+        chosen = chosen.astype(np.int64)
+        part = copy.copy(self)
+        part._places = chosen if self._places is None else self._places[chosen]
+        part._indices = None if self._indices is None else self._indices[chosen]
+        part.members = len(chosen)
+        return part
+
+    def member(self, index: int) -> Ensemble:
+        """One member alone, with the bits that it has among all. Raises IndexError where there is none."""
+        return self.subset([operator.index(index)])
+
+    @property
+    def replicates(self) -> int:
+        """Independent replicates of its design, member i of the i-th mod so many; 1 for chosen members: they are no design."""
+        return self.sampling.replicates_of_members() if self._places is None and not self._explicit else 1
+
+    def explicit(self) -> dict[str, np.ndarray]:
+        """What was given as arrays, by name: states and parameters of the whole, (members of the whole, ...), or what its
+        sampling has of them, and "indices".
+
+        Empty for an ensemble that is drawn, with `indices` of its own alone if they were set.
+        """
+        own = {} if self._indices is None else {"indices": np.asarray(self._indices, dtype=np.int64)}
+        sampled = {name: values[: self._whole] for name, values in self.sampling.arrays().items()}
+        return dict(self._explicit) | sampled | own
+
+    def to_dict(self) -> dict[str, Any]:
+        """members, seed, vary, sampling and indices as in a scene file, and the names that were given as arrays."""
+        settings = EnsembleSettings(self._whole, self.seed, self.vary, self.sampling, self._places)
+        return settings.to_dict() | ({"explicit": sorted(self._explicit)} if self._explicit else {})
+
+
+# Members whose numbers are looked at together before a run: some tens of megabytes a thread.
+AT_ONCE = 16_384
+Found = TypeVar("Found")
+
+
+def over_members(look: Callable[[int, int], Found], members: int) -> list[Found]:
+    """What look(first, stop) finds of all members, so many at a time that memory stays small, on all cores; in order."""
+    firsts = range(0, members, AT_ONCE)
+    with ThreadPoolExecutor(min(machine.thread_count(), max(1, len(firsts)))) as pool:
+        return list(pool.map(lambda first: look(first, min(first + AT_ONCE, members)), firsts))
+
+
+@dataclass
+class _Unphysical:
+    """What was found of one quantity: the first member, its value, and how many. shared: one number of all members."""
+
+    first: int
+    value: Any
+    shared: bool
+    of: int
+    count: int
+
+
+def _is_name(name: Any) -> bool:
+    """A text, or several for one law."""
+    return isinstance(name, str) or (isinstance(name, tuple) and all(isinstance(one, str) for one in name))
+
+
+def _vehicle_checks(p: Mapping[str, np.ndarray], varied: set[str], tolerance: float) -> dict[str, np.ndarray]:
+    """Name -> (n,), which members' numbers of vehicle and environment are unphysical. tolerance: see Vehicle."""
+    checks: dict[str, np.ndarray] = {}
+    if "vehicle.mass" in p:
+        mass = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
+        heavy = np.isfinite(p["vehicle.mass"]) & (p["vehicle.mass"] >= vehicles.LEAST)
+        checks |= {
+            "vehicle.mass": ~heavy,
+            "vehicle.inertia": ~_positive_definite(p["vehicle.inertia"]),
+            "vehicle.mass + vehicle.added_mass": heavy & ~_positive_definite(mass),
+        }
+    else:
+        rigid, added = "vehicle.rigid_body_mass_matrix", "vehicle.added_mass_matrix"
+        good = _positive_definite(p[rigid])
+        possible = np.where(good[:, None, None], p[rigid], np.eye(6))
+        bad = ~good | vehicles.impossible(possible, tolerance)
+        checks |= {rigid: bad, f"{rigid} + {added}": ~_positive_definite(p[rigid] + p[added])}
+    for key in ("vehicle.center_of_buoyancy", "vehicle.center_of_gravity"):
+        if key in p:
+            checks[key] = ~np.isfinite(p[key]).all(axis=1)
+    for key in ("vehicle.buoyancy", "vehicle.weight", "environment.gravity"):
+        if key in p:
+            checks[key] = ~(np.isfinite(p[key]) & (p[key] >= 0.0))
+    checks["environment.water_density"] = ~(
+        np.isfinite(p["environment.water_density"]) & (p["environment.water_density"] > 0)
+    )
+    return {key: bad for key, bad in checks.items() if any(name in varied for name in key.split(" + "))}
+
+
+def _state(faults: Faults, key: str, value: Any) -> np.ndarray:
+    """A state's float64 copy, which may hold NaN: the caller's later writes to his array do not reach the ensemble.
+
+    A data frame's columns may be called position[0], position[1], position[2], in any order.
+    """
+    names = column_names(value)
+    if key != "attitude" and names is not None and all(isinstance(name, str) for name in names):
+        columns = columns_by_name(faults, key, value)
+        entries = [f"{key}[{i}]" for i in range(3)]
+        if not columns or not match(faults, key, list(columns), entries):
+            return np.empty(0)
+        value = [columns[entry] for entry in entries]
+        array = faults.real(key, value, "give an array of numbers")
+        return np.empty(0) if array is None else np.ascontiguousarray(array.T)
+    array = faults.real(key, value, "give an array of numbers")
+    return np.empty(0) if array is None else array
+
+
+def _given_parameters(faults: Faults, base: Mapping[str, np.ndarray], given: Any, n: int) -> dict[str, np.ndarray]:
+    """Name -> (n, *shape) of the parameters that are given by name, whole or by their entries."""
+    if given is None or (isinstance(given, Mapping) and not given):
+        return {}
+    if not is_labelled(given):
+        faults.add(
+            "parameters", given, "has no names", 'give {"vehicle.mass": array, ...} or a DataFrame with such names'
+        )
+        return {}
+    found: dict[str, np.ndarray] = {}
+    named = []
+    for key, column in columns_by_name(faults, "parameters", given).items():
+        (target, *more) = variations.targets(key)
+        if more or target.name not in base:
+            faults.keys("", {key: column}, base)
+        elif variations.known_target(faults, key, "...", target, base):
+            named.append((key, (target,)))
+            name = key if target.index is not None else target.name
+            values = _explicit_parameter(faults, name, column, (n, *target.of(base[target.name]).shape))
+            if target.index is None:
+                found[target.name] = values
+            elif values.shape == (n,):
+                found.setdefault(target.name, np.repeat(base[target.name][None], n, axis=0))
+                variations.put(found, target, values)
+    variations.clashes(faults, named)
+    return found
+
+
+def check_names(vary: Mapping[str, Any], parameters: Sequence[str]) -> None:
+    """Refuse names that a scene with these parameters has not. Raises SceneError."""
+    faults = Faults("ensemble.vary.")
+    known = [*parameters, *(f"start.{name}" for name in SHAPES)]
+    for key, law in vary.items():
+        for target in variations.targets(key):
+            if target.name not in known:
+                remedy = functools.partial(closest, target.name, known)
+                faults.add(f'"{key}"', law, "does not name what a scene has", remedy)
+    faults.raise_if_any()
+
+
+def _explicit_parameter(faults: Faults, key: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+    array = faults.real(key, value, "give an array of numbers")
+    if array is None:
+        return np.empty(0)
+    if key in MATRICES and array.shape == shape[:2]:
+        return np.where(np.eye(shape[1], dtype=bool), array[:, :, None], 0.0)
+    if array.shape != shape:
+        also = f" or {shape[:2]}" if key in MATRICES else ""
+        faults.add(key, value, f"has shape {array.shape}", f"give an array of shape {shape}{also}")
+    elif key in MATRICES and np.any(np.abs(array - np.swapaxes(array, 1, 2)) > 1e-9 * np.abs(array).max()):
+        faults.add(key, "...", "holds a matrix that is not symmetric", "give symmetric matrices")
+    return array
+
+
+def _positive_definite(matrices: np.ndarray) -> np.ndarray:
+    """Which symmetric matrices (n, d, d) are positive definite, by the pivots of elimination; False where not finite."""
+    d = matrices.shape[-1]
+    left = matrices.copy()
+    good = np.isfinite(matrices).all(axis=(1, 2))
+    for k in range(d):
+        pivot = left[:, k, k]
+        good &= pivot >= vehicles.LEAST
+        row = left[:, k, k + 1 :] / np.where(good, pivot, 1.0)[:, None]
+        left[:, k + 1 :, k + 1 :] -= left[:, k + 1 :, k, None] * row[:, None, :]
+    return np.asarray(good)

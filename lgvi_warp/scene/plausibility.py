@@ -1,0 +1,296 @@
+"""What is possible and yet odd, and most likely a unit: said in messages, refused nowhere.
+
+Every check looks at the numbers of many members at once. Members that are odd are counted, and the first is named.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import operator
+from collections.abc import Callable, Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from lgvi_warp.physics import vehicle as vehicles
+from lgvi_warp.physics.terms.base import Term
+from lgvi_warp.physics.terms.control_fins import ControlFins
+from lgvi_warp.physics.terms.cross_flow import CrossFlow
+from lgvi_warp.sampling.members import Members
+from lgvi_warp.scene.ensemble import Ensemble, over_members
+from lgvi_warp.scene.like import SceneLike
+from lgvi_warp.scene.oddities import Look, Oddities, gathered
+
+Numbers = Mapping[str, np.ndarray]
+
+
+class Limit(NamedTuple):
+    """What is odd beyond a value [unit], and why."""
+
+    value: float
+    unit: str
+    reason: str
+
+
+LIMITS = {
+    "net weight": Limit(0.5, "of the weight", "vehicles are trimmed to some per cent; drop weights make some tens"),
+    "light water": Limit(100.0, "kg/m3", "water has 1,000 or a little more; 1.025 would be in g/cm3"),
+    "heavy water": Limit(3000.0, "kg/m3", "brine has 1,300, mud 2,000; 1,025,000 would be in g/m3"),
+    "current": Limit(5.0, "m/s", "the strongest tides through straits; knots are half of m/s"),
+    "fin angle": Limit(math.pi / 2.0, "rad", "a fin across the flow; 20 would be in degrees"),
+    "speed": Limit(30.0, "m/s", "the fastest torpedoes without a cavity; km/h or mm/s would be more"),
+    "depth": Limit(
+        0.0, "m", "depth is positive down; above the surface there is no water, which this model does not know"
+    ),
+}
+# Fields of terms that hold velocities of water [m/s].
+CURRENTS = {
+    "current": "velocity",
+    "current_profile": "velocities",
+    "current_harmonics": "amplitudes",
+    "gauss_markov_current": "standard_deviation",
+}
+# Fields of terms and events that hold depths [m].
+DEPTHS = {"floor": "depth", "current_profile": "depths", "stratification": "reference_depth"}
+# Samples that are looked at after a run, in numbers: of more, the last times alone.
+MOST_SAMPLES = 30_000_000
+
+
+def net_weight(scene: SceneLike, p: Numbers) -> Iterator[Look]:
+    """Weight and buoyancy that nearly no vehicle has."""
+    weight, buoyancy = np.broadcast_arrays(vehicles.weight(p), p["vehicle.buoyancy"])
+    net = weight - buoyancy
+
+    def text(i: int) -> str:
+        way = "down" if net[i] > 0.0 else "up"
+        asked = "is the mass in kg, and are weight and buoyancy in N" if buoyancy[i] else "is buoyancy [N] left out"
+        return f"the net weight, {abs(net[i]):.4g} N {way}, is beyond half the weight, {weight[i]:.4g} N: {asked}?"
+
+    yield "vehicle.buoyancy", np.abs(net) > LIMITS["net weight"].value * weight, text
+
+
+def density(scene: SceneLike, p: Numbers) -> Iterator[Look]:
+    """Water that is none."""
+    rho = p["environment.water_density"]
+    odd = (rho < LIMITS["light water"].value) | (rho > LIMITS["heavy water"].value)
+    yield (
+        "environment.water_density",
+        odd,
+        lambda i: f"{rho[i]:.6g} kg/m3 is not water, which has 1,000 or more: a unit?",
+    )
+
+
+def currents(scene: SceneLike, p: Numbers) -> Iterator[Look]:
+    """Water that is too fast."""
+    for term in scene.terms:
+        field = CURRENTS.get(term.type)
+        if field is None:
+            continue
+        values = p[f"{term.key}.{field}"]
+        speed = np.sqrt(np.square(values).sum(axis=-1)).reshape(len(values), -1).max(axis=1)
+        yield f"{term.key}.{field}", speed > LIMITS["current"].value, _too_fast(speed)
+
+
+def _too_fast(speed: np.ndarray) -> Callable[[int], str]:
+    limit = LIMITS["current"].value
+    return lambda i: f"a current of {speed[i]:.4g} m/s is beyond the {limit:g} m/s of the strongest tides: a unit?"
+
+
+def fin_angles(scene: SceneLike, p: Numbers) -> Iterator[Look]:
+    """Fins that turn beyond 90 degrees; of one term its limit and its commands, in whichever way they are given."""
+    for term in scene.terms:
+        if not isinstance(term, ControlFins):
+            continue
+        for field in ("limit", "command_schedule"):
+            values = np.abs(p[f"{term.key}.{field}"])
+            angle = values.reshape(len(values), -1).max(axis=1)
+            held = field == "command_schedule" and len(term.times) == 1
+            name = f"{term.key}.{'command' if held else field}"
+            yield name, angle > LIMITS["fin angle"].value * (1.0 + 1e-9), _too_far(angle)
+
+
+def _too_far(angle: np.ndarray) -> Callable[[int], str]:
+    return lambda i: f"an angle of {angle[i]:.4g} rad is beyond 90 degrees: is it given in degrees?"
+
+
+def depths(scene: SceneLike, p: Numbers) -> Iterator[Look]:
+    """Floors above the surface, and tables of which no depth is below it: their depths are heights."""
+    for term in (*scene.terms, *scene.events):
+        field = DEPTHS.get(term.type)
+        if field is not None:
+            values = p[f"{term.key}.{field}"]
+            deepest = values.reshape(len(values), -1).max(axis=1)
+            highest = values.reshape(len(values), -1).min(axis=1)
+            odd = (highest < LIMITS["depth"].value) & (deepest <= LIMITS["depth"].value)
+            yield f"{term.key}.{field}", odd, _too_high(highest)
+
+
+def _too_high(depth: np.ndarray) -> Callable[[int], str]:
+    return lambda i: f"a depth of {depth[i]:.4g} m is above the surface: depth is positive down"
+
+
+def inertia(scene: SceneLike, p: Numbers) -> Iterator[Look]:
+    """Inertia that a body of this mass and length cannot have.
+
+    The length is that of the stations of a cross flow. Within a length L along x and a breadth D, the variance of a
+    coordinate is at most a quarter of its range squared (Popoviciu 1935), so that the rigid body's inertia is at most
+    m (L^2 + D^2)/4. Added inertia is that of strips: at most the added mass times the largest distance squared.
+    """
+    for term in scene.terms:
+        if isinstance(term, CrossFlow):
+            x, breadth = p[f"{term.key}.stations"], p[f"{term.key}.diameters"].max(axis=1)
+            rigid = vehicles.dry_mass(p) * ((x[:, -1] - x[:, 0]) ** 2 + breadth**2) / 4.0
+            arm = np.abs(x).max(axis=1) ** 2 + breadth**2 / 4.0
+            yield from _inertia(p, rigid, arm, x[:, -1] - x[:, 0])
+
+
+def _inertia(p: Numbers, rigid: np.ndarray, arm: np.ndarray, length: np.ndarray) -> Iterator[Look]:
+    """The largest inertia about an axis of the body beside its limit: the largest of all is no less."""
+    both = "vehicle.inertia" in p
+    name = "vehicle.inertia" if both else "vehicle.rigid_body_mass_matrix"
+    added = p["vehicle.added_mass" if both else "vehicle.added_mass_matrix"]
+    strips = _diagonal(added)[:, :3].max(axis=1) * arm
+    own = p[name] if both else vehicles.about_center(p[name])
+    limits = {name: (_diagonal(own).max(axis=1), rigid + strips if both else rigid)}
+    if not both:
+        limits["vehicle.added_mass_matrix"] = _diagonal(added)[:, 3:].max(axis=1), strips
+    for key, pair in limits.items():
+        size, most, long = np.broadcast_arrays(*pair, length)
+        yield key, size > most, _too_large(size, most, long)
+
+
+def _too_large(size: np.ndarray, most: np.ndarray, length: np.ndarray) -> Callable[[int], str]:
+    return lambda i: (
+        f"an inertia of {size[i]:.4g} kg m2 is beyond the {most[i]:.4g} kg m2 that the mass allows within the "
+        f"{length[i]:.4g} m of the hull's stations: a unit?"
+    )
+
+
+def _diagonal(matrices: np.ndarray) -> np.ndarray:
+    return np.diagonal(matrices, axis1=1, axis2=2)
+
+
+# What is looked at of every member before a run.
+OF_NUMBERS = (net_weight, density, currents, fin_angles, depths, inertia)
+
+
+def of_numbers(scene: SceneLike, p: Numbers, first: int, stop: int) -> Oddities:
+    """What is odd of the numbers of some members.
+
+    Args:
+        scene: Of all members.
+        p: Its parameters by name, of 1 (shared) or of stop - first members.
+        first: Index of the first member.
+        stop: Index after the last.
+
+    Returns:
+        What is odd.
+    """
+    with np.errstate(all="ignore"):
+        return gathered((look for check in OF_NUMBERS for look in check(scene, p)), first, stop)
+
+
+def of_ensemble(ensemble: Ensemble) -> Oddities:
+    """What is odd of the numbers and the starts of all members.
+
+    Args:
+        ensemble: Whose members are drawn, so many at a time that memory stays small.
+
+    Returns:
+        What is odd.
+    """
+
+    def look(first: int, stop: int) -> Oddities:
+        members = ensemble.select(first, stop)
+        return of_numbers(ensemble.scene, members.parameters, first, stop) | of_start(ensemble.scene, members, first)
+
+    return functools.reduce(operator.or_, over_members(look, ensemble.members))
+
+
+def of_start(scene: SceneLike, members: Members, first: int = 0) -> Oddities:
+    """What is odd of the starts of some members, and of the water that laws of the user's move there.
+
+    Args:
+        scene: Of all members.
+        members: Their numbers and states, as Ensemble.select gives them.
+        first: Index of the first.
+
+    Returns:
+        What is odd.
+    """
+    with np.errstate(all="ignore"):
+        return gathered(_of_start(scene, members), first, first + members.count)
+
+
+def _of_start(scene: SceneLike, members: Members) -> Iterator[Look]:
+    speed, depth = _speed(members.velocity), members.position[:, 2]
+    limit = LIMITS["speed"].value
+    yield "start.velocity", speed > limit, lambda i: f"a speed of {speed[i]:.4g} m/s is beyond {limit:g} m/s: a unit?"
+    if not ends_at_the_surface(scene):
+        yield "start.position", depth < LIMITS["depth"].value, _too_high(depth)
+    for term in own_flows(scene):
+        own = {name: members.parameters[f"{term.key}.{name}"] for name in term.parameters()}
+        water = term.water(own, members.position[None], np.zeros(1), members.parameters)
+        if water is not None:
+            flow = _speed(water[0])
+            yield term.key, flow > LIMITS["current"].value, _too_fast(flow)
+
+
+def own_flows(scene: SceneLike) -> list[Term]:
+    """Laws of the user's that move the water. Of waves the water may be faster than any current."""
+    known = (*CURRENTS, "waves")
+    return [term for term in scene.terms if term.type not in known and type(term).water is not Term.water]
+
+
+def ends_at_the_surface(scene: SceneLike) -> bool:
+    """Whether an event stops a member that rises through the surface."""
+    boxes = (event.lower[2] for event in scene.events if event.type == "box")
+    return any(event.type == "surface" for event in scene.events) or any(top >= 0.0 for top in boxes)
+
+
+def on_the_way(scene: SceneLike, samples: Mapping[str, np.ndarray]) -> Oddities:
+    """What became odd of members that began well, by samples that are kept in memory anyway.
+
+    Args:
+        scene: Of all members.
+        samples: "position" and "velocity", (k, n, 3) [m, m/s], of which the first is the start.
+
+    Returns:
+        What is odd; nothing where there is no such sample.
+    """
+    limit = LIMITS["speed"].value
+    with np.errstate(all="ignore"):
+        fast, speed = _later(samples.get("velocity"), _speed, limit)
+        high, height = _later(samples.get("position"), _higher, -LIMITS["depth"].value)
+    if ends_at_the_surface(scene):
+        high = np.zeros_like(high)
+    looks: list[Look] = [
+        ("velocity", fast, lambda i: f"{speed[i]:.4g} m/s on the way is beyond {limit:g} m/s: a unit, or the step?"),
+        ("position", high, lambda i: f"rises {height[i]:.4g} m above the surface, where no water is: {STOP}"),
+    ]
+    return gathered(looks, 0, max(len(fast), len(high)))
+
+
+STOP = "stop members there by the event lw.Surface()"
+
+
+def _higher(position: np.ndarray) -> np.ndarray:
+    return -position[:, 2]
+
+
+def _later(
+    samples: np.ndarray | None, size: Callable[[np.ndarray], np.ndarray], limit: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Of each member (n,): whether its largest size after the start is beyond a limit that the start keeps, and the size."""
+    if not isinstance(samples, np.ndarray) or len(samples) < 2:
+        return np.zeros(0, dtype=bool), np.zeros(0)
+    times = range(1, len(samples)) if samples.size <= MOST_SAMPLES else range(len(samples) - 1, len(samples))
+    largest = np.full(samples.shape[1], -np.inf)
+    for time in times:
+        np.fmax(largest, size(samples[time]), out=largest)
+    return (size(samples[0]) < limit) & (largest > limit), largest
+
+
+def _speed(velocity: np.ndarray) -> np.ndarray:
+    return np.sqrt(np.einsum("ni,ni->n", velocity, velocity, dtype=np.float64))

@@ -1,0 +1,202 @@
+"""A scene: one vehicle, its environment, the terms that act and the state it starts from."""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.names import alike, folded
+from lgvi_warp.physics import terms
+from lgvi_warp.physics.terms import events
+from lgvi_warp.physics.vehicle import Vehicle
+from lgvi_warp.sampling.distributions.named import from_dict as law_from_dict
+from lgvi_warp.scene.ensemble import Ensemble, check_names
+from lgvi_warp.scene.file import tables_of_file, tables_of_text, with_named_vehicle
+from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
+from lgvi_warp.scene.start import Environment, Start
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything that one simulated vehicle needs. Weight, buoyancy and restoring moment follow from the vehicle.
+
+    terms: what else acts, such as lw.Drag(...), or tables as in a scene file. events: what stops a member, such as
+    lw.Surface(). controller: this version knows none, and says so. run, ensemble_settings: what a scene file holds
+    besides. Raises SceneError naming every fault.
+    """
+
+    vehicle: Vehicle
+    environment: Environment = field(default_factory=Environment)
+    terms: Sequence[Any] = ()
+    start: Start = field(default_factory=Start)
+    controller: Any = None
+    run: RunSettings = field(default_factory=RunSettings)
+    ensemble_settings: EnsembleSettings | None = None
+    events: Sequence[Any] = ()
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        with faults.including():
+            object.__setattr__(self, "terms", terms.from_list(self.terms))
+        with faults.including():
+            object.__setattr__(self, "events", events.from_list(self.events))
+        if not faults:
+            self._check_names(faults)
+        if self.controller is not None:
+            remedy = "leave it out; a held or scheduled wrench and thrusters' commands are terms"
+            faults.add("controller", self.controller, "is not known to this version", remedy)
+        for name, kind in (("vehicle", Vehicle), ("environment", Environment), ("start", Start), ("run", RunSettings)):
+            if not isinstance(getattr(self, name), kind):
+                faults.add(name, getattr(self, name), f"is no {kind.__name__}", f"give lw.{kind.__name__}(...)")
+        faults.raise_if_any()
+
+    def _check_names(self, faults: Faults) -> None:
+        """Terms and events have different names, on every file system."""
+        keys = [one.key for one in (*self.terms, *self.events)]
+        counts = Counter(keys)
+        for key in sorted({one.key for one in self.events}):
+            if folded(key) in terms.RESERVED:
+                faults.add("events", key, "is the name of a section of the scene", f'write name = "{key}_event"')
+            elif counts[key] > 1:
+                faults.add("events", key, "is the name of two events or of a term too",
+                           f'give each a name of its own: name = "{key}_2"')  # fmt: skip
+        for first, other in alike(keys):
+            what = f"is the same folder as {first!r} on file systems that do not tell capitals apart"
+            faults.add("terms and events", other, what, f'give each a name of its own: name = "{other}_2"')
+
+    def parameters(self) -> dict[str, np.ndarray]:
+        """Every number that may vary by member, by name: "vehicle.mass", "drag.quadratic", ..., as this scene has it."""
+        values = {f"vehicle.{name}": value for name, value in self.vehicle.parameters().items()}
+        values["environment.gravity"] = np.asarray(float(self.environment.gravity))
+        values["environment.water_density"] = np.asarray(float(self.environment.water_density))
+        for one in (*self.terms, *self.events):
+            values |= {f"{one.key}.{name}": value for name, value in one.parameters().items()}
+        return values
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None) -> Scene:
+        """Read a scene file (TOML). overrides: dotted key -> value, replacing what the file says. Raises SceneError."""
+        return from_dict(tables_of_file(path, overrides))
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Scene:
+        """A scene from tables in the form of a scene file, such as the importers return. Raises SceneError."""
+
+        return from_dict(content)
+
+    @classmethod
+    def named(cls, name: str, **sections: Any) -> Scene:
+        """A scene of a vehicle that comes with the package (`lw.vehicles()` lists them), with its own terms and water.
+
+        sections: as in a scene file; vehicle={...} and environment={...} replace single keys, a term in terms=[...]
+        replaces the vehicle's of the same name or type or is added; start={...}, run={...}, events=[...].
+        Raises SceneError naming every fault.
+        """
+
+        return from_dict({**sections, "vehicle": {**sections.get("vehicle", {}), "name": name}})
+
+    def to_dict(self) -> dict[str, Any]:
+        """In the shape of a scene file."""
+        content: dict[str, Any] = {
+            "vehicle": self.vehicle.to_dict(),
+            "environment": self.environment.to_dict(),
+            "start": self.start.to_dict(),
+            "run": self.run.to_dict(),
+        }
+        if self.terms:
+            content["terms"] = [term.to_dict() for term in self.terms]
+        if self.events:
+            content["events"] = [event.to_dict() for event in self.events]
+        return content | ({"ensemble": self.ensemble_settings.to_dict()} if self.ensemble_settings else {})
+
+
+SECTIONS = ("vehicle", "environment", "start", "ensemble", "run", "terms", "events", "controller", "source")
+
+
+def loads(text: str, overrides: Mapping[str, Any] | None = None) -> Scene:
+    """A Scene from the text of a scene file. Raises SceneError naming every fault."""
+    return from_dict(tables_of_text(text, overrides))
+
+
+def from_dict(content: Mapping[str, Any]) -> Scene:
+    """A Scene from the tables of a scene file. Raises SceneError naming every fault."""
+    content = with_named_vehicle(content)
+    faults = Faults()
+    faults.keys("", content, SECTIONS)
+    tables: dict[str, Any] = {}
+    for name in SECTIONS[:5]:
+        tables[name] = content.get(name, {})
+        if not isinstance(tables[name], Mapping):
+            faults.add(name, tables[name], "is not a table", f"write [{name}] and its keys below")
+            tables[name] = {}
+    if not tables["vehicle"] and isinstance(content.get("vehicle", {}), Mapping):
+        faults.add("vehicle", "", "is missing", "write [vehicle] with mass and inertia")
+    vehicle = _build(faults, "vehicle", Vehicle, tables["vehicle"]) if tables["vehicle"] else None
+    environment = _build(faults, "environment", Environment, tables["environment"])
+    start = _build(faults, "start", Start, tables["start"])
+    run = _build(faults, "run", RunSettings, tables["run"])
+    laws = _laws(faults, tables["ensemble"].get("vary", {}))
+    settings = _build(faults, "ensemble", EnsembleSettings, {**tables["ensemble"], "vary": laws})
+    scene = None
+    with faults.including():
+        # Another stands in for a section that failed, so that the faults of the rest are found as well.
+        scene = Scene(
+            vehicle or Vehicle(**_STAND_INS), environment or Environment(), content.get("terms", ()), start or Start(),
+            content.get("controller"), run or RunSettings(), settings if tables["ensemble"] else None,
+            content.get("events", ()),
+        )  # fmt: skip
+    with faults.including():
+        if scene is None:
+            # What varies of a term that has a fault itself cannot be told: the names of the rest are looked at.
+            sections = ("vehicle.", "environment.", "start.")
+            laws = {name: law for name, law in laws.items() if str(name).startswith(sections)}
+            settings = EnsembleSettings(vary=laws)
+        whole = scene if vehicle and environment and start else None
+        names = (scene or Scene(vehicle or Vehicle(**_STAND_INS))).parameters()
+        _check_ensemble(settings or EnsembleSettings(vary=laws), whole, tuple(names))
+    faults.raise_if_any()
+    assert scene is not None
+    return scene
+
+
+def _check_ensemble(settings: EnsembleSettings, scene: Scene | None, parameters: Sequence[str]) -> None:
+    """What varies must fit the scene: found here, before anything runs. Names alone if the scene has faults itself."""
+    if scene is None:
+        check_names(settings.vary, parameters)
+    else:
+        try:
+            Ensemble.of(scene, settings)
+        except MemoryError:
+            raise SceneError([f"ensemble.members = {settings.members}: do not fit into memory; give less"]) from None
+
+
+def _build(faults: Faults, name: str, kind: Callable[..., Any], table: Mapping[str, Any]) -> Any:
+    """Construct a section's object, or note what is wrong with it."""
+    signature = [key for key in inspect.signature(kind).parameters]
+    faults.keys(name, table, signature)
+    known = {key: value for key, value in table.items() if key in signature}
+    with faults.including():
+        return kind(**known)
+    return None
+
+
+_STAND_INS: dict[str, Any] = {"mass": 1.0, "inertia": (1.0, 1.0, 1.0)}
+
+
+def _laws(faults: Faults, vary: Any) -> dict[str, Any]:
+    """The distributions of the [ensemble.vary] table."""
+    laws = {}
+    if not isinstance(vary, Mapping):
+        faults.add("ensemble.vary", vary, "is not a table", 'write [ensemble.vary] and "vehicle.mass" = {...} below')
+        vary = {}
+    for key, value in vary.items():
+        with faults.including():
+            laws[key] = law_from_dict(f'ensemble.vary."{key}"', value)
+    return laws

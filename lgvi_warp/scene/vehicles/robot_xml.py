@@ -1,0 +1,154 @@
+"""XML of robot descriptions (SDF, URDF), read in bounded time and memory: nothing is fetched, expanded or executed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from typing import Any
+from xml.etree.ElementTree import Element, TreeBuilder
+from xml.parsers import expat
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, SceneError, shown
+from lgvi_warp.common.reading import MOST_OTHERS, UnreadableError, file_bytes
+
+# What one file may hold. The largest robot descriptions are far below: some 1 MB, 20,000 elements, 20 levels.
+MOST_BYTES, MOST_ELEMENTS, MOST_LEVELS = MOST_OTHERS, 100_000, 200
+# Marks of templates, whose values another program fills in, and what to do with each.
+TEMPLATES = {
+    "${": "run xacro on it (xacro FILE > FILE.urdf) and read what it writes",
+    "$(": "run xacro on it (xacro FILE > FILE.urdf) and read what it writes",
+    "<%": "run erb on it (erb FILE > model.sdf) and read what it writes",
+    "{{": "render the template (Jinja) and read what it writes",
+    "{%": "render the template (Jinja) and read what it writes",
+    "@": "generate the file with the script that it belongs to, or write the number in its place",
+}
+
+
+class Refused(Exception):  # noqa: N818
+    """What the parser meets and does not read; its text says what and the remedy."""
+
+
+class Reader:
+    """Handlers of expat that build a tree of elements. Prefixes of names are kept as they are, bound or not."""
+
+    def __init__(self) -> None:
+        self.tree, self.level, self.elements = TreeBuilder(), 0, 0
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        """Open an element. Raises Refused beyond the limits."""
+        self.level, self.elements = self.level + 1, self.elements + 1
+        if self.level > MOST_LEVELS:
+            raise Refused(f"is nested more than {MOST_LEVELS} levels deep; give the model alone")
+        if self.elements > MOST_ELEMENTS:
+            raise Refused(f"has more than {MOST_ELEMENTS:,} elements; give the model alone")
+        self.tree.start(tag, attributes)
+
+    def end(self, tag: str) -> None:
+        """Close an element."""
+        self.level -= 1
+        self.tree.end(tag)
+
+    def doctype(self, *_: Any) -> None:
+        """Raises Refused: a document type may declare entities, which can grow without end or name other files."""
+        raise Refused("has a document type declaration (<!DOCTYPE>), which is not read; remove it")
+
+
+def parse_xml(source: str | os.PathLike[str], what: str = "SDF") -> Element:
+    """The root element of a text or of a file. Raises SceneError, in one line, for what cannot be read."""
+    is_text = isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
+    content = str(source).encode() if is_text else read_bytes(source, what)
+    content = content.removeprefix(b"\xef\xbb\xbf").lstrip(b" \t\r\n")
+    if len(content) > MOST_BYTES:
+        raise SceneError([f"{what} is longer than {MOST_BYTES / 2**20:g} MiB; give the model alone"])
+    reader = Reader()
+    parser = expat.ParserCreate("utf-8" if is_text else None)
+    parser.StartElementHandler, parser.EndElementHandler = reader.start, reader.end
+    parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = reader.tree.data, reader.doctype
+    try:
+        parser.Parse(content, True)
+    except Refused as error:
+        raise SceneError([f"{what} {error}"]) from None
+    except (expat.ExpatError, ValueError, LookupError) as error:
+        raise SceneError([f"{what} is not XML: {error}; {remedy_for(content)}"]) from None
+    return reader.tree.close()
+
+
+def remedy_for(content: bytes) -> str:
+    """What to do with a text that is not XML: the program that it is a template of, or mend it."""
+    mark = next((mark for mark in (b"<%", b"{%", b"{{", b"@(", b"@{", b"=@") if mark in content), None)
+    if mark is None:
+        return "mend that line"
+    shown = f"{mark.decode()}, which is not executed here"
+    return f"it looks like a template: it holds {shown}; {TEMPLATES.get(mark.decode(), TEMPLATES['@'])}"
+
+
+def read_bytes(source: Any, what: str) -> bytes:
+    """The bytes of a file. Raises SceneError for what is no regular file of a bounded size."""
+    try:
+        return file_bytes(source, f"{what} file")
+    except UnreadableError as error:
+        raise SceneError([f"{what} file {shown(source)}: {error}"]) from None
+
+
+# Values -------------------------------------------------------------------------------------------------------------
+
+
+def text_of(element: Element | None) -> str:
+    """The text of an element without the spaces around it; "" if there is none."""
+    return (element.text or "").strip() if element is not None else ""
+
+
+def is_true(text: str | None) -> bool:
+    """A truth value as SDF writes it."""
+    return (text or "").strip().lower() in ("1", "true")
+
+
+def floats(text: str) -> np.ndarray | None:
+    """The numbers of a text, separated by spaces; None if it holds something else."""
+    try:
+        return np.array([float(word) for word in text.split()]) if text.isascii() and "_" not in text else None
+    except ValueError:
+        return None
+
+
+def numbers_in(faults: Faults, key: str, text: str, count: int) -> np.ndarray:
+    """`count` finite numbers of a text; zeros after noting a fault under that key."""
+    values = floats(text)
+    if values is not None and values.shape == (count,) and np.all(np.isfinite(values)):
+        return values
+    mark = next((mark for mark in TEMPLATES if mark in text), None)
+    wanted = f"{count} finite numbers" if count > 1 else "a finite number"
+    if values is None and mark is not None:
+        faults.add(
+            key, text, f"is not {wanted} but a placeholder of a template, which is not executed", TEMPLATES[mark]
+        )
+    else:
+        faults.add(key, text, f"does not hold {count} finite numbers", f"write {wanted}")
+    return np.zeros(count)
+
+
+def numbers(faults: Faults, where: str, parent: Element | None, tag: str, default: str) -> np.ndarray:
+    """The numbers in a child element, as many as its default holds; the default where it is missing or empty."""
+    child = None if parent is None else parent.find(tag)
+    return numbers_in(faults, f"{where}<{tag}>", text_of(child) or default, len(default.split()))
+
+
+def number(faults: Faults, where: str, parent: Element | None, tag: str, default: str) -> float:
+    """The number in a child element."""
+    return float(numbers(faults, where, parent, tag, default)[0])
+
+
+def plugins_of(element: Element) -> Iterator[Element]:
+    """The plugins of a model and of the models nested in it; not those of what it includes."""
+    for child in element:
+        if child.tag == "plugin":
+            yield child
+        elif child.tag in ("model", "gazebo"):
+            yield from plugins_of(child)
+
+
+def plugin_name(plugin: Element) -> str:
+    """Name and file of a plugin, in small letters."""
+    return (plugin.get("name", "") + " " + plugin.get("filename", "")).lower()

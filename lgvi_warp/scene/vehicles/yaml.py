@@ -1,0 +1,195 @@
+"""Vehicles from a YAML file of coefficients, as robotics packages use."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common import yaml_text
+from lgvi_warp.common.errors import Faults, SceneError, closest
+from lgvi_warp.scene.vehicles.fossen import (
+    HALF_TURN,
+    HALF_TURN_6,
+    PAIRS,
+    STANDARD_GRAVITY,
+    Coefficients,
+    add_derivatives,
+    as_positive,
+    inertia_from_names,
+    read_name,
+    read_text,
+    rigid_body,
+    symmetric,
+    turned,
+)
+from lgvi_warp.scene.vehicles.plugins import by_diagonal
+
+# YAML ---------------------------------------------------------------------------------------------------------------
+
+_ALIASES = {
+    "mass": ("mass", "m"),
+    "inertia": ("inertia", "inertial", "inertia_matrix", "moments_of_inertia"),
+    "added_mass": ("added_mass", "Ma", "added_mass_matrix"),
+    "linear": ("linear_damping", "linear_drag", "damping_linear"),
+    "forward": ("linear_damping_forward_speed",),
+    "quadratic": ("quadratic_damping", "quad_damping", "quadratic_drag", "damping_quadratic"),
+    "volume": ("volume",),
+    "buoyancy": ("buoyancy",),
+    "weight": ("weight",),
+    "center_of_buoyancy": ("center_of_buoyancy", "cob", "centre_of_buoyancy"),
+    "center_of_gravity": ("center_of_gravity", "center_of_mass", "cog", "com", "centre_of_gravity"),
+    "density": ("density", "water_density", "fluid_density", "rho"),
+    "gravity": ("gravity", "g"),
+    "neutrally_buoyant": ("neutrally_buoyant",),
+    "coefficients": ("coefficients", "hydrodynamics", "hydrodynamic_coefficients", "derivatives"),
+}
+# Of uuv_simulator's files: names, and sizes that matter near the surface alone. Known, and not needed.
+_NOT_NEEDED = ("model", "name", "type", "base_link", "body_frame", "tf_prefix", "length", "width", "height", "radius")
+
+
+def from_yaml(
+    source: str | os.PathLike[str],
+    *,
+    position_axes: str = "flu",
+    matrix_axes: str = "frd",
+    quadratic: str = "diagonal",
+    ignore: Iterable[str] = (),
+    **given: Any,
+) -> dict[str, Any]:
+    """A vehicle, its drag and its water from a YAML file of a robotics package (uuv_simulator, Plankton).
+
+    Keys, at the top or below a table: mass, inertia (3, 3x3 or ixx ...) about the centre of gravity, volume (with
+    density), buoyancy or neutrally_buoyant, cog, cob, added_mass (6x6 or 6), linear_damping,
+    linear_damping_forward_speed and quadratic_damping (6 or 6x6; derivatives or magnitudes), or a map `coefficients` of
+    Fossen's names. Damping in proportion to the forward speed, force_i = -u d_ij v_j, becomes a term body_lift.
+
+    Args:
+        source: path of the file, or its text.
+        position_axes: axes of the centres and of the inertia, "flu" (x ahead, y to port, z up, as uuv_simulator has
+            them) or "frd" (x ahead, y to starboard, z down).
+        matrix_axes: axes of added mass and damping, which uuv_simulator gives in "frd".
+        quadratic: what a 6x6 matrix of quadratic damping stands for: its "diagonal", as in uuv_simulator, or "full".
+        ignore: keys to leave out; others that are not known are refused.
+        given: values by key (mass=..., density=...) that add to the file's or replace them.
+
+    Returns:
+        The tables "vehicle", "environment" and "terms" of a scene file.
+
+    Raises:
+        SceneError: naming every fault.
+        ImportError: if PyYAML is not installed.
+    """
+    faults = Faults()
+    faults.choice("quadratic", quadratic, ("diagonal", "full"))
+    for key, value in (("position_axes", position_axes), ("matrix_axes", matrix_axes)):
+        faults.choice(key, value, ("flu", "frd"))
+    ignore = {ignore} if isinstance(ignore, str) else set(ignore)
+    read = by_meaning(faults, parse_yaml(source), ignore) | by_meaning(faults, given, set())
+    positions = HALF_TURN if position_axes == "flu" else np.ones(3)
+    matrices = HALF_TURN_6 if matrix_axes == "flu" else np.ones(6)
+    body = yaml_body(faults, read, positions)
+    for name in ("added_mass", "linear", "forward", "quadratic"):
+        value = matrices[:, None] * matrix_6(faults, name, read.get(name)) * matrices
+        setattr(body, name, symmetric(faults, name, value) if name == "added_mass" else value)
+    if quadratic == "diagonal":
+        body.quadratic = by_diagonal(body.warnings, body.quadratic)
+    if "coefficients" in read:
+        for name in {"added_mass", "linear", "forward", "quadratic"} & set(read):
+            faults.add(name, read[name], "is given besides coefficients by name", "keep one of them")
+        if matrix_axes == "flu":
+            faults.add("matrix_axes", "flu", "does not go with coefficients by name", "Fossen's names are for frd")
+        add_derivatives(faults, body, read["coefficients"], ignore)
+    return body.to_dict(faults)
+
+
+def parse_yaml(source: str | os.PathLike[str]) -> Mapping[str, Any]:
+    """The map of a YAML text or file."""
+    text = read_text(source, isinstance(source, str) and ("\n" in source or ": " in source), "YAML file")
+    content = yaml_text.parsed(text)
+    if not isinstance(content, Mapping):
+        raise SceneError(["YAML: is not a map; write mass: ..., added_mass: ..."])
+    return content
+
+
+def by_meaning(faults: Faults, content: Mapping[str, Any], ignore: set[str]) -> dict[str, Any]:
+    """The values by what they mean: aliases resolved, one level of tables opened, Fossen's names gathered."""
+    meanings = {alias: name for name, aliases in _ALIASES.items() for alias in aliases}
+    read: dict[str, Any] = {}
+    for key, value in content.items():
+        name = meanings.get(key)
+        if key in ignore or (key in _NOT_NEEDED and not isinstance(value, Mapping)):
+            continue
+        if name in read and name != "coefficients":
+            faults.add(key, value, f"is given twice, as another name of {name}", "keep one of them")
+        elif name == "coefficients" and isinstance(value, Mapping):
+            read[name] = read.get(name, {}) | dict(value)
+        elif name is not None:
+            read[name] = value
+        elif isinstance(key, str) and read_name(key):
+            read.setdefault("coefficients", {})[key] = value
+        elif isinstance(value, Mapping):
+            read |= by_meaning(faults, value, ignore)
+        else:
+            remedy = f"{closest(key, meanings)}; or name it in ignore="
+            faults.add(str(key), value, "is an unknown key", remedy)
+    return read
+
+
+def yaml_body(faults: Faults, read: Mapping[str, Any], positions: np.ndarray) -> Coefficients:
+    """Mass, inertia, centres and forces of a YAML map."""
+    inertia = read.get("inertia")
+    if isinstance(inertia, Mapping):
+        faults.keys("inertia", inertia, [f"i{pair}" for pair in PAIRS])
+        inertia = inertia_from_names(inertia)
+    gravity = read.get("gravity", STANDARD_GRAVITY)
+    gravity = abs(gravity) if isinstance(gravity, int | float) else gravity
+    for key in ("mass", "inertia"):
+        if read.get(key) is None:
+            faults.add(key, "", "is missing", f"add {key} to the file, or pass {key}=")
+    square = Faults().symmetric("inertia", inertia, "") if inertia is not None else None
+    if square is not None:
+        inertia = positions[:, None] * square * positions
+    density = read.get("density")
+    density = None if density is None else faults.positive("density", density, "kg/m3")
+    buoyancy = read.get("buoyancy")
+    if buoyancy is None and "volume" in read and not is_neutral(faults, read):
+        buoyancy = displaced_weight(faults, read["volume"], density, gravity, "density" in read)
+    zero = (0.0, 0.0, 0.0)
+    gravity_at = turned(read.get("center_of_gravity", zero), positions)
+    buoyancy_at = turned(read.get("center_of_buoyancy", zero), positions)
+    mass = 1.0 if read.get("mass") is None else read["mass"]
+    inertia = np.eye(3) if inertia is None else inertia
+    body = rigid_body(faults, mass, inertia, gravity_at, buoyancy_at, read.get("weight"), buoyancy, gravity)
+    body.water_density = density
+    return body
+
+
+def is_neutral(faults: Faults, read: Mapping[str, Any]) -> bool:
+    """Whether the file asks for a buoyancy that is the weight."""
+    given = read.get("neutrally_buoyant", False)
+    faults.choice("neutrally_buoyant", bool(given) if given in (0, 1) else given, (True, False))
+    return bool(given)
+
+
+def displaced_weight(faults: Faults, volume: Any, density: Any, gravity: Any, is_given: bool) -> float | None:
+    """The weight [N] of the displaced water; None after noting a fault."""
+    if not is_given:
+        faults.positive("density", "not given", "kg/m3 (with volume)")
+    values = [faults.positive("volume", volume, "m3"), density, Faults().number("gravity", gravity, least=0.0)]
+    return None if None in values else float(np.prod(np.array(values, dtype=float)))
+
+
+def matrix_6(faults: Faults, key: str, value: Any) -> np.ndarray:
+    """6x6, 36 numbers or the 6 of a diagonal, positive on it, from either sign convention; zeros if not given."""
+    if value is None:
+        return np.zeros((6, 6))
+    array = faults.finite(key, value)
+    if array is None:
+        return np.zeros((6, 6))
+    if array.shape not in ((6,), (36,), (6, 6)):
+        faults.add(key, value, f"has shape {array.shape}", "give 6 numbers or a 6x6 matrix")
+        return np.zeros((6, 6))
+    return as_positive(faults, key, np.diag(array) if array.shape == (6,) else array.reshape(6, 6))

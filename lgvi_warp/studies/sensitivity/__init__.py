@@ -1,0 +1,29 @@
+"""Sensitivity: what of that which varies makes a quantity of interest vary. Sobol indices, Morris' screening, adaptors.
+
+    found = lw.uq.sobol(scene, "position[2]", samples=1024, h=0.01, t1=60.0)
+    print(found)
+
+The designs and the estimates are SALib's (extra: uq).
+"""
+
+from __future__ import annotations
+
+from lgvi_warp.studies.sensitivity.adaptor import Model, model
+from lgvi_warp.studies.sensitivity.analyses import morris, morris_of, sobol, sobol_of
+from lgvi_warp.studies.sensitivity.indices import Indices, MorrisEffects, SobolIndices
+from lgvi_warp.studies.sensitivity.outputs import FailedMembers, Outputs, evaluate
+
+__all__ = [
+    "FailedMembers",
+    "Indices",
+    "Model",
+    "MorrisEffects",
+    "Outputs",
+    "SobolIndices",
+    "evaluate",
+    "model",
+    "morris",
+    "morris_of",
+    "sobol",
+    "sobol_of",
+]

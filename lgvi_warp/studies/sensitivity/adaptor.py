@@ -1,0 +1,235 @@
+"""A scene as a function of what varies, in the shapes of SALib and scipy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.labelled import columns_by_name, is_labelled
+from lgvi_warp.runs.quantities import OfInterest, quantities
+from lgvi_warp.sampling import designs as samplings
+from lgvi_warp.scene import variations
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.studies.sensitivity.columns import as_given, columns_of, names_of, stacked, whole_columns
+from lgvi_warp.studies.sensitivity.outputs import FailedMembers, evaluate
+
+
+class Model:
+    """A scene as a function of what varies, for SALib, scipy and other libraries; see `model`.
+
+    names (d,): of the columns, in the order of `vary`. problem: SALib's description. distributions (d,): each with `ppf`,
+    for scipy.
+    """
+
+    def __init__(self, scene: Scene, vary: Any, of: Any, levels: bool, failed: str, settings: Mapping[str, Any]):
+        self.scene, self.of, self.levels, self.failed, self._settings = scene, of, levels, failed, dict(settings)
+        faults = Faults()
+        with faults.including():
+            quantities(of)
+        faults.choice("failed", failed, ("refuse", "nan"))
+        self.vary = dict(vary) if isinstance(vary, Mapping) else None
+        names = () if self.vary is not None else names_of(faults, vary)
+        faults.raise_if_any()
+        if self.vary is None and levels:
+            raise SceneError([f"vary = {vary!r}: names no laws that levels could be of; map names to distributions"])
+        self._fleet = Ensemble(scene, 1, 0, self.vary)
+        self._variations = as_given(self._fleet)
+        joint = [one.key for one in self._variations if one.law.joint]
+        if joint and not levels:
+            raise SceneError([f"vary.\"{key}\": is a joint law, whose values are no numbers by themselves; use levels=True"
+                              for key in joint])  # fmt: skip
+        # Which column of the ensemble's cube, whose keys are sorted, each column of X is.
+        self._columns = [column for one in self._variations for column in columns_of(self._fleet.space, one.key)]
+        if self.vary is None:
+            self.names = names
+            self._run(np.array([[float(self._scene_value(name)) for name in names]]), dry=True)
+        else:
+            cube = samplings.salib_problem(self._fleet.space)
+            self.names = tuple(cube["names"][column] for column in self._columns)
+
+    def _scene_value(self, name: str) -> Any:
+        (target,) = variations.targets(name)
+        known = self._scene_numbers()
+        faults = Faults("vary.")
+        if variations.known_target(faults, name, "...", target, known) and target.of(known[target.name]).ndim:
+            faults.add(f'"{name}"', "...", "is no single number", f'name its entries, such as "{name}[0]"')
+        faults.raise_if_any()
+        return target.of(known[target.name])
+
+    @property
+    def problem(self) -> dict[str, Any]:
+        """For SALib.sample: with levels, the unit cube. Otherwise laws that SALib knows too. Raises SceneError."""
+        if self.levels:
+            cube = samplings.salib_problem(self._fleet.space)
+            by_column = {key: [cube[key][column] for column in self._columns] for key in ("names", "bounds", "groups")
+                         if key in cube}  # fmt: skip
+            return cube | by_column
+        faults = Faults("vary.")
+        bounds, kinds = [], []
+        for one in self._variations:
+            for law in self._single_laws(one):
+                described = _salib_law(*law)
+                if described is None:
+                    faults.add(f'"{one.key}"', one.law, "is no law that SALib has", "use levels=True")
+                    break
+                kinds.append(described[0])
+                bounds.append(described[1])
+        if not self._variations:
+            faults.add("names", list(self.names), "have no laws", "map names to distributions")
+        faults.raise_if_any()
+        return {"num_vars": len(self.names), "names": list(self.names), "bounds": bounds, "dists": kinds}
+
+    @staticmethod
+    def _single_laws(one: Any) -> list[tuple[Any, np.ndarray, dict[str, np.ndarray]]]:
+        """(law, the scene's value, the law's numbers) of each entry."""
+        (base,) = one.bases
+        numbers = {name: np.broadcast_to(value, base.shape).reshape(-1) for name, value in one.law._given().items()
+                   if np.ndim(value) <= base.ndim and one.law.kind != "choice"}  # fmt: skip
+        return [(one.law, value, {name: column[i] for name, column in numbers.items()})
+                for i, value in enumerate(np.reshape(base, -1))]  # fmt: skip
+
+    @property
+    def distributions(self) -> list[Any]:
+        """One for each column, with `ppf`: for scipy.stats.sobol_indices(dists=...)."""
+        if not self._variations:
+            raise SceneError(["vary: names without laws have no distributions; map names to distributions"])
+        return [_Levels() if self.levels else _Column(self._fleet, column) for column in self._columns]
+
+    def __call__(self, X: Any) -> np.ndarray:
+        """The quantities of members with these numbers.
+
+        Args:
+            X: (n, d), columns in the order of `names`; or by name, in any order: a data frame, a mapping of columns, a
+                structured array, an xarray Dataset. By name a whole vector may be given, "current.velocity": (n, 3).
+
+        Returns:
+            Y (n,), or (n, m) of several numbers: SALib's shape.
+
+        Raises:
+            SceneError: for labels that are missing, unknown or doubled, and for what is no real number.
+            FailedMembers: with failed="refuse", where members failed.
+        """
+        Y = self._run(self._numbers(X))
+        return Y[:, 0] if Y.shape[1] == 1 else Y
+
+    def scipy(self, X: Any) -> np.ndarray:
+        """As when called, in scipy's shape: X (d, n), or by name -> Y (n,), or (m, n) of several numbers."""
+        if is_labelled(X):
+            return np.ascontiguousarray(self(X).T)
+        faults = Faults()
+        array = faults.real("X", X, f"give an array of shape ({len(self.names)}, n)")
+        faults.raise_if_any()
+        return np.ascontiguousarray(self(np.asarray(array).T).T)
+
+    def _numbers(self, X: Any) -> np.ndarray:
+        """(n, d), the columns in the order of the names."""
+        faults = Faults()
+        shape = f"give an array of shape (n, {len(self.names)}), columns {', '.join(self.names)}"
+        if is_labelled(X):
+            columns = whole_columns(faults, self.names, self._scene_numbers(), columns_by_name(faults, "X", X))
+            array = stacked(faults, "X", self.names, columns) if columns else None
+        else:
+            array = faults.real("X", X, shape)
+            if array is not None and (array.ndim != 2 or array.shape[1] != len(self.names)):
+                faults.add("X", "...", f"has shape {array.shape}", shape)
+        if array is not None and self.levels and not np.all((array >= 0.0) & (array <= 1.0)):
+            odd = array[~((array >= 0.0) & (array <= 1.0))][0]
+            faults.add(
+                "X", odd, "is no level between 0 and 1", "give levels, or leave out levels=True to give the numbers"
+            )
+        faults.raise_if_any()
+        assert array is not None
+        return array
+
+    def _scene_numbers(self) -> dict[str, np.ndarray]:
+        """Every number that may vary, by name."""
+        return self.scene.parameters() | {f"start.{key}": value for key, value in self.scene.start.given().items()}
+
+    def _run(self, X: np.ndarray, dry: bool = False) -> np.ndarray:
+        if self.levels:
+            inside = np.empty_like(X)
+            inside[:, self._columns] = np.clip(X, 2.0**-53, 1.0 - 2.0**-53)
+            fleet = Ensemble(self.scene, None, 0, self.vary, samplings.Levels(inside))
+        else:
+            fleet = Ensemble(self.scene, None, 0, None, samplings.Table(values=dict(zip(self.names, X.T, strict=True))))
+        if dry:
+            return X
+        outputs = evaluate(fleet, self.of, **self._settings)
+        if outputs.failed.any():
+            if self.failed == "refuse":
+                raise FailedMembers([outputs.text('mend what fails, or take NaN for them: failed="nan"')])
+            return np.where(outputs.failed[:, None], np.nan, outputs.values)
+        return outputs.values
+
+
+@dataclass(frozen=True)
+class _Levels:
+    """The level itself."""
+
+    def ppf(self, u: Any) -> np.ndarray:
+        return np.asarray(u, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class _Column:
+    """One column of an ensemble's cube as a distribution of the number that follows from it."""
+
+    fleet: Ensemble
+    column: int
+
+    def ppf(self, u: Any) -> np.ndarray:
+        levels = np.reshape(np.asarray(u, dtype=np.float64), -1)
+        cube = np.full((len(levels), self.fleet.space.dimensions), 0.5)
+        cube[:, self.column] = np.clip(levels, 2.0**-53, 1.0 - 2.0**-53)
+        label = self.fleet.space.factors[self.column][0]
+        (wanted,) = variations.targets(label)
+        split = self.fleet.space.split(cube)
+        for one in self.fleet._variations:
+            for target, values in one.values(split[one.key]):
+                if target == wanted:
+                    return values.reshape(np.shape(u))
+                if target.name == wanted.name and target.index is None and wanted.index is not None:
+                    entry: tuple[Any, ...] = (slice(None), *wanted.index)
+                    return values[entry].reshape(np.shape(u))
+        raise KeyError(label)
+
+
+def _salib_law(law: Any, base: Any, numbers: Mapping[str, Any]) -> tuple[str, list[float]] | None:
+    """(name, bounds) of a law in SALib's words; None where it has no word for it."""
+    base = float(base)
+    mean = float(numbers.get("mean", base))
+    if law.kind == "normal":
+        return "norm", [mean, float(numbers["std"] if "std" in numbers else abs(base) * numbers["relative"])]
+    if law.kind == "uniform":
+        low, high = (float(law.quantile(np.array([u]), np.array(base)).reshape(-1)[0]) if np.ndim(law.high) == 0 else None
+                     for u in (0.0, 1.0))  # fmt: skip
+        if low is None or high is None:
+            low, high = float(numbers["low"]), float(numbers["high"])
+        return "unif", [low, high]
+    if law.kind == "lognormal" and float(numbers.get("median", base)) > 0.0:
+        return "lognorm", [float(np.log(numbers.get("median", base))), float(numbers["sigma"])]
+    return None
+
+
+def model(
+    scene: Scene,
+    vary: Mapping[Any, Any] | Sequence[str],
+    of: OfInterest | Sequence[OfInterest],
+    *,
+    levels: bool = False,
+    failed: str = "refuse",
+    **settings: Any,
+) -> Model:
+    """A scene as a function: f(X), X (n, d) -> Y (n,) or (n, m), for SALib; f.scipy(X), X (d, n), for scipy's sobol_indices.
+
+    vary: name -> distribution, or names alone. X holds the numbers themselves, of the entries that `names` lists, in the
+    order of `vary`; with levels, numbers in (0, 1) that the laws turn into values, which any law can be. A data frame, a
+    mapping, a structured array or an xarray Dataset is read by its names, in whatever order. of, settings: as of `sobol`.
+    failed: "refuse", or "nan" for NaN in their place. Raises SceneError naming every fault.
+    """
+    return Model(scene, vary, of, levels, failed, settings)

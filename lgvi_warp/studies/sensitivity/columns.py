@@ -1,0 +1,109 @@
+"""The columns of a model: their names and order, and those that a user gives by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.labelled import match
+from lgvi_warp.sampling.designs.space import Space
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.variations import MATRICES, Target, Variation, targets
+
+
+def names_of(faults: Faults, vary: Any) -> tuple[str, ...]:
+    """The names alone, as they are spelled everywhere; notes what is no list of names, and what is named twice."""
+    given = [vary] if isinstance(vary, str) else vary
+    if not isinstance(given, Sequence) or not given or not all(isinstance(name, str) for name in given):
+        remedy = 'give {"vehicle.mass": lw.Normal(...)} or a list of names, ["vehicle.mass", "start.position[2]"]'
+        faults.add("vary", vary, "is no list of names, and maps none to distributions", remedy)
+        return ()
+    names = tuple(", ".join(target.label for target in targets(name)) for name in given)
+    for name in sorted({name for name in names if names.count(name) > 1}):
+        faults.add("vary", name, "is named twice", "name each number once")
+    return names
+
+
+def as_given(fleet: Ensemble) -> list[Variation]:
+    """What varies, in the order of `vary`."""
+    by_key = {one.key: one for one in fleet._variations}
+    return [by_key[key] for key in fleet.vary]
+
+
+def columns_of(space: Space, key: str) -> range:
+    """The columns of the cube that a key has."""
+    place = space.keys.index(key)
+    first = sum(space.sizes[:place])
+    return range(first, first + space.sizes[place])
+
+
+def whole_columns(
+    faults: Faults, names: Sequence[str], scene: Mapping[str, np.ndarray], given: Mapping[str, Any]
+) -> dict[str, np.ndarray]:
+    """name -> (n,) of each of the names; nothing after noting a fault.
+
+    Args:
+        faults: takes labels that are missing, unknown or doubled, and columns that are no numbers.
+        names: of the model's columns, such as "current.velocity[0]".
+        scene: the scene's numbers by name.
+        given: label -> (n,), or (n, *shape) of a whole number that the names hold the entries of.
+    """
+    found: dict[str, np.ndarray] = {}
+    labels: list[str] = []
+    for key, column in given.items():
+        label = ", ".join(target.label for target in targets(key)) if key not in names else key
+        entries = {name: target for name in names for target in targets(name)
+                   if target.name == label and target.index is not None}  # fmt: skip
+        array = faults.real(f'X["{key}"]', column)
+        if array is None:
+            labels += entries or [label]
+        elif entries and label not in names:
+            parts = _entries(faults, key, array, entries, scene[label])
+            labels += entries
+            found |= parts
+        else:
+            labels.append(label)
+            found[label] = array
+    doubled = {label for label in labels if labels.count(label) > 1}
+    for label in sorted(doubled):
+        faults.add(f'X["{label}"]', "...", "is given twice", "keep one of them")
+    good = match(faults, "X", list(dict.fromkeys(labels)), names)
+    return found if good and not faults else {}
+
+
+def _entries(
+    faults: Faults, key: str, array: np.ndarray, entries: Mapping[str, Target], whole: np.ndarray
+) -> dict[str, np.ndarray]:
+    """name -> (n,) of the entries that a whole number's array (n, *shape) holds."""
+    if array.shape[1:] != whole.shape or array.ndim == 0:
+        shape = ", ".join(map(str, whole.shape))
+        faults.add(f'X["{key}"]', "...", f"has shape {array.shape}", f"give an array of shape (n, {shape})")
+        return {}
+    fixed = np.ones(whole.shape, dtype=bool)
+    found = {}
+    for name, target in entries.items():
+        index = target.index or ()
+        fixed[index] = False
+        if target.name in MATRICES:
+            fixed[index[::-1]] = False
+        place: tuple[Any, ...] = (slice(None), *index)
+        found[name] = array[place]
+    if key in MATRICES and not np.array_equal(array, np.swapaxes(array, 1, 2)):
+        faults.add(f'X["{key}"]', "...", "holds a matrix that is not symmetric", "give symmetric matrices")
+    elif np.any(array[:, fixed] != whole[fixed]):
+        odd = ", ".join(f"{key}{list(map(int, index))}" for index in np.argwhere(fixed)[:4])
+        faults.add(f'X["{key}"]', "...", "changes entries that do not vary", f"keep the scene's {odd}, or vary them")
+    return found
+
+
+def stacked(faults: Faults, key: str, names: Sequence[str], columns: Mapping[str, np.ndarray]) -> np.ndarray | None:
+    """(n, d), the columns side by side in the order of the names; None after noting columns of other lengths."""
+    shapes = {name: columns[name].shape for name in names}
+    if all(len(shape) == 1 for shape in shapes.values()) and len(set(shapes.values())) == 1:
+        return np.column_stack([columns[name] for name in names])
+    listed = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+    faults.add(key, "...", f"has columns of other shapes than one (n,): {listed}", "give one number for each member")
+    return None

@@ -1,0 +1,160 @@
+"""What a sensitivity analysis found: tables, files."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.tables import write_csv
+
+
+@dataclass(frozen=True, eq=False)
+class Indices:
+    """What an analysis found. factors (d,): what varies by itself; quantities (m,): what was looked at.
+
+    mean, std (m,): of the quantities over the design. samples: groups or paths of the design that were used. members: that
+    were run; failed: of these. confidence: level of the intervals, whose half widths are named ..._confidence.
+    messages: what the user should know.
+    """
+
+    factors: tuple[str, ...]
+    quantities: tuple[str, ...]
+    mean: np.ndarray
+    std: np.ndarray
+    samples: int
+    members: int
+    failed: int
+    confidence: float
+    messages: tuple[str, ...]
+    provenance: dict[str, Any] = field(repr=False)
+    name: ClassVar[str] = ""
+    columns: ClassVar[tuple[str, ...]] = ()
+    # What of the columns has an interval.
+    intervals: ClassVar[dict[str, str]] = {}
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """One for each quantity, factor and index: quantity, factor, other, index, value, confidence."""
+        for q, quantity in enumerate(self.quantities):
+            for f, factor in enumerate(self.factors):
+                for column in self.columns:
+                    name = self.intervals.get(column)
+                    half = getattr(self, name)[q, f] if name else np.nan
+                    yield {"quantity": quantity, "factor": factor, "other": "", "index": column,
+                           "value": float(getattr(self, column)[q, f]), "confidence": float(half)}  # fmt: skip
+
+    def _heading(self) -> str:
+        return f"{self.name}: {self.samples} samples, {self.members} members, {self.failed} failed"
+
+    def __str__(self) -> str:
+        """A table for each quantity."""
+        width = max(len(one) for one in (*self.factors, "factor"))
+        lines = [self._heading(), *(f"note: {message}" for message in self.messages)]
+        for q, quantity in enumerate(self.quantities):
+            lines += ["", f"{quantity}: mean {self.mean[q]:.6g}, standard deviation {self.std[q]:.3g}"]
+            lines.append(f"  {'factor':<{width}}" + "".join(f"  {column:>21}" for column in self.columns))
+            for f, factor in enumerate(self.factors):
+                lines.append(
+                    f"  {factor:<{width}}" + "".join(f"  {self._cell(column, q, f):>21}" for column in self.columns)
+                )
+            lines += self._more(q)
+        lines.append(f"+- is half the {self.confidence:.0%} interval")
+        return "\n".join(lines)
+
+    def _cell(self, column: str, q: int, f: int) -> str:
+        value = getattr(self, column)[q, f]
+        name = self.intervals.get(column)
+        return f"{value:.4g}" + (f" +- {getattr(self, name)[q, f]:.2g}" if name else "")
+
+    def _more(self, q: int) -> list[str]:
+        """Lines below a quantity's table."""
+        return []
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, as JSON holds it: None for what is not a number."""
+        names = ("name", "factors", "quantities", "samples", "members", "failed", "confidence", "messages")
+        numbers = {name: _plain(getattr(self, name)) for name in ("mean", "std")}
+        return {name: _plain(getattr(self, name)) for name in names} | numbers | {
+            "rows": [{key: _plain(value) for key, value in row.items()} for row in self.rows()], "provenance": self.provenance
+        }  # fmt: skip
+
+    def save(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write sensitivity.txt, .csv and .json into a folder. Returns their paths. Raises OSError."""
+        target = Path(folder)
+        target.mkdir(parents=True, exist_ok=True)
+        paths = [target / f"sensitivity.{ending}" for ending in ("txt", "csv", "json")]
+        paths[0].write_text(f"{self}\n", encoding="utf-8")
+        write_csv(list(self.rows()), paths[1])
+        paths[2].write_text(json.dumps(self.to_dict(), indent=1), encoding="utf-8")
+        return paths
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | list | tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else None
+    return value
+
+
+@dataclass(frozen=True, eq=False)
+class SobolIndices(Indices):
+    """Parts of a quantity's variance. first, total (m, d): by a factor alone, and with all that it takes part in.
+
+    second (m, d, d): by two together, beyond what each does alone; symmetric, NaN on the diagonal; None if not asked for.
+    ..._confidence: half the interval. All of a quantity that does not vary are NaN, and a message says so.
+    """
+
+    first: np.ndarray
+    first_confidence: np.ndarray
+    total: np.ndarray
+    total_confidence: np.ndarray
+    second: np.ndarray | None
+    second_confidence: np.ndarray | None
+    name: ClassVar[str] = "Sobol indices"
+    columns: ClassVar[tuple[str, ...]] = ("first", "total")
+    intervals: ClassVar[dict[str, str]] = {"first": "first_confidence", "total": "total_confidence"}
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """As of every analysis, and those of two factors together."""
+        yield from super().rows()
+        for q, j, k in self._pairs():
+            assert self.second is not None and self.second_confidence is not None
+            yield {"quantity": self.quantities[q], "factor": self.factors[j], "other": self.factors[k], "index": "second",
+                   "value": float(self.second[q, j, k]), "confidence": float(self.second_confidence[q, j, k])}  # fmt: skip
+
+    def _pairs(self) -> list[tuple[int, int, int]]:
+        d = 0 if self.second is None else len(self.factors)
+        return [(q, j, k) for q in range(len(self.quantities)) for j in range(d) for k in range(j + 1, d)]
+
+    def _more(self, q: int) -> list[str]:
+        """The pairs that matter most."""
+        if self.second is None or self.second_confidence is None:
+            return []
+        pairs = [(self.second[q, j, k], self.second_confidence[q, j, k], j, k) for p, j, k in self._pairs() if p == q]
+        pairs = sorted((one for one in pairs if one[0] > one[1]), reverse=True)[:10]
+        return [
+            f"  {self.factors[j]} with {self.factors[k]}: second {value:.4g} +- {half:.2g}"
+            for value, half, j, k in pairs
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class MorrisEffects(Indices):
+    """Elementary effects on a quantity, in its units, per whole side of the unit cube. mu_star (m, d): mean of their sizes;
+    mu: mean; sigma: standard deviation, large where a factor acts differently from place to place. mu and sigma of a factor
+    of several numbers, such as an attitude, are NaN: a step moves all of them.
+    """
+
+    mu_star: np.ndarray
+    mu_star_confidence: np.ndarray
+    mu: np.ndarray
+    sigma: np.ndarray
+    name: ClassVar[str] = "Morris screening"
+    columns: ClassVar[tuple[str, ...]] = ("mu_star", "mu", "sigma")
+    intervals: ClassVar[dict[str, str]] = {"mu_star": "mu_star_confidence"}

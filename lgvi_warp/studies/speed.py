@@ -1,0 +1,96 @@
+"""How fast the kernel is on this machine, beside the limit of the core in the same run."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator, Sequence
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.engine.packets import Packets
+from lgvi_warp.engine.peak import fma_peak
+from lgvi_warp.engine.plan import Plan
+from lgvi_warp.methods.method import Method
+from lgvi_warp.physics.vehicle import Vehicle
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.scene.start import Environment, Start
+
+# Operations (an addition, a multiplication or both fused) of one step for diagonal M and J, with weight and restoring
+# moment and the quartic's start value alone; each Newton step of each solve adds 8. Divisions are not counted.
+OPERATIONS = {"phi": 133, "phi_adjoint": 133, "psi": 242, "psi_s": 239, "psi_1": 151, "psi_x": 171, "psi_x8": 213}
+SOLVES = {"phi": 1, "phi_adjoint": 1, "psi": 2, "psi_s": 2, "psi_1": 1, "psi_x": 0, "psi_x8": 0}
+NEWTON = 8
+
+
+def operations(method: str, iterations: int | None = None) -> int | None:
+    """Operations of one step, None where they were not counted; by default the quartic makes one Newton step."""
+    if method not in OPERATIONS:
+        return None
+    return OPERATIONS[method] + NEWTON * SOLVES[method] * (1 if iterations is None else iterations)
+
+
+def example() -> Scene:
+    """The vehicle and the start of Nordkvist & Sanyal (2010)."""
+    vehicle = Vehicle(123.8, [5.46, 5.29, 5.72], [65.0, 70.0, 75.0], 1215.8, [0.0, 0.0, -0.007])
+    start = Start([0.0, 0.0, 10.0], rotation_vector=[1.0, 2.0, 3.0], velocity_inertial=[0.1, 0.2, 1.0],
+                  angular_velocity=[0.3, 0.2, 0.1])  # fmt: skip
+    return Scene(vehicle, Environment(gravity=9.8), start=start)
+
+
+def fleet(members: int) -> Ensemble:
+    """Members about the example, 10 % apart in rate."""
+    from lgvi_warp.sampling.distributions.basic import Normal
+
+    return Ensemble(example(), members, 1, {"start.angular_velocity": Normal(relative=0.1)})
+
+
+def stepper(plan: Plan) -> Callable[[], None]:
+    """All steps of all members of a plan on one thread, as a call to be timed: no samples, no set-up."""
+    plan.compile()
+    packets = Packets(plan, plan.ensemble.select(0, plan.ensemble.members))
+    return lambda: void(packets.advance(0, plan.grid.steps))
+
+
+def void(_: Any) -> None:
+    """Drop a value."""
+
+
+def interleaved(calls: Sequence[Callable[[], None]], rounds: int = 5) -> list[float]:
+    """Median seconds of each call, run in turn: what slows the machine for a while slows them all."""
+    times: list[list[float]] = [[] for _ in calls]
+    for call in calls:
+        call()
+    for _ in range(rounds):
+        for call, seconds in zip(calls, times, strict=True):
+            start = time.perf_counter()
+            call()
+            seconds.append(time.perf_counter() - start)
+    return [median(seconds) for seconds in times]
+
+
+def measure(members: int = 4096, steps: int = 1000) -> Iterator[str]:
+    """JSON lines: ns per vehicle and step of psi_s in both precisions, and the part of the core's peak that it is."""
+    for dtype in ("float64", "float32"):
+        plan = make_plan(fleet(members), "psi_s", h=0.01, t1=0.01 * steps, dtype=dtype)
+        seconds = interleaved([stepper(plan)])[0] / (members * steps)
+        peak = fma_peak(dtype)
+        yield json.dumps(record(plan.method, dtype, plan.spec.width, seconds, peak))
+
+
+def record(method: Method, dtype: str, width: int, seconds: float, peak: float) -> dict[str, Any]:
+    """One measurement of a kernel beside the core's peak of fused multiply-adds per second."""
+    count = operations(method.name, None if method.iterations is None else int(method.iterations))
+    return {
+        "method": method.name,
+        "dtype": dtype,
+        "width": width,
+        "ns_per_vehicle_step": round(1e9 * seconds, 2),
+        "operations": count,
+        "peak_gfma": round(peak / 1e9, 1),
+        "part_of_peak": None if count is None else round(float(np.divide(count / seconds, peak)), 3),
+    }

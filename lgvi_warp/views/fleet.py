@@ -1,0 +1,103 @@
+"""What the picture and the recording of a fleet share: the look of each outcome, the title, and curves of those under way."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from lgvi_warp.common.status import Status, stop_time
+from lgvi_warp.physics import energy as invariants
+
+if TYPE_CHECKING:
+    from lgvi_warp.runs.result import Result
+
+
+class Look(NamedTuple):
+    """How members with an outcome are drawn: colour as #RRGGBB, and Matplotlib's marker where they ended."""
+
+    color: str
+    marker: str
+
+    @property
+    def rgb(self) -> tuple[int, int, int]:
+        """The colour, from 0 to 255 each."""
+        red, green, blue = bytes.fromhex(self.color[1:])
+        return red, green, blue
+
+
+# Colours after Okabe & Ito, apart for every kind of colour vision; all failures have one, and each its marker.
+LOOKS = {
+    Status.OK: Look("#3C82DC", ""),
+    Status.SURFACE: Look("#009E73", "^"),
+    Status.FLOOR: Look("#E69F00", "v"),
+    Status.BOX: Look("#CC79A7", "s"),
+    Status.TIME: Look("#8C8C8C", "o"),
+    Status.CONDITION: Look("#C9B400", "D"),
+}
+FAILURES = [code for code in Status if code not in LOOKS]
+LOOKS |= {code: Look("#D55E00", marker) for code, marker in zip(FAILURES, "xX*P1+2", strict=True)}
+
+
+class Curve(NamedTuple):
+    """One number of all members against time: name, label of its axis with the unit, and values (k, n)."""
+
+    name: str
+    label: str
+    values: np.ndarray
+
+
+def energy_curve(result: Result) -> Curve:
+    """The error of energy where the scene's laws conserve it; where one gives or takes some, energy itself [J]."""
+    if "energy" in invariants.conserved(result):
+        return Curve("Energy error", "E(t) - E(0) [J]", result.energy - result.energy[:1])
+    return Curve("Energy", "E(t) [J]", result.energy)
+
+
+def quantiles(values: np.ndarray, counted: np.ndarray, levels: list[float]) -> np.ndarray:
+    """Quantiles over the members that count at each time.
+
+    Args:
+        values: (k, n).
+        counted: (k, n), which members count; a value that is not finite never does.
+        levels: m numbers from 0 to 1.
+
+    Returns:
+        (m, k); NaN at times when no member counts.
+    """
+    counted = counted & np.isfinite(values)
+    values = values.astype(np.float64)
+    if counted.all():
+        return np.asarray(np.quantile(values, levels, axis=1))
+    empty = np.full(len(levels), np.nan)
+    rows = [np.quantile(row[at], levels) if at.any() else empty for row, at in zip(values, counted, strict=True)]
+    return np.stack(rows, axis=1)
+
+
+def evenly(members: np.ndarray, most: int) -> np.ndarray:
+    """At most so many of the members, spread evenly over their indices."""
+    return members[np.unique(np.linspace(0, len(members) - 1, min(most, len(members))).astype(int))]
+
+
+def title(result: Result) -> str:
+    """Members, method and step, and how many have each outcome where not all ran to the end."""
+    method, step = result.provenance["method"]["name"], result.provenance["step"]
+    text = f"{result.members:,} members, {method}, step {step:g} s"
+    counts = result.status.counts()
+    if set(counts) == {"ok"}:
+        return text
+    return f"{text}: " + ", ".join(f"{number:,} {name}" for name, number in counts.items())
+
+
+def identity(result: Result) -> str:
+    """A name of 16 hexadecimal digits that the same run always has, and no other: a hash of provenance and samples.
+
+    The provenance alone is not enough: parts of a run share it.
+    """
+    found = hashlib.sha256(json.dumps(result.provenance, sort_keys=True).encode())
+    for array in (result.time, np.asarray(result.status), stop_time(result), result.position[0], result.position[-1]):
+        found.update(f"{array.shape} {array.dtype.str}\n".encode())
+        found.update(np.ascontiguousarray(array).data)
+    return found.hexdigest()[:16]

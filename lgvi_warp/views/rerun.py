@@ -1,0 +1,227 @@
+"""A recording of a fleet for the rerun viewer: bodies that move, a few paths, depth, energy and outcomes as curves."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common import files as durable
+from lgvi_warp.common.errors import MissingExtra, NothingToDraw
+from lgvi_warp.common.status import Status, under_way
+from lgvi_warp.physics import notation
+from lgvi_warp.runs.outcomes import outcome_text, outcomes
+from lgvi_warp.views.fleet import LOOKS, Curve, energy_curve, evenly, identity, quantiles, title
+
+if TYPE_CHECKING:
+    from lgvi_warp.runs.result import Result
+
+# More bodies than this cannot be told apart in a window, and cost time and file size.
+MOST_BODIES = 1000
+TRAILS = 40
+# Frames per chunk of columns: large enough to be quick to write, small enough to seek in.
+FRAMES = 20
+TIMELINE = "sim_time"
+# Name, quantile and colour of each curve.
+CURVES = (
+    ("smallest", 0.0, (120, 150, 190)),
+    ("median", 0.5, (255, 200, 60)),
+    ("largest", 1.0, (190, 120, 120)),
+)
+
+
+def log_rerun(result: Result, path: str | os.PathLike[str]) -> Path:
+    """Write the fleet as an .rrd recording: the file is there whole or not at all.
+
+    At most MOST_BODIES members are shown, spread evenly. A member that an event stopped, or that failed, stays where it
+    ended, in the colour of its outcome from then on. Curves are of the members under way at each time. The recording and
+    the application have ids of their own, which the same run always has: the viewer keeps recordings and layouts apart.
+
+    Args:
+        result: With position, attitude, velocity and angular velocity.
+        path: Of the file.
+
+    Returns:
+        The path.
+
+    Raises:
+        ImportError: Without rerun-sdk (extra: viz).
+        NothingToDraw: No member has a finite start.
+        OSError: The file cannot be written.
+    """
+    try:
+        import rerun as rr
+    except ModuleNotFoundError as error:
+        raise MissingExtra("recordings", "rerun-sdk", "viz") from error
+    target = Path(path)
+    finite = np.isfinite(result.position[0]).all(axis=-1) & np.isfinite(result.attitude[0]).all(axis=(-1, -2))
+    if not finite.any():
+        raise NothingToDraw("no member has a finite start: there is nothing to draw; see result.status")
+    shown = evenly(np.flatnonzero(finite), MOST_BODIES)
+    position = result.position[:, shown].astype(np.float32)
+    curve, counted = energy_curve(result), under_way(result)
+    name = identity(result)
+    recording = rr.RecordingStream(f"lgvi_warp_{name}", recording_id=name)
+    try:
+        with durable.placed(target) as beside:
+            recording.save(beside, default_blueprint=_blueprint(result.time, position, curve))
+            recording.send_recording_name(title(result))
+            _world(recording, rr, result, shown, position, counted[:, shown])
+            _fan(recording, rr, result.time, "depth", result.position[..., 2], counted)
+            _fan(recording, rr, result.time, entity_of(curve), curve.values, counted)
+            _members(recording, rr, result, counted)
+            recording.log("run", rr.TextDocument(_text(result), media_type="text/markdown"), static=True, strict=True)
+            recording.flush()
+            recording.disconnect()
+    except RuntimeError as error:
+        # rerun's word for a writer that could not begin, or not go on; it says why on stderr.
+        text = f"the recording could not be written ({error}); is the disk full, or the folder read-only?"
+        raise OSError(text) from error
+    return target
+
+
+def _text(result: Result) -> str:
+    """What became of the members, and everything that the run follows from."""
+    lines = [title(result), "", *(f"- {outcome_text(result, code)}" for code in outcomes(result)), ""]
+    return "\n".join([*lines, "```json", json.dumps(result.provenance, indent=2), "```"])
+
+
+def _world(
+    recording: Any, rr: Any, result: Result, shown: np.ndarray, position: np.ndarray, counted: np.ndarray
+) -> None:
+    """Bodies and trails. x north, y east, z down. counted: which of those shown are under way, at each time."""
+    recording.log("world", rr.ViewCoordinates.FRD, static=True, strict=True)
+    quaternion = notation.quaternion_from_matrix(result.attitude[:, shown])[..., [1, 2, 3, 0]].astype(np.float32)
+    size = max(_extent(position)) * 0.02
+    status = np.asarray(result.status)[shown]
+    groups = {"fleet": (Status.OK, counted)}
+    groups |= {code.name.lower(): (code, ~counted & (status == code)) for code in outcomes(result) if code}
+    for name, (code, visible) in groups.items():
+        if visible.any():
+            recording.log(f"world/{name}", _body(rr, size, LOOKS[code].rgb), static=True, strict=True)
+            _poses(recording, rr, f"world/{name}", result.time, position, quaternion, visible)
+    trails = evenly(np.arange(len(shown)), TRAILS)
+    strips = position[:, trails].transpose(1, 0, 2)
+    lines = rr.LineStrips3D(list(strips), radii=size * 0.05, colors=(130, 150, 160))
+    recording.log("world/trails", lines, static=True, strict=True)
+
+
+# A body that is not to be seen is so small, beside one that is: an entity without any pose would show one at the origin.
+UNSEEN = 1e-6
+
+
+def _poses(
+    recording: Any, rr: Any, entity: str, time: np.ndarray, position: np.ndarray, quaternion: np.ndarray,
+    visible: np.ndarray,
+) -> None:  # fmt: skip
+    """Send the poses (k, m) of the bodies that are visible at each time (k, m), some frames at once."""
+    empty = ~visible.any(axis=1)
+    posed = visible.copy()
+    posed[empty, 0] = True
+    for first in range(0, len(time), FRAMES):
+        frames = slice(first, first + FRAMES)
+        at = posed[frames]
+        scales = np.where(visible[frames][at], np.float32(1.0), np.float32(UNSEEN))
+        columns = rr.InstancePoses3D.columns(
+            translations=position[frames][at],
+            quaternions=quaternion[frames][at],
+            # At every time or at none: what is not sent anew holds on.
+            scales=np.repeat(scales[:, None], 3, axis=1) if empty.any() else None,
+        ).partition(at.sum(axis=1))
+        recording.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=time[frames])], columns, strict=True)
+
+
+def _extent(position: np.ndarray) -> np.ndarray:
+    """Size of the box around all positions, at least 1 m along each axis."""
+    flat = position.reshape(-1, 3)
+    return np.maximum(flat.max(axis=0) - flat.min(axis=0), 1.0)
+
+
+def _body(rr: Any, size: float, color: tuple[int, int, int]) -> Any:
+    """A spindle along the body's x axis, with a bright nose and a fin on its upper side: attitude can be read off it."""
+    s = 0.18 * size
+    points = [(size, 0, 0), (0, s, 0), (0, 0, s), (0, -s, 0), (0, 0, -s), (-size, 0, 0), (-size, 0, -2.5 * s)]
+    faces = [
+        (0, 1, 2),
+        (0, 2, 3),
+        (0, 3, 4),
+        (0, 4, 1),
+        (5, 2, 1),
+        (5, 3, 2),
+        (5, 4, 3),
+        (5, 1, 4),
+        (4, 6, 5),
+        (4, 5, 6),
+    ]
+    colors = [(255, 255, 255)] + [color] * 5 + [(255, 200, 60)]
+    return rr.Mesh3D(vertex_positions=points, triangle_indices=faces, vertex_colors=colors)
+
+
+def entity_of(curve: Curve) -> str:
+    """Where a curve lies in the recording: "energy_error" and so on."""
+    return curve.name.lower().replace(" ", "_")
+
+
+def _fan(recording: Any, rr: Any, time: np.ndarray, name: str, values: np.ndarray, counted: np.ndarray) -> None:
+    """Smallest, median and largest of the members that count at each time."""
+    rows = quantiles(values, counted, [quantile for _, quantile, _ in CURVES])
+    for (curve, _, color), row in zip(CURVES, rows, strict=True):
+        _series(recording, rr, f"{name}/{curve}", time, row, curve, color)
+
+
+def _members(recording: Any, rr: Any, result: Result, counted: np.ndarray) -> None:
+    """How many members are under way at each time, and how many ended, by outcome."""
+    status = np.asarray(result.status)
+    numbers = {"under way": (Status.OK, counted.sum(axis=1))}
+    for code in outcomes(result):
+        if code:
+            numbers[code.name.lower()] = code, (~counted & (status == code)).sum(axis=1)
+    for name, (code, row) in numbers.items():
+        _series(recording, rr, f"members/{name.replace(' ', '_')}", result.time, row, name, LOOKS[code].rgb)
+
+
+def _series(
+    recording: Any, rr: Any, entity: str, time: np.ndarray, values: np.ndarray, name: str, color: tuple[int, int, int]
+) -> None:
+    """One curve; where its values are not finite it is broken."""
+    recording.log(entity, rr.SeriesLines(names=name, colors=color, widths=2.0), static=True, strict=True)
+    columns = rr.Scalars.columns(scalars=values.astype(np.float64))
+    recording.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=time)], columns, strict=True)
+
+
+def _blueprint(time: np.ndarray, position: np.ndarray, energy: Curve) -> Any:
+    """What is seen first: the fleet from the side and above on the left, the curves and the run's facts on the right."""
+    import rerun.blueprint as rrb
+
+    flat = position.reshape(-1, 3)
+    centre, extent = (flat.max(axis=0) + flat.min(axis=0)) / 2.0, _extent(position)
+    # From the side of the way the fleet goes, and a little above: z points down.
+    way = np.mean(position[-1] - position[0], axis=0)[:2]
+    east, north = way / np.linalg.norm(way) if np.any(way) else (0.0, 1.0)
+    eye = centre + np.linalg.norm(extent) * np.array([0.8 * north, -0.8 * east, -0.2])
+    world = rrb.Spatial3DView(
+        origin="world",
+        name="Fleet (north, east, down)",
+        eye_controls=rrb.EyeControls3D(position=eye, look_target=centre, eye_up=(0.0, 0.0, -1.0)),
+    )
+    whole = rrb.TimeAxis(
+        view_range=rrb.TimeRange(
+            start=rrb.TimeRangeBoundary.absolute(seconds=float(time[0])),
+            end=rrb.TimeRangeBoundary.absolute(seconds=float(time[-1])),
+        )
+    )
+    side = rrb.Vertical(
+        rrb.TimeSeriesView(origin="depth", name="Depth [m] of the members under way", axis_x=whole),
+        rrb.TimeSeriesView(origin=entity_of(energy), name=f"{energy.name} [J] of the members under way", axis_x=whole),
+        rrb.TimeSeriesView(origin="members", name="Members by outcome", axis_x=whole),
+        rrb.TextDocumentView(origin="run", name="Run"),
+    )
+    return rrb.Blueprint(
+        rrb.Horizontal(world, side, column_shares=[3, 2]),
+        rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+    )

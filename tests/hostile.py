@@ -160,10 +160,10 @@ def parts(data):
     def harm(path, home):
         found = data(home) if callable(data) else data
         (path / "parts" / "000000000.npy").write_bytes(found)
-        marker = path / "blocks" / "000000000.json"
+        marker_file = path / "blocks" / "000000000.json"
         sums = read_marker(path, "blocks/000000000.json")
         sums["parts/000000000.npy"] = [len(found), store.durable.checksum(found)]
-        marker.write_bytes(marker(sums))
+        marker_file.write_bytes(marker(sums))
 
     return harm
 
@@ -176,10 +176,10 @@ def chunk(name, values):
         data = values.tobytes()
         data += store.durable.checksum(data).to_bytes(4, "little")
         file.write_bytes(data)
-        marker = path / "blocks" / "000000000.json"
+        marker_file = path / "blocks" / "000000000.json"
         sums = read_marker(path, "blocks/000000000.json")
         sums[f"{name}/{file.name}"] = [len(data), store.durable.checksum(data)]
-        marker.write_bytes(marker(sums))
+        marker_file.write_bytes(marker(sums))
 
     return harm
 

@@ -304,7 +304,7 @@ def test_work_that_cannot_be_read_is_refused_with_the_reason():
     data = sent(Work(plan, (Samples(plan), Outcomes(plan))), "processes")
     assert isinstance(received(data, "processes").plan.ensemble, lw.Ensemble)
     with pytest.raises(lw.SceneError, match=r"cannot be read by other processes.*ModuleNotFoundError"):
-        received(data.replace(b"lgvi_warp.engine.keepers.memory", b"lgvi_warp.kiipers"), "processes")
+        received(data.replace(b"lgvi_warp.engine.keepers.memory", b"lgvi_warp.engine.kiipers.memory"), "processes")
 
 
 def test_samples_are_not_sent():

@@ -28,7 +28,8 @@ TOGETHER = """
 import sys, time, os
 from pathlib import Path
 import lgvi_warp as lw
-from lgvi_warp import store, stored
+from lgvi_warp.runs.store import folder as store
+from lgvi_warp.runs.store import open as stored
 from tests.stores import SETTINGS, fleet
 path, mode, here = Path(sys.argv[1]), sys.argv[2], Path(sys.argv[3])
 (here / f"ready{os.getpid()}").touch()
@@ -43,7 +44,9 @@ except lw.SceneError as error:
 DYING = """
 import sys, os
 import lgvi_warp as lw
-from lgvi_warp import durable, safe_files, scratch, store
+from lgvi_warp.common import files as durable
+from lgvi_warp.common import safe_files, scratch
+from lgvi_warp.runs.store import folder as store
 from tests.stores import SETTINGS, fleet
 path, place, count, exchange = sys.argv[1], sys.argv[2], int(sys.argv[3]), sys.argv[4] == "yes"
 if not exchange:

@@ -287,9 +287,8 @@ def test_the_command_leaves_a_full_disk_as_it_was(tmp_path):
 
 @pytest.mark.slow
 def test_one_that_is_killed_while_it_compiles_leaves_nothing_for_long(tmp_path):
-    code = (
-        "import lgvi_warp as lw; from lgvi_warp import speed; lw.solve(lw.Ensemble(speed.example(), 4), h=0.01, t1=0.1)"
-    )
+    run = "lw.solve(lw.Ensemble(speed.example(), 4), h=0.01, t1=0.1)"
+    code = f"import lgvi_warp as lw; from lgvi_warp.studies import speed; {run}"
     env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "WARP_CACHE_PATH": str(tmp_path)}
     process = subprocess.Popen([sys.executable, "-c", code], env=env)
     while not list(tmp_path.rglob("*.cpp")):

@@ -13,6 +13,7 @@ from rerun.chunk import RrdReader
 import lgvi_warp as lw
 from lgvi_warp import cli
 from lgvi_warp.cli import report
+from lgvi_warp.common import status
 from lgvi_warp.common.status import Status, StatusArray, failed, stopped
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.runs import outcomes
@@ -100,9 +101,9 @@ def test_failed_and_stopped_are_told_apart():
 
 
 def test_members_are_under_way_until_they_end(mixed):
-    end = outcomes.stop_time(mixed)
+    end = status.stop_time(mixed)
     np.testing.assert_allclose(end, [3.0, 6.0, 12.0, np.inf, np.inf, 12.5, 5.0], rtol=1e-9)
-    np.testing.assert_array_equal(outcomes.under_way(mixed).sum(axis=0), [4, 7, 13, 21, 21, 13, 6])
+    np.testing.assert_array_equal(status.under_way(mixed).sum(axis=0), [4, 7, 13, 21, 21, 13, 6])
 
 
 def test_a_sample_at_the_last_good_step_counts():
@@ -110,7 +111,7 @@ def test_a_sample_at_the_last_good_step_counts():
     few = SimpleNamespace(
         time=np.array([0.0, 0.3, 0.6]), status=np.array([1, 1]), failure_time=np.array([0.3 - 1e-16, 0.1])
     )
-    assert outcomes.under_way(few).tolist() == [[True, True], [True, False], [False, False]]
+    assert status.under_way(few).tolist() == [[True, True], [True, False], [False, False]]
 
 
 def test_the_first_in_time_is_named(mixed):
@@ -315,7 +316,7 @@ def test_a_recording_shows_each_member_by_its_outcome_from_then_on(mixed, tmp_pa
         ]
         for name in seen
     }
-    under_way = outcomes.under_way(mixed)
+    under_way = status.under_way(mixed)
     assert visible["fleet"] == under_way.sum(axis=1).tolist()
     for name, code in (("floor", Status.FLOOR), ("surface", Status.SURFACE)):
         assert visible[name] == (~under_way & (mixed.status == code)).sum(axis=1).tolist()

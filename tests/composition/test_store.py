@@ -559,7 +559,7 @@ def test_a_file_system_that_is_read_only(tmp_path, monkeypatch, capsys):
     def refused(*_, **__):
         raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(tmp_path))
 
-    monkeypatch.setattr(store, "skeleton", refused)
+    monkeypatch.setattr("lgvi_warp.runs.store.create.skeleton", refused)
     arguments = [
         "run",
         str(ROOT / "examples" / "paper.toml"),

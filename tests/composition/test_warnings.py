@@ -5,6 +5,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status, Warnings
+from lgvi_warp.engine import step_warnings
 from lgvi_warp.engine.step_warnings import COARSE, PRECISION
 from lgvi_warp.engine.survey import frame_of
 from lgvi_warp.methods import limits
@@ -223,7 +224,7 @@ def test_a_swing_from_rest_is_no_failure():
 @pytest.mark.parametrize("method", ["psi_s", "psi_x", "rk4"])
 def test_energy_is_that_of_the_result(method, monkeypatch):
     # Kernel against host: with a limit that round-off alone crosses, the value noted is that of the samples.
-    monkeypatch.setattr(limits, "ENERGY", 1e-12)
+    monkeypatch.setattr(step_warnings, "ENERGY", 1e-12)
     base = scene_of((1.0, 2.0, 3.0), (1.0, 2.0, 2.5), net=0.5, moment=(0.1, 0.0, -0.3))
     laws = [terms.Tether(anchor=[0.0, 0.0, 0.5], stiffness=0.4, rest_length=0.7, attachment=[0.1, 0.0, 0.05]),
             terms.Stratification(gradient=0.2, reference_depth=0.3)]  # fmt: skip
@@ -247,7 +248,7 @@ def test_energy_is_that_of_the_result(method, monkeypatch):
 
 def test_energy_where_the_forces_have_another_origin(monkeypatch):
     # psi_x keeps a coupled vehicle about one point and its forces act about another: U is that of the forces.
-    monkeypatch.setattr(limits, "ENERGY", 1e-12)
+    monkeypatch.setattr(step_warnings, "ENERGY", 1e-12)
     named = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.5})
     scene = lw.Scene(named.vehicle, named.environment)
     fleet = one(scene, *random_states(5, 16, 0.5, 0.5))

@@ -6,8 +6,9 @@ import sys
 
 SCRIPT = """
 import json, resource
-from lgvi_warp import speed
-from lgvi_warp.runs.solve import make_plan, run_plan
+from lgvi_warp.studies import speed
+from lgvi_warp.runs.run import run_plan
+from lgvi_warp.runs.settle import make_plan
 plan = make_plan(speed.fleet({members}), "psi_s", h=0.01, t1=0.01 * {steps})
 result = run_plan(plan, 1)
 peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

@@ -36,7 +36,17 @@ IMPLIED: tuple[Term, ...] = (Weight(), Restoring())
 
 
 def register(kind: type[AnyTerm]) -> type[AnyTerm]:
-    """Make a user's Term or Event known to scene files by its `type`; also as a decorator. ValueError if it is taken."""
+    """Make a user's term or event known to scene files by its `type`. It may be used as a decorator of the class.
+
+    Args:
+        kind: Subclass of `Term` or `Event` with a `type` of its own.
+
+    Returns:
+        The same class.
+
+    Raises:
+        ValueError: Where `type` is empty or taken.
+    """
     known: dict[str, Any] = kind.kinds
     if not kind.type or kind.type in known or kind.type in ("weight", "restoring"):
         raise ValueError(f"{kind.__name__}.type = {kind.type!r}: give a type that no other term has")
@@ -67,7 +77,17 @@ for _kind in (
 
 
 def from_list(given: Any) -> tuple[Term, ...]:
-    """Terms from tables of a scene file or Term objects. Raises SceneError naming every fault."""
+    """Build the terms of a scene.
+
+    Args:
+        given: A list of tables of a scene file, of `Term` objects, or of both.
+
+    Returns:
+        The terms, in the same order.
+
+    Raises:
+        SceneError: Where an entry is no term, is an event, or shares its name with another. The message lists every fault.
+    """
     faults = Faults()
     if not isinstance(given, Sequence) or isinstance(given, str):
         raise SceneError(
@@ -90,7 +110,7 @@ def from_list(given: Any) -> tuple[Term, ...]:
 
 
 def _allowed(where: str, one: Term) -> Term:
-    """A Term object, unless it is none for this list."""
+    """The term, unless it is an event or follows from the vehicle: then SceneError."""
     if not one.acts:
         raise SceneError([f"{where} = {one.type!r}: is an event; give it in events=[...]"])
     if type(one) in (Weight, Restoring):

@@ -153,7 +153,8 @@ def angular_momentum(result: Sampled) -> np.ndarray:
 def energy_growth(result: Sampled, *, dissipative: bool = False) -> np.ndarray:
     """Largest change of energy of each member, relative to the energy that it could hold.
 
-    The latter is |p|^2 / (2 M_min) + |pi|^2 / (2 J_min) at the start and, up to each time, the largest change of the potential.
+    The latter is |p|^2 / (2 M_min) + |pi|^2 / (2 J_min) at the start and, up to each time, the largest change of
+    the potential.
     A bounded motion stays below about 1, however it exchanges energy.
 
     Args:

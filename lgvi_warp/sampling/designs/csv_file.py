@@ -1,4 +1,4 @@
-"""Numbers by column from what a CSV file holds, with the line and the column of each that is none."""
+"""Columns of numbers from a CSV file; each cell that is no number is reported with its line and column."""
 
 from __future__ import annotations
 
@@ -28,10 +28,22 @@ Choose = Callable[[Faults, Sequence[str]], list[str]]
 
 
 def columns_of(faults: Faults, path: str, content: bytes, choose: Choose) -> dict[str, np.ndarray]:
-    """Columns by name: names in the first line that is not empty and no comment (#), then a line of numbers each.
+    """Columns of a CSV file by name.
 
-    Cells are parted by commas, semicolons or tabs, as the first line has it. Notes every fault, and gives nothing if there
-    is one. Raises UnicodeDecodeError for what is not in UTF-8.
+    The names are in the first line that is neither empty nor a comment (#); every other line holds one number for each.
+    Commas, semicolons or tabs separate cells, as in the first line.
+
+    Args:
+        faults: Collects the faults.
+        path: Path of the file, for messages.
+        content: Bytes of the file.
+        choose: Takes the faults and the names of the first line; returns those to read, and adds faults.
+
+    Returns:
+        Columns (lines,) by name; {} where there is a fault.
+
+    Raises:
+        UnicodeDecodeError: Where the file is not UTF-8.
     """
     rows: Any = csv.reader(())
     try:
@@ -49,7 +61,7 @@ def columns_of(faults: Faults, path: str, content: bytes, choose: Choose) -> dic
 
 
 def _lines(content: bytes) -> Iterator[str]:
-    """Every line, so that they are counted as the file has them; of comments and empty ones the end alone."""
+    """Every line, so that they are counted as the file has them; comments and empty lines become a bare line end."""
     text = io.TextIOWrapper(io.BytesIO(content), "utf-8-sig")
     while line := text.readline(LONGEST_LINE):
         if len(line) == LONGEST_LINE:
@@ -58,7 +70,7 @@ def _lines(content: bytes) -> Iterator[str]:
 
 
 def _check_names(faults: Faults, path: str, line: int, names: Sequence[str], delimiter: str) -> None:
-    """Note what is wrong with a first line."""
+    """Add a fault for a first line that does not hold names."""
     if not names:
         faults.add(
             "file", path, "is empty", "write the names in its first line, then a line of numbers for each member"
@@ -73,7 +85,7 @@ def _check_names(faults: Faults, path: str, line: int, names: Sequence[str], del
 
 
 def _check_chosen(faults: Faults, path: str, line: int, names: Sequence[str], chosen: Sequence[str]) -> None:
-    """Note what is wrong with the names to be read."""
+    """Add a fault where a chosen name is empty or names two columns."""
     counts = Counter(names)
     for name in sorted({name for name in chosen if counts[name] > 1}):
         faults.add("file", path, f"names a column twice, {name!r} (line {line})", "give each column a name of its own")
@@ -83,7 +95,7 @@ def _check_chosen(faults: Faults, path: str, line: int, names: Sequence[str], ch
 
 
 def _numbers(faults: Faults, path: str, rows: Any, names: Sequence[str], chosen: Sequence[str]) -> np.ndarray:
-    """(lines, chosen) numbers of the lines that follow."""
+    """The numbers (lines, chosen) of the lines that follow."""
     at = {name: place for place, name in enumerate(names)}
     places = [at[name] for name in chosen]
     found, wrong = array("d"), list[tuple[str, str]]()
@@ -114,7 +126,7 @@ def _numbers(faults: Faults, path: str, rows: Any, names: Sequence[str], chosen:
 def _told(
     line: int, row: Sequence[str], names: Sequence[str], chosen: Sequence[str], cells: Sequence[str]
 ) -> list[tuple[str, str]]:
-    """What is wrong with a line, and the remedy."""
+    """The faults of one line, each with its remedy."""
     if len(row) != len(names):
         return [(f"has {len(names)} names and {len(row)} cells in line {line}", "give a cell for each name")]
     told = []
@@ -132,7 +144,7 @@ def _told(
 
 
 def _number(cell: str) -> float | None:
-    """What a cell says, if that is a number."""
+    """The number in a cell; None where it holds none."""
     try:
         return float(cell)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Scrambled sequences of low discrepancy, any point of which is found from its index: Sobol's and Halton's."""
+"""Scrambled low-discrepancy sequences whose points are found directly from their indices: Sobol's and Halton's."""
 
 from __future__ import annotations
 
@@ -22,14 +22,16 @@ SOBOL_BITS = 32
 class Sobol(Replicated):
     """A scrambled Sobol sequence (linear matrix scramble and digital shift, scipy.stats.qmc.Sobol): member i is point i.
 
-    Members may be added: powers of two are balanced. What varies is part of the design: another name, another sequence.
-    replicates: so many sequences, scrambled independently, a member of each in turn.
+    Members may be added; powers of two are balanced. Another name that varies makes another sequence.
+
+    Args:
+        replicates: R, the number of sequences, scrambled independently, a member of each in turn; 1 by default.
     """
 
     kind: ClassVar[str] = "sobol"
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Points by their indices."""
+        """Points of the replicates' sequences by their indices."""
         found = np.empty((len(members), space.dimensions))
         for replicate, own, points in self.dealt(members):
             found[own] = sobol_points(space.seed, self.name(replicate), space.dimensions, points)
@@ -37,9 +39,19 @@ class Sobol(Replicated):
 
 
 def sobol_points(seed: int, name: str, dimensions: int, indices: np.ndarray, scramble: bool = True) -> np.ndarray:
-    """Points of a Sobol sequence in (0, 1), (n, dimensions), by their indices.
+    """Points of a Sobol sequence by their indices.
 
-    A point is the exclusive or of one number for each bit of its index (and the first point): so any is had at once.
+    A point is the exclusive or of point 0 and of one number for each bit of its index, so that any point is found directly.
+
+    Args:
+        seed: Seed of the scramble.
+        name: Name of the stream of random numbers.
+        dimensions: Columns of the points.
+        indices: Indices of the points, (n,).
+        scramble: Whether the sequence is scrambled; True by default.
+
+    Returns:
+        Points (n, dimensions) in (0, 1).
     """
     if not dimensions:
         return np.empty((len(indices), 0))
@@ -55,7 +67,7 @@ def sobol_points(seed: int, name: str, dimensions: int, indices: np.ndarray, scr
 # Of every replicate, for a few numbers of bits.
 @functools.lru_cache(maxsize=8 * MOST_REPLICATES)
 def _sobol_basis(seed: int, name: str, dimensions: int, bits: int, scramble: bool) -> np.ndarray:
-    """Point 0, and what each bit of an index changes in it: (bits + 1, dimensions), as whole numbers."""
+    """Point 0, and the bits that each bit of an index changes in it: (bits + 1, dimensions), as integers."""
     from scipy.stats import qmc
 
     rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed_words(seed, name))))
@@ -75,14 +87,16 @@ def _sobol_basis(seed: int, name: str, dimensions: int, bits: int, scramble: boo
 class Halton(Replicated):
     """A scrambled Halton sequence (random permutations of digits, scipy.stats.qmc.Halton): member i is point i.
 
-    Members may be added, any number of them. What varies is part of the design: another name, another sequence.
-    replicates: so many sequences, scrambled independently, a member of each in turn.
+    Any number of members may be added. Another name that varies makes another sequence.
+
+    Args:
+        replicates: R, the number of sequences, scrambled independently, a member of each in turn; 1 by default.
     """
 
     kind: ClassVar[str] = "halton"
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Points by their indices, neighbours together."""
+        """Points by their indices; neighbouring indices are computed together."""
         found = np.empty((len(members), space.dimensions))
         for replicate, own, wanted in self.dealt(members):
             ascending, place = np.unique(wanted, return_inverse=True)

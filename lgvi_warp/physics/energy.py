@@ -170,9 +170,9 @@ def energy_growth(result: Sampled, *, dissipative: bool = False) -> np.ndarray:
     I6 = np.broadcast_to(vehicle.inertia6(result.parameters), (result.members, 6, 6))
     held = sum(0.5 * np.sum(momenta[:, part] ** 2, axis=1) / np.linalg.eigvalsh(I6[:, part, part])[:, 0]
                for part in (slice(0, 3), slice(3, 6)))  # fmt: skip
-    given = np.maximum.accumulate(np.abs(potential - potential[:1]), axis=0)
+    exchanged = np.maximum.accumulate(np.abs(potential - potential[:1]), axis=0)
     change = total - total[:1]
-    growth = np.max((change if dissipative else np.abs(change)) / np.maximum(held + given, 1e-300), axis=0)
+    growth = np.max((change if dissipative else np.abs(change)) / np.maximum(held + exchanged, 1e-300), axis=0)
     return np.where(np.isfinite(total).all(axis=0), growth, np.inf)
 
 

@@ -225,12 +225,12 @@ def schur(I6: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         M [kg], E = M^-1 C [m] and Js = J - C^T E [kg m2], each (n, 3, 3).
     """
     M, C, J = blocks(I6)
-    some = np.any(C, axis=(-2, -1))
-    if not some.any():
+    coupled = np.any(C, axis=(-2, -1))
+    if not coupled.any():
         return M, np.zeros_like(C), J
     E, Js = np.zeros_like(C), J.copy()
-    E[some] = np.linalg.solve(M[some], C[some])
-    Js[some] -= np.swapaxes(C[some], -1, -2) @ E[some]
+    E[coupled] = np.linalg.solve(M[coupled], C[coupled])
+    Js[coupled] -= np.swapaxes(C[coupled], -1, -2) @ E[coupled]
     return M, E, Js
 
 
@@ -248,12 +248,12 @@ def uncoupled_frame(I6: np.ndarray) -> tuple[Frame, np.ndarray]:
     M, E, Js = schur(I6)
     origin = -vee(E)
     Q, J = notation.principal_axes(Js)
-    some, left = np.any(E, axis=(-2, -1)), np.zeros(len(E))
-    if some.any():
-        left[some] = coupling(moved(I6[some], origin[some], Q[some]))
-    none = np.zeros_like(M)
+    coupled, remaining = np.any(E, axis=(-2, -1)), np.zeros(len(E))
+    if coupled.any():
+        remaining[coupled] = coupling(moved(I6[coupled], origin[coupled], Q[coupled]))
+    zero = np.zeros_like(M)
     # Mass does not depend on the origin.
-    return Frame(Q, origin, origin, np.swapaxes(Q, -1, -2) @ M @ Q, J, none, none), left
+    return Frame(Q, origin, origin, np.swapaxes(Q, -1, -2) @ M @ Q, J, zero, zero), remaining
 
 
 def ascending(Q: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -94,11 +94,11 @@ class Vehicle:
             "buoyancy": faults.number("buoyancy", self.buoyancy, "N", least=0.0),
             "center_of_buoyancy": faults.finite("center_of_buoyancy", self.center_of_buoyancy, (3,), "m"),
         }
-        given = _texts(faults, self.warnings)
+        user_warnings = _texts(faults, self.warnings)
         tolerance = faults.number("inertia_tolerance", self.inertia_tolerance, "1", least=0.0)
         object.__setattr__(self, "inertia_tolerance", tolerance or 0.0)
         values |= self._full(faults) if self.full else self._simple(faults)
-        values["warnings"] = (*given, *map(Seen, values["warnings"]))
+        values["warnings"] = (*user_warnings, *map(Seen, values["warnings"]))
         faults.raise_if_any()
         for name, value in values.items():
             if isinstance(value, np.ndarray):
@@ -118,15 +118,15 @@ class Vehicle:
             if getattr(self, name) is None:
                 faults.add(name, None, "is missing", f"give it [{UNITS[name]}]")
         mass = None if self.mass is None else faults.positive("mass", self.mass, "kg")
-        given = (0.0, 0.0, 0.0) if self.added_mass is None else self.added_mass
+        added_as_given = (0.0, 0.0, 0.0) if self.added_mass is None else self.added_mass
         if mass is not None and mass < LEAST:
             faults.add("mass", self.mass, "has no inverse in float64", f"give a mass from {LEAST:.3g} kg")
-        added = faults.symmetric("added_mass", given, "kg")
+        added = faults.symmetric("added_mass", added_as_given, "kg")
         inertia = None if self.inertia is None else faults.symmetric("inertia", self.inertia, "kg m2")
         if inertia is not None and not _definite(inertia):
             faults.add("inertia", self.inertia, "is not positive definite", "give principal inertias above 0 [kg m2]")
         if mass is not None and added is not None and not _definite(added, mass * np.eye(3)):
-            faults.add("added_mass", given, "with the mass is not positive definite", SIGN)
+            faults.add("added_mass", added_as_given, "with the mass is not positive definite", SIGN)
         warnings = unusual("inertia", inertia) if inertia is not None else ()
         return {"mass": mass, "added_mass": added, "inertia": inertia, "warnings": warnings}
 
@@ -143,8 +143,8 @@ class Vehicle:
         else:
             rigid = faults.symmetric("rigid_body_mass_matrix", self.rigid_body_mass_matrix, unit, 6)
         zeros = np.zeros((6, 6))
-        given = zeros if self.added_mass_matrix is None else self.added_mass_matrix
-        added = faults.symmetric("added_mass_matrix", given, unit, 6)
+        added_as_given = zeros if self.added_mass_matrix is None else self.added_mass_matrix
+        added = faults.symmetric("added_mass_matrix", added_as_given, unit, 6)
         weight = None if self.weight is None else faults.number("weight", self.weight, "N", least=0.0)
         center: np.ndarray | None = None
         warnings: tuple[str, ...] = ()
@@ -155,7 +155,7 @@ class Vehicle:
             if _definite(rigid):
                 warnings += self._triangle(faults, rigid)
         if rigid is not None and added is not None and _definite(rigid) and not _definite(added, rigid):
-            faults.add("added_mass_matrix", given, "with the rigid body's is not positive definite", SIGN)
+            faults.add("added_mass_matrix", added_as_given, "with the rigid body's is not positive definite", SIGN)
         values = {"rigid_body_mass_matrix": rigid, "added_mass_matrix": added, "weight": weight}
         return values | {"center_of_gravity": center, "warnings": warnings}
 
@@ -164,14 +164,16 @@ class Vehicle:
         short = float(shortage(rigid[None])[0])
         if short <= ROUND_OFF:
             return ()
-        moments = ", ".join(f"{one:.6g}" for one in np.linalg.eigvalsh(about_center(rigid[None])[0]))
-        what = f"has principal inertias {moments} kg m2, two of which sum to less than the third"
-        by = f"by {100.0 * short:.2g} % of it"
+        moments = ", ".join(f"{moment:.6g}" for moment in np.linalg.eigvalsh(about_center(rigid[None])[0]))
+        fault = f"has principal inertias {moments} kg m2, two of which sum to less than the third"
+        amount = f"by {100.0 * short:.2g} % of it"
         if short <= self.inertia_tolerance:
-            return (f"vehicle.rigid_body_mass_matrix: {what}, {by}: no rigid body has; taken as it is",)
+            return (f"vehicle.rigid_body_mass_matrix: {fault}, {amount}: no rigid body has; taken as it is",)
         remedy = "give the rigid body's own inertia here, and added inertia in added_mass_matrix"
         remedy += f"; or allow it: inertia_tolerance = {short * 1.01:.2g}" if short <= LITTLE else ""
-        faults.add("rigid_body_mass_matrix", rigid[3:, 3:], f"{what}: no rigid body has", f"it misses {by}; {remedy}")
+        faults.add(
+            "rigid_body_mass_matrix", rigid[3:, 3:], f"{fault}: no rigid body has", f"it misses {amount}; {remedy}"
+        )
         return ()
 
     def _rigid(self, faults: Faults, rigid: np.ndarray, center: Any) -> tuple[np.ndarray | None, tuple[str, ...]]:
@@ -223,9 +225,9 @@ class Vehicle:
         for name, value in self.parameters().items():
             full = name in ("rigid_body_mass_matrix", "added_mass_matrix")
             content[name] = compact(value) if value.shape == (3, 3) and not full else value.tolist()
-        given = [text for text in self.warnings if not isinstance(text, Seen)]
+        user_warnings = [text for text in self.warnings if not isinstance(text, Seen)]
         content |= {"inertia_tolerance": self.inertia_tolerance} if self.inertia_tolerance else {}
-        return content | ({"warnings": given} if given else {})
+        return content | ({"warnings": user_warnings} if user_warnings else {})
 
 
 def _texts(faults: Faults, given: Any) -> tuple[str, ...]:

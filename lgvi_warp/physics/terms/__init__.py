@@ -95,9 +95,11 @@ def from_list(given: Any) -> tuple[Term, ...]:
         )
     few_enough("terms", given)
     terms: list[Term] = []
-    for i, one in enumerate(given):
+    for i, entry in enumerate(given):
         with faults.including():
-            terms.append(_allowed(f"terms[{i}]", one) if isinstance(one, Term) else _from_table(f"terms[{i}]", one))
+            terms.append(
+                _allowed(f"terms[{i}]", entry) if isinstance(entry, Term) else _from_table(f"terms[{i}]", entry)
+            )
     counts = Counter(term.key for term in terms)
     for key in sorted(key for key in counts if folded(key) in RESERVED):
         faults.add("terms", key, "is the name of a section of the scene", f'give another name: name = "{key}_term"')

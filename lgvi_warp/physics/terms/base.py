@@ -115,9 +115,9 @@ class Term:
         elif self.key and (wrong := names.wrong_with(self.key)):
             faults.add("name" if self.name else "type", self.key, *wrong)
         lengths: dict[str, int] = {}
-        for one in self.quantities():
-            value = getattr(self, one.name)
-            object.__setattr__(self, one.name, _checked(faults, one, value, lengths))
+        for item in self.quantities():
+            value = getattr(self, item.name)
+            object.__setattr__(self, item.name, _checked(faults, item, value, lengths))
         if not faults:
             self.check(faults)
         faults.raise_if_any()
@@ -129,7 +129,7 @@ class Term:
         Returns:
             The dataclass fields declared by `quantity`, in the order of the class.
         """
-        return tuple(one for one in dataclasses.fields(cls) if "shape" in one.metadata)
+        return tuple(item for item in dataclasses.fields(cls) if "shape" in item.metadata)
 
     @property
     def key(self) -> str:
@@ -149,7 +149,7 @@ class Term:
         Returns:
             The array of each numeric field, by the field's name, in the field's own shape.
         """
-        return {one.name: getattr(self, one.name) for one in self.quantities()}
+        return {item.name: getattr(self, item.name) for item in self.quantities()}
 
     def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
         """Which members have numbers that this term cannot take: not finite, or out of bounds.
@@ -161,11 +161,11 @@ class Term:
             A mask (n,) for each numeric field, True where the member's number is refused.
         """
         bad = {}
-        for one in self.quantities():
-            value = own[one.name].reshape(len(own[one.name]), -1)
-            low, high = one.metadata["least"], one.metadata["most"]
+        for item in self.quantities():
+            value = own[item.name].reshape(len(own[item.name]), -1)
+            low, high = item.metadata["least"], item.metadata["most"]
             with np.errstate(invalid="ignore"):
-                bad[one.name] = ~np.all(np.isfinite(value) & (value >= low) & (value <= high), axis=1)
+                bad[item.name] = ~np.all(np.isfinite(value) & (value >= low) & (value <= high), axis=1)
         return bad
 
     def present(self, own: Numbers) -> bool:
@@ -275,10 +275,10 @@ class Term:
             `type`, `name` where it has one, and every field that is not None, arrays as lists.
         """
         content: dict[str, Any] = {"type": self.type} | ({"name": self.name} if self.name else {})
-        for one in dataclasses.fields(self):
-            value = getattr(self, one.name)
-            if one.name != "name" and value is not None:
-                content[one.name] = value.tolist() if isinstance(value, np.ndarray) else value
+        for item in dataclasses.fields(self):
+            value = getattr(self, item.name)
+            if item.name != "name" and value is not None:
+                content[item.name] = value.tolist() if isinstance(value, np.ndarray) else value
         return content
 
 
@@ -356,20 +356,20 @@ def build(where: str, kind: type[AnyTerm], table: Mapping[str, Any]) -> AnyTerm:
         SceneError: Where a field is unknown, missing or wrong. The message lists every fault.
     """
     faults = Faults()
-    fields = {one.name: one for one in dataclasses.fields(kind) if one.init}
-    given = {key: value for key, value in table.items() if key != "type"}
-    faults.keys(where, given, fields)
-    for name, one in fields.items():
-        if one.default is dataclasses.MISSING and name not in given:
-            faults.add(f"{where}.{name}", "", "is missing", f"give it [{one.metadata.get('unit', '')}]")
+    fields = {item.name: item for item in dataclasses.fields(kind) if item.init}
+    values = {key: value for key, value in table.items() if key != "type"}
+    faults.keys(where, values, fields)
+    for name, item in fields.items():
+        if item.default is dataclasses.MISSING and name not in values:
+            faults.add(f"{where}.{name}", "", "is missing", f"give it [{item.metadata.get('unit', '')}]")
     faults.raise_if_any()
     try:
-        return kind(**given)
+        return kind(**values)
     except SceneError:
         raise
     except ValueError:  # what a law makes of its numbers before they are checked
-        for name in (name for name in fields if name in given and ragged(given[name])):
-            faults.add(f"{where}.{name}", given[name], "has rows of different lengths", "give rows of one length")
+        for name in (name for name in fields if name in values and ragged(values[name])):
+            faults.add(f"{where}.{name}", values[name], "has rows of different lengths", "give rows of one length")
         faults.raise_if_any()
         raise
 

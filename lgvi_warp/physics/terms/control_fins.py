@@ -47,8 +47,8 @@ class ControlFins(Fins):
 
     def __post_init__(self) -> None:
         first = first_row(self.command_schedule)
-        given = self.command is not None and self.command_schedule is not None
-        object.__setattr__(self, "_both", given and not np.array_equal(first, self.command))
+        twice = self.command is not None and self.command_schedule is not None
+        object.__setattr__(self, "_both", twice and not np.array_equal(first, self.command))
         if self.command is None:
             object.__setattr__(self, "command", first)
         self.repeat("limit", "rate_limit", "command")
@@ -94,7 +94,7 @@ class ControlFins(Fins):
 def _at_start(times: np.ndarray, schedule: np.ndarray) -> np.ndarray:
     """The commands (n, fins) [rad] at t = 0."""
     n = max(len(times), len(schedule))
-    times, schedule = (np.broadcast_to(one, (n, *one.shape[1:])) for one in (times, schedule))
+    times, schedule = (np.broadcast_to(table, (n, *table.shape[1:])) for table in (times, schedule))
     return np.array(
         [[np.interp(0.0, t, column) for column in commands.T] for t, commands in zip(times, schedule, strict=True)]
     )

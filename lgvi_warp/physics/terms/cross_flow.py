@@ -69,8 +69,8 @@ class CrossFlow(Term):
         half_length = 0.5 * np.diff(stations)
         half_density = 0.5 * setting.parameters["environment.water_density"][:, None]
         strips = []
-        for part in GAUSS:
-            x, c = (one[:, :-1] + part * np.diff(one) for one in (stations, strength))
+        for place in GAUSS:
+            x, c = (table[:, :-1] + place * np.diff(table) for table in (stations, strength))
             strips.append(side_by_side([x[..., None], (half_density * half_length * c)[..., None]]))
         rows = side_by_side(strips)
         return Packed(values | {"count": 2 * half_length.shape[1]}, rows.reshape(len(rows), -1))

@@ -130,17 +130,17 @@ def from_list(given: Any) -> tuple[Event, ...]:
             [f"events = {shown(given)}: is no list; write [[events]] and type = ... below, or events=[lw.Surface()]"]
         )
     few_enough("events", given)
-    faults, found = Faults(), list[Event]()
-    for i, one in enumerate(given):
+    faults, events = Faults(), list[Event]()
+    for i, entry in enumerate(given):
         with faults.including():
-            if isinstance(one, Event):
-                found.append(one)
+            if isinstance(entry, Event):
+                events.append(entry)
                 continue
-            word = one.get("type", "") if isinstance(one, Mapping) else one
-            kind = TYPES.get(word) if isinstance(one, Mapping) and isinstance(word, str) else None
+            word = entry.get("type", "") if isinstance(entry, Mapping) else entry
+            kind = TYPES.get(word) if isinstance(entry, Mapping) and isinstance(word, str) else None
             if kind is None:
                 faults.add(f"events[{i}].type", word, "is not known", closest(str(word), TYPES))
             else:
-                found.append(build(f"events[{i}]", kind, one))
+                events.append(build(f"events[{i}]", kind, entry))
     faults.raise_if_any()
-    return tuple(found)
+    return tuple(events)

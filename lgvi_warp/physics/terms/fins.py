@@ -118,7 +118,7 @@ def fin_rows(own: Numbers, setting: Setting) -> np.ndarray:
     for part in (slice(0, 3), slice(3, 6)):
         s, w = S[..., part, part], W[..., part, part]
         blocks.append(np.concatenate([np.diagonal(s, axis1=-2, axis2=-1), s[..., *off], w[..., *off]], axis=-1))
-    between = [one[..., :3, 3:].reshape(*one.shape[:-2], 9) for one in (S, W)]
+    between = [matrix[..., :3, 3:].reshape(*matrix.shape[:-2], 9) for matrix in (S, W)]
     return side_by_side([c, n, *(size[..., None] for size in sizes), blocks[0], *between, blocks[1]])
 
 
@@ -134,7 +134,7 @@ def twist(frame: Frame, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
         Twists (n, ..., 6), linear part first, in the kernel's axes about the origin of the forces.
     """
     n = max(len(frame.Q), len(frame.forces), len(point), len(direction))
-    point, direction = (np.broadcast_to(one, (n, *one.shape[1:])) for one in (point, direction))
+    point, direction = (np.broadcast_to(vectors, (n, *vectors.shape[1:])) for vectors in (point, direction))
     return np.concatenate([frame.vector(direction), frame.torque(np.cross(point, direction), direction)], axis=-1)
 
 

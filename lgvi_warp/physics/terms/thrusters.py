@@ -129,16 +129,16 @@ class Thrusters(Term):
         Returns:
             Commands (n,) [unit of the command]; where a curve does not reach the thrust, the command of its largest thrust.
         """
-        found = np.zeros(len(self.coefficient))
-        for i, wanted in enumerate(np.broadcast_to(np.asarray(thrust, dtype=np.float64), found.shape)):
+        least_commands = np.zeros(len(self.coefficient))
+        for i, wanted in enumerate(np.broadcast_to(np.asarray(thrust, dtype=np.float64), least_commands.shape)):
             side = 1.0 if wanted > 0.0 else -1.0
             curve, gain = (
                 (self.polynomial, self.coefficient) if side > 0.0 else (self.polynomial_astern, self.coefficient_astern)
             )
             if wanted and gain[i] > 0.0:
                 reach = max(self.limit[i] - self.dead_band[i], 0.0)
-                found[i] = side * (self.dead_band[i] + solve(curve, abs(wanted) / gain[i], reach))
-        return np.clip(found, -self.limit, self.limit)
+                least_commands[i] = side * (self.dead_band[i] + solve(curve, abs(wanted) / gain[i], reach))
+        return np.clip(least_commands, -self.limit, self.limit)
 
     def check(self, faults: Faults) -> None:
         """Adds a fault where a direction has no length, times do not rise, or the command is given twice."""
@@ -168,8 +168,8 @@ class Thrusters(Term):
         faults = Faults(f"{self.key}.")
         for name in ("polynomial", "polynomial_astern"):
             if self.is_square and not np.all(own[name] == SQUARE):
-                what = "does not act: the scene has none"
-                faults.add(name, own[name][0], what, f"give {self.key}.{name} in the scene as well")
+                fault = "does not act: the scene has none"
+                faults.add(name, own[name][0], fault, f"give {self.key}.{name} in the scene as well")
         faults.raise_if_any()
 
     @property
@@ -188,8 +188,8 @@ class Thrusters(Term):
         parts = [force, torque, *(x[..., None] for x in (*numbers, rate))]
         times, schedule = commands(own)
         n = max(*(len(part) for part in parts), len(times), len(schedule))
-        whole = [np.broadcast_to(part, (n, *part.shape[1:])) for part in parts]
-        rows = [np.concatenate(whole, axis=2).reshape(n, -1)]
+        columns = [np.broadcast_to(part, (n, *part.shape[1:])) for part in parts]
+        rows = [np.concatenate(columns, axis=2).reshape(n, -1)]
         for i in range(schedule.shape[2]):
             table = knots(times, schedule[:, :, i : i + 1])
             rows.append(np.broadcast_to(table, (n, table.shape[1])))

@@ -58,8 +58,8 @@ class Waves(Term):
         g = setting.parameters["environment.gravity"]
         if np.any(g <= 0.0):
             faults = Faults()
-            what = f"leaves the length of {self.key} unknown (wavenumber = omega^2 / gravity)"
-            faults.add("environment.gravity", float(g.min()), what, f"give gravity above 0, or leave {self.key} out")
+            fault = f"leaves the length of {self.key} unknown (wavenumber = omega^2 / gravity)"
+            faults.add("environment.gravity", float(g.min()), fault, f"give gravity above 0, or leave {self.key} out")
             faults.raise_if_any()
         rows = np.stack(np.broadcast_arrays(*_components(own, g)), axis=-1)
         return Packed({"count": rows.shape[1]}, rows.reshape(len(rows), -1))

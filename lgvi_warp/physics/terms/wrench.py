@@ -146,13 +146,13 @@ def refuse_idle(term: Any, own: Numbers, rate: str, remembers: np.ndarray, remed
     faults = Faults(f"{term.key}.")
     held = len(term.command_schedule) == 1
     acts, idle = ("command", ("times", "command_schedule")) if held else ("command_schedule", ("command",))
-    found = {name: (own[name] != getattr(term, name), f"a {acts}", f"vary {term.key}.{acts}") for name in idle}
+    unread = {name: (own[name] != getattr(term, name), f"a {acts}", f"vary {term.key}.{acts}") for name in idle}
     if not term.memory:
-        found[rate] = (remembers, "none", remedy)
-    for name, (bad, there, what_to_do) in found.items():
+        unread[rate] = (remembers, "none", remedy)
+    for name, (bad, alternative, what_to_do) in unread.items():
         if np.any(bad):
             i = int(bad.reshape(len(bad), -1).any(axis=1).argmax())
-            faults.add(f"{name} of member {i}", own[name][i], f"does not act: the scene has {there}", what_to_do)
+            faults.add(f"{name} of member {i}", own[name][i], f"does not act: the scene has {alternative}", what_to_do)
     faults.raise_if_any()
 
 

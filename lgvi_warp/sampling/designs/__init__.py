@@ -22,7 +22,7 @@ from lgvi_warp.sampling.designs.sequences import Halton, Sobol, sobol_points
 from lgvi_warp.sampling.designs.table import Table
 
 KINDS: dict[str, type[Sampling]] = {
-    one.kind: one for one in (Random, LatinHypercube, Sobol, Halton, Saltelli, Morris, Grid, Table, Levels)
+    design.kind: design for design in (Random, LatinHypercube, Sobol, Halton, Saltelli, Morris, Grid, Table, Levels)
 }
 
 

@@ -110,17 +110,19 @@ class Sampling:
             space: The cube: which names vary, with how many columns each.
             members: The number of members.
         """
-        own, group = self.own_members(space), self.group_size(space)
-        if own is not None and self.fewer and members > own:
-            what = f"are more than the {own} of the {self.kind}"
-            faults.add("members", members, what, f"give {own} or less, or leave members out")
-        elif own is not None and not self.fewer and members != own:
-            faults.add("members", members, f"is not the {own} of the {self.kind}", f"give {own}, or leave members out")
+        fixed, group = self.own_members(space), self.group_size(space)
+        if fixed is not None and self.fewer and members > fixed:
+            fault = f"are more than the {fixed} of the {self.kind}"
+            faults.add("members", members, fault, f"give {fixed} or less, or leave members out")
+        elif fixed is not None and not self.fewer and members != fixed:
+            faults.add(
+                "members", members, f"is not the {fixed} of the {self.kind}", f"give {fixed}, or leave members out"
+            )
         elif members % group:
             low = members // group * group
             near = f"{low} or {low + group}" if low else f"{group}"
-            what = f"is no whole number of groups of {group}, which {self.kind} is made of here"
-            faults.add("members", members, what, f"give {near}")
+            fault = f"is no whole number of groups of {group}, which {self.kind} is made of here"
+            faults.add("members", members, fault, f"give {near}")
 
     def to_dict(self) -> Any:
         """The sampling as a scene file has it.
@@ -180,8 +182,8 @@ class Replicated(Sampling):
     def __post_init__(self) -> None:
         R = self.replicates
         faults = Faults(f"ensemble.sampling.{self.kind}.")
-        whole = isinstance(R, int | np.integer) and not isinstance(R, bool)
-        if not whole or not 1 <= R <= MOST_REPLICATES or R & (R - 1):
+        is_integer = isinstance(R, int | np.integer) and not isinstance(R, bool)
+        if not is_integer or not 1 <= R <= MOST_REPLICATES or R & (R - 1):
             faults.add("replicates", R, f"is no power of two from 1 to {MOST_REPLICATES}", "give 8, 16, 32 or 64")
         self.check_own(faults)
         faults.raise_if_any()
@@ -216,8 +218,8 @@ class Replicated(Sampling):
             return
         point, replicate = np.divmod(members, self.replicates)
         for r in np.unique(replicate):
-            own = replicate == r
-            yield int(r), own, point[own]
+            mask = replicate == r
+            yield int(r), mask, point[mask]
 
     def name(self, replicate: int) -> str:
         """The name of a replicate's stream of random numbers.

@@ -48,7 +48,7 @@ def columns_of(faults: Faults, path: str, content: bytes, choose: Choose) -> dic
     rows: Any = csv.reader(())
     try:
         head = next((line for line in _lines(content) if line.strip()), "")
-        delimiter = next((one for one in "\t;" if one in head), ",")
+        delimiter = next((separator for separator in "\t;" if separator in head), ",")
         rows = csv.reader(_lines(content), delimiter=delimiter, skipinitialspace=True)
         names = [name.strip() for name in next((row for row in rows if row), [])]
         _check_names(faults, path, rows.line_num, names, delimiter)
@@ -76,8 +76,8 @@ def _check_names(faults: Faults, path: str, line: int, names: Sequence[str], del
             "file", path, "is empty", "write the names in its first line, then a line of numbers for each member"
         )
     elif all(_number(name) is not None for name in names):
-        what = f"has numbers where the names should be (line {line})"
-        faults.add("file", path, what, 'write the names above them, without # (numpy.savetxt: comments="")')
+        fault = f"has numbers where the names should be (line {line})"
+        faults.add("file", path, fault, 'write the names above them, without # (numpy.savetxt: comments="")')
     elif delimiter == "," and any(name.count("[") != name.count("]") for name in names):
         torn = next(name for name in names if name.count("[") != name.count("]"))
         remedy = 'quote a name with a comma: "vehicle.inertia[0,1]"'
@@ -90,15 +90,15 @@ def _check_chosen(faults: Faults, path: str, line: int, names: Sequence[str], ch
     for name in sorted({name for name in chosen if counts[name] > 1}):
         faults.add("file", path, f"names a column twice, {name!r} (line {line})", "give each column a name of its own")
     if "" in chosen:
-        what = f"has a column without a name, number {names.index('') + 1} (line {line})"
-        faults.add("file", path, what, 'name it, or leave it out: ignore = [""]')
+        fault = f"has a column without a name, number {names.index('') + 1} (line {line})"
+        faults.add("file", path, fault, 'name it, or leave it out: ignore = [""]')
 
 
 def _numbers(faults: Faults, path: str, rows: Any, names: Sequence[str], chosen: Sequence[str]) -> np.ndarray:
     """The numbers (lines, chosen) of the lines that follow."""
-    at = {name: place for place, name in enumerate(names)}
-    places = [at[name] for name in chosen]
-    found, wrong = array("d"), list[tuple[str, str]]()
+    place_of = {name: place for place, name in enumerate(names)}
+    places = [place_of[name] for name in chosen]
+    cells_read, wrong = array("d"), list[tuple[str, str]]()
     for row in rows:
         if not row:
             continue
@@ -112,15 +112,15 @@ def _numbers(faults: Faults, path: str, rows: Any, names: Sequence[str], chosen:
             wrong += _told(rows.line_num, row, names, chosen, cells)
             if len(wrong) >= MOST_COUNTED:
                 break
-        found.extend(numbers)
-    for what, remedy in wrong[:MOST_TOLD]:
-        faults.add("file", path, what, remedy)
+        cells_read.extend(numbers)
+    for fault, remedy in wrong[:MOST_TOLD]:
+        faults.add("file", path, fault, remedy)
     if len(wrong) > MOST_TOLD:
         more = f"{len(wrong) - MOST_TOLD} more such faults" + " or more" * (len(wrong) >= MOST_COUNTED)
         faults.add("file", path, f"has {more}", "mend them too")
-    if not found and not wrong:
+    if not cells_read and not wrong:
         faults.add("file", path, "has names and no members", "write a line of numbers for each member")
-    return np.array(found).reshape(-1, len(chosen)) if not wrong else np.empty((0, 0))
+    return np.array(cells_read).reshape(-1, len(chosen)) if not wrong else np.empty((0, 0))
 
 
 def _told(
@@ -129,18 +129,18 @@ def _told(
     """The faults of one line, each with its remedy."""
     if len(row) != len(names):
         return [(f"has {len(names)} names and {len(row)} cells in line {line}", "give a cell for each name")]
-    told = []
+    reports = []
     for name, cell in zip(chosen, cells, strict=True):
         number = _number(cell)
         if number is None:
-            what = f"{cell!r}, which is no number," if cell.strip() else "no number"
+            description = f"{cell!r}, which is no number," if cell.strip() else "no number"
         elif not math.isfinite(number):
-            what = f"{cell.strip()}, which is not finite,"
+            description = f"{cell.strip()}, which is not finite,"
         else:
             continue
         remedy = f'write a number with a point, 120.5, or leave the column out: ignore = ["{name}"]'
-        told.append((f'has {what} in line {line}, column "{name}"', remedy))
-    return told
+        reports.append((f'has {description} in line {line}, column "{name}"', remedy))
+    return reports
 
 
 def _number(cell: str) -> float | None:

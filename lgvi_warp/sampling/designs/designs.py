@@ -65,11 +65,11 @@ class Saltelli(Sampling):
         Returns:
             Mask (group size, dimensions).
         """
-        own = np.zeros((len(space.factors), space.dimensions), dtype=bool)
+        from_B = np.zeros((len(space.factors), space.dimensions), dtype=bool)
         for number, (_, columns) in enumerate(space.factors):
-            own[number, list(columns)] = True
-        none = np.zeros((1, space.dimensions), dtype=bool)
-        return np.concatenate([none, own, *([~own] if self.second_order else []), ~none])
+            from_B[number, list(columns)] = True
+        nothing = np.zeros((1, space.dimensions), dtype=bool)
+        return np.concatenate([nothing, from_B, *([~from_B] if self.second_order else []), ~nothing])
 
 
 @dataclass(frozen=True)

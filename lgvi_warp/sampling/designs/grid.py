@@ -69,9 +69,9 @@ class Grid(Sampling):
         """In addition, adds a fault for a number of levels without a distribution in `vary`."""
         for name in self.axes:
             if name not in space.keys:
-                what = "is a number of levels of what has no law"
+                fault = "is a number of levels of what has no law"
                 faults.add(
-                    f'sampling.grid."{name}"', self.axes[name], what, "give it a law in vary, or a list of values"
+                    f'sampling.grid."{name}"', self.axes[name], fault, "give it a law in vary, or a list of values"
                 )
         super().check(faults, space, members)
 

@@ -50,14 +50,14 @@ class LatinHypercube(Replicated):
         """Levels from the hypercube of each member's group; each name is drawn by itself, and so may be added."""
         R = self.replicates
         group, place = np.divmod(members, self.group * R)
-        found = {}
+        levels = {}
         for key, size in zip(space.keys, space.sizes, strict=True):
-            found[key] = np.empty((len(members), size))
+            levels[key] = np.empty((len(members), size))
             for g in np.unique(group):
                 mine = group == g
                 cubes = _hypercubes(space.seed, key, int(g) * R, R, self.group, size)
-                found[key][mine] = cubes[place[mine]]
-        return found
+                levels[key][mine] = cubes[place[mine]]
+        return levels
 
 
 # A block of members lies in few groups: these are kept from one block to the next.

@@ -20,7 +20,8 @@ class Levels(Sampling):
     """A design of your own: points in the open unit cube, whose columns are in the order of the names.
 
     `ensemble.space` says which column is which: an entry that varies by itself has one column of its name, a joint
-    distribution has several, "start.attitude 0" and so on. The number of members is that of the points, or less: the first ones.
+    distribution has several, "start.attitude 0" and so on. The number of members is that of the points, or less: the
+    first ones.
 
     Args:
         points: Levels (n, dimensions) in (0, 1). Also a data frame, a mapping of columns, a structured array or an xarray
@@ -57,8 +58,8 @@ class Levels(Sampling):
         if self.names is not None:
             faults.add("names", self.names, "are given beside points that have names", "leave them out")
         columns = columns_by_name(faults, "points", self.points)
-        given = [faults.finite(f'points["{name}"]', column) for name, column in columns.items()]
-        arrays = [array for array in given if array is not None]
+        checked = [faults.finite(f'points["{name}"]', column) for name, column in columns.items()]
+        arrays = [array for array in checked if array is not None]
         if faults:
             return None
         if len({array.shape for array in arrays}) != 1 or arrays[0].ndim != 1:

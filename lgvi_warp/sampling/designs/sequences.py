@@ -32,10 +32,10 @@ class Sobol(Replicated):
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
         """Points of the replicates' sequences by their indices."""
-        found = np.empty((len(members), space.dimensions))
-        for replicate, own, points in self.dealt(members):
-            found[own] = sobol_points(space.seed, self.name(replicate), space.dimensions, points)
-        return space.split(found)
+        levels = np.empty((len(members), space.dimensions))
+        for replicate, mask, points in self.dealt(members):
+            levels[mask] = sobol_points(space.seed, self.name(replicate), space.dimensions, points)
+        return space.split(levels)
 
 
 def sobol_points(seed: int, name: str, dimensions: int, indices: np.ndarray, scramble: bool = True) -> np.ndarray:
@@ -72,15 +72,15 @@ def _sobol_basis(seed: int, name: str, dimensions: int, bits: int, scramble: boo
 
     rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed_words(seed, name))))
     engine = qmc.Sobol(dimensions, scramble=scramble, bits=SOBOL_BITS, rng=rng)
-    points, made = [], 0
+    points, position = [], 0
     for index in (0, *(1 << bit for bit in range(bits))):
-        if index > made:
-            engine.fast_forward(index - made)
+        if index > position:
+            engine.fast_forward(index - position)
         points.append(engine.random(1)[0])
-        made = index + 1
-    whole = (np.array(points) * 2.0**SOBOL_BITS).astype(np.uint64)
-    whole[1:] ^= whole[0]
-    return whole
+        position = index + 1
+    bit_words = (np.array(points) * 2.0**SOBOL_BITS).astype(np.uint64)
+    bit_words[1:] ^= bit_words[0]
+    return bit_words
 
 
 @dataclass(frozen=True)
@@ -97,13 +97,13 @@ class Halton(Replicated):
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
         """Points by their indices; neighbouring indices are computed together."""
-        found = np.empty((len(members), space.dimensions))
-        for replicate, own, wanted in self.dealt(members):
+        levels = np.empty((len(members), space.dimensions))
+        for replicate, mask, wanted in self.dealt(members):
             ascending, place = np.unique(wanted, return_inverse=True)
             runs = np.split(ascending, np.flatnonzero(np.diff(ascending) > 1) + 1)
             points = np.concatenate([self._run(space, replicate, int(run[0]), len(run)) for run in runs])
-            found[own] = inside(points)[place.reshape(-1)]
-        return space.split(found)
+            levels[mask] = inside(points)[place.reshape(-1)]
+        return space.split(levels)
 
     def _run(self, space: Space, replicate: int, first: int, count: int) -> np.ndarray:
         if not space.dimensions:

@@ -60,8 +60,8 @@ class Table(Sampling):
             object.__setattr__(self, "values", self.file)
             object.__setattr__(self, "file", None)
         if (self.file is None) == (self.values is None):
-            what = "has no values beside it" if self.file is None else "is given beside values"
-            faults.add("file", self.file, what, "give one of file and values")
+            fault = "has no values beside it" if self.file is None else "is given beside values"
+            faults.add("file", self.file, fault, "give one of file and values")
         self._check_options(faults)
         faults.raise_if_any()
         read = self._from_file(faults) if self.file is not None else self._from_values(faults)
@@ -92,13 +92,17 @@ class Table(Sampling):
 
     def _check_options(self, faults: Faults) -> None:
         for name in ("columns", "ignore"):
-            given = getattr(self, name)
-            if given is None:
+            chosen = getattr(self, name)
+            if chosen is None:
                 continue
-            if not isinstance(given, list | tuple) or not given or not all(isinstance(one, str) for one in given):
-                faults.add(name, given, "is no list of names", f'write {name} = ["vehicle.mass"]')
+            if (
+                not isinstance(chosen, list | tuple)
+                or not chosen
+                or not all(isinstance(entry, str) for entry in chosen)
+            ):
+                faults.add(name, chosen, "is no list of names", f'write {name} = ["vehicle.mass"]')
             else:
-                object.__setattr__(self, name, list(given))
+                object.__setattr__(self, name, list(chosen))
         if self.columns is not None and self.ignore is not None:
             faults.add("ignore", self.ignore, "is given beside columns", "keep one of them")
 
@@ -122,11 +126,11 @@ class Table(Sampling):
             remedy = 'give a file, {"vehicle.mass": array, ...} or a DataFrame with such names'
             faults.add("values", self.values, "has no names of columns", remedy)
             return read
-        given = columns_by_name(faults, "values", self.values)
-        if not given:
+        table = columns_by_name(faults, "values", self.values)
+        if not table:
             return read
-        for name in self._chosen(faults, list(given)):
-            array = _column(faults, f'"{name}"', given[name])
+        for name in self._chosen(faults, list(table)):
+            array = _column(faults, f'"{name}"', table[name])
             if array is not None:
                 read[name] = array
         object.__setattr__(self, "values", read)
@@ -145,12 +149,12 @@ class Table(Sampling):
                 "file", path, "is a file of NumPy, or an archive", "give a CSV file, or arrays: lw.Table({name: array})"
             )
             return {}
-        found = hashlib.sha256(content).hexdigest()
-        if self.sha256 not in (None, found):
-            what = f"is not that of {path}, which has changed"
-            faults.add("sha256", self.sha256, what, "leave sha256 out to take it")
+        checksum = hashlib.sha256(content).hexdigest()
+        if self.sha256 not in (None, checksum):
+            fault = f"is not that of {path}, which has changed"
+            faults.add("sha256", self.sha256, fault, "leave sha256 out to take it")
             return {}
-        object.__setattr__(self, "sha256", found)
+        object.__setattr__(self, "sha256", checksum)
         try:
             return columns_of(faults, path, content, self._chosen)
         except UnicodeDecodeError:

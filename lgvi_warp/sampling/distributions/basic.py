@@ -35,10 +35,10 @@ class Distribution:
 
     def __post_init__(self) -> None:
         faults = Faults(f"{self.kind}.")
-        given = [name for name in self.widths if getattr(self, name) is not None]
-        if self.widths and len(given) != 1:
+        widths_given = [name for name in self.widths if getattr(self, name) is not None]
+        if self.widths and len(widths_given) != 1:
             remedy = f"give one of {', '.join(self.widths)}"
-            faults.add(" and ".join(given) or "width", "...", f"{len(given)} given", remedy)
+            faults.add(" and ".join(widths_given) or "width", "...", f"{len(widths_given)} given", remedy)
         values = {name: faults.finite(name, value) for name, value in self._given().items()}
         for name, array in values.items():
             if array is not None and name not in ("mean", "median", "low", "high", "values") and np.any(array < 0.0):

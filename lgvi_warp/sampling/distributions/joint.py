@@ -97,12 +97,12 @@ def root(matrix: np.ndarray) -> np.ndarray:
 
 def _covariance(faults: Faults, law: Any, size: int | None) -> np.ndarray | None:
     """The covariance that was given, or that follows from std and correlation; None after adding a fault."""
-    given = {name for name in ("covariance", "std", "correlation") if getattr(law, name, None) is not None}
-    if ("covariance" in given) == ("std" in given) or given == {"covariance", "correlation"}:
-        what = f"{' and '.join(sorted(given)) or 'nothing'} given"
-        faults.add("covariance", "...", what, "give covariance, or std (and correlation)")
+    arguments = {name for name in ("covariance", "std", "correlation") if getattr(law, name, None) is not None}
+    if ("covariance" in arguments) == ("std" in arguments) or arguments == {"covariance", "correlation"}:
+        fault = f"{' and '.join(sorted(arguments)) or 'nothing'} given"
+        faults.add("covariance", "...", fault, "give covariance, or std (and correlation)")
         return None
-    name = "correlation" if "correlation" in given else next(iter(given))
+    name = "correlation" if "correlation" in arguments else next(iter(arguments))
     matrix = np.asarray(faults.finite(name, getattr(law, name)), dtype=np.float64)
     if matrix.dtype == object or np.any(np.isnan(matrix)):
         return None
@@ -250,8 +250,8 @@ class CorrelatedNormal(JointLaw):
 class RotationNormal(JointLaw):
     """Concentrated normal distribution of an attitude, R = R0 exp(hat(v)); for "start.attitude".
 
-    R0 is the scene's attitude, and v is normal about 0, in body axes. Barfoot & Furgale (2014), Associating uncertainty with three-dimensional poses, with the
-    perturbation on the body's side.
+    R0 is the scene's attitude, and v is normal about 0, in body axes. Barfoot & Furgale (2014), Associating uncertainty
+    with three-dimensional poses, with the perturbation on the body's side.
 
     Args:
         std: Standard deviation of v about the body's axes, one or (3,) [rad].
@@ -318,9 +318,9 @@ class PositiveDefinite(JointLaw):
     """Distribution of a symmetric matrix that stays positive definite: A = L T T^T L^T, L L^T the scene's matrix.
 
     T is lower triangular, with exp(sigma z / 2) on the diagonal and off_diagonal z below it, z standard normal. So the
-    logarithm of each entry of a diagonal matrix varies with standard deviation sigma, and its median is the scene's. What is zero in the
-    scene, such as an added mass that is absent, stays zero. After the log-Cholesky coordinates of Lin (2019), Riemannian
-    geometry of symmetric positive definite matrices via Cholesky decomposition.
+    logarithm of each entry of a diagonal matrix varies with standard deviation sigma, and its median is the scene's. What
+    is zero in the scene, such as an added mass that is absent, stays zero. After the log-Cholesky coordinates of Lin
+    (2019), Riemannian geometry of symmetric positive definite matrices via Cholesky decomposition.
 
     Args:
         sigma: Standard deviation of the logarithm, one or (d,).
@@ -388,8 +388,9 @@ class PhysicalInertia(PositiveDefinite):
 
     It is `PositiveDefinite` of the second moments of mass S = tr(J) / 2 - J, then J = tr(S) - S: an inertia is that of a
     distribution of mass exactly where S is positive definite (Wensing, Kim & Slotine 2018, Linear matrix inequalities for
-    physically consistent inertial parameter identification). It serves "vehicle.inertia", whose scene value must itself be
-    that of a rigid body, and "vehicle.rigid_body_mass_matrix": there S is about the centre of gravity, which stays where it is.
+    physically consistent inertial parameter identification). It serves "vehicle.inertia", whose scene value must itself
+    be that of a rigid body, and "vehicle.rigid_body_mass_matrix": there S is about the centre of gravity, which stays
+    where it is.
 
     Args:
         sigma: Standard deviation of the logarithm of the principal second moments, one or (3,).

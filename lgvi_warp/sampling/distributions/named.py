@@ -82,8 +82,8 @@ class Frozen(Distribution):
 
     def _numbers(self) -> dict[str, Any]:
         """The parameters as lists; loc = 0 for a distribution that was frozen with none, so that a file holds a number."""
-        given = self._given_numbers() or {"loc": 0.0}
-        return {name: np.asarray(value).tolist() for name, value in given.items()}
+        parameters = self._given_numbers() or {"loc": 0.0}
+        return {name: np.asarray(value).tolist() for name, value in parameters.items()}
 
     def numbers(self) -> list[Any]:
         """The distribution's parameters, in the order given."""
@@ -95,9 +95,9 @@ class Frozen(Distribution):
 
     def to_dict(self) -> dict[str, Any]:
         """{ gamma = { a = 2.0, scale = 3.0 } }, or { scipy = { name = "...", ... } } where a scene file has no name for it."""
-        own = {name: kind for kind, name in SCIPY.items()}
-        if self.name in own:
-            return {own[self.name]: self._numbers()}
+        file_names = {name: kind for kind, name in SCIPY.items()}
+        if self.name in file_names:
+            return {file_names[self.name]: self._numbers()}
         return {"scipy": {"name": self.name} | self._numbers()}
 
     @classmethod
@@ -119,26 +119,28 @@ class Frozen(Distribution):
 
         faults = Faults()
         name = SCIPY.get(kind, values.get("name"))
-        law = getattr(stats, name, None) if isinstance(name, str) else None
-        if not isinstance(law, stats.rv_continuous | stats.rv_discrete):
+        distribution = getattr(stats, name, None) if isinstance(name, str) else None
+        if not isinstance(distribution, stats.rv_continuous | stats.rv_discrete):
             faults.add(
                 f"{key}.{kind}.name", name, "is no distribution of scipy.stats", 'give its name, such as "gamma"'
             )
             faults.raise_if_any()
-        assert law is not None
-        shapes, known = _shapes(law), _numbers_of(law)
-        given = {one: value for one, value in values.items() if kind in SCIPY or one != "name"}
-        faults.keys(f"{key}.{kind}", given, known)
-        for one in shapes:
-            if one not in given:
-                faults.add(f"{key}.{kind}.{one}", None, "is missing", f"scipy.stats.{name} takes {', '.join(known)}")
-        if not given and not shapes:
+        assert distribution is not None
+        shapes, known = _shapes(distribution), _numbers_of(distribution)
+        parameters = {parameter: value for parameter, value in values.items() if kind in SCIPY or parameter != "name"}
+        faults.keys(f"{key}.{kind}", parameters, known)
+        for parameter in shapes:
+            if parameter not in parameters:
+                faults.add(
+                    f"{key}.{kind}.{parameter}", None, "is missing", f"scipy.stats.{name} takes {', '.join(known)}"
+                )
+        if not parameters and not shapes:
             faults.add(f"{key}.{kind}", dict(values), "has no numbers", f"give one or more of {', '.join(known)}")
-        for one, value in given.items():
-            faults.finite(f"{key}.{kind}.{one}", value)
+        for parameter, value in parameters.items():
+            faults.finite(f"{key}.{kind}.{parameter}", value)
         faults.raise_if_any()
         try:
-            return cls(law(**{one: np.asarray(value)[()] for one, value in given.items()}))
+            return cls(distribution(**{parameter: np.asarray(value)[()] for parameter, value in parameters.items()}))
         except SceneError as error:
             raise error.prefixed(f"{key}.{kind}: ") from None
 
@@ -234,8 +236,8 @@ def quantiles_of(law: Any) -> Any:
     Returns:
         Its method ppf or icdf; None where it has neither.
     """
-    found = getattr(law, "ppf", None) or getattr(law, "icdf", None)
-    return found if callable(found) else None
+    function = getattr(law, "ppf", None) or getattr(law, "icdf", None)
+    return function if callable(function) else None
 
 
 KINDS: dict[str, type[Distribution]] = {
@@ -314,11 +316,11 @@ def as_law(key: str, value: Any) -> Any:
         return value
     if isinstance(value, Mapping):
         return from_dict(key, value)
-    given = getattr(value, "args", ()) or getattr(value, "kwds", {})
-    whole = getattr(value, "dist", value)
-    if type(whole).__name__ == "rv_histogram" and not given:
-        edges = whole._histogram[1]
-        return Histogram(np.diff(whole.cdf(edges)).tolist(), np.asarray(edges).tolist())
+    parameters = getattr(value, "args", ()) or getattr(value, "kwds", {})
+    distribution = getattr(value, "dist", value)
+    if type(distribution).__name__ == "rv_histogram" and not parameters:
+        edges = distribution._histogram[1]
+        return Histogram(np.diff(distribution.cdf(edges)).tolist(), np.asarray(edges).tolist())
     if is_frozen(value):
         return Frozen(value)
     if type(value).__name__ == "multivariate_normal_frozen":

@@ -168,8 +168,8 @@ def energy_growth(result: Sampled, *, dissipative: bool = False) -> np.ndarray:
     potential = total - kinetic
     momenta = _momenta(result)[0]
     I6 = np.broadcast_to(vehicle.inertia6(result.parameters), (result.members, 6, 6))
-    held = sum(0.5 * np.sum(momenta[:, part] ** 2, axis=1) / np.linalg.eigvalsh(I6[:, part, part])[:, 0]
-               for part in (slice(0, 3), slice(3, 6)))  # fmt: skip
+    held = sum(0.5 * np.sum(momenta[:, half] ** 2, axis=1) / np.linalg.eigvalsh(I6[:, half, half])[:, 0]
+               for half in (slice(0, 3), slice(3, 6)))  # fmt: skip
     exchanged = np.maximum.accumulate(np.abs(potential - potential[:1]), axis=0)
     change = total - total[:1]
     growth = np.max((change if dissipative else np.abs(change)) / np.maximum(held + exchanged, 1e-300), axis=0)
@@ -217,13 +217,13 @@ def drift(result: Sampled) -> dict[str, float]:
         "energy" [J], "horizontal_momentum" [N s] and "vertical_angular_momentum" [N m s]: the largest over times and members.
         Members that failed are left out; NaN where all failed.
     """
-    good = ~failed(result.status)
-    if not good.any():
+    successful = ~failed(result.status)
+    if not successful.any():
         return dict.fromkeys(sorted(CONSERVED), np.nan)
     changes = {
         "energy": result.energy,
         "horizontal_momentum": linear_momentum(result)[..., :2],
         "vertical_angular_momentum": angular_momentum(result)[..., 2],
     }
-    counted = under_way(result)[:, good]
-    return {name: float(np.abs(values - values[:1])[:, good][counted].max()) for name, values in changes.items()}
+    counted = under_way(result)[:, successful]
+    return {name: float(np.abs(values - values[:1])[:, successful][counted].max()) for name, values in changes.items()}

@@ -12,7 +12,7 @@ import numpy as np
 
 from lgvi_warp.physics import notation
 
-# A coupling below this fraction of what it could be is the round-off of turning and shifting.
+# A coupling below this fraction of its possible size is round-off of turned axes and shifted origins.
 ROUND_OFF = 1e-12
 
 

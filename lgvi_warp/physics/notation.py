@@ -10,7 +10,7 @@ import numpy as np
 
 # A matrix whose off-diagonal elements are below this fraction of its largest is diagonal as given.
 DIAGONAL = 1e-14
-# How far from orthogonal an attitude may be: the round-off of printing one with ten digits, and no more.
+# How far from orthogonal an attitude may be: the round-off of one printed with ten digits.
 ORTHOGONAL = 1e-9
 
 
@@ -132,7 +132,7 @@ def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
         Matrices (..., 3, 3).
     """
     q = np.asarray(q, dtype=np.float64)
-    q = q / np.abs(q).max(axis=-1, keepdims=True)  # its square neither overflows nor vanishes
+    q = q / np.abs(q).max(axis=-1, keepdims=True)  # so that its square neither overflows nor vanishes
     w, v = q[..., :1, None], q[..., 1:]
     norm = np.sum(q * q, axis=-1)[..., None, None]
     hat = np.zeros((*v.shape[:-1], 3, 3))

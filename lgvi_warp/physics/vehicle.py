@@ -13,7 +13,7 @@ from lgvi_warp.physics import inertia as inertias
 
 Numbers = Mapping[str, np.ndarray]
 
-# The two ways to say what the inertia is: about the centre of gravity, uncoupled; or 6x6 about any origin.
+# The two forms of a vehicle: uncoupled about the centre of gravity, or 6x6 about any origin.
 SIMPLE = {"mass": (), "added_mass": (3, 3), "inertia": (3, 3), "buoyancy": (), "center_of_buoyancy": (3,)}
 FULL = {
     "rigid_body_mass_matrix": (6, 6),
@@ -34,10 +34,10 @@ UNITS = {
     "center_of_gravity": "m",
     "center_of_buoyancy": "m",
 }
-# The least mass or inertia: what is smaller has no inverse in float64.
+# The smallest mass or inertia that has an inverse in float64.
 LEAST = float(np.finfo(np.float64).tiny)
-# By what part of the third two principal inertias of a rigid body may sum to less than it: round-off; and as far as
-# published ones miss it (those of the ECA A9 by 0.126).
+# The fraction of the third principal inertia by which the other two may sum to less than it: by round-off, and as
+# published numbers do (those of the ECA A9 by 0.126).
 ROUND_OFF, LITTLE = 1e-6, 0.15
 SYMMETRIC = ("added_mass", "inertia", "rigid_body_mass_matrix", "added_mass_matrix")
 

@@ -25,13 +25,13 @@ from lgvi_warp.physics.terms.waves import Waves
 from lgvi_warp.physics.terms.wrench import Wrench, WrenchSchedule
 from lgvi_warp.physics.terms.wrench_noise import WrenchNoise
 
-# The types of a scene file.
+# Classes of terms by their type in a scene file.
 TYPES = Term.kinds
 
-# Would mix a term's numbers with those of the scene.
+# Names that no term may have: its parameters would be mixed with those of the scene.
 RESERVED = ("vehicle", "environment", "start")
 
-# Follow from the vehicle; refused in a list of terms.
+# Terms that follow from the vehicle, and are refused in a list of terms.
 IMPLIED: tuple[Term, ...] = (Weight(), Restoring())
 
 

@@ -13,10 +13,10 @@ from lgvi_warp.common import names
 from lgvi_warp.common.errors import Faults, SceneError, ragged
 from lgvi_warp.physics.inertia import Frame
 
-# Own numbers of a term, or all parameters of a scene, by name; leading dimension 1 (shared) or n (one per member).
+# A term's own numbers, or all parameters of a scene, by name; leading dimension 1 (shared) or n (one per member).
 Numbers = Mapping[str, np.ndarray]
 
-# What a motion may conserve: energy [J], horizontal linear momentum [N s], vertical angular momentum [N m s].
+# What a motion can conserve: energy [J], horizontal linear momentum [N s], vertical angular momentum [N m s].
 CONSERVED = frozenset({"energy", "horizontal_momentum", "vertical_angular_momentum"})
 
 
@@ -98,9 +98,9 @@ class Term:
     """
 
     type: ClassVar[str] = ""
-    # The types of a scene file; events have their own.
+    # Classes by their type in a scene file; events have a table of their own.
     kinds: ClassVar[dict[str, Any]] = {}
-    # Whether it has a force: an event has none.
+    # Whether it acts on the motion: an event does not.
     acts: ClassVar[bool] = True
     device: ClassVar[Any] = ""
     timed: ClassVar[bool] = False
@@ -334,7 +334,7 @@ def knots(at: np.ndarray, values: np.ndarray, steps: bool = False) -> np.ndarray
     return np.concatenate(rows, axis=1)
 
 
-# 1 / distance of a jump: far beyond any step, and within float32.
+# 1 / distance of a jump between knots: steeper than any step resolves, and within float32.
 STEEP = 1e20
 
 
@@ -367,14 +367,14 @@ def build(where: str, kind: type[AnyTerm], table: Mapping[str, Any]) -> AnyTerm:
         return kind(**values)
     except SceneError:
         raise
-    except ValueError:  # what a law makes of its numbers before they are checked
+    except ValueError:  # a law that computes with its numbers before they are checked
         for name in (name for name in fields if name in values and ragged(values[name])):
             faults.add(f"{where}.{name}", values[name], "has rows of different lengths", "give rows of one length")
         faults.raise_if_any()
         raise
 
 
-# Of a scene, and so many events: each is code of the kernel.
+# The most terms, and the most events, of a scene: each adds code to the kernel.
 MOST_TERMS = 1000
 
 

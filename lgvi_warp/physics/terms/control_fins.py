@@ -12,7 +12,7 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, knots, quanti
 from lgvi_warp.physics.terms.fins import Fins, fin_rows, side_by_side
 from lgvi_warp.physics.terms.wrench import commands, first_row, not_rising, refuse_idle, rising
 
-# rad/s: from here on a limit of the rate is none.
+# From this rate on [rad/s] a limit counts as none.
 UNLIMITED = 1e6
 
 

@@ -12,7 +12,7 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantit
 from lgvi_warp.physics.terms.fins import side_by_side, twist
 from lgvi_warp.physics.terms.wrench import not_rising, rising
 
-# Gauss' two points of a segment from 0 to 1.
+# The two Gauss points of a segment from 0 to 1.
 GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
 ACROSS = (np.array([[0.0, 1.0, 0.0]]), np.array([[0.0, 0.0, 1.0]]))
 

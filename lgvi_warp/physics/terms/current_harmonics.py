@@ -90,9 +90,9 @@ class CurrentHarmonics(Term):
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
         """Device rows of each harmonic: amplitude, angular frequency [rad/s], phase."""
-        parts = [own["amplitudes"], 2.0 * np.pi / own["periods"][..., None], own["phases"][..., None]]
-        n = max(len(part) for part in parts)
-        rows = np.concatenate([np.broadcast_to(part, (n, *part.shape[1:])) for part in parts], axis=2)
+        columns = [own["amplitudes"], 2.0 * np.pi / own["periods"][..., None], own["phases"][..., None]]
+        n = max(len(column) for column in columns)
+        rows = np.concatenate([np.broadcast_to(column, (n, *column.shape[1:])) for column in columns], axis=2)
         return Packed({"count": rows.shape[1]}, rows.reshape(n, -1))
 
     def water(self, own: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:

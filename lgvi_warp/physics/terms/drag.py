@@ -13,9 +13,9 @@ from lgvi_warp.physics.inertia import Frame, motion_from
 from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantity
 
 ZEROS = (0.0,) * 6
-# Off-diagonal elements below this fraction of the largest are the round-off of turning the axes.
+# Off-diagonal elements below this fraction of the largest are round-off of the turned axes.
 DIAGONAL = 1e-12
-# Part of the exact flow -> the coefficients that it is of.
+# Part of the exact flow -> its coefficients: their kind, and force or torque.
 PARTS = {
     "linear_force": ("linear", slice(0, 3)),
     "linear_torque": ("linear", slice(3, 6)),
@@ -195,10 +195,10 @@ def _creates_energy(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, 
     products = np.einsum("ki,kj->kij", directions, np.abs(directions) * directions).reshape(-1, 36)
     bad, worst = np.zeros(len(matrices), bool), np.zeros((len(matrices), 6))
     for first in range(0, len(matrices), 1024):  # 33 MB at a time
-        part = slice(first, first + 1024)
-        power = products @ matrices[part].reshape(-1, 36).T
+        chunk = slice(first, first + 1024)
+        power = products @ matrices[chunk].reshape(-1, 36).T
         lowest = power.argmin(axis=0)
-        bad[part], worst[part] = power.min(axis=0) < limit[part], directions[lowest]
+        bad[chunk], worst[chunk] = power.min(axis=0) < limit[chunk], directions[lowest]
     return bad, worst
 
 
@@ -216,7 +216,7 @@ def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, setting: Setting) -
     Returns:
         The rows, and which parts are present.
     """
-    # The user's velocities from those at the origin of the forces in the kernel's axes.
+    # X gives the user's velocities from those at the origin of the forces in the kernel's axes.
     X = motion_from(setting.frame.forces, setting.frame.Q)
     n = max(len(linear), len(quadratic), len(X))
     X = np.broadcast_to(X, (n, 6, 6))

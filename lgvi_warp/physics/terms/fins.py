@@ -11,7 +11,7 @@ from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantity
 
-# A normal that differs from the chord by a smaller sine has no direction of its own.
+# Below this sine of the angle between them, chord and normal count as parallel.
 PARALLEL = 1e-6
 
 
@@ -115,8 +115,8 @@ def fin_rows(own: Numbers, setting: Setting) -> np.ndarray:
     S, W = cc + nn, nc - np.swapaxes(nc, -1, -2)
     off = ([1, 2, 0], [2, 0, 1])
     blocks: list[np.ndarray] = []
-    for part in (slice(0, 3), slice(3, 6)):
-        s, w = S[..., part, part], W[..., part, part]
+    for half_twist in (slice(0, 3), slice(3, 6)):
+        s, w = S[..., half_twist, half_twist], W[..., half_twist, half_twist]
         blocks.append(np.concatenate([np.diagonal(s, axis1=-2, axis2=-1), s[..., *off], w[..., *off]], axis=-1))
     between = [matrix[..., :3, 3:].reshape(*matrix.shape[:-2], 9) for matrix in (S, W)]
     return side_by_side([c, n, *(size[..., None] for size in sizes), blocks[0], *between, blocks[1]])
@@ -147,5 +147,5 @@ def side_by_side(parts: list[np.ndarray]) -> np.ndarray:
     Returns:
         One array (n, k, sum of d).
     """
-    n = max(len(part) for part in parts)
-    return np.concatenate([np.broadcast_to(part, (n, *part.shape[1:])) for part in parts], axis=-1)
+    n = max(len(block) for block in parts)
+    return np.concatenate([np.broadcast_to(block, (n, *block.shape[1:])) for block in parts], axis=-1)

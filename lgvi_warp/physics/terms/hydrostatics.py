@@ -45,7 +45,7 @@ class Restoring(Term):
         return CONSERVED
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """The moment arm B r_b - W r_g [N m] about the origin of the forces."""
+        """The vector B r_b - W r_g [N m] about the origin of the forces, in the kernel's axes."""
         p, origin = setting.parameters, setting.frame.forces
         return Packed({"moment": setting.frame.vector(moment(p) + net(p)[:, None] * origin)})
 
@@ -67,7 +67,7 @@ def net(p: Numbers) -> np.ndarray:
 
 
 def moment(p: Numbers) -> np.ndarray:
-    """Moment arm B r_b - W r_g about the user's origin.
+    """The vector B r_b - W r_g about the user's origin, from which the restoring moment follows.
 
     Args:
         p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).

@@ -27,7 +27,7 @@ class Thrusters(Term):
         polynomial: Polynomial f+ of all thrusters, (p,), from the first power up; w^2 by default.
         polynomial_astern: Polynomial f- of all thrusters, (q,), from the first power up; by default that ahead.
         dead_band: Size of the command below which there is no thrust, (n,) [unit]; 0 by default.
-        limit: Largest size of the command, (n,) [unit]; none by default.
+        limit: Largest size of the command, (n,) [unit]; 1e6 by default.
         time_constant: Time constant of the first-order lag from the command to u, (n,) [s]; 0 by default, no lag.
         command: Command that is held, (n,) [unit]; 0 by default.
         times: Times of the schedule, (k,) [s], rising.
@@ -185,10 +185,10 @@ class Thrusters(Term):
         with np.errstate(divide="ignore"):
             rate = np.where(own["time_constant"] > 0.0, 1.0 / own["time_constant"], FAST)
         numbers = [own[key] for key in ("coefficient", "coefficient_astern", "dead_band", "limit")]
-        parts = [force, torque, *(x[..., None] for x in (*numbers, rate))]
+        blocks = [force, torque, *(x[..., None] for x in (*numbers, rate))]
         times, schedule = commands(own)
-        n = max(*(len(part) for part in parts), len(times), len(schedule))
-        columns = [np.broadcast_to(part, (n, *part.shape[1:])) for part in parts]
+        n = max(*(len(block) for block in blocks), len(times), len(schedule))
+        columns = [np.broadcast_to(block, (n, *block.shape[1:])) for block in blocks]
         rows = [np.concatenate(columns, axis=2).reshape(n, -1)]
         for i in range(schedule.shape[2]):
             table = knots(times, schedule[:, :, i : i + 1])
@@ -198,8 +198,8 @@ class Thrusters(Term):
         if not self.is_square:
             curves, powers = side_by_side(own["polynomial"], own["polynomial_astern"])
             rows.append(curves)
-            n = max(len(part) for part in rows)
-            rows = [np.broadcast_to(part, (n, part.shape[1])) for part in rows]
+            n = max(len(block) for block in rows)
+            rows = [np.broadcast_to(block, (n, block.shape[1])) for block in rows]
         values = {"count": count, "knots": times.shape[1] - 1, "lagged": int(self.memory)}
         values |= {} if self.is_square else {"powers": powers}
         if not self.memory:
@@ -209,11 +209,11 @@ class Thrusters(Term):
         return Packed(values, np.concatenate(rows, axis=1), start)
 
 
-# 1 / time constant of a thruster without a lag, among others that have one: faster than any step, and within float32.
+# 1 / time constant of a thruster without lag beside others with one: faster than any step, and within float32.
 FAST = 1e20
 
 
-# w^2, from the first power up.
+# The curve w^2, coefficients from the first power up.
 SQUARE = (0.0, 1.0)
 
 
@@ -251,7 +251,7 @@ def solve(polynomial: np.ndarray, wanted: float, reach: float) -> float:
     values = evaluate(polynomial, places)
     if values.max() <= wanted:
         return float(places[values.argmax()])
-    # Monotonic between its turns: the first stretch on whose end it is above what is wanted holds the root.
+    # The polynomial is monotonic between its turns: the first interval at whose end it reaches the value has the root.
     i = int((values >= wanted).argmax())
     low, high = places[i - 1], places[i]
     for _ in range(200):

@@ -70,7 +70,7 @@ class Waves(Term):
         total = np.zeros(position.shape)
         x, y, depth = np.moveaxis(position, -1, 0)
         for j in range(own["periods"].shape[1]):
-            north, east, k, omega, phase, *speed = (part[:, j] for part in _components(own, gravity))
+            north, east, k, omega, phase, *speed = (table[:, j] for table in _components(own, gravity))
             theta = north * x + east * y + (phase - omega * time[:, None])
             e = np.exp(-k * np.maximum(depth, 0.0))
             cosine, sine = e * np.cos(theta), e * np.sin(theta)

@@ -12,7 +12,7 @@ from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.random import seed_words
 from lgvi_warp.sampling.designs.space import Space
 
-# A block has as many members, or a multiple: it holds as many points of each replicate.
+# A block's members are a multiple of this, so that it has equally many points of each replicate.
 MOST_REPLICATES = 64
 
 Drawn = dict[str, np.ndarray]
@@ -30,7 +30,7 @@ class Sampling:
     """
 
     kind: ClassVar[str] = ""
-    # Whether the first so many of the members that it has may be taken.
+    # Whether a run may take only the first of the members that the sampling has.
     fewer: ClassVar[bool] = False
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:

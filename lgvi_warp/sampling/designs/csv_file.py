@@ -14,16 +14,16 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 
-# Of the lines that are wrong so many are told one by one.
+# The most faulty lines that a message lists; the others are counted.
 MOST_TOLD = 8
 
-# After so many the rest of the file is not read.
+# The most faults that are counted; after them the rest of the file is not read.
 MOST_COUNTED = 10_000
 
-# Characters of a line: of ten thousands of columns.
+# The most characters of a line: enough for tens of thousands of columns.
 LONGEST_LINE = 1 << 20
 
-# Of the names in the first line, those to be read; notes what is wrong with them.
+# Takes the names of the first line and returns those to read; adds a fault for each that is wrong.
 Choose = Callable[[Faults, Sequence[str]], list[str]]
 
 
@@ -98,7 +98,7 @@ def _numbers(faults: Faults, path: str, rows: Any, names: Sequence[str], chosen:
     """The numbers (lines, chosen) of the lines that follow."""
     place_of = {name: place for place, name in enumerate(names)}
     places = [place_of[name] for name in chosen]
-    cells_read, wrong = array("d"), list[tuple[str, str]]()
+    values, reports = array("d"), list[tuple[str, str]]()
     for row in rows:
         if not row:
             continue
@@ -107,20 +107,20 @@ def _numbers(faults: Faults, path: str, rows: Any, names: Sequence[str], chosen:
             numbers = [float(cell) for cell in cells]
         except ValueError:
             numbers = [math.nan]
-        # A sum is finite where every number is, but for the largest: those are looked at one by one.
+        # The sum is finite where every number is, unless it overflows: then each number is checked.
         if not cells or not math.isfinite(sum(numbers)):
-            wrong += _told(rows.line_num, row, names, chosen, cells)
-            if len(wrong) >= MOST_COUNTED:
+            reports += _told(rows.line_num, row, names, chosen, cells)
+            if len(reports) >= MOST_COUNTED:
                 break
-        cells_read.extend(numbers)
-    for fault, remedy in wrong[:MOST_TOLD]:
+        values.extend(numbers)
+    for fault, remedy in reports[:MOST_TOLD]:
         faults.add("file", path, fault, remedy)
-    if len(wrong) > MOST_TOLD:
-        more = f"{len(wrong) - MOST_TOLD} more such faults" + " or more" * (len(wrong) >= MOST_COUNTED)
+    if len(reports) > MOST_TOLD:
+        more = f"{len(reports) - MOST_TOLD} more such faults" + " or more" * (len(reports) >= MOST_COUNTED)
         faults.add("file", path, f"has {more}", "mend them too")
-    if not cells_read and not wrong:
+    if not values and not reports:
         faults.add("file", path, "has names and no members", "write a line of numbers for each member")
-    return np.array(cells_read).reshape(-1, len(chosen)) if not wrong else np.empty((0, 0))
+    return np.array(values).reshape(-1, len(chosen)) if not reports else np.empty((0, 0))
 
 
 def _told(

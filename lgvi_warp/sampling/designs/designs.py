@@ -128,7 +128,7 @@ class Morris(Sampling):
             ImportError: Where SALib is not installed.
         """
         paths = int(members.max()) // self.group_size(space) + 1
-        # A longer design begins with the shorter one; few lengths, for the cache.
+        # A longer design begins with the shorter one; lengths are powers of two, so that the cache holds few.
         return _morris(space, self.levels, 1 << (paths - 1).bit_length())[members]
 
 

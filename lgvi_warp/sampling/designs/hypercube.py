@@ -60,7 +60,7 @@ class LatinHypercube(Replicated):
         return levels
 
 
-# A block of members lies in few groups: these are kept from one block to the next.
+# A block of members is within few groups: their hypercubes are cached from one block to the next.
 @functools.lru_cache(maxsize=64)
 def _hypercubes(seed: int, key: str, first: int, number: int, size: int, columns: int) -> np.ndarray:
     """`number` hypercubes from the first on, a point of each in turn: (size * number, columns)."""

@@ -13,8 +13,8 @@ from lgvi_warp.common.random import seed_words
 from lgvi_warp.sampling.designs.base import MOST_REPLICATES, Drawn, Replicated, inside
 from lgvi_warp.sampling.designs.space import Space
 
-# Of a Sobol sequence: a point is at the middle of one of 2^32 parts of each side, so that no level is 0 or 1. It has as
-# many points, more than an ensemble has members.
+# Bits of a Sobol sequence. A point is in the middle of one of 2^32 parts of each side, so that no level is 0 or 1. The
+# sequence has 2^32 points, more than an ensemble has members.
 SOBOL_BITS = 32
 
 
@@ -56,7 +56,7 @@ def sobol_points(seed: int, name: str, dimensions: int, indices: np.ndarray, scr
     if not dimensions:
         return np.empty((len(indices), 0))
     bits = max(int(indices.max()).bit_length(), 1)
-    bits = -(-bits // 4) * 4  # few distinct tables, however many members there come to be
+    bits = -(-bits // 4) * 4  # so that few distinct tables are cached, whatever the number of members
     basis = _sobol_basis(seed, name, dimensions, min(bits, SOBOL_BITS), scramble)
     points = np.broadcast_to(basis[0], (len(indices), dimensions)).copy()
     for bit in range(min(bits, SOBOL_BITS)):
@@ -64,7 +64,7 @@ def sobol_points(seed: int, name: str, dimensions: int, indices: np.ndarray, scr
     return np.asarray((points.astype(np.float64) + 0.5) * 2.0**-SOBOL_BITS)
 
 
-# Of every replicate, for a few numbers of bits.
+# The cache holds the tables of every replicate, for up to eight numbers of bits.
 @functools.lru_cache(maxsize=8 * MOST_REPLICATES)
 def _sobol_basis(seed: int, name: str, dimensions: int, bits: int, scramble: bool) -> np.ndarray:
     """Point 0, and the bits that each bit of an index changes in it: (bits + 1, dimensions), as integers."""

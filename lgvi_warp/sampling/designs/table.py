@@ -21,7 +21,7 @@ from lgvi_warp.sampling.designs.csv_file import columns_of
 from lgvi_warp.sampling.designs.random import Random
 from lgvi_warp.sampling.designs.space import Space
 
-# What files of numpy.save, numpy.savez and archives begin with. None is opened: objects in them could be code.
+# First bytes of files of numpy.save and numpy.savez, and of archives. They are not opened, since they could hold code.
 BINARY = (b"\x93NUMPY", b"PK\x03\x04", b"\x1f\x8b")
 
 

@@ -30,7 +30,7 @@ class Distribution:
     """
 
     kind: ClassVar[str] = ""
-    # Exactly one of these says how wide the law is.
+    # Arguments of which exactly one sets the width.
     widths: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
@@ -79,10 +79,10 @@ class Distribution:
         """
         (shape,) = shapes
         try:
-            good = np.broadcast_shapes(shape, *(np.shape(number) for number in self.numbers())) == shape
+            fits = np.broadcast_shapes(shape, *(np.shape(number) for number in self.numbers())) == shape
         except ValueError:
-            good = False
-        if good:
+            fits = False
+        if fits:
             return None
         wanted = f"one number or {' x '.join(map(str, shape))}, one per component" if shape else "one number"
         return f"does not fit a quantity of shape {shape}", f"give {wanted}"
@@ -224,7 +224,7 @@ class LogNormal(Distribution):
         from scipy.special import ndtri
 
         median = base if self.median is None else np.asarray(self.median)
-        with np.errstate(over="ignore"):  # what is too large is refused by the ensemble, or marked by the run
+        with np.errstate(over="ignore"):  # the ensemble refuses what is too large, or the run marks it
             return median * np.exp(np.asarray(self.sigma) * ndtri(u))
 
 
@@ -302,7 +302,7 @@ class Choice(Distribution):
             values = np.array(self.values, dtype=np.float64)
             weights = np.ones(len(values)) if self.weights is None else np.array(self.weights, dtype=np.float64)
         except (TypeError, ValueError):
-            return  # said already: not numeric
+            return  # a fault for numbers that are not numeric is there already
         if values.ndim == 0 or not len(values):
             faults.add("values", self.values, "is no list of values", "give one value or more")
         elif weights.shape != values.shape[:1] or not weights.sum() > 0.0:

@@ -12,9 +12,9 @@ from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics import inertia, notation
 from lgvi_warp.sampling.distributions.basic import Distribution, Spread
 
-# Of a matrix's largest entry: what a negative eigenvalue of it may be by round-off.
+# The fraction of a matrix's largest entry that a negative eigenvalue may reach by round-off.
 ROUND_OFF = 1e-12
-# What a negative eigenvalue of a correlation matrix may be: of one that was written with six digits.
+# The size that a negative eigenvalue may reach in a correlation matrix that is written with six digits.
 SIX_DIGITS = 1e-5
 
 
@@ -242,7 +242,8 @@ class CorrelatedNormal(JointLaw):
         drawn = (scene if self.mean is None else np.asarray(self.mean)) + combined(L, normals(u))
         ends = np.cumsum([base.size for base in bases])[:-1]
         return [
-            part.reshape(len(u), *base.shape) for part, base in zip(np.split(drawn, ends, axis=1), bases, strict=True)
+            entries.reshape(len(u), *base.shape)
+            for entries, base in zip(np.split(drawn, ends, axis=1), bases, strict=True)
         ]
 
 

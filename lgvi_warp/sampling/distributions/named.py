@@ -21,7 +21,7 @@ from lgvi_warp.sampling.distributions.joint import (
     UniformRotation,
 )
 
-# Name in a scene file -> name in scipy.stats, whose parameters, loc and scale it takes.
+# Name in a scene file -> name in scipy.stats; shape parameters, loc and scale are named as there.
 SCIPY = {
     "beta": "beta",
     "exponential": "expon",
@@ -204,10 +204,10 @@ class OwnLaw(Distribution):
             faults.add("law", f"scipy.stats.{unfrozen}", *without_numbers(self.law))
             faults.raise_if_any()
         try:
-            good = bool(np.all(np.isfinite(self._quantiles(np.array([0.25, 0.75])))))
+            usable = bool(np.all(np.isfinite(self._quantiles(np.array([0.25, 0.75])))))
         except Exception:  # whatever a user's object raises
-            good = False
-        if not good:
+            usable = False
+        if not usable:
             faults.add("law", self.law, "gives no numbers at the levels 0.25 and 0.75", "give an object with ppf(u)")
         faults.raise_if_any()
 

@@ -277,7 +277,7 @@ def turns_frame(I6: np.ndarray, middle: int = 3) -> tuple[Frame, np.ndarray]:
 
     Args:
         I6: Mass matrices (n, 6, 6) about the user's origin, in the user's axes.
-        middle: Axis of the turn in the middle of the step, 2 or 3; 3 by default.
+        middle: Axis at whose origin the kick acts, 2 or 3; 3 by default.
 
     Returns:
         The frame, and U (n, 3, 3) [m], upper triangular: E at the origin of the state.

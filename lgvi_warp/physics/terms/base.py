@@ -30,7 +30,8 @@ class Setting:
         members: Indices of the members, shape (n,).
         seed: Seed of the ensemble.
         h: Step [s].
-        aligned: Whether, for every member of the run, the kernel's axes are the user's up to their order and sense.
+        aligned: Whether, for every member of the run, the kernel's axes are the user's up to their order and sense, and the
+            origin of the forces is the user's; False by default.
     """
 
     parameters: Numbers
@@ -201,7 +202,7 @@ class Term:
         """The device code for the axes of this run.
 
         Args:
-            aligned: Whether the kernel's axes are the user's up to their order and sense (see `Setting`).
+            aligned: As of `Setting`: whether the kernel's axes and origin are the user's.
 
         Returns:
             The name of a module of lgvi_kernels.terms, or an object with the same functions.

@@ -14,7 +14,7 @@ from lgvi_warp.physics.terms.wrench import not_rising, rising
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Current(Term):
-    """A steady, uniform current.
+    """A current that is the same everywhere and at all times.
 
     Args:
         velocity: Velocity of the water, (3,) [m/s], in inertial axes.

@@ -55,13 +55,13 @@ class Restoring(Term):
 
 
 def net(p: Numbers) -> np.ndarray:
-    """Weight less buoyancy.
+    """Weight less buoyancy, the net force downward.
 
     Args:
         p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
 
     Returns:
-        Force (n,) [N], positive downward.
+        Force (n,) [N], negative where buoyancy is the larger.
     """
     return vehicle.weight(p) - p["vehicle.buoyancy"]
 

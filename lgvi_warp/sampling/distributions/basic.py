@@ -152,7 +152,7 @@ def _width(std: Spread | None, relative: Spread | None, base: np.ndarray) -> np.
 
 @dataclass(frozen=True)
 class Normal(Distribution):
-    """Normal distribution.
+    """Normal distribution, by default about the scene's value.
 
     Args:
         std: Standard deviation, in the unit of the quantity.

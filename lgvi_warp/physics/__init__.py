@@ -1,1 +1,1 @@
-"""To be said in one sentence."""
+"""The physics of one vehicle: inertia, the forces that act on it, energy, and conventions of axes and attitudes."""

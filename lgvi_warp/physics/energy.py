@@ -13,50 +13,57 @@ from lgvi_warp.physics.terms.base import CONSERVED, Term
 
 
 class Sampled(Protocol):
-    """Samples (k times, n members, ...) of some members: a Result, or a block of one."""
+    """Samples at k times of n members: a `Result`, or one block of it."""
 
     @property
     def time(self) -> np.ndarray:
-        """(k,) [s]."""
+        """Times of the samples, (k,) [s]."""
 
     @property
     def position(self) -> np.ndarray:
-        """(k, n, 3) [m]."""
+        """Positions, (k, n, 3) [m], in inertial axes."""
 
     @property
     def attitude(self) -> np.ndarray:
-        """(k, n, 3, 3)."""
+        """Attitudes, (k, n, 3, 3), body to inertial axes."""
 
     @property
     def velocity(self) -> np.ndarray:
-        """(k, n, 3) [m/s]."""
+        """Velocities, (k, n, 3) [m/s], in body axes."""
 
     @property
     def angular_velocity(self) -> np.ndarray:
-        """(k, n, 3) [rad/s]."""
+        """Angular velocities, (k, n, 3) [rad/s], in body axes."""
 
     @property
     def energy(self) -> np.ndarray:
-        """(k, n) [J]."""
+        """Total energy, (k, n) [J], as `energy` gives it."""
 
     @property
     def status(self) -> np.ndarray:
-        """(n,)."""
+        """Status of each member, (n,)."""
 
     @property
     def members(self) -> int:
-        """n."""
+        """The number of members, n."""
 
     @property
     def parameters(self) -> Mapping[str, np.ndarray]:
-        """Numbers by name."""
+        """The scene's parameters by name, each of shape (1, ...) or (n, ...)."""
 
     @property
     def terms(self) -> Sequence[Term]:
-        """Those of the scene."""
+        """The terms of the scene, without weight and restoring moment."""
 
     def own(self, term: Term) -> dict[str, np.ndarray]:
-        """A term's numbers."""
+        """The numbers of one term.
+
+        Args:
+            term: A term of the scene.
+
+        Returns:
+            Its numbers by field, each of shape (1, ...) or (n, ...).
+        """
 
 
 def _times(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
@@ -69,7 +76,7 @@ def _times(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 
 def _relative(result: Sampled) -> np.ndarray:
-    """(nu, Om) relative to the water, (k, n, 6), body axes about the user's origin."""
+    """Velocities (nu, Om) relative to the water, (k, n, 6), in body axes about the user's origin."""
     nu = result.velocity.astype(np.float64)
     position, time = result.position.astype(np.float64), result.time
     for term in result.terms:
@@ -89,12 +96,26 @@ def _broadcast(matrices: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, n
 
 
 def kinetic_energy(result: Sampled) -> np.ndarray:
-    """Kinetic energy relative to the water, (nu, Om).I6 (nu, Om) / 2, (k, n) [J]."""
+    """Kinetic energy relative to the water, (nu, Om).I6 (nu, Om) / 2.
+
+    Args:
+        result: Samples with all four fields of the state.
+
+    Returns:
+        Energy (k, n) [J].
+    """
     return np.asarray(0.5 * np.sum(_relative(result) * _momenta(result), axis=-1))
 
 
 def energy(result: Sampled) -> np.ndarray:
-    """Kinetic energy and the potential of every term, (k, n) [J]."""
+    """Total energy: the kinetic energy relative to the water, and the potential of every term.
+
+    Args:
+        result: Samples with all four fields of the state.
+
+    Returns:
+        Energy (k, n) [J].
+    """
     total = kinetic_energy(result)
     position, attitude = result.position.astype(np.float64), result.attitude.astype(np.float64)
     for term in (*terms.IMPLIED, *result.terms):
@@ -103,12 +124,26 @@ def energy(result: Sampled) -> np.ndarray:
 
 
 def linear_momentum(result: Sampled) -> np.ndarray:
-    """R p in inertial axes, (k, n, 3) [N s]. Without a potential it is conserved."""
+    """Linear momentum R p in inertial axes. Without a potential it is conserved.
+
+    Args:
+        result: Samples with all four fields of the state.
+
+    Returns:
+        Momentum (k, n, 3) [N s].
+    """
     return _times(result.attitude.astype(np.float64), _momenta(result)[..., :3])
 
 
 def angular_momentum(result: Sampled) -> np.ndarray:
-    """R pi + b x R p about the inertial origin, (k, n, 3) [N m s]. Without a potential it is conserved."""
+    """Angular momentum R pi + b x R p about the inertial origin. Without a potential it is conserved.
+
+    Args:
+        result: Samples with all four fields of the state.
+
+    Returns:
+        Momentum (k, n, 3) [N m s].
+    """
     spin = _momenta(result)[..., 3:]
     b, P = (np.moveaxis(x, -1, 0) for x in (result.position.astype(np.float64), linear_momentum(result)))
     orbit = np.stack([b[1] * P[2] - b[2] * P[1], b[2] * P[0] - b[0] * P[2], b[0] * P[1] - b[1] * P[0]], axis=-1)
@@ -116,20 +151,28 @@ def angular_momentum(result: Sampled) -> np.ndarray:
 
 
 def energy_growth(result: Sampled, *, dissipative: bool = False) -> np.ndarray:
-    """Largest change of energy (n,), or where it is dissipative largest growth, over what members could hold.
+    """Largest change of energy of each member, relative to the energy that it could hold.
 
-    That is |p|^2 / (2 M_min) + |pi|^2 / (2 J_min) of the start and, up to each time, the largest change of the potential:
-    a bounded motion stays below about 1, whatever it exchanges.
+    The latter is |p|^2 / (2 M_min) + |pi|^2 / (2 J_min) at the start and, up to each time, the largest change of
+    the potential.
+    A bounded motion stays below about 1, however it exchanges energy.
+
+    Args:
+        result: Samples with all four fields of the state.
+        dissipative: Whether only growth counts, since energy may be lost; by default any change does.
+
+    Returns:
+        Ratios (n,); infinite where the energy is not finite at some time.
     """
     kinetic, total = kinetic_energy(result), result.energy
     potential = total - kinetic
     momenta = _momenta(result)[0]
     I6 = np.broadcast_to(vehicle.inertia6(result.parameters), (result.members, 6, 6))
-    held = sum(0.5 * np.sum(momenta[:, part] ** 2, axis=1) / np.linalg.eigvalsh(I6[:, part, part])[:, 0]
-               for part in (slice(0, 3), slice(3, 6)))  # fmt: skip
-    given = np.maximum.accumulate(np.abs(potential - potential[:1]), axis=0)
+    held = sum(0.5 * np.sum(momenta[:, half] ** 2, axis=1) / np.linalg.eigvalsh(I6[:, half, half])[:, 0]
+               for half in (slice(0, 3), slice(3, 6)))  # fmt: skip
+    exchanged = np.maximum.accumulate(np.abs(potential - potential[:1]), axis=0)
     change = total - total[:1]
-    growth = np.max((change if dissipative else np.abs(change)) / np.maximum(held + given, 1e-300), axis=0)
+    growth = np.max((change if dissipative else np.abs(change)) / np.maximum(held + exchanged, 1e-300), axis=0)
     return np.where(np.isfinite(total).all(axis=0), growth, np.inf)
 
 
@@ -142,38 +185,45 @@ def conserved(result: Sampled) -> frozenset[str]:
     """What the laws of a result's scene conserve, as each term says itself (`Term.conserves`).
 
     Args:
-        result: Of a run; its parameters say which terms are felt.
+        result: A run, whose parameters decide which terms act.
 
     Returns:
-        Those of "energy", "horizontal_momentum" and "vertical_angular_momentum" that every term keeps.
+        The names among "energy", "horizontal_momentum" and "vertical_angular_momentum" that every acting term conserves.
     """
     return CONSERVED.intersection(*(term.conserves for term in _present(result)))
 
 
 def at_work(result: Sampled) -> tuple[str, ...]:
-    """Keys of the terms that give or take energy: drag, thrust, noise, moving water and the like; () where none does."""
+    """The terms that do work: drag, thrust, noise, moving water and the like.
+
+    Args:
+        result: A run, whose parameters decide which terms act.
+
+    Returns:
+        Keys of these terms; () where there is none.
+    """
     return tuple(term.key for term in _present(result) if "energy" not in term.conserves)
 
 
 def drift(result: Sampled) -> dict[str, float]:
     """Largest change of energy and momenta, over the times that each member was under way.
 
-    What of it is an error, and what the work of forces, `conserved` tells.
+    Where `conserved` names the quantity the change is an error of the method; elsewhere it contains the work of forces.
 
     Args:
-        result: Of a run, with all four fields of the state.
+        result: Samples with all four fields of the state.
 
     Returns:
-        energy [J], horizontal_momentum [N s] and vertical_angular_momentum [N m s]: the largest over times and members.
-        Members that failed are left out; NaN where none is left.
+        "energy" [J], "horizontal_momentum" [N s] and "vertical_angular_momentum" [N m s]: the largest over times and members.
+        Members that failed are left out; NaN where all failed.
     """
-    good = ~failed(result.status)
-    if not good.any():
+    successful = ~failed(result.status)
+    if not successful.any():
         return dict.fromkeys(sorted(CONSERVED), np.nan)
     changes = {
         "energy": result.energy,
         "horizontal_momentum": linear_momentum(result)[..., :2],
         "vertical_angular_momentum": angular_momentum(result)[..., 2],
     }
-    counted = under_way(result)[:, good]
-    return {name: float(np.abs(values - values[:1])[:, good][counted].max()) for name, values in changes.items()}
+    counted = under_way(result)[:, successful]
+    return {name: float(np.abs(values - values[:1])[:, successful][counted].max()) for name, values in changes.items()}

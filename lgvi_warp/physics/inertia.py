@@ -1,7 +1,7 @@
-"""The inertia of a vehicle about the origins and in the axes that a method wants.
+"""The inertia of a vehicle about the origins and in the axes that a method needs.
 
-I6 = [[M, C], [C^T, J]], linear first. E = M^-1 C, Js = J - C^T M^-1 C. Arrays have a leading dimension of 1 (shared by all
-members) or n. A shift of the origin by d (body axes) leaves M and Js and adds hat(d) to E.
+I6 = [[M, C], [C^T, J]], linear part first. E = M^-1 C, Js = J - C^T M^-1 C. Arrays have a leading dimension of 1 (shared by
+all members) or n. A shift of the origin by d (body axes) leaves M and Js unchanged and adds hat(d) to E.
 """
 
 from __future__ import annotations
@@ -12,53 +12,104 @@ import numpy as np
 
 from lgvi_warp.physics import notation
 
-# A coupling below this fraction of what it could be is the round-off of turning and shifting.
+# A coupling below this fraction of its possible size is round-off of turned axes and shifted origins.
 ROUND_OFF = 1e-12
 
 
 def hat(a: np.ndarray) -> np.ndarray:
-    """Skew matrices (..., 3, 3) with hat(a) x = a x x."""
+    """Skew matrices of vectors, with hat(a) x = a x x.
+
+    Args:
+        a: Vectors (..., 3).
+
+    Returns:
+        Matrices (..., 3, 3).
+    """
     zero = np.zeros(a.shape[:-1])
     rows = [[zero, -a[..., 2], a[..., 1]], [a[..., 2], zero, -a[..., 0]], [-a[..., 1], a[..., 0], zero]]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def vee(A: np.ndarray) -> np.ndarray:
-    """The vector of the skew part of (..., 3, 3)."""
+    """Vectors of the skew part of matrices, the inverse of `hat`.
+
+    Args:
+        A: Matrices (..., 3, 3).
+
+    Returns:
+        Vectors (..., 3).
+    """
     return 0.5 * np.stack(
         [A[..., 2, 1] - A[..., 1, 2], A[..., 0, 2] - A[..., 2, 0], A[..., 1, 0] - A[..., 0, 1]], axis=-1
     )
 
 
 def blocks(I6: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """M, C, J of I6 (n, 6, 6)."""
+    """The blocks M, C and J of mass matrices.
+
+    Args:
+        I6: Mass matrices (n, 6, 6), linear part first.
+
+    Returns:
+        M [kg], C [kg m] and J [kg m2], each (n, 3, 3).
+    """
     return I6[:, :3, :3], I6[:, :3, 3:], I6[:, 3:, 3:]
 
 
 def joined(M: np.ndarray, C: np.ndarray, J: np.ndarray) -> np.ndarray:
-    """I6 (n, 6, 6)."""
+    """Mass matrices made of their blocks.
+
+    Args:
+        M: Mass, (n, 3, 3) [kg].
+        C: Coupling, (n, 3, 3) [kg m].
+        J: Inertia, (n, 3, 3) [kg m2].
+
+    Returns:
+        I6 (n, 6, 6), linear part first.
+    """
     I6 = np.empty((len(M), 6, 6))
     I6[:, :3, :3], I6[:, :3, 3:], I6[:, 3:, :3], I6[:, 3:, 3:] = M, C, np.swapaxes(C, -1, -2), J
     return I6
 
 
 def motion_from(origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
-    """X (n, 6, 6): (nu, Om) at another origin and in axes Q -> the same motion at the user's, in the user's axes."""
+    """Matrices that turn velocities at another origin and in axes Q into those of the same motion at the user's, in his axes.
+
+    Args:
+        origin: The other origin, (n, 3) [m], from the user's in his axes.
+        Q: The other axes in the user's, (n, 3, 3).
+
+    Returns:
+        X (n, 6, 6), which act on (nu, Om).
+    """
     zero = np.zeros(np.broadcast_shapes(Q.shape, hat(origin).shape))
     turned = zero + Q
     return np.block([[turned, hat(origin) @ Q], [zero, turned]])
 
 
 def moved(I6: np.ndarray, origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
-    """I6 about another origin (n, 3), from the user's in the user's axes, and in the axes Q (n, 3, 3)."""
+    """Mass matrices about another origin and in other axes.
+
+    Args:
+        I6: Mass matrices (n, 6, 6) about the user's origin, in the user's axes.
+        origin: The other origin, (n, 3) [m], from the user's in his axes.
+        Q: The other axes in the user's, (n, 3, 3).
+
+    Returns:
+        I6 (n, 6, 6) there.
+    """
     X = motion_from(origin, Q)
     return np.swapaxes(X, -1, -2) @ I6 @ X
 
 
 def coupling(I6: np.ndarray) -> np.ndarray:
-    """The coupling norm k (n,), 0 to 1: the largest singular value of M^-1/2 C J^-1/2.
+    """The coupling norm: the largest singular value of M^-1/2 C J^-1/2.
 
-    Infinite where round-off or overflow leaves no definite matrix.
+    Args:
+        I6: Mass matrices (n, 6, 6).
+
+    Returns:
+        Norms (n,), from 0 to 1; infinite where round-off or overflow leaves no positive definite matrix.
     """
     M, C, J = blocks(I6)
     try:
@@ -73,11 +124,16 @@ def coupling(I6: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Frame:
-    """Where and in which axes a kernel keeps a vehicle. Leading dimension 1 or n.
+    """The axes and origins in which a kernel keeps a vehicle. Leading dimensions are 1 or n.
 
-    Q: (., 3, 3), the kernel's body axes in the user's. origin: (., 3) [m], of the state, from the user's in his axes;
-    forces: that of the forces. M: (., 3, 3) and J: (., 3), mass matrix and diagonal (Schur) inertia in the axes Q.
-    E, E_forces: (., 3, 3) [m], M^-1 C at both origins, zero without coupling.
+    Args:
+        Q: The kernel's body axes in the user's, (., 3, 3).
+        origin: Origin of the state, (., 3) [m], from the user's in his axes.
+        forces: Origin of the forces, (., 3) [m], from the user's in his axes.
+        M: Mass matrix in the axes Q, (., 3, 3) [kg].
+        J: Diagonal (Schur) inertia in the axes Q, (., 3) [kg m2].
+        E: M^-1 C at the origin of the state, (., 3, 3) [m]; 0 without coupling.
+        E_forces: M^-1 C at the origin of the forces, (., 3, 3) [m]; 0 without coupling.
     """
 
     Q: np.ndarray
@@ -90,39 +146,67 @@ class Frame:
 
     @property
     def aligned(self) -> bool:
-        """Whether the axes of every member are the user's, in any order or sense, and the origin of the forces his."""
+        """Whether every member's axes are the user's up to order and sense, and the origin of the forces is the user's."""
         Q = np.abs(self.Q)
         return bool(np.all((Q == 0.0) | (Q == 1.0)) and not np.any(self.forces))
 
     @property
     def coupled(self) -> bool:
-        """Whether the velocities of some member are coupled at either origin."""
+        """Whether linear and angular velocities of some member are coupled at either origin."""
         return bool(np.any(self.E) or np.any(self.E_forces))
 
     def inertia_at(self, E: np.ndarray) -> np.ndarray:
-        """I6 in these axes where M^-1 C is E: J = Js + E^T M E."""
+        """Mass matrix in these axes, at the origin where M^-1 C is E: J = Js + E^T M E.
+
+        Args:
+            E: M^-1 C at that origin, (n, 3, 3) [m].
+
+        Returns:
+            I6 (n, 6, 6).
+        """
         J = self.J[:, :, None] * np.eye(3)
         return joined(self.M + 0.0 * E, self.M @ E, J + np.swapaxes(E, -1, -2) @ self.M @ E)
 
     def vector(self, v: np.ndarray) -> np.ndarray:
-        """Body vectors (n, ..., 3) in these axes."""
+        """Components of body vectors in these axes.
+
+        Args:
+            v: Vectors (n, ..., 3) in the user's axes.
+
+        Returns:
+            Vectors (n, ..., 3).
+        """
         return np.einsum("nji,n...j->n...i", *_broadcast(self.Q, v))
 
     def point(self, r: np.ndarray) -> np.ndarray:
-        """Points (n, ..., 3) [m], from the origin of the forces in these axes."""
+        """Points relative to the origin of the forces, in these axes.
+
+        Args:
+            r: Points (n, ..., 3) [m] from the user's origin, in the user's axes.
+
+        Returns:
+            Points (n, ..., 3) [m].
+        """
         return self.vector(r - _expanded(self.forces, r))
 
     def torque(self, torque: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Torques (n, ..., 3) [N m] about the origin of the forces, of wrenches about the user's; in these axes.
+        """Torques about the origin of the forces, in these axes.
 
-        The angular part of a twist that measures a velocity moves in the same way.
+        The angular part of a twist that measures a velocity transforms in the same way.
+
+        Args:
+            torque: Torques (n, ..., 3) [N m] about the user's origin, in the user's axes.
+            force: Forces (n, ..., 3) [N] of the same wrenches.
+
+        Returns:
+            Torques (n, ..., 3) [N m].
         """
         arm, torque, force = np.broadcast_arrays(_expanded(self.forces, force), torque, force)
         return self.vector(torque - np.cross(arm, force))
 
 
 def _expanded(origin: np.ndarray, like: np.ndarray) -> np.ndarray:
-    """(n, 3) with as many dimensions as (n, ..., 3)."""
+    """Origins (n, 3) with the number of dimensions of (n, ..., 3)."""
     return origin.reshape(len(origin), *(1,) * (like.ndim - 2), 3)
 
 
@@ -132,35 +216,56 @@ def _broadcast(Q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def schur(I6: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """M, E = M^-1 C, and Js = J - C^T E."""
+    """The mass, E and the Schur complement of mass matrices.
+
+    Args:
+        I6: Mass matrices (n, 6, 6).
+
+    Returns:
+        M [kg], E = M^-1 C [m] and Js = J - C^T E [kg m2], each (n, 3, 3).
+    """
     M, C, J = blocks(I6)
-    some = np.any(C, axis=(-2, -1))
-    if not some.any():
+    coupled = np.any(C, axis=(-2, -1))
+    if not coupled.any():
         return M, np.zeros_like(C), J
     E, Js = np.zeros_like(C), J.copy()
-    E[some] = np.linalg.solve(M[some], C[some])
-    Js[some] -= np.swapaxes(C[some], -1, -2) @ E[some]
+    E[coupled] = np.linalg.solve(M[coupled], C[coupled])
+    Js[coupled] -= np.swapaxes(C[coupled], -1, -2) @ E[coupled]
     return M, E, Js
 
 
 def uncoupled_frame(I6: np.ndarray) -> tuple[Frame, np.ndarray]:
-    """The frame at the origin where M and J are not coupled, J diagonal; and the coupling norm (n,) that is left there.
+    """The frame at the origin where M and J are uncoupled, with J diagonal.
 
-    The coupling vanishes there if and only if E is skew; its largest remaining value tells whether it does.
+    The coupling vanishes there if and only if E is skew.
+
+    Args:
+        I6: Mass matrices (n, 6, 6) about the user's origin, in the user's axes.
+
+    Returns:
+        The frame, and the coupling norm (n,) that remains there.
     """
     M, E, Js = schur(I6)
     origin = -vee(E)
     Q, J = notation.principal_axes(Js)
-    some, left = np.any(E, axis=(-2, -1)), np.zeros(len(E))
-    if some.any():
-        left[some] = coupling(moved(I6[some], origin[some], Q[some]))
-    none = np.zeros_like(M)
+    coupled, remaining = np.any(E, axis=(-2, -1)), np.zeros(len(E))
+    if coupled.any():
+        remaining[coupled] = coupling(moved(I6[coupled], origin[coupled], Q[coupled]))
+    zero = np.zeros_like(M)
     # Mass does not depend on the origin.
-    return Frame(Q, origin, origin, np.swapaxes(Q, -1, -2) @ M @ Q, J, none, none), left
+    return Frame(Q, origin, origin, np.swapaxes(Q, -1, -2) @ M @ Q, J, zero, zero), remaining
 
 
 def ascending(Q: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Axes by rising J, still right-handed."""
+    """Principal axes in the order of rising inertia, still right-handed.
+
+    Args:
+        Q: Axes (n, 3, 3).
+        J: Principal inertias (n, 3) [kg m2].
+
+    Returns:
+        Axes (n, 3, 3) and inertias (n, 3) in that order.
+    """
     order = np.argsort(J, axis=1, kind="stable")
     Q = np.take_along_axis(Q, order[:, None, :], axis=2)
     Q = Q * np.where(np.arange(3) == 2, np.sign(np.linalg.det(Q))[:, None], 1.0)[:, None, :]
@@ -168,7 +273,15 @@ def ascending(Q: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def turns_frame(I6: np.ndarray, middle: int = 3) -> tuple[Frame, np.ndarray]:
-    """The frame of psi_x, and U (n, 3, 3): the state at axis 1's origin, the forces at that of axis `middle`."""
+    """The frame of psi_x: the state at axis 1's origin, the forces at the origin of axis `middle`.
+
+    Args:
+        I6: Mass matrices (n, 6, 6) about the user's origin, in the user's axes.
+        middle: Axis at whose origin the kick acts, 2 or 3; 3 by default.
+
+    Returns:
+        The frame, and U (n, 3, 3) [m], upper triangular: E at the origin of the state.
+    """
     M, E, Js = schur(I6)
     Q, J = ascending(*notation.principal_axes(Js))
     turned = np.swapaxes(Q, -1, -2)
@@ -188,7 +301,14 @@ def turns_frame(I6: np.ndarray, middle: int = 3) -> tuple[Frame, np.ndarray]:
 
 
 def symmetric_frame(I6: np.ndarray) -> Frame:
-    """The frame of psi_w: at the origin where E = S is symmetric, in the principal axes of Js."""
+    """The frame of psi_w: at the origin where E = S is symmetric, in the principal axes of Js.
+
+    Args:
+        I6: Mass matrices (n, 6, 6) about the user's origin, in the user's axes.
+
+    Returns:
+        The frame.
+    """
     M, E, Js = schur(I6)
     origin = -vee(E)
     Q, J = notation.principal_axes(Js)

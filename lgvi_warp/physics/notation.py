@@ -1,7 +1,7 @@
-"""The border between the user's notation and axes (Fossen's) and the paper's: momenta, principal axes, attitudes.
+"""Conversion between the user's notation and axes (Fossen's) and the paper's: momenta, principal axes, attitudes.
 
 velocity = nu, angular_velocity = Om, position = b, attitude = R (body to inertial); p = M nu, pi = J Om.
-Every function works on any leading dimensions; matrices and vectors of a leading dimension 1 are shared.
+Every function accepts any leading dimensions; matrices and vectors of a leading dimension 1 are shared.
 """
 
 from __future__ import annotations
@@ -10,22 +10,49 @@ import numpy as np
 
 # A matrix whose off-diagonal elements are below this fraction of its largest is diagonal as given.
 DIAGONAL = 1e-14
-# How far from orthogonal an attitude may be: the round-off of printing one with ten digits, and no more.
+# How far from orthogonal an attitude may be: the round-off of one printed with ten digits.
 ORTHOGONAL = 1e-9
 
 
 def to_momenta(M: np.ndarray, J: np.ndarray, nu: np.ndarray, Om: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """p = M nu [N s], pi = J Om [N m s]."""
+    """Momenta of velocities, p = M nu and pi = J Om.
+
+    Args:
+        M: Mass, (..., 3, 3) [kg].
+        J: Inertia, (..., 3, 3) [kg m2].
+        nu: Velocity, (..., 3) [m/s], body axes.
+        Om: Angular velocity, (..., 3) [rad/s], body axes.
+
+    Returns:
+        p (..., 3) [N s] and pi (..., 3) [N m s].
+    """
     return (M @ nu[..., None])[..., 0], (J @ Om[..., None])[..., 0]
 
 
 def from_momenta(M: np.ndarray, J: np.ndarray, p: np.ndarray, pi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """nu = M^-1 p [m/s], Om = J^-1 pi [rad/s]."""
+    """Velocities of momenta, nu = M^-1 p and Om = J^-1 pi.
+
+    Args:
+        M: Mass, (..., 3, 3) [kg].
+        J: Inertia, (..., 3, 3) [kg m2].
+        p: Linear momentum, (..., 3) [N s], body axes.
+        pi: Angular momentum, (..., 3) [N m s], body axes.
+
+    Returns:
+        nu (..., 3) [m/s] and Om (..., 3) [rad/s].
+    """
     return np.linalg.solve(M, p[..., None])[..., 0], np.linalg.solve(J, pi[..., None])[..., 0]
 
 
 def principal_axes(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(Q, d) with J = Q diag(d) Q^T and det Q = +1, for J (n, 3, 3). A diagonal J keeps its axes and their order."""
+    """Principal axes of inertia: J = Q diag(d) Q^T with det Q = +1. A diagonal J keeps its axes and their order.
+
+    Args:
+        J: Inertia (n, 3, 3) [kg m2], symmetric.
+
+    Returns:
+        Q (n, 3, 3) and d (n, 3) [kg m2].
+    """
     off = np.abs(J[:, ~np.eye(3, dtype=bool)]).max(axis=1)
     turned = off > DIAGONAL * np.abs(J).max(axis=(1, 2))
     Q = np.repeat(np.eye(3)[None], len(J), axis=0)
@@ -37,24 +64,54 @@ def principal_axes(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def rotations(R: np.ndarray) -> np.ndarray:
-    """Which matrices of R (..., 3, 3) are rotations to ORTHOGONAL; False where a number is not finite."""
+    """Which matrices are rotations to within ORTHOGONAL.
+
+    Args:
+        R: Matrices (..., 3, 3).
+
+    Returns:
+        Mask (...), False where a number is not finite.
+    """
     with np.errstate(invalid="ignore", over="ignore"):
         close = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2)) <= ORTHOGONAL
         return np.asarray(close & (np.linalg.det(R) > 0.0))
 
 
 def rotate_into(Q: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Q^T v: body vectors from the user's axes into the axes Q."""
+    """Components of body vectors in other axes, Q^T v.
+
+    Args:
+        Q: The other axes in the user's, (..., 3, 3).
+        vectors: Vectors (..., 3) in the user's axes.
+
+    Returns:
+        Vectors (..., 3) in the axes Q.
+    """
     return np.matmul(np.swapaxes(Q, -1, -2), vectors[..., None])[..., 0]
 
 
 def rotate_out(Q: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Q v: body vectors from the axes Q into the user's."""
+    """Components of body vectors in the user's axes, Q v; the inverse of `rotate_into`.
+
+    Args:
+        Q: The other axes in the user's, (..., 3, 3).
+        vectors: Vectors (..., 3) in the axes Q.
+
+    Returns:
+        Vectors (..., 3) in the user's axes.
+    """
     return np.matmul(Q, vectors[..., None])[..., 0]
 
 
 def matrix_from_rotation_vector(f: np.ndarray) -> np.ndarray:
-    """exp(hat(f)), Rodrigues' formula; exact to round-off at f = 0."""
+    """Rotation matrix exp(hat(f)) by Rodrigues' formula; exact to round-off at f = 0.
+
+    Args:
+        f: Rotation vectors (..., 3) [rad].
+
+    Returns:
+        Matrices (..., 3, 3).
+    """
     f = np.asarray(f, dtype=np.float64)
     angle = np.linalg.norm(f, axis=-1)[..., None, None]
     a = np.sinc(angle / np.pi)
@@ -66,9 +123,16 @@ def matrix_from_rotation_vector(f: np.ndarray) -> np.ndarray:
 
 
 def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
-    """Rotation matrix of a quaternion, scalar first; any length but 0."""
+    """Rotation matrix of a quaternion.
+
+    Args:
+        q: Quaternions (..., 4), scalar first, of any length but 0.
+
+    Returns:
+        Matrices (..., 3, 3).
+    """
     q = np.asarray(q, dtype=np.float64)
-    q = q / np.abs(q).max(axis=-1, keepdims=True)  # its square neither overflows nor vanishes
+    q = q / np.abs(q).max(axis=-1, keepdims=True)  # so that its square neither overflows nor vanishes
     w, v = q[..., :1, None], q[..., 1:]
     norm = np.sum(q * q, axis=-1)[..., None, None]
     hat = np.zeros((*v.shape[:-1], 3, 3))
@@ -78,7 +142,14 @@ def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
 
 
 def quaternion_from_matrix(R: np.ndarray) -> np.ndarray:
-    """Unit quaternion, scalar first and not negative (Shepperd 1978: divide by the largest of the four)."""
+    """Unit quaternion of a rotation matrix (Shepperd 1978: divide by the largest of the four).
+
+    Args:
+        R: Rotation matrices (..., 3, 3).
+
+    Returns:
+        Quaternions (..., 4), scalar first and not negative.
+    """
     R = np.asarray(R, dtype=np.float64)
     xx, yy, zz = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
     trace = xx + yy + zz
@@ -101,7 +172,14 @@ def quaternion_from_matrix(R: np.ndarray) -> np.ndarray:
 
 
 def matrix_from_euler_deg(angles: np.ndarray) -> np.ndarray:
-    """Rz(yaw) Ry(pitch) Rx(roll) of (roll, pitch, yaw) [deg]: Fossen's zyx convention."""
+    """Rotation matrix Rz(yaw) Ry(pitch) Rx(roll), Fossen's zyx convention.
+
+    Args:
+        angles: Roll, pitch and yaw, (..., 3) [deg].
+
+    Returns:
+        Matrices (..., 3, 3), body to inertial axes.
+    """
     roll, pitch, yaw = np.moveaxis(np.deg2rad(np.asarray(angles, dtype=np.float64)), -1, 0)
     zero = np.zeros_like(roll)
 

@@ -13,7 +13,7 @@ from lgvi_warp.physics import inertia as inertias
 
 Numbers = Mapping[str, np.ndarray]
 
-# The two ways to say what the inertia is: about the centre of gravity, uncoupled; or 6x6 about any origin.
+# The two forms of a vehicle: uncoupled about the centre of gravity, or 6x6 about any origin.
 SIMPLE = {"mass": (), "added_mass": (3, 3), "inertia": (3, 3), "buoyancy": (), "center_of_buoyancy": (3,)}
 FULL = {
     "rigid_body_mass_matrix": (6, 6),
@@ -34,35 +34,46 @@ UNITS = {
     "center_of_gravity": "m",
     "center_of_buoyancy": "m",
 }
-# The least mass or inertia: what is smaller has no inverse in float64.
+# The smallest mass or inertia that has an inverse in float64.
 LEAST = float(np.finfo(np.float64).tiny)
-# By what part of the third two principal inertias of a rigid body may sum to less than it: round-off; and as far as
-# published ones miss it (those of the ECA A9 by 0.126).
+# The fraction of the third principal inertia by which the other two may sum to less than it: by round-off, and as
+# published numbers do (those of the ECA A9 by 0.126).
 ROUND_OFF, LITTLE = 1e-6, 0.15
 SYMMETRIC = ("added_mass", "inertia", "rigid_body_mass_matrix", "added_mass_matrix")
 
 
 class Seen(str):
-    """A warning that a vehicle found in its own numbers: found anew where it is made again from another's fields."""
+    """A warning that a vehicle raises about its own numbers, and raises again when it is rebuilt from another's fields."""
 
 
 @dataclass(frozen=True, eq=False)
 class Vehicle:
-    """A rigid body in water, in body axes (x ahead, y to starboard, z down), said in one of two ways.
+    """A rigid body in water, in body axes (x ahead, y to starboard, z down), described in one of two forms.
 
-    About its centre of gravity: mass, dry [kg]; inertia, (3,) or (3, 3) [kg m2], added inertia included; added_mass, (3,)
-    or symmetric (3, 3) [kg]. Or about any origin of the body: rigid_body_mass_matrix and added_mass_matrix, (6, 6),
-    linear first [kg, kg m, kg m2], added mass positive (minus Fossen's X_udot ...); weight [N], which acts at
-    center_of_gravity (3,) [m] from the origin (by default where the rigid body's matrix has it).
+    The simple form is about the centre of gravity: `mass`, `inertia`, `added_mass`. The 6x6 form is about any origin of the
+    body: `rigid_body_mass_matrix`, `added_mass_matrix`, `weight`, `center_of_gravity`. Matrices are stored in full.
 
-    inertia_tolerance: by what part of the largest the other two principal inertias may sum to less than it, in the 6x6
-    form; 0 by default, where a matrix that no rigid body has is refused. Importers set it for published numbers.
+    Args:
+        mass: Dry mass [kg]. Simple form.
+        inertia: Inertia about the centre of gravity, added inertia included, (3,) or (3, 3) [kg m2]. Simple form.
+        added_mass: Added mass of translation, (3,) or symmetric (3, 3) [kg]; 0 by default. Simple form.
+        buoyancy: Weight of the displaced water [N]; 0 by default.
+        center_of_buoyancy: Where buoyancy acts, (3,) [m] from the origin; by default the origin.
+        rigid_body_mass_matrix: Mass matrix of the dry body, (6, 6) [kg, kg m, kg m2], linear part first. 6x6 form.
+        added_mass_matrix: Added mass, (6, 6) [kg, kg m, kg m2], positive: minus Fossen's X_udot and so on; 0 by default.
+            6x6 form.
+        weight: Weight [N]; by default mass times gravity. 6x6 form.
+        center_of_gravity: Where the weight acts, (3,) [m] from the origin; by default where the rigid body's matrix has it.
+            6x6 form.
+        inertia_tolerance: The fraction of the largest principal inertia by which the other two may sum to less than it, in
+            the 6x6 form. With 0, the default, a matrix that no rigid body has is refused; importers set it for published
+            numbers.
+        warnings: Texts about what is unusual but allowed, as importers give them. The vehicle adds what it finds itself;
+            all are among the messages of a run.
 
-    buoyancy: weight of the displaced water [N], at center_of_buoyancy (3,) [m] from the origin. Matrices are kept in
-    full. `warnings` holds what is unusual but allowed: texts given here, as an importer does, and what is found. They are
-    among the messages of a run.
-
-    Raises SceneError naming every fault: not positive, not finite, wrong shape, not symmetric, not positive definite.
+    Raises:
+        SceneError: Where a number is not finite, not positive, of the wrong shape, not symmetric or not positive definite.
+            The message lists every fault.
     """
 
     mass: float | None = None
@@ -83,11 +94,11 @@ class Vehicle:
             "buoyancy": faults.number("buoyancy", self.buoyancy, "N", least=0.0),
             "center_of_buoyancy": faults.finite("center_of_buoyancy", self.center_of_buoyancy, (3,), "m"),
         }
-        given = _texts(faults, self.warnings)
+        user_warnings = _texts(faults, self.warnings)
         tolerance = faults.number("inertia_tolerance", self.inertia_tolerance, "1", least=0.0)
         object.__setattr__(self, "inertia_tolerance", tolerance or 0.0)
         values |= self._full(faults) if self.full else self._simple(faults)
-        values["warnings"] = (*given, *map(Seen, values["warnings"]))
+        values["warnings"] = (*user_warnings, *map(Seen, values["warnings"]))
         faults.raise_if_any()
         for name, value in values.items():
             if isinstance(value, np.ndarray):
@@ -96,7 +107,7 @@ class Vehicle:
 
     @property
     def full(self) -> bool:
-        """Whether the inertia is said by 6x6 matrices."""
+        """Whether the inertia is given by 6x6 matrices."""
         return self.rigid_body_mass_matrix is not None or self.added_mass_matrix is not None
 
     def _simple(self, faults: Faults) -> dict[str, Any]:
@@ -107,15 +118,15 @@ class Vehicle:
             if getattr(self, name) is None:
                 faults.add(name, None, "is missing", f"give it [{UNITS[name]}]")
         mass = None if self.mass is None else faults.positive("mass", self.mass, "kg")
-        given = (0.0, 0.0, 0.0) if self.added_mass is None else self.added_mass
+        added_as_given = (0.0, 0.0, 0.0) if self.added_mass is None else self.added_mass
         if mass is not None and mass < LEAST:
             faults.add("mass", self.mass, "has no inverse in float64", f"give a mass from {LEAST:.3g} kg")
-        added = faults.symmetric("added_mass", given, "kg")
+        added = faults.symmetric("added_mass", added_as_given, "kg")
         inertia = None if self.inertia is None else faults.symmetric("inertia", self.inertia, "kg m2")
         if inertia is not None and not _definite(inertia):
             faults.add("inertia", self.inertia, "is not positive definite", "give principal inertias above 0 [kg m2]")
         if mass is not None and added is not None and not _definite(added, mass * np.eye(3)):
-            faults.add("added_mass", given, "with the mass is not positive definite", SIGN)
+            faults.add("added_mass", added_as_given, "with the mass is not positive definite", SIGN)
         warnings = unusual("inertia", inertia) if inertia is not None else ()
         return {"mass": mass, "added_mass": added, "inertia": inertia, "warnings": warnings}
 
@@ -132,8 +143,8 @@ class Vehicle:
         else:
             rigid = faults.symmetric("rigid_body_mass_matrix", self.rigid_body_mass_matrix, unit, 6)
         zeros = np.zeros((6, 6))
-        given = zeros if self.added_mass_matrix is None else self.added_mass_matrix
-        added = faults.symmetric("added_mass_matrix", given, unit, 6)
+        added_as_given = zeros if self.added_mass_matrix is None else self.added_mass_matrix
+        added = faults.symmetric("added_mass_matrix", added_as_given, unit, 6)
         weight = None if self.weight is None else faults.number("weight", self.weight, "N", least=0.0)
         center: np.ndarray | None = None
         warnings: tuple[str, ...] = ()
@@ -144,27 +155,29 @@ class Vehicle:
             if _definite(rigid):
                 warnings += self._triangle(faults, rigid)
         if rigid is not None and added is not None and _definite(rigid) and not _definite(added, rigid):
-            faults.add("added_mass_matrix", given, "with the rigid body's is not positive definite", SIGN)
+            faults.add("added_mass_matrix", added_as_given, "with the rigid body's is not positive definite", SIGN)
         values = {"rigid_body_mass_matrix": rigid, "added_mass_matrix": added, "weight": weight}
         return values | {"center_of_gravity": center, "warnings": warnings}
 
     def _triangle(self, faults: Faults, rigid: np.ndarray) -> tuple[str, ...]:
-        """Refuse principal inertias that no rigid body has; warn of those that the tolerance allows."""
+        """Add a fault for principal inertias that no rigid body has; return warnings for those within the tolerance."""
         short = float(shortage(rigid[None])[0])
         if short <= ROUND_OFF:
             return ()
-        moments = ", ".join(f"{one:.6g}" for one in np.linalg.eigvalsh(about_center(rigid[None])[0]))
-        what = f"has principal inertias {moments} kg m2, two of which sum to less than the third"
-        by = f"by {100.0 * short:.2g} % of it"
+        moments = ", ".join(f"{moment:.6g}" for moment in np.linalg.eigvalsh(about_center(rigid[None])[0]))
+        fault = f"has principal inertias {moments} kg m2, two of which sum to less than the third"
+        amount = f"by {100.0 * short:.2g} % of it"
         if short <= self.inertia_tolerance:
-            return (f"vehicle.rigid_body_mass_matrix: {what}, {by}: no rigid body has; taken as it is",)
+            return (f"vehicle.rigid_body_mass_matrix: {fault}, {amount}: no rigid body has; taken as it is",)
         remedy = "give the rigid body's own inertia here, and added inertia in added_mass_matrix"
         remedy += f"; or allow it: inertia_tolerance = {short * 1.01:.2g}" if short <= LITTLE else ""
-        faults.add("rigid_body_mass_matrix", rigid[3:, 3:], f"{what}: no rigid body has", f"it misses {by}; {remedy}")
+        faults.add(
+            "rigid_body_mass_matrix", rigid[3:, 3:], f"{fault}: no rigid body has", f"it misses {amount}; {remedy}"
+        )
         return ()
 
     def _rigid(self, faults: Faults, rigid: np.ndarray, center: Any) -> tuple[np.ndarray | None, tuple[str, ...]]:
-        """Check that the matrix is that of a rigid body: m I, -m hat(r), a positive inertia. Returns r, warnings."""
+        """Check that the matrix is that of a rigid body: m I, -m hat(r), a positive inertia. Return r and the warnings."""
         remedy = "give [[m I, -m hat(r_g)], [m hat(r_g), inertia about the origin]]"
         m = rigid[0, 0]
         if not _definite(rigid):
@@ -193,23 +206,32 @@ class Vehicle:
         return np.asarray(np.asarray(self.mass) * np.eye(3) + self.added_mass)
 
     def parameters(self) -> dict[str, np.ndarray]:
-        """What may vary by member, by name. The weight of a 6x6 vehicle is there only if it was given."""
+        """The numbers that may vary by member.
+
+        Returns:
+            Each number by its name, as a float64 array in its own shape. The weight of a 6x6 vehicle is among them only if it
+            was given.
+        """
         names = [name for name in (FULL if self.full else SIMPLE) if getattr(self, name) is not None]
         return {name: np.asarray(getattr(self, name), dtype=np.float64) for name in names}
 
     def to_dict(self) -> dict[str, Any]:
-        """As in a scene file: diagonal matrices as their diagonal."""
+        """The vehicle as a table of a scene file.
+
+        Returns:
+            Numbers by name; 3x3 matrices that are diagonal as their diagonal. Of the warnings, only those of the user.
+        """
         content = {}
         for name, value in self.parameters().items():
             full = name in ("rigid_body_mass_matrix", "added_mass_matrix")
             content[name] = compact(value) if value.shape == (3, 3) and not full else value.tolist()
-        given = [text for text in self.warnings if not isinstance(text, Seen)]
+        user_warnings = [text for text in self.warnings if not isinstance(text, Seen)]
         content |= {"inertia_tolerance": self.inertia_tolerance} if self.inertia_tolerance else {}
-        return content | ({"warnings": given} if given else {})
+        return content | ({"warnings": user_warnings} if user_warnings else {})
 
 
 def _texts(faults: Faults, given: Any) -> tuple[str, ...]:
-    """The texts given as warnings, without those that a vehicle found itself; none after noting a fault."""
+    """The texts given as warnings, without those that a vehicle raised itself; () after adding a fault."""
     if isinstance(given, list | tuple) and all(isinstance(text, str) for text in given):
         return tuple(text for text in given if not isinstance(text, Seen))
     faults.add("warnings", given, "is not a list of texts", 'give ["..."], or leave it out')
@@ -220,20 +242,35 @@ SIGN = "added mass is positive here: minus Fossen's X_udot, Y_vdot, Z_wdot ..."
 
 
 def _definite(matrix: np.ndarray, other: Any = 0.0) -> bool:
-    """Whether the sum is positive definite; False where it overflows."""
+    """Whether the sum of two matrices is positive definite; False where it overflows."""
     with np.errstate(over="ignore"):
         total = matrix + other
     return bool(np.isfinite(total).all() and np.linalg.eigvalsh(total)[0] >= LEAST)
 
 
 def compact(matrix: np.ndarray) -> list[Any]:
-    """A diagonal matrix as its 3 numbers, another as nested lists."""
+    """A 3x3 matrix as a scene file writes it.
+
+    Args:
+        matrix: Square matrix.
+
+    Returns:
+        The diagonal as a list where nothing is beside it, else nested lists.
+    """
     diagonal = np.diag(matrix)
     return (diagonal if np.array_equal(matrix, np.diag(diagonal)) else matrix).tolist()
 
 
 def unusual(name: str, inertia: Any) -> tuple[str, ...]:
-    """Warns of principal inertias that no rigid body has (J_i + J_j < J_k); added inertia can have them."""
+    """Warn about principal inertias that no rigid body has (J_i + J_j < J_k), though a body with added inertia may have them.
+
+    Args:
+        name: Name of the field, for the message.
+        inertia: Inertia (3, 3) [kg m2].
+
+    Returns:
+        One warning, or ().
+    """
     small, middle, large = np.linalg.eigvalsh(inertia)
     if small >= large * (1.0 - 1e-12) - middle:
         return ()
@@ -242,25 +279,54 @@ def unusual(name: str, inertia: Any) -> tuple[str, ...]:
 
 
 def about_center(rigid: np.ndarray) -> np.ndarray:
-    """Inertia (n, 3, 3) [kg m2] about the centre of gravity, from rigid bodies' matrices (n, 6, 6)."""
+    """Inertia about the centre of gravity.
+
+    Args:
+        rigid: Rigid bodies' mass matrices (n, 6, 6) [kg, kg m, kg m2] about any origin.
+
+    Returns:
+        Inertia (n, 3, 3) [kg m2].
+    """
     m = rigid[:, :1, :1]
     H = inertias.hat(-inertias.vee(rigid[:, :3, 3:]) / m[:, 0])
     return np.asarray(rigid[:, 3:, 3:] + m * (H @ H))
 
 
 def shortage(rigid: np.ndarray) -> np.ndarray:
-    """By what part of the largest the other two principal inertias of matrices (n, 6, 6) sum to less than it; or below 0."""
+    """The fraction of the largest principal inertia by which the other two sum to less than it.
+
+    Args:
+        rigid: Rigid bodies' mass matrices (n, 6, 6) [kg, kg m, kg m2].
+
+    Returns:
+        Fractions (n,); 0 or below for what a rigid body can have.
+    """
     small, middle, large = np.linalg.eigvalsh(about_center(rigid)).T
     return np.asarray(1.0 - (small + middle) / large)
 
 
 def impossible(rigid: np.ndarray, tolerance: float = 0.0) -> np.ndarray:
-    """Which matrices (n, 6, 6) no rigid body has: two principal inertias sum to less than the third by more."""
+    """Which mass matrices no rigid body has: two principal inertias sum to less than the third.
+
+    Args:
+        rigid: Mass matrices (n, 6, 6) [kg, kg m, kg m2].
+        tolerance: Fraction of the largest principal inertia that is allowed to be missing, besides round-off.
+
+    Returns:
+        Mask (n,), True for an impossible matrix.
+    """
     return shortage(rigid) > max(tolerance, ROUND_OFF)
 
 
 def inertia6(p: Numbers) -> np.ndarray:
-    """I6 (n, 6, 6) about the user's origin, added inertia included, from the parameters of a scene."""
+    """Mass matrix of body and added mass about the user's origin.
+
+    Args:
+        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+
+    Returns:
+        I6 (n, 6, 6) [kg, kg m, kg m2], linear part first.
+    """
     if "vehicle.rigid_body_mass_matrix" in p:
         return np.asarray(p["vehicle.rigid_body_mass_matrix"] + p["vehicle.added_mass_matrix"])
     M = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
@@ -271,28 +337,56 @@ def inertia6(p: Numbers) -> np.ndarray:
 
 
 def dry_mass(p: Numbers) -> np.ndarray:
-    """Mass of the rigid body (n,) [kg]."""
+    """Mass of the rigid body.
+
+    Args:
+        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+
+    Returns:
+        Mass (n,) [kg].
+    """
     if "vehicle.rigid_body_mass_matrix" in p:
         return np.asarray(p["vehicle.rigid_body_mass_matrix"][:, 0, 0])
     return np.asarray(p["vehicle.mass"])
 
 
 def weight(p: Numbers) -> np.ndarray:
-    """Weight (n,) [N]: as given, or mass times gravity."""
+    """Weight of the vehicle: as given, or mass times gravity.
+
+    Args:
+        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+
+    Returns:
+        Weight (n,) [N].
+    """
     if "vehicle.weight" in p:
         return np.asarray(p["vehicle.weight"])
     return dry_mass(p) * p["environment.gravity"]
 
 
 def displaced_mass(p: Numbers) -> np.ndarray:
-    """Mass of the displaced water (n,) [kg]: buoyancy over gravity; without gravity, the mass of a neutral vehicle."""
+    """Mass of the displaced water: buoyancy over gravity, or without gravity the mass of a neutral vehicle.
+
+    Args:
+        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+
+    Returns:
+        Mass (n,) [kg].
+    """
     g = p["environment.gravity"]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(g > 0.0, p["vehicle.buoyancy"] / g, dry_mass(p))
 
 
 def center_of_mass(p: Numbers) -> np.ndarray:
-    """Where the rigid body's mass is (n, 3) [m], from the user's origin."""
+    """Centre of the rigid body's mass, from the user's origin.
+
+    Args:
+        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+
+    Returns:
+        Points (n, 3) [m] in body axes; zero, shape (1, 3), for a vehicle in the simple form.
+    """
     if "vehicle.rigid_body_mass_matrix" in p:
         rigid = p["vehicle.rigid_body_mass_matrix"]
         return np.asarray(-inertias.vee(rigid[:, :3, 3:]) / rigid[:, 0, 0, None])

@@ -1,1 +1,1 @@
-"""To be said in one sentence."""
+"""What varies from member to member: designs that fill the unit cube, and distributions that turn its levels into values."""

@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""The parameters and initial states of the members of a run."""
 
 from __future__ import annotations
 
@@ -11,10 +11,16 @@ STATES = ("position", "attitude", "velocity", "angular_velocity")
 
 @dataclass(frozen=True, eq=False)
 class Members:
-    """A run of m members. Parameters have a leading dimension of 1 (shared) or m (varied), in the scene's names.
+    """Parameters and initial states of m members.
 
-    position (m, 3) [m], attitude (m, 3, 3) body to inertial, velocity (m, 3) [m/s], angular_velocity (m, 3) [rad/s].
-    indices (m,): which members they are, and seed: what their random numbers are keyed by, in a subset as in the whole.
+    Args:
+        parameters: Numbers of the scene by name, with a leading dimension of 1 (shared) or m (varied).
+        position: Positions, (m, 3) [m], in inertial axes.
+        attitude: Attitudes, (m, 3, 3), body to inertial axes.
+        velocity: Velocities, (m, 3) [m/s], in body axes.
+        angular_velocity: Angular velocities, (m, 3) [rad/s], in body axes.
+        indices: Indices of these members in the ensemble, (m,).
+        seed: Seed of the ensemble. It and the index key a member's random numbers, in a subset as in the whole.
     """
 
     parameters: dict[str, np.ndarray]
@@ -27,5 +33,5 @@ class Members:
 
     @property
     def count(self) -> int:
-        """m."""
+        """The number of members, m."""
         return len(self.position)

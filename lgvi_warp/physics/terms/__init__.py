@@ -25,18 +25,28 @@ from lgvi_warp.physics.terms.waves import Waves
 from lgvi_warp.physics.terms.wrench import Wrench, WrenchSchedule
 from lgvi_warp.physics.terms.wrench_noise import WrenchNoise
 
-# The types of a scene file.
+# Classes of terms by their type in a scene file.
 TYPES = Term.kinds
 
-# Would mix a term's numbers with those of the scene.
+# Names that no term may have: its parameters would be mixed with those of the scene.
 RESERVED = ("vehicle", "environment", "start")
 
-# Follow from the vehicle; refused in a list of terms.
+# Terms that follow from the vehicle, and are refused in a list of terms.
 IMPLIED: tuple[Term, ...] = (Weight(), Restoring())
 
 
 def register(kind: type[AnyTerm]) -> type[AnyTerm]:
-    """Make a user's Term or Event known to scene files by its `type`; also as a decorator. ValueError if it is taken."""
+    """Make a user's term or event known to scene files by its `type`. It may be used as a decorator of the class.
+
+    Args:
+        kind: Subclass of `Term` or `Event` with a `type` of its own.
+
+    Returns:
+        The same class.
+
+    Raises:
+        ValueError: Where `type` is empty or taken.
+    """
     known: dict[str, Any] = kind.kinds
     if not kind.type or kind.type in known or kind.type in ("weight", "restoring"):
         raise ValueError(f"{kind.__name__}.type = {kind.type!r}: give a type that no other term has")
@@ -67,7 +77,17 @@ for _kind in (
 
 
 def from_list(given: Any) -> tuple[Term, ...]:
-    """Terms from tables of a scene file or Term objects. Raises SceneError naming every fault."""
+    """Build the terms of a scene.
+
+    Args:
+        given: A list of tables of a scene file, of `Term` objects, or of both.
+
+    Returns:
+        The terms, in the same order.
+
+    Raises:
+        SceneError: Where an entry is no term, is an event, or shares its name with another. The message lists every fault.
+    """
     faults = Faults()
     if not isinstance(given, Sequence) or isinstance(given, str):
         raise SceneError(
@@ -75,9 +95,11 @@ def from_list(given: Any) -> tuple[Term, ...]:
         )
     few_enough("terms", given)
     terms: list[Term] = []
-    for i, one in enumerate(given):
+    for i, entry in enumerate(given):
         with faults.including():
-            terms.append(_allowed(f"terms[{i}]", one) if isinstance(one, Term) else _from_table(f"terms[{i}]", one))
+            terms.append(
+                _allowed(f"terms[{i}]", entry) if isinstance(entry, Term) else _from_table(f"terms[{i}]", entry)
+            )
     counts = Counter(term.key for term in terms)
     for key in sorted(key for key in counts if folded(key) in RESERVED):
         faults.add("terms", key, "is the name of a section of the scene", f'give another name: name = "{key}_term"')
@@ -90,7 +112,7 @@ def from_list(given: Any) -> tuple[Term, ...]:
 
 
 def _allowed(where: str, one: Term) -> Term:
-    """A Term object, unless it is none for this list."""
+    """The term, unless it is an event or follows from the vehicle: then SceneError."""
     if not one.acts:
         raise SceneError([f"{where} = {one.type!r}: is an event; give it in events=[...]"])
     if type(one) in (Weight, Restoring):

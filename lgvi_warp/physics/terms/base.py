@@ -1,4 +1,4 @@
-"""What every term is: checked numbers with units, any of which may vary by member, and how the kernel gets them."""
+"""The base class of every term: numbers with units, checked, any of which may vary by member, and how the kernel gets them."""
 
 from __future__ import annotations
 
@@ -13,20 +13,25 @@ from lgvi_warp.common import names
 from lgvi_warp.common.errors import Faults, SceneError, ragged
 from lgvi_warp.physics.inertia import Frame
 
-# Own numbers of a term, or all parameters of a scene, by name; leading dimension 1 (shared) or n (one per member).
+# A term's own numbers, or all parameters of a scene, by name; leading dimension 1 (shared) or n (one per member).
 Numbers = Mapping[str, np.ndarray]
 
-# What a motion may conserve: energy [J], horizontal linear momentum [N s], vertical angular momentum [N m s].
+# What a motion can conserve: energy [J], horizontal linear momentum [N s], vertical angular momentum [N m s].
 CONSERVED = frozenset({"energy", "horizontal_momentum", "vertical_angular_momentum"})
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What a term may know when its numbers are made ready: all parameters of the scene, the frame, the run.
+    """What a term may look at when it packs its numbers for the device: the scene's parameters, the frame, the run.
 
-    parameters: "vehicle.mass" and so on; frame: axes and origin of the forces; members: indices (n,) of the members;
-    seed: of the ensemble; h: the step [s]. aligned: whether the frame of every member of the run is the user's but for the
-    order and sense of its axes.
+    Args:
+        parameters: All parameters of the scene by name ("vehicle.mass"), each of shape (1, ...) or (n, ...).
+        frame: Axes and origins in which the kernel keeps the vehicle; the forces are taken about `frame.forces`.
+        members: Indices of the members, shape (n,).
+        seed: Seed of the ensemble.
+        h: Step [s].
+        aligned: Whether, for every member of the run, the kernel's axes are the user's up to their order and sense, and the
+            origin of the forces is the user's; False by default.
     """
 
     parameters: Numbers
@@ -38,11 +43,14 @@ class Setting:
 
 
 class Packed(NamedTuple):
-    """A term's numbers as its device code reads them.
+    """A term's numbers as its device code reads them; the leading dimension n is 1 where all members share them.
 
-    values: field of its Params -> (n,) numbers, (n, 3) vectors, whole numbers or (n,) whole numbers, in the kernel's axes;
-    rows: (n, rows), its part of the table; memory: (n, rows), what it remembers at the start; work: how many rows it wants
-    for numbers of the moment. n is 1 where all is shared.
+    Args:
+        values: The fields of the device struct by name: numbers (n,), vectors (n, 3) in the kernel's axes, whole numbers,
+            or whole numbers (n,).
+        rows: The term's rows of the device table, shape (n, rows); None for none.
+        memory: What the term remembers from step to step, at the start, shape (n, rows); None for none.
+        work: Number of scratch rows that the device code may overwrite during one call.
     """
 
     values: dict[str, Any]
@@ -54,7 +62,19 @@ class Packed(NamedTuple):
 def quantity(
     shape: tuple[Any, ...], unit: str, default: Any = dataclasses.MISSING, least: float = -np.inf, most: float = np.inf
 ) -> Any:
-    """A field of numbers. A name in the shape stands for any length, the same in all fields that use it."""
+    """Declare a numeric field of a term.
+
+    Args:
+        shape: Shape of the field. It may contain a name such as "k": a length that is free, but equal in all fields that
+            use the same name.
+        unit: Unit of the field, as faults show it; "1" for none.
+        default: Value where the user gives none; without it the field must be given.
+        least: Smallest value that is allowed, in the field's unit.
+        most: Largest value that is allowed, in the field's unit.
+
+    Returns:
+        A dataclass field with shape, unit and bounds in its metadata.
+    """
     meta = {"shape": shape, "unit": unit, "least": least, "most": most}
     if default is dataclasses.MISSING:
         return field(metadata=meta)
@@ -63,19 +83,25 @@ def quantity(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Term:
-    """A law that a scene names. Its fields made by `quantity` are arrays after construction.
+    """A force, a moment or a motion of the water that a scene names.
 
-    type: the name in a scene file; device: its module in lgvi_kernels.terms, by name, or any object with the same
-    functions; timed: whether the law looks at the time; dissipative: whether its
-    damping never creates energy. name tells two terms of one type apart in "name.field".
+    Fields declared by `quantity` are arrays after construction.
 
-    Raises SceneError naming every fault.
+    Class attributes: `type` is the name in a scene file; `device` is the module of lgvi_kernels.terms by name, or any object
+    with the same functions; `timed` says whether the law depends on time; `dissipative`, whether its damping never creates
+    energy. docs/add_a_law.md shows how to write one.
+
+    Args:
+        name: Name of the term in parameters ("name.field"), which tells two terms of one type apart; by default the type.
+
+    Raises:
+        SceneError: Where a number has the wrong shape, is not finite or is out of bounds. The message lists every fault.
     """
 
     type: ClassVar[str] = ""
-    # The types of a scene file; events have their own.
+    # Classes by their type in a scene file; events have a table of their own.
     kinds: ClassVar[dict[str, Any]] = {}
-    # Whether it has a force: an event has none.
+    # Whether it acts on the motion: an event does not.
     acts: ClassVar[bool] = True
     device: ClassVar[Any] = ""
     timed: ClassVar[bool] = False
@@ -90,42 +116,68 @@ class Term:
         elif self.key and (wrong := names.wrong_with(self.key)):
             faults.add("name" if self.name else "type", self.key, *wrong)
         lengths: dict[str, int] = {}
-        for one in self.quantities():
-            value = getattr(self, one.name)
-            object.__setattr__(self, one.name, _checked(faults, one, value, lengths))
+        for item in self.quantities():
+            value = getattr(self, item.name)
+            object.__setattr__(self, item.name, _checked(faults, item, value, lengths))
         if not faults:
             self.check(faults)
         faults.raise_if_any()
 
     @classmethod
     def quantities(cls) -> tuple[dataclasses.Field[Any], ...]:
-        """The fields that hold numbers."""
-        return tuple(one for one in dataclasses.fields(cls) if "shape" in one.metadata)
+        """The fields that hold numbers.
+
+        Returns:
+            The dataclass fields declared by `quantity`, in the order of the class.
+        """
+        return tuple(item for item in dataclasses.fields(cls) if "shape" in item.metadata)
 
     @property
     def key(self) -> str:
-        """What its parameters are called by: its name, or its type."""
+        """The name by which parameters refer to this term: its `name`, or its `type` where it has none."""
         return self.name if isinstance(self.name, str) and self.name else self.type
 
     def check(self, faults: Faults) -> None:
-        """Note what is wrong beyond shapes and bounds."""
+        """Add a fault for each number that is wrong for reasons beyond its shape and its bounds; by default there is none.
+
+        Args:
+            faults: Collects the faults. It is called only where all shapes and bounds are right.
+        """
 
     def parameters(self) -> dict[str, np.ndarray]:
-        """Numbers that may vary by member, by field."""
-        return {one.name: getattr(self, one.name) for one in self.quantities()}
+        """The numbers that may vary by member.
+
+        Returns:
+            The array of each numeric field, by the field's name, in the field's own shape.
+        """
+        return {item.name: getattr(self, item.name) for item in self.quantities()}
 
     def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
-        """Field -> (n,), which members' numbers are not finite or out of bounds."""
+        """Which members have numbers that this term cannot take: not finite, or out of bounds.
+
+        Args:
+            own: The term's numbers by field, each of shape (n, ...).
+
+        Returns:
+            A mask (n,) for each numeric field, True where the member's number is refused.
+        """
         bad = {}
-        for one in self.quantities():
-            value = own[one.name].reshape(len(own[one.name]), -1)
-            low, high = one.metadata["least"], one.metadata["most"]
+        for item in self.quantities():
+            value = own[item.name].reshape(len(own[item.name]), -1)
+            low, high = item.metadata["least"], item.metadata["most"]
             with np.errstate(invalid="ignore"):
-                bad[one.name] = ~np.all(np.isfinite(value) & (value >= low) & (value <= high), axis=1)
+                bad[item.name] = ~np.all(np.isfinite(value) & (value >= low) & (value <= high), axis=1)
         return bad
 
     def present(self, own: Numbers) -> bool:
-        """Whether any member feels it; by default always, since it was asked for."""
+        """Whether any member feels the term; by default always, since the scene names it.
+
+        Args:
+            own: The term's numbers by field, each of shape (n, ...).
+
+        Returns:
+            False where the term has no effect, so that the kernel leaves its code out.
+        """
         return True
 
     @property
@@ -135,11 +187,11 @@ class Term:
 
     @property
     def conserves(self) -> frozenset[str]:
-        """What of `CONSERVED` a motion keeps where this law alone acts.
+        """Which quantities of `CONSERVED` a motion keeps where this law alone acts.
 
-        By default energy, of a law whose device code is POTENTIAL and nothing else, if `potential` is defined and does not
-        look at the time; else nothing. A law whose potential depends on depth and on the attitude to the vertical alone
-        conserves all three: it overrides this.
+        By default it is the energy, for a law whose device code is POTENTIAL and has no other role, if `potential` is defined
+        and does not depend on time; for any other law it is nothing. A law whose potential depends only on depth and on the
+        attitude relative to the vertical conserves all three, and overrides this.
         """
         device = self.device
         follows = getattr(device, "POTENTIAL", False) and type(self).potential is not Term.potential
@@ -147,43 +199,92 @@ class Term:
         return frozenset({"energy"} if follows and not more else ())
 
     def device_in(self, aligned: bool) -> Any:
-        """Its device code, where the kernel's axes are the user's (see Setting) and where they are not."""
+        """The device code for the axes of this run.
+
+        Args:
+            aligned: As of `Setting`: whether the kernel's axes and origin are the user's.
+
+        Returns:
+            The name of a module of lgvi_kernels.terms, or an object with the same functions.
+        """
         return self.device
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """Its numbers in the kernel's axes."""
+        """Pack the term's numbers for its device code, in the kernel's axes. Every term must define this.
+
+        Args:
+            own: The term's numbers by field, each of shape (n, ...), n = 1 where members share them.
+            setting: The scene's parameters, the frame and the run.
+
+        Returns:
+            The fields of the device struct, and the rows, memory and scratch rows that the device code needs.
+
+        Raises:
+            NotImplementedError: Where the term does not define it.
+        """
         raise NotImplementedError(f"{type(self).__name__} must define packed(own, setting): see docs/add_a_law.md")
 
     def water(self, own: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray | None:
-        """Velocity of the water (k, n, 3) [m/s] at positions (k, n, 3) and times (k,) [s].
+        """Velocity of the water that this term moves; by default it moves none.
 
-        None for laws that move none, or whose water is not known after the run.
+        Args:
+            own: The term's numbers by field, each of shape (n, ...).
+            position: Positions (k, n, 3) [m] in inertial axes.
+            time: Times (k,) [s].
+            parameters: All parameters of the scene, by name.
+
+        Returns:
+            Velocity (k, n, 3) [m/s] in inertial axes. None for a law that moves no water, or whose water is not known after
+            the run.
         """
         return None
 
     def water_at_start(self, own: Numbers, position: np.ndarray, setting: Setting) -> np.ndarray:
-        """Velocity of the water (n, 3) [m/s] where members start."""
+        """Velocity of the water where members start; by default that of `water` at t = 0.
+
+        Args:
+            own: The term's numbers by field, each of shape (n, ...).
+            position: Positions (n, 3) [m] at the start, in inertial axes.
+            setting: The scene's parameters, the frame and the run.
+
+        Returns:
+            Velocity (n, 3) [m/s] in inertial axes.
+        """
         still = self.water(own, position[None], np.zeros(1), setting.parameters)
         return np.zeros_like(position) if still is None else still[0]
 
     def potential(
         self, own: Numbers, position: np.ndarray, attitude: np.ndarray, setting: Numbers
     ) -> np.ndarray | float:
-        """Potential energy (k, n) [J] at positions (k, n, 3) and attitudes (k, n, 3, 3); 0 for laws without one."""
+        """Potential energy of the law at sampled states.
+
+        Args:
+            own: The term's numbers by field, each of shape (n, ...).
+            position: Positions (k, n, 3) [m] in inertial axes.
+            attitude: Attitudes (k, n, 3, 3), body to inertial axes.
+            setting: All parameters of the scene, by name.
+
+        Returns:
+            Energy (k, n) [J]; 0 for a law without a potential.
+        """
         return 0.0
 
     def to_dict(self) -> dict[str, Any]:
-        """As in a scene file."""
+        """The term as a table of a scene file.
+
+        Returns:
+            `type`, `name` where it has one, and every field that is not None, arrays as lists.
+        """
         content: dict[str, Any] = {"type": self.type} | ({"name": self.name} if self.name else {})
-        for one in dataclasses.fields(self):
-            value = getattr(self, one.name)
-            if one.name != "name" and value is not None:
-                content[one.name] = value.tolist() if isinstance(value, np.ndarray) else value
+        for item in dataclasses.fields(self):
+            value = getattr(self, item.name)
+            if item.name != "name" and value is not None:
+                content[item.name] = value.tolist() if isinstance(value, np.ndarray) else value
         return content
 
 
 def _checked(faults: Faults, one: dataclasses.Field[Any], value: Any, lengths: dict[str, int]) -> np.ndarray | None:
-    """The value of a field as an array of its shape, or None after noting a fault."""
+    """The value of a field as an array of its shape; None after adding a fault."""
     meta = one.metadata
     shape, unit = meta["shape"], meta["unit"]
     if any(isinstance(size, str) for size in shape):
@@ -212,10 +313,17 @@ def _checked(faults: Faults, one: dataclasses.Field[Any], value: Any, lengths: d
 
 
 def knots(at: np.ndarray, values: np.ndarray, steps: bool = False) -> np.ndarray:
-    """Rows (n, ...) of a table on the device: first value, then for each knot after it its place, 1 / distance, change.
+    """Rows of a table for the device: the first value, then for each interval its place, 1 / length and change of the value.
 
-    at: (n, k), rising; values: (n, k, d). Linear between knots and constant outside; `steps`: each value holds from its
-    knot to the next.
+    Between knots the table is linear, outside it is constant.
+
+    Args:
+        at: Places of the knots (n, k), rising, in any unit.
+        values: Values at the knots (n, k, d).
+        steps: Whether each value holds from its knot to the next, instead of the linear interpolation.
+
+    Returns:
+        Rows (n, d + (k - 1) (2 + d)); n is the larger of the two leading dimensions.
     """
     n = max(len(at), len(values))
     at, values = np.broadcast_to(at, (n, at.shape[1])), np.broadcast_to(values, (n, *values.shape[1:]))
@@ -227,7 +335,7 @@ def knots(at: np.ndarray, values: np.ndarray, steps: bool = False) -> np.ndarray
     return np.concatenate(rows, axis=1)
 
 
-# 1 / distance of a jump: far beyond any step, and within float32.
+# 1 / distance of a jump between knots: steeper than any step resolves, and within float32.
 STEEP = 1e20
 
 
@@ -235,31 +343,51 @@ AnyTerm = TypeVar("AnyTerm", bound=Term)
 
 
 def build(where: str, kind: type[AnyTerm], table: Mapping[str, Any]) -> AnyTerm:
-    """A term of this kind from its table in a scene file. Raises SceneError naming every fault."""
+    """Build a term of one type from its table in a scene file.
+
+    Args:
+        where: Place of the table in the file, "terms[0]", with which faults begin.
+        kind: Class of the term.
+        table: Fields by name, as the file has them.
+
+    Returns:
+        The term.
+
+    Raises:
+        SceneError: Where a field is unknown, missing or wrong. The message lists every fault.
+    """
     faults = Faults()
-    fields = {one.name: one for one in dataclasses.fields(kind) if one.init}
-    given = {key: value for key, value in table.items() if key != "type"}
-    faults.keys(where, given, fields)
-    for name, one in fields.items():
-        if one.default is dataclasses.MISSING and name not in given:
-            faults.add(f"{where}.{name}", "", "is missing", f"give it [{one.metadata.get('unit', '')}]")
+    fields = {item.name: item for item in dataclasses.fields(kind) if item.init}
+    values = {key: value for key, value in table.items() if key != "type"}
+    faults.keys(where, values, fields)
+    for name, item in fields.items():
+        if item.default is dataclasses.MISSING and name not in values:
+            faults.add(f"{where}.{name}", "", "is missing", f"give it [{item.metadata.get('unit', '')}]")
     faults.raise_if_any()
     try:
-        return kind(**given)
+        return kind(**values)
     except SceneError:
         raise
-    except ValueError:  # what a law makes of its numbers before they are checked
-        for name in (name for name in fields if name in given and ragged(given[name])):
-            faults.add(f"{where}.{name}", given[name], "has rows of different lengths", "give rows of one length")
+    except ValueError:  # a law that computes with its numbers before they are checked
+        for name in (name for name in fields if name in values and ragged(values[name])):
+            faults.add(f"{where}.{name}", values[name], "has rows of different lengths", "give rows of one length")
         faults.raise_if_any()
         raise
 
 
-# Of a scene, and so many events: each is code of the kernel.
+# The most terms, and the most events, of a scene: each adds code to the kernel.
 MOST_TERMS = 1000
 
 
 def few_enough(what: str, given: Sequence[Any]) -> None:
-    """Refuse a list of more terms or events than any scene has. Raises SceneError."""
+    """Refuse a list of more terms or events than a scene may have.
+
+    Args:
+        what: Name of the list, "terms" or "events".
+        given: The list.
+
+    Raises:
+        SceneError: Where it has more than `MOST_TERMS` entries.
+    """
     if len(given) > MOST_TERMS:
         raise SceneError([f"{what}: are {len(given):,}; give at most {MOST_TERMS:,}"])

@@ -12,17 +12,27 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, knots, quanti
 from lgvi_warp.physics.terms.fins import Fins, fin_rows, side_by_side
 from lgvi_warp.physics.terms.wrench import commands, first_row, not_rising, refuse_idle, rising
 
-# rad/s: from here on a limit of the rate is none.
+# From this rate on [rad/s] a limit counts as none.
 UNLIMITED = 1e6
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ControlFins(Fins):
-    """Fins that are turned about their span by a deflection, positive where the flow from ahead then lifts along +normal.
+    """Fins that are turned about their span by a deflection, which follows a command.
 
-    As Fins, with limit: (n,) [rad] of the deflection either way; rate_limit: (n,) [rad/s], by default none; command: (n,)
-    [rad], held, or with times (k,) [s], rising: command_schedule (k, n), linear between. The deflection is the command
-    within its limit, followed no faster than the rate limit; at t = 0 it is there.
+    A positive deflection lifts along +normal where the flow comes from ahead. It is the command within `limit`, followed no
+    faster than `rate_limit`; at t = 0 it equals the command. One number stands for n equal ones.
+
+    Args:
+        position, chord, normal, area, lift_slope, drag, drag_normal: As of `Fins`.
+        limit: Largest deflection either way, (n,) [rad]; 0.35 by default.
+        rate_limit: Largest rate of the deflection, (n,) [rad/s]; none by default.
+        command: Deflection that is held, (n,) [rad].
+        times: Times of the schedule, (k,) [s], rising.
+        command_schedule: Deflections at these times, (k, n) [rad], linear between them; instead of `command`.
+
+    Raises:
+        SceneError: As `Fins`, and where times do not rise or the command is given twice.
     """
 
     type: ClassVar[str] = "control_fins"
@@ -37,8 +47,8 @@ class ControlFins(Fins):
 
     def __post_init__(self) -> None:
         first = first_row(self.command_schedule)
-        given = self.command is not None and self.command_schedule is not None
-        object.__setattr__(self, "_both", given and not np.array_equal(first, self.command))
+        twice = self.command is not None and self.command_schedule is not None
+        object.__setattr__(self, "_both", twice and not np.array_equal(first, self.command))
         if self.command is None:
             object.__setattr__(self, "command", first)
         self.repeat("limit", "rate_limit", "command")
@@ -48,14 +58,14 @@ class ControlFins(Fins):
         super().__post_init__()
 
     def check(self, faults: Faults) -> None:
-        """Also, times must rise and a command is given in one way."""
+        """In addition, adds a fault where times do not rise or the command is given twice."""
         super().check(faults)
         rising(faults, "times", self.times)
         if self.__dict__["_both"]:
             faults.add("command", self.command, "is given beside command_schedule", "keep one of them")
 
     def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
-        """Also times that do not rise. Raises SceneError for numbers that would not act."""
+        """In addition, refuses times that do not rise; raises SceneError for members' numbers that would have no effect."""
         bad = super().unphysical(own)
         bad["times"] = bad["times"] | not_rising(own["times"])
         remedy = f"give {self.key}.rate_limit below {UNLIMITED:g} rad/s in the scene as well"
@@ -64,11 +74,11 @@ class ControlFins(Fins):
 
     @property
     def memory(self) -> bool:
-        """Whether some fin's rate is limited."""
+        """Whether the rate of some fin is limited."""
         return bool(np.any(self.rate_limit < UNLIMITED))
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """Rows as the device code has them: each fin's, then each one's commands."""
+        """The device rows: those of each fin, then the command table of each fin."""
         fins = side_by_side([fin_rows(own, setting), own["limit"][..., None], own["rate_limit"][..., None]])
         times, schedule = commands(own)
         count = schedule.shape[2]
@@ -82,9 +92,9 @@ class ControlFins(Fins):
 
 
 def _at_start(times: np.ndarray, schedule: np.ndarray) -> np.ndarray:
-    """The commands (n, fins) at t = 0."""
+    """The commands (n, fins) [rad] at t = 0."""
     n = max(len(times), len(schedule))
-    times, schedule = (np.broadcast_to(one, (n, *one.shape[1:])) for one in (times, schedule))
+    times, schedule = (np.broadcast_to(table, (n, *table.shape[1:])) for table in (times, schedule))
     return np.array(
         [[np.interp(0.0, t, column) for column in commands.T] for t, commands in zip(times, schedule, strict=True)]
     )

@@ -12,17 +12,24 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantit
 from lgvi_warp.physics.terms.fins import side_by_side, twist
 from lgvi_warp.physics.terms.wrench import not_rising, rising
 
-# Gauss' two points of a segment from 0 to 1.
+# The two Gauss points of a segment from 0 to 1.
 GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
 ACROSS = (np.array([[0.0, 1.0, 0.0]]), np.array([[0.0, 0.0, 1.0]]))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CrossFlow(Term):
-    """Force per length -rho/2 Cd D |w| w, w the flow across the hull at its station (Hoerner 1965; Fossen 2021, 8).
+    """Cross-flow drag of a slender hull, by strips: force per length -rho/2 Cd D |w| w (Hoerner 1965; Fossen 2021, chapter 8).
 
-    stations: (k,) [m] along the body's x axis, rising; diameters: (k,) [m], the hull's breadth across the flow;
-    drag_coefficient: (k,), or one number. Between stations the product Cd D is linear.
+    w is the flow across the hull at the strip. Between stations the product Cd D is linear.
+
+    Args:
+        stations: Places along the body's x axis, (k,) [m], rising; two or more.
+        diameters: Breadth D of the hull across the flow, (k,) [m].
+        drag_coefficient: Drag coefficient Cd, (k,), or one number for all stations.
+
+    Raises:
+        SceneError: Where stations do not rise or are fewer than two, and as `Term`.
     """
 
     type: ClassVar[str] = "cross_flow"
@@ -39,31 +46,31 @@ class CrossFlow(Term):
         super().__post_init__()
 
     def check(self, faults: Faults) -> None:
-        """Stations must rise, and enclose a hull."""
+        """Adds a fault where stations do not rise or are fewer than two."""
         rising(faults, "stations", self.stations)
         if len(self.stations) < 2:
             faults.add("stations", self.stations, "has one station", "give two or more, from stern to bow")
 
     def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
-        """Also where a member's stations do not rise."""
+        """In addition, refuses members whose stations do not rise."""
         bad = super().unphysical(own)
         bad["stations"] = bad["stations"] | not_rising(own["stations"])
         return bad
 
     def present(self, own: Numbers) -> bool:
-        """Whether some member has a hull that resists."""
+        """Whether some member has a diameter and a drag coefficient above 0."""
         return bool(np.any(own["diameters"]) and np.any(own["drag_coefficient"]))
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """The directions across, and two strips a segment: station and rho/2 Cd D times length."""
+        """The two directions across the hull, and two strips per segment: station, and rho/2 Cd D times its length."""
         a, b = (twist(setting.frame, np.zeros((1, 3)), direction) for direction in ACROSS)
         values: dict[str, Any] = {"a": a[:, :3], "a_arm": a[:, 3:], "b": b[:, :3], "b_arm": b[:, 3:]}
         stations, strength = own["stations"], own["drag_coefficient"] * own["diameters"]
         half_length = 0.5 * np.diff(stations)
         half_density = 0.5 * setting.parameters["environment.water_density"][:, None]
         strips = []
-        for part in GAUSS:
-            x, c = (one[:, :-1] + part * np.diff(one) for one in (stations, strength))
+        for place in GAUSS:
+            x, c = (table[:, :-1] + place * np.diff(table) for table in (stations, strength))
             strips.append(side_by_side([x[..., None], (half_density * half_length * c)[..., None]]))
         rows = side_by_side(strips)
         return Packed(values | {"count": 2 * half_length.shape[1]}, rows.reshape(len(rows), -1))

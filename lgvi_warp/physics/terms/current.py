@@ -1,4 +1,4 @@
-"""Currents: how the water moves. Momenta are relative to it, so drag and lift feel it without more."""
+"""Currents: how the water moves. Momenta are relative to the water, so that drag and lift need no further code."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from lgvi_warp.physics.terms.wrench import not_rising, rising
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Current(Term):
-    """A steady, uniform current.
+    """A current that is the same everywhere and at all times.
 
-    velocity: (3,) [m/s], inertial.
+    Args:
+        velocity: Velocity of the water, (3,) [m/s], in inertial axes.
     """
 
     type: ClassVar[str] = "current"
@@ -25,23 +26,28 @@ class Current(Term):
     velocity: Any = quantity((3,), "m/s")
 
     def present(self, own: Numbers) -> bool:
-        """Whether some member has one."""
+        """Whether the current of some member is not zero."""
         return bool(np.any(own["velocity"]))
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """As it is: inertial axes are not turned."""
+        """The velocity unchanged: the kernel's inertial axes are the user's."""
         return Packed({"velocity": own["velocity"]})
 
     def water(self, own: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
-        """Velocity of the water (k, n, 3) [m/s]."""
+        """The same velocity (k, n, 3) [m/s] at all positions and times."""
         return np.broadcast_to(own["velocity"], position.shape)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CurrentProfile(Term):
-    """A current that varies with depth: a table, linear between its depths and constant outside.
+    """A current that varies with depth by a table, linear between its depths and constant outside.
 
-    depths: (k,) [m], rising; velocities: (k, 3) [m/s], inertial.
+    Args:
+        depths: Depths, (k,) [m], rising.
+        velocities: Velocities of the water at these depths, (k, 3) [m/s], in inertial axes.
+
+    Raises:
+        SceneError: Where depths do not rise, and as `Term`.
     """
 
     type: ClassVar[str] = "current_profile"
@@ -51,20 +57,20 @@ class CurrentProfile(Term):
     velocities: Any = quantity(("k", 3), "m/s")
 
     def check(self, faults: Faults) -> None:
-        """Depths must rise."""
+        """Adds a fault where depths do not rise."""
         rising(faults, "depths", self.depths)
 
     def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
-        """Also where a member's depths do not rise."""
+        """In addition, refuses members whose depths do not rise."""
         bad = super().unphysical(own)
         return bad | {"depths": bad["depths"] | not_rising(own["depths"])}
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """The table, knot by knot."""
+        """The table as device rows, knot by knot."""
         return Packed({"count": own["depths"].shape[1] - 1}, knots(own["depths"], own["velocities"]))
 
     def water(self, own: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
-        """Velocity of the water (k, n, 3) [m/s]."""
+        """Velocity (k, n, 3) [m/s] at the depth of each position, whatever the time."""
         depths, velocities = own["depths"], own["velocities"]
         result = np.empty(position.shape)
         for i in range(position.shape[1]):

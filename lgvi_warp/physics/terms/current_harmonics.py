@@ -12,27 +12,54 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantit
 
 
 def above_zero(faults: Faults, key: str, values: np.ndarray, unit: str) -> None:
-    """Note numbers that are not above 0."""
+    """Add a fault where some number is not above 0.
+
+    Args:
+        faults: Collects the faults.
+        key: Name of the field.
+        values: Numbers of any shape.
+        unit: Unit of the numbers, for the message.
+    """
     if np.any(values <= 0.0):
         faults.add(key, values, "is not positive", f"give numbers above 0 [{unit}]")
 
 
 def not_above_zero(values: np.ndarray) -> np.ndarray:
-    """Which members' numbers, (n, ...), are not all above 0."""
+    """Which members have a number that is not above 0.
+
+    Args:
+        values: Numbers (n, ...).
+
+    Returns:
+        Mask (n,), True also where a number is NaN.
+    """
     with np.errstate(invalid="ignore"):
         return ~np.all(values.reshape(len(values), -1) > 0.0, axis=1)
 
 
 def zeros_like_first(values: Any) -> np.ndarray:
-    """As many zeros as there are components."""
+    """Default phases: one zero for each component.
+
+    Args:
+        values: The components, a sequence of length k or one number.
+
+    Returns:
+        Zeros (k,).
+    """
     return np.zeros(len(np.atleast_1d(np.asarray(values, dtype=object))))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CurrentHarmonics(Term):
-    """u(t) = sum of amplitude cos(2 pi t / period + phase), everywhere the same.
+    """A uniform current that is a sum of harmonics, u(t) = sum of amplitude cos(2 pi t / period + phase).
 
-    amplitudes: (k, 3) [m/s], inertial; periods: (k,) [s], above 0; phases: (k,) [rad].
+    Args:
+        amplitudes: Amplitudes, (k, 3) [m/s], in inertial axes.
+        periods: Periods, (k,) [s], above 0.
+        phases: Phases at t = 0, (k,) [rad]; 0 by default.
+
+    Raises:
+        SceneError: Where a period is not above 0, and as `Term`.
     """
 
     type: ClassVar[str] = "current_harmonics"
@@ -49,27 +76,27 @@ class CurrentHarmonics(Term):
         super().__post_init__()
 
     def check(self, faults: Faults) -> None:
-        """Periods must be positive."""
+        """Adds a fault where a period is not above 0."""
         above_zero(faults, "periods", self.periods, "s")
 
     def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
-        """Periods must be positive."""
+        """In addition, refuses members with a period that is not above 0."""
         bad = super().unphysical(own)
         return bad | {"periods": bad["periods"] | not_above_zero(own["periods"])}
 
     def present(self, own: Numbers) -> bool:
-        """Whether some member has one."""
+        """Whether some amplitude of some member is not zero."""
         return bool(np.any(own["amplitudes"]))
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """The table, harmonic by harmonic."""
-        parts = [own["amplitudes"], 2.0 * np.pi / own["periods"][..., None], own["phases"][..., None]]
-        n = max(len(part) for part in parts)
-        rows = np.concatenate([np.broadcast_to(part, (n, *part.shape[1:])) for part in parts], axis=2)
+        """Device rows of each harmonic: amplitude, angular frequency [rad/s], phase."""
+        columns = [own["amplitudes"], 2.0 * np.pi / own["periods"][..., None], own["phases"][..., None]]
+        n = max(len(column) for column in columns)
+        rows = np.concatenate([np.broadcast_to(column, (n, *column.shape[1:])) for column in columns], axis=2)
         return Packed({"count": rows.shape[1]}, rows.reshape(n, -1))
 
     def water(self, own: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
-        """Velocity of the water (k, n, 3) [m/s]."""
+        """Velocity (k, n, 3) [m/s] at each time, the same at all positions."""
         total = np.zeros(position.shape)
         for j in range(own["periods"].shape[1]):
             angle = 2.0 * np.pi / own["periods"][:, j] * time[:, None] + own["phases"][:, j]

@@ -13,9 +13,9 @@ from lgvi_warp.physics.inertia import Frame, motion_from
 from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantity
 
 ZEROS = (0.0,) * 6
-# Off-diagonal elements below this fraction of the largest are the round-off of turning the axes.
+# Off-diagonal elements below this fraction of the largest are round-off of the turned axes.
 DIAGONAL = 1e-12
-# Part of the exact flow -> the coefficients that it is of.
+# Part of the exact flow -> its coefficients: their kind, and force or torque.
 PARTS = {
     "linear_force": ("linear", slice(0, 3)),
     "linear_torque": ("linear", slice(3, 6)),
@@ -26,9 +26,13 @@ PARTS = {
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Drag(Term):
-    """Per axis: force = -(linear + quadratic |v|) v, torque likewise (Fossen 2021, 8.1).
+    """Drag along each body axis by itself: force = -(linear + quadratic |v|) v, torque likewise (Fossen 2021, section 8.1).
 
-    linear: (6,) [N s/m, N m s]; quadratic: (6,) [N s2/m2, N m s2]; none negative. Velocities are relative to the water.
+    Velocities are relative to the water, about the user's origin.
+
+    Args:
+        linear: Linear coefficients, (6,) [N s/m, N m s], from 0; 0 by default.
+        quadratic: Quadratic coefficients, (6,) [N s2/m2, N m s2], from 0; 0 by default.
     """
 
     type: ClassVar[str] = "drag"
@@ -42,11 +46,27 @@ class Drag(Term):
         return bool(np.any(own["linear"]) or np.any(own["quadratic"]))
 
     def parts(self, own: Numbers) -> tuple[str, ...]:
-        """Which parts of the exact flow some member has."""
+        """Which parts of the exact flow some member has.
+
+        Args:
+            own: The term's numbers by field, each of shape (n, 6).
+
+        Returns:
+            Names of `PARTS`: "linear_force" and so on.
+        """
         return tuple(part for part, (kind, half) in PARTS.items() if np.any(own[kind][:, half]))
 
     def packed_exact(self, own: Numbers, frame: Frame, scale: np.ndarray) -> Packed:
-        """For the exact flow: l / I [1/s], and q / I per momentum, which is kept divided by scale (1 or n,)."""
+        """The numbers for the exact flow of drag, which acts on each momentum by itself.
+
+        Args:
+            own: The term's numbers by field, each of shape (n, 6).
+            frame: The kernel's frame, whose axes are the user's up to their order (`has_exact_flow`).
+            scale: The factor by which the kernel divides momenta, (1,) or (n,).
+
+        Returns:
+            Linear coefficients over inertia [1/s], and quadratic ones over inertia squared times `scale`.
+        """
         inertia = {"force": np.einsum("nii->ni", frame.M), "torque": frame.J}
         values = {}
         for where, half in (("force", slice(0, 3)), ("torque", slice(3, 6))):
@@ -56,7 +76,15 @@ class Drag(Term):
         return Packed(values)
 
     def packed_directions(self, own: Numbers, setting: Setting) -> Packed:
-        """For one axis after the other: the columns of the inverse inertia, each divided by its diagonal element L."""
+        """The numbers for drag along one axis after the other, where inertia is coupled.
+
+        Args:
+            own: The term's numbers by field, each of shape (n, 6).
+            setting: The scene's parameters, the frame and the run.
+
+        Returns:
+            For each axis the column of the inverse inertia, divided by its diagonal element L, and the coefficients times L.
+        """
         frame = setting.frame
         scale = frame.J.max(axis=1)
         inverse = np.linalg.inv(vehicle.inertia6(setting.parameters))
@@ -72,12 +100,12 @@ class Drag(Term):
         return Packed(values)
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """As the matrix that it is the diagonal of."""
+        """The coefficients as diagonal matrices, packed as those of `DragMatrix`."""
         matrices = {kind: own[kind][:, :, None] * np.eye(6) for kind in ("linear", "quadratic")}
         return packed_matrix(matrices["linear"], matrices["quadratic"], setting)
 
     def device_in(self, aligned: bool) -> str:
-        """As of the matrix."""
+        """The device code of `DragMatrix`, in the form for these axes."""
         return "drag_matrix" if aligned else "drag_matrix_turned"
 
 
@@ -89,7 +117,14 @@ def _turned(Q: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
 
 
 def has_exact_flow(frame: Frame) -> bool:
-    """Whether the user's axes are principal axes of M and J, in any order, about the same origin."""
+    """Whether the user's axes are principal axes of M and J, in any order, about the same origin.
+
+    Args:
+        frame: The kernel's frame.
+
+    Returns:
+        True where drag along each axis changes one momentum only, in every member.
+    """
     M = frame.M
     off = np.abs(M[:, ~np.eye(3, dtype=bool)]).max(axis=1)
     diagonal = off <= DIAGONAL * np.abs(np.einsum("nii->ni", M)).max(axis=1)
@@ -98,10 +133,17 @@ def has_exact_flow(frame: Frame) -> bool:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DragMatrix(Term):
-    """force_i = -sum_j (linear_ij + quadratic_ij |v_j|) v_j, forces and torques, velocities and rates (Fossen 2021, 8.1).
+    """Drag by full matrices: force_i = -sum_j (linear_ij + quadratic_ij |v_j|) v_j (Fossen 2021, section 8.1).
 
-    linear: (6, 6) [N s/m, N s, N m s]; quadratic: (6, 6) [N s2/m2 and so on]. Refused if they create energy: the
-    symmetric part of the linear matrix must not be negative, nor that of the quadratic at any velocity tried.
+    i and j run over forces and torques, velocities and angular velocities, relative to the water and about the user's origin.
+
+    Args:
+        linear: Linear coefficients, (6, 6) [N s/m, N s, N m s]; 0 by default.
+        quadratic: Quadratic coefficients, (6, 6) [N s2/m2, N s2, N m s2]; 0 by default.
+
+    Raises:
+        SceneError: Where a matrix creates energy: its power nu.D nu is negative at some velocity (for the quadratic matrix,
+            at one of 4,000 fixed directions). Also as `Term`.
     """
 
     type: ClassVar[str] = "drag_matrix"
@@ -111,7 +153,7 @@ class DragMatrix(Term):
     quadratic: Any = quantity((6, 6), "N s2/m2, N s2, N m s2", ((0.0,) * 6,) * 6)
 
     def check(self, faults: Faults) -> None:
-        """Drag must not create energy."""
+        """Adds a fault where a matrix creates energy."""
         remedy = "drag opposes motion: positive on the diagonal (minus Fossen's X_u, X_u|u| ...), small beside it"
         for kind in ("linear", "quadratic"):
             matrix = getattr(self, kind)
@@ -120,7 +162,7 @@ class DragMatrix(Term):
                 faults.add(kind, matrix, f"creates energy at the velocity {np.round(velocity, 3).tolist()}", remedy)
 
     def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
-        """Also where a member's matrix creates energy."""
+        """In addition, refuses members whose matrix creates energy."""
         bad = super().unphysical(own)
         for kind in ("linear", "quadratic"):
             bad[kind] = bad[kind] | _creates_energy(np.nan_to_num(own[kind]), kind == "quadratic")[0]
@@ -131,18 +173,18 @@ class DragMatrix(Term):
         return bool(np.any(own["linear"]) or np.any(own["quadratic"]))
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """In the axes and about the origin of the forces."""
+        """The matrices in the axes and about the origin of the forces."""
         return packed_matrix(own["linear"], own["quadratic"], setting)
 
     def device_in(self, aligned: bool) -> str:
-        """Where the axes are not the kernel's, velocities along them are to be found first."""
+        """The code that reads matrices directly, or for turned axes the code that first finds the user's velocities."""
         return "drag_matrix" if aligned else "drag_matrix_turned"
 
 
 def _creates_energy(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.ndarray]:
     """Which of the matrices (n, 6, 6) would speed a vehicle up, and the worst velocity (n, 6) for each.
 
-    nu.D nu for linear matrices by their eigenvalues; for quadratic ones, nu.D(|nu|) nu at 4,000 fixed directions.
+    The test is nu.D nu: for linear matrices by eigenvalues, for quadratic ones at 4,000 fixed directions.
     """
     limit = -1e-9 * np.abs(matrices).max(axis=(1, 2))
     if not quadratic:
@@ -153,19 +195,28 @@ def _creates_energy(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, 
     products = np.einsum("ki,kj->kij", directions, np.abs(directions) * directions).reshape(-1, 36)
     bad, worst = np.zeros(len(matrices), bool), np.zeros((len(matrices), 6))
     for first in range(0, len(matrices), 1024):  # 33 MB at a time
-        part = slice(first, first + 1024)
-        power = products @ matrices[part].reshape(-1, 36).T
+        chunk = slice(first, first + 1024)
+        power = products @ matrices[chunk].reshape(-1, 36).T
         lowest = power.argmin(axis=0)
-        bad[part], worst[part] = power.min(axis=0) < limit[part], directions[lowest]
+        bad[chunk], worst[chunk] = power.min(axis=0) < limit[chunk], directions[lowest]
     return bad, worst
 
 
 def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, setting: Setting) -> Packed:
-    """Rows: the linear matrix, then the quadratic one.
+    """Device rows of drag matrices: the linear matrix, then the quadratic one.
 
-    Or, where the axes are not the kernel's, for each velocity that has a quadratic column its twist (6) and its wrench (6).
+    Where the kernel's axes are turned, the quadratic part is given for each velocity that has a column: its twist (6), which
+    measures the velocity, and its wrench (6).
+
+    Args:
+        linear: Linear coefficients (n, 6, 6), user's axes and origin.
+        quadratic: Quadratic coefficients (n, 6, 6), user's axes and origin.
+        setting: The scene's parameters, the frame and the run.
+
+    Returns:
+        The rows, and which parts are present.
     """
-    # The user's velocities from those at the origin of the forces in the kernel's axes.
+    # X gives the user's velocities from those at the origin of the forces in the kernel's axes.
     X = motion_from(setting.frame.forces, setting.frame.Q)
     n = max(len(linear), len(quadratic), len(X))
     X = np.broadcast_to(X, (n, 6, 6))

@@ -1,4 +1,4 @@
-"""Events: conditions that stop a member, with a status of their own and the time."""
+"""Events: conditions that stop a member. Each has a status of its own, and the run records the time."""
 
 from __future__ import annotations
 
@@ -15,10 +15,13 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, build, 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Event(Term):
-    """A condition with a distance that is positive while a member goes on; it stops where the distance is 0 or below.
+    """A condition that stops a member as soon as its distance, positive while the member goes on, is 0 or below.
 
-    device: the name of a module of lgvi_kernels.stops, or any object with `params(width, real)` and
-    `distance(view, p)`. status: what a member that stopped has.
+    Class attributes: `device` is the name of a module of lgvi_kernels.stops, or any object with `params(width, real)` and
+    `distance(view, p)`; `status` is the status of a member that it stopped.
+
+    Args:
+        name: Name of the event in parameters ("name.field"); by default its type.
     """
 
     status: ClassVar[Status] = Status.CONDITION
@@ -26,15 +29,16 @@ class Event(Term):
     acts: ClassVar[bool] = False
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """Its numbers as they are: events look at the position of the body's origin, in inertial axes."""
+        """The numbers unchanged: events look at the position of the body's origin, in inertial axes."""
         return Packed(dict(own))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Surface(Event):
-    """The body's origin rises to a depth.
+    """Stop where the body's origin rises to a depth.
 
-    depth [m], 0 at the surface.
+    Args:
+        depth: Depth [m]; 0 by default, the surface.
     """
 
     type: ClassVar[str] = "surface"
@@ -46,9 +50,10 @@ class Surface(Event):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Floor(Event):
-    """The body's origin sinks to the sea floor.
+    """Stop where the body's origin sinks to the sea floor.
 
-    depth [m].
+    Args:
+        depth: Depth of the floor [m].
     """
 
     type: ClassVar[str] = "floor"
@@ -60,9 +65,11 @@ class Floor(Event):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Box(Event):
-    """The body's origin leaves a box.
+    """Stop where the body's origin leaves a box.
 
-    lower, upper: (3,) [m], inertial corners.
+    Args:
+        lower: Lower corner, shape (3,) [m], in inertial axes.
+        upper: Upper corner, shape (3,) [m], in inertial axes; above `lower` on each axis.
     """
 
     type: ClassVar[str] = "box"
@@ -73,13 +80,13 @@ class Box(Event):
     upper: Any = quantity((3,), "m")
 
     def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
-        """Also where a member's corners span no box."""
+        """In addition, refuses members whose corners span no box."""
         bad = super().unphysical(own)
         crossed = np.any(own["upper"] <= own["lower"], axis=1)
         return {"lower": bad["lower"] | crossed, "upper": bad["upper"] | crossed}
 
     def check(self, faults: Faults) -> None:
-        """The corners must span a box."""
+        """Adds a fault where the corners span no box."""
         if np.any(self.upper <= self.lower):
             faults.add(
                 "upper", self.upper, f"is not above lower = {self.lower.tolist()}", "give upper > lower on each axis"
@@ -88,9 +95,10 @@ class Box(Event):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StopTime(Event):
-    """A time after which a member stops.
+    """Stop a member at a time.
 
-    at [s].
+    Args:
+        at: Time [s], from 0.
     """
 
     type: ClassVar[str] = "time"
@@ -106,23 +114,33 @@ TYPES.update({kind.type: kind for kind in (Surface, Floor, Box, StopTime)})
 
 
 def from_list(given: Any) -> tuple[Event, ...]:
-    """Events from tables of a scene file or Event objects. Raises SceneError naming every fault."""
+    """Build the events of a scene.
+
+    Args:
+        given: A list of tables of a scene file, of `Event` objects, or of both.
+
+    Returns:
+        The events, in the same order.
+
+    Raises:
+        SceneError: Where an entry is no event. The message lists every fault.
+    """
     if not isinstance(given, Sequence) or isinstance(given, str):
         raise SceneError(
             [f"events = {shown(given)}: is no list; write [[events]] and type = ... below, or events=[lw.Surface()]"]
         )
     few_enough("events", given)
-    faults, found = Faults(), list[Event]()
-    for i, one in enumerate(given):
+    faults, events = Faults(), list[Event]()
+    for i, entry in enumerate(given):
         with faults.including():
-            if isinstance(one, Event):
-                found.append(one)
+            if isinstance(entry, Event):
+                events.append(entry)
                 continue
-            word = one.get("type", "") if isinstance(one, Mapping) else one
-            kind = TYPES.get(word) if isinstance(one, Mapping) and isinstance(word, str) else None
+            word = entry.get("type", "") if isinstance(entry, Mapping) else entry
+            kind = TYPES.get(word) if isinstance(entry, Mapping) and isinstance(word, str) else None
             if kind is None:
                 faults.add(f"events[{i}].type", word, "is not known", closest(str(word), TYPES))
             else:
-                found.append(build(f"events[{i}]", kind, one))
+                events.append(build(f"events[{i}]", kind, entry))
     faults.raise_if_any()
-    return tuple(found)
+    return tuple(events)

@@ -11,17 +11,27 @@ from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantity
 
-# A normal that differs from the chord by a smaller sine has no direction of its own.
+# Below this sine of the angle between them, chord and normal count as parallel.
 PARALLEL = 1e-6
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Fins(Term):
-    """n fins, each with lift rho A/2 lift_slope sin(a) cos(a) V^2 and drag rho A/2 (drag + drag_normal sin^2 a) V^2.
+    """n fixed fins with lift rho A/2 lift_slope sin(a) cos(a) V^2 and drag rho A/2 (drag + drag_normal sin^2 a) V^2.
 
-    position: (n, 3) [m] from the body's origin; chord: (n, 3), ahead, and normal: (n, 3), of any length but 0, the normal
-    made orthogonal to the chord; area: (n,) [m2]; lift_slope: (n,) [1/rad]; drag, drag_normal: (n,), the latter 0 by
-    default. One number stands for n equal ones. V and a are those of the flow in the plane of chord and normal.
+    V and a are speed and angle of the flow in the plane of chord and normal. One number stands for n equal ones.
+
+    Args:
+        position: Where each fin's force acts, (n, 3) [m] from the body's origin.
+        chord: Direction from trailing to leading edge, (n, 3), of any length but 0.
+        normal: Direction of lift, (n, 3), of any length but 0; it is made orthogonal to the chord.
+        area: Area A, (n,) [m2].
+        lift_slope: Slope of the lift coefficient, (n,) [1/rad].
+        drag: Drag coefficient along the flow, (n,).
+        drag_normal: Drag coefficient that grows with sin^2 a, (n,); 0 by default.
+
+    Raises:
+        SceneError: Where chord and normal span no plane, and as `Term`.
     """
 
     type: ClassVar[str] = "fins"
@@ -40,7 +50,11 @@ class Fins(Term):
         super().__post_init__()
 
     def repeat(self, *names: str) -> None:
-        """One number for every fin, where one is given for all."""
+        """Replace one number by n equal ones, where one is given for all fins.
+
+        Args:
+            names: Names of the fields.
+        """
         count = len(np.atleast_1d(np.asarray(self.position, dtype=object)))
         for name in names:
             value = getattr(self, name)
@@ -48,7 +62,7 @@ class Fins(Term):
                 object.__setattr__(self, name, np.array([value] * count))
 
     def check(self, faults: Faults) -> None:
-        """Chord and normal need directions, not the same one."""
+        """Adds a fault where chord and normal of a fin span no plane."""
         for i, (chord, normal) in enumerate(zip(self.chord, self.normal, strict=True)):
             if not np.any(chord):
                 remedy = "give the direction from trailing to leading edge, such as [1, 0, 0]"
@@ -59,7 +73,7 @@ class Fins(Term):
                 faults.add(f"normal[{i}]", normal, "is along the chord", "give a direction across the fin's plane")
 
     def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
-        """Also where a member's chord and normal leave no plane."""
+        """In addition, refuses members whose chord and normal span no plane."""
         bad = super().unphysical(own)
         chord, normal = np.nan_to_num(own["chord"]), np.nan_to_num(own["normal"])
         bad["chord"] = bad["chord"] | ~np.all(np.any(chord, axis=-1), axis=-1)
@@ -67,7 +81,7 @@ class Fins(Term):
         return bad
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """Rows as the device code has them."""
+        """Device rows of each fin, see `fin_rows`."""
         rows = fin_rows(own, setting)
         count = rows.shape[1]
         return Packed({"count": count}, rows.reshape(len(rows), -1), work=2 * count)
@@ -80,9 +94,16 @@ def _degenerate(chord: np.ndarray, normal: np.ndarray) -> Any:
 
 
 def fin_rows(own: Numbers, setting: Setting) -> np.ndarray:
-    """(n, fins, 51): the twists along chord and normal, rho A/2 times lift slope and the drag coefficients, S and W.
+    """Device rows of fins: the twists c and n along chord and normal, rho A/2 times the three coefficients, and S and W.
 
-    S = c c^T + n n^T and W = n c^T - c n^T of these twists c and n, block by block (kernels: terms/fins.py).
+    S = c c^T + n n^T and W = n c^T - c n^T, block by block (lgvi_kernels/terms/fins.py).
+
+    Args:
+        own: The term's numbers by field, each of shape (members, fins, ...).
+        setting: The scene's parameters, the frame and the run.
+
+    Returns:
+        Rows (members, fins, 51).
     """
     chord = own["chord"] / np.linalg.norm(own["chord"], axis=-1, keepdims=True)
     normal = own["normal"] - np.sum(own["normal"] * chord, axis=-1, keepdims=True) * chord
@@ -94,21 +115,37 @@ def fin_rows(own: Numbers, setting: Setting) -> np.ndarray:
     S, W = cc + nn, nc - np.swapaxes(nc, -1, -2)
     off = ([1, 2, 0], [2, 0, 1])
     blocks: list[np.ndarray] = []
-    for part in (slice(0, 3), slice(3, 6)):
-        s, w = S[..., part, part], W[..., part, part]
+    for half_twist in (slice(0, 3), slice(3, 6)):
+        s, w = S[..., half_twist, half_twist], W[..., half_twist, half_twist]
         blocks.append(np.concatenate([np.diagonal(s, axis1=-2, axis2=-1), s[..., *off], w[..., *off]], axis=-1))
-    between = [one[..., :3, 3:].reshape(*one.shape[:-2], 9) for one in (S, W)]
+    between = [matrix[..., :3, 3:].reshape(*matrix.shape[:-2], 9) for matrix in (S, W)]
     return side_by_side([c, n, *(size[..., None] for size in sizes), blocks[0], *between, blocks[1]])
 
 
 def twist(frame: Frame, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """(n, ..., 6): what measures the velocity of a point along a unit vector, and the wrench of a unit force there."""
+    """Rows that measure the velocity of a point along a unit vector, which are also the wrench of a unit force there.
+
+    Args:
+        frame: The kernel's frame.
+        point: Points (n, ..., 3) [m] from the user's origin, user's axes.
+        direction: Unit vectors (n, ..., 3), user's axes.
+
+    Returns:
+        Twists (n, ..., 6), linear part first, in the kernel's axes about the origin of the forces.
+    """
     n = max(len(frame.Q), len(frame.forces), len(point), len(direction))
-    point, direction = (np.broadcast_to(one, (n, *one.shape[1:])) for one in (point, direction))
+    point, direction = (np.broadcast_to(vectors, (n, *vectors.shape[1:])) for vectors in (point, direction))
     return np.concatenate([frame.vector(direction), frame.torque(np.cross(point, direction), direction)], axis=-1)
 
 
 def side_by_side(parts: list[np.ndarray]) -> np.ndarray:
-    """(1 or n, k, d) joined along d."""
-    n = max(len(part) for part in parts)
-    return np.concatenate([np.broadcast_to(part, (n, *part.shape[1:])) for part in parts], axis=-1)
+    """Join arrays along the last dimension; a leading dimension of 1 is repeated.
+
+    Args:
+        parts: Arrays (1 or n, k, d).
+
+    Returns:
+        One array (n, k, sum of d).
+    """
+    n = max(len(block) for block in parts)
+    return np.concatenate([np.broadcast_to(block, (n, *block.shape[1:])) for block in parts], axis=-1)

@@ -1,4 +1,4 @@
-"""A uniform current that wanders at random, each member's its own."""
+"""A uniform current that varies at random in time, independently for each member."""
 
 from __future__ import annotations
 
@@ -19,10 +19,15 @@ STARTS = ("zero", "stationary")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class GaussMarkovCurrent(Term):
-    """u' = -u / time_constant + noise, everywhere the same: a first-order Gauss-Markov process.
+    """A uniform current u' = -u / time_constant + noise: a first-order Gauss-Markov process for each member.
 
-    standard_deviation: (3,) [m/s], inertial, of u in the long run; time_constant [s], above 0. start: "zero", u = 0 at
-    t = 0, or "stationary", u drawn with the standard deviation.
+    Args:
+        standard_deviation: Standard deviation of u in the long run, (3,) [m/s], in inertial axes.
+        time_constant: Correlation time [s], above 0.
+        start: "zero", the default: u = 0 at t = 0; or "stationary": u is drawn with the standard deviation.
+
+    Raises:
+        SceneError: Where the time constant is not above 0, and as `Term`.
     """
 
     type: ClassVar[str] = "gauss_markov_current"
@@ -34,26 +39,26 @@ class GaussMarkovCurrent(Term):
     start: str = "zero"
 
     def check(self, faults: Faults) -> None:
-        """The time constant must be positive."""
+        """Adds a fault where the time constant is not above 0, or `start` is unknown."""
         above_zero(faults, "time_constant", self.time_constant, "s")
         faults.choice("start", self.start, STARTS)
 
     def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
-        """The time constant must be positive."""
+        """In addition, refuses members whose time constant is not above 0."""
         bad = super().unphysical(own)
         return bad | {"time_constant": bad["time_constant"] | not_above_zero(own["time_constant"])}
 
     def present(self, own: Numbers) -> bool:
-        """Whether some member has one."""
+        """Whether some standard deviation is not zero."""
         return bool(np.any(own["standard_deviation"]))
 
     @property
     def memory(self) -> bool:
-        """It remembers the current."""
+        """Always true: the current itself is remembered."""
         return True
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """The process over one step, exactly; what it remembers: u, u and du/dt."""
+        """Decay and spread of the process over one step, exact; the memory holds u twice and du/dt."""
         steps = setting.h / own["time_constant"]
         spread = own["standard_deviation"] * np.sqrt(-np.expm1(-2.0 * steps))[:, None]
         first = self._first(own, setting)
@@ -61,11 +66,11 @@ class GaussMarkovCurrent(Term):
         return Packed(values, memory=np.concatenate([first, first, np.zeros_like(first)], axis=1))
 
     def water_at_start(self, own: Numbers, position: np.ndarray, setting: Setting) -> np.ndarray:
-        """Velocity of the water (m, 3) [m/s] where members start."""
+        """The current (n, 3) [m/s] of each member at t = 0."""
         return np.broadcast_to(self._first(own, setting), position.shape)
 
     def _first(self, own: Numbers, setting: Setting) -> np.ndarray:
-        """u at t = 0, (1 or m, 3): keyed by seed, member and the term's name, as what varies from member to member."""
+        """u at t = 0, (1 or n, 3) [m/s], drawn by seed, member and the term's name, as every number that varies by member."""
         if self.start == "zero":
             return np.zeros((1, 3))
         name, members = f"{self.key}.start", setting.members

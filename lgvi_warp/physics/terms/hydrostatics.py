@@ -1,4 +1,4 @@
-"""Weight, buoyancy and restoring moment: they follow from the vehicle, and no scene needs to list them."""
+"""Weight, buoyancy and restoring moment. They follow from the vehicle, so that no scene needs to list them."""
 
 from __future__ import annotations
 
@@ -13,54 +13,68 @@ from lgvi_warp.physics.terms.base import CONSERVED, Numbers, Packed, Setting, Te
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Weight(Term):
-    """Weight less buoyancy, along the vertical (section IV of Nordkvist & Sanyal 2010)."""
+    """Weight less buoyancy, along the vertical (section IV of Nordkvist & Sanyal 2010). It takes no numbers."""
 
     type: ClassVar[str] = "weight"
     device: ClassVar[str] = "weight"
 
     @property
     def conserves(self) -> frozenset[str]:
-        """All: its potential depends on depth alone."""
+        """All three: its potential depends on depth alone."""
         return CONSERVED
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """(m - rho V) g cancels: formed here in float64, whatever the kernel's precision."""
+        """The net force (m - rho V) g, formed here in float64 since it cancels, whatever the kernel's precision."""
         return Packed({"net": net(setting.parameters)})
 
     def potential(self, own: Numbers, position: np.ndarray, attitude: np.ndarray, setting: Numbers) -> np.ndarray:
-        """U = -net b3."""
+        """Energy U = -net b3, (k, n) [J], b3 the depth."""
         return -net(setting) * position[..., 2]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Restoring(Term):
-    """Moment of buoyancy and weight about the body's origin (section IV of Nordkvist & Sanyal 2010)."""
+    """Moment of buoyancy and weight about the body's origin (section IV of Nordkvist & Sanyal 2010). It takes no numbers."""
 
     type: ClassVar[str] = "restoring"
     device: ClassVar[str] = "restoring"
 
     @property
     def conserves(self) -> frozenset[str]:
-        """All: its potential depends on the attitude to the vertical alone."""
+        """All three: its potential depends only on the attitude relative to the vertical."""
         return CONSERVED
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """B r_b - W r_g about the origin of the forces."""
+        """The vector B r_b - W r_g [N m] about the origin of the forces, in the kernel's axes."""
         p, origin = setting.parameters, setting.frame.forces
         return Packed({"moment": setting.frame.vector(moment(p) + net(p)[:, None] * origin)})
 
     def potential(self, own: Numbers, position: np.ndarray, attitude: np.ndarray, setting: Numbers) -> np.ndarray:
-        """U = (B r_b - W r_g).R^T e3."""
+        """Energy U = (B r_b - W r_g).R^T e3, (k, n) [J]."""
         return np.sum(moment(setting) * attitude[..., 2, :], axis=-1)
 
 
 def net(p: Numbers) -> np.ndarray:
-    """Weight less buoyancy (n,) [N]."""
+    """Weight less buoyancy, the net force downward.
+
+    Args:
+        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+
+    Returns:
+        Force (n,) [N], negative where buoyancy is the larger.
+    """
     return vehicle.weight(p) - p["vehicle.buoyancy"]
 
 
 def moment(p: Numbers) -> np.ndarray:
-    """B r_b - W r_g about the user's origin (n, 3) [N m]."""
+    """The vector B r_b - W r_g about the user's origin, from which the restoring moment follows.
+
+    Args:
+        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+
+    Returns:
+        Vectors (n, 3) [N m] in body axes.
+    """
     lift = p["vehicle.buoyancy"][:, None] * p["vehicle.center_of_buoyancy"]
     if "vehicle.center_of_gravity" not in p:
         return lift

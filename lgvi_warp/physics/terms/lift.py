@@ -13,10 +13,13 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantit
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BodyLift(Term):
-    """force_i = -u sum_j matrix_ij v_j, forces and torques, velocities and rates; u the speed along the body's x axis.
+    """Lift of a hull in proportion to its speed ahead: force_i = -u sum_j matrix_ij v_j, u the speed along the body's x axis.
 
-    matrix: (6, 6) [kg/m, kg, kg m]: minus Prestero's Y_uv, Z_uw, M_uw, N_uv ... (2001). Any is taken: an empirical law
-    may speed the vehicle up.
+    i and j run over forces and torques, velocities and angular velocities. Any matrix is allowed: an empirical law may speed
+    the vehicle up.
+
+    Args:
+        matrix: Coefficients, (6, 6) [kg/m, kg, kg m]: minus Prestero's (2001) Y_uv, Z_uw, M_uw, N_uv and so on.
     """
 
     type: ClassVar[str] = "body_lift"
@@ -30,7 +33,7 @@ class BodyLift(Term):
         return bool(np.any(own["matrix"]))
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """Rows: what measures u (6), and the matrix (36), in the axes and about the origin of the forces."""
+        """Rows that measure u (6), and the matrix (36), in the axes and about the origin of the forces."""
         X = motion_from(setting.frame.forces, setting.frame.Q)
         matrix = np.swapaxes(X, 1, 2) @ own["matrix"] @ X
         ahead = np.broadcast_to(X[:, 0, :], (len(matrix), 6))

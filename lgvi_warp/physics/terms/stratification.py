@@ -12,9 +12,14 @@ from lgvi_warp.physics.terms.base import CONSERVED, Numbers, Packed, Setting, Te
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Stratification(Term):
-    """Buoyancy B (1 + gradient (d - reference_depth)), d the depth of the centre of buoyancy, B the vehicle's.
+    """Buoyancy that varies with depth: B (1 + gradient (d - reference_depth)), d the depth of the centre of buoyancy.
 
-    gradient [1/m]: positive where denser water lies below, negative for a hull that yields; reference_depth [m].
+    B is the vehicle's buoyancy.
+
+    Args:
+        gradient: Relative change of buoyancy per depth [1/m]: positive where denser water lies below, negative for a hull
+            that is compressed.
+        reference_depth: Depth [m] at which buoyancy is B; 0 by default.
     """
 
     type: ClassVar[str] = "stratification"
@@ -24,22 +29,22 @@ class Stratification(Term):
     reference_depth: Any = quantity((), "m", 0.0)
 
     def present(self, own: Numbers) -> bool:
-        """Whether some member has one."""
+        """Whether the gradient of some member is not zero."""
         return bool(np.any(own["gradient"]))
 
     @property
     def conserves(self) -> frozenset[str]:
-        """All: its potential depends on the depth of the centre of buoyancy alone."""
+        """All three: its potential depends on the depth of the centre of buoyancy alone."""
         return CONSERVED
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """The deviation from B alone: B is the vehicle's weight less buoyancy's."""
+        """Only the deviation from B, since B itself is part of `Weight`."""
         center = setting.frame.point(setting.parameters["vehicle.center_of_buoyancy"])
         stiffness = setting.parameters["vehicle.buoyancy"] * own["gradient"]
         return Packed({"stiffness": stiffness, "center": center, "reference_depth": own["reference_depth"]})
 
     def potential(self, own: Numbers, position: np.ndarray, attitude: np.ndarray, setting: Numbers) -> np.ndarray:
-        """U = B gradient (d - d0)^2 / 2."""
+        """Energy U = B gradient (d - reference_depth)^2 / 2, (k, n) [J]."""
         center = np.sum(setting["vehicle.center_of_buoyancy"] * attitude[..., 2, :], axis=-1)
         depth = position[..., 2] + center - own["reference_depth"]
         return 0.5 * setting["vehicle.buoyancy"] * own["gradient"] * depth**2

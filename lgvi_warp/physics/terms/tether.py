@@ -12,9 +12,13 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantit
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Tether(Term):
-    """Tension stiffness (length - rest_length) from anchor to attachment, slack when shorter.
+    """A spring from a fixed anchor to a point of the vehicle: tension stiffness (length - rest_length), slack if shorter.
 
-    anchor: (3,) [m, inertial]; stiffness [N/m]; attachment: (3,) [m] from the body's origin; rest_length [m].
+    Args:
+        anchor: Fixed end, (3,) [m], in inertial axes.
+        stiffness: Stiffness [N/m].
+        attachment: End on the vehicle, (3,) [m] from the body's origin; by default the origin.
+        rest_length: Length without tension [m]; 0 by default.
     """
 
     type: ClassVar[str] = "tether"
@@ -27,16 +31,16 @@ class Tether(Term):
 
     @property
     def conserves(self) -> frozenset[str]:
-        """Energy: the anchor takes up momentum."""
+        """Energy only: the anchor takes up momentum."""
         return frozenset({"energy"})
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """The attachment from the origin of the forces."""
+        """The numbers, with the attachment from the origin of the forces in the kernel's axes."""
         values = {key: own[key] for key in ("anchor", "stiffness", "rest_length")}
         return Packed(values | {"attachment": setting.frame.point(own["attachment"])})
 
     def potential(self, own: Numbers, position: np.ndarray, attitude: np.ndarray, setting: Numbers) -> np.ndarray:
-        """U = k max(length - L0, 0)^2 / 2."""
+        """Energy U = stiffness max(length - rest_length, 0)^2 / 2, (k, n) [J]."""
         end = position + np.einsum("knij,nj->kni", attitude, np.broadcast_to(own["attachment"], position.shape[1:]))
         stretch = np.maximum(np.linalg.norm(end - own["anchor"], axis=-1) - own["rest_length"], 0.0)
         return 0.5 * own["stiffness"] * stretch**2

@@ -16,12 +16,26 @@ from lgvi_warp.physics.terms.wrench import commands, first_row, not_rising, refu
 class Thrusters(Term):
     """n thrusters, each with thrust = c+ f+(max(u - band, 0)) - c- f-(max(-u - band, 0)) along its direction (Fossen 2021, 9).
 
-    f+(w) = polynomial_1 w + polynomial_2 w^2 + ..., by default w^2; f-: polynomial_astern, by default f+.
-    position: (n, 3) [m] from the body's origin; direction: (n, 3), any length but 0; coefficient: (n,) [N per unit of f]
-    ahead, 1 by default where a polynomial [N] is given; coefficient_astern: (n,), the same by default; polynomial,
-    polynomial_astern: (p,), of all thrusters, from the first power up; dead_band, limit: (n,) of the command;
-    time_constant: (n,) [s] of the first-order lag from command to u, 0 for none; command: (n,), held, or with times (k,)
-    [s], rising: command_schedule (k, n), linear between. The unit of command is the user's: 1, V or rad/s.
+    f(w) = polynomial_1 w + polynomial_2 w^2 + ..., by default w^2. u is the command within its limit, after the lag. One
+    number stands for n equal ones. The unit of the command is the user's: 1, V or rad/s.
+
+    Args:
+        position: Where each thrust acts, (n, 3) [m] from the body's origin.
+        direction: Direction in which it pushes the vehicle, (n, 3), of any length but 0.
+        coefficient: Coefficient c+ ahead, (n,) [N per unit of f]; 1 by default where a polynomial [N] is given.
+        coefficient_astern: Coefficient c- astern, (n,) [N per unit of f]; by default that ahead.
+        polynomial: Polynomial f+ of all thrusters, (p,), from the first power up; w^2 by default.
+        polynomial_astern: Polynomial f- of all thrusters, (q,), from the first power up; by default that ahead.
+        dead_band: Size of the command below which there is no thrust, (n,) [unit]; 0 by default.
+        limit: Largest size of the command, (n,) [unit]; 1e6 by default.
+        time_constant: Time constant of the first-order lag from the command to u, (n,) [s]; 0 by default, no lag.
+        command: Command that is held, (n,) [unit]; 0 by default.
+        times: Times of the schedule, (k,) [s], rising.
+        command_schedule: Commands at these times, (k, n) [unit], linear between them; instead of `command`.
+
+    Raises:
+        SceneError: Where a direction has no length, times do not rise, the command is given twice, or neither a coefficient
+            nor a polynomial is given. Also as `Term`.
     """
 
     type: ClassVar[str] = "thrusters"
@@ -72,7 +86,7 @@ class Thrusters(Term):
         super().__post_init__()
 
     def _check_polynomial_given(self) -> None:
-        """Raises SceneError if neither coefficient nor polynomial says what the thrust is."""
+        """Raise SceneError where neither a coefficient nor a polynomial is given."""
         if self.polynomial is None:
             faults = Faults(f"{self.key}.")
             faults.add("coefficient", None, "is missing", "give (n,) [N per unit^2], or a polynomial [N]")
@@ -80,40 +94,54 @@ class Thrusters(Term):
 
     @property
     def is_square(self) -> bool:
-        """Whether both curves are w^2."""
+        """Whether the curves ahead and astern are both w^2."""
         return all(np.array_equal(curve, SQUARE) for curve in (self.polynomial, self.polynomial_astern))
 
     def device_in(self, aligned: bool) -> str:
-        """Code that evaluates polynomials only where one is given."""
+        """The code that evaluates polynomials only where one is given."""
         return self.device if self.is_square else "thrusters_polynomial"
 
     def to_dict(self) -> dict[str, Any]:
-        """As in a scene file: polynomials only where they are not w^2."""
+        """The term as a table of a scene file; polynomials only where they are not w^2."""
         content = super().to_dict()
         return {key: value for key, value in content.items() if not (self.is_square and key.startswith("polynomial"))}
 
     def thrust(self, command: Any) -> np.ndarray:
-        """Thrust (n,) or (k, n) [N] at commands (n,) or (k, n), within their limits, after the lag."""
+        """Steady thrust at given commands, within their limits, after the lag.
+
+        Args:
+            command: Commands (n,) or (k, n) [unit of the command].
+
+        Returns:
+            Thrust (n,) or (k, n) [N] along each direction.
+        """
         u = np.clip(np.asarray(command, dtype=np.float64), -self.limit, self.limit)
         ahead = evaluate(self.polynomial, np.maximum(u - self.dead_band, 0.0))
         astern = evaluate(self.polynomial_astern, np.maximum(-u - self.dead_band, 0.0))
         return np.asarray(self.coefficient * ahead - self.coefficient_astern * astern)
 
     def command_for(self, thrust: Any) -> np.ndarray:
-        """The least commands (n,) for thrusts (n,) [N]; where a curve does not reach one, that of its greatest thrust."""
-        found = np.zeros(len(self.coefficient))
-        for i, wanted in enumerate(np.broadcast_to(np.asarray(thrust, dtype=np.float64), found.shape)):
+        """The smallest commands that give these thrusts.
+
+        Args:
+            thrust: Thrusts (n,), or one number for all [N].
+
+        Returns:
+            Commands (n,) [unit of the command]; where a curve does not reach the thrust, the command of its largest thrust.
+        """
+        least_commands = np.zeros(len(self.coefficient))
+        for i, wanted in enumerate(np.broadcast_to(np.asarray(thrust, dtype=np.float64), least_commands.shape)):
             side = 1.0 if wanted > 0.0 else -1.0
             curve, gain = (
                 (self.polynomial, self.coefficient) if side > 0.0 else (self.polynomial_astern, self.coefficient_astern)
             )
             if wanted and gain[i] > 0.0:
                 reach = max(self.limit[i] - self.dead_band[i], 0.0)
-                found[i] = side * (self.dead_band[i] + solve(curve, abs(wanted) / gain[i], reach))
-        return np.clip(found, -self.limit, self.limit)
+                least_commands[i] = side * (self.dead_band[i] + solve(curve, abs(wanted) / gain[i], reach))
+        return np.clip(least_commands, -self.limit, self.limit)
 
     def check(self, faults: Faults) -> None:
-        """Directions need a length, times must rise, a command is given in one way."""
+        """Adds a fault where a direction has no length, times do not rise, or the command is given twice."""
         zero = np.flatnonzero(np.linalg.norm(self.direction, axis=1) == 0.0)
         if len(zero):
             remedy = "give the direction that the thrust pushes the vehicle, such as [1, 0, 0]"
@@ -123,7 +151,10 @@ class Thrusters(Term):
             faults.add("command", self.command, "differs from the first of command_schedule", "keep one of them")
 
     def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
-        """Also a direction without length and times that do not rise. Raises SceneError for numbers that would not act."""
+        """In addition, refuses directions without length and times that do not rise.
+
+        Raises SceneError for members' numbers that would have no effect.
+        """
         bad = super().unphysical(own)
         bad["direction"] = bad["direction"] | np.any(~np.any(own["direction"], axis=-1), axis=-1)
         bad["times"] = bad["times"] | not_rising(own["times"])
@@ -133,32 +164,32 @@ class Thrusters(Term):
         return bad
 
     def _refuse_idle_polynomial(self, own: Numbers) -> None:
-        """Refuse members' polynomials in a scene that has none: its code does not look at them."""
+        """Refuse members' polynomials in a scene that has none, since its device code does not read them."""
         faults = Faults(f"{self.key}.")
         for name in ("polynomial", "polynomial_astern"):
             if self.is_square and not np.all(own[name] == SQUARE):
-                what = "does not act: the scene has none"
-                faults.add(name, own[name][0], what, f"give {self.key}.{name} in the scene as well")
+                fault = "does not act: the scene has none"
+                faults.add(name, own[name][0], fault, f"give {self.key}.{name} in the scene as well")
         faults.raise_if_any()
 
     @property
     def memory(self) -> bool:
-        """Whether some thruster lags."""
+        """Whether some thruster has a lag."""
         return bool(np.any(self.time_constant > 0.0))
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """Rows as the device code has them: each thruster's, then each one's commands."""
+        """The device rows: those of each thruster, then the command table of each thruster."""
         direction = own["direction"] / np.linalg.norm(own["direction"], axis=-1, keepdims=True)
         arms = np.cross(own["position"] + 0.0 * direction, direction + 0.0 * own["position"])
         force, torque = setting.frame.vector(direction), setting.frame.torque(arms, direction + 0.0 * arms)
         with np.errstate(divide="ignore"):
             rate = np.where(own["time_constant"] > 0.0, 1.0 / own["time_constant"], FAST)
         numbers = [own[key] for key in ("coefficient", "coefficient_astern", "dead_band", "limit")]
-        parts = [force, torque, *(x[..., None] for x in (*numbers, rate))]
+        blocks = [force, torque, *(x[..., None] for x in (*numbers, rate))]
         times, schedule = commands(own)
-        n = max(*(len(part) for part in parts), len(times), len(schedule))
-        whole = [np.broadcast_to(part, (n, *part.shape[1:])) for part in parts]
-        rows = [np.concatenate(whole, axis=2).reshape(n, -1)]
+        n = max(*(len(block) for block in blocks), len(times), len(schedule))
+        columns = [np.broadcast_to(block, (n, *block.shape[1:])) for block in blocks]
+        rows = [np.concatenate(columns, axis=2).reshape(n, -1)]
         for i in range(schedule.shape[2]):
             table = knots(times, schedule[:, :, i : i + 1])
             rows.append(np.broadcast_to(table, (n, table.shape[1])))
@@ -167,8 +198,8 @@ class Thrusters(Term):
         if not self.is_square:
             curves, powers = side_by_side(own["polynomial"], own["polynomial_astern"])
             rows.append(curves)
-            n = max(len(part) for part in rows)
-            rows = [np.broadcast_to(part, (n, part.shape[1])) for part in rows]
+            n = max(len(block) for block in rows)
+            rows = [np.broadcast_to(block, (n, block.shape[1])) for block in rows]
         values = {"count": count, "knots": times.shape[1] - 1, "lagged": int(self.memory)}
         values |= {} if self.is_square else {"powers": powers}
         if not self.memory:
@@ -178,16 +209,24 @@ class Thrusters(Term):
         return Packed(values, np.concatenate(rows, axis=1), start)
 
 
-# 1 / time constant of a thruster without a lag, among others that have one: faster than any step, and within float32.
+# 1 / time constant of a thruster without lag beside others with one: faster than any step, and within float32.
 FAST = 1e20
 
 
-# w^2, from the first power up.
+# The curve w^2, coefficients from the first power up.
 SQUARE = (0.0, 1.0)
 
 
 def evaluate(polynomial: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """p_1 w + p_2 w^2 + ..., of the shape of w."""
+    """Value of a polynomial without a constant, p_1 w + p_2 w^2 + ...
+
+    Args:
+        polynomial: Coefficients from the first power up.
+        w: Arguments, of any shape.
+
+    Returns:
+        Values in the shape of `w`.
+    """
     value = np.zeros_like(w)
     for coefficient in polynomial[::-1]:
         value = (value + coefficient) * w
@@ -195,7 +234,16 @@ def evaluate(polynomial: np.ndarray, w: np.ndarray) -> np.ndarray:
 
 
 def solve(polynomial: np.ndarray, wanted: float, reach: float) -> float:
-    """The least w in 0 ... reach at which a polynomial has that value; where it has not, that of its greatest value."""
+    """The smallest w in [0, reach] at which a polynomial without a constant has a given value.
+
+    Args:
+        polynomial: Coefficients from the first power up.
+        wanted: The value, above 0.
+        reach: Upper end of the interval.
+
+    Returns:
+        That w; where the polynomial does not reach the value, the w of its largest value.
+    """
     powers = np.concatenate([[-wanted], polynomial])
     slope = np.polynomial.polynomial.polyder(powers)
     turns = _within(np.polynomial.polynomial.polyroots(slope), reach)
@@ -203,7 +251,7 @@ def solve(polynomial: np.ndarray, wanted: float, reach: float) -> float:
     values = evaluate(polynomial, places)
     if values.max() <= wanted:
         return float(places[values.argmax()])
-    # Monotonic between its turns: the first stretch on whose end it is above what is wanted holds the root.
+    # The polynomial is monotonic between its turns: the first interval at whose end it reaches the value has the root.
     i = int((values >= wanted).argmax())
     low, high = places[i - 1], places[i]
     for _ in range(200):
@@ -216,19 +264,27 @@ def solve(polynomial: np.ndarray, wanted: float, reach: float) -> float:
 
 
 def _within(roots: np.ndarray, reach: float) -> np.ndarray:
-    """The real roots between 0 and reach, sorted."""
+    """The real roots strictly between 0 and reach, sorted."""
     real = roots.real[np.abs(roots.imag) <= 1e-9 * (1.0 + np.abs(roots))]
     return np.sort(real[(real > 0.0) & (real < reach)])
 
 
 def side_by_side(ahead: np.ndarray, astern: np.ndarray) -> tuple[np.ndarray, int]:
-    """Two polynomials (n, p), (n, q) as rows of one length (n, 2 powers), and how many powers."""
+    """Two polynomials as device rows of one length.
+
+    Args:
+        ahead: Coefficients (n, p), from the first power up.
+        astern: Coefficients (n, q), from the first power up.
+
+    Returns:
+        Rows (n, 2 powers), padded with zeros, and the number of powers.
+    """
     powers, n = max(ahead.shape[1], astern.shape[1]), max(len(ahead), len(astern))
     padded = [np.pad(curve, ((0, 0), (0, powers - curve.shape[1]))) for curve in (ahead, astern)]
     return np.concatenate([np.broadcast_to(curve, (n, powers)) for curve in padded], axis=1), powers
 
 
 def _columns(times: np.ndarray, schedule: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """(times, commands) of each thruster of each member."""
+    """The times and commands of each thruster of each member."""
     n = max(len(times), len(schedule))
     return [(times[i % len(times)], column) for i in range(n) for column in schedule[i % len(schedule)].T]

@@ -14,10 +14,16 @@ from lgvi_warp.physics.terms.current_harmonics import above_zero, not_above_zero
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Waves(Term):
-    """A sum of linear waves in deep water: wavenumber (2 pi / period)^2 / environment.gravity.
+    """A sum of linear waves in deep water, of wavenumber (2 pi / period)^2 / environment.gravity.
 
-    amplitudes: (k,) [m] of the surface; periods: (k,) [s], above 0; headings_deg: (k,) [deg] from north, where the waves
-    travel to; phases: (k,) [rad].
+    Args:
+        amplitudes: Amplitudes of the surface, (k,) [m].
+        periods: Periods, (k,) [s], above 0.
+        headings_deg: Directions in which the waves travel, (k,) [deg] from north.
+        phases: Phases at the inertial origin and t = 0, (k,) [rad]; 0 by default.
+
+    Raises:
+        SceneError: Where a period is not above 0, and as `Term`.
     """
 
     type: ClassVar[str] = "waves"
@@ -35,36 +41,36 @@ class Waves(Term):
         super().__post_init__()
 
     def check(self, faults: Faults) -> None:
-        """Periods must be positive."""
+        """Adds a fault where a period is not above 0."""
         above_zero(faults, "periods", self.periods, "s")
 
     def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
-        """Periods must be positive."""
+        """In addition, refuses members with a period that is not above 0."""
         bad = super().unphysical(own)
         return bad | {"periods": bad["periods"] | not_above_zero(own["periods"])}
 
     def present(self, own: Numbers) -> bool:
-        """Whether some member has one."""
+        """Whether some amplitude of some member is not zero."""
         return bool(np.any(own["amplitudes"]))
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """The table, component by component. Raises SceneError without gravity."""
+        """Device rows of each component; raises SceneError where there is no gravity, hence no wavenumber."""
         g = setting.parameters["environment.gravity"]
         if np.any(g <= 0.0):
             faults = Faults()
-            what = f"leaves the length of {self.key} unknown (wavenumber = omega^2 / gravity)"
-            faults.add("environment.gravity", float(g.min()), what, f"give gravity above 0, or leave {self.key} out")
+            fault = f"leaves the length of {self.key} unknown (wavenumber = omega^2 / gravity)"
+            faults.add("environment.gravity", float(g.min()), fault, f"give gravity above 0, or leave {self.key} out")
             faults.raise_if_any()
         rows = np.stack(np.broadcast_arrays(*_components(own, g)), axis=-1)
         return Packed({"count": rows.shape[1]}, rows.reshape(len(rows), -1))
 
     def water(self, own: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
-        """Velocity of the water (k, n, 3) [m/s]."""
+        """Orbital velocity (k, n, 3) [m/s] at positions and times; above the surface as at the surface."""
         gravity = parameters["environment.gravity"]
         total = np.zeros(position.shape)
         x, y, depth = np.moveaxis(position, -1, 0)
         for j in range(own["periods"].shape[1]):
-            north, east, k, omega, phase, *speed = (part[:, j] for part in _components(own, gravity))
+            north, east, k, omega, phase, *speed = (table[:, j] for table in _components(own, gravity))
             theta = north * x + east * y + (phase - omega * time[:, None])
             e = np.exp(-k * np.maximum(depth, 0.0))
             cosine, sine = e * np.cos(theta), e * np.sin(theta)
@@ -73,7 +79,7 @@ class Waves(Term):
 
 
 def _components(own: Numbers, gravity: np.ndarray) -> tuple[np.ndarray, ...]:
-    """What the device's table has of each component, each (n, k) with n 1 or that of the members."""
+    """The device table of the components, each entry of shape (n, k), n = 1 or the number of members."""
     omega, heading = 2.0 * np.pi / own["periods"], np.radians(own["headings_deg"])
     k = omega**2 / gravity[:, None]
     speed, along, across = own["amplitudes"] * omega, np.cos(heading), np.sin(heading)

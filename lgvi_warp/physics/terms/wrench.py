@@ -1,4 +1,4 @@
-"""A wrench that is held, or follows a schedule, in body axes."""
+"""A force and torque in body axes that is constant, or follows a schedule."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ SHAPES = ("linear", "steps")
 class Wrench(Term):
     """Constant force and torque in body axes, about the body's origin.
 
-    force: (3,) [N]; torque: (3,) [N m].
+    Args:
+        force: Force, (3,) [N]; 0 by default.
+        torque: Torque, (3,) [N m]; 0 by default.
     """
 
     type: ClassVar[str] = "wrench"
@@ -27,21 +29,29 @@ class Wrench(Term):
     torque: Any = quantity((3,), "N m", (0.0, 0.0, 0.0))
 
     def present(self, own: Numbers) -> bool:
-        """Whether some member has one."""
+        """Whether force or torque of some member is not zero."""
         return bool(np.any(own["force"]) or np.any(own["torque"]))
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """About the origin of the forces."""
+        """Force and torque about the origin of the forces, in the kernel's axes."""
         force, torque = own["force"], own["torque"]
         return Packed({"force": setting.frame.vector(force), "torque": setting.frame.torque(torque, force)})
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WrenchSchedule(Term):
-    """Force and torque in body axes from a table over time.
+    """Force and torque in body axes, about the body's origin, from a table over time.
 
-    times: (k,) [s], rising; force: (k, 3) [N]; torque: (k, 3) [N m]. interpolation: "linear" between the times, or
-    "steps", each value held until the next time; constant before the first and after the last.
+    Before the first time and after the last the values are constant.
+
+    Args:
+        times: Times, (k,) [s], rising.
+        force: Forces at these times, (k, 3) [N].
+        torque: Torques at these times, (k, 3) [N m]; 0 by default.
+        interpolation: "linear" between the times, the default; or "steps", each value held until the next time.
+
+    Raises:
+        SceneError: Where times do not rise, and as `Term`.
     """
 
     type: ClassVar[str] = "wrench_schedule"
@@ -59,17 +69,17 @@ class WrenchSchedule(Term):
         super().__post_init__()
 
     def check(self, faults: Faults) -> None:
-        """Times must rise."""
+        """Adds a fault where times do not rise, or the interpolation is unknown."""
         rising(faults, "times", self.times)
         faults.choice("interpolation", self.interpolation, SHAPES)
 
     def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
-        """Also where a member's times do not rise."""
+        """In addition, refuses members whose times do not rise."""
         bad = super().unphysical(own)
         return bad | {"times": bad["times"] | not_rising(own["times"])}
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """Two tables, of the force and of the torque about the origin of the forces."""
+        """Two tables: the force, and the torque about the origin of the forces."""
         force = setting.frame.vector(own["force"])
         torque = setting.frame.torque(own["torque"] + 0.0 * own["force"], own["force"] + 0.0 * own["torque"])
         tables = [knots(own["times"], values, self.interpolation == "steps") for values in (force, torque)]
@@ -79,12 +89,26 @@ class WrenchSchedule(Term):
 
 
 def not_rising(values: np.ndarray) -> np.ndarray:
-    """Which members' tables (n, k) have places that do not rise."""
+    """Which members have a table whose places do not rise.
+
+    Args:
+        values: Places (n, k).
+
+    Returns:
+        Mask (n,).
+    """
     return np.any(np.diff(np.nan_to_num(values)) <= 0.0, axis=1)
 
 
 def first_row(schedule: Any) -> Any:
-    """The commands at the schedule's first time; 0 where there is none, or none that could be read."""
+    """The commands at the first time of a schedule.
+
+    Args:
+        schedule: Commands (k, units), as the user gave them, or None.
+
+    Returns:
+        Commands (units,); 0.0 where there is no schedule, or none that can be read.
+    """
     try:
         return np.atleast_2d(np.array(schedule, dtype=np.float64))[0] if schedule is not None else 0.0
     except (TypeError, ValueError, IndexError):
@@ -92,27 +116,53 @@ def first_row(schedule: Any) -> Any:
 
 
 def commands(own: Numbers) -> tuple[np.ndarray, np.ndarray]:
-    """Times (n, k) [s] and commands (n, k, units); a command that is held is the schedule's only row."""
+    """Times and commands of a term; a command that is held is the only row of the schedule.
+
+    Args:
+        own: The term's numbers by field, each of shape (n, ...).
+
+    Returns:
+        Times (n, k) [s] and commands (n, k, units).
+    """
     schedule = own["command_schedule"]
     return own["times"], own["command"][:, None, :] if schedule.shape[1] == 1 else schedule
 
 
 def refuse_idle(term: Any, own: Numbers, rate: str, remembers: np.ndarray, remedy: str) -> None:
-    """Refuse members' numbers that would do nothing: of the command or of its schedule, and of a memory that is not kept."""
+    """Refuse members' numbers that would have no effect, since the scene's kernel does not read them.
+
+    That is `command` in a scene with a schedule and the reverse, and the numbers of a memory that the scene does not have.
+
+    Args:
+        term: The term of the scene.
+        own: Members' numbers by field, each of shape (n, ...).
+        rate: Name of the field that gives the term a memory, such as "time_constant".
+        remembers: Whether each member's number in that field needs the memory, (n, units).
+        remedy: What to do, for the message.
+
+    Raises:
+        SceneError: Where some member's number would have no effect.
+    """
     faults = Faults(f"{term.key}.")
     held = len(term.command_schedule) == 1
     acts, idle = ("command", ("times", "command_schedule")) if held else ("command_schedule", ("command",))
-    found = {name: (own[name] != getattr(term, name), f"a {acts}", f"vary {term.key}.{acts}") for name in idle}
+    unread = {name: (own[name] != getattr(term, name), f"a {acts}", f"vary {term.key}.{acts}") for name in idle}
     if not term.memory:
-        found[rate] = (remembers, "none", remedy)
-    for name, (bad, there, what_to_do) in found.items():
+        unread[rate] = (remembers, "none", remedy)
+    for name, (bad, alternative, what_to_do) in unread.items():
         if np.any(bad):
             i = int(bad.reshape(len(bad), -1).any(axis=1).argmax())
-            faults.add(f"{name} of member {i}", own[name][i], f"does not act: the scene has {there}", what_to_do)
+            faults.add(f"{name} of member {i}", own[name][i], f"does not act: the scene has {alternative}", what_to_do)
     faults.raise_if_any()
 
 
 def rising(faults: Faults, key: str, values: np.ndarray) -> None:
-    """Note a table whose places do not rise."""
+    """Add a fault where the places of a table do not rise.
+
+    Args:
+        faults: Collects the faults.
+        key: Name of the field.
+        values: Places (k,).
+    """
     if np.any(np.diff(values) <= 0.0):
         faults.add(key, values, "is not rising", "sort the table and drop repetitions")

@@ -1,4 +1,4 @@
-"""White noise of force and torque, each member's its own."""
+"""White noise of force and torque, independent for each member."""
 
 from __future__ import annotations
 
@@ -12,15 +12,29 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantit
 
 
 def channel(key: str) -> int:
-    """The first of a term's two channels of random numbers, as int32: twice a hash of its name, so no two overlap.
+    """The first of a term's two channels of random numbers: twice a hash of its name, so that no two overlap.
 
-    Two names of one scene share it with a chance of 2^-31.
+    Two names of one scene have the same channel with a probability of 2^-31.
+
+    Args:
+        key: Name of the term.
+
+    Returns:
+        The channel, an int32.
     """
     return _signed(2 * zlib.crc32(key.encode()))
 
 
 def noise_key(key: str, setting: Setting) -> dict[str, Any]:
-    """What a term's random numbers are keyed by, besides the step: the low 64 bits of the seed, the member, the term."""
+    """What keys a term's random numbers, besides the step: the low 64 bits of the seed, the member, the term.
+
+    Args:
+        key: Name of the term.
+        setting: The scene's parameters, the frame and the run.
+
+    Returns:
+        Fields "member", "seed0", "seed1" and "channel" of the device struct.
+    """
     return {
         "member": setting.members.astype(np.int32),
         "seed0": _signed(setting.seed),
@@ -38,7 +52,11 @@ def _signed(word: int) -> int:
 class WrenchNoise(Term):
     """White noise of force and torque along the body's axes, about the body's origin.
 
-    force: (3,) [N s^1/2]; torque: (3,) [N m s^1/2]: S with a variance S^2 t of the impulse over a time t.
+    Over a time t the impulse has the variance S^2 t, S the strength.
+
+    Args:
+        force: Strength of the force, (3,) [N s^1/2]; 0 by default.
+        torque: Strength of the torque, (3,) [N m s^1/2]; 0 by default.
     """
 
     type: ClassVar[str] = "wrench_noise"
@@ -49,11 +67,11 @@ class WrenchNoise(Term):
     torque: Any = quantity((3,), "N m s^1/2", (0.0, 0.0, 0.0), least=0.0)
 
     def present(self, own: Numbers) -> bool:
-        """Whether some member has one."""
+        """Whether some strength of some member is not zero."""
         return bool(np.any(own["force"]) or np.any(own["torque"]))
 
     def packed(self, own: Numbers, setting: Setting) -> Packed:
-        """What each of the user's axes adds: drawn there, a run's numbers do not depend on the kernel's axes."""
+        """The force and moment of each of the user's axes: drawn there, the numbers do not depend on the kernel's axes."""
         frame, none = setting.frame, np.zeros((1, 3))
         values = noise_key(self.key, setting)
         for i, axis in enumerate("xyz"):

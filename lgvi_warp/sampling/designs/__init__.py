@@ -1,8 +1,8 @@
-"""How the members' numbers are chosen: samplings of the unit cube, tables and grids.
+"""How the members' numbers are chosen: designs of the unit cube, tables and grids.
 
-A sampling gives any members by their indices, so that a member is the same in whatever run it is asked for, and alone.
-Laws turn the cube's levels into values (distributions.py, joint_laws.py). The cube's columns are in the order of the names
-that vary ("environment.gravity" before "vehicle.mass"), entries of a quantity one after the other.
+A sampling gives any members by their indices, so that a member is the same in every run that contains it. Distributions turn
+the cube's levels into values (sampling/distributions). The cube's columns are in the order of the names that vary
+("environment.gravity" before "vehicle.mass"), with the entries of a quantity one after the other.
 """
 
 from __future__ import annotations
@@ -22,12 +22,22 @@ from lgvi_warp.sampling.designs.sequences import Halton, Sobol, sobol_points
 from lgvi_warp.sampling.designs.table import Table
 
 KINDS: dict[str, type[Sampling]] = {
-    one.kind: one for one in (Random, LatinHypercube, Sobol, Halton, Saltelli, Morris, Grid, Table, Levels)
+    design.kind: design for design in (Random, LatinHypercube, Sobol, Halton, Saltelli, Morris, Grid, Table, Levels)
 }
 
 
 def sampling_of(content: Any) -> Sampling:
-    """A sampling from itself, its name, or { name = { ... } } as in a scene file. Raises SceneError naming every fault."""
+    """Build a sampling from what a scene file or a user gives.
+
+    Args:
+        content: A `Sampling`, its name, or { name = { ... } } as in a scene file.
+
+    Returns:
+        The sampling.
+
+    Raises:
+        SceneError: Where the name or a setting is unknown or wrong. The message lists every fault.
+    """
     if isinstance(content, Sampling):
         return content
     faults = Faults("ensemble.")

@@ -1,4 +1,4 @@
-"""What every sampling is, and designs that may be drawn several times."""
+"""The base class of every sampling, and designs that can be drawn several times independently."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.random import seed_words
 from lgvi_warp.sampling.designs.space import Space
 
-# A block has as many members, or a multiple: it holds as many points of each replicate.
+# A block's members are a multiple of this, so that it has equally many points of each replicate.
 MOST_REPLICATES = 64
 
 Drawn = dict[str, np.ndarray]
@@ -20,56 +20,116 @@ Drawn = dict[str, np.ndarray]
 
 @dataclass(frozen=True)
 class Sampling:
-    """How the unit cube is filled. Raises SceneError naming every fault."""
+    """How the points of the members fill the unit cube.
+
+    Class attributes: `kind` is the name in a scene file; `fewer` says whether a run may take only the first of the members
+    that the sampling brings.
+
+    Raises:
+        SceneError: Where a setting is wrong. The message lists every fault.
+    """
 
     kind: ClassVar[str] = ""
-    # Whether the first so many of the members that it has may be taken.
+    # Whether a run may take only the first of the members that the sampling has.
     fewer: ClassVar[bool] = False
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Numbers in (0, 1) by key, each (n, size), of the members (n,) by index."""
+        """Levels of members in the unit cube. Every sampling must define this.
+
+        Args:
+            space: The cube: which names vary, with how many columns each.
+            members: Indices of the members, (n,).
+
+        Returns:
+            Levels in (0, 1) by key, each (n, size).
+
+        Raises:
+            TypeError: Where the sampling does not define it.
+        """
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def laws(self) -> dict[str, Any]:
-        """Laws that the sampling itself brings, by name."""
+        """Distributions that the sampling itself brings.
+
+        Returns:
+            Distributions by the name of what they vary.
+        """
         return {}
 
     def own_values(self) -> dict[str, np.ndarray]:
-        """Values of every member that the sampling itself brings, by name."""
+        """Values of all members that the sampling itself brings.
+
+        Returns:
+            Values (members, ...) by the name of what they set.
+        """
         return {}
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """What it was given as arrays, by name, a row for each member: a store keeps them as such."""
+        """The arrays that the sampling was given, which a store keeps as arrays.
+
+        Returns:
+            Arrays by name, with a row for each member.
+        """
         return {}
 
     def own_members(self, space: Space) -> int | None:
-        """How many members it has, if that follows from itself."""
+        """The number of members that the sampling itself fixes.
+
+        Args:
+            space: The cube: which names vary, with how many columns each.
+
+        Returns:
+            The number, or None where the user chooses it.
+        """
         return None
 
     def group_size(self, space: Space) -> int:
-        """Members come in whole groups of so many."""
+        """The size of the groups in which members come; their number must be a multiple of it.
+
+        Args:
+            space: The cube: which names vary, with how many columns each.
+
+        Returns:
+            Members in a group; 1 where any number is allowed.
+        """
         return 1
 
     def replicates_of_members(self) -> int:
-        """Independent replicates of the design, R: member i is point i // R of replicate i mod R. 1: it has none."""
+        """The number R of independent replicates of the design: member i is point i // R of replicate i mod R.
+
+        Returns:
+            R; 1 for a design without replicates.
+        """
         return 1
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
-        """Note what is wrong with a number of members or with what varies."""
-        own, group = self.own_members(space), self.group_size(space)
-        if own is not None and self.fewer and members > own:
-            what = f"are more than the {own} of the {self.kind}"
-            faults.add("members", members, what, f"give {own} or less, or leave members out")
-        elif own is not None and not self.fewer and members != own:
-            faults.add("members", members, f"is not the {own} of the {self.kind}", f"give {own}, or leave members out")
+        """Add a fault where the number of members, or what varies, does not suit the sampling.
+
+        Args:
+            faults: Collects the faults.
+            space: The cube: which names vary, with how many columns each.
+            members: The number of members.
+        """
+        fixed, group = self.own_members(space), self.group_size(space)
+        if fixed is not None and self.fewer and members > fixed:
+            fault = f"are more than the {fixed} of the {self.kind}"
+            faults.add("members", members, fault, f"give {fixed} or less, or leave members out")
+        elif fixed is not None and not self.fewer and members != fixed:
+            faults.add(
+                "members", members, f"is not the {fixed} of the {self.kind}", f"give {fixed}, or leave members out"
+            )
         elif members % group:
             low = members // group * group
             near = f"{low} or {low + group}" if low else f"{group}"
-            what = f"is no whole number of groups of {group}, which {self.kind} is made of here"
-            faults.add("members", members, what, f"give {near}")
+            fault = f"is no whole number of groups of {group}, which {self.kind} is made of here"
+            faults.add("members", members, fault, f"give {near}")
 
     def to_dict(self) -> Any:
-        """As in a scene file: the name, or { name = { ... } }."""
+        """The sampling as a scene file has it.
+
+        Returns:
+            The name, or { name: settings } where a setting differs from its default.
+        """
         values = {
             item.name: getattr(self, item.name) for item in fields(self) if getattr(self, item.name) != item.default
         }
@@ -77,12 +137,27 @@ class Sampling:
 
 
 def generator(space: Space, name: str) -> np.random.Generator:
-    """Random numbers that depend on the seed and a name only."""
+    """A random generator that depends on the seed and a name only.
+
+    Args:
+        space: The cube, which holds the seed.
+        name: Name of the stream.
+
+    Returns:
+        A Philox generator.
+    """
     return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed_words(space.seed, name))))
 
 
 def inside(cube: np.ndarray) -> np.ndarray:
-    """The same within (0, 1), where quantiles are finite."""
+    """Levels clipped to the open interval (0, 1), where quantiles are finite.
+
+    Args:
+        cube: Levels in [0, 1], of any shape.
+
+    Returns:
+        A read-only array of the same shape.
+    """
     cube = np.clip(cube, 2.0**-54, 1.0 - 2.0**-53)
     cube.setflags(write=False)
     return np.asarray(cube)
@@ -90,11 +165,16 @@ def inside(cube: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Replicated(Sampling):
-    """A design that may be drawn R times, independently: member i is point i // R of replicate i mod R.
+    """A design that can be drawn R times independently: member i is point i // R of replicate i mod R.
 
-    replicates: R, a power of two from 1 to 64; members must be a multiple of it. Each replicate's estimate of a statistic
-    is independent of the others', and their spread is the error of their mean: intervals then follow from it (L'Ecuyer,
-    Nakayama, Owen & Tuffin 2023, Winter Simulation Conference). Raises SceneError.
+    The replicates' estimates of a statistic are independent, and their spread gives the error of their mean, from which
+    intervals follow (L'Ecuyer, Nakayama, Owen & Tuffin 2023, Winter Simulation Conference).
+
+    Args:
+        replicates: R, a power of two from 1 to 64, 1 by default. The number of members must be a multiple of it.
+
+    Raises:
+        SceneError: Where a setting is wrong. The message lists every fault.
     """
 
     replicates: int = field(default=1, kw_only=True)
@@ -102,34 +182,52 @@ class Replicated(Sampling):
     def __post_init__(self) -> None:
         R = self.replicates
         faults = Faults(f"ensemble.sampling.{self.kind}.")
-        whole = isinstance(R, int | np.integer) and not isinstance(R, bool)
-        if not whole or not 1 <= R <= MOST_REPLICATES or R & (R - 1):
+        is_integer = isinstance(R, int | np.integer) and not isinstance(R, bool)
+        if not is_integer or not 1 <= R <= MOST_REPLICATES or R & (R - 1):
             faults.add("replicates", R, f"is no power of two from 1 to {MOST_REPLICATES}", "give 8, 16, 32 or 64")
         self.check_own(faults)
         faults.raise_if_any()
         object.__setattr__(self, "replicates", int(R))
 
     def check_own(self, faults: Faults) -> None:
-        """Note what is wrong with its other settings."""
+        """Add a fault for each of the design's further settings that is wrong; by default there are none.
+
+        Args:
+            faults: Collects the faults.
+        """
 
     def replicates_of_members(self) -> int:
-        """As given."""
+        """The number of replicates R that was given."""
         return self.replicates
 
     def group_size(self, space: Space) -> int:
-        """One point of each replicate."""
+        """One point of each replicate, R members."""
         return self.replicates
 
     def dealt(self, members: np.ndarray) -> Iterator[tuple[int, np.ndarray | slice, np.ndarray]]:
-        """(replicate, which of the members are its own, the indices of their points) of each that has any."""
+        """Deal members to their replicates.
+
+        Args:
+            members: Indices of the members, (n,).
+
+        Yields:
+            For each replicate that has any: its number, which of the members are its own, and the indices of their points.
+        """
         if self.replicates == 1:
             yield 0, slice(None), members
             return
         point, replicate = np.divmod(members, self.replicates)
         for r in np.unique(replicate):
-            own = replicate == r
-            yield int(r), own, point[own]
+            mask = replicate == r
+            yield int(r), mask, point[mask]
 
     def name(self, replicate: int) -> str:
-        """What the replicate's random numbers are drawn by; one alone is the design without replicates."""
+        """The name of a replicate's stream of random numbers.
+
+        Args:
+            replicate: Number of the replicate, from 0.
+
+        Returns:
+            The kind and that number; with R = 1 the kind alone, as of the design without replicates.
+        """
         return self.kind if self.replicates == 1 else f"{self.kind} {replicate}"

@@ -1,4 +1,4 @@
-"""Numbers by column from what a CSV file holds, with the line and the column of each that is none."""
+"""Columns of numbers from a CSV file; each cell that is no number is reported with its line and column."""
 
 from __future__ import annotations
 
@@ -14,29 +14,41 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 
-# Of the lines that are wrong so many are told one by one.
+# The most faulty lines that a message lists; the others are counted.
 MOST_TOLD = 8
 
-# After so many the rest of the file is not read.
+# The most faults that are counted; after them the rest of the file is not read.
 MOST_COUNTED = 10_000
 
-# Characters of a line: of ten thousands of columns.
+# The most characters of a line: enough for tens of thousands of columns.
 LONGEST_LINE = 1 << 20
 
-# Of the names in the first line, those to be read; notes what is wrong with them.
+# Takes the names of the first line and returns those to read; adds a fault for each that is wrong.
 Choose = Callable[[Faults, Sequence[str]], list[str]]
 
 
 def columns_of(faults: Faults, path: str, content: bytes, choose: Choose) -> dict[str, np.ndarray]:
-    """Columns by name: names in the first line that is not empty and no comment (#), then a line of numbers each.
+    """Columns of a CSV file by name.
 
-    Cells are parted by commas, semicolons or tabs, as the first line has it. Notes every fault, and gives nothing if there
-    is one. Raises UnicodeDecodeError for what is not in UTF-8.
+    The names are in the first line that is neither empty nor a comment (#); every other line holds one number for each.
+    Commas, semicolons or tabs separate cells, as in the first line.
+
+    Args:
+        faults: Collects the faults.
+        path: Path of the file, for messages.
+        content: Bytes of the file.
+        choose: Takes the faults and the names of the first line; returns those to read, and adds faults.
+
+    Returns:
+        Columns (lines,) by name; {} where there is a fault.
+
+    Raises:
+        UnicodeDecodeError: Where the file is not UTF-8.
     """
     rows: Any = csv.reader(())
     try:
         head = next((line for line in _lines(content) if line.strip()), "")
-        delimiter = next((one for one in "\t;" if one in head), ",")
+        delimiter = next((separator for separator in "\t;" if separator in head), ",")
         rows = csv.reader(_lines(content), delimiter=delimiter, skipinitialspace=True)
         names = [name.strip() for name in next((row for row in rows if row), [])]
         _check_names(faults, path, rows.line_num, names, delimiter)
@@ -49,7 +61,7 @@ def columns_of(faults: Faults, path: str, content: bytes, choose: Choose) -> dic
 
 
 def _lines(content: bytes) -> Iterator[str]:
-    """Every line, so that they are counted as the file has them; of comments and empty ones the end alone."""
+    """Every line, so that they are counted as the file has them; comments and empty lines become a bare line end."""
     text = io.TextIOWrapper(io.BytesIO(content), "utf-8-sig")
     while line := text.readline(LONGEST_LINE):
         if len(line) == LONGEST_LINE:
@@ -58,14 +70,14 @@ def _lines(content: bytes) -> Iterator[str]:
 
 
 def _check_names(faults: Faults, path: str, line: int, names: Sequence[str], delimiter: str) -> None:
-    """Note what is wrong with a first line."""
+    """Add a fault for a first line that does not hold names."""
     if not names:
         faults.add(
             "file", path, "is empty", "write the names in its first line, then a line of numbers for each member"
         )
     elif all(_number(name) is not None for name in names):
-        what = f"has numbers where the names should be (line {line})"
-        faults.add("file", path, what, 'write the names above them, without # (numpy.savetxt: comments="")')
+        fault = f"has numbers where the names should be (line {line})"
+        faults.add("file", path, fault, 'write the names above them, without # (numpy.savetxt: comments="")')
     elif delimiter == "," and any(name.count("[") != name.count("]") for name in names):
         torn = next(name for name in names if name.count("[") != name.count("]"))
         remedy = 'quote a name with a comma: "vehicle.inertia[0,1]"'
@@ -73,20 +85,20 @@ def _check_names(faults: Faults, path: str, line: int, names: Sequence[str], del
 
 
 def _check_chosen(faults: Faults, path: str, line: int, names: Sequence[str], chosen: Sequence[str]) -> None:
-    """Note what is wrong with the names to be read."""
+    """Add a fault where a chosen name is empty or names two columns."""
     counts = Counter(names)
     for name in sorted({name for name in chosen if counts[name] > 1}):
         faults.add("file", path, f"names a column twice, {name!r} (line {line})", "give each column a name of its own")
     if "" in chosen:
-        what = f"has a column without a name, number {names.index('') + 1} (line {line})"
-        faults.add("file", path, what, 'name it, or leave it out: ignore = [""]')
+        fault = f"has a column without a name, number {names.index('') + 1} (line {line})"
+        faults.add("file", path, fault, 'name it, or leave it out: ignore = [""]')
 
 
 def _numbers(faults: Faults, path: str, rows: Any, names: Sequence[str], chosen: Sequence[str]) -> np.ndarray:
-    """(lines, chosen) numbers of the lines that follow."""
-    at = {name: place for place, name in enumerate(names)}
-    places = [at[name] for name in chosen]
-    found, wrong = array("d"), list[tuple[str, str]]()
+    """The numbers (lines, chosen) of the lines that follow."""
+    place_of = {name: place for place, name in enumerate(names)}
+    places = [place_of[name] for name in chosen]
+    values, reports = array("d"), list[tuple[str, str]]()
     for row in rows:
         if not row:
             continue
@@ -95,44 +107,44 @@ def _numbers(faults: Faults, path: str, rows: Any, names: Sequence[str], chosen:
             numbers = [float(cell) for cell in cells]
         except ValueError:
             numbers = [math.nan]
-        # A sum is finite where every number is, but for the largest: those are looked at one by one.
+        # The sum is finite where every number is, unless it overflows: then each number is checked.
         if not cells or not math.isfinite(sum(numbers)):
-            wrong += _told(rows.line_num, row, names, chosen, cells)
-            if len(wrong) >= MOST_COUNTED:
+            reports += _told(rows.line_num, row, names, chosen, cells)
+            if len(reports) >= MOST_COUNTED:
                 break
-        found.extend(numbers)
-    for what, remedy in wrong[:MOST_TOLD]:
-        faults.add("file", path, what, remedy)
-    if len(wrong) > MOST_TOLD:
-        more = f"{len(wrong) - MOST_TOLD} more such faults" + " or more" * (len(wrong) >= MOST_COUNTED)
+        values.extend(numbers)
+    for fault, remedy in reports[:MOST_TOLD]:
+        faults.add("file", path, fault, remedy)
+    if len(reports) > MOST_TOLD:
+        more = f"{len(reports) - MOST_TOLD} more such faults" + " or more" * (len(reports) >= MOST_COUNTED)
         faults.add("file", path, f"has {more}", "mend them too")
-    if not found and not wrong:
+    if not values and not reports:
         faults.add("file", path, "has names and no members", "write a line of numbers for each member")
-    return np.array(found).reshape(-1, len(chosen)) if not wrong else np.empty((0, 0))
+    return np.array(values).reshape(-1, len(chosen)) if not reports else np.empty((0, 0))
 
 
 def _told(
     line: int, row: Sequence[str], names: Sequence[str], chosen: Sequence[str], cells: Sequence[str]
 ) -> list[tuple[str, str]]:
-    """What is wrong with a line, and the remedy."""
+    """The faults of one line, each with its remedy."""
     if len(row) != len(names):
         return [(f"has {len(names)} names and {len(row)} cells in line {line}", "give a cell for each name")]
-    told = []
+    reports = []
     for name, cell in zip(chosen, cells, strict=True):
         number = _number(cell)
         if number is None:
-            what = f"{cell!r}, which is no number," if cell.strip() else "no number"
+            description = f"{cell!r}, which is no number," if cell.strip() else "no number"
         elif not math.isfinite(number):
-            what = f"{cell.strip()}, which is not finite,"
+            description = f"{cell.strip()}, which is not finite,"
         else:
             continue
         remedy = f'write a number with a point, 120.5, or leave the column out: ignore = ["{name}"]'
-        told.append((f'has {what} in line {line}, column "{name}"', remedy))
-    return told
+        reports.append((f'has {description} in line {line}, column "{name}"', remedy))
+    return reports
 
 
 def _number(cell: str) -> float | None:
-    """What a cell says, if that is a number."""
+    """The number in a cell; None where it holds none."""
     try:
         return float(cell)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Designs for sensitivity analyses: Saltelli's and Morris'."""
+"""Designs for sensitivity analyses: Saltelli's and Morris's."""
 
 from __future__ import annotations
 
@@ -16,11 +16,17 @@ from lgvi_warp.sampling.designs.space import Space
 
 @dataclass(frozen=True)
 class Saltelli(Sampling):
-    """The design for Sobol indices, in the order of SALib.sample.sobol: groups of 2 d + 2 members, or d + 2.
+    """Design for Sobol indices, in the order of SALib.sample.sobol: groups of 2 d + 2 members.
 
-    d + 2: without second_order. d: factors, which are the entries that vary by themselves and each joint law. A group is a
-    point A and a point B of one Sobol sequence, A with each factor of B, and B with each of A. Groups may be added; powers
-    of two of them are balanced. Saltelli et al. (2010), Computer Physics Communications 181.
+    d is the number of factors: the entries that vary by themselves, and each joint distribution. A group is a point A and a
+    point B of one Sobol sequence, A with each factor of B, and B with each factor of A. Groups may be added; powers of two of
+    them are balanced. Saltelli et al. (2010), Computer Physics Communications 181.
+
+    Args:
+        second_order: Whether second-order indices follow, True by default; without them groups have d + 2 members.
+
+    Raises:
+        SceneError: Where second_order is neither True nor False.
     """
 
     second_order: bool = True
@@ -32,18 +38,18 @@ class Saltelli(Sampling):
         faults.raise_if_any()
 
     def group_size(self, space: Space) -> int:
-        """2 d + 2, or d + 2."""
+        """Members in a group: 2 d + 2, or d + 2 without second-order indices."""
         return (2 if self.second_order else 1) * len(space.factors) + 2
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
-        """Something must vary."""
+        """In addition, adds a fault where nothing varies."""
         if not space.factors:
             faults.add("sampling", self.kind, "has nothing that varies", "give [ensemble.vary]")
             return
         super().check(faults, space, members)
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """A where a factor is of A, else B."""
+        """Levels of point A where the member has the factor of A, else of point B."""
         point, row = np.divmod(members, self.group_size(space))
         chosen, place = np.unique(point, return_inverse=True)
         D = space.dimensions
@@ -51,20 +57,34 @@ class Saltelli(Sampling):
         return space.split(np.where(self.rows(space)[row], AB[:, D:], AB[:, :D]))
 
     def rows(self, space: Space) -> np.ndarray:
-        """(group, dimensions), whether a row of a group has its column from B."""
-        own = np.zeros((len(space.factors), space.dimensions), dtype=bool)
+        """Which columns each member of a group has from point B.
+
+        Args:
+            space: The cube: which names vary, with how many columns each.
+
+        Returns:
+            Mask (group size, dimensions).
+        """
+        from_B = np.zeros((len(space.factors), space.dimensions), dtype=bool)
         for number, (_, columns) in enumerate(space.factors):
-            own[number, list(columns)] = True
-        none = np.zeros((1, space.dimensions), dtype=bool)
-        return np.concatenate([none, own, *([~own] if self.second_order else []), ~none])
+            from_B[number, list(columns)] = True
+        nothing = np.zeros((1, space.dimensions), dtype=bool)
+        return np.concatenate([nothing, from_B, *([~from_B] if self.second_order else []), ~nothing])
 
 
 @dataclass(frozen=True)
 class Morris(Sampling):
-    """The design of Morris' screening (SALib.sample.morris): paths of d + 1 members, each step moving one factor.
+    """Design of Morris's screening (SALib.sample.morris): paths of d + 1 members, each step of which changes one factor.
 
-    levels: even, the parts of each side; a member is at the middle of a part, so that laws without bounds stay finite. Paths
-    may be added. Morris (1991), Technometrics 33; Campolongo, Cariboni & Saltelli (2007). Needs SALib (extra: uq).
+    Each side of the cube is divided into parts, and a member is in the middle of a part, so that distributions without bounds
+    stay finite. Paths may be added. Needs SALib (extra: uq). Morris (1991), Technometrics 33; Campolongo, Cariboni & Saltelli
+    (2007).
+
+    Args:
+        levels: Number of parts of each side, even, from 4; 4 by default.
+
+    Raises:
+        SceneError: Where levels is not an even number from 4.
     """
 
     levels: int = 4
@@ -79,25 +99,36 @@ class Morris(Sampling):
         object.__setattr__(self, "levels", int(levels))
 
     def group_size(self, space: Space) -> int:
-        """d + 1."""
+        """Members on a path, d + 1, d the number of factors."""
         return len(space.factors) + 1
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
-        """Something must vary."""
+        """In addition, adds a fault where fewer than two factors vary."""
         if len(space.factors) < 2:
             faults.add("sampling", self.kind, f"has {len(space.factors)} factors to tell apart", "vary two or more")
             return
         super().check(faults, space, members)
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """The middle of each part."""
+        """Levels in the middle of each part."""
         x = self.design(space, members)
         return space.split((x * (self.levels - 1) + 0.5) / self.levels)
 
     def design(self, space: Space, members: np.ndarray) -> np.ndarray:
-        """SALib's numbers (n, dimensions): multiples of 1 / (levels - 1) from 0 to 1."""
+        """The design as SALib numbers it.
+
+        Args:
+            space: The cube: which names vary, with how many columns each.
+            members: Indices of the members, (n,).
+
+        Returns:
+            Multiples of 1 / (levels - 1) from 0 to 1, (n, dimensions).
+
+        Raises:
+            ImportError: Where SALib is not installed.
+        """
         paths = int(members.max()) // self.group_size(space) + 1
-        # A longer design begins with the shorter one; few lengths, for the cache.
+        # A longer design begins with the shorter one; lengths are powers of two, so that the cache holds few.
         return _morris(space, self.levels, 1 << (paths - 1).bit_length())[members]
 
 
@@ -113,7 +144,14 @@ def _morris(space: Space, levels: int, paths: int) -> np.ndarray:
 
 
 def salib_problem(space: Space) -> dict[str, Any]:
-    """The unit cube as SALib describes it: columns, and groups of them where a factor has several."""
+    """The unit cube as a problem of SALib.
+
+    Args:
+        space: The cube: which names vary, with how many columns each.
+
+    Returns:
+        "num_vars", "names" and "bounds" of the columns, and "groups" where a factor has several columns.
+    """
     names = [
         label if len(columns) == 1 else f"{label} {i}" for label, columns in space.factors for i in range(len(columns))
     ]

@@ -1,4 +1,4 @@
-"""Every combination of the values of some names."""
+"""A full grid: every combination of given values."""
 
 from __future__ import annotations
 
@@ -18,11 +18,16 @@ from lgvi_warp.sampling.distributions.basic import Choice
 
 @dataclass(frozen=True, eq=False)
 class Grid(Sampling):
-    """A full grid: every combination of the values of each name, the last name (in their order) fastest.
+    """A full grid: every combination of the values of each name, the last name in their order fastest.
 
-    axes: name -> a list of values (of an entry such as "start.position[2]", or of the whole quantity), or a number of levels:
-    the middles of so many equal parts of the name's law in `vary`, for each of its entries. Names of `vary` that the grid does
-    not have are drawn at random. The number of members follows. Raises SceneError naming every fault.
+    Names of `vary` that the grid does not contain are drawn at random. The number of members is the number of combinations.
+
+    Args:
+        axes: By name, either a list of values (of an entry such as "start.position[2]", or of the whole quantity), or a number
+            of levels: the middles of so many equal parts of the name's distribution in `vary`, for each of its entries.
+
+    Raises:
+        SceneError: Where an axis is neither. The message lists every fault.
     """
 
     axes: Mapping[str, Any] = field(default_factory=dict)
@@ -44,11 +49,11 @@ class Grid(Sampling):
         faults.raise_if_any()
 
     def laws(self) -> dict[str, Any]:
-        """A choice among the values of each name that has them."""
+        """A `Choice` among the values, for each name that has a list of them."""
         return {name: Choice(axis) for name, axis in self.axes.items() if not isinstance(axis, int | np.integer)}
 
     def _radices(self, space: Space) -> tuple[Space, list[int]]:
-        """The cube's part that is a grid, and the levels of each of its columns."""
+        """The part of the cube that is a grid, and the number of levels of each of its columns."""
         inner = space.of(self.axes)
         numbers = []
         for key, size in zip(inner.keys, inner.sizes, strict=True):
@@ -57,21 +62,21 @@ class Grid(Sampling):
         return inner, numbers
 
     def own_members(self, space: Space) -> int:
-        """Of all combinations."""
+        """The number of combinations of all axes."""
         return math.prod(self._radices(space)[1])
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
-        """Every axis must vary something."""
+        """In addition, adds a fault for a number of levels without a distribution in `vary`."""
         for name in self.axes:
             if name not in space.keys:
-                what = "is a number of levels of what has no law"
+                fault = "is a number of levels of what has no law"
                 faults.add(
-                    f'sampling.grid."{name}"', self.axes[name], what, "give it a law in vary, or a list of values"
+                    f'sampling.grid."{name}"', self.axes[name], fault, "give it a law in vary, or a list of values"
                 )
         super().check(faults, space, members)
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """The member's index as a number with these radices."""
+        """Levels from the digits of the member's index, written with the axes' lengths as radices."""
         inner, numbers = self._radices(space)
         radices = np.array(numbers, dtype=np.int64)
         places = np.ones(len(radices), dtype=np.int64)
@@ -81,5 +86,5 @@ class Grid(Sampling):
         return inner.split((digits + 0.5) / radices) | Random().draw(space.of(others), members)
 
     def to_dict(self) -> Any:
-        """As in a scene file."""
+        """The grid as a scene file has it: lists and numbers of levels by name."""
         return {self.kind: {name: np.asarray(axis).tolist() for name, axis in self.axes.items()}}

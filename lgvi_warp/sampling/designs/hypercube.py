@@ -1,4 +1,4 @@
-"""Latin hypercubes."""
+"""Latin hypercubes, added group by group."""
 
 from __future__ import annotations
 
@@ -18,18 +18,23 @@ LARGEST_GROUP = 2**20
 
 @dataclass(frozen=True)
 class LatinHypercube(Replicated):
-    """Groups of `group` members, each a full Latin hypercube: every column has one member in each of `group` equal parts.
+    """Groups of members, each a full Latin hypercube: every column has one member in each of `group` equal parts.
 
-    Members are added group by group, and names may be added. group: 2 to 2^20; members must be a multiple of it. With
-    replicates, as many groups are filled at once, a member of each in turn. McKay, Beckman & Conover (1979);
-    scipy.stats.qmc.LatinHypercube.
+    Members are added group by group, and names may be added. McKay, Beckman & Conover (1979); scipy.stats.qmc.LatinHypercube.
+
+    Args:
+        group: Members in a hypercube, 2 to 2^20; it must be given. The number of members must be a multiple of it.
+        replicates: R, the number of hypercubes that are filled at once, a member of each in turn; 1 by default.
+
+    Raises:
+        SceneError: Where a setting is wrong. The message lists every fault.
     """
 
     group: int = 0
     kind: ClassVar[str] = "latin_hypercube"
 
     def check_own(self, faults: Faults) -> None:
-        """The group must be stated."""
+        """Adds a fault where the group is missing or out of bounds."""
         group = self.group
         if isinstance(group, bool) or not isinstance(group, int | np.integer) or not 2 <= group <= LARGEST_GROUP:
             faults.add("group", group, f"is not a whole number from 2 to {LARGEST_GROUP}",
@@ -38,27 +43,27 @@ class LatinHypercube(Replicated):
             object.__setattr__(self, "group", int(group))
 
     def group_size(self, space: Space) -> int:
-        """A hypercube for each replicate."""
+        """Members in one hypercube of each replicate."""
         return self.group * self.replicates
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """From the hypercube of each member's group; names by themselves, so that others do not change them."""
+        """Levels from the hypercube of each member's group; each name is drawn by itself, and so may be added."""
         R = self.replicates
         group, place = np.divmod(members, self.group * R)
-        found = {}
+        levels = {}
         for key, size in zip(space.keys, space.sizes, strict=True):
-            found[key] = np.empty((len(members), size))
+            levels[key] = np.empty((len(members), size))
             for g in np.unique(group):
                 mine = group == g
                 cubes = _hypercubes(space.seed, key, int(g) * R, R, self.group, size)
-                found[key][mine] = cubes[place[mine]]
-        return found
+                levels[key][mine] = cubes[place[mine]]
+        return levels
 
 
-# A block of members lies in few groups: these are kept from one block to the next.
+# A block of members is within few groups: their hypercubes are cached from one block to the next.
 @functools.lru_cache(maxsize=64)
 def _hypercubes(seed: int, key: str, first: int, number: int, size: int, columns: int) -> np.ndarray:
-    """So many hypercubes from the first on, a point of each in turn: (size * number, columns)."""
+    """`number` hypercubes from the first on, a point of each in turn: (size * number, columns)."""
     from scipy.stats import qmc
 
     cubes = np.empty((size, number, columns))

@@ -1,4 +1,4 @@
-"""Points of the unit cube that the user gives."""
+"""A design of the user's own: points of the unit cube."""
 
 from __future__ import annotations
 
@@ -17,12 +17,19 @@ from lgvi_warp.sampling.designs.space import Space
 
 @dataclass(frozen=True, eq=False)
 class Levels(Sampling):
-    """A design of your own: points (n, dimensions) in the open unit cube, whose columns are in the order of the names.
+    """A design of your own: points in the open unit cube, whose columns are in the order of the names.
 
-    `ensemble.space` says which column is what: an entry that varies by itself has one column of its name, a joint law
-    several, "start.attitude 0" and so on. points may be a data frame, a mapping of columns, a structured array or an xarray
-    Dataset with these names, in any order. names: of the columns of an array, where they are not in that order. The number
-    of members is that of the points, or less: the first ones. Raises SceneError.
+    `ensemble.space` says which column is which: an entry that varies by itself has one column of its name, a joint
+    distribution has several, "start.attitude 0" and so on. The number of members is that of the points, or less: the
+    first ones.
+
+    Args:
+        points: Levels (n, dimensions) in (0, 1). Also a data frame, a mapping of columns, a structured array or an xarray
+            Dataset with these names, in any order.
+        names: Names of an array's columns, where they are not in the order of the cube.
+
+    Raises:
+        SceneError: Where points are outside the cube, or do not fit the names. The message lists every fault.
     """
 
     points: Any = None
@@ -47,12 +54,12 @@ class Levels(Sampling):
         object.__setattr__(self, "points", array)
 
     def _by_name(self, faults: Faults) -> np.ndarray | None:
-        """The columns side by side; keeps their names."""
+        """The named columns side by side; also keeps their names."""
         if self.names is not None:
             faults.add("names", self.names, "are given beside points that have names", "leave them out")
         columns = columns_by_name(faults, "points", self.points)
-        given = [faults.finite(f'points["{name}"]', column) for name, column in columns.items()]
-        arrays = [array for array in given if array is not None]
+        checked = [faults.finite(f'points["{name}"]', column) for name, column in columns.items()]
+        arrays = [array for array in checked if array is not None]
         if faults:
             return None
         if len({array.shape for array in arrays}) != 1 or arrays[0].ndim != 1:
@@ -62,15 +69,15 @@ class Levels(Sampling):
         return np.column_stack(arrays)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The points."""
+        """The points, by the name "points"."""
         return {"points": self.points}
 
     def own_members(self, space: Space) -> int:
-        """Of the points."""
+        """The number of points that were given."""
         return len(self.points)
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
-        """As many columns as the cube has."""
+        """In addition, adds a fault where the columns are not those of the cube."""
         if self.points.shape[1] != space.dimensions:
             remedy = f"give {space.dimensions}, of {', '.join(space.keys) or 'nothing'}"
             faults.add("sampling.levels.points", "...", f"has {self.points.shape[1]} columns", remedy)
@@ -79,13 +86,13 @@ class Levels(Sampling):
         super().check(faults, space, members)
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """As given."""
+        """The points as given, with columns in the order of the cube."""
         if self.names is None:
             return space.split(self.points[members])
         order = [list(self.names).index(name) for name in salib_problem(space)["names"]]
         return space.split(self.points[members][:, order])
 
     def to_dict(self) -> Any:
-        """As in a scene file."""
+        """The points as a scene file has them, as nested lists, with their names where given."""
         names = {} if self.names is None else {"names": list(self.names)}
         return {self.kind: {"points": self.points.tolist(), **names}}

@@ -1,4 +1,4 @@
-"""Every number by itself."""
+"""Independent random numbers."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from lgvi_warp.sampling.designs.space import Space
 
 @dataclass(frozen=True)
 class Random(Sampling):
-    """Every number by itself, from the seed, the member's index and the name. Members and names may be added."""
+    """Independent random numbers, from the seed, the member's index and the name. Members and names may be added."""
 
     kind: ClassVar[str] = "random"
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Philox counters keyed by seed and name, at the member's place."""
+        """Levels from Philox counters keyed by seed and name, at the member's place."""
         return {
             key: uniforms_of(space.seed, key, members, size) for key, size in zip(space.keys, space.sizes, strict=True)
         }

@@ -1,4 +1,4 @@
-"""Scrambled sequences of low discrepancy, any point of which is found from its index: Sobol's and Halton's."""
+"""Scrambled low-discrepancy sequences whose points are found directly from their indices: Sobol's and Halton's."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from lgvi_warp.common.random import seed_words
 from lgvi_warp.sampling.designs.base import MOST_REPLICATES, Drawn, Replicated, inside
 from lgvi_warp.sampling.designs.space import Space
 
-# Of a Sobol sequence: a point is at the middle of one of 2^32 parts of each side, so that no level is 0 or 1. It has as
-# many points, more than an ensemble has members.
+# Bits of a Sobol sequence. A point is in the middle of one of 2^32 parts of each side, so that no level is 0 or 1. The
+# sequence has 2^32 points, more than an ensemble has members.
 SOBOL_BITS = 32
 
 
@@ -22,29 +22,41 @@ SOBOL_BITS = 32
 class Sobol(Replicated):
     """A scrambled Sobol sequence (linear matrix scramble and digital shift, scipy.stats.qmc.Sobol): member i is point i.
 
-    Members may be added: powers of two are balanced. What varies is part of the design: another name, another sequence.
-    replicates: so many sequences, scrambled independently, a member of each in turn.
+    Members may be added; powers of two are balanced. Another name that varies makes another sequence.
+
+    Args:
+        replicates: R, the number of sequences, scrambled independently, a member of each in turn; 1 by default.
     """
 
     kind: ClassVar[str] = "sobol"
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Points by their indices."""
-        found = np.empty((len(members), space.dimensions))
-        for replicate, own, points in self.dealt(members):
-            found[own] = sobol_points(space.seed, self.name(replicate), space.dimensions, points)
-        return space.split(found)
+        """Points of the replicates' sequences by their indices."""
+        levels = np.empty((len(members), space.dimensions))
+        for replicate, mask, points in self.dealt(members):
+            levels[mask] = sobol_points(space.seed, self.name(replicate), space.dimensions, points)
+        return space.split(levels)
 
 
 def sobol_points(seed: int, name: str, dimensions: int, indices: np.ndarray, scramble: bool = True) -> np.ndarray:
-    """Points of a Sobol sequence in (0, 1), (n, dimensions), by their indices.
+    """Points of a Sobol sequence by their indices.
 
-    A point is the exclusive or of one number for each bit of its index (and the first point): so any is had at once.
+    A point is the exclusive or of point 0 and of one number for each bit of its index, so that any point is found directly.
+
+    Args:
+        seed: Seed of the scramble.
+        name: Name of the stream of random numbers.
+        dimensions: Columns of the points.
+        indices: Indices of the points, (n,).
+        scramble: Whether the sequence is scrambled; True by default.
+
+    Returns:
+        Points (n, dimensions) in (0, 1).
     """
     if not dimensions:
         return np.empty((len(indices), 0))
     bits = max(int(indices.max()).bit_length(), 1)
-    bits = -(-bits // 4) * 4  # few distinct tables, however many members there come to be
+    bits = -(-bits // 4) * 4  # so that few distinct tables are cached, whatever the number of members
     basis = _sobol_basis(seed, name, dimensions, min(bits, SOBOL_BITS), scramble)
     points = np.broadcast_to(basis[0], (len(indices), dimensions)).copy()
     for bit in range(min(bits, SOBOL_BITS)):
@@ -52,44 +64,46 @@ def sobol_points(seed: int, name: str, dimensions: int, indices: np.ndarray, scr
     return np.asarray((points.astype(np.float64) + 0.5) * 2.0**-SOBOL_BITS)
 
 
-# Of every replicate, for a few numbers of bits.
+# The cache holds the tables of every replicate, for up to eight numbers of bits.
 @functools.lru_cache(maxsize=8 * MOST_REPLICATES)
 def _sobol_basis(seed: int, name: str, dimensions: int, bits: int, scramble: bool) -> np.ndarray:
-    """Point 0, and what each bit of an index changes in it: (bits + 1, dimensions), as whole numbers."""
+    """Point 0, and the bits that each bit of an index changes in it: (bits + 1, dimensions), as integers."""
     from scipy.stats import qmc
 
     rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed_words(seed, name))))
     engine = qmc.Sobol(dimensions, scramble=scramble, bits=SOBOL_BITS, rng=rng)
-    points, made = [], 0
+    points, position = [], 0
     for index in (0, *(1 << bit for bit in range(bits))):
-        if index > made:
-            engine.fast_forward(index - made)
+        if index > position:
+            engine.fast_forward(index - position)
         points.append(engine.random(1)[0])
-        made = index + 1
-    whole = (np.array(points) * 2.0**SOBOL_BITS).astype(np.uint64)
-    whole[1:] ^= whole[0]
-    return whole
+        position = index + 1
+    bit_words = (np.array(points) * 2.0**SOBOL_BITS).astype(np.uint64)
+    bit_words[1:] ^= bit_words[0]
+    return bit_words
 
 
 @dataclass(frozen=True)
 class Halton(Replicated):
     """A scrambled Halton sequence (random permutations of digits, scipy.stats.qmc.Halton): member i is point i.
 
-    Members may be added, any number of them. What varies is part of the design: another name, another sequence.
-    replicates: so many sequences, scrambled independently, a member of each in turn.
+    Any number of members may be added. Another name that varies makes another sequence.
+
+    Args:
+        replicates: R, the number of sequences, scrambled independently, a member of each in turn; 1 by default.
     """
 
     kind: ClassVar[str] = "halton"
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Points by their indices, neighbours together."""
-        found = np.empty((len(members), space.dimensions))
-        for replicate, own, wanted in self.dealt(members):
+        """Points by their indices; neighbouring indices are computed together."""
+        levels = np.empty((len(members), space.dimensions))
+        for replicate, mask, wanted in self.dealt(members):
             ascending, place = np.unique(wanted, return_inverse=True)
             runs = np.split(ascending, np.flatnonzero(np.diff(ascending) > 1) + 1)
             points = np.concatenate([self._run(space, replicate, int(run[0]), len(run)) for run in runs])
-            found[own] = inside(points)[place.reshape(-1)]
-        return space.split(found)
+            levels[mask] = inside(points)[place.reshape(-1)]
+        return space.split(levels)
 
     def _run(self, space: Space, replicate: int, first: int, count: int) -> np.ndarray:
         if not space.dimensions:

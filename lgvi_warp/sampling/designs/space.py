@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""The unit cube of an ensemble: which names vary, with how many columns each."""
 
 from __future__ import annotations
 
@@ -10,9 +10,13 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Space:
-    """The unit cube that a sampling fills: `keys` in the order of their names, each with so many columns.
+    """The unit cube that a sampling fills.
 
-    factors: (label, columns) of what varies by itself: an entry, or all that one joint law draws.
+    Args:
+        seed: Seed of the ensemble.
+        keys: Names that vary, in their order.
+        sizes: The number of columns of each.
+        factors: Label and columns of each factor: an entry that varies by itself, or all that one joint distribution draws.
     """
 
     seed: int
@@ -22,16 +26,30 @@ class Space:
 
     @property
     def dimensions(self) -> int:
-        """Columns in all."""
+        """The number of columns of all keys."""
         return sum(self.sizes)
 
     def split(self, cube: np.ndarray) -> dict[str, np.ndarray]:
-        """Points (n, dimensions) as (n, size) by key."""
+        """Split points into the columns of each key.
+
+        Args:
+            cube: Points (n, dimensions).
+
+        Returns:
+            Levels (n, size) by key.
+        """
         parts = np.split(cube, np.cumsum(self.sizes)[:-1], axis=1) if self.keys else []
         return dict(zip(self.keys, parts, strict=True))
 
     def of(self, keys: Iterable[str]) -> Space:
-        """The same with these keys only."""
+        """The part of the cube that some keys span.
+
+        Args:
+            keys: The keys to keep.
+
+        Returns:
+            A cube with the same seed and only these keys and their factors.
+        """
         wanted = set(keys)
         starts = np.cumsum([0, *self.sizes])
         kept = [i for i, key in enumerate(self.keys) if key in wanted]

@@ -1,4 +1,4 @@
-"""Members' own values, from a file or from arrays."""
+"""Values of every member, from a file or from arrays."""
 
 from __future__ import annotations
 
@@ -21,21 +21,29 @@ from lgvi_warp.sampling.designs.csv_file import columns_of
 from lgvi_warp.sampling.designs.random import Random
 from lgvi_warp.sampling.designs.space import Space
 
-# What files of numpy.save, numpy.savez and archives begin with. None is opened: objects in them could be code.
+# First bytes of files of numpy.save and numpy.savez, and of archives. They are not opened, since they could hold code.
 BINARY = (b"\x93NUMPY", b"PK\x03\x04", b"\x1f\x8b")
 
 
 @dataclass(frozen=True, eq=False)
 class Table(Sampling):
-    """Members' own values: from a CSV file whose first line names the columns, or from arrays by name.
+    """Values of every member: from a CSV file whose first line names the columns, or from arrays by name.
 
-    file: its columns are numbers of the scene or entries of them, "vehicle.mass", "start.position[2]" (quote a name with a
-    comma in it), parted by commas, semicolons or tabs; empty lines and those that begin with # are passed over. values:
-    name -> (n,) or (n, *shape), a data frame, a structured array, or an xarray Dataset with such names. columns: those to
-    take; ignore: those to leave out, such as an id. sha256: of the file as it must be, written by `to_dict`. Names of `vary`
-    that the table does not have are drawn at random. The number of members is that of the lines, or less: the first ones;
-    lines may be added.
-    Raises SceneError naming every fault.
+    Names of `vary` that the table does not contain are drawn at random. The number of members is that of the lines, or less:
+    the first ones; lines may be added.
+
+    Args:
+        file: Path of the file. Its columns are numbers of the scene or entries of them, "vehicle.mass", "start.position[2]"
+            (quote a name that contains a comma), separated by commas, semicolons or tabs. Empty lines and lines that begin
+            with # are skipped.
+        values: Arrays (n,) or (n, *shape) by name, instead of a file; also a data frame, a structured array or an xarray
+            Dataset with such names.
+        sha256: Checksum that the file must have, written by `to_dict`; any by default.
+        columns: Names of the columns to take; all by default.
+        ignore: Names of the columns to leave out, such as an id; none by default.
+
+    Raises:
+        SceneError: Where the file cannot be read, or a cell is no number. The message lists every fault.
     """
 
     file: str | os.PathLike[str] | None = None
@@ -52,8 +60,8 @@ class Table(Sampling):
             object.__setattr__(self, "values", self.file)
             object.__setattr__(self, "file", None)
         if (self.file is None) == (self.values is None):
-            what = "has no values beside it" if self.file is None else "is given beside values"
-            faults.add("file", self.file, what, "give one of file and values")
+            fault = "has no values beside it" if self.file is None else "is given beside values"
+            faults.add("file", self.file, fault, "give one of file and values")
         self._check_options(faults)
         faults.raise_if_any()
         read = self._from_file(faults) if self.file is not None else self._from_values(faults)
@@ -68,14 +76,14 @@ class Table(Sampling):
         """A table whose file was read when a store was made of it: the store has its numbers.
 
         Args:
-            told: what `to_dict` says of the file, by key.
-            values: columns by name, (n,) or (n, *shape).
+            told: What `to_dict` says of the file, by key.
+            values: Columns by name, (n,) or (n, *shape).
 
         Returns:
-            The table, whether the file is still there or not.
+            The table, whether or not the file still exists.
 
         Raises:
-            SceneError: where the values are no columns of one length.
+            SceneError: Where the values are no columns of one length.
         """
         table = cls(values=values)
         for item in fields(cls):
@@ -84,18 +92,22 @@ class Table(Sampling):
 
     def _check_options(self, faults: Faults) -> None:
         for name in ("columns", "ignore"):
-            given = getattr(self, name)
-            if given is None:
+            chosen = getattr(self, name)
+            if chosen is None:
                 continue
-            if not isinstance(given, list | tuple) or not given or not all(isinstance(one, str) for one in given):
-                faults.add(name, given, "is no list of names", f'write {name} = ["vehicle.mass"]')
+            if (
+                not isinstance(chosen, list | tuple)
+                or not chosen
+                or not all(isinstance(entry, str) for entry in chosen)
+            ):
+                faults.add(name, chosen, "is no list of names", f'write {name} = ["vehicle.mass"]')
             else:
-                object.__setattr__(self, name, list(given))
+                object.__setattr__(self, name, list(chosen))
         if self.columns is not None and self.ignore is not None:
             faults.add("ignore", self.ignore, "is given beside columns", "keep one of them")
 
     def _chosen(self, faults: Faults, names: Sequence[str]) -> list[str]:
-        """Which of the columns there are to take."""
+        """The names of the columns to take."""
         known = set(names)
         for option in ("columns", "ignore"):
             for name in getattr(self, option) or ():
@@ -114,11 +126,11 @@ class Table(Sampling):
             remedy = 'give a file, {"vehicle.mass": array, ...} or a DataFrame with such names'
             faults.add("values", self.values, "has no names of columns", remedy)
             return read
-        given = columns_by_name(faults, "values", self.values)
-        if not given:
+        table = columns_by_name(faults, "values", self.values)
+        if not table:
             return read
-        for name in self._chosen(faults, list(given)):
-            array = _column(faults, f'"{name}"', given[name])
+        for name in self._chosen(faults, list(table)):
+            array = _column(faults, f'"{name}"', table[name])
             if array is not None:
                 read[name] = array
         object.__setattr__(self, "values", read)
@@ -137,12 +149,12 @@ class Table(Sampling):
                 "file", path, "is a file of NumPy, or an archive", "give a CSV file, or arrays: lw.Table({name: array})"
             )
             return {}
-        found = hashlib.sha256(content).hexdigest()
-        if self.sha256 not in (None, found):
-            what = f"is not that of {path}, which has changed"
-            faults.add("sha256", self.sha256, what, "leave sha256 out to take it")
+        checksum = hashlib.sha256(content).hexdigest()
+        if self.sha256 not in (None, checksum):
+            fault = f"is not that of {path}, which has changed"
+            faults.add("sha256", self.sha256, fault, "leave sha256 out to take it")
             return {}
-        object.__setattr__(self, "sha256", found)
+        object.__setattr__(self, "sha256", checksum)
         try:
             return columns_of(faults, path, content, self._chosen)
         except UnicodeDecodeError:
@@ -150,23 +162,23 @@ class Table(Sampling):
             return {}
 
     def own_values(self) -> dict[str, np.ndarray]:
-        """As read."""
+        """The table's columns by name, as read."""
         return dict(self._own)  # type: ignore[attr-defined]
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Columns: also those of a file, which may be moved or changed."""
+        """The columns, also those of a file, since that may be moved or changed."""
         return self.own_values()
 
     def own_members(self, space: Space) -> int:
-        """Lines."""
+        """The number of lines of the table."""
         return len(next(iter(self.own_values().values())))
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """At random, of what the table does not have."""
+        """Random levels for the names that the table does not contain."""
         return Random().draw(space, members)
 
     def to_dict(self) -> Any:
-        """As in a scene file."""
+        """The table as a scene file has it: the file with its checksum, or the values as lists."""
         if self.file is None:
             return {self.kind: {"values": {name: column.tolist() for name, column in self.own_values().items()}}}
         chosen = {name: getattr(self, name) for name in ("columns", "ignore") if getattr(self, name) is not None}
@@ -174,16 +186,15 @@ class Table(Sampling):
 
 
 def moved(file: str, sha256: str | None, beside: Path) -> str:
-    """Where a table lies now, if it and a store were moved together.
+    """Where a table is now, if it was moved together with a store.
 
     Args:
-        file: where it lay, absolute.
-        sha256: its checksum, which tells it from any other.
-        beside: the store.
+        file: Absolute path where it was.
+        sha256: Checksum of the file; None where it is unknown.
+        beside: Path of the store.
 
     Returns:
-        The path with its last parts below a folder above the store, as far as a file with that checksum is there; else
-        where it lay.
+        The last parts of the path below a folder above the store, where a file with that checksum is there; else `file`.
     """
     parts = Path(file).parts[1:]
     if sha256 is None or Path(file).exists():
@@ -198,7 +209,7 @@ def moved(file: str, sha256: str | None, beside: Path) -> str:
 
 
 def _column(faults: Faults, key: str, given: Any) -> np.ndarray | None:
-    """A column of finite numbers; None after noting a fault."""
+    """A column of finite numbers; None after adding a fault."""
     plain = isinstance(given, np.ndarray) and given.dtype.kind == "f" and given.ndim and not np.ma.is_masked(given)
     if plain and not np.isfinite(given).all():
         row = int(np.argmin(np.isfinite(given.reshape(len(given), -1)).all(axis=1)))

@@ -1,1 +1,1 @@
-"""To be said in one sentence."""
+"""Probability distributions of what varies: of single numbers, of whole quantities, and by their names in a scene file."""

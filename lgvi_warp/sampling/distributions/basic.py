@@ -1,6 +1,6 @@
-"""What may vary from member to member: distributions as quantile functions, and uniform numbers keyed by member.
+"""Distributions of single numbers, as quantile functions.
 
-Every distribution maps uniform numbers in (0, 1) to values, so any sampling of the unit cube can feed it.
+Every distribution maps uniform numbers in (0, 1) to values, so that any sampling of the unit cube can feed it.
 """
 
 from __future__ import annotations
@@ -19,21 +19,26 @@ Spread = float | tuple[float, ...] | list[float] | np.ndarray
 
 @dataclass(frozen=True)
 class Distribution:
-    """A law of a quantity, around the scene's value of it unless the law says otherwise.
+    """The distribution of a quantity, around the scene's value of it unless the distribution says otherwise.
 
-    Numbers may be one for all components or one per component. Raises SceneError naming every fault.
+    Numbers may be one for all components, or one per component, in the unit of the quantity.
+
+    Class attributes: `kind` is the name in a scene file; `widths` names the arguments of which exactly one sets the width.
+
+    Raises:
+        SceneError: Where a number is wrong. The message lists every fault.
     """
 
     kind: ClassVar[str] = ""
-    # Exactly one of these says how wide the law is.
+    # Arguments of which exactly one sets the width.
     widths: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
         faults = Faults(f"{self.kind}.")
-        given = [name for name in self.widths if getattr(self, name) is not None]
-        if self.widths and len(given) != 1:
+        widths_given = [name for name in self.widths if getattr(self, name) is not None]
+        if self.widths and len(widths_given) != 1:
             remedy = f"give one of {', '.join(self.widths)}"
-            faults.add(" and ".join(given) or "width", "...", f"{len(given)} given", remedy)
+            faults.add(" and ".join(widths_given) or "width", "...", f"{len(widths_given)} given", remedy)
         values = {name: faults.finite(name, value) for name, value in self._given().items()}
         for name, array in values.items():
             if array is not None and name not in ("mean", "median", "low", "high", "values") and np.any(array < 0.0):
@@ -48,40 +53,74 @@ class Distribution:
         return {item.name: getattr(self, item.name) for item in fields(self) if getattr(self, item.name) is not None}
 
     def _check_more(self, faults: Faults) -> None:
-        """Note what else is wrong with this kind of law."""
+        """Add a fault for what else is wrong with this kind of distribution."""
 
     def numbers(self) -> list[Any]:
-        """The numbers that were given."""
+        """The numbers that were given and must fit the components of the quantity.
+
+        Returns:
+            Numbers or arrays, in the order of the fields.
+        """
         return list(self._given().values())
 
     @property
     def joint(self) -> bool:
-        """Whether it gives a quantity, or several, as a whole (a `JointLaw`), and not each entry by itself."""
+        """Whether it draws whole quantities (as a `JointLaw`), and not each entry by itself."""
         return False
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
-        """(what is wrong, the remedy) for quantities of these shapes that it is to draw; None if it fits."""
+        """What prevents it from drawing quantities of these shapes.
+
+        Args:
+            shapes: The shape of each quantity.
+
+        Returns:
+            The fault and its remedy; None where it fits.
+        """
         (shape,) = shapes
         try:
-            good = np.broadcast_shapes(shape, *(np.shape(number) for number in self.numbers())) == shape
+            fits = np.broadcast_shapes(shape, *(np.shape(number) for number in self.numbers())) == shape
         except ValueError:
-            good = False
-        if good:
+            fits = False
+        if fits:
             return None
         wanted = f"one number or {' x '.join(map(str, shape))}, one per component" if shape else "one number"
         return f"does not fit a quantity of shape {shape}", f"give {wanted}"
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """Values at the levels u (n, *shape) of a quantity whose scene value is base (*shape)."""
+        """Values at given levels. Every distribution of single numbers must define this.
+
+        Args:
+            u: Levels in (0, 1), (n, *shape).
+            base: The scene's value of the quantity, of that shape.
+
+        Returns:
+            Values (n, *shape), in the unit of the quantity.
+
+        Raises:
+            TypeError: Where the distribution does not define it.
+        """
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def to_dict(self) -> dict[str, Any]:
-        """As in a scene file: { normal = { std = ... } }."""
+        """The distribution as a scene file has it, { normal = { std = ... } }.
+
+        Returns:
+            The kind, with the numbers that were given, arrays as lists.
+        """
         return {self.kind: {key: np.asarray(value).tolist() for key, value in self._given().items()}}
 
 
 def ordered(low: np.ndarray, high: np.ndarray) -> bool:
-    """Whether low < high in every component; False where their shapes do not fit each other."""
+    """Whether low < high in every component.
+
+    Args:
+        low: Lower bounds.
+        high: Upper bounds.
+
+    Returns:
+        False also where the shapes do not fit each other.
+    """
     try:
         return bool(np.all(low < high))
     except ValueError:
@@ -89,7 +128,15 @@ def ordered(low: np.ndarray, high: np.ndarray) -> bool:
 
 
 def varies_nothing(law: Distribution, bases: Sequence[np.ndarray]) -> str | None:
-    """Where a law is relative to the scene's value, and that is 0 in every entry: what its width is called; else None."""
+    """Find a distribution that is relative to the scene's value where that is 0, so that nothing would vary.
+
+    Args:
+        law: The distribution.
+        bases: The scene's value of each quantity that it draws.
+
+    Returns:
+        The name of its width, "relative" or "sigma"; None where it does vary the quantity.
+    """
     if any(np.any(base) for base in bases):
         return None
     relative = getattr(law, "relative", None)
@@ -99,13 +146,19 @@ def varies_nothing(law: Distribution, bases: Sequence[np.ndarray]) -> str | None
 
 
 def _width(std: Spread | None, relative: Spread | None, base: np.ndarray) -> np.ndarray:
-    """Absolute spread, from itself or as a fraction of the scene's value."""
+    """The absolute spread: as given, or as a fraction of the scene's value."""
     return np.asarray(std) if std is not None else np.abs(base) * np.asarray(relative)
 
 
 @dataclass(frozen=True)
 class Normal(Distribution):
-    """Normal about mean (default: the scene's value), std or relative std (a fraction of the scene's value)."""
+    """Normal distribution, by default about the scene's value.
+
+    Args:
+        std: Standard deviation, in the unit of the quantity.
+        relative: Standard deviation as a fraction of the scene's value; instead of `std`.
+        mean: Mean; by default the scene's value.
+    """
 
     std: Spread | None = None
     relative: Spread | None = None
@@ -114,7 +167,7 @@ class Normal(Distribution):
     widths: ClassVar[tuple[str, ...]] = ("std", "relative")
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """mean + std * Phi^-1(u)."""
+        """Values mean + std * Phi^-1(u)."""
         from scipy.special import ndtri
 
         mean = base if self.mean is None else np.asarray(self.mean)
@@ -123,7 +176,14 @@ class Normal(Distribution):
 
 @dataclass(frozen=True)
 class Uniform(Distribution):
-    """Uniform from low to high, or about the scene's value within half_width, or within relative times it."""
+    """Uniform distribution: from low to high, or about the scene's value.
+
+    Args:
+        low: Lower end, with `high`.
+        high: Upper end, with `low`.
+        half_width: Largest distance from the scene's value; instead of `low` and `high`.
+        relative: That distance as a fraction of the scene's value; instead of `half_width`.
+    """
 
     low: Spread | None = None
     high: Spread | None = None
@@ -139,7 +199,7 @@ class Uniform(Distribution):
             faults.add("high", self.high, "is given without low", "give both, or half_width, or relative")
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """low + (high - low) u."""
+        """Values low + (high - low) u, or the same about the scene's value."""
         if self.high is not None:
             return np.asarray(self.low) + (np.asarray(self.high) - np.asarray(self.low)) * u
         return base + _width(self.half_width, self.relative, base) * (2.0 * u - 1.0)
@@ -147,7 +207,12 @@ class Uniform(Distribution):
 
 @dataclass(frozen=True)
 class LogNormal(Distribution):
-    """exp(Normal): median (default: the scene's value) times exp(sigma Z); keeps the sign of the median."""
+    """Log-normal distribution: median * exp(sigma Z), Z standard normal. Values have the sign of the median.
+
+    Args:
+        sigma: Standard deviation of the logarithm.
+        median: Median; by default the scene's value.
+    """
 
     sigma: Spread | None = None
     median: Spread | None = None
@@ -155,18 +220,25 @@ class LogNormal(Distribution):
     widths: ClassVar[tuple[str, ...]] = ("sigma",)
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """median * exp(sigma Phi^-1(u))."""
+        """Values median * exp(sigma * Phi^-1(u))."""
         from scipy.special import ndtri
 
         median = base if self.median is None else np.asarray(self.median)
-        with np.errstate(over="ignore"):  # what is too large is refused by the ensemble, or marked by the run
+        with np.errstate(over="ignore"):  # the ensemble refuses what is too large, or the run marks it
             return median * np.exp(np.asarray(self.sigma) * ndtri(u))
 
 
 @dataclass(frozen=True)
 class TruncatedNormal(Distribution):
-    """Normal kept between low and high (absolute; one alone leaves the other side open), or within `width` standard
-    deviations of its mean (default 3).
+    """Normal distribution restricted to an interval.
+
+    Args:
+        std: Standard deviation of the normal, in the unit of the quantity.
+        relative: Standard deviation as a fraction of the scene's value; instead of `std`.
+        mean: Mean of the normal; by default the scene's value.
+        low: Lower bound; without it that side is open.
+        high: Upper bound; without it that side is open.
+        width: Bounds as a multiple of the standard deviation from the mean; 3 by default where no bound is given.
     """
 
     std: Spread | None = None
@@ -179,7 +251,7 @@ class TruncatedNormal(Distribution):
     widths: ClassVar[tuple[str, ...]] = ("std", "relative")
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """The normal's quantile at a level between those of the bounds; upper tails by symmetry, for their digits."""
+        """Normal quantiles at levels between those of the bounds; upper tails by symmetry, which keeps their digits."""
         from scipy.special import log_ndtr, ndtr, ndtri, ndtri_exp
 
         mean = base if self.mean is None else np.asarray(self.mean)
@@ -204,7 +276,7 @@ class TruncatedNormal(Distribution):
             faults.add("width", self.width, "is given with low or high", "keep either width or the bounds")
 
     def _bounds(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """low, high, width, infinite where not given; width is 3 if none is."""
+        """low, high and width, infinite where not given; width is 3 if none is given."""
         width = 3.0 if self.width is None and self.low is None and self.high is None else self.width
         open_ended = ((self.low, -np.inf), (self.high, np.inf), (width, np.inf))
         low, high, width = (np.asarray(default if value is None else value) for value, default in open_ended)
@@ -213,10 +285,12 @@ class TruncatedNormal(Distribution):
 
 @dataclass(frozen=True)
 class Choice(Distribution):
-    """One of the values, with chances proportional to the weights (default: equal).
+    """One of several values, with probabilities in proportion to weights.
 
-    values (k,): every entry of the quantity gets one of these numbers, each entry by itself; (k, *shape): the quantity gets
-    one of these as a whole.
+    Args:
+        values: (k,): every entry of the quantity gets one of these numbers, each entry by itself; (k, *shape): the quantity
+            gets one of these as a whole.
+        weights: Weights (k,), from 0; equal by default.
     """
 
     values: Any = ()
@@ -228,7 +302,7 @@ class Choice(Distribution):
             values = np.array(self.values, dtype=np.float64)
             weights = np.ones(len(values)) if self.weights is None else np.array(self.weights, dtype=np.float64)
         except (TypeError, ValueError):
-            return  # said already: not numeric
+            return  # a fault for numbers that are not numeric is there already
         if values.ndim == 0 or not len(values):
             faults.add("values", self.values, "is no list of values", "give one value or more")
         elif weights.shape != values.shape[:1] or not weights.sum() > 0.0:
@@ -237,7 +311,7 @@ class Choice(Distribution):
             )
 
     def numbers(self) -> list[Any]:
-        """None of them is a component's."""
+        """Always []: the values need not fit the components."""
         return []
 
     @property
@@ -246,7 +320,7 @@ class Choice(Distribution):
         return np.ndim(self.values) > 1
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
-        """A value of the whole quantity must have its shape."""
+        """What prevents it from drawing quantities of these shapes: a whole value must have the quantity's shape."""
         if not self.joint:
             return super().fault(shapes)
         shape = np.shape(self.values)[1:]
@@ -255,15 +329,30 @@ class Choice(Distribution):
         return f"has values of shape {shape}", f"give values of shape {shapes[0]}"
 
     def size(self, bases: Sequence[np.ndarray]) -> int:
-        """One uniform number chooses a whole value."""
+        """Always 1: one uniform number chooses a whole value.
+
+        Args:
+            bases: The scene's value of the quantity.
+
+        Returns:
+            The number 1.
+        """
         return 1
 
     def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """A value of the whole quantity at the levels u (n, 1)."""
+        """Draw values of the whole quantity.
+
+        Args:
+            u: Levels (n, 1).
+            bases: The scene's value of the quantity, as the only entry.
+
+        Returns:
+            Values (n, *shape), as the only entry.
+        """
         return [self.quantile(u[:, 0], bases[0])]
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """The value whose part of (0, 1) holds u."""
+        """The value whose part of (0, 1), in proportion to its weight, contains u."""
         values = np.asarray(self.values, dtype=np.float64)
         weights = np.ones(len(values)) if self.weights is None else np.asarray(self.weights, dtype=np.float64)
         ends = np.cumsum(weights)[:-1] / weights.sum()

@@ -1,4 +1,4 @@
-"""Laws of a quantity as a whole, or of several together: correlated normals, rotations, matrices that stay physical."""
+"""Joint distributions, of whole quantities or of several: correlated normals, rotations, matrices that stay physical."""
 
 from __future__ import annotations
 
@@ -12,23 +12,37 @@ from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics import inertia, notation
 from lgvi_warp.sampling.distributions.basic import Distribution, Spread
 
-# Of a matrix's largest entry: what a negative eigenvalue of it may be by round-off.
+# The fraction of a matrix's largest entry that a negative eigenvalue may reach by round-off.
 ROUND_OFF = 1e-12
-# What a negative eigenvalue of a correlation matrix may be: of one that was written with six digits.
+# The size that a negative eigenvalue may reach in a correlation matrix that is written with six digits.
 SIX_DIGITS = 1e-5
 
 
 def normals(u: np.ndarray) -> np.ndarray:
-    """Standard normal numbers at the levels u."""
+    """Standard normal numbers at given levels.
+
+    Args:
+        u: Levels in (0, 1), of any shape.
+
+    Returns:
+        Numbers of the same shape.
+    """
     from scipy.special import ndtri
 
     return np.asarray(ndtri(u))
 
 
 def combined(matrix: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """matrix (d, d) times each row of z (n, d).
+    """A matrix times each row of numbers.
 
-    Written out: the sum's order, and so the bits, must not depend on how many rows there are.
+    The sum is written out: its order, and so its bits, must not depend on the number of rows.
+
+    Args:
+        matrix: Matrix (d, d).
+        z: Rows (n, d).
+
+    Returns:
+        Products (n, d).
     """
     total = z[:, :1] * matrix[:, 0]
     for k in range(1, z.shape[1]):
@@ -37,9 +51,15 @@ def combined(matrix: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 def correlation(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """std (d,) and correlation (d, d) of a covariance; 1 on the diagonal where the variance is 0.
+    """Standard deviations and correlation of a covariance.
 
-    Units and sizes of the entries play no part in it: metres beside newtons are judged alike.
+    Units and sizes of the entries play no part in the correlation: metres beside newtons are judged alike.
+
+    Args:
+        covariance: Covariance (d, d).
+
+    Returns:
+        Standard deviations (d,) and correlation (d, d), with 1 on the diagonal where the variance is 0.
     """
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     scale = np.where(std > 0.0, std, 1.0)
@@ -47,13 +67,27 @@ def correlation(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def root_of_covariance(covariance: np.ndarray) -> np.ndarray:
-    """L (d, d) with L L^T = covariance, from the correlation's."""
+    """L with L L^T = covariance, found from the correlation.
+
+    Args:
+        covariance: Covariance (d, d), positive semidefinite.
+
+    Returns:
+        L (d, d).
+    """
     std, C = correlation(covariance)
     return np.asarray(std[:, None] * root(C))
 
 
 def root(matrix: np.ndarray) -> np.ndarray:
-    """L (d, d) with L L^T = matrix, positive semidefinite: Cholesky's factor, or where that has none the symmetric root."""
+    """L with L L^T = matrix: Cholesky's factor, or the symmetric root where the matrix is singular.
+
+    Args:
+        matrix: Matrix (d, d), positive semidefinite.
+
+    Returns:
+        L (d, d).
+    """
     try:
         return np.linalg.cholesky(matrix)
     except np.linalg.LinAlgError:
@@ -62,13 +96,13 @@ def root(matrix: np.ndarray) -> np.ndarray:
 
 
 def _covariance(faults: Faults, law: Any, size: int | None) -> np.ndarray | None:
-    """The covariance that a law was given, or that follows from std and correlation; None after noting a fault."""
-    given = {name for name in ("covariance", "std", "correlation") if getattr(law, name, None) is not None}
-    if ("covariance" in given) == ("std" in given) or given == {"covariance", "correlation"}:
-        what = f"{' and '.join(sorted(given)) or 'nothing'} given"
-        faults.add("covariance", "...", what, "give covariance, or std (and correlation)")
+    """The covariance that was given, or that follows from std and correlation; None after adding a fault."""
+    arguments = {name for name in ("covariance", "std", "correlation") if getattr(law, name, None) is not None}
+    if ("covariance" in arguments) == ("std" in arguments) or arguments == {"covariance", "correlation"}:
+        fault = f"{' and '.join(sorted(arguments)) or 'nothing'} given"
+        faults.add("covariance", "...", fault, "give covariance, or std (and correlation)")
         return None
-    name = "correlation" if "correlation" in given else next(iter(given))
+    name = "correlation" if "correlation" in arguments else next(iter(arguments))
     matrix = np.asarray(faults.finite(name, getattr(law, name)), dtype=np.float64)
     if matrix.dtype == object or np.any(np.isnan(matrix)):
         return None
@@ -105,35 +139,70 @@ def _covariance(faults: Faults, law: Any, size: int | None) -> np.ndarray | None
 
 
 def components(shapes: Sequence[tuple[int, ...]]) -> int:
-    """Numbers in quantities of these shapes."""
+    """The number of entries in quantities of these shapes.
+
+    Args:
+        shapes: The shape of each quantity.
+
+    Returns:
+        The sum of their sizes.
+    """
     return sum(int(np.prod(shape)) for shape in shapes)
 
 
 @dataclass(frozen=True)
 class JointLaw(Distribution):
-    """A law of whole quantities: `size` uniform numbers give all of their entries."""
+    """A distribution of whole quantities: `size` uniform numbers give all of their entries."""
 
     @property
     def joint(self) -> bool:
-        """Always."""
+        """Always True: it draws whole quantities."""
         return True
 
     def size(self, bases: Sequence[np.ndarray]) -> int:
-        """Uniform numbers that a draw of quantities with these scene values takes."""
+        """The number of uniform numbers for one draw. Every joint distribution must define this.
+
+        Args:
+            bases: The scene's value of each quantity.
+
+        Returns:
+            Columns of the unit cube.
+
+        Raises:
+            TypeError: Where the distribution does not define it.
+        """
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Values (n, *shape) of each quantity at the levels u (n, size)."""
+        """Draw values of the quantities. Every joint distribution must define this.
+
+        Args:
+            u: Levels (n, size) in (0, 1).
+            bases: The scene's value of each quantity.
+
+        Returns:
+            Values (n, *shape) of each quantity.
+
+        Raises:
+            TypeError: Where the distribution does not define it.
+        """
         raise TypeError(f"{type(self).__name__} is abstract")
 
 
 @dataclass(frozen=True)
 class CorrelatedNormal(JointLaw):
-    """Normal numbers with a covariance between the entries of one quantity or of several, named "a, b" in `vary`.
+    """Normal distribution with a covariance between the entries of one quantity, or of several, named "a, b" in `vary`.
 
-    covariance (d, d), in the units of the entries, in the order of the names; or std, one or (d,), with correlation (d, d).
-    mean (d,): default the scene's values. The covariance may be singular. Of a symmetric matrix the entries are those on and
-    above the diagonal (of a diagonal one, those on it). Raises SceneError naming every fault.
+    Of a symmetric matrix the entries are those on and above the diagonal (of a diagonal one, those on it).
+
+    Args:
+        covariance: Covariance (d, d), in the units and order of the entries; it may be singular.
+        std: Standard deviation, one or (d,); instead of `covariance`.
+        correlation: Correlation (d, d), with `std`; none by default.
+        mean: Mean, one or (d,); by default the scene's values.
+
+    Raises:
+        SceneError: Where the matrix is not positive semidefinite or the numbers do not fit. The message lists every fault.
     """
 
     covariance: Any = None
@@ -152,7 +221,7 @@ class CorrelatedNormal(JointLaw):
         object.__setattr__(self, "_root", root_of_covariance(matrix))
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
-        """As many rows as there are entries, unless one std serves all."""
+        """What prevents it from drawing quantities of these shapes: a matrix needs one row per entry."""
         d, rows = components(shapes), len(self._root)  # type: ignore[attr-defined]
         if rows != d and not (rows == 1 and self.covariance is None and self.correlation is None):
             return f"is of {rows} components, {d} are named", f"give {d} x {d} numbers, in the order of the names"
@@ -161,11 +230,11 @@ class CorrelatedNormal(JointLaw):
         return None
 
     def size(self, bases: Sequence[np.ndarray]) -> int:
-        """One for each entry."""
+        """One uniform number for each entry."""
         return components([base.shape for base in bases])
 
     def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """mean + L Phi^-1(u), L L^T the covariance."""
+        """Values mean + L Phi^-1(u), L L^T the covariance."""
         L: np.ndarray = self._root  # type: ignore[attr-defined]
         if len(L) != u.shape[1]:
             L = L[0, 0] * np.eye(u.shape[1])
@@ -173,17 +242,24 @@ class CorrelatedNormal(JointLaw):
         drawn = (scene if self.mean is None else np.asarray(self.mean)) + combined(L, normals(u))
         ends = np.cumsum([base.size for base in bases])[:-1]
         return [
-            part.reshape(len(u), *base.shape) for part, base in zip(np.split(drawn, ends, axis=1), bases, strict=True)
+            entries.reshape(len(u), *base.shape)
+            for entries, base in zip(np.split(drawn, ends, axis=1), bases, strict=True)
         ]
 
 
 @dataclass(frozen=True)
 class RotationNormal(JointLaw):
-    """A concentrated normal law of an attitude: R = R0 exp(hat(v)), v normal about 0, in body axes; for "start.attitude".
+    """Concentrated normal distribution of an attitude, R = R0 exp(hat(v)); for "start.attitude".
 
-    R0: the scene's attitude. std [rad], one or (3,), about the body's axes; or covariance (3, 3) [rad^2]. Barfoot & Furgale
-    (2014), Associating uncertainty with three-dimensional poses, with the perturbation on the body's side.
-    Raises SceneError naming every fault.
+    R0 is the scene's attitude, and v is normal about 0, in body axes. Barfoot & Furgale (2014), Associating uncertainty
+    with three-dimensional poses, with the perturbation on the body's side.
+
+    Args:
+        std: Standard deviation of v about the body's axes, one or (3,) [rad].
+        covariance: Covariance of v, (3, 3) [rad^2]; instead of `std`.
+
+    Raises:
+        SceneError: Where the numbers do not fit. The message lists every fault.
     """
 
     std: Spread | None = None
@@ -200,22 +276,22 @@ class RotationNormal(JointLaw):
         object.__setattr__(self, "_root", root_of_covariance(matrix))
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
-        """The ensemble gives it attitudes only."""
+        """Always None: the ensemble gives it attitudes only."""
         return None
 
     def size(self, bases: Sequence[np.ndarray]) -> int:
-        """Three turns."""
+        """Always 3: one uniform number per axis."""
         return 3
 
     def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """R0 exp(hat(L Phi^-1(u)))."""
+        """Attitudes R0 exp(hat(L Phi^-1(u))), L L^T the covariance."""
         v = combined(self._root, normals(u))  # type: ignore[attr-defined]
         return [bases[0] @ notation.matrix_from_rotation_vector(v)]
 
 
 @dataclass(frozen=True)
 class UniformRotation(JointLaw):
-    """Every attitude alike: Haar's measure on SO(3), whatever the scene's attitude is; for "start.attitude".
+    """Uniform distribution of an attitude: Haar's measure on SO(3), whatever the scene's attitude; for "start.attitude".
 
     Shoemake (1992), Uniform random rotations, in Graphics Gems III.
     """
@@ -223,15 +299,15 @@ class UniformRotation(JointLaw):
     kind: ClassVar[str] = "uniform_rotation"
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
-        """The ensemble gives it attitudes only."""
+        """Always None: the ensemble gives it attitudes only."""
         return None
 
     def size(self, bases: Sequence[np.ndarray]) -> int:
-        """Three: a length and two angles."""
+        """Always 3: a length and two angles."""
         return 3
 
     def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """The rotation of a unit quaternion that is uniform on its sphere."""
+        """Attitudes of unit quaternions that are uniform on their sphere."""
         a, b = np.sqrt(1.0 - u[:, 0]), np.sqrt(u[:, 0])
         s, t = 2.0 * np.pi * u[:, 1], 2.0 * np.pi * u[:, 2]
         q = np.stack([a * np.sin(s), a * np.cos(s), b * np.sin(t), b * np.cos(t)], axis=1)
@@ -240,12 +316,16 @@ class UniformRotation(JointLaw):
 
 @dataclass(frozen=True)
 class PositiveDefinite(JointLaw):
-    """A symmetric matrix that stays positive definite: A = L T T^T L^T, L L^T the scene's matrix, T lower triangular.
+    """Distribution of a symmetric matrix that stays positive definite: A = L T T^T L^T, L L^T the scene's matrix.
 
-    The diagonal of T is exp(sigma z / 2), below it are off_diagonal z (default 0), z standard normal: the logarithm of each
-    entry of a diagonal matrix varies with standard deviation sigma, its median the scene's. sigma: one or (d,). What is zero
-    in the scene, such as an added mass that is not there, stays so. After the log-Cholesky coordinates of Lin (2019),
-    Riemannian geometry of symmetric positive definite matrices via Cholesky decomposition.
+    T is lower triangular, with exp(sigma z / 2) on the diagonal and off_diagonal z below it, z standard normal. So the
+    logarithm of each entry of a diagonal matrix varies with standard deviation sigma, and its median is the scene's. What
+    is zero in the scene, such as an added mass that is absent, stays zero. After the log-Cholesky coordinates of Lin
+    (2019), Riemannian geometry of symmetric positive definite matrices via Cholesky decomposition.
+
+    Args:
+        sigma: Standard deviation of the logarithm, one or (d,).
+        off_diagonal: Standard deviation of the entries of T below the diagonal; 0 by default.
     """
 
     sigma: Spread | None = None
@@ -260,25 +340,32 @@ class PositiveDefinite(JointLaw):
             faults.add("sigma", self.sigma, "is a matrix", "give one number, or one for each axis")
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
-        """One sigma, or one for each row."""
+        """What prevents it from drawing a matrix of this shape: there must be one sigma, or one for each row."""
         d = shapes[0][0]
         if np.asarray(self.sigma).size in (1, d):
             return None
         return f"has {np.asarray(self.sigma).size} sigmas for a {d} x {d} matrix", f"give one number or {d}"
 
     def unusable(self, base: np.ndarray) -> tuple[str, str] | None:
-        """(what is wrong, the remedy) with the scene's matrix; None if the law can start from it."""
+        """What prevents the distribution from starting at the scene's matrix.
+
+        Args:
+            base: The scene's matrix (d, d).
+
+        Returns:
+            The fault and its remedy; None where the matrix is positive semidefinite.
+        """
         if np.linalg.eigvalsh(base)[0] >= -ROUND_OFF * np.abs(base).max():
             return None
         return "varies a matrix that is not positive in the scene", "give the scene a positive semidefinite matrix"
 
     def size(self, bases: Sequence[np.ndarray]) -> int:
-        """The diagonal of T, and what is below it."""
+        """One uniform number for each entry on the diagonal of T, and for those below it where they vary."""
         d = len(bases[0])
         return d + (d * (d - 1) // 2 if self.off_diagonal else 0)
 
     def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """L T T^T L^T."""
+        """Matrices L T T^T L^T."""
         return [self._around(bases[0], u)]
 
     def _around(self, base: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -298,27 +385,31 @@ class PositiveDefinite(JointLaw):
 
 @dataclass(frozen=True)
 class PhysicalInertia(PositiveDefinite):
-    """The inertia of a rigid body that stays one of a rigid body: positive, and no principal inertia above the sum of the
-    other two.
+    """Distribution of the inertia of a rigid body that stays physical: no principal inertia above the sum of the other two.
 
-    `PositiveDefinite` for the second moments of mass S = tr(J) / 2 - J, then J = tr(S) - S: an inertia is that of a
+    It is `PositiveDefinite` of the second moments of mass S = tr(J) / 2 - J, then J = tr(S) - S: an inertia is that of a
     distribution of mass exactly where S is positive definite (Wensing, Kim & Slotine 2018, Linear matrix inequalities for
-    physically consistent inertial parameter identification). sigma: of the logarithm of the principal second moments.
-    For "vehicle.inertia", whose scene value must itself be that of a rigid body, and "vehicle.rigid_body_mass_matrix":
-    there S is about the centre of gravity, which stays where it is, and mass_sigma is that of the mass (default 0).
+    physically consistent inertial parameter identification). It serves "vehicle.inertia", whose scene value must itself
+    be that of a rigid body, and "vehicle.rigid_body_mass_matrix": there S is about the centre of gravity, which stays
+    where it is.
+
+    Args:
+        sigma: Standard deviation of the logarithm of the principal second moments, one or (3,).
+        off_diagonal: As of `PositiveDefinite`, for S; 0 by default.
+        mass_sigma: Standard deviation of the logarithm of the mass, for a 6x6 matrix; 0 by default.
     """
 
     mass_sigma: float | None = None
     kind: ClassVar[str] = "physical_inertia"
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
-        """One sigma, or one for each axis; mass_sigma only where there is a mass."""
+        """What prevents it from drawing a matrix of this shape; mass_sigma needs a matrix that contains the mass."""
         if shapes[0] == (3, 3) and self.mass_sigma is not None:
             return "gives mass_sigma to a matrix without mass", 'vary "vehicle.mass"'
         return super().fault([(3, 3)])
 
     def unusable(self, base: np.ndarray) -> tuple[str, str] | None:
-        """The scene's second moments must be positive."""
+        """What prevents it from starting at the scene's matrix: the second moments must be positive."""
         S = second_moments(_about_center(base)[0])
         if np.linalg.eigvalsh(S)[0] > ROUND_OFF * np.trace(S):
             return None
@@ -326,11 +417,11 @@ class PhysicalInertia(PositiveDefinite):
                 "use PositiveDefinite, which keeps it positive")  # fmt: skip
 
     def size(self, bases: Sequence[np.ndarray]) -> int:
-        """That of S, and one for the mass of a 6x6 matrix."""
+        """The uniform numbers of S, and one for the mass of a 6x6 matrix."""
         return 3 + 3 * bool(self.off_diagonal) + (len(bases[0]) == 6)
 
     def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """tr(S) - S, moved back to the scene's origin with the mass of a 6x6 matrix."""
+        """Inertia tr(S) - S; a 6x6 matrix is moved back to the scene's origin, with its mass."""
         J, mass, center = _about_center(bases[0])
         moments = 3 + 3 * bool(self.off_diagonal)
         S = self._around(second_moments(J), u[:, :moments])
@@ -349,12 +440,19 @@ def _trace(matrices: np.ndarray) -> np.ndarray:
 
 
 def second_moments(J: np.ndarray) -> np.ndarray:
-    """S = tr(J) / 2 - J (..., 3, 3) [kg m2]: the integral of r r^T over the mass."""
+    """Second moments of mass, S = tr(J) / 2 - J: the integral of r r^T over the mass.
+
+    Args:
+        J: Inertia (..., 3, 3) [kg m2].
+
+    Returns:
+        S (..., 3, 3) [kg m2].
+    """
     return np.asarray(0.5 * _trace(J) * np.eye(3) - J)
 
 
 def _about_center(base: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
-    """Inertia about the centre of gravity, mass and centre of a rigid body's 3x3 or 6x6 matrix."""
+    """Inertia about the centre of gravity, mass and centre of gravity of a rigid body's 3x3 or 6x6 matrix."""
     if len(base) == 3:
         return base, 0.0, np.zeros(3)
     mass = float(base[0, 0])

@@ -1,4 +1,4 @@
-"""Every law by its name in a scene file, and those of scipy.stats as they are there."""
+"""Every distribution by its name in a scene file, and those of scipy.stats."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from lgvi_warp.sampling.distributions.joint import (
     UniformRotation,
 )
 
-# Name in a scene file -> name in scipy.stats, whose parameters, loc and scale it takes.
+# Name in a scene file -> name in scipy.stats; shape parameters, loc and scale are named as there.
 SCIPY = {
     "beta": "beta",
     "exponential": "expon",
@@ -35,10 +35,15 @@ SCIPY = {
 
 @dataclass(frozen=True, eq=False)
 class Frozen(Distribution):
-    """A frozen distribution of scipy.stats: lw.Frozen(scipy.stats.gamma(2.0, scale=3.0)), or in `vary` that itself.
+    """A frozen distribution of scipy.stats, as lw.Frozen(scipy.stats.gamma(2.0, scale=3.0)); in `vary` it needs no wrapper.
 
-    Its values are absolute: the scene's own value plays no part. Its parameters may be one number or one per component.
-    Raises SceneError for what has no quantiles.
+    Its values are absolute: the scene's own value plays no part.
+
+    Args:
+        distribution: The frozen distribution; its parameters are one number or one per component.
+
+    Raises:
+        SceneError: Where it is not frozen, has no quantiles, or scipy refuses its numbers.
     """
 
     distribution: Any = None
@@ -67,71 +72,89 @@ class Frozen(Distribution):
 
     @property
     def name(self) -> str:
-        """In scipy.stats."""
+        """The distribution's name in scipy.stats."""
         return str(getattr(self.distribution.dist, "name", None) or type(self.distribution.dist).__name__)
 
     def _given_numbers(self) -> dict[str, Any]:
-        """By their names in scipy.stats, as they were given."""
+        """The parameters by their names in scipy.stats, as they were given."""
         known = [*_shapes(self.distribution.dist), "loc", "scale"]
         return dict(zip(known, self.distribution.args, strict=False)) | dict(self.distribution.kwds)
 
     def _numbers(self) -> dict[str, Any]:
-        """The same as lists; of one that was frozen with none, where it lies, so that a file holds a number."""
-        given = self._given_numbers() or {"loc": 0.0}
-        return {name: np.asarray(value).tolist() for name, value in given.items()}
+        """The parameters as lists; loc = 0 for a distribution that was frozen with none, so that a file holds a number."""
+        parameters = self._given_numbers() or {"loc": 0.0}
+        return {name: np.asarray(value).tolist() for name, value in parameters.items()}
 
     def numbers(self) -> list[Any]:
-        """Its parameters."""
+        """The distribution's parameters, in the order given."""
         return list(self._numbers().values())
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """scipy's ppf."""
+        """Values of the distribution's ppf."""
         return np.asarray(self.distribution.ppf(u), dtype=np.float64)
 
     def to_dict(self) -> dict[str, Any]:
-        """{ gamma = { a = 2.0, scale = 3.0 } }, or { scipy = { name = "...", ... } } of one without a name of its own."""
-        own = {name: kind for kind, name in SCIPY.items()}
-        if self.name in own:
-            return {own[self.name]: self._numbers()}
+        """{ gamma = { a = 2.0, scale = 3.0 } }, or { scipy = { name = "...", ... } } where a scene file has no name for it."""
+        file_names = {name: kind for kind, name in SCIPY.items()}
+        if self.name in file_names:
+            return {file_names[self.name]: self._numbers()}
         return {"scipy": {"name": self.name} | self._numbers()}
 
     @classmethod
     def from_table(cls, key: str, kind: str, values: Mapping[str, Any]) -> Frozen:
-        """From what `to_dict` gives. Raises SceneError naming the key and every fault."""
+        """Build a distribution from what `to_dict` gives.
+
+        Args:
+            key: Name of what varies, with which faults begin.
+            kind: Name of the distribution in a scene file, or "scipy".
+            values: Parameters by name; with "scipy" also the name in scipy.stats.
+
+        Returns:
+            The distribution.
+
+        Raises:
+            SceneError: Where the name or a number is wrong. The message lists every fault.
+        """
         from scipy import stats
 
         faults = Faults()
         name = SCIPY.get(kind, values.get("name"))
-        law = getattr(stats, name, None) if isinstance(name, str) else None
-        if not isinstance(law, stats.rv_continuous | stats.rv_discrete):
+        distribution = getattr(stats, name, None) if isinstance(name, str) else None
+        if not isinstance(distribution, stats.rv_continuous | stats.rv_discrete):
             faults.add(
                 f"{key}.{kind}.name", name, "is no distribution of scipy.stats", 'give its name, such as "gamma"'
             )
             faults.raise_if_any()
-        assert law is not None
-        shapes, known = _shapes(law), _numbers_of(law)
-        given = {one: value for one, value in values.items() if kind in SCIPY or one != "name"}
-        faults.keys(f"{key}.{kind}", given, known)
-        for one in shapes:
-            if one not in given:
-                faults.add(f"{key}.{kind}.{one}", None, "is missing", f"scipy.stats.{name} takes {', '.join(known)}")
-        if not given and not shapes:
+        assert distribution is not None
+        shapes, known = _shapes(distribution), _numbers_of(distribution)
+        parameters = {parameter: value for parameter, value in values.items() if kind in SCIPY or parameter != "name"}
+        faults.keys(f"{key}.{kind}", parameters, known)
+        for parameter in shapes:
+            if parameter not in parameters:
+                faults.add(
+                    f"{key}.{kind}.{parameter}", None, "is missing", f"scipy.stats.{name} takes {', '.join(known)}"
+                )
+        if not parameters and not shapes:
             faults.add(f"{key}.{kind}", dict(values), "has no numbers", f"give one or more of {', '.join(known)}")
-        for one, value in given.items():
-            faults.finite(f"{key}.{kind}.{one}", value)
+        for parameter, value in parameters.items():
+            faults.finite(f"{key}.{kind}.{parameter}", value)
         faults.raise_if_any()
         try:
-            return cls(law(**{one: np.asarray(value)[()] for one, value in given.items()}))
+            return cls(distribution(**{parameter: np.asarray(value)[()] for parameter, value in parameters.items()}))
         except SceneError as error:
             raise error.prefixed(f"{key}.{kind}: ") from None
 
 
 @dataclass(frozen=True, eq=False)
 class Histogram(Distribution):
-    """Numbers from bins: counts (k,), with any scale, between edges (k + 1,), uniform within each bin.
+    """Distribution given by a histogram, uniform within each bin.
 
-    Absolute: the scene's own value plays no part. lw.Histogram is the statistic; this law is "histogram" in a scene file, and
-    scipy.stats.rv_histogram in `vary`.
+    Its values are absolute: the scene's own value plays no part. It is "histogram" in a scene file and
+    scipy.stats.rv_histogram in `vary`; lw.Histogram is the statistic.
+
+    Args:
+        counts: Weights of the bins, (k,), from 0, in any scale.
+        edges: Edges of the bins, (k + 1,), rising, in the unit of the quantity.
     """
 
     counts: Any = ()
@@ -148,11 +171,11 @@ class Histogram(Distribution):
             faults.add("edges", self.edges, f"do not bound {len(counts)} bins", "give one more than counts, rising")
 
     def numbers(self) -> list[Any]:
-        """None of them is a component's."""
+        """Always []: counts and edges need not fit the components."""
         return []
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """Linear in each bin."""
+        """Values linear in the level within each bin."""
         counts = np.asarray(self.counts, dtype=np.float64)
         levels = np.concatenate([[0.0], np.cumsum(counts)]) / counts.sum()
         return np.interp(u, levels, np.asarray(self.edges, dtype=np.float64))
@@ -160,9 +183,15 @@ class Histogram(Distribution):
 
 @dataclass(frozen=True, eq=False)
 class OwnLaw(Distribution):
-    """A law by an object of the user's with quantiles: ppf(u), or icdf(u) as scipy's new distributions have.
+    """A distribution given by an object of the user's with quantiles: ppf(u), or icdf(u) as scipy's new distributions have.
 
-    Its values are absolute. A file has its words only: what is read from one wants the ensemble again.
+    Its values are absolute. A file stores only its text, so that a run read from a file needs the ensemble again.
+
+    Args:
+        law: The object.
+
+    Raises:
+        SceneError: Where the object gives no finite numbers at the levels 0.25 and 0.75.
     """
 
     law: Any = None
@@ -175,33 +204,40 @@ class OwnLaw(Distribution):
             faults.add("law", f"scipy.stats.{unfrozen}", *without_numbers(self.law))
             faults.raise_if_any()
         try:
-            good = bool(np.all(np.isfinite(self._quantiles(np.array([0.25, 0.75])))))
+            usable = bool(np.all(np.isfinite(self._quantiles(np.array([0.25, 0.75])))))
         except Exception:  # whatever a user's object raises
-            good = False
-        if not good:
+            usable = False
+        if not usable:
             faults.add("law", self.law, "gives no numbers at the levels 0.25 and 0.75", "give an object with ppf(u)")
         faults.raise_if_any()
 
     def numbers(self) -> list[Any]:
-        """None that are known."""
+        """Always []: the object's numbers are not known."""
         return []
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """The object's."""
+        """Values of the object's own quantile function."""
         return self._quantiles(u)
 
     def _quantiles(self, u: np.ndarray) -> np.ndarray:
         return real_results(quantiles_of(self.law)(u)).astype(np.float64)
 
     def to_dict(self) -> dict[str, Any]:
-        """What it says of itself, but for its place in memory: that would make each run another one."""
+        """Its text without the memory address, so that the same distribution always gives the same provenance."""
         return {self.kind: {"law": re.sub(r" at 0x[0-9a-fA-F]+", "", str(self.law))}}
 
 
 def quantiles_of(law: Any) -> Any:
-    """The quantile function of an object, ppf or icdf; None where it has none."""
-    found = getattr(law, "ppf", None) or getattr(law, "icdf", None)
-    return found if callable(found) else None
+    """The quantile function of an object.
+
+    Args:
+        law: Any object.
+
+    Returns:
+        Its method ppf or icdf; None where it has neither.
+    """
+    function = getattr(law, "ppf", None) or getattr(law, "icdf", None)
+    return function if callable(function) else None
 
 
 KINDS: dict[str, type[Distribution]] = {
@@ -212,19 +248,40 @@ KINDS: dict[str, type[Distribution]] = {
 
 
 def is_frozen(value: Any) -> bool:
-    """Whether it is a frozen distribution of scipy.stats; without importing that."""
+    """Whether an object is a frozen distribution of scipy.stats, found without importing that.
+
+    Args:
+        value: Any object.
+
+    Returns:
+        True where it has the attributes of one.
+    """
     return all(hasattr(value, name) for name in ("dist", "args", "kwds", "ppf"))
 
 
 def name_of_unfrozen(value: Any) -> str | None:
-    """The name of what scipy.stats holds as a distribution without numbers, such as scipy.stats.norm; None of all else."""
+    """The name of a distribution of scipy.stats that was given without numbers, such as scipy.stats.norm.
+
+    Args:
+        value: Any object.
+
+    Returns:
+        The name; None for anything else.
+    """
     known = sys.modules.get("scipy.stats")
     name = getattr(value, "name", None)
     return name if isinstance(name, str) and known is not None and getattr(known, name, None) is value else None
 
 
 def without_numbers(value: Any) -> tuple[str, str]:
-    """(what is wrong, the remedy) with such a one."""
+    """The fault of a distribution of scipy.stats that was given without numbers.
+
+    Args:
+        value: The distribution, as scipy.stats.norm.
+
+    Returns:
+        The fault and its remedy.
+    """
     numbers = ", ".join(f"{name}=..." for name in _numbers_of(value))
     return (
         "is no frozen distribution of scipy.stats: it has no numbers",
@@ -238,24 +295,32 @@ def _shapes(law: Any) -> list[str]:
 
 
 def _numbers_of(law: Any) -> list[str]:
-    """Names of all of its parameters."""
+    """Names of all parameters of a distribution of scipy.stats."""
     return [*_shapes(law), "loc"] + ["scale"] * hasattr(law, "pdf")
 
 
 def as_law(key: str, value: Any) -> Any:
-    """What may stand in `vary` as a law: a table, what scipy.stats has, an object with quantiles; all else as it is.
+    """Turn what stands in `vary` into a distribution, where it is one.
 
-    Raises SceneError for a table that is none.
+    Args:
+        key: Name of what varies, with which faults begin.
+        value: A table, a distribution of scipy.stats, an object with quantiles, or anything else.
+
+    Returns:
+        The distribution; anything else unchanged.
+
+    Raises:
+        SceneError: Where a table or an object is no distribution.
     """
     if isinstance(value, Distribution | type):
         return value
     if isinstance(value, Mapping):
         return from_dict(key, value)
-    given = getattr(value, "args", ()) or getattr(value, "kwds", {})
-    whole = getattr(value, "dist", value)
-    if type(whole).__name__ == "rv_histogram" and not given:
-        edges = whole._histogram[1]
-        return Histogram(np.diff(whole.cdf(edges)).tolist(), np.asarray(edges).tolist())
+    parameters = getattr(value, "args", ()) or getattr(value, "kwds", {})
+    distribution = getattr(value, "dist", value)
+    if type(distribution).__name__ == "rv_histogram" and not parameters:
+        edges = distribution._histogram[1]
+        return Histogram(np.diff(distribution.cdf(edges)).tolist(), np.asarray(edges).tolist())
     if is_frozen(value):
         return Frozen(value)
     if type(value).__name__ == "multivariate_normal_frozen":
@@ -267,7 +332,18 @@ def as_law(key: str, value: Any) -> Any:
 
 
 def from_dict(key: str, content: Any) -> Distribution:
-    """A distribution from { normal = { std = 1.0 } }. Raises SceneError naming the key and every fault."""
+    """Build a distribution from a table of a scene file, { normal = { std = 1.0 } }.
+
+    Args:
+        key: Name of what varies, with which faults begin.
+        content: The table.
+
+    Returns:
+        The distribution.
+
+    Raises:
+        SceneError: Where the name or a number is wrong. The message lists every fault.
+    """
     faults = Faults()
     if not isinstance(content, Mapping) or len(content) != 1:
         faults.add(key, content, "is not a distribution", "write { normal = { std = 1.0 } }")

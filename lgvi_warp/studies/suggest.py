@@ -179,7 +179,9 @@ def suggest(
     more = sample.more(CHECKED) if sample.whole.members > sample.members else sample
     if more is not sample:
         reference = checked_reference(more, compared, error, 0.4 * seconds, taken)
-    final = [refined(more, trial.setting, reference, compared.name, error / SAFETY**0.5) for trial in trials[:FINALISTS]]
+    final = [
+        refined(more, trial.setting, reference, compared.name, error / SAFETY**0.5) for trial in trials[:FINALISTS]
+    ]
     final = [trial for trial in final if trial.error(compared.name) <= error] or final[:1]
     readings = cost.costs([trial.plan for trial in final], rounds=ROUNDS)
     prices = [reading.us_per_vehicle_second for reading in readings]

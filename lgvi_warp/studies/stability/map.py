@@ -37,7 +37,7 @@ from lgvi_warp.studies.stability.runs import (
     refusals,
     run_method,
 )
-from lgvi_warp.studies.tradeoff import _finite, chosen_methods
+from lgvi_warp.studies.tradeoff import chosen_methods, finite_or_none
 
 METHODS = ("psi", "psi_s", "psi_x", "rk4")
 # Maps by name: their two axes.
@@ -144,7 +144,7 @@ class StabilityMap:
                              for method, found in self.ratios.items()}  # fmt: skip
         content["limits"] = {method: self.limit(method).tolist() for method in self.methods}
         content["legend"] = {str(int(cell)): f"{cell.name.lower()}: {cell.text}" for cell in Cell}
-        return dict(_finite(content))
+        return dict(finite_or_none(content))
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> StabilityMap:

@@ -324,7 +324,7 @@ def step_cost(plan: Plan) -> float:
     """Measure what one step of a plan costs.
 
     Args:
-        plan: the plan, compiled.
+        plan: the plan.
 
     Returns:
         Microseconds of one core for one step of one vehicle.

@@ -310,7 +310,7 @@ def costs(plans: Sequence[Plan], rounds: int = 5) -> list[float]:
     """Measure the cost of plans (see cost.py).
 
     Args:
-        plans: the plans, compiled.
+        plans: the plans.
         rounds: number of readings of each. Default 5.
 
     Returns:

@@ -421,7 +421,7 @@ def tradeoff(
             text = (
                 f"errors of single members are up to {sample.times[until]:g} s, where the reference still agrees with"
             )
-            messages.append(f"{text} itself; beyond, statistics alone mean something")
+            messages.append(f"{text} itself; beyond it only statistics are meaningful")
     deadline = time.perf_counter() + 0.6 * seconds
     trials, skipped = sweep(
         sample, taken, reference, until, deadline, begun + seconds, lambda fraction: report(0.2 + 0.6 * fraction)
@@ -696,10 +696,10 @@ def growth_text(found: Growth) -> str:
         One or two sentences.
     """
     if not np.isfinite(found.rate):
-        return "unknown: a difference of 1e-8 rad is lost at once"
+        return "unknown: a difference of 1e-8 rad grows beyond measure at once"
     if found.power is not None:
         return (f"errors grow like time to the power {found.power:.1f}, {found.factor:.2g} times in this run: single "
-                "trajectories mean something throughout")  # fmt: skip
+                "trajectories are meaningful throughout")  # fmt: skip
     until = ", ".join(f"{dtype} to about {t:.3g} s" for dtype, t in found.predictable.items())
     return (f"errors double every {found.doubling:.3g} s (rate {found.rate:.2g} /s, {found.factor:.2g} times in this run). "
             f"One round-off reaches {comparison.LOST:g}: {until}; beyond, compare statistics only")  # fmt: skip

@@ -48,12 +48,14 @@ class Model:
         names = () if self.vary is not None else names_of(faults, vary)
         faults.raise_if_any()
         if self.vary is None and levels:
-            raise SceneError([f"vary = {vary!r}: names no laws that levels could be of; map names to distributions"])
+            raise SceneError(
+                [f"vary = {vary!r}: has no distributions, which levels=True needs; map names to distributions"]
+            )
         self._fleet = Ensemble(scene, 1, 0, self.vary)
         self._variations = as_given(self._fleet)
         joint = [variation.key for variation in self._variations if variation.law.joint]
         if joint and not levels:
-            raise SceneError([f"vary.\"{key}\": is a joint law, whose values are no numbers by themselves; use levels=True"
+            raise SceneError([f"vary.\"{key}\": is a joint distribution, whose values are not single numbers; use levels=True"
                               for key in joint])  # fmt: skip
         # Column of the ensemble's cube, whose keys are sorted, for each column of X.
         self._columns = [
@@ -71,7 +73,7 @@ class Model:
         known = self._scene_numbers()
         faults = Faults("vary.")
         if variations.known_target(faults, name, "...", target, known) and target.of(known[target.name]).ndim:
-            faults.add(f'"{name}"', "...", "is no single number", f'name its entries, such as "{name}[0]"')
+            faults.add(f'"{name}"', "...", "is not a single number", f'name its entries, such as "{name}[0]"')
         faults.raise_if_any()
         return target.of(known[target.name])
 
@@ -95,12 +97,17 @@ class Model:
             for law in self._single_laws(variation):
                 described = _salib_law(*law)
                 if described is None:
-                    faults.add(f'"{variation.key}"', variation.law, "is no law that SALib has", "use levels=True")
+                    faults.add(
+                        f'"{variation.key}"',
+                        variation.law,
+                        "is unknown to SALib",
+                        "use levels=True",
+                    )
                     break
                 kinds.append(described[0])
                 bounds.append(described[1])
         if not self._variations:
-            faults.add("names", list(self.names), "have no laws", "map names to distributions")
+            faults.add("names", list(self.names), "have no distributions", "map names to distributions")
         faults.raise_if_any()
         return {"num_vars": len(self.names), "names": list(self.names), "bounds": bounds, "dists": kinds}
 
@@ -121,7 +128,7 @@ class Model:
             SceneError: for names alone.
         """
         if not self._variations:
-            raise SceneError(["vary: names without laws have no distributions; map names to distributions"])
+            raise SceneError(["vary: names alone have no distributions; map names to distributions"])
         return [_Levels() if self.levels else _Column(self._fleet, column) for column in self._columns]
 
     def __call__(self, X: Any) -> np.ndarray:
@@ -175,7 +182,7 @@ class Model:
         if array is not None and self.levels and not np.all((array >= 0.0) & (array <= 1.0)):
             odd = array[~((array >= 0.0) & (array <= 1.0))][0]
             faults.add(
-                "X", odd, "is no level between 0 and 1", "give levels, or leave out levels=True to give the numbers"
+                "X", odd, "is not a level between 0 and 1", "give levels, or leave out levels=True to give the numbers"
             )
         faults.raise_if_any()
         assert array is not None

@@ -27,7 +27,7 @@ def names_of(faults: Faults, vary: Any) -> tuple[str, ...]:
     listed = [vary] if isinstance(vary, str) else vary
     if not isinstance(listed, Sequence) or not listed or not all(isinstance(name, str) for name in listed):
         remedy = 'give {"vehicle.mass": lw.Normal(...)} or a list of names, ["vehicle.mass", "start.position[2]"]'
-        faults.add("vary", vary, "is no list of names, and maps none to distributions", remedy)
+        faults.add("vary", vary, "is neither a list of names nor a mapping of names to distributions", remedy)
         return ()
     names = tuple(", ".join(target.label for target in targets(name)) for name in listed)
     for name in sorted({name for name in names if names.count(name) > 1}):

@@ -230,7 +230,7 @@ class Grid:
         """Complete the range of an axis; add to the faults what is wrong with it."""
         known = [*SPECIAL, *self.base.parameters]
         if axis.key not in known:
-            faults.add("axis", axis.name, "is no name of the scene's", closest(axis.name, known))
+            faults.add("axis", axis.name, "is not a parameter of the scene", closest(axis.name, known))
             return axis
         low, high = self._default(axis)
         low, high = low if axis.low is None else axis.low, high if axis.high is None else axis.high

@@ -1,1 +1,1 @@
-"""To be said in one sentence."""
+"""Studies over many runs: cost against accuracy, suggested settings, stability maps and sensitivity."""

@@ -12,20 +12,33 @@ from lgvi_warp.runs.quantities import samples_of
 from lgvi_warp.runs.result import Result
 from lgvi_warp.statistics.functional import Functional, functional
 
-# What results are always compared in, with its units. Attitude is the angle between the two.
+# Quantities that results are always compared in, and their units. Attitudes differ by the angle between them.
 QUANTITIES = {"position": "m", "attitude": "rad", "velocity": "m/s", "angular_velocity": "rad/s", "energy": "J"}
 
 
 @dataclass(frozen=True)
 class Compared:
-    """What errors are of. functional: its numbers, at each time; None for those of QUANTITIES."""
+    """Quantity that errors are measured in.
+
+    Attributes:
+        name: name of the quantity.
+        unit: its unit.
+        functional: computes its numbers at each time; None for those of QUANTITIES.
+    """
 
     name: str
     unit: str
     functional: Functional | None = None
 
     def values(self, result: Result) -> np.ndarray:
-        """(k, n, components), float64."""
+        """Compute the quantity at each time.
+
+        Args:
+            result: of k times and n members.
+
+        Returns:
+            Its numbers (k, n, components), float64 [unit].
+        """
         if self.functional is None:
             return np.asarray(getattr(result, self.name), dtype=np.float64).reshape(
                 len(result.time), result.members, -1
@@ -33,7 +46,15 @@ class Compared:
         return self.functional(*samples_of(result))
 
     def distance(self, result: Result, reference: Result) -> np.ndarray:
-        """(k, n), the length of the difference; of angles [rad] the short way round."""
+        """Measure the distance of two results in this quantity.
+
+        Args:
+            result: of k times and n members.
+            reference: the same members at the same times.
+
+        Returns:
+            Length of the difference (k, n) [unit]; of angles [rad] the short way round.
+        """
         with np.errstate(invalid="ignore"):
             apart = self.values(result) - self.values(reference)
             if self.unit == "rad":
@@ -41,16 +62,29 @@ class Compared:
         return np.linalg.norm(apart, axis=-1)
 
     def largest(self, result: Result) -> float:
-        """The largest number of it."""
+        """Return the largest size of the quantity.
+
+        Args:
+            result: of any run.
+
+        Returns:
+            Largest absolute value over times, members and components [unit].
+        """
         values = getattr(result, self.name) if self.functional is None else self.values(result)
         return float(np.nanmax(np.abs(values)))
 
 
 def compared_in(of: Any) -> Compared:
-    """What `of` means: a name, "depth", "position[2]", "norm(velocity)", or a lw.Quantity.
+    """Find the quantity that a name or a lw.Quantity means.
+
+    Args:
+        of: a name such as "position", "depth", "position[2]" or "norm(velocity)", a lw.Quantity, or a Compared.
+
+    Returns:
+        The quantity with its unit.
 
     Raises:
-        SceneError: for what is not known, and for what has no number at each time.
+        SceneError: for unknown names, for several quantities, and for those that look over the path.
     """
     if isinstance(of, Compared):
         return of
@@ -58,10 +92,10 @@ def compared_in(of: Any) -> Compared:
         return Compared(of.strip(), QUANTITIES[of.strip()])
     if isinstance(of, list | tuple):
         raise SceneError([f"of = {of!r}: is several quantities; errors are of one of them: give its name"])
-    found = functional("of", of)
-    if found.over_path:
-        remedy = f"give {found.quantity.name!r}, whose largest error over the path is told"
+    parsed = functional("of", of)
+    if parsed.over_path:
+        remedy = f"give {parsed.quantity.name!r}, whose largest error over the path is reported"
         raise SceneError(
-            [f"of = {found.label!r}: looks over the path, and errors are of a quantity at each time; {remedy}"]
+            [f"of = {parsed.label!r}: looks over the path, and errors are of a quantity at each time; {remedy}"]
         )
-    return Compared(found.label, found.unit or "1", found)
+    return Compared(parsed.label, parsed.unit or "1", parsed)

@@ -1,4 +1,4 @@
-"""Runs of a sample of an ensemble by different settings, and how far apart they are: members, statistics, growth."""
+"""Runs of a sample of an ensemble with different settings, and how far apart they are: members, statistics, growth."""
 
 from __future__ import annotations
 
@@ -26,19 +26,27 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.compared import QUANTITIES, Compared, compared_in
 
-# An error at which a trajectory says nothing any more [m or rad].
+# Error at which a trajectory is no longer meaningful [m or rad].
 LOST = 1e-2
 ROUND_OFF = {"float64": 2.0**-53, "float32": 2.0**-24}
-# Samples that runs are compared at.
+# Number of times that runs are compared at.
 SAMPLES = 20
-# For the reference, the best first; the first two that a scene takes share as little as can be.
+# Methods for the reference, the best first; neighbours share as little as possible.
 PRECISE = ("kl8(psi_x)", "rk8", "kl8(psi_s)", "kl6(psi_x)", "kl6(psi_s)", "rk5", "su4(psi_x)", "su4(psi_s)", "rk4", "psi_x",
            "psi_s", "psi_w", "psi_1", "psi")  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Setting:
-    """How to solve: method by name, step h [s], dtype, solver of equation (24), its Newton steps (None: to tolerance)."""
+    """How to solve: method, step, precision and solver.
+
+    Attributes:
+        method: name of the method.
+        h: step [s].
+        dtype: precision, such as "float64" or "float32".
+        solver: solver of equation (24): "quartic", "cayley", "newton" or "moser_veselov".
+        iterations: its Newton steps; None for as many as its tolerance needs.
+    """
 
     method: str
     h: float
@@ -48,36 +56,66 @@ class Setting:
 
     @property
     def plain(self) -> bool:
-        """Whether the solver is the default one."""
+        """Whether the solver of equation (24) is the default one."""
         return (self.solver, self.iterations) == ("quartic", None)
 
     @property
     def name(self) -> str:
-        """Method and solver, without step and dtype."""
+        """Method and solver as a text, without step and dtype."""
         if self.plain:
             return self.method
         return f"{self.method} {self.solver}" + ("" if self.iterations is None else f" {self.iterations}")
 
     def options(self) -> dict[str, Any]:
-        """For lw.solve(fleet, **options)."""
+        """Convert the setting to arguments for lw.solve.
+
+        Returns:
+            method, h [s] and dtype, for `lw.solve(fleet, **options)`.
+        """
         method: Any = self.method if self.plain else self.resolved()
         return {"method": method, "h": self.h, "dtype": self.dtype}
 
     def resolved(self) -> Method:
-        """The Method. Raises SceneError."""
+        """Build the method with its solver.
+
+        Returns:
+            The Method.
+
+        Raises:
+            SceneError: where the method or the solver does not exist.
+        """
         return Method(self.method, self.solver, self.iterations)
 
 
 class Sample:
-    """The first members of an ensemble from 0 to t1 [s], at times that runs of every step have in common.
+    """The first members of an ensemble from 0 to t1, at times that runs of every step have in common.
 
-    Steps are spacing / m for whole m: spacing is run.save_every of the scene, where it divides t1, or t1 / samples.
-    Raises SceneError without a duration.
+    Steps are spacing / m for whole m. The spacing is run.save_every of the scene where it divides t1, else t1 / samples.
+
+    Args:
+        fleet: the ensemble, or a Scene with one.
+        t1: end time [s]. Default: run.duration of the scene.
+        members: largest number of members. Default 128.
+        samples: largest number of times after 0. Default 20.
+
+    Attributes:
+        whole: the whole ensemble.
+        ensemble: the sample of it.
+        members: size of the sample.
+        t1: end time [s].
+        samples: largest number of times after 0.
+        spacing: length that steps divide [s], a Fraction.
+        index: the times as multiples of the spacing (k,), int64.
+        times: the times (k,) [s].
+        rate: largest angular rate at the start, at least one turn in t1 [rad/s].
+
+    Raises:
+        SceneError: without an end time.
     """
 
     def __init__(self, fleet: Ensemble | Scene, t1: float | None = None, members: int = 128, samples: int = SAMPLES):
-        whole = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
-        settings = whole.scene.run
+        ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
+        settings = ensemble.scene.run
         t1 = settings.duration if t1 is None else t1
         faults = Faults()
         if t1 is None:
@@ -86,8 +124,8 @@ class Sample:
             faults.positive("t1", t1)
         faults.raise_if_any()
         assert t1 is not None
-        self.whole, self.t1, self.samples = whole, float(t1), samples
-        self.ensemble = whole if whole.members <= members else whole.subset(range(members))
+        self.whole, self.t1, self.samples = ensemble, float(t1), samples
+        self.ensemble = ensemble if ensemble.members <= members else ensemble.subset(range(members))
         self.members = self.ensemble.members
         end = saveat._exact(self.t1)
         every = settings.save_every
@@ -100,33 +138,94 @@ class Sample:
         self.rate = float(max(np.nanmax(np.linalg.norm(start.angular_velocity, axis=1)), 2.0 * math.pi / self.t1))
 
     def more(self, members: int) -> Sample:
-        """The same with more members."""
+        """Make the same sample with more members.
+
+        Args:
+            members: largest number of members.
+
+        Returns:
+            A new sample.
+        """
         return Sample(self.whole, self.t1, members, self.samples)
 
     def coarsest(self, angle: float) -> int:
-        """m of the largest step that turns by at most this angle [rad]."""
+        """Find the largest step in which no member turns by more than an angle at the start.
+
+        Args:
+            angle: largest turn of one step [rad].
+
+        Returns:
+            m, for the step spacing / m.
+        """
         return max(1, math.ceil(float(self.spacing) * self.rate / angle))
 
     def h(self, m: int) -> float:
-        """The step [s]."""
+        """Compute a step from its number.
+
+        Args:
+            m: number of steps in the spacing.
+
+        Returns:
+            The step spacing / m [s].
+        """
         return float(self.spacing / m)
 
     def setting(self, method: str, m: int, dtype: str = "float64", solver: Any = ("quartic", None)) -> Setting:
-        """A setting with the step spacing / m."""
+        """Make a setting with the step spacing / m.
+
+        Args:
+            method: name of the method.
+            m: number of steps in the spacing.
+            dtype: precision. Default "float64".
+            solver: (name, iterations) of the solver of equation (24). Default: the quartic to its tolerance.
+
+        Returns:
+            The setting.
+        """
         return Setting(method, self.h(m), dtype, *solver)
 
     def plan(self, setting: Setting, ensemble: Ensemble | None = None) -> Plan:
-        """Its plan. Raises SceneError where the scene refuses the method."""
+        """Make the plan of a run at the sample's times.
+
+        Args:
+            setting: method, step, precision and solver.
+            ensemble: members to run in place of the sample's.
+
+        Returns:
+            The plan, not yet compiled.
+
+        Raises:
+            SceneError: where the scene refuses the method.
+        """
         m = round(float(self.spacing / Fraction(setting.h)))
         grid = TimeGrid(setting.h, self.index * m, self.times)
         return Plan(ensemble or self.ensemble, setting.resolved(), grid, FIELDS, setting.dtype)
 
     def run(self, setting: Setting, ensemble: Ensemble | None = None) -> Result:
-        """Its result at the common times, on one thread."""
+        """Run a setting on one thread.
+
+        Args:
+            setting: method, step, precision and solver.
+            ensemble: members to run in place of the sample's.
+
+        Returns:
+            The result at the sample's times.
+
+        Raises:
+            SceneError: where the scene refuses the method.
+        """
         return run_plan(self.plan(setting, ensemble), 1)
 
     def accepted(self, methods: Sequence[str], dtype: str = "float64") -> tuple[list[str], dict[str, str]]:
-        """Methods that the scene takes, and for each other one the reason. Names that are not known are left out."""
+        """Sort methods into those that the scene takes and those that it refuses.
+
+        Args:
+            methods: names; those that do not exist are left out.
+            dtype: precision. Default "float64".
+
+        Returns:
+            (accepted, refused): names of the first, and name -> reason of the others.
+        """
         good, refused = [], {}
         for name in methods:
             try:
@@ -141,53 +240,87 @@ class Sample:
         return good, refused
 
     def noisy(self, method: str) -> bool:
-        """Whether random numbers act, which differ from step to step."""
+        """Tell whether random numbers act, which differ from step to step.
+
+        Args:
+            method: name of a method that the scene takes.
+
+        Returns:
+            True if a force or a current of the scene is noise.
+        """
         laws = self.plan(self.setting(method, 1)).model.laws
         return any(getattr(module, "NOISE", False) for _, module in laws)
 
 
 def failed(result: Result) -> bool:
-    """Whether some member failed, events not counted."""
+    """Tell whether some member failed; those stopped by an event did not.
+
+    Args:
+        result: of any run.
+
+    Returns:
+        True if at least one member failed.
+    """
     return bool(failed_members(result.status).any())
 
 
 def distances(result: Result, reference: Result, asked: Compared | None = None) -> dict[str, np.ndarray]:
-    """Quantity -> (k, n), how far apart they are; NaN from where an event stopped a member in either.
+    """Measure how far two results are apart at each time.
 
-    asked: one more than those of QUANTITIES.
+    Args:
+        result: of k times and n members.
+        reference: the same members at the same times.
+        asked: one more quantity than those of QUANTITIES.
+
+    Returns:
+        Quantity -> distance (k, n) [its unit]; NaN from where an event stopped a member in either result.
     """
     pairs = {name: (getattr(result, name).astype(np.float64), getattr(reference, name)) for name in FIELDS}
-    found = {name: np.linalg.norm(a - b, axis=-1) for name, (a, b) in pairs.items() if name in ("position", "velocity")}
-    found["angular_velocity"] = np.linalg.norm(np.subtract(*pairs["angular_velocity"]), axis=-1)
+    lengths = {
+        name: np.linalg.norm(a - b, axis=-1) for name, (a, b) in pairs.items() if name in ("position", "velocity")
+    }
+    lengths["angular_velocity"] = np.linalg.norm(np.subtract(*pairs["angular_velocity"]), axis=-1)
     chord = np.linalg.norm(np.subtract(*pairs["attitude"]), axis=(-2, -1))
-    found["attitude"] = 2.0 * np.arcsin(np.minimum(chord / math.sqrt(8.0), 1.0))
-    found["energy"] = np.abs(result.energy - reference.energy)
-    found = {name: found[name] for name in QUANTITIES}
-    if asked is not None and asked.name not in found:
-        found[asked.name] = asked.distance(result, reference)
+    lengths["attitude"] = 2.0 * np.arcsin(np.minimum(chord / math.sqrt(8.0), 1.0))
+    lengths["energy"] = np.abs(result.energy - reference.energy)
+    lengths = {name: lengths[name] for name in QUANTITIES}
+    if asked is not None and asked.name not in lengths:
+        lengths[asked.name] = asked.distance(result, reference)
     gone = reference.time[:, None] >= np.minimum(stop_time(result), stop_time(reference))
-    return {name: np.where(gone, np.nan, values) for name, values in found.items()}
+    return {name: np.where(gone, np.nan, values) for name, values in lengths.items()}
 
 
 def errors(apart: dict[str, np.ndarray], until: int) -> dict[str, dict[str, float]]:
-    """Quantity -> end_max, end_rms, path_max, path_rms over the members that go on, up to the sample `until`."""
-    found = {}
+    """Reduce distances to norms over members and times, leaving out members that were stopped.
+
+    Args:
+        apart: quantity -> (k, n), as of `distances`.
+        until: index of the last sample that counts.
+
+    Returns:
+        Quantity -> {"end_max", "end_rms", "path_max", "path_rms"} [its unit].
+    """
+    norms = {}
     for name, values in apart.items():
         values = values[: until + 1]
         rows = np.flatnonzero(np.isfinite(values).any(axis=1))
         end = values[rows[-1]] if len(rows) else np.zeros(1)
         numbers = {"end_max": np.nanmax(end), "end_rms": np.sqrt(np.nanmean(end**2))}
         numbers |= {"path_max": np.nanmax(values), "path_rms": np.sqrt(np.nanmean(values**2))}
-        found[name] = {key: float(value) for key, value in numbers.items()}
-    return found
+        norms[name] = {key: float(value) for key, value in numbers.items()}
+    return norms
 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """What errors are measured from: the finer of two runs that share no step, at best no method, and how far they agree.
+    """What errors are measured from: the finer of two runs that share no step and, at best, no method.
 
-    own: quantity -> (k,), largest difference of the two up to each time, over the members. wall_seconds: what it took.
-    asked: what errors are asked of, where that is none of QUANTITIES.
+    Attributes:
+        result: of the finer run.
+        text: the two methods and their steps, in words.
+        own: quantity -> (k,), largest difference of the two runs over the members and up to each time [its unit].
+        wall_seconds: time that it took [s].
+        asked: quantity of the errors, where it is none of QUANTITIES.
     """
 
     result: Result
@@ -197,37 +330,73 @@ class Reference:
     asked: Compared | None = None
 
     def error(self, of: str, until: int = -1) -> float:
-        """Its own error up to a sample (the last by default)."""
+        """Return the reference's own error.
+
+        Args:
+            of: name of the quantity.
+            until: index of the last sample that counts. Default: the last of all.
+
+        Returns:
+            Largest difference of the two runs up to that sample [unit of `of`].
+        """
         return float(self.own[of][until])
 
     def reaches(self, of: str, error: float) -> int:
-        """The last sample up to which its own error is at most this."""
+        """Find how far the reference's own error stays below a bound.
+
+        Args:
+            of: name of the quantity.
+            error: the bound [unit of `of`].
+
+        Returns:
+            Index of the last sample up to which it does.
+        """
         return int(np.searchsorted(self.own[of], error, side="right")) - 1
 
 
 def extrapolated(sample: Sample, method: str, m: int) -> Result:
-    """A run; of methods of low order three, from which the leading powers of the step are taken out."""
+    """Run a method; where its order is below four, extrapolate from three steps.
+
+    Richardson's extrapolation of the steps h, h/2 and h/4 takes out the terms in h^2 and h^3.
+
+    Args:
+        sample: members and times.
+        method: name of the method.
+        m: number of steps in the spacing.
+
+    Returns:
+        The result at the sample's times.
+    """
     if Method(method).order >= 4:
         return sample.run(sample.setting(method, m))
     runs = [sample.run(sample.setting(method, k * m)) for k in (1, 2, 4)]
     samples = {}
     for name in FIELDS:
-        a, b, c = (one.samples[name] for one in runs)
+        a, b, c = (run.samples[name] for run in runs)
         ab, bc = b + (b - a) / 3.0, c + (c - b) / 3.0
         samples[name] = bc + (bc - ab) / 7.0
-    return replace(runs[-1], samples=samples, compile_seconds=sum(one.compile_seconds for one in runs))
+    return replace(runs[-1], samples=samples, compile_seconds=sum(run.compile_seconds for run in runs))
 
 
 def agreement(a: Result, b: Result, asked: Compared | None = None) -> dict[str, np.ndarray]:
-    """Quantity -> (k,), the largest distance up to each time; infinite where a member failed. asked: as of `distances`."""
+    """Measure how far two results agree up to each time, over all members.
+
+    Args:
+        a: a result of k times.
+        b: the same members at the same times.
+        asked: one more quantity than those of QUANTITIES.
+
+    Returns:
+        Quantity -> largest distance up to each time (k,) [its unit]; infinite where a member failed.
+    """
     if failed(a) or failed(b):
         names = dict.fromkeys([*QUANTITIES, *([asked.name] if asked else [])])
         return {name: np.where(a.time > 0.0, np.inf, 0.0) for name in names}
-    found = {}
+    running_maxima = {}
     for name, values in distances(a, b, asked).items():
-        most = np.max(np.where(np.isnan(values), 0.0, values), axis=1)
-        found[name] = np.maximum.accumulate(np.where(np.isfinite(most), most, np.inf))
-    return found
+        largest = np.max(np.where(np.isnan(values), 0.0, values), axis=1)
+        running_maxima[name] = np.maximum.accumulate(np.where(np.isfinite(largest), largest, np.inf))
+    return running_maxima
 
 
 def make_reference(
@@ -238,13 +407,26 @@ def make_reference(
     methods: Sequence[str] | None = None,
     report: Callable[[float], None] | None = None,
 ) -> Reference:
-    """Refine two high-order runs together until they agree to the goal, agree no better, or the time is spent.
+    """Refine two high-order runs together until they agree to a goal, agree no better, or the time is spent.
 
-    seconds: about how long, compiling aside. methods: two names in place of the scene's best ones. Raises SceneError
-    where there are none; how well the runs agree is for the caller to judge.
+    How well the runs agree is for the caller to judge.
+
+    Args:
+        sample: members and times.
+        of: quantity whose agreement counts. Default "position".
+        goal: difference at which to stop [unit of `of`]. Default 0: as small as it gets.
+        seconds: approximate time to spend, without compiling [s]. Default 15.
+        methods: two names in place of the best ones that the scene takes.
+        report: called with the fraction of the time that is spent.
+
+    Returns:
+        The reference whose two runs agreed best.
+
+    Raises:
+        SceneError: where the scene takes none of the precise methods.
     """
-    asked = compared_in(of)
-    of = asked.name
+    compared = compared_in(of)
+    of = compared.name
     names = list(methods or sample.accepted(PRECISE)[0][:2])
     if not names:
         raise SceneError(
@@ -260,17 +442,17 @@ def make_reference(
         finer = max(m + 1, round(1.5 * m))
         with np.errstate(all="ignore"):
             runs = extrapolated(sample, first, m), extrapolated(sample, second, finer)
-            own = agreement(*runs, asked)
-        end = own[of][-1]
+            disagreement = agreement(*runs, compared)
+        end = disagreement[of][-1]
         if best is None or end < best.error(of):
             worse = worse + 1 if best and end > 0.5 * best.error(of) and end < LOST else 0
             text = f"{second} at h = {sample.h(finer):.4g} s against {first} at h = {sample.h(m):.4g} s"
-            best = Reference(runs[1], text, own, time.perf_counter() - begun, asked)
+            best = Reference(runs[1], text, disagreement, time.perf_counter() - begun, compared)
         else:
             worse += best.error(of) < LOST
-        begun += sum(one.compile_seconds for one in runs)
+        begun += sum(run.compile_seconds for run in runs)
         # The coarser runs of an extrapolation take 3/4 of the finest one's time.
-        last, spent = 1.75 * sum(one.run_seconds for one in runs), time.perf_counter() - begun
+        last, spent = 1.75 * sum(run.run_seconds for run in runs), time.perf_counter() - begun
         if report:
             report(min(1.0, spent / seconds))
         if best.error(of) <= goal or worse >= 2 or spent + 2.0 * last > seconds:
@@ -282,12 +464,16 @@ def make_reference(
 
 @dataclass(frozen=True)
 class Growth:
-    """How a small difference grows.
+    """How a small difference between two starts grows.
 
-    rate: of the logarithm, by least squares [1/s]; doubling: ln 2 / rate [s], infinite where there is no exponential.
-    power: of a fit t^power, where that fits better than an exponential, else None. factor: growth over the run.
-    predictable: dtype -> time at which one round-off has grown to 1e-2 [s], beyond the run by the fit; may be infinite.
-    times [s] and curve: (k,) growth, the root mean square over members of position [m] and attitude [rad].
+    Attributes:
+        rate: growth rate of its logarithm, by least squares [1/s].
+        doubling: ln 2 / rate [s]; infinite where growth is no exponential.
+        power: exponent p of the fit t^p, where it fits better than an exponential; else None.
+        factor: growth over the whole run.
+        predictable: dtype -> time at which one round-off has grown to 1e-2, extrapolated beyond the run [s]; may be infinite.
+        times: times of the curve (k,) [s].
+        curve: growth (k,): root mean square over the members of position [m] and attitude [rad].
     """
 
     rate: float
@@ -299,13 +485,22 @@ class Growth:
     curve: np.ndarray
 
 
+# Angle between the two starts [rad].
 NUDGE = 1e-8
-# Powers of time above this are an exponential seen at few times.
+# A fitted power of time above this is an exponential sampled at few times.
 STEEPEST = 3.0
 
 
 def growth(sample: Sample, setting: Setting) -> Growth:
-    """From runs whose starts differ by 1e-8 rad in attitude."""
+    """Measure growth by two runs whose starts differ by 1e-8 rad in attitude.
+
+    Args:
+        sample: members and times.
+        setting: method, step, precision and solver of both runs.
+
+    Returns:
+        Growth of the difference.
+    """
     fleet = sample.ensemble
     members = fleet.select(0, fleet.members)
     turn = np.random.default_rng(0).normal(size=(fleet.members, 3))
@@ -314,9 +509,9 @@ def growth(sample: Sample, setting: Setting) -> Growth:
     varied = {k: v for k, v in members.parameters.items() if len(v) == fleet.members and len(v) > 1}
     runs = []
     for R in (members.attitude, members.attitude @ notation.matrix_from_rotation_vector(turn)):
-        one = Ensemble.from_states(fleet.scene, states[0], R, *states[1:], varied)
-        one.indices, one.seed = fleet.indices, fleet.seed
-        runs.append(sample.run(setting, one))
+        nudged = Ensemble.from_states(fleet.scene, states[0], R, *states[1:], varied)
+        nudged.indices, nudged.seed = fleet.indices, fleet.seed
+        runs.append(sample.run(setting, nudged))
     apart = distances(runs[0], runs[1])
     both = np.hypot(apart["position"], apart["attitude"]) / NUDGE
     alive = np.isfinite(both)
@@ -326,7 +521,16 @@ def growth(sample: Sample, setting: Setting) -> Growth:
 
 
 def fitted(times: np.ndarray, curve: np.ndarray, t1: float) -> Growth:
-    """Growth from the curve of a difference, 1 at the start."""
+    """Fit an exponential and a power of time to the growth of a difference.
+
+    Args:
+        times: times (k,) [s].
+        curve: difference over that at the start (k,).
+        t1: end time [s].
+
+    Returns:
+        The growth; its numbers are NaN with fewer than two times after 0.
+    """
     later = times > 0.0
     if later.sum() < 2:
         return Growth(np.nan, np.nan, None, np.nan, dict.fromkeys(ROUND_OFF, 0.0), times, curve)
@@ -346,47 +550,71 @@ def fitted(times: np.ndarray, curve: np.ndarray, t1: float) -> Growth:
 
 
 def statistics(result: Result, asked: Compared | None = None) -> dict[str, np.ndarray]:
-    """What means and spreads are taken of: (k, n, components). Of the attitude, the vertical in body axes.
+    """Collect the quantities that means and spreads are taken of.
 
-    asked: one more than those of QUANTITIES, but for angles, which have no such mean.
+    The attitude is represented by the vertical in body axes.
+
+    Args:
+        result: of k times and n members.
+        asked: one more quantity; angles are left out, since they have no such mean.
+
+    Returns:
+        Quantity -> (k, n, components), float64 [its unit].
     """
-    found = {name: getattr(result, name).astype(np.float64) for name in ("position", "velocity", "angular_velocity")}
-    found["attitude"] = result.attitude[..., 2, :].astype(np.float64)
-    found["energy"] = result.energy[..., None]
-    found["linear_momentum"] = invariants.linear_momentum(result)
-    found["angular_momentum"] = invariants.angular_momentum(result)
-    if asked is not None and asked.name not in found and asked.unit != "rad":
-        found[asked.name] = asked.values(result)
-    return found
+    values = {name: getattr(result, name).astype(np.float64) for name in ("position", "velocity", "angular_velocity")}
+    values["attitude"] = result.attitude[..., 2, :].astype(np.float64)
+    values["energy"] = result.energy[..., None]
+    values["linear_momentum"] = invariants.linear_momentum(result)
+    values["angular_momentum"] = invariants.angular_momentum(result)
+    if asked is not None and asked.name not in values and asked.unit != "rad":
+        values[asked.name] = asked.values(result)
+    return values
 
 
 def biases(result: Result, reference: Result, asked: Compared | None = None) -> dict[str, float]:
-    """Name of mean or std -> its difference in standard errors of the sample, rms over components and times after 0.
+    """Compare means and standard deviations of two results.
 
-    Two samples that have nothing in common but their law differ by about 1.4. Empty for one member.
+    Each difference is in standard errors of the sample, as root mean square over components and times after 0. Two
+    independent samples of the same distribution differ by about 1.4.
+
+    Args:
+        result: of k times and n members.
+        reference: the same quantities at the same times.
+        asked: one more quantity than those of QUANTITIES.
+
+    Returns:
+        "NAME_mean" and "NAME_std" -> difference [standard errors]; empty for one member or where one failed.
     """
     n = result.members
     if n < 2 or failed(result):
         return {}
-    found = {}
+    deviations = {}
     mine, theirs = statistics(result, asked), statistics(reference, asked)
     for name, b in theirs.items():
         a, b = mine[name][1:], b[1:]
         spread = b.std(axis=1, ddof=1)
-        # What does not vary, but for round-off, has no standard error.
+        # A component that varies by round-off alone has no standard error.
         real = spread > 1e-9 * np.maximum(np.abs(b).max(axis=1), 1e-12)
         if not real.any():
             continue
-        for what, change, size in (
+        for moment, change, size in (
             ("mean", a.mean(axis=1) - b.mean(axis=1), 1.0 / math.sqrt(n)),
             ("std", a.std(axis=1, ddof=1) - spread, 1.0 / math.sqrt(2.0 * (n - 1))),
         ):
-            found[f"{name}_{what}"] = float(np.sqrt(np.mean((change[real] / (spread[real] * size)) ** 2)))
-    return found
+            deviations[f"{name}_{moment}"] = float(np.sqrt(np.mean((change[real] / (spread[real] * size)) ** 2)))
+    return deviations
 
 
 def part(result: Result, members: Sequence[int]) -> Result:
-    """Some members of a result."""
+    """Select some members of a result, in memory or in a store.
+
+    Args:
+        result: of n members.
+        members: their indices.
+
+    Returns:
+        A result of these members.
+    """
     at = np.asarray(members)
     if result.store is not None:
         from lgvi_warp.runs.store.open import chosen

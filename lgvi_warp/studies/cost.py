@@ -1,4 +1,4 @@
-"""What a step of a method costs on one core: CPU time of the thread that makes it, the least of several readings."""
+"""Cost of a method's step on one core: CPU time of the thread that runs it, the least of several readings."""
 
 from __future__ import annotations
 
@@ -14,31 +14,37 @@ import numpy as np
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.plan import Plan
 
-# A launch that is timed takes about so long [s].
+# Approximate length of a launch that is timed [s].
 TIMED = 2e-3
-# Readings disagree where their median is beyond so many times the least.
+# Readings disagree where their median is above the least by this factor.
 DISAGREE = 1.3
-# The least reading is sure where another is so near; if none is, so many times as many are taken again.
+# The least reading is trusted where another is within this part of it;
+# else as many readings again are taken, up to MORE times.
 NEAR = 0.05
 MORE = 3
-# So many are told by name.
+# Largest number of settings that a message names.
 MOST_TOLD = 6
 
 
 def thread_seconds() -> float:
-    """CPU time that this thread has taken [s]: what other programs take does not count.
+    """Read the CPU time of this thread, which other programs do not add to.
 
-    A kernel on the CPU runs in the thread that launches it, so its time is that thread's. Windows counts CPU time in ticks
-    of 16 ms, too long for a launch: there it is the time of day.
+    A kernel on the CPU runs in the thread that launches it, so its time is that thread's. Windows counts CPU time in
+    ticks of 16 ms, too coarse for a launch: there time.perf_counter is read.
+
+    Returns:
+        Time since an arbitrary start [s].
     """
     return time.perf_counter() if os.name == "nt" else time.thread_time()
 
 
 @dataclass(frozen=True)
 class Cost:
-    """What a setting costs. us_per_vehicle_second: microseconds of one core per vehicle and simulated second.
+    """Cost of a setting.
 
-    spread: the median of the readings over the least, which is taken; near 1 on a machine that does nothing else.
+    Attributes:
+        us_per_vehicle_second: microseconds of one core per vehicle and simulated second.
+        spread: median of the readings over the least, which is taken; near 1 on an idle machine.
     """
 
     us_per_vehicle_second: float
@@ -46,14 +52,21 @@ class Cost:
 
     @property
     def doubtful(self) -> bool:
-        """Whether its readings disagree."""
+        """Whether the readings of this cost disagree."""
         return self.spread > DISAGREE
 
 
 def costs(plans: Sequence[Plan], rounds: int = 5) -> list[Cost]:
-    """Of each plan: one number for all plans that run the same kernel, whatever their step.
+    """Measure the cost of plans, with one number for all plans that run the same kernel.
 
-    The readings are of interleaved rounds: what slows the machine for a while slows them all.
+    The readings are taken in interleaved rounds: what slows the machine for a while slows all plans alike.
+
+    Args:
+        plans: the plans.
+        rounds: number of readings of each. Default 5.
+
+    Returns:
+        Cost of each plan.
     """
     calls, steps = launches(plans)
     kinds = [Kind(plan.spec, plan.grid.h, work_grows(plan)) for plan in plans]
@@ -71,7 +84,13 @@ def costs(plans: Sequence[Plan], rounds: int = 5) -> list[Cost]:
 
 @dataclass(frozen=True)
 class Kind:
-    """Which readings belong together: the kernel, the step h [s], whether longer steps are more work."""
+    """Which readings measure the same work.
+
+    Attributes:
+        kernel: identifies the kernel.
+        h: step [s].
+        grows: whether a longer step is more work.
+    """
 
     kernel: Hashable
     h: float
@@ -79,38 +98,66 @@ class Kind:
 
 
 def of_steps(kinds: Sequence[Kind], seconds: np.ndarray) -> list[tuple[float, float]]:
-    """(seconds of a step, median over least) of each kind, from readings (kinds, rounds), NaN where there is none.
+    """Estimate the cost of a step of each kind from all readings.
 
-    A step of one kernel is the same work whatever its length, and costs the least of all its readings. Where a longer step
-    is more work, it costs the least of the readings of steps as long or longer, each of which is at least its cost.
+    A step of one kernel is the same work whatever its length, and costs the least of all its readings. Where a longer
+    step is more work, it costs the least of the readings of steps as long or longer, each of which is at least its cost.
+
+    Args:
+        kinds: kind of each row of readings.
+        seconds: readings of one step (kinds, rounds) [s]; NaN where there is none.
+
+    Returns:
+        (seconds of a step [s], median over least) of each kind.
     """
-    found = []
+    prices = []
     for kind in kinds:
-        own = _bounding(kind, kinds, seconds)
-        least = float(np.nanmin(own))
-        # Longer steps may be dearer by right: whether readings disagree is seen in those of this step alone.
-        alike = seconds[[other.kernel == kind.kernel and other.h == kind.h for other in kinds]] if kind.grows else own
-        found.append((least, float(np.nanmedian(alike) / np.nanmin(alike))))
-    return found
+        bounding = _bounding(kind, kinds, seconds)
+        least = float(np.nanmin(bounding))
+        # Longer steps may truly cost more, so only readings of this very step can disagree.
+        alike = (
+            seconds[[candidate.kernel == kind.kernel and candidate.h == kind.h for candidate in kinds]]
+            if kind.grows
+            else bounding
+        )
+        prices.append((least, float(np.nanmedian(alike) / np.nanmin(alike))))
+    return prices
 
 
 def confirmed(kinds: Sequence[Kind], seconds: np.ndarray) -> list[bool]:
-    """Whether the least reading of each kind was met again, to NEAR: by chance a busy machine leaves none alone."""
-    found = []
+    """Tell for each kind whether a second reading came near the least one.
+
+    On a busy machine every reading may be disturbed; two that agree are taken as undisturbed.
+
+    Args:
+        kinds: kind of each row of readings.
+        seconds: readings of one step (kinds, rounds) [s]; NaN where there is none.
+
+    Returns:
+        True where the second least reading is within NEAR of the least.
+    """
+    met_again = []
     for kind in kinds:
         rising = np.sort(_bounding(kind, kinds, seconds), axis=None)  # NaN is last
-        found.append(len(rising) > 1 and bool(rising[1] <= (1.0 + NEAR) * rising[0]))
-    return found
+        met_again.append(len(rising) > 1 and bool(rising[1] <= (1.0 + NEAR) * rising[0]))
+    return met_again
 
 
 def _bounding(kind: Kind, kinds: Sequence[Kind], seconds: np.ndarray) -> np.ndarray:
     """The readings of which none can be below the kind's cost."""
-    like = [other.kernel == kind.kernel and (not kind.grows or other.h >= kind.h) for other in kinds]
-    return np.asarray(seconds[np.array(like)])
+    bounds_it = [candidate.kernel == kind.kernel and (not kind.grows or candidate.h >= kind.h) for candidate in kinds]
+    return np.asarray(seconds[np.array(bounds_it)])
 
 
 def launches(plans: Sequence[Plan]) -> tuple[list[Callable[[], object]], np.ndarray]:
-    """A call of each plan that is worth timing, and the steps of vehicles that it makes (plans, 1)."""
+    """Prepare one launch of each plan that is long enough to time.
+
+    Args:
+        plans: the plans.
+
+    Returns:
+        (calls, steps): a call of each plan, and the steps times vehicles that it makes (plans, 1).
+    """
     calls: list[Callable[[], object]] = []
     steps = np.empty((len(plans), 1))
     for i, plan in enumerate(plans):
@@ -123,23 +170,38 @@ def launches(plans: Sequence[Plan]) -> tuple[list[Callable[[], object]], np.ndar
 
 
 def timed(calls: Sequence[Callable[[], object]], rounds: int) -> np.ndarray:
-    """CPU seconds of each call in each round, (calls, rounds); before the first, each is made once."""
+    """Time calls in interleaved rounds, after one call of each to warm up.
+
+    Args:
+        calls: functions without arguments.
+        rounds: number of readings of each.
+
+    Returns:
+        CPU time of each call in each round (calls, rounds) [s], at least the clock's resolution.
+    """
     for call in calls:
         call()
-    found = np.empty((len(calls), rounds))
+    readings = np.empty((len(calls), rounds))
     for j in range(rounds):
         for i, call in enumerate(calls):
             begun = thread_seconds()
             call()
-            found[i, j] = thread_seconds() - begun
-    # Below what the clock can tell apart nothing is known.
-    return np.maximum(found, time.get_clock_info("thread_time").resolution)
+            readings[i, j] = thread_seconds() - begun
+    # Nothing shorter than the clock's resolution can be measured.
+    return np.maximum(readings, time.get_clock_info("thread_time").resolution)
 
 
 def work_grows(plan: Plan) -> bool:
-    """Whether a longer step is more work: where one iterates to a tolerance, but for the quartic's few Newton steps.
+    """Tell whether a longer step is more work.
 
-    Also where each packet chooses its steps.
+    It is where a step iterates to a tolerance (the quartic's few Newton steps aside), and where each packet chooses
+    its own steps.
+
+    Args:
+        plan: the plan.
+
+    Returns:
+        True if the cost of a step depends on its length.
     """
     spec, letters = plan.spec, {letter for letter, _ in plan.spec.maps}
     newton = spec.explicit is None and spec.adaptive and (spec.solver != "quartic" or "W" in letters)
@@ -147,7 +209,14 @@ def work_grows(plan: Plan) -> bool:
 
 
 def disagreement(priced: Sequence[tuple[str, Cost]]) -> str | None:
-    """What to say of costs whose readings disagree, by the names of their settings; None where all agree."""
+    """Write the message about costs whose readings disagree.
+
+    Args:
+        priced: (name of the setting, its cost) of each.
+
+    Returns:
+        The message; None where all readings agree.
+    """
     worst: dict[str, float] = {}
     for name, cost in priced:
         if cost.doubtful:
@@ -162,6 +231,13 @@ def disagreement(priced: Sequence[tuple[str, Cost]]) -> str | None:
 
 
 def agreement_text(spreads: Sequence[float]) -> str:
-    """How costs were read, and how well the readings agree."""
+    """Describe how costs were read and how well the readings agree.
+
+    Args:
+        spreads: median over least of each cost.
+
+    Returns:
+        One line of text.
+    """
     most = max((spread for spread in spreads if math.isfinite(spread)), default=1.0)
     return f"CPU time of one thread, the least of several readings; their median is at most {most:.2f} times that"

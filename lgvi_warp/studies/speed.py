@@ -1,4 +1,4 @@
-"""How fast the kernel is on this machine, beside the limit of the core in the same run."""
+"""Speed of the kernel on this machine, next to the peak of the core measured in the same run."""
 
 from __future__ import annotations
 
@@ -28,14 +28,26 @@ NEWTON = 8
 
 
 def operations(method: str, iterations: int | None = None) -> int | None:
-    """Operations of one step, None where they were not counted; by default the quartic makes one Newton step."""
+    """Count the arithmetic operations of one step.
+
+    Args:
+        method: name of the method.
+        iterations: Newton steps of each solve of the quartic. Default: one.
+
+    Returns:
+        Number of operations; None for methods that were not counted.
+    """
     if method not in OPERATIONS:
         return None
     return OPERATIONS[method] + NEWTON * SOLVES[method] * (1 if iterations is None else iterations)
 
 
 def example() -> Scene:
-    """The vehicle and the start of Nordkvist & Sanyal (2010)."""
+    """Build the example of Nordkvist & Sanyal (2010).
+
+    Returns:
+        A Scene of its vehicle and start.
+    """
     vehicle = Vehicle(123.8, [5.46, 5.29, 5.72], [65.0, 70.0, 75.0], 1215.8, [0.0, 0.0, -0.007])
     start = Start([0.0, 0.0, 10.0], rotation_vector=[1.0, 2.0, 3.0], velocity_inertial=[0.1, 0.2, 1.0],
                   angular_velocity=[0.3, 0.2, 0.1])  # fmt: skip
@@ -43,25 +55,47 @@ def example() -> Scene:
 
 
 def fleet(members: int) -> Ensemble:
-    """Members about the example, 10 % apart in rate."""
+    """Build an ensemble around the example, whose angular velocities vary by 10 %.
+
+    Args:
+        members: number of members.
+
+    Returns:
+        The ensemble.
+    """
     from lgvi_warp.sampling.distributions.basic import Normal
 
     return Ensemble(example(), members, 1, {"start.angular_velocity": Normal(relative=0.1)})
 
 
 def stepper(plan: Plan) -> Callable[[], None]:
-    """All steps of all members of a plan on one thread, as a call to be timed: no samples, no set-up."""
+    """Prepare a call that makes all steps of a plan on one thread, without samples and set-up.
+
+    Args:
+        plan: the plan; it is compiled here.
+
+    Returns:
+        A function to be timed.
+    """
     plan.compile()
     packets = Packets(plan, plan.ensemble.select(0, plan.ensemble.members))
     return lambda: void(packets.advance(0, plan.grid.steps))
 
 
 def void(_: Any) -> None:
-    """Drop a value."""
+    """Accept any value and return nothing."""
 
 
 def interleaved(calls: Sequence[Callable[[], None]], rounds: int = 5) -> list[float]:
-    """Median seconds of each call, run in turn: what slows the machine for a while slows them all."""
+    """Time calls in turn, so that a slow period of the machine slows all of them.
+
+    Args:
+        calls: functions without arguments.
+        rounds: number of readings of each. Default 5.
+
+    Returns:
+        Median wall time of each call [s].
+    """
     times: list[list[float]] = [[] for _ in calls]
     for call in calls:
         call()
@@ -74,7 +108,15 @@ def interleaved(calls: Sequence[Callable[[], None]], rounds: int = 5) -> list[fl
 
 
 def measure(members: int = 4096, steps: int = 1000) -> Iterator[str]:
-    """JSON lines: ns per vehicle and step of psi_s in both precisions, and the part of the core's peak that it is."""
+    """Measure psi_s in both precisions next to the peak of the core.
+
+    Args:
+        members: number of members. Default 4096.
+        steps: number of steps. Default 1000.
+
+    Yields:
+        A line of JSON for each precision, as of `record`.
+    """
     for dtype in ("float64", "float32"):
         plan = make_plan(fleet(members), "psi_s", h=0.01, t1=0.01 * steps, dtype=dtype)
         seconds = interleaved([stepper(plan)])[0] / (members * steps)
@@ -83,7 +125,18 @@ def measure(members: int = 4096, steps: int = 1000) -> Iterator[str]:
 
 
 def record(method: Method, dtype: str, width: int, seconds: float, peak: float) -> dict[str, Any]:
-    """One measurement of a kernel beside the core's peak of fused multiply-adds per second."""
+    """Describe one measurement of a kernel next to the core's peak.
+
+    Args:
+        method: the method.
+        dtype: its precision.
+        width: members in one packet.
+        seconds: time per vehicle and step [s].
+        peak: fused multiply-adds of the core per second [1/s].
+
+    Returns:
+        Record of the settings, ns per vehicle and step, operations, peak [1e9/s] and the part of the peak reached.
+    """
     count = operations(method.name, None if method.iterations is None else int(method.iterations))
     return {
         "method": method.name,

@@ -1,4 +1,4 @@
-"""The cheapest setting that keeps an error, found on a sample, checked on more members, and checked again after a run."""
+"""The cheapest setting that keeps a given error: searched on a sample, checked on more members and after the run."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ from lgvi_warp.studies.comparison import Reference, Sample, Setting
 from lgvi_warp.studies.speed import void
 from lgvi_warp.studies.tradeoff import PRECISIONS, Trial, chosen_methods, costs, growth_of, growth_text, tried
 
-# A setting is taken where its error on the sample is below the asked one by this factor.
+# A setting is accepted where its error on the sample is below the error asked for by this factor.
 SAFETY = 1.15
-# Times that errors are compared at, where the scene does not say: few, so that steps may be long.
+# Number of times that errors are compared at, where the scene gives none: few, so that steps may be long.
 TIMES = 5
-# Tried first to last: whose lines are seldom the cheapest is left out.
+# Methods in the order in which they are tried; those that are seldom the cheapest are left out.
 CANDIDATES = tuple(name for name in tradeoffs.CANDIDATES if name not in ("phi", "psi", "psi_w"))
-# Members that the choice is checked on.
+# Number of members that the choice is checked on.
 CHECKED = 1024
-# Members that a finished run is checked on.
+# Number of members that a finished run is checked on.
 CONFIRMED = 64
-# Settings of the last comparison of costs, and readings of each cost.
+# Number of settings in the last comparison of costs, and of readings of each cost.
 FINALISTS = 4
 ROUNDS = 7
 # Bytes of a member besides its samples: state, parameters, status, and the arrays they are made from.
@@ -48,14 +48,27 @@ BYTES_OF_A_MEMBER = 2000
 
 @dataclass(frozen=True)
 class Suggestion:
-    """The cheapest setting found for an error.
+    """Cheapest setting found for an error, with what it is predicted to cost.
 
-    settings: for lw.solve(fleet, **settings). error: asked, of: of what, expected: the largest over members and path on
-    the members checked, all in `unit`; margin = error / expected. us_per_vehicle_second: cost on one core. run_seconds:
-    predicted for all members on `threads` cores, without compiling; memory_bytes: predicted for the result and the run.
-    members: of the sample that was checked; reference: what against, reference_error: how good that is.
-    rivals: (setting, cost, error) of the next best. worst: members with the largest errors, for the check after the run;
-    asked: what the error is of, for the same. messages: what the user should know.
+    Attributes:
+        settings: arguments for `lw.solve(fleet, **settings)`: method, h and dtype.
+        setting: the same as a Setting.
+        error: error asked for [`unit`].
+        of: name of the quantity that the error is of.
+        unit: unit of that quantity.
+        expected: largest error over members and path, on the members checked [`unit`].
+        us_per_vehicle_second: microseconds of one core per vehicle and simulated second.
+        run_seconds: predicted run time of all members on `threads` threads, without compiling [s].
+        threads: threads that `run_seconds` assumes.
+        memory_bytes: predicted memory of the run and its result [bytes].
+        members: number of members that the setting was checked on.
+        t1: end time that was checked [s].
+        reference: the pair of runs that errors were measured against, in words.
+        reference_error: largest difference between these two runs [`unit`].
+        rivals: (setting, us_per_vehicle_second, error) of the next best settings.
+        worst: indices of the members with the largest errors, the largest first; `verified` runs them again.
+        asked: the quantity itself, for `verified`.
+        messages: notes for the user.
     """
 
     settings: dict[str, Any]
@@ -79,7 +92,7 @@ class Suggestion:
 
     @property
     def margin(self) -> float:
-        """How many times better than asked."""
+        """Factor by which the expected error is below the error asked for; infinite without any error."""
         return self.error / self.expected if self.expected > 0.0 else math.inf
 
     def __str__(self) -> str:
@@ -110,20 +123,33 @@ def suggest(
     seconds: float = 30.0,
     progress: Callable[[float], None] | None = None,
 ) -> Suggestion:
-    """Find the cheapest method, step and precision whose error stays below `error` for every member and time up to t1.
+    """Find the cheapest method, step and precision that keep an error for every member up to a time.
 
-    of: any quantity that statistics know, "position" [m], "attitude" [rad], "depth" [m], "position[2]", "speed" [m/s],
-    "energy" [J] ..., or a lw.Quantity. t1: [s], by default
-    run.duration of the scene. methods: names (default: all that the scene takes). members: of the sample that it searches
-    on; what it finds is checked on up to 1024. threads: for the predicted time. seconds: about how long to search,
-    compiling aside.
+    The search runs a sample of members; its best settings are then checked on up to 1024 members, and their steps
+    shortened where needed.
 
-    Raises SceneError naming every fault; where noise acts; and where the reference cannot be known ten times better than
-    the error, since errors grow too fast: it says up to which time they can.
+    Args:
+        fleet: the ensemble, or a Scene with one.
+        error: largest error allowed, over members and path, in the unit of `of`; above 0. Default 1e-3.
+        of: quantity that the error is of: any that statistics know, such as "position" [m], "attitude" [rad], "depth" [m],
+            "position[2]" [m], "speed" [m/s] or "energy" [J], or a lw.Quantity. Default "position".
+        t1: end time [s]. Default: run.duration of the scene.
+        methods: names of the methods to try. Default: all that the scene takes.
+        members: size of the sample that is searched. Default 128.
+        threads: threads of the predicted run. Default: those of this machine.
+        seconds: approximate length of the search, without compiling [s]. Default 30.
+        progress: called with the fraction of the work that is done, from 0 to 1.
+
+    Returns:
+        The cheapest setting, its expected error, its predicted time and memory, and the next best settings.
+
+    Raises:
+        SceneError: for faulty arguments, all in one message; where noise acts; and where no reference is ten times better
+            than the error, with the time up to which one is.
     """
-    asked = compared_in(of)
+    compared = compared_in(of)
     faults = Faults()
-    faults.positive("error", error, asked.unit)
+    faults.positive("error", error, compared.unit)
     faults.positive("seconds", seconds)
     check_threads(faults, threads)
     faults.raise_if_any()
@@ -134,78 +160,105 @@ def suggest(
     if not taken:
         raise SceneError([f"method {name}: {why}" for name, why in refused.items()])
     if sample.noisy(taken[0]):
-        what = f"error = {error:g}: noise acts, whose path differs from step to step, so members have no error"
-        raise SceneError([f"{what}; use lgvi-warp tradeoff, which compares statistics"])
-    reference = checked_reference(sample, asked, error, 0.4 * seconds, taken)
+        problem = f"error = {error:g}: noise acts, whose path differs from step to step, so members have no error"
+        raise SceneError([f"{problem}; use lgvi-warp tradeoff, which compares statistics"])
+    reference = checked_reference(sample, compared, error, 0.4 * seconds, taken)
     report(0.3)
-    found = search(
+    trials = search(
         sample,
         taken,
         reference,
-        asked,
+        compared,
         error / SAFETY,
         time.perf_counter() + 0.6 * seconds,
         lambda x: report(0.3 + 0.5 * x),
     )
-    if not found:
-        what = f"error = {error:g} {asked.unit} of {asked.name}: no step of {', '.join(taken)} kept it"
-        raise SceneError([f"{what}; ask for a larger error, a shorter t1, or give more seconds"])
+    if not trials:
+        problem = f"error = {error:g} {compared.unit} of {compared.name}: no step of {', '.join(taken)} kept it"
+        raise SceneError([f"{problem}; ask for a larger error, a shorter t1, or give more seconds"])
     more = sample.more(CHECKED) if sample.whole.members > sample.members else sample
     if more is not sample:
-        reference = checked_reference(more, asked, error, 0.4 * seconds, taken)
-    final = [refined(more, one.setting, reference, asked.name, error / SAFETY**0.5) for one in found[:FINALISTS]]
-    final = [one for one in final if one.error(asked.name) <= error] or final[:1]
-    readings = cost.costs([one.plan for one in final], rounds=ROUNDS)
-    prices = [one.us_per_vehicle_second for one in readings]
+        reference = checked_reference(more, compared, error, 0.4 * seconds, taken)
+    final = [
+        refined(more, trial.setting, reference, compared.name, error / SAFETY**0.5) for trial in trials[:FINALISTS]
+    ]
+    final = [trial for trial in final if trial.error(compared.name) <= error] or final[:1]
+    readings = cost.costs([trial.plan for trial in final], rounds=ROUNDS)
+    prices = [reading.us_per_vehicle_second for reading in readings]
     text = cost.disagreement(
-        [(f"{one.setting.name} {one.setting.dtype}", price) for one, price in zip(final, readings, strict=True)]
+        [(f"{trial.setting.name} {trial.setting.dtype}", price) for trial, price in zip(final, readings, strict=True)]
     )
     order = sorted(range(len(final)), key=prices.__getitem__)
     best, price = final[order[0]], prices[order[0]]
-    whole = sample.whole
-    used = min(threads or machine.thread_count(), len(blocks(whole.members)))
+    ensemble = sample.whole
+    used = min(threads or machine.thread_count(), len(blocks(ensemble.members)))
     report(1.0)
     return Suggestion(
         settings=best.setting.options(),
         setting=best.setting,
         error=float(error),
-        of=asked.name,
-        unit=asked.unit,
-        expected=best.error(asked.name),
+        of=compared.name,
+        unit=compared.unit,
+        expected=best.error(compared.name),
         us_per_vehicle_second=price,
-        run_seconds=seconds_of(whole, best.setting, sample.t1) / used,
+        run_seconds=seconds_of(ensemble, best.setting, sample.t1) / used,
         threads=used,
-        memory_bytes=memory_of(whole, best.setting, sample.t1),
+        memory_bytes=memory_of(ensemble, best.setting, sample.t1),
         members=more.members,
         t1=sample.t1,
         reference=reference.text,
-        reference_error=reference.error(asked.name),
-        rivals=tuple((final[i].setting, prices[i], final[i].error(asked.name)) for i in order[1:]),
-        worst=worst_of(best, reference, asked.name),
-        asked=asked,
+        reference_error=reference.error(compared.name),
+        rivals=tuple((final[i].setting, prices[i], final[i].error(compared.name)) for i in order[1:]),
+        worst=worst_of(best, reference, compared.name),
+        asked=compared,
         messages=(text,) if text else (),
     )
 
 
 def worst_of(one: Trial, reference: Reference, of: str, members: int = CONFIRMED // 2) -> tuple[int, ...]:
-    """The members with the largest errors, the largest first."""
+    """Find the members of a trial that have the largest errors.
+
+    Args:
+        one: the trial.
+        reference: what errors are measured against.
+        of: name of the quantity.
+        members: largest number of indices. Default 32.
+
+    Returns:
+        Indices of the members, the largest error first.
+    """
     apart = comparison.distances(one.result, reference.result, reference.asked)[of]
     largest = np.max(np.where(np.isnan(apart), 0.0, apart), axis=0)
     return tuple(int(i) for i in np.argsort(-largest)[:members])
 
 
 def checked_reference(sample: Sample, of: Compared, error: float, seconds: float, taken: Sequence[str]) -> Reference:
-    """A reference ten times better than the error up to t1. Raises SceneError."""
+    """Make a reference that is ten times better than the error up to the end.
+
+    Args:
+        sample: members and times.
+        of: quantity that the error is of.
+        error: error asked for [unit of `of`].
+        seconds: approximate time to spend, without compiling [s].
+        taken: methods that the scene takes; one of them measures how errors grow, for the message.
+
+    Returns:
+        The reference.
+
+    Raises:
+        SceneError: where the two best runs differ by more than a tenth of the error; it names the time up to which they
+            agree.
+    """
     reference = comparison.make_reference(sample, of, goal=error / 30.0, seconds=seconds)
     if reference.error(of.name) > 0.1 * error:
         until = sample.times[reference.reaches(of.name, 0.1 * error)]
         unit = of.unit
-        what = f"error = {error:g} {unit} of {of.name} up to {sample.t1:g} s cannot be checked: {reference.text} differ by "
-        what += f"{reference.error(of.name):.1e} {unit}; {growth_text(growth_of(sample, taken, reference))}"
+        problem = f"error = {error:g} {unit} of {of.name} up to {sample.t1:g} s cannot be checked: {reference.text} differ by "
+        problem += f"{reference.error(of.name):.1e} {unit}; {growth_text(growth_of(sample, taken, reference))}"
         remedy = (
             f"ask for t1 (--duration) up to {until:g} s, " if until > 0.0 else "ask for a shorter t1 (--duration), "
         )
-        raise SceneError([f"{what}; {remedy}for a larger error, or give more seconds"])
+        raise SceneError([f"{problem}; {remedy}for a larger error, or give more seconds"])
     return reference
 
 
@@ -218,52 +271,84 @@ def search(
     deadline: float,
     report: Callable[[float], None],
 ) -> list[Trial]:
-    """For each method and precision the longest step that keeps the target, the cheapest first.
+    """Find for each method and precision the longest step that keeps the target.
 
-    A step is halved until it does, and then lengthened by the slope of the errors; a method ends where it costs 1.5 times
-    what another does.
+    The step is halved until the error is below the target, then lengthened by the slope of the errors. A method is
+    given up where its steps cost twice what the cheapest setting so far does.
+
+    Args:
+        sample: members and times.
+        methods: names of the methods to try, in this order.
+        reference: what errors are measured against.
+        asked: quantity that the error is of.
+        target: largest error allowed [unit of `asked`].
+        deadline: time.perf_counter() at which to stop [s]; compiling postpones it.
+        report: called with the fraction of the search that is done.
+
+    Returns:
+        Trials that keep the target, the cheapest first; those above 1.5 times the cheapest cost are left out.
     """
     of, size_of = asked.name, asked.largest(reference.result)
-    # What float32 cannot hold is not asked of it.
+    # A precision whose round-off is near the target is not tried.
     dtypes = [name for name in PRECISIONS if target > 4.0 * comparison.ROUND_OFF[name] * size_of]
     ladders = [(name, dtype) for name in methods for dtype in dtypes or ["float64"]]
-    found: list[tuple[float, Trial]] = []
+    priced: list[tuple[float, Trial]] = []
     for i, (method, dtype) in enumerate(ladders):
         report(i / len(ladders))
-        if time.perf_counter() > deadline and found:
+        if time.perf_counter() > deadline and priced:
             break
         m, before, worse = sample.coarsest(2.0), math.inf, 0
         plan = sample.plan(sample.setting(method, m, dtype))
         deadline += plan.compile()
         per_step = step_cost(plan)
-        cheapest = min((price for price, _ in found), default=math.inf)
+        cheapest = min((price for price, _ in priced), default=math.inf)
         while per_step / sample.h(m) < 2.0 * cheapest:
-            one = tried(sample, sample.setting(method, m, dtype), reference)
-            deadline += one.result.compile_seconds
-            size = one.error(of)
+            trial = tried(sample, sample.setting(method, m, dtype), reference)
+            deadline += trial.result.compile_seconds
+            size = trial.error(of)
             if size <= target:
-                best = lengthened(sample, one, m, before, reference, of, target)
-                # Of a step that iterates, a shorter one is less work; one that fails is other work.
-                found.append((step_cost(best.plan) / best.setting.h, best))
+                best = lengthened(sample, trial, m, before, reference, of, target)
+                # Price the step that was found: where a step iterates, its work depends on its length.
+                priced.append((step_cost(best.plan) / best.setting.h, best))
                 break
             worse = worse + 1 if size > 0.8 * before and before < 0.1 else 0
             if worse >= 2 or m > 10**7 or time.perf_counter() > deadline:
                 break
             before = size
             m *= 2
-    cheapest = min((price for price, _ in found), default=math.inf)
-    return [one for price, one in sorted(found, key=lambda pair: pair[0]) if price < 1.5 * cheapest]
+    cheapest = min((price for price, _ in priced), default=math.inf)
+    return [trial for price, trial in sorted(priced, key=lambda pair: pair[0]) if price < 1.5 * cheapest]
 
 
 def step_cost(plan: Plan) -> float:
-    """Microseconds of one core for one step of one vehicle."""
+    """Measure what one step of a plan costs.
+
+    Args:
+        plan: the plan.
+
+    Returns:
+        Microseconds of one core for one step of one vehicle.
+    """
     return costs([plan], ROUNDS)[0] * plan.grid.h
 
 
 def lengthened(
     sample: Sample, good: Trial, m: int, before: float, reference: Reference, of: str, target: float
 ) -> Trial:
-    """Between the step that keeps the target and twice it, the longest that does; `before` is the error of the latter."""
+    """Lengthen a step towards twice its length as far as the target allows.
+
+    Args:
+        sample: members and times.
+        good: trial that keeps the target, of the step spacing / m.
+        m: number of its steps in the sample's spacing.
+        before: error of the step twice as long [unit of `of`].
+        reference: what errors are measured against.
+        of: name of the quantity.
+        target: largest error allowed [unit of `of`].
+
+    Returns:
+        The trial of the longest step found that keeps the target; `good` itself where none does better.
+    """
     low, high, size = m // 2, m, good.error(of)
     if not math.isfinite(before) or before <= target or low < 1:
         return good
@@ -273,32 +358,53 @@ def lengthened(
         guess = min(max(guess, low + 1), high - 1)
         if guess <= low or guess >= high or high - low < 0.04 * high:
             break
-        one = tried(sample, sample.setting(good.setting.method, guess, good.setting.dtype), reference)
-        if one.error(of) <= target:
-            good, high, size = one, guess, one.error(of)
-        elif math.isfinite(one.error(of)):
-            low, before = guess, one.error(of)
+        trial = tried(sample, sample.setting(good.setting.method, guess, good.setting.dtype), reference)
+        if trial.error(of) <= target:
+            good, high, size = trial, guess, trial.error(of)
+        elif math.isfinite(trial.error(of)):
+            low, before = guess, trial.error(of)
         else:
             break
     return good
 
 
 def refined(sample: Sample, setting: Setting, reference: Reference, of: str, target: float) -> Trial:
-    """The setting on these members, its step shortened until it keeps the target."""
-    one = tried(sample, setting, reference)
+    """Run a setting on a sample and shorten its step until it keeps the target.
+
+    Args:
+        sample: members and times.
+        setting: where to begin.
+        reference: what errors are measured against.
+        of: name of the quantity.
+        target: largest error allowed [unit of `of`].
+
+    Returns:
+        The last trial; after six shorter steps it may still miss the target.
+    """
+    trial = tried(sample, setting, reference)
     for _ in range(6):
-        size = one.error(of)
+        size = trial.error(of)
         if size <= target:
             break
         factor = min((size / target) ** (1.0 / Method(setting.method).order) * 1.02, 2.0) if np.isfinite(size) else 1.5
-        m = round(float(sample.spacing) / one.setting.h)
+        m = round(float(sample.spacing) / trial.setting.h)
         longer = sample.setting(setting.method, max(m + 1, math.ceil(m * factor)), setting.dtype)
-        one = tried(sample, longer, reference)
-    return one
+        trial = tried(sample, longer, reference)
+    return trial
 
 
 def seconds_of(fleet: Ensemble, setting: Setting, t1: float, members: int = 256) -> float:
-    """What all members take on one core, the scene's samples included, from the CPU time of a few of them [s]."""
+    """Predict the CPU time of a whole run from that of a few members.
+
+    Args:
+        fleet: all members.
+        setting: method, step, precision and solver.
+        t1: end time [s].
+        members: number of members that are timed. Default 256.
+
+    Returns:
+        Time of all members on one core, the scene's samples included and compiling not [s].
+    """
     n = min(members, fleet.members)
     plan = make_plan(fleet.subset(range(n)), setting.resolved(), setting.h, t1, dtype=setting.dtype)
     plan.compile()
@@ -306,26 +412,43 @@ def seconds_of(fleet: Ensemble, setting: Setting, t1: float, members: int = 256)
 
 
 def memory_of(fleet: Ensemble, setting: Setting, t1: float) -> int:
-    """Bytes that a run of all members takes, with the scene's samples."""
+    """Predict the memory of a run of all members, with the scene's samples.
+
+    Args:
+        fleet: all members.
+        setting: method, step, precision and solver.
+        t1: end time [s].
+
+    Returns:
+        Memory of the run and its result [bytes].
+    """
     grid = make_plan(fleet.subset([0]), setting.resolved(), setting.h, t1, dtype=setting.dtype).grid
     a_sample = 18 * np.dtype(machine.DTYPES[setting.dtype]).itemsize
     return fleet.members * (len(grid.times) * a_sample + BYTES_OF_A_MEMBER)
 
 
 def verified(fleet: Ensemble, result: Result, found: Suggestion) -> tuple[float, int]:
-    """The error of a finished run, largest over some members and all samples, from half its step; and how many members.
+    """Measure the error of a finished run by running some of its members again with half the step.
 
-    They are those that had the largest errors in the search, and the first ones. A method of order p at half the step is
-    2^p times better, so the difference is the error but for one part in 2^p.
+    The members are those with the largest errors in the search, then the first ones. A method of order p is 2^p times
+    better at half the step, so the difference between the runs is the error but for one part in 2^p.
+
+    Args:
+        fleet: the ensemble that was run.
+        result: its result.
+        found: the suggestion that it was run by.
+
+    Returns:
+        (error, members): largest error over these members and all samples [found.unit], and how many members they are.
     """
     setting = found.setting
     chosen = list(dict.fromkeys((*found.worst, *range(fleet.members))))[:CONFIRMED]
-    part = fleet.subset(chosen)
-    plan = make_plan(part, setting.resolved(), setting.h, float(result.time[-1]), dtype=setting.dtype)
+    checked_fleet = fleet.subset(chosen)
+    plan = make_plan(checked_fleet, setting.resolved(), setting.h, float(result.time[-1]), dtype=setting.dtype)
     h = result.provenance["step"]
     steps = np.rint(result.time / h).astype(np.int64)
-    # In double precision, so that round-off of the run's own is seen as well.
-    half = Plan(part, plan.method, TimeGrid(h / 2.0, 2 * steps, result.time), plan.fields, "float64")
+    # In double precision, so that the error contains the run's round-off too.
+    half = Plan(checked_fleet, plan.method, TimeGrid(h / 2.0, 2 * steps, result.time), plan.fields, "float64")
     with np.errstate(all="ignore"):
         apart = comparison.distances(comparison.part(result, chosen), run_plan(half, 1), found.asked)
         size = comparison.errors(apart, len(result.time) - 1)[found.of]["path_max"]

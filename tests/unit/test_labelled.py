@@ -129,7 +129,7 @@ def test_levels_are_read_in_the_order_of_the_laws(drifting, seen):
             base, _, index = name.partition("[")
             values = seen[base][:, int(index[:-1])] if index else seen[base]
             np.testing.assert_allclose(values, exact[j].ppf(u[:, j]), rtol=1e-15)
-    assert "is no level between 0 and 1" in faults(model, ROWS)
+    assert "is not a level between 0 and 1" in faults(model, ROWS)
 
 
 def test_a_joint_law_keeps_its_place_among_levels(drifting, seen):
@@ -201,9 +201,9 @@ def test_entries_that_do_not_vary_stay_the_scenes(drifting, seen):
 
 @pytest.mark.parametrize(
     ("vary", "words"),
-    [([MASS, MASS], ["is named twice"]), ({MASS, BUOYANCY}, ["is no list of names"]), ([], ["is no list of names"]),
-     (["start.position[2]", "start.position[ 2 ]"], ["start.position[2]", "named twice"]), (3, ["is no list of names"]),
-     (["vehicle.inertia[0,1]", "vehicle.inertia[1,0]"], ["is varied by"]), ([MASS, 3], ["is no list of names"])],
+    [([MASS, MASS], ["is named twice"]), ({MASS, BUOYANCY}, ["neither a list of names"]), ([], ["is neither a list of names"]),
+     (["start.position[2]", "start.position[ 2 ]"], ["start.position[2]", "named twice"]), (3, ["is neither a list of names"]),
+     (["vehicle.inertia[0,1]", "vehicle.inertia[1,0]"], ["is varied by"]), ([MASS, 3], ["is neither a list of names"])],
 )  # fmt: skip
 def test_names_that_are_no_list(drifting, vary, words):
     message = faults(uq.model, drifting, vary, "position[2]", h=0.01, t1=0.02)

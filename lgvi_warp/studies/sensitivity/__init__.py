@@ -1,7 +1,7 @@
-"""Sensitivity: what of that which varies makes a quantity of interest vary. Sobol indices, Morris' screening, adaptors.
+"""Which of the varied parameters make a quantity of interest vary: Sobol indices, Morris' screening, and adaptors.
 
-    found = lw.uq.sobol(scene, "position[2]", samples=1024, h=0.01, t1=60.0)
-    print(found)
+    indices = lw.uq.sobol(scene, "position[2]", samples=1024, h=0.01, t1=60.0)
+    print(indices)
 
 The designs and the estimates are SALib's (extra: uq).
 """

@@ -20,10 +20,22 @@ from lgvi_warp.studies.sensitivity.outputs import FailedMembers, evaluate
 
 
 class Model:
-    """A scene as a function of what varies, for SALib, scipy and other libraries; see `model`.
+    """A scene as a function of what varies, for SALib, scipy and other libraries; made by `model`.
 
-    names (d,): of the columns, in the order of `vary`. problem: SALib's description. distributions (d,): each with `ppf`,
-    for scipy.
+    Args:
+        scene: the scene.
+        vary: name -> distribution, or names alone.
+        of: one or several quantities of interest, as of `sobol`.
+        levels: whether X holds numbers in (0, 1) in place of the values themselves.
+        failed: "refuse" or "nan", for members that fail.
+        settings: arguments of `lw.solve` and of `evaluate`.
+
+    Attributes:
+        names: of the columns of X (d,), in the order of `vary`.
+        scene, vary, of, levels, failed: as given.
+
+    Raises:
+        SceneError: for faulty arguments, all in one message.
     """
 
     def __init__(self, scene: Scene, vary: Any, of: Any, levels: bool, failed: str, settings: Mapping[str, Any]):
@@ -36,15 +48,19 @@ class Model:
         names = () if self.vary is not None else names_of(faults, vary)
         faults.raise_if_any()
         if self.vary is None and levels:
-            raise SceneError([f"vary = {vary!r}: names no laws that levels could be of; map names to distributions"])
+            raise SceneError(
+                [f"vary = {vary!r}: has no distributions, which levels=True needs; map names to distributions"]
+            )
         self._fleet = Ensemble(scene, 1, 0, self.vary)
         self._variations = as_given(self._fleet)
-        joint = [one.key for one in self._variations if one.law.joint]
+        joint = [variation.key for variation in self._variations if variation.law.joint]
         if joint and not levels:
-            raise SceneError([f"vary.\"{key}\": is a joint law, whose values are no numbers by themselves; use levels=True"
+            raise SceneError([f"vary.\"{key}\": is a joint distribution, whose values are not single numbers; use levels=True"
                               for key in joint])  # fmt: skip
-        # Which column of the ensemble's cube, whose keys are sorted, each column of X is.
-        self._columns = [column for one in self._variations for column in columns_of(self._fleet.space, one.key)]
+        # Column of the ensemble's cube, whose keys are sorted, for each column of X.
+        self._columns = [
+            column for variation in self._variations for column in columns_of(self._fleet.space, variation.key)
+        ]
         if self.vary is None:
             self.names = names
             self._run(np.array([[float(self._scene_value(name)) for name in names]]), dry=True)
@@ -57,13 +73,19 @@ class Model:
         known = self._scene_numbers()
         faults = Faults("vary.")
         if variations.known_target(faults, name, "...", target, known) and target.of(known[target.name]).ndim:
-            faults.add(f'"{name}"', "...", "is no single number", f'name its entries, such as "{name}[0]"')
+            faults.add(f'"{name}"', "...", "is not a single number", f'name its entries, such as "{name}[0]"')
         faults.raise_if_any()
         return target.of(known[target.name])
 
     @property
     def problem(self) -> dict[str, Any]:
-        """For SALib.sample: with levels, the unit cube. Otherwise laws that SALib knows too. Raises SceneError."""
+        """Description of the columns for SALib.sample: num_vars, names, bounds, and dists or groups.
+
+        With levels it is the unit cube; otherwise it holds the distributions, all of which SALib must have.
+
+        Raises:
+            SceneError: for distributions that SALib does not have, and for names alone.
+        """
         if self.levels:
             cube = samplings.salib_problem(self._fleet.space)
             by_column = {key: [cube[key][column] for column in self._columns] for key in ("names", "bounds", "groups")
@@ -71,22 +93,27 @@ class Model:
             return cube | by_column
         faults = Faults("vary.")
         bounds, kinds = [], []
-        for one in self._variations:
-            for law in self._single_laws(one):
+        for variation in self._variations:
+            for law in self._single_laws(variation):
                 described = _salib_law(*law)
                 if described is None:
-                    faults.add(f'"{one.key}"', one.law, "is no law that SALib has", "use levels=True")
+                    faults.add(
+                        f'"{variation.key}"',
+                        variation.law,
+                        "is unknown to SALib",
+                        "use levels=True",
+                    )
                     break
                 kinds.append(described[0])
                 bounds.append(described[1])
         if not self._variations:
-            faults.add("names", list(self.names), "have no laws", "map names to distributions")
+            faults.add("names", list(self.names), "have no distributions", "map names to distributions")
         faults.raise_if_any()
         return {"num_vars": len(self.names), "names": list(self.names), "bounds": bounds, "dists": kinds}
 
     @staticmethod
     def _single_laws(one: Any) -> list[tuple[Any, np.ndarray, dict[str, np.ndarray]]]:
-        """(law, the scene's value, the law's numbers) of each entry."""
+        """List (distribution, the scene's value, the distribution's numbers) of each entry of a variation."""
         (base,) = one.bases
         numbers = {name: np.broadcast_to(value, base.shape).reshape(-1) for name, value in one.law._given().items()
                    if np.ndim(value) <= base.ndim and one.law.kind != "choice"}  # fmt: skip
@@ -95,13 +122,17 @@ class Model:
 
     @property
     def distributions(self) -> list[Any]:
-        """One for each column, with `ppf`: for scipy.stats.sobol_indices(dists=...)."""
+        """Distribution of each column (d,), each with `ppf`, for scipy.stats.sobol_indices(dists=...).
+
+        Raises:
+            SceneError: for names alone.
+        """
         if not self._variations:
-            raise SceneError(["vary: names without laws have no distributions; map names to distributions"])
+            raise SceneError(["vary: names alone have no distributions; map names to distributions"])
         return [_Levels() if self.levels else _Column(self._fleet, column) for column in self._columns]
 
     def __call__(self, X: Any) -> np.ndarray:
-        """The quantities of members with these numbers.
+        """Run members with these numbers and return their quantities.
 
         Args:
             X: (n, d), columns in the order of `names`; or by name, in any order: a data frame, a mapping of columns, a
@@ -118,7 +149,18 @@ class Model:
         return Y[:, 0] if Y.shape[1] == 1 else Y
 
     def scipy(self, X: Any) -> np.ndarray:
-        """As when called, in scipy's shape: X (d, n), or by name -> Y (n,), or (m, n) of several numbers."""
+        """Run members as a call does, in scipy's shape.
+
+        Args:
+            X: (d, n), rows in the order of `names`; or by name, in any order.
+
+        Returns:
+            Y (n,), or (m, n) of several numbers.
+
+        Raises:
+            SceneError: for labels that are missing, unknown or doubled, and for what is no real number.
+            FailedMembers: with failed="refuse", where members failed.
+        """
         if is_labelled(X):
             return np.ascontiguousarray(self(X).T)
         faults = Faults()
@@ -127,7 +169,7 @@ class Model:
         return np.ascontiguousarray(self(np.asarray(array).T).T)
 
     def _numbers(self, X: Any) -> np.ndarray:
-        """(n, d), the columns in the order of the names."""
+        """Convert X to an array (n, d), columns in the order of the names."""
         faults = Faults()
         shape = f"give an array of shape (n, {len(self.names)}), columns {', '.join(self.names)}"
         if is_labelled(X):
@@ -140,14 +182,14 @@ class Model:
         if array is not None and self.levels and not np.all((array >= 0.0) & (array <= 1.0)):
             odd = array[~((array >= 0.0) & (array <= 1.0))][0]
             faults.add(
-                "X", odd, "is no level between 0 and 1", "give levels, or leave out levels=True to give the numbers"
+                "X", odd, "is not a level between 0 and 1", "give levels, or leave out levels=True to give the numbers"
             )
         faults.raise_if_any()
         assert array is not None
         return array
 
     def _scene_numbers(self) -> dict[str, np.ndarray]:
-        """Every number that may vary, by name."""
+        """Collect every number of the scene that may vary, by name."""
         return self.scene.parameters() | {f"start.{key}": value for key, value in self.scene.start.given().items()}
 
     def _run(self, X: np.ndarray, dry: bool = False) -> np.ndarray:
@@ -169,7 +211,7 @@ class Model:
 
 @dataclass(frozen=True)
 class _Levels:
-    """The level itself."""
+    """Uniform distribution on (0, 1): the value is the level itself."""
 
     def ppf(self, u: Any) -> np.ndarray:
         return np.asarray(u, dtype=np.float64)
@@ -177,7 +219,7 @@ class _Levels:
 
 @dataclass(frozen=True)
 class _Column:
-    """One column of an ensemble's cube as a distribution of the number that follows from it."""
+    """Distribution of the number that one column of an ensemble's cube determines."""
 
     fleet: Ensemble
     column: int
@@ -189,8 +231,8 @@ class _Column:
         label = self.fleet.space.factors[self.column][0]
         (wanted,) = variations.targets(label)
         split = self.fleet.space.split(cube)
-        for one in self.fleet._variations:
-            for target, values in one.values(split[one.key]):
+        for variation in self.fleet._variations:
+            for target, values in variation.values(split[variation.key]):
                 if target == wanted:
                     return values.reshape(np.shape(u))
                 if target.name == wanted.name and target.index is None and wanted.index is not None:
@@ -200,7 +242,7 @@ class _Column:
 
 
 def _salib_law(law: Any, base: Any, numbers: Mapping[str, Any]) -> tuple[str, list[float]] | None:
-    """(name, bounds) of a law in SALib's words; None where it has no word for it."""
+    """Translate a distribution to SALib's (name, bounds); None where SALib has none for it."""
     base = float(base)
     mean = float(numbers.get("mean", base))
     if law.kind == "normal":
@@ -225,11 +267,23 @@ def model(
     failed: str = "refuse",
     **settings: Any,
 ) -> Model:
-    """A scene as a function: f(X), X (n, d) -> Y (n,) or (n, m), for SALib; f.scipy(X), X (d, n), for scipy's sobol_indices.
+    """Turn a scene into a function of what varies.
 
-    vary: name -> distribution, or names alone. X holds the numbers themselves, of the entries that `names` lists, in the
-    order of `vary`; with levels, numbers in (0, 1) that the laws turn into values, which any law can be. A data frame, a
-    mapping, a structured array or an xarray Dataset is read by its names, in whatever order. of, settings: as of `sobol`.
-    failed: "refuse", or "nan" for NaN in their place. Raises SceneError naming every fault.
+    f(X) takes X (n, d) and returns Y (n,) or (n, m), for SALib; f.scipy(X) takes X (d, n), for scipy's sobol_indices.
+
+    Args:
+        scene: the scene.
+        vary: name -> distribution, or names alone. The columns are the entries that `names` lists, in this order.
+        of: one or several quantities of interest, as of `sobol`.
+        levels: whether X holds numbers in (0, 1), which the distributions turn into values, in place of the values
+            themselves; joint distributions need it. Default False.
+        failed: "refuse" for an error where members fail, "nan" for NaN in their place. Default "refuse".
+        settings: arguments of `lw.solve` (method, h, t1, save, dtype, threads, progress) and of `evaluate`.
+
+    Returns:
+        The function; X may also be a data frame, a mapping, a structured array or an xarray Dataset with columns by name.
+
+    Raises:
+        SceneError: for faulty arguments, all in one message.
     """
     return Model(scene, vary, of, levels, failed, settings)

@@ -18,7 +18,7 @@ from lgvi_warp.studies.sensitivity.indices import MorrisEffects, SobolIndices
 from lgvi_warp.studies.sensitivity.outputs import FailedMembers, Outputs, evaluate
 
 FAILED = ("refuse", "drop")
-# Below this part of its size, a quantity that differs from member to member does so by round-off.
+# A quantity whose range is below this part of its size varies by round-off alone.
 CONSTANT = 1e-14
 
 
@@ -35,16 +35,31 @@ def sobol(
     failed: str = "refuse",
     **settings: Any,
 ) -> SobolIndices:
-    """Sobol indices of quantities of interest, by Saltelli's design and SALib's estimates.
+    """Estimate Sobol indices of quantities of interest, by Saltelli's design and SALib's estimates.
 
-    scene: a Scene, with what varies in its ensemble or in `vary`; or an Ensemble, for its scene, vary and seed. of:
-    "position[2]" or "depth" (at the end), "max(energy)" (over the path), a lw.Quantity, a function of a Result to (n,) or
-    (n, m), or several. samples: N, a power of two is best; N (2 d + 2) members are run for d factors, N (d + 2) without
-    second_order. confidence, resamples: of the bootstrap's intervals. failed: "refuse", or "drop" to use the groups without
-    a failed member only.
-    settings: those of `lw.solve` (method, h, t1, save, dtype, threads, progress) and of `evaluate`.
+    The factors vary independently; a joint distribution counts as one factor. Source: Saltelli et al. (2010), Computer
+    Physics Communications 181.
 
-    The factors vary independently: a joint law counts as one. Raises SceneError, and FailedMembers.
+    Args:
+        scene: a Scene, with what varies in its ensemble or in `vary`; or an Ensemble, for its scene, vary and seed.
+        of: "position[2]" or "depth" (at the end), "max(energy)" (over the path), a lw.Quantity, a function of a Result to
+            (n,) or (n, m), or several of these.
+        samples: N, best a power of two; N (2 d + 2) members are run for d factors, N (d + 2) without second_order. Default
+            1024.
+        vary: name -> distribution. Default: that of the scene or the ensemble.
+        seed: of the design. Default: that of the scene or the ensemble.
+        second_order: whether to estimate indices of pairs as well. Default True.
+        confidence: level of the bootstrap's intervals, between 0 and 1. Default 0.95.
+        resamples: number of the bootstrap's resamples. Default 100.
+        failed: "refuse" for an error where members fail, "drop" to use the groups without a failed member. Default "refuse".
+        settings: arguments of `lw.solve` (method, h, t1, save, dtype, threads, progress) and of `evaluate`.
+
+    Returns:
+        First-order and total indices of every factor, and second-order indices of pairs.
+
+    Raises:
+        SceneError: for faulty arguments, all in one message.
+        FailedMembers: where members failed and the indices cannot be computed from the others.
     """
     _check(samples, 2, confidence, resamples, failed)
     design = samplings.Saltelli(second_order)
@@ -56,31 +71,46 @@ def sobol(
 def sobol_of(
     fleet: Ensemble, outputs: Outputs, *, confidence: float = 0.95, resamples: int = 100, failed: str = "refuse"
 ) -> SobolIndices:
-    """The same from the outputs of an ensemble with Saltelli's design that was run already."""
+    """Estimate Sobol indices from outputs that are already there.
+
+    Args:
+        fleet: the ensemble that was run, with Saltelli's design.
+        outputs: its quantities of interest.
+        confidence: level of the bootstrap's intervals, between 0 and 1. Default 0.95.
+        resamples: number of the bootstrap's resamples. Default 100.
+        failed: "refuse" or "drop", as of `sobol`. Default "refuse".
+
+    Returns:
+        The indices, as of `sobol`.
+
+    Raises:
+        FailedMembers: where members failed and the indices cannot be computed from the others.
+        ImportError: without SALib.
+    """
     analyze = _salib("sobol")
     design = fleet.sampling
     assert isinstance(design, samplings.Saltelli)
     factors = tuple(label for label, _ in fleet.space.factors)
     Y, messages = _whole_groups(outputs, design.group_size(fleet.space), failed)
     m, d = Y.shape[1], len(factors)
-    found = {name: np.full((m, d), np.nan) for name in ("S1", "S1_conf", "ST", "ST_conf")}
-    found |= {name: np.full((m, d, d), np.nan) for name in ("S2", "S2_conf")}
+    estimates = {name: np.full((m, d), np.nan) for name in ("S1", "S1_conf", "ST", "ST_conf")}
+    estimates |= {name: np.full((m, d, d), np.nan) for name in ("S2", "S2_conf")}
     problem = {"num_vars": d, "names": list(factors), "bounds": [[0.0, 1.0]] * d}
     for q in _varying(Y, outputs.labels, messages):
         S = analyze(problem, Y[:, q].copy(), calc_second_order=design.second_order, num_resamples=resamples,
                     conf_level=confidence, seed=fleet.seed + 1)  # fmt: skip
-        for name in found.keys() & S.keys():
-            found[name][q] = S[name]
+        for name in estimates.keys() & S.keys():
+            estimates[name][q] = S[name]
     for name in ("S2", "S2_conf"):  # SALib gives what is above the diagonal
-        found[name] = np.where(np.isnan(found[name]), np.swapaxes(found[name], 1, 2), found[name])
+        estimates[name] = np.where(np.isnan(estimates[name]), np.swapaxes(estimates[name], 1, 2), estimates[name])
     return SobolIndices(
         **_common(factors, outputs, Y, design.group_size(fleet.space), confidence, messages),
-        first=found["S1"],
-        first_confidence=found["S1_conf"],
-        total=found["ST"],
-        total_confidence=found["ST_conf"],
-        second=found["S2"] if design.second_order else None,
-        second_confidence=found["S2_conf"] if design.second_order else None,
+        first=estimates["S1"],
+        first_confidence=estimates["S1_conf"],
+        total=estimates["ST"],
+        total_confidence=estimates["ST_conf"],
+        second=estimates["S2"] if design.second_order else None,
+        second_confidence=estimates["S2_conf"] if design.second_order else None,
     )
 
 
@@ -97,10 +127,26 @@ def morris(
     failed: str = "refuse",
     **settings: Any,
 ) -> MorrisEffects:
-    """Morris' screening: which factors matter at all, for few members.
+    """Screen for the factors that matter at all, by Morris' elementary effects on few members.
 
-    samples: paths; samples (d + 1) members are run for d factors. levels: even, of the grid that paths go along; a step moves
-    a factor by half of it. The rest as of `sobol`. Raises SceneError, and FailedMembers.
+    Args:
+        scene: a Scene, with what varies in its ensemble or in `vary`; or an Ensemble, for its scene, vary and seed.
+        of: one or several quantities of interest, as of `sobol`.
+        samples: number of paths; samples (d + 1) members are run for d factors. Default 64.
+        levels: number of levels of the grid that paths go along, even; a step moves a factor by half the grid. Default 4.
+        vary: name -> distribution. Default: that of the scene or the ensemble.
+        seed: of the design. Default: that of the scene or the ensemble.
+        confidence: level of the bootstrap's intervals, between 0 and 1. Default 0.95.
+        resamples: number of the bootstrap's resamples. Default 100.
+        failed: "refuse" for an error where members fail, "drop" to use the paths without a failed member. Default "refuse".
+        settings: arguments of `lw.solve` (method, h, t1, save, dtype, threads, progress) and of `evaluate`.
+
+    Returns:
+        Elementary effects of every factor.
+
+    Raises:
+        SceneError: for faulty arguments, all in one message.
+        FailedMembers: where members failed and the effects cannot be computed from the others.
     """
     _check(samples, 2, confidence, resamples, failed)
     fleet = _designed(scene, vary, seed, samplings.Morris(levels), samples)
@@ -111,7 +157,22 @@ def morris(
 def morris_of(
     fleet: Ensemble, outputs: Outputs, *, confidence: float = 0.95, resamples: int = 100, failed: str = "refuse"
 ) -> MorrisEffects:
-    """The same from the outputs of an ensemble with Morris' design that was run already."""
+    """Compute elementary effects from outputs that are already there.
+
+    Args:
+        fleet: the ensemble that was run, with Morris' design.
+        outputs: its quantities of interest.
+        confidence: level of the bootstrap's intervals, between 0 and 1. Default 0.95.
+        resamples: number of the bootstrap's resamples. Default 100.
+        failed: "refuse" or "drop", as of `morris`. Default "refuse".
+
+    Returns:
+        The elementary effects, as of `morris`.
+
+    Raises:
+        FailedMembers: where members failed and the effects cannot be computed from the others.
+        ImportError: without SALib.
+    """
     analyze = _salib("morris")
     design, space = fleet.sampling, fleet.space
     assert isinstance(design, samplings.Morris)
@@ -119,32 +180,34 @@ def morris_of(
     kept = _good_rows(outputs, group, failed)
     Y, messages = _whole_groups(outputs, group, failed)
     X = design.design(space, np.arange(fleet.members))[kept]
-    # A step moves the level by another part of the cube than SALib's number: p / 2 of its p parts.
+    # A step moves the level by p / 2 of the cube's p parts, where SALib divides by another length.
     scale = design.levels / (design.levels - 1.0)
     factors = tuple(label for label, _ in space.factors)
-    found = {name: np.full((Y.shape[1], len(factors)), np.nan) for name in ("mu", "mu_star", "sigma", "mu_star_conf")}
+    estimates = {
+        name: np.full((Y.shape[1], len(factors)), np.nan) for name in ("mu", "mu_star", "sigma", "mu_star_conf")
+    }
     for q in _varying(Y, outputs.labels, messages):
         S = analyze(samplings.salib_problem(space), X, Y[:, q].copy(), num_resamples=resamples, conf_level=confidence,
                     num_levels=design.levels, seed=fleet.seed)  # fmt: skip
         order = [list(S["names"]).index(label) for label, _ in space.factors]
-        for name, values in found.items():
+        for name, values in estimates.items():
             values[q] = np.ma.filled(np.ma.masked_invalid(np.ma.array(S[name], dtype=float)), np.nan)[order] * scale
     for number, (_, columns) in enumerate(space.factors):
         if len(columns) > 1:  # a step moves several numbers, and has no sense of its own
-            found["mu"][:, number] = found["sigma"][:, number] = np.nan
+            estimates["mu"][:, number] = estimates["sigma"][:, number] = np.nan
     return MorrisEffects(
         **_common(factors, outputs, Y, group, confidence, messages),
-        mu_star=found["mu_star"],
-        mu_star_confidence=found["mu_star_conf"],
-        mu=found["mu"],
-        sigma=found["sigma"],
+        mu_star=estimates["mu_star"],
+        mu_star_confidence=estimates["mu_star_conf"],
+        mu=estimates["mu"],
+        sigma=estimates["sigma"],
     )
 
 
 def _common(
     factors: tuple[str, ...], outputs: Outputs, Y: np.ndarray, group: int, confidence: float, messages: list[str]
 ) -> dict[str, Any]:
-    """What every analysis has."""
+    """Collect the fields that every analysis has."""
     return {
         "factors": factors,
         "quantities": outputs.labels,
@@ -172,12 +235,12 @@ def _check(samples: Any, least: int, confidence: Any, resamples: Any, failed: An
 
 
 def _designed(scene: Any, vary: Any, seed: int | None, design: samplings.Sampling, samples: int) -> Ensemble:
-    """The ensemble of a design with so many groups."""
+    """Build the ensemble of a design with this number of groups."""
     if isinstance(scene, Ensemble):
         scene, known, known_seed = scene.scene, scene.vary, scene.seed
     elif isinstance(scene, Scene):
-        own = scene.ensemble_settings or EnsembleSettings()
-        known, known_seed = dict(own.vary), own.seed
+        settings = scene.ensemble_settings or EnsembleSettings()
+        known, known_seed = dict(settings.vary), settings.seed
     else:
         raise SceneError([f"scene = {scene!r}: is neither a Scene nor an Ensemble; give lw.Scene(...)"])
     chosen = (known if vary is None else vary, known_seed if seed is None else seed)
@@ -195,7 +258,7 @@ def _salib(name: str) -> Callable[..., Any]:
 
 
 def _good_rows(outputs: Outputs, group: int, failed: str) -> np.ndarray:
-    """(n,), the members of groups without a failure."""
+    """Mask (n,) of the members whose group has no failure."""
     if outputs.failed.any() and failed == "refuse":
         remedy = 'mend what fails (see result.status of lw.solve), or use the whole groups alone: failed="drop"'
         raise FailedMembers([outputs.text(remedy)])
@@ -208,12 +271,12 @@ def _good_rows(outputs: Outputs, group: int, failed: str) -> np.ndarray:
 
 
 def _whole_groups(outputs: Outputs, group: int, failed: str) -> tuple[np.ndarray, list[str]]:
-    """The quantities of groups without a failure, and what is to be said about the others."""
+    """Select the quantities of groups without a failure; write messages about the other groups."""
     kept = _good_rows(outputs, group, failed)
     messages = []
     if not kept.all():
-        left = int((~kept).sum()) // group
-        messages.append(outputs.text(f"the {left} of {len(kept) // group} groups that they are in were left out, and "
+        dropped = int((~kept).sum()) // group
+        messages.append(outputs.text(f"the {dropped} of {len(kept) // group} groups that they are in were left out, and "
                                      "what remains may not be typical"))  # fmt: skip
     stopped = sum(number for name, number in outputs.counts.items() if name.upper() in Status.__members__
                   and Status[name.upper()].stopped)  # fmt: skip
@@ -223,7 +286,7 @@ def _whole_groups(outputs: Outputs, group: int, failed: str) -> tuple[np.ndarray
 
 
 def _varying(Y: np.ndarray, labels: Sequence[str], messages: list[str]) -> list[int]:
-    """Quantities that vary; notes those that do not."""
+    """List the quantities that vary; write messages about those that do not."""
     constant = np.ptp(Y, axis=0) <= CONSTANT * np.abs(Y).max(axis=0)
     messages += [f"{labels[int(q)]} does not vary: it has no indices" for q in np.flatnonzero(constant)]
     return [int(q) for q in np.flatnonzero(~constant)]

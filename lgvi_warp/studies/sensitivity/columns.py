@@ -15,26 +15,49 @@ from lgvi_warp.scene.variations import MATRICES, Target, Variation, targets
 
 
 def names_of(faults: Faults, vary: Any) -> tuple[str, ...]:
-    """The names alone, as they are spelled everywhere; notes what is no list of names, and what is named twice."""
-    given = [vary] if isinstance(vary, str) else vary
-    if not isinstance(given, Sequence) or not given or not all(isinstance(name, str) for name in given):
+    """Check and normalise a list of names without distributions.
+
+    Args:
+        faults: takes what is no list of names, and names that occur twice.
+        vary: a name or a list of names.
+
+    Returns:
+        The names in their usual spelling; none after a fault.
+    """
+    listed = [vary] if isinstance(vary, str) else vary
+    if not isinstance(listed, Sequence) or not listed or not all(isinstance(name, str) for name in listed):
         remedy = 'give {"vehicle.mass": lw.Normal(...)} or a list of names, ["vehicle.mass", "start.position[2]"]'
-        faults.add("vary", vary, "is no list of names, and maps none to distributions", remedy)
+        faults.add("vary", vary, "is neither a list of names nor a mapping of names to distributions", remedy)
         return ()
-    names = tuple(", ".join(target.label for target in targets(name)) for name in given)
+    names = tuple(", ".join(target.label for target in targets(name)) for name in listed)
     for name in sorted({name for name in names if names.count(name) > 1}):
         faults.add("vary", name, "is named twice", "name each number once")
     return names
 
 
 def as_given(fleet: Ensemble) -> list[Variation]:
-    """What varies, in the order of `vary`."""
-    by_key = {one.key: one for one in fleet._variations}
+    """List what varies in the order of `vary`.
+
+    Args:
+        fleet: the ensemble.
+
+    Returns:
+        Its variations.
+    """
+    by_key = {variation.key: variation for variation in fleet._variations}
     return [by_key[key] for key in fleet.vary]
 
 
 def columns_of(space: Space, key: str) -> range:
-    """The columns of the cube that a key has."""
+    """Find the columns of the cube that belong to a key.
+
+    Args:
+        space: the cube of an ensemble.
+        key: of a variation.
+
+    Returns:
+        Range of its columns.
+    """
     place = space.keys.index(key)
     first = sum(space.sizes[:place])
     return range(first, first + space.sizes[place])
@@ -43,15 +66,18 @@ def columns_of(space: Space, key: str) -> range:
 def whole_columns(
     faults: Faults, names: Sequence[str], scene: Mapping[str, np.ndarray], given: Mapping[str, Any]
 ) -> dict[str, np.ndarray]:
-    """name -> (n,) of each of the names; nothing after noting a fault.
+    """Select one column for each name from data given by label.
 
     Args:
         faults: takes labels that are missing, unknown or doubled, and columns that are no numbers.
         names: of the model's columns, such as "current.velocity[0]".
         scene: the scene's numbers by name.
         given: label -> (n,), or (n, *shape) of a whole number that the names hold the entries of.
+
+    Returns:
+        Name -> column (n,); empty after a fault.
     """
-    found: dict[str, np.ndarray] = {}
+    columns: dict[str, np.ndarray] = {}
     labels: list[str] = []
     for key, column in given.items():
         label = ", ".join(target.label for target in targets(key)) if key not in names else key
@@ -63,44 +89,54 @@ def whole_columns(
         elif entries and label not in names:
             parts = _entries(faults, key, array, entries, scene[label])
             labels += entries
-            found |= parts
+            columns |= parts
         else:
             labels.append(label)
-            found[label] = array
-    doubled = {label for label in labels if labels.count(label) > 1}
-    for label in sorted(doubled):
+            columns[label] = array
+    doubled_labels = {label for label in labels if labels.count(label) > 1}
+    for label in sorted(doubled_labels):
         faults.add(f'X["{label}"]', "...", "is given twice", "keep one of them")
     good = match(faults, "X", list(dict.fromkeys(labels)), names)
-    return found if good and not faults else {}
+    return columns if good and not faults else {}
 
 
 def _entries(
     faults: Faults, key: str, array: np.ndarray, entries: Mapping[str, Target], whole: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """name -> (n,) of the entries that a whole number's array (n, *shape) holds."""
+    """Select the entries (n,) that vary from the array (n, *shape) of a whole number, by name."""
     if array.shape[1:] != whole.shape or array.ndim == 0:
         shape = ", ".join(map(str, whole.shape))
         faults.add(f'X["{key}"]', "...", f"has shape {array.shape}", f"give an array of shape (n, {shape})")
         return {}
     fixed = np.ones(whole.shape, dtype=bool)
-    found = {}
+    entry_columns = {}
     for name, target in entries.items():
         index = target.index or ()
         fixed[index] = False
         if target.name in MATRICES:
             fixed[index[::-1]] = False
         place: tuple[Any, ...] = (slice(None), *index)
-        found[name] = array[place]
+        entry_columns[name] = array[place]
     if key in MATRICES and not np.array_equal(array, np.swapaxes(array, 1, 2)):
         faults.add(f'X["{key}"]', "...", "holds a matrix that is not symmetric", "give symmetric matrices")
     elif np.any(array[:, fixed] != whole[fixed]):
         odd = ", ".join(f"{key}{list(map(int, index))}" for index in np.argwhere(fixed)[:4])
         faults.add(f'X["{key}"]', "...", "changes entries that do not vary", f"keep the scene's {odd}, or vary them")
-    return found
+    return entry_columns
 
 
 def stacked(faults: Faults, key: str, names: Sequence[str], columns: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    """(n, d), the columns side by side in the order of the names; None after noting columns of other lengths."""
+    """Put the columns side by side in the order of the names.
+
+    Args:
+        faults: takes columns of different lengths.
+        key: name of the argument in the message.
+        names: of the columns.
+        columns: name -> column (n,).
+
+    Returns:
+        Array (n, d); None after a fault.
+    """
     shapes = {name: columns[name].shape for name in names}
     if all(len(shape) == 1 for shape in shapes.values()) and len(set(shapes.values())) == 1:
         return np.column_stack([columns[name] for name in names])

@@ -1,4 +1,4 @@
-"""What a sensitivity analysis found: tables, files."""
+"""Results of a sensitivity analysis, as tables and files."""
 
 from __future__ import annotations
 
@@ -16,11 +16,19 @@ from lgvi_warp.common.tables import write_csv
 
 @dataclass(frozen=True, eq=False)
 class Indices:
-    """What an analysis found. factors (d,): what varies by itself; quantities (m,): what was looked at.
+    """Result of a sensitivity analysis of m quantities for d factors.
 
-    mean, std (m,): of the quantities over the design. samples: groups or paths of the design that were used. members: that
-    were run; failed: of these. confidence: level of the intervals, whose half widths are named ..._confidence.
-    messages: what the user should know.
+    Attributes:
+        factors: what varies independently (d,).
+        quantities: labels of the quantities of interest (m,).
+        mean: mean of the quantities over the design (m,) [their units].
+        std: standard deviation of the quantities over the design (m,) [their units].
+        samples: number of groups or paths of the design that were used.
+        members: number of members that were run.
+        failed: number of members that failed.
+        confidence: level of the intervals; fields named ..._confidence hold their half widths.
+        messages: notes for the user.
+        provenance: scene, settings, versions and machine of the runs.
     """
 
     factors: tuple[str, ...]
@@ -35,11 +43,15 @@ class Indices:
     provenance: dict[str, Any] = field(repr=False)
     name: ClassVar[str] = ""
     columns: ClassVar[tuple[str, ...]] = ()
-    # What of the columns has an interval.
+    # Column -> field with the half width of its interval.
     intervals: ClassVar[dict[str, str]] = {}
 
     def rows(self) -> Iterator[dict[str, Any]]:
-        """One for each quantity, factor and index: quantity, factor, other, index, value, confidence."""
+        """List one record for each quantity, factor and index.
+
+        Yields:
+            Records of quantity, factor, other, index, value and confidence.
+        """
         for q, quantity in enumerate(self.quantities):
             for f, factor in enumerate(self.factors):
                 for column in self.columns:
@@ -53,7 +65,7 @@ class Indices:
 
     def __str__(self) -> str:
         """A table for each quantity."""
-        width = max(len(one) for one in (*self.factors, "factor"))
+        width = max(len(label) for label in (*self.factors, "factor"))
         lines = [self._heading(), *(f"note: {message}" for message in self.messages)]
         for q, quantity in enumerate(self.quantities):
             lines += ["", f"{quantity}: mean {self.mean[q]:.6g}, standard deviation {self.std[q]:.3g}"]
@@ -76,7 +88,11 @@ class Indices:
         return []
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything, as JSON holds it: None for what is not a number."""
+        """Convert the result to plain types for JSON.
+
+        Returns:
+            All fields and rows; numbers that are not finite are None.
+        """
         names = ("name", "factors", "quantities", "samples", "members", "failed", "confidence", "messages")
         numbers = {name: _plain(getattr(self, name)) for name in ("mean", "std")}
         return {name: _plain(getattr(self, name)) for name in names} | numbers | {
@@ -84,7 +100,17 @@ class Indices:
         }  # fmt: skip
 
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write sensitivity.txt, .csv and .json into a folder. Returns their paths. Raises OSError."""
+        """Write sensitivity.txt, .csv and .json into a folder, which is made if needed.
+
+        Args:
+            folder: of the three files.
+
+        Returns:
+            Paths of the three files.
+
+        Raises:
+            OSError: where they cannot be written.
+        """
         target = Path(folder)
         target.mkdir(parents=True, exist_ok=True)
         paths = [target / f"sensitivity.{ending}" for ending in ("txt", "csv", "json")]
@@ -96,7 +122,7 @@ class Indices:
 
 def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray | list | tuple):
-        return [_plain(one) for one in value]
+        return [_plain(item) for item in value]
     if isinstance(value, float | np.floating):
         return float(value) if np.isfinite(value) else None
     return value
@@ -104,10 +130,18 @@ def _plain(value: Any) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class SobolIndices(Indices):
-    """Parts of a quantity's variance. first, total (m, d): by a factor alone, and with all that it takes part in.
+    """Parts of the variance of each quantity.
 
-    second (m, d, d): by two together, beyond what each does alone; symmetric, NaN on the diagonal; None if not asked for.
-    ..._confidence: half the interval. All of a quantity that does not vary are NaN, and a message says so.
+    All indices of a quantity that does not vary are NaN, and a message says so.
+
+    Attributes:
+        first: part due to each factor alone (m, d) [1].
+        first_confidence: half width of its interval (m, d).
+        total: part due to each factor with all its interactions (m, d) [1].
+        total_confidence: half width of its interval (m, d).
+        second: part due to two factors together, beyond what each does alone (m, d, d) [1]; symmetric, NaN on the diagonal;
+            None if not asked for.
+        second_confidence: half width of its interval (m, d, d), or None.
     """
 
     first: np.ndarray
@@ -121,7 +155,7 @@ class SobolIndices(Indices):
     intervals: ClassVar[dict[str, str]] = {"first": "first_confidence", "total": "total_confidence"}
 
     def rows(self) -> Iterator[dict[str, Any]]:
-        """As of every analysis, and those of two factors together."""
+        """List the records of every analysis, then those of two factors together."""
         yield from super().rows()
         for q, j, k in self._pairs():
             assert self.second is not None and self.second_confidence is not None
@@ -133,11 +167,11 @@ class SobolIndices(Indices):
         return [(q, j, k) for q in range(len(self.quantities)) for j in range(d) for k in range(j + 1, d)]
 
     def _more(self, q: int) -> list[str]:
-        """The pairs that matter most."""
+        """List the pairs with the largest second-order indices."""
         if self.second is None or self.second_confidence is None:
             return []
         pairs = [(self.second[q, j, k], self.second_confidence[q, j, k], j, k) for p, j, k in self._pairs() if p == q]
-        pairs = sorted((one for one in pairs if one[0] > one[1]), reverse=True)[:10]
+        pairs = sorted((pair for pair in pairs if pair[0] > pair[1]), reverse=True)[:10]
         return [
             f"  {self.factors[j]} with {self.factors[k]}: second {value:.4g} +- {half:.2g}"
             for value, half, j, k in pairs
@@ -146,9 +180,15 @@ class SobolIndices(Indices):
 
 @dataclass(frozen=True, eq=False)
 class MorrisEffects(Indices):
-    """Elementary effects on a quantity, in its units, per whole side of the unit cube. mu_star (m, d): mean of their sizes;
-    mu: mean; sigma: standard deviation, large where a factor acts differently from place to place. mu and sigma of a factor
-    of several numbers, such as an attitude, are NaN: a step moves all of them.
+    """Elementary effects on each quantity, per whole side of the unit cube.
+
+    mu and sigma of a factor of several numbers, such as an attitude, are NaN: a step moves all of them.
+
+    Attributes:
+        mu_star: mean of their absolute values (m, d) [the quantity's unit].
+        mu_star_confidence: half width of its interval (m, d).
+        mu: mean (m, d) [the quantity's unit].
+        sigma: standard deviation (m, d) [the quantity's unit]; large where a factor acts differently from place to place.
     """
 
     mu_star: np.ndarray

@@ -1,1 +1,1 @@
-"""To be said in one sentence."""
+"""Maps of where each method is accurate, bounded or unstable, over two parameters."""

@@ -1,4 +1,4 @@
-"""The members of a stability map: what varies along its two axes, and every cell's state and parameters."""
+"""The members of a stability map: what varies along its two axes, and the state and parameters of every cell."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.stability import limits as stability_limits
 
-# What an axis may be besides a parameter of the scene -> its unit and its label.
+# Names of axes that are no parameters of the scene -> unit and label.
 SPECIAL = {
     "h": ("s", "step h"),
     "angular_velocity": ("rad/s", "|angular velocity|"),
@@ -26,19 +26,24 @@ SPECIAL = {
     "drag_number": ("1/s", "largest drag rate (l + 2 q |v|) / I"),
 }
 ALIASES = {"start.angular_velocity": "angular_velocity", "start.velocity": "speed", "omega": "angular_velocity"}
-# Starts of all cells: some gigabytes.
+# Largest number of starts of all cells: some gigabytes.
 MOST_MEMBERS = 10_000_000
 FORM = '"NAME", "NAME=LOW:HIGH" or "NAME=LOW:HIGH:linear", with ":scale" or ":set" at the end for parameters'
 
 
 @dataclass(frozen=True)
 class Axis:
-    """What varies along an axis of a map: a name, from low to high, in equal factors (log) or equal steps.
+    """What varies along an axis of a map, from a low to a high value.
 
-    name: "h" [s], "angular_velocity" [rad/s] and "speed" [m/s] (size of the start's, direction kept), "added_mass_ratio"
-    (largest added mass over the mass), "drag_number" (largest (l + 2 q |v|) / I of the start [1/s]; times h it is the drag
-    number), or a name of scene.parameters(). low, high: None for a range that fits the scene. scaled: whether a parameter is
-    multiplied by the value, or set to it; None: numbers are set, vectors and matrices multiplied.
+    Attributes:
+        name: "h" [s]; "angular_velocity" [rad/s] or "speed" [m/s]: size of the start's, direction kept;
+            "added_mass_ratio": largest added mass over the mass [1]; "drag_number": largest (l + 2 q |v|) / I of the start
+            [1/s], which times h is the drag number; or a name of scene.parameters().
+        low: lowest value; None for one that fits the scene.
+        high: highest value; None for one that fits the scene.
+        log: whether values rise by equal factors, else by equal steps. Default True.
+        scaled: whether a parameter is multiplied by the value, or set to it. Default None: numbers are set, vectors and
+            matrices multiplied.
     """
 
     name: str
@@ -49,7 +54,17 @@ class Axis:
 
     @classmethod
     def parse(cls, text: str) -> Axis:
-        """From "h", "h=0.01:3", "vehicle.mass=50:500:linear", "vehicle.inertia=0.1:10:log:scale". Raises SceneError."""
+        """Read an axis from a text.
+
+        Args:
+            text: such as "h", "h=0.01:3", "vehicle.mass=50:500:linear" or "vehicle.inertia=0.1:10:log:scale".
+
+        Returns:
+            The axis.
+
+        Raises:
+            SceneError: where the text has another form.
+        """
         name, equals, rest = str(text).partition("=")
         faults, words = Faults(), rest.split(":") if equals else []
         low, high, log, scaled = None, None, True, None
@@ -70,18 +85,33 @@ class Axis:
 
     @property
     def key(self) -> str:
-        """The name, without aliases."""
+        """Name of the axis with aliases replaced."""
         return ALIASES.get(self.name, self.name)
 
     def values(self, points: int) -> np.ndarray:
-        """The values (points,) from low to high."""
+        """Compute the values along the axis, whose range must be known.
+
+        Args:
+            points: number of values.
+
+        Returns:
+            Values from low to high (points,), in the unit of the axis.
+        """
         assert self.low is not None and self.high is not None
         return np.geomspace(self.low, self.high, points) if self.log else np.linspace(self.low, self.high, points)
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """An axis of a finished map: its name, label, unit, whether it is drawn in equal factors, and its values (k,)."""
+    """Axis of a finished map.
+
+    Attributes:
+        name: its name, without aliases.
+        label: text for a figure.
+        unit: unit of the values.
+        log: whether it is drawn in equal factors.
+        values: the values (k,) [unit].
+    """
 
     name: str
     label: str
@@ -90,17 +120,38 @@ class Line:
     values: np.ndarray
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON holds it."""
+        """Convert the axis to plain types for JSON.
+
+        Returns:
+            All fields; values as a list.
+        """
         return vars(self) | {"values": self.values.tolist()}
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> Line:
-        """From what `to_dict` gave."""
+        """Build an axis from the content of a JSON file.
+
+        Args:
+            content: as `to_dict` returns it.
+
+        Returns:
+            The axis.
+        """
         return cls(**content | {"values": np.asarray(content["values"], dtype=np.float64)})
 
 
 def axis_of(given: Any) -> Axis:
-    """An Axis from one, a text, or (name, low, high). Raises SceneError."""
+    """Convert a user's description to an Axis.
+
+    Args:
+        given: an Axis, a text for Axis.parse, or (name, low, high).
+
+    Returns:
+        The axis.
+
+    Raises:
+        SceneError: for a text that is no axis.
+    """
     if isinstance(given, Axis):
         return given
     if isinstance(given, tuple | list) and len(given) == 3:
@@ -109,10 +160,35 @@ def axis_of(given: Any) -> Axis:
 
 
 class Grid:
-    """Every cell of a map of two axes, with some directions of velocity and spin in each.
+    """Every cell of a map of two axes, with several starts in each.
 
-    Members are numbered (y, x, direction), the last fastest. The first direction is the scene's own start, the others are
-    random, from the seed. What the scene's ensemble varies is left out. Raises SceneError naming every fault.
+    Members are numbered (y, x, direction), the last fastest. The first direction is the scene's own start; the others are
+    turned at random. What the scene's ensemble varies is left out.
+
+    Args:
+        scene: the scene.
+        x: horizontal axis, in any form that `axis_of` takes.
+        y: vertical axis, likewise.
+        points: number of cells (nx, ny).
+        directions: number of starts of each cell.
+        seed: of the random turns.
+        h: the step, where it is on no axis [s]; None for run.step of the scene.
+
+    Attributes:
+        scene: the scene without its ensemble.
+        base: the scene's start as one member.
+        rate: fastest motion at the scene's start [rad/s].
+        x: horizontal axis, with its range.
+        y: vertical axis, with its range.
+        step: the step where it is on no axis [s].
+        shape: (ny, nx, directions).
+        state: position, attitude, velocity and angular velocity of every member, with leading dimension n.
+        varied: name -> values of the parameters that differ between members, with leading dimension n.
+        direction: name -> unit vectors (n, 3) of velocity and angular velocity, body axes.
+        h: step of every member (n,) [s].
+
+    Raises:
+        SceneError: for faulty arguments, all in one message.
     """
 
     def __init__(
@@ -120,20 +196,20 @@ class Grid:
     ):
         faults = Faults()
         axes = []
-        for given in (x, y):
+        for description in (x, y):
             with faults.including():
-                axes.append(axis_of(given))
+                axes.append(axis_of(description))
         for name, value, least in (("points", points, 1), ("directions", (directions,), 1)):
             if any(isinstance(k, bool) or not isinstance(k, int) or k < least for k in value):
                 faults.add(name, value, "is not a whole number above 0", "give how many")
         if not faults and (members := points[0] * points[1] * directions) > MOST_MEMBERS:
-            what = f"make {members:,} members, more than {MOST_MEMBERS:,}"
-            faults.add("points", points, what, "give fewer points or directions")
+            problem = f"make {members:,} members, more than {MOST_MEMBERS:,}"
+            faults.add("points", points, problem, "give fewer points or directions")
         faults.raise_if_any()
-        self.scene = _prepared(scene, [one.key for one in axes])
+        self.scene = _prepared(scene, [axis.key for axis in axes])
         self.base = Ensemble(self.scene, 1).select(0, 1)
         self.rate = self._rate()
-        self.x, self.y = (self._ranged(faults, one) for one in axes)
+        self.x, self.y = (self._ranged(faults, axis) for axis in axes)
         if self.x.key == self.y.key:
             faults.add("x, y", self.x.name, "is on both axes", "give two different names")
         self.step = self.scene.run.step if h is None else faults.positive("h", h)
@@ -147,14 +223,14 @@ class Grid:
     def _rate(self) -> float:
         """The fastest of spin, Munk and restoring oscillation at the scene's start [rad/s]; 1 if all rest."""
         m = self.base
-        found = stability_limits.rates(m.parameters, m.velocity, m.angular_velocity)
-        return float(max(found[name][0] for name in ("rotation", "munk", "restoring"))) or 1.0
+        rates = stability_limits.rates(m.parameters, m.velocity, m.angular_velocity)
+        return float(max(rates[name][0] for name in ("rotation", "munk", "restoring"))) or 1.0
 
     def _ranged(self, faults: Faults, axis: Axis) -> Axis:
-        """With a range; notes what is wrong with it."""
+        """Complete the range of an axis; add to the faults what is wrong with it."""
         known = [*SPECIAL, *self.base.parameters]
         if axis.key not in known:
-            faults.add("axis", axis.name, "is no name of the scene's", closest(axis.name, known))
+            faults.add("axis", axis.name, "is not a parameter of the scene", closest(axis.name, known))
             return axis
         low, high = self._default(axis)
         low, high = low if axis.low is None else axis.low, high if axis.high is None else axis.high
@@ -181,7 +257,7 @@ class Grid:
         return replace(axis, low=float(low), high=float(high))
 
     def _default(self, axis: Axis) -> tuple[Any, Any]:
-        """A range that fits the scene."""
+        """Choose a range of an axis that fits the scene."""
         w, m = self.rate, self.base
         speed = float(np.linalg.norm(m.velocity)) or 1.0
         known = {
@@ -199,13 +275,28 @@ class Grid:
         return (0.1 * value, 10.0 * value) if value > 0.0 else (None, None)
 
     def scaled(self, axis: Axis) -> bool:
-        """Whether a parameter is multiplied by the axis' values."""
+        """Tell whether a parameter is multiplied by the values of an axis.
+
+        Args:
+            axis: one of the map's.
+
+        Returns:
+            True if it is multiplied, False if it is set or no parameter.
+        """
         if axis.key in SPECIAL:
             return False
         return bool(self.base.parameters[axis.key][0].ndim) if axis.scaled is None else axis.scaled
 
     def line(self, axis: Axis, values: np.ndarray) -> Line:
-        """The axis as a finished map has it."""
+        """Describe an axis as a finished map has it.
+
+        Args:
+            axis: one of the map's.
+            values: its values (k,).
+
+        Returns:
+            The axis with label, unit and values.
+        """
         if axis.key in SPECIAL:
             unit, label = SPECIAL[axis.key]
         elif self.scaled(axis):
@@ -220,13 +311,13 @@ class Grid:
             return vehicle.UNITS.get(name, "")
         if section == "environment":
             return {"gravity": "m/s2", "water_density": "kg/m3"}[name]
-        terms = (one for one in (*self.scene.terms, *self.scene.events) if one.key == section)
-        units = {one.name: str(one.metadata["unit"]) for term in terms for one in term.quantities()}
+        terms = (term for term in (*self.scene.terms, *self.scene.events) if term.key == section)
+        units = {field.name: str(field.metadata["unit"]) for term in terms for field in term.quantities()}
         return units.get(name, "")
 
     @property
     def lines(self) -> tuple[Line, Line]:
-        """x and y."""
+        """Both axes of the finished map, x and y."""
         return self.line(self.x, self._values[1]), self.line(self.y, self._values[0])
 
     def _drag_rate(self) -> np.ndarray:
@@ -234,22 +325,22 @@ class Grid:
         return stability_limits.drag_rate(m.parameters, vehicle.inertia6(m.parameters), m.velocity, m.angular_velocity)
 
     def _build(self, rng: np.random.Generator) -> None:
-        """State and parameters of every member."""
+        """Compute the state, the step and the parameters of every member."""
         n, d = math.prod(self.shape), self.shape[2]
         self.state = {name: np.repeat(getattr(self.base, name), n, axis=0) for name in STATES}
         self.varied: dict[str, np.ndarray] = {}
         self.direction: dict[str, np.ndarray] = {}
         for name in ("velocity", "angular_velocity"):
-            own = getattr(self.base, name)[0]
-            size = np.linalg.norm(own)
-            # What rests has a direction as well, of none of the body's axes, for an axis that sets its size.
-            unit = own / size if size > 0.0 else np.full(3, 3.0**-0.5)
+            start = getattr(self.base, name)[0]
+            size = np.linalg.norm(start)
+            # A vector of zero length gets a direction off the body's axes, for an axis that sets its size.
+            unit = start / size if size > 0.0 else np.full(3, 3.0**-0.5)
             turns = notation.matrix_from_rotation_vector(_rotations(rng, d))
             self.direction[name] = np.tile(turns @ unit, (n // d, 1))
             self.state[name] = size * self.direction[name]
         self.h = np.full(n, self.step or 0.0)
         cells = np.meshgrid(*self._values, np.zeros(d), indexing="ij")
-        # Masses first: drag rates and the like are of the vehicle that is then there.
+        # Masses first: drag rates depend on them.
         for axis, values in sorted(
             zip((self.y, self.x), cells[:2], strict=True), key=lambda pair: pair[0].key in SPECIAL
         ):
@@ -266,9 +357,9 @@ class Grid:
             self._apply_added_mass(values)
         elif key == "drag_number":
             rate = self._drag_rate()
-            for one in stability_limits.drag_keys(self.base.parameters):
+            for term in stability_limits.drag_keys(self.base.parameters):
                 for kind in ("linear", "quadratic"):
-                    self._scale(f"{one}.{kind}", values / rate)
+                    self._scale(f"{term}.{kind}", values / rate)
         elif self.scaled(axis):
             self._scale(key, values)
         else:
@@ -287,34 +378,59 @@ class Grid:
         if largest[0] > 0.0:
             self._scale(key, values * mass / largest)
         else:
-            # A vehicle without added mass gets that of a long body: none ahead.
+            # A vehicle without added mass gets that of a slender body: none along x.
             size = 6 if full else 3
             self.varied[key] = (values * mass)[:, None, None] * np.diag(([0.0, 1.0, 1.0, 0.0, 0.0, 0.0])[:size])
 
     def parameters(self, members: np.ndarray) -> dict[str, np.ndarray]:
-        """All parameters of some members, shared ones with a leading dimension of 1."""
+        """Collect all parameters of some members.
+
+        Args:
+            members: their indices (k,).
+
+        Returns:
+            Name -> values with leading dimension k, or 1 where members share them [the scene's units].
+        """
         return {name: self.varied[name][members] if name in self.varied else value
                 for name, value in self.base.parameters.items()}  # fmt: skip
 
     def fleet(self, members: np.ndarray) -> Ensemble:
-        """Some members as an ensemble. Raises SceneError for unphysical values."""
+        """Build an ensemble of some members.
+
+        Args:
+            members: their indices (k,).
+
+        Returns:
+            The ensemble, of explicit states.
+
+        Raises:
+            SceneError: for unphysical values.
+        """
         b, R, nu, Om = (self.state[name][members] for name in STATES)
         varied = {name: value[members] for name, value in self.varied.items()}
         return Ensemble.from_states(self.scene, b, R, nu, Om, varied)
 
     def rates(self) -> dict[str, np.ndarray]:
-        """How fast every member moves at its start, by kind (see stability_limits.rates)."""
+        """Compute how fast every member moves at its start.
+
+        Returns:
+            Names of studies.stability.limits.LIMITS -> rate (n,) [rad/s or 1/s].
+        """
         every = np.arange(len(self.h))
         return stability_limits.rates(self.parameters(every), self.state["velocity"], self.state["angular_velocity"])
 
     def columns(self) -> list[tuple[float, np.ndarray]]:
-        """(h, members) of every step that occurs."""
-        steps, which = np.unique(self.h, return_inverse=True)
-        return [(float(h), np.flatnonzero(which == i)) for i, h in enumerate(steps)]
+        """Group the members by their step.
+
+        Returns:
+            (h [s], indices of the members that take it) of each step, the shortest first.
+        """
+        steps, step_index = np.unique(self.h, return_inverse=True)
+        return [(float(h), np.flatnonzero(step_index == i)) for i, h in enumerate(steps)]
 
 
 def _rotations(rng: np.random.Generator, n: int) -> np.ndarray:
-    """Rotation vectors (n, 3), the first of them none, the others of random turns."""
+    """Draw rotation vectors (n, 3) [rad] of uniformly random attitudes; the first is zero."""
     q = rng.normal(size=(n, 4))
     q /= np.linalg.norm(q, axis=1, keepdims=True)
     angle = 2.0 * np.arctan2(np.linalg.norm(q[:, 1:], axis=1), q[:, 0])
@@ -324,7 +440,7 @@ def _rotations(rng: np.random.Generator, n: int) -> np.ndarray:
 
 
 def _prepared(scene: Scene, names: Sequence[str]) -> Scene:
-    """The scene without its ensemble, and with drag on every axis where the map varies drag that it has not."""
+    """Copy the scene without its ensemble; add drag on every axis where the map varies drag and there is none."""
     terms = list(scene.terms)
     plain = Scene.parameters(scene)
     if "drag_number" in names and not stability_limits.drag_keys({key: value[None] for key, value in plain.items()}):

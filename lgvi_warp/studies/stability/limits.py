@@ -16,21 +16,21 @@ from lgvi_warp.methods.method import FORCED, Method
 from lgvi_warp.methods.tableaux import Tableau
 from lgvi_warp.physics import inertia, vehicle
 
-# A step that makes a small motion grow by less than this passes for stable: tenfold in 4000 steps.
+# A step counts as stable where a small motion grows by less than this: tenfold in 4000 steps.
 GROWTH = math.log(10.0) / 4000.0
-# What the iteration for the forces of Phi* can: a contraction that reaches its tolerance in 60 rounds.
+# Slowest contraction with which the iteration for the forces of Phi* reaches its tolerance in 60 rounds.
 CONTRACTION = 1e-14 ** (1.0 / 60.0)
-# Numbers h w that are looked at.
+# Spacing and end of the numbers h w that are tried [rad].
 STEP, MOST = 1e-3, 30.0
-# Letters of programs: which sub-map turns the body, and which gives it moment, in each oscillation. Turns about the three
-# axes come one after another; only that about the oscillation's own axis, R1 or R3 (twice a step), counts.
+# Letters of programs: sub-maps that turn the body, and those that change its momentum in each oscillation. Turns about
+# the three axes follow one another; only that about the oscillation's own axis, R1 or R3 (twice a step), counts.
 TURNS = ("D", "W", "R1", "A")
 MOMENTS = {"munk": ("T", "Ap", "B"), "restoring": ("K", "B")}
 OSCILLATIONS = tuple(MOMENTS)
 
 
 def _oscillator(method: Method, moments: tuple[str, ...]) -> list[tuple[bool, float]]:
-    """Of one step, in turn: (whether the angle or the rate is advanced, over how many steps)."""
+    """List the moves of one step in turn: (whether the angle or the rate is advanced, over how many steps)."""
     if method.two_part:
         first = method.program[0][0]
         return [((first == "A") == (i % 2 == 0), g) for i, g in enumerate(method.stages)]
@@ -50,10 +50,17 @@ def _oscillator(method: Method, moments: tuple[str, ...]) -> list[tuple[bool, fl
 
 @functools.cache
 def oscillation_limit(name: str, kind: str = "munk") -> float:
-    """Largest h w at which a small oscillation of frequency w stays small: "munk" or "restoring".
+    """Compute the largest h w at which a small oscillation of frequency w stays small.
 
-    Of sub-maps, by the product of shears that a step is; of explicit methods, by the stability polynomial at i h w.
-    Infinite without a limit; NaN for gauss*, which end where their iteration does. Large amplitudes may tumble earlier.
+    For sub-maps it follows from the product of shears that a step is, for explicit methods from the stability polynomial
+    at i h w. Large amplitudes may tumble earlier.
+
+    Args:
+        name: of the method.
+        kind: "munk" or "restoring". Default "munk".
+
+    Returns:
+        The limit [rad]; infinite without one; NaN for gauss*, which end where their iteration does.
     """
     method, numbers = Method(name), np.arange(STEP, MOST, STEP)
     if method.gauss:
@@ -63,8 +70,8 @@ def oscillation_limit(name: str, kind: str = "munk") -> float:
     else:
         step = np.broadcast_to(np.eye(2), (len(numbers), 2, 2)).copy()
         for angle, c in _oscillator(method, MOMENTS[kind]):
-            row, other, sign = (0, 1, 1.0) if angle else (1, 0, -1.0)
-            step[:, row] += (sign * c * numbers)[:, None] * step[:, other]
+            row, source, sign = (0, 1, 1.0) if angle else (1, 0, -1.0)
+            step[:, row] += (sign * c * numbers)[:, None] * step[:, source]
         # Determinant 1: both eigenvalues lie on the unit circle up to a trace of 2.
         half = 0.5 * np.abs(step[:, 0, 0] + step[:, 1, 1])
         growth = half + np.sqrt(np.maximum(half**2 - 1.0, 0.0))
@@ -72,7 +79,15 @@ def oscillation_limit(name: str, kind: str = "munk") -> float:
 
 
 def stability_polynomial(tableau: Tableau, z: np.ndarray) -> np.ndarray:
-    """R(z) of an explicit method at the numbers z (n,): what a step makes of y' = (z/h) y."""
+    """Evaluate the stability polynomial R(z) of an explicit method: one step of y' = (z/h) y from y = 1.
+
+    Args:
+        tableau: of the method.
+        z: complex or real numbers (n,).
+
+    Returns:
+        R(z) (n,).
+    """
     s = len(tableau.b)
     slopes: list[np.ndarray] = []
     for i in range(s):
@@ -87,9 +102,15 @@ def _first(numbers: np.ndarray, growth: np.ndarray) -> float:
 
 @functools.cache
 def drag_limit(name: str) -> float:
-    """Largest h (l + 2 q |v|) / I: explicit drag grows beyond it. Infinite where drag is advanced exactly or implicitly.
+    """Compute the largest h (l + 2 q |v|) / I, beyond which explicit drag grows.
 
-    A composition is refused where a stage that goes backward would meet a drag number above .5.
+    A composition is refused where a stage that goes backward would meet a drag number above 0.5.
+
+    Args:
+        name: of the method.
+
+    Returns:
+        The limit [1]; infinite where drag is advanced exactly or implicitly.
     """
     method = Method(name)
     if method.tableau:
@@ -104,10 +125,16 @@ def drag_limit(name: str) -> float:
 
 @functools.cache
 def rotation_limit(name: str) -> float:
-    """Largest h |J^-1 pi|: of equation (24), where |J^-1 a| = 1; of turns about axes, where half an angle is 1; of rk*, where
-    the numbers of R would grow.
+    """Compute the largest h |J^-1 pi| of a method.
 
-    Infinite for methods on the rotation group; NaN for gauss*.
+    It is |J^-1 a| = 1 for equation (24), half an angle of 1 for turns about axes, and for rk* the step at which the
+    numbers of R grow.
+
+    Args:
+        name: of the method.
+
+    Returns:
+        The limit [rad]; infinite for Runge-Kutta methods on the rotation group; NaN for gauss*.
     """
     method = Method(name)
     if method.tableau:
@@ -118,9 +145,9 @@ def rotation_limit(name: str) -> float:
         # The modified rotation of a part ends at a quarter turn.
         first = method.program[0][0] == "A"
         return 0.5 * math.pi / max(abs(g) for g in method.stages[0 if first else 1 :: 2])
-    part = max(abs(c) for letter, c in method.program if letter in ("D", "W", "R1"))
+    share = max(abs(c) for letter, c in method.program if letter in ("D", "W", "R1"))
     longest = max(abs(g) for g in method.stages) * (2.0 if method.halved else 1.0)
-    return (2.0 if method.turns else 1.0) / (part * longest)
+    return (2.0 if method.turns else 1.0) / (share * longest)
 
 
 LIMITS: dict[str, Callable[[str], float]] = {
@@ -140,10 +167,17 @@ TEXTS = {
 def rates(
     parameters: Mapping[str, np.ndarray], velocity: np.ndarray, angular_velocity: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """How fast members move at their start: LIMITS' names -> (n,) [rad/s or 1/s].
+    """Compute how fast members move at their start.
 
-    parameters: names of the scene, leading dimension 1 or n; velocity (n, 3) [m/s] and angular_velocity (n, 3) [rad/s],
-    body axes. Mathematics, section 7: w_Munk^2 = |p|^2 (1/M_min - 1/M_max) / J_min, w_restoring^2 = B |r| / J_min.
+    Mathematics, section 7: w_Munk^2 = |p|^2 (1/M_min - 1/M_max) / J_min, w_restoring^2 = B |r| / J_min.
+
+    Args:
+        parameters: names of the scene -> values with leading dimension 1 or n.
+        velocity: of the members (n, 3) [m/s], body axes.
+        angular_velocity: of the members (n, 3) [rad/s], body axes.
+
+    Returns:
+        Names of LIMITS -> rate (n,) [rad/s; drag 1/s].
     """
     n = len(velocity)
     I6 = np.broadcast_to(vehicle.inertia6(parameters), (n, 6, 6))
@@ -155,18 +189,28 @@ def rates(
     moment = parameters["vehicle.buoyancy"] * np.linalg.norm(arm, axis=-1)
     # A difference of two equal masses is round-off.
     spread = np.where(most - least > 1e-12 * most, most - least, 0.0)
-    found = {
+    by_kind = {
         "rotation": np.linalg.norm(angular_velocity, axis=1),
         "munk": np.linalg.norm(p, axis=1) * np.sqrt(spread / J),
         "restoring": np.sqrt(moment / J) + np.zeros(n),
     }
-    return found | {"drag": drag_rate(parameters, I6, velocity, angular_velocity)}
+    return by_kind | {"drag": drag_rate(parameters, I6, velocity, angular_velocity)}
 
 
 def drag_rate(
     parameters: Mapping[str, np.ndarray], I6: np.ndarray, velocity: np.ndarray, angular_velocity: np.ndarray
 ) -> np.ndarray:
-    """Largest (l_ii + 2 q_ii |v_i|) / I_ii over the axes (n,) [1/s], of all drag terms; 0 without."""
+    """Compute the largest (l_ii + 2 q_ii |v_i|) / I_ii over the six axes, summed over all drag terms.
+
+    Args:
+        parameters: names of the scene -> values with leading dimension 1 or n.
+        I6: inertia with added mass (n, 6, 6) [kg, kg m, kg m^2].
+        velocity: of the members (n, 3) [m/s], body axes.
+        angular_velocity: of the members (n, 3) [rad/s], body axes.
+
+    Returns:
+        Rate (n,) [1/s]; 0 without drag.
+    """
     speeds = np.abs(np.concatenate([velocity, angular_velocity], axis=1))
     total = np.zeros_like(speeds)
     for key in drag_keys(parameters):
@@ -176,7 +220,14 @@ def drag_rate(
 
 
 def drag_keys(parameters: Mapping[str, np.ndarray]) -> list[str]:
-    """Terms with six linear and quadratic drag coefficients, or matrices of them."""
+    """Find the terms with linear and quadratic drag coefficients on six axes.
+
+    Args:
+        parameters: names of the scene -> values.
+
+    Returns:
+        Keys of the terms, such as "drag".
+    """
     keys = [name.removesuffix(".quadratic") for name in parameters if name.endswith(".quadratic")]
     return [key for key in keys if parameters.get(f"{key}.linear", np.zeros(1)).shape[-1] == 6]
 

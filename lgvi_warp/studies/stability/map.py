@@ -37,15 +37,19 @@ from lgvi_warp.studies.stability.runs import (
     refusals,
     run_method,
 )
-from lgvi_warp.studies.tradeoff import _finite, chosen_methods
+from lgvi_warp.studies.tradeoff import chosen_methods, finite_or_none
 
 METHODS = ("psi", "psi_s", "psi_x", "rk4")
-# Maps by name: their two axes.
+# Name of a map -> its two axes.
 GRIDS = {"omega": ("h", "angular_velocity"), "mass": ("h", "added_mass_ratio"), "drag": ("h", "drag_number")}
 
 
 class Cell(IntEnum):
-    """What became of the members of a cell, the worst of its directions."""
+    """Class of a cell of the map: the worst of its members.
+
+    ACCURATE: the error is below its bound. BOUNDED: the error is not, energy and rotation are bounded. FLAGGED: bounded,
+    with a status or a warning. FAILED: unbounded or not finite, with a status or a warning. SILENT: unbounded without any.
+    """
 
     ACCURATE = 0
     BOUNDED = 1
@@ -55,7 +59,7 @@ class Cell(IntEnum):
 
     @property
     def text(self) -> str:
-        """What it means, in a few words."""
+        """Meaning of the class in a few words."""
         return TEXTS[self]
 
 
@@ -72,12 +76,28 @@ TEXTS = {
 class StabilityMap:
     """Classes of cells over two axes, for each method.
 
-    x, y: lines of nx and ny values. classes: method -> (ny, nx), Cell. errors: largest error [unit of `of`] up to
-    error_time, infinite without one; energies: largest growth of energy over the bound, above 1 where it is unbounded;
-    statuses: the worst Status code (255: the program refused to run it). ratios: method -> limit -> (ny, nx), h over the
-    analytic limit of the fastest direction (see stability_limits.LIMITS), above 1 beyond it. error_bound [unit of `of`];
-    error_time and t1 [s], each rounded up to whole steps. judged: how energies are ("conservative", "dissipative" or
-    "driven"). unverified: cells whose reference was not good enough, which so cannot be accurate. refused: method -> why.
+    Attributes:
+        x: horizontal axis, of nx values.
+        y: vertical axis, of ny values.
+        classes: method -> Cell codes (ny, nx).
+        errors: method -> largest error up to error_time (ny, nx) [unit]; infinite where there is none.
+        energies: method -> largest growth of energy over energy_bound (ny, nx) [1]; unbounded above 1.
+        statuses: method -> worst Status code (ny, nx); 255 where the program refused to run the cell.
+        ratios: method -> limit -> step h over the analytic limit of the fastest start (ny, nx) [1]; above 1 beyond it. The
+            limits are those of studies.stability.limits.LIMITS.
+        of: name of the quantity that errors are of.
+        error_bound: largest error of an accurate cell [unit].
+        error_time: time up to which errors count, rounded up to whole steps [s].
+        t1: time up to which energy counts, rounded up to whole steps [s].
+        directions: number of starts of each cell.
+        judged: how energies are judged: "conservative", "dissipative" or "driven".
+        reference: what errors are measured against, in words.
+        unverified: number of cells whose reference is not good enough; none of them can be accurate.
+        provenance: scene, settings, versions and machine.
+        refused: method -> why the scene does not take it.
+        messages: notes for the user.
+        seconds: time that the map took [s].
+        unit: unit of the errors. Default: that of `of`.
     """
 
     x: Line
@@ -102,28 +122,57 @@ class StabilityMap:
     unit: str = ""
 
     def __post_init__(self) -> None:
-        if not self.unit:  # of what was written before there were others
+        if not self.unit:  # a map written before `of` could be any quantity
             object.__setattr__(self, "unit", QUANTITIES.get(self.of, "1"))
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Methods of the map."""
+        """Names of the methods that the map shows."""
         return tuple(self.classes)
 
     def limit(self, method: str, worst: Cell = Cell.BOUNDED) -> np.ndarray:
-        """The measured limit per y (ny,): the largest x up to which all cells are at most `worst`; NaN where the first is not.
+        """Measure the limit of x in each row: the largest x up to which all cells are at most this class.
 
-        The last x where the whole row is: the limit then lies beyond the map.
+        Args:
+            method: name of a method of the map.
+            worst: worst class still within the limit. Default: Cell.BOUNDED.
+
+        Returns:
+            Limit for each y (ny,) [x.unit]; NaN where the first cell is worse. The last x means that the limit lies beyond
+            the map.
+
+        Raises:
+            SceneError: for a method that the map does not have.
         """
         good = np.logical_and.accumulate(self._of(method) <= worst, axis=1).sum(axis=1)
         return np.where(good > 0, self.x.values[np.maximum(good - 1, 0)], np.nan)
 
     def counts(self, method: str) -> dict[str, int]:
-        """Cells by class."""
+        """Count the cells of each class.
+
+        Args:
+            method: name of a method of the map.
+
+        Returns:
+            Name of the class -> number of cells.
+
+        Raises:
+            SceneError: for a method that the map does not have.
+        """
         return {cell.name.lower(): int(np.sum(self._of(method) == cell)) for cell in Cell}
 
     def silent(self, method: str) -> list[tuple[float, float]]:
-        """(x, y) of the cells whose energy is unbounded without any flag: what must never happen."""
+        """List the cells whose energy is unbounded without any flag: what must never happen.
+
+        Args:
+            method: name of a method of the map.
+
+        Returns:
+            (x, y) of each cell [x.unit, y.unit].
+
+        Raises:
+            SceneError: for a method that the map does not have.
+        """
         return [
             (float(self.x.values[j]), float(self.y.values[i])) for i, j in np.argwhere(self._of(method) == Cell.SILENT)
         ]
@@ -135,35 +184,61 @@ class StabilityMap:
         return self.classes[method]
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything, as JSON holds it; what is not finite is None."""
+        """Convert the map to plain types for JSON.
+
+        Returns:
+            All fields, with "limits" and "legend"; numbers that are not finite are None.
+        """
         content = {name: value for name, value in vars(self).items() if name not in ("x", "y", *ARRAYS, "ratios")}
         content |= {"x": self.x.to_dict(), "y": self.y.to_dict(), "messages": list(self.messages)}
         for name in ARRAYS:
             content[name] = {method: values.tolist() for method, values in getattr(self, name).items()}
-        content["ratios"] = {method: {limit: values.tolist() for limit, values in found.items()}
-                             for method, found in self.ratios.items()}  # fmt: skip
+        content["ratios"] = {method: {limit: values.tolist() for limit, values in by_limit.items()}
+                             for method, by_limit in self.ratios.items()}  # fmt: skip
         content["limits"] = {method: self.limit(method).tolist() for method in self.methods}
         content["legend"] = {str(int(cell)): f"{cell.name.lower()}: {cell.text}" for cell in Cell}
-        return dict(_finite(content))
+        return dict(finite_or_none(content))
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> StabilityMap:
-        """From what `to_dict` gave."""
+        """Build a map from the content of a JSON file.
+
+        Args:
+            content: as `to_dict` returns it.
+
+        Returns:
+            The map; what was not finite is infinite.
+        """
         kept = {name: value for name, value in content.items() if name not in ("limits", "legend")}
         kept |= {"x": Line.from_dict(content["x"]), "y": Line.from_dict(content["y"])}
         for name, kind in ARRAYS.items():
             kept[name] = {method: _array(values, kind) for method, values in content[name].items()}
-        kept["ratios"] = {method: {limit: _array(values, np.float64) for limit, values in found.items()}
-                          for method, found in content["ratios"].items()}  # fmt: skip
+        kept["ratios"] = {method: {limit: _array(values, np.float64) for limit, values in by_limit.items()}
+                          for method, by_limit in content["ratios"].items()}  # fmt: skip
         return cls(**kept | {"messages": tuple(content["messages"])})
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> StabilityMap:
-        """Read the JSON that `save` wrote. Raises OSError or ValueError if it is none."""
+        """Read a map from the JSON file that `save` wrote.
+
+        Args:
+            path: of the file.
+
+        Returns:
+            The map.
+
+        Raises:
+            OSError: where the file cannot be read.
+            ValueError: where it is no JSON.
+        """
         return cls.from_dict(json.loads(Path(path).read_text()))
 
     def rows(self) -> list[dict[str, Any]]:
-        """A flat record for each cell and method."""
+        """Flatten the map to one record for each method and cell, as the CSV file has them.
+
+        Returns:
+            Records of method, both axes, class, error, energy growth, status and ratios to the limits.
+        """
         rows = []
         for method in self.methods:
             for i, j in np.ndindex(self.classes[method].shape):
@@ -182,29 +257,57 @@ class StabilityMap:
         return rows
 
     def to_csv(self, path: str | os.PathLike[str]) -> Path:
-        """Write the rows to a CSV file. Returns its path."""
+        """Write the rows to a CSV file.
+
+        Args:
+            path: of the file.
+
+        Returns:
+            Path of the file.
+
+        Raises:
+            OSError: where it cannot be written.
+        """
         return write_csv(self.rows(), path)
 
     def save(self, folder: str | os.PathLike[str], name: str = "stability") -> list[Path]:
-        """Write NAME.json and NAME.csv into a folder. Returns their paths."""
+        """Write NAME.json and NAME.csv into a folder, which is made if needed.
+
+        Args:
+            folder: of the two files.
+            name: their name without the ending. Default "stability".
+
+        Returns:
+            Paths of the two files.
+
+        Raises:
+            OSError: where they cannot be written.
+        """
         target = Path(folder)
         target.mkdir(parents=True, exist_ok=True)
         (target / f"{name}.json").write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False))
         return [target / f"{name}.json", self.to_csv(target / f"{name}.csv")]
 
 
-# Arrays (ny, nx) by method, and their types.
+# Fields that hold an array (ny, nx) for each method, and its type.
 ARRAYS: dict[str, Any] = {"classes": np.int64, "errors": np.float64, "energies": np.float64, "statuses": np.int64}
 
 
 def _array(values: Any, kind: Any) -> np.ndarray:
-    """An array; None is infinite."""
+    """Convert nested lists to an array (ny, nx); None becomes infinite."""
     array = np.array(values, dtype=object)
     return np.asarray(np.where(array == np.array(None), np.inf, array).astype(kind))
 
 
 def status_name(code: int) -> str:
-    """In small letters."""
+    """Name a status code of the map.
+
+    Args:
+        code: of Status, or 255 for a refused cell.
+
+    Returns:
+        Name in small letters, or "refused".
+    """
     return "refused" if code == REFUSED else Status(code).name.lower()
 
 
@@ -227,34 +330,52 @@ def stability_map(
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> StabilityMap:
-    """Run a grid of members by every method and say of each cell whether it is accurate, bounded, flagged, failed or silent.
+    """Run a grid of starts by every method, and classify each cell as accurate, bounded, flagged, failed or silent.
 
-    x, y: axes: "h", "angular_velocity", "speed", "added_mass_ratio", "drag_number" or a name of scene.parameters(), as a
-    text ("h=0.01:3", "vehicle.mass=50:500:linear"), as (name, low, high) or as a stability_grid.Axis. methods: names
-    (default psi, psi_s, psi_x, rk4). points: cells along x and y, one number or two. directions: starts per cell, the
-    scene's own and such of velocity and spin turned at random; the worst counts. h: the step [s], where it is on no axis.
-    dtype: default the scene's. What the scene's ensemble varies is left out.
+    A cell is accurate where its error stays below the bound up to error_time, against a reference of fine steps that two
+    runs agree on ten times better. It is bounded where only energy and rotation stay bounded up to t1: the energy of a
+    conservative scene changes, that of a damped one grows, by less than energy_bound times what the start's momenta can
+    hold as kinetic energy plus what the potentials gave. It is flagged where that holds and a member got a status or a
+    warning; failed where it does not hold and a member got one, or numbers are not finite; silent where it does not hold
+    and no member got one. What drives a scene (wrenches, thrusters, waves) changes its energy by right: there the energy is
+    compared with the reference's, up to error_time or 16 steps. What the scene's ensemble varies is left out.
 
-    of: any quantity that statistics know ("attitude", "position", "depth", "euler[1]", ...), or a lw.Quantity.
+    Args:
+        scene: the scene.
+        x: horizontal axis: "h", "angular_velocity", "speed", "added_mass_ratio", "drag_number" or a name of
+            scene.parameters(); as a text ("h=0.01:3", "vehicle.mass=50:500:linear"), as (name, low, high), or as an
+            Axis of studies.stability.grid. Default "h".
+        y: vertical axis, in the same forms. Default "angular_velocity".
+        methods: names. Default: psi, psi_s, psi_x and rk4.
+        points: number of cells along x and y, one number or two. Default 24.
+        t1: time up to which energy counts [s]. Default: ten periods of the fastest motion at the start.
+        error: largest error of an accurate cell, in the unit of `of`; above 0. Default 1e-2.
+        of: quantity that errors are of: any that statistics know ("attitude", "position", "depth", "euler[1]", ...), or a
+            lw.Quantity. Default "attitude" [rad].
+        error_time: time up to which errors count [s]. Default: one period of the fastest motion at the start.
+        energy_bound: largest growth of energy of a bounded cell [1]. Default 1.
+        directions: number of starts of each cell: the scene's own, and others with velocity and spin turned at random; the
+            worst counts. Default 4.
+        h: the step, where it is on no axis [s]. Default: run.step of the scene.
+        dtype: precision. Default: that of the scene.
+        seed: of the random turns. Default 0.
+        threads: number of threads. Default: those of this machine.
+        progress: called with the fraction of the work that is done, from 0 to 1.
 
-    A cell is accurate where the error of `of` stays below `error` [its unit] up to error_time [s] (default: one period of
-    the fastest motion at the start), against a reference of fine steps that two runs agree on ten times better; bounded
-    where only energy and rotation stay bounded up to t1 [s] (default: ten periods): a conservative scene's energy changes,
-    a damped one's grows, by less than energy_bound times what the start's momenta can hold as kinetic energy plus what the
-    potentials gave. It is flagged where that holds and a member got a status or a warning; failed where it does not and
-    one was given, also for numbers that are not finite; silent where it does not and none was. What drives a scene (wrenches,
-    thrusters, waves) changes its energy by right: there it is compared with the reference's, up to error_time or 16 steps.
+    Returns:
+        The map.
 
-    progress: called with the fraction of the work done. Raises SceneError naming every fault, and where noise acts.
+    Raises:
+        SceneError: for faulty arguments, all in one message; where the scene takes none of the methods; and where noise acts.
     """
     begun, report = time.perf_counter(), progress or void
     dtype = dtype or scene.run.dtype
     names = chosen_methods(methods, METHODS)
     faults = Faults()
-    asked, unit_of_error = None, ""
+    compared, unit_of_error = None, ""
     with faults.including():
-        asked = compared_in(of)
-        unit_of_error = asked.unit
+        compared = compared_in(of)
+        unit_of_error = compared.unit
     for name, value, unit in (("error", error, unit_of_error), ("energy_bound", energy_bound, "1"),
                               *((name, value, "s") for name, value in (("t1", t1), ("error_time", error_time))
                                 if value is not None)):  # fmt: skip
@@ -265,7 +386,7 @@ def stability_map(
         both = (points, points) if isinstance(points, int) else tuple(points)
         grid = Grid(scene, x, y, both, directions, seed, h)
     faults.raise_if_any()
-    assert grid is not None and asked is not None
+    assert grid is not None and compared is not None
     refused = refusals(grid, names, dtype)
     if len(refused) == len(names):
         raise SceneError([f"method {name}: {why}" for name, why in refused.items()])
@@ -277,29 +398,31 @@ def stability_map(
     least = LEAST_DRIVEN if kind == "driven" else 1
     columns = [column(step, members, error_time, t1, least) for step, members in grid.columns()]
     threads = threads or machine.thread_count()
-    text = make_references(grid, columns, asked, error, threads, lambda part: report(0.4 * part))
-    found, messages = {}, []
+    text = make_references(grid, columns, compared, error, threads, lambda fraction: report(0.4 * fraction))
+    outcomes, messages = {}, []
     for i, name in enumerate(names):
-        one, why = run_method(grid, columns, name, dtype, asked, kind, threads)
+        outcome, why = run_method(grid, columns, name, dtype, compared, kind, threads)
         report(0.4 + 0.6 * (i + 1) / len(names))
-        found[name] = one
+        outcomes[name] = outcome
         if why:
-            messages.append(f"{name}: refused in {int(_worst(grid, one.status == REFUSED).sum())} cells: {why}")
+            messages.append(f"{name}: refused in {int(_worst(grid, outcome.status == REFUSED).sum())} cells: {why}")
     verified = np.zeros(len(grid.h), bool)
-    for part in columns:
-        verified[part.members] = part.verified
-    classes = {name: _worst(grid, cells_of(one, verified, error, energy_bound)) for name, one in found.items()}
+    for step_column in columns:
+        verified[step_column.members] = step_column.verified
+    classes = {
+        name: _worst(grid, cells_of(outcome, verified, error, energy_bound)) for name, outcome in outcomes.items()
+    }
     line_x, line_y = grid.lines
     result = StabilityMap(
         x=line_x,
         y=line_y,
         classes=classes,
-        errors={name: _worst(grid, one.error) for name, one in found.items()},
-        energies={name: _worst(grid, one.growth / energy_bound) for name, one in found.items()},
-        statuses={name: _worst_status(grid, one.status) for name, one in found.items()},
-        ratios=_ratios(grid, list(found)),
-        of=asked.name,
-        unit=asked.unit,
+        errors={name: _worst(grid, outcome.error) for name, outcome in outcomes.items()},
+        energies={name: _worst(grid, outcome.growth / energy_bound) for name, outcome in outcomes.items()},
+        statuses={name: _worst_status(grid, outcome.status) for name, outcome in outcomes.items()},
+        ratios=_ratios(grid, list(outcomes)),
+        of=compared.name,
+        unit=compared.unit,
         error_bound=float(error),
         error_time=float(error_time),
         t1=float(t1),
@@ -307,7 +430,7 @@ def stability_map(
         judged=kind,
         reference=text,
         unverified=int(_worst(grid, ~verified).sum()),
-        provenance=_provenance(grid, list(found), dtype, seed, energy_bound),
+        provenance=_provenance(grid, list(outcomes), dtype, seed, energy_bound),
         refused=refused,
         messages=tuple(messages),
         seconds=time.perf_counter() - begun,
@@ -317,19 +440,32 @@ def stability_map(
 
 
 def _worst(grid: Grid, values: np.ndarray) -> np.ndarray:
-    """(ny, nx) of what members have: the largest over the directions of a cell."""
+    """Take the largest value over the starts of each cell (ny, nx)."""
     return np.max(values.reshape(grid.shape), axis=2)
 
 
 def _worst_status(grid: Grid, status: np.ndarray) -> np.ndarray:
-    """(ny, nx): what the program refused before failures, those before events, and the latter before OK."""
+    """Take the worst status over the starts of each cell (ny, nx).
+
+    Refusals by the program come first, then failures, events and OK.
+    """
     rank = np.where(stopped(status), status - 500, np.where(status == Status.OK, -1000, status)).reshape(grid.shape)
     chosen = np.argmax(rank, axis=2)[:, :, None]
     return np.take_along_axis(status.reshape(grid.shape), chosen, axis=2)[:, :, 0]
 
 
 def cells_of(one: Found, verified: np.ndarray, error: float, energy_bound: float) -> np.ndarray:
-    """The class of every member."""
+    """Classify every member of a method's runs.
+
+    Args:
+        one: what the runs showed.
+        verified: whether each member's reference is good enough (n,).
+        error: largest error of an accurate member [unit of the quantity].
+        energy_bound: largest growth of energy of a bounded member [1].
+
+    Returns:
+        Cell codes (n,).
+    """
     unbounded = ~(one.growth / energy_bound <= 1.0)
     flagged = one.warned | failed(one.status)
     accurate = verified & (one.error <= error)
@@ -338,18 +474,21 @@ def cells_of(one: Found, verified: np.ndarray, error: float, energy_bound: float
 
 
 def _ratios(grid: Grid, methods: Sequence[str]) -> dict[str, dict[str, np.ndarray]]:
-    """method -> limit -> h over the analytic limit; limits that a method has not, or that nothing reaches, are left out."""
+    """Compute the step over each analytic limit, of the fastest start of each cell.
+
+    Returns method -> limit -> (ny, nx) [1]. Limits that a method does not have, or whose motion is absent, are left out.
+    """
     numbers = {name: _worst(grid, grid.h * rate) for name, rate in grid.rates().items()}
-    found: dict[str, dict[str, np.ndarray]] = {}
+    ratios: dict[str, dict[str, np.ndarray]] = {}
     for method in methods:
         limits = {name: limit(method) for name, limit in LIMITS.items()}
-        found[method] = {name: number / limits[name] for name, number in numbers.items()
+        ratios[method] = {name: number / limits[name] for name, number in numbers.items()
                          if math.isfinite(limits[name]) and np.any(number)}  # fmt: skip
-    return found
+    return ratios
 
 
 def _provenance(grid: Grid, methods: Sequence[str], dtype: str, seed: int, energy_bound: float) -> dict[str, Any]:
-    """Scene, settings, versions, machine."""
+    """Describe the scene, the settings, the versions and the machine of a map."""
     content = provenance(plan_of(grid, np.arange(1), methods[0], SHORTEST, "float64"))
     content = {name: content[name] for name in ("scene", "versions", "machine", "checks")}
     axes = {name: vars(axis) for name, axis in (("x", grid.x), ("y", grid.y))}
@@ -363,7 +502,14 @@ def _provenance(grid: Grid, methods: Sequence[str], dtype: str, seed: int, energ
 
 
 def report_text(found: StabilityMap) -> str:
-    """The map in lines for people."""
+    """Write the map as a text of several lines.
+
+    Args:
+        found: the map.
+
+    Returns:
+        Messages, axes, bounds, reference, and a table of cells by class for each method.
+    """
     unit = found.unit
     lines = [f"note        {message}" for message in found.messages]
     lines += [

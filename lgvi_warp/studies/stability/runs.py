@@ -1,4 +1,4 @@
-"""The runs behind a stability map: references, every method's columns, and what energies say of them."""
+"""Runs behind a stability map: references, every method's runs, and the errors and energies that they show."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from lgvi_warp.studies.compared import Compared, compared_in
 from lgvi_warp.studies.comparison import PRECISE
 from lgvi_warp.studies.stability.grid import Grid
 
-# Times that errors are taken at, and that energies are looked at.
+# Number of times at which errors are measured, and energies.
 ERROR_SAMPLES, ENERGY_SAMPLES = 8, 64
-# A reference agrees with another run to the error bound over this.
+# The two runs of a reference agree to the error bound divided by this.
 TRUST = 10.0
-# Of a reference: it turns by this at most in its first step [rad], and its step is halved so often to agree.
+# Largest turn in the first step of a reference [rad], and largest number of times that its step is halved.
 FINE, HALVINGS = 0.2, 6
-# What is judged by the reference's energy makes so many steps: in two even the worst method does not blow up.
+# Least number of steps of driven scenes: in two steps even the worst method does not blow up.
 LEAST_DRIVEN = 16
-# A matrix this far from a rotation is none any more.
+# Distance from a rotation at which a matrix no longer counts as one.
 SKEWED = 0.1
-# The status of members whose column the program refused to run.
+# Status of members that the program refused to run.
 REFUSED = 255
 # One step so short that no method refuses it for its length.
 SHORTEST = TimeGrid(1e-9, np.array([0, 1]), np.array([0.0, 1e-9]))
@@ -42,7 +42,14 @@ SHORTEST = TimeGrid(1e-9, np.array([0, 1]), np.array([0.0, 1e-9]))
 
 @dataclass
 class Found:
-    """What a method's runs showed, by member."""
+    """What a method's runs showed, for each member.
+
+    Attributes:
+        error: largest error up to the error time (n,) [unit of the quantity]; infinite where there is none.
+        growth: largest growth of energy over the energy available (n,) [1].
+        status: Status codes (n,); REFUSED where the program refused to run the member.
+        warned: whether the member got a warning (n,).
+    """
 
     error: np.ndarray
     growth: np.ndarray
@@ -52,7 +59,16 @@ class Found:
 
 @dataclass(eq=False)
 class Column:
-    """One step and the members that take it, with the times that its runs are sampled at, and the reference there."""
+    """One step, the members that take it, and their reference.
+
+    Attributes:
+        h: the step [s].
+        members: indices of the members (k,).
+        error_steps: numbers of the steps at which errors are measured.
+        steps: numbers of the steps at which energies are measured, those of errors included.
+        reference: result at the error steps; None before it is made.
+        verified: whether each member's reference is good enough (k,).
+    """
 
     h: float
     members: np.ndarray
@@ -62,13 +78,32 @@ class Column:
     verified: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
 
     def grid(self, finer: int = 1, whole: bool = True) -> TimeGrid:
-        """The steps and samples; `finer`: of h over this many."""
+        """Make the steps and sample times of a run.
+
+        Args:
+            finer: factor by which h is divided. Default 1.
+            whole: whether to sample the whole run, or at the error steps alone. Default True.
+
+        Returns:
+            The steps and the times [s].
+        """
         steps = self.steps if whole else self.error_steps
         return TimeGrid(self.h / finer, steps * finer, steps * self.h)
 
 
 def column(h: float, members: np.ndarray, error_time: float, t1: float, least: int = 1) -> Column:
-    """The column of these members: both times rounded up to whole steps, `least` of them or more."""
+    """Make the column of the members that share a step, with both times rounded up to whole steps.
+
+    Args:
+        h: the step [s].
+        members: their indices (k,).
+        error_time: time up to which errors count [s].
+        t1: time up to which energies count [s].
+        least: least number of steps. Default 1.
+
+    Returns:
+        The column, without a reference.
+    """
     short, long = (max(least, math.ceil(t / h * (1.0 - 1e-12))) for t in (error_time, t1))
     errors = np.unique(np.linspace(0, short, ERROR_SAMPLES + 1).round().astype(np.int64))
     more = np.linspace(0, max(long, short), ENERGY_SAMPLES + 1).round().astype(np.int64)
@@ -76,13 +111,36 @@ def column(h: float, members: np.ndarray, error_time: float, t1: float, least: i
 
 
 def plan_of(grid: Grid, members: np.ndarray, method: str, times: TimeGrid, dtype: str) -> Plan:
-    """A run of some members. Raises SceneError where the method cannot do it."""
+    """Make the plan of a run of some members.
+
+    Args:
+        grid: cells of the map.
+        members: their indices.
+        method: name of the method.
+        times: steps and sample times.
+        dtype: precision.
+
+    Returns:
+        The plan, with all checks where they are available.
+
+    Raises:
+        SceneError: where the method cannot make the run.
+    """
     checks = "all" if "all" in plan.CHECKS else "safe"
     return Plan(grid.fleet(members), Method(method), times, FIELDS, dtype, checks=checks)
 
 
 def refusals(grid: Grid, names: Sequence[str], dtype: str) -> dict[str, str]:
-    """Methods that the scene does not take at any step, and why."""
+    """Find the methods that the scene does not take at any step.
+
+    Args:
+        grid: cells of the map.
+        names: of the methods.
+        dtype: precision.
+
+    Returns:
+        Name of the method -> reason.
+    """
     refused = {}
     for name in names:
         try:
@@ -93,7 +151,18 @@ def refusals(grid: Grid, names: Sequence[str], dtype: str) -> dict[str, str]:
 
 
 def judged(grid: Grid, names: Sequence[str]) -> str:
-    """Whether energy is kept, only lost, or given by what acts. Raises SceneError where noise acts."""
+    """Decide how energies are judged, by the forces that act.
+
+    Args:
+        grid: cells of the map.
+        names: of methods that the scene takes.
+
+    Returns:
+        "conservative" where energy is kept, "dissipative" where it is only lost, "driven" where a force may supply it.
+
+    Raises:
+        SceneError: where noise acts.
+    """
     laws = plan_of(grid, np.arange(1), names[0], SHORTEST, "float64").model.laws
     if any(getattr(module, "NOISE", False) for _, module in laws):
         raise SceneError(["terms: noise acts, whose path differs from step to step; leave it out for a stability map"])
@@ -113,7 +182,10 @@ def judged(grid: Grid, names: Sequence[str]) -> str:
 
 
 def _carried(term: Any, module: Any) -> bool:
-    """Whether a steady current, if level, gives no energy, relative to the water, through this: weight, buoyancy, drag."""
+    """Tell whether a steady current supplies no energy through a law, relative to the water.
+
+    It supplies none if it is level and the law is weight, buoyancy or drag.
+    """
     if getattr(module, "FLOW", "none") == "steady":
         return not np.any(np.asarray(term.velocity)[2:])
     return getattr(module, "SEPARABLE", False) or not hasattr(module, "law")
@@ -122,13 +194,31 @@ def _carried(term: Any, module: Any) -> bool:
 def make_references(
     grid: Grid, columns: Sequence[Column], of: Any, error: float, threads: int, report: Callable[[float], None]
 ) -> str:
-    """Give every column the states at its error times; says by which methods."""
-    asked = compared_in(of)
+    """Give every column its reference at the error times.
+
+    Args:
+        grid: cells of the map.
+        columns: all columns; their references are filled in.
+        of: quantity that the error is of.
+        error: largest error of an accurate cell [unit of `of`]; references agree to a tenth of it.
+        threads: number of threads.
+        report: called with the fraction of the columns that is done.
+
+    Returns:
+        Methods and steps of the references, in words.
+
+    Raises:
+        SceneError: where the scene takes none of the precise methods.
+    """
+    compared = compared_in(of)
     first, second = _precise(grid)
     rates = np.max(list(grid.rates().values()), axis=0)
     done = 0
     with ThreadPoolExecutor(threads) as pool:
-        jobs = [pool.submit(_reference, grid, one, (first, second), rates, asked, error / TRUST) for one in columns]
+        jobs = [
+            pool.submit(_reference, grid, step_column, (first, second), rates, compared, error / TRUST)
+            for step_column in columns
+        ]
         for job in as_completed(jobs):
             job.result()
             done += 1
@@ -137,7 +227,7 @@ def make_references(
 
 
 def _precise(grid: Grid) -> tuple[str, str]:
-    """The two best methods that the scene takes; the best twice where the second is of much lower order."""
+    """Choose the two best methods that the scene takes; the best twice where the second is of much lower order."""
     names: list[str] = []
     for name in PRECISE:
         try:
@@ -157,7 +247,7 @@ def _precise(grid: Grid) -> tuple[str, str]:
 def _reference(
     grid: Grid, column: Column, names: tuple[str, str], rates: np.ndarray, of: Compared, goal: float
 ) -> None:
-    """Fill in a column's reference: two methods, halving the steps of the members that they do not yet agree on."""
+    """Fill in a column's reference by two methods, halving the steps of members that do not agree yet."""
     n = len(column.members)
     column.verified = np.zeros(n, bool)
     open_ = np.arange(n)
@@ -172,7 +262,7 @@ def _reference(
                 good = ~failed(a.status) & ~failed(b.status) & np.isfinite(b.attitude).all(axis=(0, 2, 3))
                 good &= np.max(np.nan_to_num(apart, posinf=np.inf), axis=0) <= goal
         except SceneError:
-            # Too long for a stage that goes backward.
+            # The step is too long for a stage that goes backward.
             finer *= 2
             continue
         column.reference = _joined(column.reference, b, open_)
@@ -184,13 +274,13 @@ def _reference(
 
 
 def _joined(whole: Result | None, part: Result, at: np.ndarray) -> Result:
-    """The part's members in the place of those of the whole."""
+    """Replace the members `at` of the whole result by those of the part; the part alone where there is no whole."""
     if whole is None:
         return part
     for name, values in part.samples.items():
         whole.samples[name][:, at] = values
     whole.status[at], whole.failure_time[at] = part.status, part.failure_time
-    # Energies that were asked for already are of the old samples.
+    # A cached energy belongs to the old samples.
     vars(whole).pop("energy", None)
     return whole
 
@@ -198,9 +288,22 @@ def _joined(whole: Result | None, part: Result, at: np.ndarray) -> Result:
 def run_method(
     grid: Grid, columns: Sequence[Column], method: str, dtype: str, of: Compared, judged: str, threads: int
 ) -> tuple[Found, str]:  # fmt: skip
-    """Run a method over all columns; also the reason where the program refused some."""
+    """Run a method over all columns.
+
+    Args:
+        grid: cells of the map.
+        columns: all columns, with their references.
+        method: name of the method.
+        dtype: precision.
+        of: quantity that errors are of.
+        judged: how energies are judged, as of the function `judged`.
+        threads: number of threads.
+
+    Returns:
+        (findings, reason): what the runs showed, and why the program refused some of them; "" where it refused none.
+    """
     n = len(grid.h)
-    found = Found(np.full(n, np.inf), np.zeros(n), np.full(n, REFUSED), np.zeros(n, bool))
+    findings = Found(np.full(n, np.inf), np.zeros(n), np.full(n, REFUSED), np.zeros(n, bool))
     why: list[str] = []
     rows = grid.shape[2]
     plan_of(grid, np.arange(n), method, SHORTEST, dtype).compile()
@@ -212,23 +315,23 @@ def run_method(
         except SceneError as error:
             why.append(str(error))
             if len(at) > rows:
-                # Only some cells of it are refused: halves of whole cells.
+                # Perhaps only some cells are refused: try both halves, each of whole cells.
                 half = len(at) // rows // 2 * rows
                 column_of(column, at[:half])
                 column_of(column, at[half:])
             return
         with np.errstate(all="ignore"):
-            _judge(run_plan(run, 1), column, at, found, of, judged)
+            _judge(run_plan(run, 1), column, at, findings, of, judged)
 
     with ThreadPoolExecutor(threads) as pool:
-        jobs = [pool.submit(column_of, one, np.arange(len(one.members))) for one in columns]
+        jobs = [pool.submit(column_of, step_column, np.arange(len(step_column.members))) for step_column in columns]
         for job in jobs:
             job.result()
-    return found, why[0] if why else ""
+    return findings, why[0] if why else ""
 
 
 def _judge(result: Result, column: Column, at: np.ndarray, found: Found, of: Compared, judged: str) -> None:
-    """Note what the run of some members of a column showed."""
+    """Write down the errors, energies, statuses and warnings of a run of some members of a column."""
     members = column.members[at]
     found.status[members] = np.asarray(result.status)
     warnings = getattr(result, "warnings", None)
@@ -238,7 +341,7 @@ def _judge(result: Result, column: Column, at: np.ndarray, found: Found, of: Com
     if column.reference is not None:
         reference = comparison.part(column.reference, at.tolist())
         apart = comparison.distances(_at_times(result, early), reference, of)[of.name]
-        # Beyond an event there is no error; a member that was frozen has none at all.
+        # Distances end at an event; NaN without an event means that the member was lost.
         stopped = np.isfinite(np.minimum(stop_time(result), stop_time(reference)))
         lost = failed(result.status) | (np.isnan(apart).any(axis=0) & ~stopped)
         largest = np.max(np.nan_to_num(apart, posinf=np.inf), axis=0)
@@ -260,7 +363,10 @@ def _at_times(result: Result, rows: np.ndarray) -> Result:
 
 
 def _with_rotation(growth: np.ndarray, result: Result) -> np.ndarray:
-    """Also how far R is from a rotation, over SKEWED; infinite where a number of the state is not finite."""
+    """Return the larger of the growth of energy and the distance of R from a rotation over SKEWED (n,).
+
+    It is infinite where a number of the state is not finite.
+    """
     R = result.attitude.astype(np.float64)
     skewed = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(0, 2, 3)) / SKEWED
     worst = np.maximum(growth, skewed)

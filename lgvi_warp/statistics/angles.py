@@ -73,7 +73,7 @@ class CircularMean(Statistic):
         across = np.sqrt(np.maximum(v * v * cc - 2.0 * u * v * cs + u * u * ss, 0.0))
         along = np.sqrt(np.maximum(u * u * cc + 2.0 * u * v * cs + v * v * ss, 0.0))
         arrays = {"value": np.arctan2(S, C), "resultant_length": length}
-        # The angles' spread about their own mean, as of a variance: 1 - cos of small angles is half their square.
+        # 1 - cos of small angles is half their square: 1 - length is treated as a variance.
         least, some = np.maximum(n - 1, 1), np.maximum(n, 1)
         wide = np.sqrt(along**2 + 3.0 * length * (1.0 - length) ** 2 / (some * least)) * (some / least)
         factors = (intervals.student(size, self.confidence) for size in (n, n - 1))
@@ -173,13 +173,13 @@ class MeanAttitude(Statistic):
         S = np.swapaxes(R, 1, 2) @ M
         trace = np.einsum("kii->k", S)
         spread = trace[:, None, None] * np.eye(3) - 0.5 * (S + np.swapaxes(S, 1, 2))
-        # Turns that the mean leaves open, where attitudes spread over all of SO(3), have no finite error.
+        # Where attitudes spread over all of SO(3) the mean leaves some turns undetermined: their error is infinite.
         known = np.linalg.eigvalsh(spread)[:, 0] > 1e-9
         inverse = np.linalg.inv(np.where(known[:, None, None], spread, np.eye(3)))
         vee = np.zeros((3, 3, 3))
         for i, (j, k) in enumerate(((2, 1), (0, 2), (1, 0))):
             vee[i, j, k], vee[i, k, j] = 1.0, -1.0
-        # q_i = sum of vee[i, j, k] (R^T X)_jk, X an attitude; then turned into the angle about each axis.
+        # q_i = sum of vee[i, j, k] (R^T X)_jk for an attitude X; `inverse` converts q to angles about the axes.
         to_angle = (inverse @ np.einsum("ijk,tlj->tilk", vee, R).reshape(-1, 3, 9)).reshape(-1, 3, 9)
         n = np.maximum(count - 1, 1)[:, None, None]
         covariance = to_angle @ (part["m11"] / n) @ np.swapaxes(to_angle, 1, 2)
@@ -209,7 +209,7 @@ class MeanAttitude(Statistic):
     def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
         """Form the intervals from the turns of the replicates' means relative to the mean of all members."""
         X = np.swapaxes(whole.value, 1, 2) @ np.stack([replicate.value for replicate in each])
-        # v of X = exp(hat(v)), but for a third power of its length.
+        # v of X = exp(hat(v)), with an error of third order in its length.
         v = 0.5 * np.stack([X[..., j, i] - X[..., i, j] for i, j in ((1, 2), (2, 0), (0, 1))], axis=-1)
         v = v - v.mean(axis=0)
         n = len(each)

@@ -26,7 +26,7 @@ from lgvi_warp.statistics.values import Values
 
 STOPPED = ("held", "left_out")
 
-# The types of a scene file.
+# Statistics by their type in a scene file; each class adds itself.
 TYPES: dict[str, type[Statistic]] = {}
 
 
@@ -95,13 +95,13 @@ class Statistic:
     """
 
     type: ClassVar[str] = ""
-    # Arrays of a part that have no row for each time.
+    # Names of a part's arrays that are the same for all sample times.
     shared: ClassVar[frozenset[str]] = frozenset()
-    # What it is of where nothing is said; None: it must be said.
+    # Value of `of` where none is given; None: it must be given.
     default: ClassVar[str | None] = None
-    # Whether it is of numbers of members, one for each, whenever they are of.
+    # Whether it reads one number of each member at one time, so that it can follow a path or an end.
     of_numbers: ClassVar[bool] = True
-    # Whether it is of how members end, not of samples.
+    # Whether it reads how members end instead of samples.
     of_ends: ClassVar[bool] = False
 
     of: Any = None
@@ -270,7 +270,7 @@ class Statistic:
         """
         return [self.read(self.whole(parts), time)]
 
-    # Members of R replicates: each array of a part then has R rows for one, those of a time side by side.
+    # With R replicates each array of a part has R rows for each sample time, side by side.
 
     def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
         """Return the part of the members of one replicate.
@@ -387,7 +387,7 @@ def from_list(given: Any, key: str = "statistics", *, whole: bool = True) -> tup
     faults, statistics = Faults(), list[Statistic]()
     for i, entry in enumerate(given):
         with faults.including():
-            statistics.append(_one(f"{key}[{i}]", entry))
+            statistics.append(_from_table(f"{key}[{i}]", entry))
     if whole and not faults:
         names: list[str] = []
         for statistic in statistics:
@@ -401,7 +401,7 @@ def from_list(given: Any, key: str = "statistics", *, whole: bool = True) -> tup
     return tuple(statistics)
 
 
-def _one(where: str, given: Any) -> Statistic:
+def _from_table(where: str, given: Any) -> Statistic:
     """Return the statistic of a table, or the statistic itself.
 
     Raises:

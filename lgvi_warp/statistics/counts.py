@@ -235,7 +235,7 @@ class Exceedance(Condition, Counted):
         return estimate(self, "Wilson", component_dims("value", "lower", "upper"), arrays, time, unit="1")
 
 
-# What lies between two samples is counted in so many equal parts.
+# Number of equal pieces of the time between two samples, in which passages are counted.
 PIECES = 8
 
 
@@ -248,7 +248,7 @@ class _Passages(Gatherer):
     def __init__(self, statistic: FirstPassage, time: np.ndarray, count: int):
         self._statistic, self._time, self._times = statistic, time, len(time)
         self._passed = np.full(count, len(time), np.int64)
-        # How far between the sample before and the one that sees it.
+        # Fraction of the time from the sample before to the sample that shows the passage.
         self._share = np.ones(count)
         self._known = np.zeros(count, np.int64)
         self._before: np.ndarray | None = None
@@ -265,7 +265,7 @@ class _Passages(Gatherer):
         if values.good is None:
             self._known[open_] = when.stop
         else:
-            # A member that is lost stays lost: what comes after is not looked at.
+            # A member that is lost stays lost: its later samples are ignored.
             lost = ~values.good.reshape(k, -1)
             good = np.where(lost.any(axis=0), lost.argmax(axis=0), len(lost))
             self._known = np.where(open_, when.start + good, self._known)
@@ -281,7 +281,7 @@ class _Passages(Gatherer):
             return
         at = self._passed[now] - when.start
         before = np.where(at > 0, x[at - 1, now], self._before[now])
-        # Into a band over the end that is nearer.
+        # A band is entered over its nearer end.
         limit = below if above is None else above if below is None else np.where(before <= above, above, below)
         limit = np.asarray(limit).ravel()
         self._share[now] = (limit - before) / (x[at, now] - before)
@@ -466,7 +466,7 @@ class Curve:
         # log(1 + variance / mean^2) of a Beta(a, b) is log(1 + b / (a (a + b + 1))).
         spread = _so_far(np.log1p((n - left) / ((left + 1.0) * (n + 2.0))), np.add)
         spread = spread + np.log1p(0.5 / ((left + 0.5) * (left + 2.0)))
-        # Of a Beta(a, b) mean (1 - mean) / variance is a + b + 1: here two more than the members.
+        # For a Beta(a, b) mean (1 - mean) / variance is a + b + 1, which is the number of members plus two.
         return np.asarray(np.maximum(-np.expm1(mean) / (np.exp(mean) * np.expm1(spread)) - 2.0, 0.0))
 
     def ends(self, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -10,7 +10,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.common.status import Status, failed, stopped
 
-# Words for several statuses: any event, any failure.
+# Outcomes that comprise several statuses: any event, any failure.
 STOPPED, FAILED = "stopped", "failed"
 
 

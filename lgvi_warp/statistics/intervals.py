@@ -11,6 +11,9 @@ def normal(confidence: float) -> float:
 
     Args:
         confidence: confidence level, between 0 and 1.
+
+    Returns:
+        The quantile of the standard normal at 0.5 + 0.5 confidence.
     """
     return float(ndtri(0.5 + 0.5 * confidence))
 
@@ -84,7 +87,7 @@ def wilson(
     spread = np.maximum(probability * (1.0 - probability), 0.0) / n + 0.25 * z2 / n**2
     half = np.sqrt(z2) * np.sqrt(np.where(count > 0, spread, 0.0)) / (1.0 + z2 / n)
     some = np.asarray(count > 0)
-    # At 0 and at 1 the end of the interval is that number; rounding must not put the value outside.
+    # At 0 and at 1 the interval ends at the value itself: rounding must not put the value outside.
     lower = np.where(some, np.clip(np.fmin(centre - half, probability), 0.0, 1.0), 0.0)
     upper = np.where(some, np.clip(np.fmax(centre + half, probability), 0.0, 1.0), 1.0)
     return lower, upper
@@ -139,12 +142,15 @@ def probability_of_replicates(
 
 
 def binomial_quantile(p: float | np.ndarray, n: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Return the least k with P(B <= k) >= p for a binomial B of n trials with probability q.
+    """Return a quantile of the binomial distribution: the least k with P(B <= k) >= p.
 
     Args:
-        p: the level of the quantile.
+        p: level of the quantile, between 0 and 1.
         n: number of trials.
         q: probability of success in one trial.
+
+    Returns:
+        k as float64, in the common shape of the arguments.
     """
     n = np.asarray(n, dtype=np.float64)
     with np.errstate(invalid="ignore"):

@@ -25,7 +25,7 @@ def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     Returns:
         (k, d, d).
     """
-    # A few rows by thousands of members: beyond some rows BLAS pays, which makes threads of its own for larger products.
+    # BLAS pays only for more than a few rows; pieces keep each product too small for BLAS to start threads of its own.
     if a.shape[1] <= 4:
         return np.einsum("kin,kjn->kij", a, b)
     parts = (a[..., i : i + 512] @ np.swapaxes(b[..., i : i + 512], 1, 2) for i in range(0, a.shape[2], 512))
@@ -72,6 +72,9 @@ def moved(part: Part, a: np.ndarray) -> Part:
     Args:
         part: count (k,), m11 (k, d, d), and m21, m22 (k, d, d) where fourth moments are kept.
         a: (k, d), the mean less the point.
+
+    Returns:
+        m11, and m21 and m22 where the part has them, (k, d, d) each.
     """
     n, m11, aa = part["count"][:, None, None], part["m11"], outer(a, a)
     moments = {"m11": m11 + n * aa}
@@ -92,6 +95,9 @@ def joined(left: Part, right: Part) -> Part:
     Args:
         left: part of the first set.
         right: part of the second set.
+
+    Returns:
+        The part of both sets, with the same arrays.
     """
     both, a, b = joined_means(left, right)
     first, second = moved(left, a), moved(right, b)
@@ -105,6 +111,9 @@ def empty_as_nan(values: np.ndarray, count: np.ndarray, least: int = 1) -> np.nd
         values: (k, ...).
         count: (k,), members at each time.
         least: the least number of members; by default 1.
+
+    Returns:
+        (k, ...), as values.
     """
     few = (count < least).reshape(-1, *[1] * (values.ndim - 1))
     return np.asarray(np.where(few, np.nan, values))

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-# A number that stands by itself: no index in brackets.
+# A number that stands alone, not an index in brackets.
 _NUMBER = re.compile(r"(?<![\w.\[])-?\d+(?:\.\d*)?(?:e[+-]?\d+)?(?![\w.\]])")
-# Of a number or of its exponent: a hyphen between words is none.
+# The minus sign of a number or of its exponent, not a hyphen between words.
 _MINUS = re.compile(r"(?<!\w)-(?=[\d.])|(?<=\de)-(?=\d)")
 
 

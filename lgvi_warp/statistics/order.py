@@ -17,7 +17,7 @@ from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate
 from lgvi_warp.statistics.tree import Part
 from lgvi_warp.statistics.values import Values
 
-# Numbers of sketches: some 50 bytes are needed for each.
+# Values of sketches that are sorted together; each takes some 50 bytes.
 SORTED_AT_ONCE = 2_000_000
 
 
@@ -120,7 +120,7 @@ class Quantiles(Statistic):
     def rows(self, values: Values) -> Part:
         """Return the sketch of the block: its values sorted, and thinned to `size` values where there are more."""
         x = values.filled(np.inf)
-        # Sorting is most of the work, and half as much of numbers half as long.
+        # Sorting is most of the work, and takes half as long in float32.
         x = x.astype(np.float32) if values.single else x
         return {"count": values.count} | sketch.of(x, values.size, self.size, values.block)
 
@@ -162,7 +162,7 @@ class Quantiles(Statistic):
         """Return quantiles, linear between sorted values as np.quantile, with intervals by ranks."""
         n, level = part["count"][:, None], np.array(self.levels)[None, :]
         low, high = intervals.ranks(n, level, self.confidence)
-        # The sketch's own error adds to the ranks' variance.
+        # The variance of the sketch's error adds to that of the ranks.
         binomial = n * level * (1.0 - level)
         more = intervals.normal(self.confidence) * (np.sqrt(binomial + part["variance"][0]) - np.sqrt(binomial))
         ends = ((low - more)[:, :, None], (high + more)[:, :, None])

@@ -21,10 +21,10 @@ from lgvi_warp.statistics.then import Then
 from lgvi_warp.statistics.tree import Part
 from lgvi_warp.statistics.values import Values
 
-# How a member ended: as is asked for; otherwise; not before the end of the run.
+# How a member ended: by the outcome asked for, otherwise, or not before the end of the run.
 SO, OTHERWISE, NOT = 1.0, 2.0, 0.0
 
-# Curves of replicates are compared at so many times at most, besides the sample times.
+# Largest number of times, beside the sample times, at which curves of replicates are compared.
 MOST_TIMES = 4096
 
 
@@ -159,7 +159,7 @@ class Outcome(OfEnds):
         members = int(part["members"].sum())
         ended, otherwise = (np.searchsorted(np.sort(part["time"][kind]), time, "right") for kind in _kinds(part))
         fraction = ended / max(members, 1)
-        # Where nothing else ended before, the product is this fraction but for its round-off.
+        # If no member ended otherwise before, the product equals this fraction except for round-off.
         value = np.where(otherwise == 0, fraction, curve.value[rows, 0]) if members else curve.value[rows, 0]
         low, high = intervals.wilson(fraction, np.full(len(time), members), self.confidence)
         arrays = {"value": value, "lower": np.fmin(lower[rows], value), "upper": np.fmax(upper[rows], value)}
@@ -182,7 +182,7 @@ def _curve(part: Part, at: np.ndarray) -> Curve:
     """Kaplan & Meier's curve at rising times `at` [s]; an end between two of them counts at the second one."""
     so = np.searchsorted(at, part["time"][part["so"]])
     passed = np.bincount(so, minlength=len(at))[: len(at), None]
-    # Who ends otherwise at one of the times is at risk at it, and at no later one.
+    # A member that ends otherwise at one of the times is at risk at that time, and at no later one.
     late = np.searchsorted(at, part["time"][~part["so"]], "right")
     lost = np.bincount(late, minlength=len(at))[: len(at)]
     return Curve(passed, lost, int(part["members"].sum()))

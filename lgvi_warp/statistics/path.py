@@ -19,7 +19,7 @@ class _Walk(Gatherer):
 
     def __init__(self, statistic: OfPath, time: np.ndarray):
         self._statistic, self._time = statistic, time
-        # One row, or one of each replicate.
+        # One row for each replicate; one row without replicates.
         self._state: np.ndarray | None = None
         self._last = np.empty(0)
         self._whole: np.ndarray | None = None
@@ -29,7 +29,7 @@ class _Walk(Gatherer):
         """Take in the samples at these times."""
         rows = (-1, values.replicates)
         samples = values.x.reshape(*rows, *values.x.shape[1:])
-        # One after the other: however many come at once, the bits are the same.
+        # Samples are taken one by one, so that the bits do not depend on how many come at once.
         for t, x in zip(range(when.start, when.stop), samples, strict=True):
             self._state = self._statistic.start(x) if self._state is None else self._stepped(self._state, t, x)
             self._last = x
@@ -67,14 +67,14 @@ class OfPath(Then):
     """
 
     of_numbers: ClassVar[bool] = False
-    # Whether the number is one of the samples.
+    # Whether the path's number is one of its samples, so that float32 holds it exactly.
     of_samples: ClassVar[bool] = False
 
     def open(self, time: np.ndarray, count: int) -> _Walk:
         """Return the object that follows the members of a block."""
         return _Walk(self, time)
 
-    # What a path comes to, of d components of members, (replicates, d, members): from its first sample on.
+    # The reduction of a path, for arrays (replicates, d components, members), from its first sample on.
 
     def start(self, x: np.ndarray) -> np.ndarray:
         """Return the state of the paths after their first sample.
@@ -256,7 +256,7 @@ class PathTime(OfPath, Condition):
             low, high = np.minimum(before, x), np.maximum(before, x)
             over = 1.0 if above is None else _part(high - above, high - low)
             under = 1.0 if below is None else _part(below - low, high - low)
-            # Each point of a line is above the one or below the other, or both.
+            # Each point of the line satisfies at least one of the two limits.
             fraction = np.maximum(over + under - 1.0, 0.0)
         return np.asarray(state + dt * fraction)
 

@@ -55,7 +55,7 @@ def of(x: np.ndarray, members: int, size: int, block: int) -> Part:
     first = coin(-1, block, weight)
     if weight > 1:
         values = np.ascontiguousarray(values[..., first::weight])
-    # Of w values one stays: counts change by -first to w - 1 - first.
+    # One of `weight` values is kept: counts change by -first to weight - 1 - first.
     error = 0.5 * (weight - 1)
     return _part(values, np.full(values.shape[2], weight), error, error**2, error - first)
 

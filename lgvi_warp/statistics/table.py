@@ -110,7 +110,7 @@ _LINES: dict[str, Callable[[Estimate], Iterator[Line]]] = {
     "histogram": _histogram,
 }
 
-# Members that an estimate is of, where that is not its count at the end.
+# Number of members behind an estimate, for types where it is not the count at the end.
 _MEMBERS: dict[str, Callable[[Estimate], int]] = {
     "first_passage": lambda one: int(one.count[0]),
     "outcome": lambda one: int(one.count[0] + one["ended"][0] + one["otherwise"][0]),

@@ -48,7 +48,7 @@ class Then(Statistic):
                 faults.add(f"then[{i}].at", statistic.at, f"says when, and a {self.type} has no time", "leave it out")
         object.__setattr__(self, "then", tuple(statistics))
         if self.of is not None and not faults:
-            with faults.including():  # a limit that is missing is told now, and not by the run
+            with faults.including():  # report a missing limit now, not during the run
                 self.parts()
 
     def then_default(self) -> Sequence[Statistic]:

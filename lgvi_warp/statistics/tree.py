@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-# What a statistic keeps of some members: named arrays.
+# Named arrays that summarise some members for a statistic.
 Part = dict[str, np.ndarray]
 Join = Callable[[Part, Part, tuple[int, int]], Part]
 

@@ -19,7 +19,7 @@ from lgvi_warp.statistics.naming import canonical
 from lgvi_warp.statistics.order import Quantiles
 from lgvi_warp.statistics.quantity import KNOWN
 
-# Looks are made at every block until this share of the members is a block, then whenever so many came to them.
+# After a look, the number of members grows by at least this fraction before the next one.
 GROWTH = 0.05
 
 
@@ -110,7 +110,7 @@ class Watch:
     until: Until
     statistic: Statistic
     name: str
-    # Dimension -> index: which entries along it are watched, all along others.
+    # Dimension -> index of the watched entry; all entries along other dimensions.
     entry: Mapping[str, int]
     rows: np.ndarray
     looked: int = 0
@@ -192,7 +192,7 @@ def watch(until: Until, statistics: Sequence[Statistic], times: np.ndarray) -> W
         target = next(alike, None) or _mean(until.statistic)
     if target is None:
         hint = closest(until.statistic, known or KNOWN)
-        if known and not hint.startswith("did you mean"):  # of all names, those of whole statistics say enough
+        if known and not hint.startswith("did you mean"):  # list the statistics alone, not their components
             hint = closest(until.statistic, dict.fromkeys(name for _, name, _ in known.values()))
         faults.add("statistic", until.statistic, "is none of the run's statistics", hint)
     faults.raise_if_any()

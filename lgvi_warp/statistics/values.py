@@ -55,14 +55,20 @@ class Values:
 
         Args:
             at: (k, d), places along the last axis of `x`.
+
+        Returns:
+            (k, d), indices of members of the run.
         """
         return self.first + at * self.replicates + (np.arange(len(at)) % self.replicates)[:, None]
 
     def filled(self, value: float) -> np.ndarray:
-        """Return x (k, d, n) with a given number where a member does not count.
+        """Return x with a given number where a member does not count.
 
         Args:
             value: the number to fill in.
+
+        Returns:
+            (k, d, n), in the quantity's unit.
         """
         return self.x if self.good is None else np.where(self.good[:, None], self.x, value)
 
@@ -98,5 +104,5 @@ def dealt(x: np.ndarray, good: np.ndarray | None, first: int, block: int, size: 
     rows = np.moveaxis(x.reshape(k, d, n // R, R), 3, 1).reshape(k * R, d, n // R)
     if good is not None:
         good = np.swapaxes(good.reshape(k, n // R, R), 1, 2).reshape(k * R, n // R)
-    # Sums along rows that lie apart would be added in another order, with other bits.
+    # Strided rows would be summed in another order, with other bits.
     return Values(np.ascontiguousarray(rows), good, first, block, size // R, R)

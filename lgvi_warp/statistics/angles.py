@@ -1,4 +1,4 @@
-"""Means of what lives on a circle or on SO(3)."""
+"""Means of quantities on the circle and on SO(3)."""
 
 from __future__ import annotations
 
@@ -19,27 +19,37 @@ from lgvi_warp.statistics.values import Values
 
 @dataclass(frozen=True, eq=False)
 class CircularMean(Statistic):
-    """Mean direction of angles [rad] in (-pi, pi], with the resultant length: value, resultant_length, (k, d).
+    """Mean direction of angles [rad], with the resultant length.
 
-    resultant_length is 1 where all are equal and 0 where they spread over the circle, and has an interval too:
-    resultant_length_lower, _upper. circular_deviation [rad]: sqrt(-2 log of it). Intervals: normal theory (delta method
-    from the covariance of cosine and sine); the whole circle where the resultant is not clear of 0. Of the length that of
-    the logarithm of 1 less it, as of a variance (see Covariance): 0 to 1 of two members.
+    Intervals: normal theory (delta method from the covariance of cosine and sine); the whole circle where the resultant
+    is not clear of 0. For the length it is the interval of the logarithm of 1 less the length, as for a variance (see
+    Covariance); with two members it is 0 to 1.
+
+    Arrays of the estimate, beside lower, upper and count (k,):
+
+    * value (k, d) [rad]: the mean direction, in (-pi, pi].
+    * resultant_length (k, d): 1 where all angles are equal, 0 where they spread over the circle; with its interval
+      resultant_length_lower, resultant_length_upper.
+    * circular_deviation (k, d) [rad]: sqrt(-2 log(resultant_length)).
+    * standard_error (k, d) [rad]: of the mean direction.
+
+    Args:
+        of: a quantity in rad; see `Statistic`, also for name, confidence, stopped and at.
     """
 
     type: ClassVar[str] = "circular_mean"
 
     def rows(self, values: Values) -> Part:
-        """Moments of cosines and sines."""
+        """Return the moments of cosines and sines."""
         d = values.x.shape[1]
         both = Values(np.concatenate([np.cos(values.x), np.sin(values.x)], axis=1), values.good)
         c, s = both.centred[:, :d], both.centred[:, d:]
-        found = {"count": both.count, "mean": both.mean}
+        moments = {"count": both.count, "mean": both.mean}
         pairs = {"cc": (c, c), "cs": (c, s), "ss": (s, s)}
-        return found | {key: np.einsum("kdn,kdn->kd", *pair) for key, pair in pairs.items()}
+        return moments | {key: np.einsum("kdn,kdn->kd", *pair) for key, pair in pairs.items()}
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """Moments about the common mean."""
+        """Join the moments about the common mean."""
         both, *shifts = joined_means(left, right)
         d = left["cc"].shape[1]
         for key, i, j in (("cc", 0, 0), ("cs", 0, d), ("ss", d, d)):
@@ -51,7 +61,7 @@ class CircularMean(Statistic):
         return both
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """atan2 of the mean sine and cosine; its error from their covariance along and across the mean direction."""
+        """Return atan2 of the mean sine and cosine; its error follows from their covariance about that direction."""
         count, d = part["count"], part["cc"].shape[1]
         n = count[:, None]
         C, S = empty_as_nan(part["mean"], count)[:, :d], empty_as_nan(part["mean"], count)[:, d:]
@@ -63,10 +73,10 @@ class CircularMean(Statistic):
         across = np.sqrt(np.maximum(v * v * cc - 2.0 * u * v * cs + u * u * ss, 0.0))
         along = np.sqrt(np.maximum(u * u * cc + 2.0 * u * v * cs + v * v * ss, 0.0))
         arrays = {"value": np.arctan2(S, C), "resultant_length": length}
-        # The angles' spread about their own mean, as of a variance: 1 - cos of small angles is half their square.
+        # 1 - cos of small angles is half their square: 1 - length is treated as a variance.
         least, some = np.maximum(n - 1, 1), np.maximum(n, 1)
         wide = np.sqrt(along**2 + 3.0 * length * (1.0 - length) ** 2 / (some * least)) * (some / least)
-        factors = (intervals.student(one, self.confidence) for one in (n, n - 1))
+        factors = (intervals.student(size, self.confidence) for size in (n, n - 1))
         arrays |= self._ends(arrays["value"], length, (across, along, wide), *factors)
         arrays |= {"circular_deviation": np.sqrt(-2.0 * np.log(np.clip(length, 1e-300, 1.0))), "count": count}
         return estimate(self, "delta method on the circle", component_dims(*list(arrays)[:-1]), arrays, time)
@@ -79,62 +89,79 @@ class CircularMean(Statistic):
         factor: np.ndarray,
         factor_of_length: np.ndarray,
     ) -> dict[str, np.ndarray]:
-        """Intervals from the errors of the mean of (cosine, sine), across and along its direction, and of its length."""
+        """Intervals of the mean direction and of the resultant length.
+
+        Args:
+            value: (k, d) [rad], the mean direction.
+            length: (k, d), the resultant length.
+            errors: standard errors (k, d) of the mean of (cosine, sine) across and along its direction, and of its
+                length.
+            factor: number of standard errors in half an interval of the direction.
+            factor_of_length: the same of the length.
+        """
         across, along, wide = errors
         error = across / np.where(length > 0.0, length, 1.0)
         clear = np.isfinite(factor) & (np.where(np.isfinite(factor), factor, 0.0) * np.maximum(across, along) < length)
         half = np.where(clear, np.minimum(np.where(clear, factor, 0.0) * error, np.pi), np.pi)
         high, low = (1.0 - end for end in intervals.of_logarithm(1.0 - length, wide, factor_of_length))
-        found = {"lower": value - half, "upper": value + half, "standard_error": error}
-        return found | {"resultant_length_lower": np.fmax(low, 0.0), "resultant_length_upper": np.fmin(high, 1.0)}
+        arrays = {"lower": value - half, "upper": value + half, "standard_error": error}
+        return arrays | {"resultant_length_lower": np.fmax(low, 0.0), "resultant_length_upper": np.fmin(high, 1.0)}
 
     def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
-        """The delta method again, with the covariance of the mean that the replicates' means have."""
-        turned = np.stack([one.value for one in each]) - whole.value
-        length = np.stack([one["resultant_length"] for one in each])
+        """Apply the delta method with the covariance of the mean that follows from the replicates' means."""
+        turned = np.stack([replicate.value for replicate in each]) - whole.value
+        length = np.stack([replicate["resultant_length"] for replicate in each])
         across, along = (
-            intervals.of_replicates(length * part, self.confidence)[0] for part in (np.sin(turned), np.cos(turned))
+            intervals.of_replicates(length * projection, self.confidence)[0]
+            for projection in (np.sin(turned), np.cos(turned))
         )
         factor = intervals.student(np.array(len(each)), self.confidence)
-        found = self._ends(whole.value, whole["resultant_length"], (across, along, along), factor, factor)
-        return whole.with_interval(f"delta method on the circle, Student's t of {len(each)} replicates", found)
+        arrays = self._ends(whole.value, whole["resultant_length"], (across, along, along), factor, factor)
+        return whole.with_interval(f"delta method on the circle, Student's t of {len(each)} replicates", arrays)
 
 
 @dataclass(frozen=True, eq=False)
 class MeanAttitude(Statistic):
-    """The rotation nearest the mean of the members' attitudes (chordal mean, Moakher 2002): value (k, 3, 3).
+    """The rotation nearest to the mean of the members' attitudes (chordal mean, Moakher 2002).
 
-    dispersion (k,) [rad]: sqrt(mean of |R - value|^2 / 2), the root mean square angle where angles are small. covariance
-    (k, 3, 3) [rad^2]: of v in R = value exp(hat(v)), body axes, to first order. rotation_half_width (k, 3) [rad]: of the
-    interval of the mean, about each body axis. lower, upper: that for each entry of the matrix, to first order.
+    Arrays of the estimate, beside count (k,):
+
+    * value (k, 3, 3): the mean rotation; lower, upper: the interval of each entry, to first order.
+    * dispersion (k,) [rad]: sqrt(mean of |R - value|^2 / 2), the root mean square angle where angles are small.
+    * covariance (k, 3, 3) [rad^2]: of v in R = value exp(hat(v)), in body axes, to first order.
+    * rotation_half_width (k, 3) [rad]: half the width of the mean's interval about each body axis.
+    * standard_error (k, 3) [rad]: of the mean about each body axis.
+
+    Args:
+        of: "attitude", the default; see `Statistic` for name, confidence, stopped and at.
     """
 
     type: ClassVar[str] = "mean_attitude"
     default: ClassVar[str] = "attitude"
 
     def check(self, faults: Faults) -> None:
-        """It is of the attitude, and of nothing else."""
+        """Note a fault if `of` is not the attitude."""
         if self.of != "attitude":
             faults.add("of", self.of, "is no attitude", 'leave it out, or give "attitude"')
 
     @property
     def key(self) -> str:
-        """mean_attitude, if no name was given."""
+        """The name that was given, or "mean_attitude"."""
         return self.name or self.type
 
     def rows(self, values: Values) -> Part:
-        """Mean and covariance of the nine entries."""
+        """Return mean and covariance of the nine entries of the matrix."""
         return {"count": values.count, "mean": values.mean, "m11": sums(values.centred, values.centred)}
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """Moments about the common mean."""
+        """Join the moments about the common mean."""
         both, a, b = joined_means(left, right)
         n, m = left["count"][:, None, None], right["count"][:, None, None]
         shifted = (left["m11"] + n * a[:, :, None] * a[:, None], right["m11"] + m * b[:, :, None] * b[:, None])
         return both | {"m11": shifted[0] + shifted[1]}
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Polar part of the mean M = R S; a change dM turns R by (tr(S) I - S)^-1 vee(R^T dM - dM^T R)."""
+        """Return the polar part R of the mean M = R S; a change dM turns R by (tr(S) I - S)^-1 vee(R^T dM - dM^T R)."""
         count = part["count"]
         few = (count < 1)[:, None, None]
         M = np.where(few, np.eye(3), part["mean"].reshape(-1, 3, 3))
@@ -146,13 +173,13 @@ class MeanAttitude(Statistic):
         S = np.swapaxes(R, 1, 2) @ M
         trace = np.einsum("kii->k", S)
         spread = trace[:, None, None] * np.eye(3) - 0.5 * (S + np.swapaxes(S, 1, 2))
-        # Turns that the mean leaves open, where attitudes spread over all of SO(3), have no finite error.
+        # Where attitudes spread over all of SO(3) the mean leaves some turns undetermined: their error is infinite.
         known = np.linalg.eigvalsh(spread)[:, 0] > 1e-9
         inverse = np.linalg.inv(np.where(known[:, None, None], spread, np.eye(3)))
         vee = np.zeros((3, 3, 3))
         for i, (j, k) in enumerate(((2, 1), (0, 2), (1, 0))):
             vee[i, j, k], vee[i, k, j] = 1.0, -1.0
-        # q_i = sum of vee[i, j, k] (R^T X)_jk, X an attitude; then turned into the angle about each axis.
+        # q_i = sum of vee[i, j, k] (R^T X)_jk for an attitude X; `inverse` converts q to angles about the axes.
         to_angle = (inverse @ np.einsum("ijk,tlj->tilk", vee, R).reshape(-1, 3, 9)).reshape(-1, 3, 9)
         n = np.maximum(count - 1, 1)[:, None, None]
         covariance = to_angle @ (part["m11"] / n) @ np.swapaxes(to_angle, 1, 2)
@@ -170,31 +197,31 @@ class MeanAttitude(Statistic):
         return estimate(self, "delta method on SO(3)", dims, arrays, time, axes, labels=())
 
     def _ends(self, R: np.ndarray, turn: np.ndarray, known: np.ndarray, factor: np.ndarray) -> dict[str, np.ndarray]:
-        """Intervals from the covariance (k, 3, 3) of the mean's small turns, where it is known (k,)."""
+        """Intervals from the covariance `turn` (k, 3, 3) [rad^2] of small turns of the mean, where it is known."""
         error = np.where(known[:, None], np.sqrt(np.maximum(np.einsum("kii->ki", turn), 0.0)), np.inf)
         some = known & np.isfinite(factor)
         t = np.where(some, factor, 0.0)
         half = np.where(some[:, None], t[:, None] * np.where(known[:, None], error, 0.0), np.pi)
         reach = np.where(some[:, None, None], t[:, None, None] * self._entries(R, turn), 2.0)
-        found = {"lower": R - reach, "upper": R + reach}
-        return found | {"rotation_half_width": np.minimum(half, np.pi), "standard_error": error}
+        arrays = {"lower": R - reach, "upper": R + reach}
+        return arrays | {"rotation_half_width": np.minimum(half, np.pi), "standard_error": error}
 
     def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
-        """The same from the turns of the replicates' means from that of all."""
-        X = np.swapaxes(whole.value, 1, 2) @ np.stack([one.value for one in each])
-        # v of X = exp(hat(v)), but for a third power of its length.
+        """Form the intervals from the turns of the replicates' means relative to the mean of all members."""
+        X = np.swapaxes(whole.value, 1, 2) @ np.stack([replicate.value for replicate in each])
+        # v of X = exp(hat(v)), with an error of third order in its length.
         v = 0.5 * np.stack([X[..., j, i] - X[..., i, j] for i, j in ((1, 2), (2, 0), (0, 1))], axis=-1)
         v = v - v.mean(axis=0)
         n = len(each)
         turn = np.einsum("rki,rkj->kij", v, v) / (n * (n - 1))
         known = np.isfinite(whole["standard_error"]).all(axis=1) & np.isfinite(turn).all(axis=(1, 2))
         factor = np.full(len(turn), intervals.student(np.array(n), self.confidence))
-        found = self._ends(whole.value, np.where(known[:, None, None], turn, 0.0), known, factor)
-        return whole.with_interval(f"rotations' Student's t of {n} replicates", found)
+        arrays = self._ends(whole.value, np.where(known[:, None, None], turn, 0.0), known, factor)
+        return whole.with_interval(f"rotations' Student's t of {n} replicates", arrays)
 
     @staticmethod
     def _entries(R: np.ndarray, turn: np.ndarray) -> np.ndarray:
-        """Standard error of each entry of R under a small turn of this covariance (k, 3, 3): R hat(v)."""
+        """Standard error of each entry of R; `turn` (k, 3, 3) [rad^2] is the covariance of v in the change R hat(v)."""
         hats = np.zeros((3, 3, 3))
         for i, (j, k) in enumerate(((2, 1), (0, 2), (1, 0))):
             hats[i, j, k], hats[i, k, j] = 1.0, -1.0

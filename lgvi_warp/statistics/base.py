@@ -1,4 +1,9 @@
-"""What every statistic has: what it is of, its name, and how blocks' parts of it are made, joined and read."""
+"""The base class of all statistics, and the tables that scene files give them as.
+
+A block of members is reduced to a part: named arrays that summarise these members. Parts of blocks are joined pairwise
+(see `tree`), and the joined parts are read as estimates. Shapes: k sample times, d components of a quantity, n members,
+R replicates of a sampling design.
+"""
 
 from __future__ import annotations
 
@@ -21,37 +26,47 @@ from lgvi_warp.statistics.values import Values
 
 STOPPED = ("held", "left_out")
 
-# The types of a scene file.
+# Statistics by their type in a scene file; each class adds itself.
 TYPES: dict[str, type[Statistic]] = {}
 
 
 class Gatherer:
-    """What gathers a statistic of one block. Abstract."""
+    """Reduces the samples of one block of members to a part. Abstract."""
 
     def take(self, values: Values, when: slice) -> None:
-        """Take in the values of these sample times: each time once, in order."""
+        """Take in the values at some sample times.
+
+        Args:
+            values: the quantity of the block's members at these times.
+            when: slice of the run's sample times. Each time is taken once, in order.
+        """
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def end(self, ends: Ends, replicates: int) -> None:
-        """Take in how and when the block's members ended, after the last sample; members are of so many replicates."""
+        """Take in how and when the block's members ended, after the last sample.
+
+        Args:
+            ends: the ends of the block's members.
+            replicates: number R of replicates; member i belongs to replicate i mod R.
+        """
 
     def close(self) -> Part:
-        """The part of the block."""
+        """Return the part that summarises the block."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
 
 class Rows(Gatherer):
-    """Of a block: one row of each array for each sample time, made when the samples come."""
+    """Gathers one row of each array for each sample time, as the samples come."""
 
     def __init__(self, statistic: Statistic):
         self._statistic, self._rows = statistic, list[Part]()
 
     def take(self, values: Values, when: slice) -> None:
-        """Make the rows of these times."""
+        """Make the rows of these sample times."""
         self._rows.append(self._statistic.rows(values))
 
     def close(self) -> Part:
-        """The rows of all times."""
+        """Return the rows of all sample times, joined along the first axis."""
         first = self._rows[0]
         shared = self._statistic.shared
         return {
@@ -61,26 +76,32 @@ class Rows(Gatherer):
 
 @dataclass(frozen=True, eq=False)
 class Statistic:
-    """A statistic over members, at every sample time.
+    """A statistic over members at every sample time. Abstract.
 
-    of: a quantity (see lw.Quantity): "position", "position[2]", "depth", "speed", "euler[0]", "energy", ..., a function of
-    (samples, members), or a list of these taken together. name: what the result calls it, by default its type and
-    what it is of. confidence: of its intervals. stopped: whether a member that an event stopped counts with the state that
-    it stopped in ("held"), or not from then on ("left_out"). Members that failed are left out from their failure on.
-    at: an outcome ("floor", any event's name, "stopped"): the statistic is of the members that ended so, each in the state
-    that it ended in, and has one row.
+    Members that failed are left out from their failure on.
 
-    Raises SceneError naming every fault.
+    Args:
+        of: a quantity (see lw.Quantity): "position", "position[2]", "depth", "speed", "euler[0]", "energy", ..., a
+            function of (samples, members), or a list of these taken together.
+        name: key of the estimate in the result; by default the type and the quantity, as in "mean position".
+        confidence: confidence level of the intervals, between 0 and 1; by default 0.95.
+        stopped: whether a member that an event stopped counts with the state that it stopped in ("held", the default),
+            or not from then on ("left_out").
+        at: an outcome ("floor", the name of an event, or "stopped"). The statistic is then over the members that ended
+            so, each in its final state, and has one row. By default None: all sample times.
+
+    Raises:
+        SceneError: with every fault.
     """
 
     type: ClassVar[str] = ""
-    # Arrays of a part that have no row for each time.
+    # Names of a part's arrays that are the same for all sample times.
     shared: ClassVar[frozenset[str]] = frozenset()
-    # What it is of where nothing is said; None: it must be said.
+    # Value of `of` where none is given; None: it must be given.
     default: ClassVar[str | None] = None
-    # Whether it is of numbers of members, one for each, whenever they are of.
+    # Whether it reads one number of each member at one time, so that it can follow a path or an end.
     of_numbers: ClassVar[bool] = True
-    # Whether it is of how members end, not of samples.
+    # Whether it reads how members end instead of samples.
     of_ends: ClassVar[bool] = False
 
     of: Any = None
@@ -115,126 +136,216 @@ class Statistic:
         faults.raise_if_any()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Made anew in another process from what was said of it: functions are found by their names there."""
-        return _made, (type(self), {one.name: getattr(self, one.name) for one in fields(self)})
+        """Pickle the arguments alone: the other process makes the statistic anew, and finds functions by name."""
+        return _made, (type(self), {argument.name: getattr(self, argument.name) for argument in fields(self)})
 
     def check(self, faults: Faults) -> None:
-        """Note what else is wrong."""
+        """Note faults in the arguments that the class adds to these.
+
+        Args:
+            faults: the list that faults are added to.
+        """
 
     def meant(self) -> Quantity:
-        """The quantity that `of` means. Raises SceneError."""
+        """Return the quantity that `of` names.
+
+        Raises:
+            SceneError: `of` names no quantity.
+        """
         return quantity(f"{self.type}.of", self.of)
 
     @property
     def quantity(self) -> Quantity:
-        """What it is of. Raises SceneError where nothing was said."""
-        found: Quantity | None = getattr(self, "_quantity", None)
-        if found is None:
+        """The quantity that the statistic is of.
+
+        Raises:
+            SceneError: `of` was not given.
+        """
+        meaning: Quantity | None = getattr(self, "_quantity", None)
+        if meaning is None:
             raise SceneError(
                 [f"{self.type}.of = None: is missing; say what it is of: lw.{type(self).__name__}('depth')"]
             )
-        return found
+        return meaning
 
     @property
     def key(self) -> str:
-        """What the result calls it."""
+        """The name of the estimate in the result."""
         return self.name or f"{self.type} {self.quantity.name}{self.at_text}"
 
     @property
     def at_text(self) -> str:
-        """What comes last in its name: " at floor"."""
+        """The end of the name that says the outcome: " at floor", or ""."""
         return "" if self.at is None else f" at {self.at}"
 
     @property
     def at_end(self) -> bool:
-        """Whether it is gathered when it is known how the members of a block ended."""
+        """Whether it is gathered only when the ends of a block's members are known."""
         return self.of_ends or self.at is not None
 
     @property
     def outcomes(self) -> tuple[str, ...]:
-        """Names of the outcomes that it is of."""
+        """Names of the outcomes that the statistic refers to."""
         return () if self.at is None else (self.at,)
 
     def at_ends(self, ends: Ends, last: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
-        """Its numbers (1, d, n) at the members' ends, and which count (1, n).
+        """Return the numbers that the statistic takes from the members' ends.
 
-        last: (1, d, n), its quantity at the last sample: where a stopped member stands from its event on.
+        Args:
+            ends: the ends of n members.
+            last: (1, d, n), the quantity at the last sample time, where a stopped member holds the state that it
+                stopped in; None where the statistic needs no samples.
+
+        Returns:
+            Numbers (1, d, n), and which members count (1, n); None in place of the latter if all do.
         """
         assert self.at is not None and last is not None
         return last, ends.are(self.at)[None]
 
     def over(self, time: np.ndarray) -> Statistic:
-        """The statistic for a run of these sample times (k,) [s], where that makes a difference."""
+        """Return the statistic with all settings that depend on the run's sample times filled in.
+
+        Args:
+            time: (k,) [s], the run's sample times.
+        """
         return self
 
     def parts(self) -> tuple[Statistic, ...]:
-        """The statistics that its estimates are of: itself, or those of what it makes of each member's path."""
+        """Return the statistics that its estimates are of: itself, or those that `then` lists."""
         return (self,)
 
     def open(self, time: np.ndarray, count: int) -> Gatherer:
-        """What gathers a block of `count` members over all sample times (k,) [s]."""
+        """Return the object that gathers one block of members.
+
+        Args:
+            time: (k,) [s], all sample times of the run.
+            count: number of members of the block.
+        """
         return Rows(self)
 
     def rows(self, values: Values) -> Part:
-        """Arrays with one row for each time of the values."""
+        """Return the part of a block at some sample times: arrays with one row for each time.
+
+        Args:
+            values: the quantity of the block's members at these times.
+        """
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """Of two runs of blocks, of both; place: level and number in the tree of blocks."""
+        """Return the part of two neighbouring sets of members together.
+
+        Args:
+            left: part of the members that come first.
+            right: part of the members that follow.
+            place: (level, index) of the joined part in the tree of blocks; (-1, 0) outside the tree.
+        """
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def whole(self, parts: Sequence[Part]) -> Part:
-        """Of everything, from parts in the order of the blocks, the later ones of fewer members."""
+        """Return the part of all members.
+
+        Args:
+            parts: parts in the order of the blocks, the later ones of fewer members.
+        """
         return reduce(lambda right, left: self.join(left, right, (-1, 0)), reversed(parts))
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """The statistic and its interval at each time (k,) [s]."""
+        """Return the statistic with its interval at each sample time.
+
+        Args:
+            part: the part of all members.
+            time: (k,) [s], the sample times.
+        """
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
-        """What it says."""
+        """Return the estimates of a run whose members are independent.
+
+        Args:
+            parts: parts in the order of the blocks.
+            time: (k,) [s], the sample times.
+
+        Returns:
+            One estimate for each statistic of `self.parts()`.
+        """
         return [self.read(self.whole(parts), time)]
 
-    # Members of R replicates: each array of a part then has R rows for one, those of a time side by side.
+    # With R replicates each array of a part has R rows for each sample time, side by side.
 
     def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
-        """The part of one replicate's members."""
+        """Return the part of the members of one replicate.
+
+        Args:
+            part: a part with R rows for each sample time, one for each replicate.
+            replicate: index of the replicate, from 0.
+            replicates: number R of replicates.
+        """
         return {key: a if key in self.shared else a[replicate::replicates] for key, a in part.items()}
 
     def each_replicate(self, parts: Sequence[Part], replicates: int) -> list[list[Part]]:
-        """The parts of each replicate's members."""
+        """Return, for each replicate, the parts of its members.
+
+        Args:
+            parts: parts in the order of the blocks, with R rows for each sample time.
+            replicates: number R of replicates.
+        """
         return [[self.of_replicate(part, r, replicates) for part in parts] for r in range(replicates)]
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
-        """What it says where members are of so many independent replicates: values of all, intervals from their spread."""
+        """Return the estimates of a run of independent replicates: their intervals are from the replicates' spread.
+
+        Args:
+            parts: parts in the order of the blocks, with R rows for each sample time.
+            time: (k,) [s], the sample times.
+            replicates: number R of replicates.
+
+        Returns:
+            One estimate for each statistic of `self.parts()`.
+        """
         each = self.each_replicate(parts, replicates)
-        (whole,) = self.estimates(together(each), time)
-        return [self.spread(whole, [self.estimates(own, time)[0] for own in each])]
+        (overall,) = self.estimates(together(each), time)
+        return [self.spread(overall, [self.estimates(replicate_parts, time)[0] for replicate_parts in each])]
 
     def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
-        """The estimate of all members with the interval that the replicates' estimates give: Student's t."""
-        error, half = intervals.of_replicates(np.stack([one.value for one in each]), self.confidence)
-        found = {"lower": whole.value - half, "upper": whole.value + half}
-        found |= {"standard_error": error} if "standard_error" in whole.arrays else {}
-        return whole.with_interval(f"Student's t of {len(each)} replicates", found)
+        """Return the estimate of all members with Student's t interval from the replicates' estimates.
+
+        Args:
+            whole: the estimate of all members.
+            each: the estimate of each replicate.
+        """
+        error, half = intervals.of_replicates(np.stack([replicate.value for replicate in each]), self.confidence)
+        arrays = {"lower": whole.value - half, "upper": whole.value + half}
+        arrays |= {"standard_error": error} if "standard_error" in whole.arrays else {}
+        return whole.with_interval(f"Student's t of {len(each)} replicates", arrays)
 
     def to_dict(self) -> dict[str, Any]:
-        """As in a scene file: type, of, and what differs from the defaults; a function by its name."""
+        """Return the scene file's table of this statistic: its type, `of`, and what differs from the defaults.
+
+        A function is given by its name.
+        """
         content: dict[str, Any] = {"type": self.type}
-        for one in fields(self):
-            value = getattr(self, one.name)
-            default = None if one.default is MISSING else one.default
+        for argument in fields(self):
+            value = getattr(self, argument.name)
+            default = None if argument.default is MISSING else argument.default
             if value is not None and plain(value) != plain(default):
-                content[one.name] = plain(value)
+                content[argument.name] = plain(value)
         return content
 
     def alone(self, i: int) -> Quantity:
-        """One component of what it is of."""
+        """Return one component of the quantity.
+
+        Args:
+            i: index of the component.
+        """
         return component(self.quantity, i)
 
 
 def together(each: Sequence[Sequence[Part]]) -> list[Part]:
-    """The parts of all replicates, in the order of the blocks."""
+    """Return the parts of all replicates in the order of the blocks.
+
+    Args:
+        each: the parts of each replicate.
+    """
     return [part for parts in zip(*each, strict=True) for part in parts]
 
 
@@ -243,11 +354,15 @@ def _made(kind: type[Statistic], given: dict[str, Any]) -> Statistic:
 
 
 def plain(value: Any) -> Any:
-    """A value as TOML and JSON have it."""
+    """Return a value as TOML and JSON can hold it: lists for arrays, tables for statistics, names for functions.
+
+    Args:
+        value: a value of a statistic's argument.
+    """
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if isinstance(value, list | tuple):
-        return [plain(one) for one in value]
+        return [plain(item) for item in value]
     if isinstance(value, Statistic):
         return value.to_dict()
     if isinstance(value, Quantity):
@@ -256,32 +371,42 @@ def plain(value: Any) -> Any:
 
 
 def from_list(given: Any, key: str = "statistics", *, whole: bool = True) -> tuple[Statistic, ...]:
-    """Statistics from tables of a scene file or Statistic objects. Raises SceneError naming every fault.
+    """Return statistics from tables of a scene file, from `Statistic` objects, or from a mix of both.
 
-    whole: each must say what it is of, and have a name of its own.
+    Args:
+        given: a list of tables and objects.
+        key: name of the list in messages; by default "statistics".
+        whole: whether names must differ, which needs each statistic to say what it is of; by default True.
+
+    Raises:
+        SceneError: with every fault.
     """
     if isinstance(given, str | Mapping | Statistic) or not isinstance(given, Sequence):
         example = 'write [[run.statistics]] and type = "mean" below, or statistics=[lw.Mean("position")]'
         raise SceneError([f"{key} = {shown(given)}: is no list; {example}"])
-    faults, found = Faults(), list[Statistic]()
-    for i, one in enumerate(given):
+    faults, statistics = Faults(), list[Statistic]()
+    for i, entry in enumerate(given):
         with faults.including():
-            found.append(_one(f"{key}[{i}]", one))
+            statistics.append(_from_table(f"{key}[{i}]", entry))
     if whole and not faults:
         names: list[str] = []
-        for one in found:
+        for statistic in statistics:
             with faults.including():
-                names += [part.key for part in one.parts()]
+                names += [inner.key for inner in statistic.parts()]
         for name in sorted({name for name in names if names.count(name) > 1}):
             faults.add(
                 key, name, f"is the name of {names.count(name)} statistics", "give each a name of its own: name=..."
             )
     faults.raise_if_any()
-    return tuple(found)
+    return tuple(statistics)
 
 
-def _one(where: str, given: Any) -> Statistic:
-    """A statistic from its table, or as it is. Raises SceneError naming every fault."""
+def _from_table(where: str, given: Any) -> Statistic:
+    """Return the statistic of a table, or the statistic itself.
+
+    Raises:
+        SceneError: with every fault of the table.
+    """
     if isinstance(given, Statistic):
         return given
     if not isinstance(given, Mapping):
@@ -294,7 +419,7 @@ def _one(where: str, given: Any) -> Statistic:
         raise SceneError([f"{where}.type = {shown(word)}: is not known; {closest(str(word), TYPES)}"])
     faults = Faults()
     table = {name: value for name, value in given.items() if name != "type"}
-    faults.keys(where, table, [one.name for one in dataclasses.fields(kind)])
+    faults.keys(where, table, [argument.name for argument in dataclasses.fields(kind)])
     faults.raise_if_any()
     try:
         return kind(**table)

@@ -1,4 +1,4 @@
-"""What is counted: histograms, probabilities that a condition holds, times until it first does."""
+"""Statistics that count members: histograms, probabilities of a condition, and times of its first passage."""
 
 from __future__ import annotations
 
@@ -21,31 +21,48 @@ from lgvi_warp.statistics.values import Values
 
 
 class Counted(Statistic):
-    """Of whole numbers, which add up: the same in any order."""
+    """A statistic whose part is whole numbers: these add up to the same in any order."""
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """The sums."""
+        """Add the counts of both sets of members."""
         return {key: left[key] + right[key] for key in left}
 
     def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
-        """Wilson's interval with the variance of the replicates' fractions."""
+        """Form Wilson's interval with the variance of the replicates' fractions."""
         count = whole.count.reshape(-1, *[1] * (whole.value.ndim - 1))
-        fractions = np.stack([one.value for one in each])
+        fractions = np.stack([replicate.value for replicate in each])
         lower, upper = intervals.probability_of_replicates(whole.value, fractions, count, self.confidence)
         return whole.with_interval(by_replicates(len(each)), {"lower": lower, "upper": upper})
 
 
 def by_replicates(number: int) -> str:
-    """How an interval of a probability was formed."""
+    """Return the text that says how an interval of a probability was formed.
+
+    Args:
+        number: number of replicates.
+    """
     return f"Wilson with the variance and Student's t of {number} replicates"
 
 
 @dataclass(frozen=True, eq=False)
 class Histogram(Counted):
-    """Fraction of members in each bin: value (k, d, bins); counts; below and above the edges (k, d).
+    """Fraction of members in each bin, with Wilson's interval for each bin.
 
-    edges: rising; or bins and limits=(low, high) for equal bins; limits="run": from the first to the last sample time, for
-    times (see EndTime). A bin holds its lower edge, the last one its upper edge too. Interval: Wilson's, for each bin.
+    A bin contains its lower edge; the last bin contains its upper edge too. Give either `edges`, or `bins` and
+    `limits`.
+
+    Arrays of the estimate, beside lower, upper and count (k,):
+
+    * value (k, d, bins): fraction of the members.
+    * counts (k, d, bins): number of members.
+    * below, above (k, d): number of members outside the edges.
+
+    Args:
+        of: a quantity; see `Statistic`, also for name, confidence, stopped and at.
+        edges: rising edges of the bins, in the quantity's unit.
+        bins: number of equal bins.
+        limits: (low, high) of equal bins, in the quantity's unit; or "run", from the first to the last sample time, for
+            statistics of times (see EndTime).
     """
 
     type: ClassVar[str] = "histogram"
@@ -55,7 +72,7 @@ class Histogram(Counted):
     limits: Any = None
 
     def check(self, faults: Faults) -> None:
-        """Edges must rise."""
+        """Note faults of edges, bins and limits."""
         if self.edges is not None and self.bins is not None:
             faults.add("edges", self.edges, "and bins are both given", "keep one of them")
             return
@@ -80,13 +97,13 @@ class Histogram(Counted):
         object.__setattr__(self, "_edges", edges)
 
     def over(self, time: np.ndarray) -> Histogram:
-        """With edges."""
+        """Return the histogram with edges, where its limits are those of the run."""
         if not isinstance(self.limits, str):
             return self
         return replace(self, edges=np.linspace(time[0], time[-1], (self.bins or 0) + 1), bins=None, limits=None)
 
     def rows(self, values: Values) -> Part:
-        """Counts of the block."""
+        """Count the block's members in each bin."""
         edges: np.ndarray = self._edges  # type: ignore[attr-defined]
         k, d, _ = values.x.shape
         # 0: below; 1 to B: bins; B + 1: above. The last edge belongs to the last bin.
@@ -103,7 +120,7 @@ class Histogram(Counted):
         return np.repeat(values.good[:, None], d, axis=1)
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Fractions of the members that count."""
+        """Return the fractions of the members that count, with their intervals."""
         edges: np.ndarray = self._edges  # type: ignore[attr-defined]
         count, counts = part["count"], part["counts"]
         n = count[:, None, None]
@@ -120,19 +137,22 @@ class Histogram(Counted):
 
 @dataclass(frozen=True, eq=False)
 class Condition(Statistic):
-    """A quantity above or below a number, or with both between them, above < x < below.
+    """A statistic with a condition: a quantity above a number, below one, or between two: above < x < below.
 
-    With neither, where a function is not 0, which so may say true or false; a quantity by name wants a number.
+    Args:
+        above: one number, or one for each component, in the quantity's unit; None (the default): no limit.
+        below: the same for the upper limit. With neither, the condition holds where a function is not 0, so that a
+            function may return true or false; a quantity by name needs a number.
     """
 
     above: Any = None
     below: Any = None
 
     def check(self, faults: Faults) -> None:
-        """Numbers that leave something between them."""
+        """Note limits that are no numbers, are missing, or leave nothing between them."""
         super().check(faults)
-        found = getattr(self, "_quantity", None)
-        fits, limits = (1,) if found is None else (1, found.size), list[np.ndarray]()
+        quantity = getattr(self, "_quantity", None)
+        fits, limits = (1,) if quantity is None else (1, quantity.size), list[np.ndarray]()
         for name in ("above", "below"):
             if getattr(self, name) is not None:
                 limit = faults.finite(name, getattr(self, name))
@@ -143,53 +163,70 @@ class Condition(Statistic):
         if len(limits) == 2 and not np.all(limits[0] < limits[1]):
             both = self.above, self.below
             faults.add("above and below", both, "leave nothing between them", "give above < below, or one of them")
-        if found is not None and self.above is None and self.below is None and found.needs_limit:
-            unit = f" [{found.unit}]" if found.unit else ""
+        if quantity is not None and self.above is None and self.below is None and quantity.needs_limit:
+            unit = f" [{quantity.unit}]" if quantity.unit else ""
             remedy = f"give above=... or below=...{unit}, or a function that says true or false"
-            faults.add("above", None, f"and below are missing: {found.name} is compared with nothing", remedy)
+            faults.add("above", None, f"and below are missing: {quantity.name} is compared with nothing", remedy)
 
     @property
     def key(self) -> str:
-        """What the result calls it: "exceedance depth above 50", "exceedance depth above 1 below 2"."""
+        """The name in the result: "exceedance depth above 50", "exceedance depth above 1 below 2"."""
         return self.name or f"{self.type} {self.quantity.name}{self.limits_text}{self.at_text}"
 
     @property
     def limits_text(self) -> str:
-        """What comes after the quantity: " above 50"."""
-        given = ((word, getattr(self, word)) for word in ("above", "below"))
-        return "".join(f" {word} {spelled(limit)}" for word, limit in given if limit is not None)
+        """The part of the name that says the limits: " above 50"."""
+        bounds = ((word, getattr(self, word)) for word in ("above", "below"))
+        return "".join(f" {word} {spelled(limit)}" for word, limit in bounds if limit is not None)
 
     def limits(self, d: int) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """above and below as (d, 1), for each of d components; None where there is none."""
-        given = (None if one is None else np.asarray(one, np.float64) for one in (self.above, self.below))
-        above, below = (None if one is None else np.broadcast_to(one.reshape(-1, 1), (d, 1)) for one in given)
+        """Return the limits as arrays.
+
+        Args:
+            d: number of components.
+
+        Returns:
+            above and below, (d, 1) each; None where there is no limit.
+        """
+        bounds = (None if bound is None else np.asarray(bound, np.float64) for bound in (self.above, self.below))
+        above, below = (None if bound is None else np.broadcast_to(bound.reshape(-1, 1), (d, 1)) for bound in bounds)
         return above, below
 
     def holds(self, values: Values) -> np.ndarray:
-        """(k, d, n): for which members that count it holds."""
+        """Return where the condition holds.
+
+        Args:
+            values: numbers of n members at k times.
+
+        Returns:
+            (k, d, n); false where a member does not count.
+        """
         above, below = self.limits(values.x.shape[1])
         if below is None:
-            found = values.x != 0.0 if above is None else values.x > above
+            mask = values.x != 0.0 if above is None else values.x > above
         else:
-            found = values.x < below if above is None else (values.x > above) & (values.x < below)
-        return found if values.good is None else found & values.good[:, None]
+            mask = values.x < below if above is None else (values.x > above) & (values.x < below)
+        return mask if values.good is None else mask & values.good[:, None]
 
 
 @dataclass(frozen=True, eq=False)
 class Exceedance(Condition, Counted):
-    """Probability that a quantity is above (or below) a number at each sample time: value (k, d). Interval: Wilson's.
+    """Probability that a condition holds at each sample time: value (k, d), with Wilson's interval.
 
-    above, below: one number, or one for each component; with both, that it lies between them.
+    Args:
+        of: a quantity; see `Statistic`, also for name, confidence, stopped and at.
+        above: one number, or one for each component, in the quantity's unit.
+        below: the same for the upper limit; with both, the quantity lies between them.
     """
 
     type: ClassVar[str] = "exceedance"
 
     def rows(self, values: Values) -> Part:
-        """Counts of the block."""
+        """Count the block's members for which the condition holds."""
         return {"count": values.count, "hits": self.holds(values).sum(axis=2)}
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """The fraction of members."""
+        """Return the fraction of members for which the condition holds."""
         count = part["count"]
         n = count[:, None]
         fraction = part["hits"] / np.maximum(n, 1)
@@ -198,27 +235,27 @@ class Exceedance(Condition, Counted):
         return estimate(self, "Wilson", component_dims("value", "lower", "upper"), arrays, time, unit="1")
 
 
-# What lies between two samples is counted in so many equal parts.
+# Number of equal pieces of the time between two samples, in which passages are counted.
 PIECES = 8
 
 
 class _Passages(Gatherer):
-    """Of a block: the first sample at which the condition holds for each member, or the last one that is known of it.
+    """Follows a block: for each member the first sample at which the condition holds, or the last sample that is known.
 
-    Members are those of the first replicate, then of the next.
+    Members are ordered by replicate: those of the first replicate, then of the next.
     """
 
     def __init__(self, statistic: FirstPassage, time: np.ndarray, count: int):
         self._statistic, self._time, self._times = statistic, time, len(time)
         self._passed = np.full(count, len(time), np.int64)
-        # How far between the sample before and the one that sees it.
+        # Fraction of the time from the sample before to the sample that shows the passage.
         self._share = np.ones(count)
         self._known = np.zeros(count, np.int64)
         self._before: np.ndarray | None = None
         self._replicates = 1
 
     def take(self, values: Values, when: slice) -> None:
-        """Look at these times."""
+        """Note the passages at these sample times."""
         k = when.stop - when.start
         self._replicates = values.replicates
         x = values.x.reshape(k, -1)
@@ -228,7 +265,7 @@ class _Passages(Gatherer):
         if values.good is None:
             self._known[open_] = when.stop
         else:
-            # A member that is lost stays lost: what comes after is not looked at.
+            # A member that is lost stays lost: its later samples are ignored.
             lost = ~values.good.reshape(k, -1)
             good = np.where(lost.any(axis=0), lost.argmax(axis=0), len(lost))
             self._known = np.where(open_, when.start + good, self._known)
@@ -238,19 +275,19 @@ class _Passages(Gatherer):
         self._before = x[-1]
 
     def _place(self, x: np.ndarray, when: slice, now: np.ndarray) -> None:
-        """In which part of the time since the sample before these members passed: linear between the two."""
+        """Set when, between the previous sample and this one, these members passed: linear between the two."""
         above, below = self._statistic.limits(1)
         if self._before is None or (above is None and below is None):
             return
         at = self._passed[now] - when.start
         before = np.where(at > 0, x[at - 1, now], self._before[now])
-        # Into a band over the end that is nearer.
+        # A band is entered over its nearer end.
         limit = below if above is None else above if below is None else np.where(before <= above, above, below)
         limit = np.asarray(limit).ravel()
         self._share[now] = (limit - before) / (x[at, now] - before)
 
     def end(self, ends: Ends, replicates: int) -> None:
-        """A member that was stopped between two samples came to its last state when it was stopped, and not at the second."""
+        """Correct passages of stopped members, which reached their last state before the second sample."""
         end = ends.time.reshape(-1, replicates).T.ravel()
         stopped = ends.are(STOPPED).reshape(-1, replicates).T.ravel()
         now = np.flatnonzero((self._passed > 0) & (self._passed < self._times) & stopped)
@@ -258,7 +295,7 @@ class _Passages(Gatherer):
         self._share[now] *= np.clip((end[now] - before) / (at - before), 0.0, 1.0)
 
     def close(self) -> Part:
-        """How many pass at each time, by parts of the time before it, and how many are lost before without having passed."""
+        """Return how many members pass in each piece of time, and how many are lost before passing."""
         R, length = self._replicates, self._times + 1
         row = np.repeat(np.arange(R), len(self._passed) // R) * length
         piece = np.clip(np.floor(self._share * PIECES), 0, PIECES - 1).astype(np.int64)
@@ -270,18 +307,32 @@ class _Passages(Gatherer):
 
 @dataclass(frozen=True, eq=False)
 class FirstPassage(Condition, Counted):
-    """Time until a quantity is first above (or below) a number, or with both between them, as its samples tell.
+    """Time until a condition first holds, as the samples show it.
 
-    value (k,): probability to have passed by each time, Kaplan & Meier's estimate: a member that fails before it passes
-    counts until its last good sample; NaN where no member is known at any time. survival is 1 - value. Interval: Wilson's
-    with the number of members whose fraction has the variance of a beta product (Fay, Brittain & Proschan 2013), which
-    knows how few are at risk; up to 1 where none is. passed, lost (k,): members that pass at a time, and that failed
-    before it without having passed; count (k,): members at risk of passing at each time; censored: those that were good
-    to the end and did not pass. passage_time (levels,) [s]: the time by which that fraction has passed, infinite if it
-    never has, with passage_time_lower, _upper from the interval of value. A member passes between the sample before and
-    the one that sees it, where the line between the two does; of a quantity without a number, that is true or false, at
-    the sample that sees it. A passage that comes and goes between two samples is not seen (an event of the scene sees
-    every step).
+    The probability is Kaplan & Meier's estimate: a member that fails before it passes counts until its last good
+    sample; NaN where no member is known at any time. Interval: Wilson's with the number of members whose fraction has
+    the variance of a beta product (Fay, Brittain & Proschan 2013), which accounts for few members at risk; its upper
+    end is 1 where none is.
+
+    A member passes between the sample before and the sample that shows it, where the line between the two crosses the
+    limit; a quantity without a limit, which is true or false, passes at the sample that shows it. A passage that comes
+    and goes between two samples is not seen (an event of the scene looks at every step).
+
+    Arrays of the estimate, beside lower and upper:
+
+    * value (k,): probability to have passed by each time; survival is 1 - value.
+    * passed (k,): number of members that pass at each time.
+    * lost (k,): number of members that failed before each time without having passed.
+    * count (k,): number of members at risk of passing at each time.
+    * censored: number of members that were good to the end and did not pass.
+    * passage_time (levels,) [s]: time by which that fraction has passed, infinite if it never has; passage_time_lower,
+      passage_time_upper from the interval of value.
+
+    Args:
+        of: a quantity of one component; see `Statistic`, also for name, confidence and stopped.
+        above: the lower limit, in the quantity's unit.
+        below: the upper limit; with both, the quantity lies between them.
+        levels: fractions of members between 0 and 1; by default (0.05, 0.5, 0.95).
     """
 
     type: ClassVar[str] = "first_passage"
@@ -290,18 +341,18 @@ class FirstPassage(Condition, Counted):
     levels: Any = (0.05, 0.5, 0.95)
 
     def check(self, faults: Faults) -> None:
-        """Of one component."""
+        """Note faults of the levels, and a quantity of several components."""
         super().check(faults)
         check_levels(faults, self.levels)
         if self.of is not None and getattr(self, "_quantity", None) is not None and self.quantity.size != 1:
             faults.add("of", self.of, f"has {self.quantity.size} components", f"give one: {self.quantity.labels[0]!r}")
 
     def open(self, time: np.ndarray, count: int) -> _Passages:
-        """What follows the members of a block."""
+        """Return the object that follows the members of a block."""
         return _Passages(self, time, count)
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Kaplan & Meier 1958."""
+        """Return the estimate of Kaplan & Meier (1958)."""
         curve = Curve.of(part)
         lower, upper = curve.ends(*intervals.wilson(curve.value, curve.members, self.confidence))
         passed, lost = curve.passed.sum(axis=1), part["lost"][0]
@@ -316,61 +367,80 @@ class FirstPassage(Condition, Counted):
         return estimate(self, text, dims | along(times, "level"), arrays, time, levels, "1", labels=())
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
-        """The intervals of probabilities from the spread of the replicates' curves."""
+        """Return probabilities with intervals from the spread of the replicates' curves."""
         each = self.each_replicate(parts, replicates)
-        everything = self.whole(together(each))
-        curve = Curve.of(everything)
-        curves = np.stack([Curve.of(self.whole(own)).value for own in each])
+        overall = self.whole(together(each))
+        curve = Curve.of(overall)
+        curves = np.stack([Curve.of(self.whole(replicate_parts)).value for replicate_parts in each])
         ends = curve.ends(*intervals.probability_of_replicates(curve.value, curves, curve.members, self.confidence))
-        found = {name: end[:, -1] for name, end in zip(("lower", "upper"), ends, strict=True)}
-        found |= self._times(curve.value, *ends, time)
-        return [self.read(everything, time).with_interval(by_replicates(replicates), found)]
+        arrays = {name: end[:, -1] for name, end in zip(("lower", "upper"), ends, strict=True)}
+        arrays |= self._times(curve.value, *ends, time)
+        return [self.read(overall, time).with_interval(by_replicates(replicates), arrays)]
 
     def _times(
         self, value: np.ndarray, lower: np.ndarray, upper: np.ndarray, time: np.ndarray
     ) -> dict[str, np.ndarray]:
-        """When the curves (k, pieces) reach each level."""
+        """Times at which the curves (k, pieces) reach each level."""
         curves = {"passage_time": value, "passage_time_lower": upper, "passage_time_upper": lower}
         return {
-            name: np.array([self._reached(one, level, time) for level in self.levels]) for name, one in curves.items()
+            name: np.array([self._reached(curve, level, time) for level in self.levels])
+            for name, curve in curves.items()
         }
 
     def _reached(self, curve: np.ndarray, level: float, time: np.ndarray) -> float:
-        """The time at which a rising curve reaches a level: linear within a piece, or a sample time if there is no line."""
+        """Time [s] at which a rising curve reaches a level: linear within a piece; without limits a sample time."""
         if np.isnan(curve).all():
             return np.nan
-        there = np.flatnonzero(curve.ravel() >= level)
-        if not len(there):
+        reached = np.flatnonzero(curve.ravel() >= level)
+        if not len(reached):
             return np.inf
-        i, piece = divmod(int(there[0]), PIECES)
+        i, piece = divmod(int(reached[0]), PIECES)
         if i == 0 or (self.above is None and self.below is None):
             return float(time[i])
-        low, high = curve.ravel()[there[0] - 1], curve[i, piece]
+        low, high = curve.ravel()[reached[0] - 1], curve[i, piece]
         return float(time[i - 1] + (time[i] - time[i - 1]) * (piece + (level - low) / (high - low)) / PIECES)
 
 
 def check_levels(faults: Faults, levels: Any) -> None:
-    """Fractions of members must lie between 0 and 1."""
+    """Note a fault if levels are no fractions between 0 and 1.
+
+    Args:
+        faults: the list that faults are added to.
+        levels: the fractions of members.
+    """
     numbers = faults.finite("levels", levels)
     if numbers is not None and (numbers.ndim != 1 or np.any(numbers <= 0.0) or np.any(numbers >= 1.0)):
         faults.add("levels", levels, "are no numbers between 0 and 1", "give (0.05, 0.5, 0.95)")
 
 
 class Curve:
-    """Kaplan & Meier's curve at the end of each piece of the times before samples: survival, and value 1 less it, (k, pieces).
+    """Kaplan & Meier's curve at the end of each piece of the times before the samples.
 
-    passed (k, pieces): members that pass in a piece; risk (k,): members at risk of passing at each sample time; left (k,
-    pieces): those that still are at a piece's end. A member that is lost is known up to the last sample before, and at risk
-    in no piece after it. members (k, pieces): of independent ones, as many would be as sure.
+    A member that is lost is known up to the sample before, and is at risk in no later piece.
+
+    Args:
+        passed: (k, pieces), number of members that pass in each piece.
+        lost: (k,), number of members that are lost before each time.
+        total: number of all members.
+
+    Attributes:
+        survival: (k, pieces), estimated probability not to have passed.
+        value: (k, pieces), 1 less survival.
+        risk: (k,), number of members at risk of passing at each sample time.
+        left: (k, pieces), number of members still at risk at the end of each piece.
+        members: (k, pieces), number of independent members that would give the same variance.
     """
 
     @classmethod
     def of(cls, part: Part) -> Curve:
-        """That of first passages."""
+        """Return the curve of first passages.
+
+        Args:
+            part: the part of all members, of one replicate.
+        """
         return cls(part["passed"][0, :-1], part["lost"][0, :-1], int(part["passed"][0].sum()))
 
     def __init__(self, passed: np.ndarray, lost: np.ndarray, total: int):
-        """lost (k,): members that are lost before each time; total: all members."""
         self.passed = passed
         at = self.passed.sum(axis=1)
         self.risk = total - np.cumsum(lost) - (np.cumsum(at) - at)
@@ -384,27 +454,36 @@ class Curve:
 
     @staticmethod
     def _members(n: np.ndarray, left: np.ndarray) -> np.ndarray:
-        """Members whose fraction has the variance of a product of beta numbers, one for each time with n at risk.
+        """Number of members whose fraction has the variance of a product of beta variables, one for each time.
 
-        After m of n passed a survival lies between products of Beta(n - m + 1, m), of all times, without and with a last
-        Beta(left, 1), as it does between Clopper & Pearson's limits (Fay, Brittain & Proschan 2013, Biostatistics 14).
-        Between the two is a last Beta(left + 1/2, 1/2), with which the product is Jeffreys' Beta(n - m + 1/2, m + 1/2)
-        where none is lost: then these are all members. Where few are at risk Greenwood's variance is far too small.
+        After m of n passed, survival lies between products of Beta(n - m + 1, m) over all times, without and with a
+        last Beta(left, 1), as it does between Clopper & Pearson's limits (Fay, Brittain & Proschan 2013, Biostatistics
+        14). Between the two is a last Beta(left + 1/2, 1/2). If no member is lost, the product is then Jeffreys' Beta(n
+        - m + 1/2, m + 1/2), and the number is that of all members. Where few are at risk Greenwood's variance is far
+        too small.
         """
         mean = _so_far(np.log1p((left - n) / (n + 1.0)), np.add) + np.log1p(-0.5 / (left + 1.0))
         # log(1 + variance / mean^2) of a Beta(a, b) is log(1 + b / (a (a + b + 1))).
         spread = _so_far(np.log1p((n - left) / ((left + 1.0) * (n + 2.0))), np.add)
         spread = spread + np.log1p(0.5 / ((left + 0.5) * (left + 2.0)))
-        # Of a Beta(a, b) mean (1 - mean) / variance is a + b + 1: here two more than the members.
+        # For a Beta(a, b) mean (1 - mean) / variance is a + b + 1, which is the number of members plus two.
         return np.asarray(np.maximum(-np.expm1(mean) / (np.exp(mean) * np.expm1(spread)) - 2.0, 0.0))
 
     def ends(self, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """An interval: who is lost last may pass at once, and so may all where none is known."""
+        """Return an interval widened where nothing is known.
+
+        The upper end is 1 after the last member at risk, who may pass at once; without any member the interval is 0 to
+        1.
+
+        Args:
+            lower: (k, pieces), lower end.
+            upper: (k, pieces), upper end.
+        """
         nobody = not self.risk[0]
         return np.where(nobody, 0.0, lower), np.where(nobody | (self.left <= 0), 1.0, upper)
 
 
 def _so_far(steps: np.ndarray, join: np.ufunc) -> np.ndarray:
-    """Of steps within each time (k, pieces), from the start: whole times joined, and the last one so far."""
-    whole = join.accumulate(np.concatenate([[join.identity], steps[:-1, -1]]))
-    return np.asarray(join(whole[:, None], steps))
+    """Accumulate steps within each time (k, pieces) from the start: all earlier times, then the last one so far."""
+    totals = join.accumulate(np.concatenate([[join.identity], steps[:-1, -1]]))
+    return np.asarray(join(totals[:, None], steps))

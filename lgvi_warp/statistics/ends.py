@@ -1,4 +1,4 @@
-"""How the members of a block ended, and when: what statistics of outcomes are of."""
+"""How and when the members of a block ended: the data that statistics of outcomes are of."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.common.status import Status, failed, stopped
 
-# Words for several statuses: any event, any failure.
+# Outcomes that comprise several statuses: any event, any failure.
 STOPPED, FAILED = "stopped", "failed"
 
 
@@ -58,8 +58,8 @@ def outcomes(events: Iterable[str], statuses: Iterable[Status]) -> list[str]:
     Returns:
         The names of events, their statuses and those of failures, "stopped" and "failed".
     """
-    failures = (one for one in Status if not one.stopped)
-    names = [*events, STOPPED, FAILED, *(one.name.lower() for one in (*statuses, *failures))]
+    failures = (status for status in Status if not status.stopped)
+    names = [*events, STOPPED, FAILED, *(status.name.lower() for status in (*statuses, *failures))]
     return list(dict.fromkeys(names))
 
 

@@ -1,4 +1,4 @@
-"""What a statistic came to: its values with their intervals, by time."""
+"""Estimates: the values of a statistic with their intervals, by sample time."""
 
 from __future__ import annotations
 
@@ -20,17 +20,31 @@ Dims = dict[str, tuple[str, ...]]
 
 
 def along(names: Iterable[str], *dims: str) -> Dims:
-    """These arrays have these dimensions."""
+    """Return the same dimensions for several arrays.
+
+    Args:
+        names: names of the arrays.
+        *dims: names of their dimensions, in order.
+    """
     return dict.fromkeys(names, dims)
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """One statistic: arrays by name, estimate["count"], those that all have also as attributes.
+    """The values of one statistic with their intervals, as named arrays: estimate["count"].
 
-    value: the statistic, by time first (a path's: of length 1), then component, level or bin as `dims` says; lower, upper:
-    its interval of this confidence, each entry for itself; count (k,): members that it is of. interval: how the
-    interval was formed. coordinates: "time" [s], "component" and so on. settings: as in a scene file.
+    Arrays that all estimates have are attributes too: value, lower, upper, count.
+
+    Args:
+        name: name of the statistic, as in "mean position".
+        settings: the statistic's table, as in a scene file.
+        unit: unit of the value.
+        confidence: confidence level of the intervals.
+        interval: how the interval was formed.
+        dims: names of each array's dimensions. The first is "time" (of length 1 for a statistic of paths), then
+            component, level or bin.
+        arrays: the arrays by name.
+        coordinates: coordinates of the dimensions: "time" (k,) [s], "component" and so on.
     """
 
     name: str
@@ -43,47 +57,56 @@ class Estimate:
     coordinates: dict[str, np.ndarray]
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """One of its arrays."""
+        """Return one of the arrays by its name."""
         return self.arrays[name]
 
     @property
     def value(self) -> np.ndarray:
-        """The statistic."""
+        """The estimated statistic itself, with dimensions `dims["value"]`."""
         return self.arrays["value"]
 
     @property
     def lower(self) -> np.ndarray:
-        """Lower end of the interval."""
+        """Lower ends of the intervals, shaped like `value`."""
         return self.arrays["lower"]
 
     @property
     def upper(self) -> np.ndarray:
-        """Upper end of the interval."""
+        """Upper ends of the intervals, shaped like `value`."""
         return self.arrays["upper"]
 
     @property
     def half_width(self) -> np.ndarray:
-        """The larger distance from the value to an end of its interval; infinite where there is no end."""
+        """The larger distance from the value to an end of its interval; infinite where the interval is unbounded."""
         with np.errstate(invalid="ignore"):
             return np.fmax(self.upper - self.value, self.value - self.lower)
 
     @property
     def count(self) -> np.ndarray:
-        """(k,), members that it is of at each time."""
+        """Number of members behind the value at each time, (k,)."""
         return self.arrays["count"]
 
     @property
     def time(self) -> np.ndarray:
-        """(k,) [s]."""
+        """Sample times (k,) [s] of the values."""
         return self.coordinates["time"]
 
     def with_interval(self, interval: str, arrays: Mapping[str, np.ndarray]) -> Estimate:
-        """The same with an interval formed otherwise: these arrays instead of its own."""
+        """Return the same estimate with another interval.
+
+        Args:
+            interval: how the interval was formed.
+            arrays: arrays that replace those of the same names.
+        """
         return replace(self, interval=interval, arrays=self.arrays | dict(arrays))
 
     @functools.cached_property
     def dataset(self) -> xarray.Dataset:
-        """Its arrays as an xarray Dataset (extra: store)."""
+        """The arrays as an xarray Dataset.
+
+        Raises:
+            ImportError: xarray is not installed (extra: store).
+        """
         try:
             import xarray as xr
         except ImportError as error:
@@ -100,10 +123,14 @@ class Estimate:
 
 
 class Estimates(Mapping[str, Estimate]):
-    """A run's statistics, by name, in the order that they were asked for; "above 10.0" in a name is "above 10"."""
+    """The estimates of a run by name, in the order of the statistics; "above 10.0" in a name is found as "above 10".
+
+    Args:
+        estimates: the estimates; by default none.
+    """
 
     def __init__(self, estimates: Sequence[Estimate] = ()):
-        self._found = {one.name: one for one in estimates}
+        self._found = {estimate.name: estimate for estimate in estimates}
         self._spelled = {canonical(name): name for name in self._found}
 
     def __getitem__(self, name: str) -> Estimate:
@@ -119,47 +146,61 @@ class Estimates(Mapping[str, Estimate]):
 
     @functools.cached_property
     def dataset(self) -> xarray.Dataset:
-        """All as one xarray Dataset: "mean position" is the variable mean_position, its interval mean_position_lower.
+        """All estimates as one xarray Dataset.
 
-        -0.5 in a name is minus_0_5; of names that make the same word the later ones end on _2, _3.
+        "mean position" becomes the variable mean_position, the lower end of its interval mean_position_lower. In names
+        of variables -0.5 becomes minus_0_5; of names that would be equal the later ones end in _2, _3.
         """
         import xarray as xr
 
-        whole, taken = [], {"time"}
-        for one in self.values():
-            single = one.dataset
-            word = free(one.name, lambda word, single=single: _renamed(single, word).values(), taken)  # type: ignore[misc]
+        datasets, taken = [], {"time"}
+        for estimate in self.values():
+            single = estimate.dataset
+            word = free(estimate.name, lambda word, single=single: _renamed(single, word).values(), taken)  # type: ignore[misc]
             for name in single.data_vars:
-                single[name].attrs |= {"long_name": f"{name} of {one.name}", "interval": one.interval}
-            whole.append(single.rename(_renamed(single, word)).drop_attrs(deep=False))
-        return xr.merge(whole, join="exact", compat="equals")
+                single[name].attrs |= {"long_name": f"{name} of {estimate.name}", "interval": estimate.interval}
+            datasets.append(single.rename(_renamed(single, word)).drop_attrs(deep=False))
+        return xr.merge(datasets, join="exact", compat="equals")
 
     def to_arrays(self) -> tuple[dict[str, np.ndarray], str]:
-        """Named arrays, and a text of all else, for a file."""
+        """Return the estimates in a form that a file can hold.
+
+        Returns:
+            Named arrays, and a JSON text of everything else.
+        """
         arrays, words = dict[str, np.ndarray](), []
-        for i, one in enumerate(self.values()):
-            arrays |= {f"{i}/{name}": values for name, values in one.arrays.items()}
-            arrays |= {f"{i}/coordinates/{name}": values for name, values in one.coordinates.items()}
+        for i, estimate in enumerate(self.values()):
+            arrays |= {f"{i}/{name}": values for name, values in estimate.arrays.items()}
+            arrays |= {f"{i}/coordinates/{name}": values for name, values in estimate.coordinates.items()}
             words.append(
-                {key: getattr(one, key) for key in ("name", "settings", "unit", "confidence", "interval", "dims")}
+                {key: getattr(estimate, key) for key in ("name", "settings", "unit", "confidence", "interval", "dims")}
             )
         return arrays, json.dumps(words)
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, np.ndarray], text: str) -> Estimates:
-        """What `to_arrays` gave."""
-        found = []
+        """Return the estimates that `to_arrays` has written.
+
+        Args:
+            arrays: the named arrays.
+            text: the JSON text.
+        """
+        estimates = []
         for i, words in enumerate(json.loads(text)):
-            own = {name.removeprefix(f"{i}/"): values for name, values in arrays.items() if name.startswith(f"{i}/")}
+            estimate_arrays = {
+                name.removeprefix(f"{i}/"): values for name, values in arrays.items() if name.startswith(f"{i}/")
+            }
             head = "coordinates/"
-            coordinates = {name.removeprefix(head): values for name, values in own.items() if name.startswith(head)}
+            coordinates = {
+                name.removeprefix(head): values for name, values in estimate_arrays.items() if name.startswith(head)
+            }
             words["dims"] = {name: tuple(dims) for name, dims in words["dims"].items()}
-            values = {name: values for name, values in own.items() if not name.startswith(head)}
-            found.append(Estimate(**words, arrays=values, coordinates=coordinates))
-        return cls(found)
+            values = {name: values for name, values in estimate_arrays.items() if not name.startswith(head)}
+            estimates.append(Estimate(**words, arrays=values, coordinates=coordinates))
+        return cls(estimates)
 
 
 def _renamed(single: xarray.Dataset, word: str) -> dict[Hashable, str]:
-    """Of one estimate's dataset, what all of its variables and dimensions are called among others'."""
+    """New names of the variables and dimensions of one estimate's dataset, which keep it apart from the others."""
     names = {name: word if name == "value" else f"{word}_{name}" for name in single.data_vars}
     return names | {d: f"{d}_of_{word}" for d, n in single.sizes.items() if d != "time" or n == 1}

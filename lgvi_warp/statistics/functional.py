@@ -1,7 +1,8 @@
-"""The little language of quantities: a name, an entry of it, a length, and what a whole path comes to.
+"""Expressions for quantities: a name, a component of it, a norm, and a reduction over the path.
 
-"position[2]", "norm(velocity)" are numbers of each member at each time; "max(depth)", "range(norm(velocity))" are one of
-each member, over its path. Statistics, sensitivity, trade-offs and stability maps all read it here.
+"position[2]" and "norm(velocity)" give numbers of each member at each time; "max(depth)" and "range(norm(velocity))"
+give one number of each member, over its path. Statistics, sensitivity, trade-offs and stability maps all read them
+here.
 """
 
 from __future__ import annotations
@@ -26,9 +27,13 @@ FUNCTIONS = (*OVER_TIME, "norm")
 
 @dataclass(frozen=True)
 class Functional:
-    """A quantity of each member at each time, and what is made of it: functions, the innermost first.
+    """A quantity with the functions applied to it.
 
-    label: as it was written, without spaces. entry: the component of what comes out that is meant; None: all.
+    Args:
+        label: the expression without spaces.
+        quantity: the innermost quantity.
+        functions: names of the functions, the innermost first; by default none.
+        entry: index of the component that is taken of the result; None (the default): all.
     """
 
     label: str
@@ -38,22 +43,22 @@ class Functional:
 
     @property
     def over_path(self) -> bool:
-        """Whether it looks over the path: one row for each member, and none for each time."""
+        """Whether it reduces the path: one row for each member instead of one for each time."""
         return any(name in OVER_TIME for name in self.functions)
 
     @property
     def unit(self) -> str:
-        """Of its numbers."""
+        """The unit of its numbers."""
         return self.quantity.unit
 
     @property
     def size(self) -> int:
-        """Numbers of each member (at each time)."""
+        """Number of components of the result."""
         return 1 if self.entry is not None or "norm" in self.functions else self.quantity.size
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """One for each of its numbers: each may be asked for by its label."""
+        """Names of the components; each is an expression for that component."""
         if self.size == 1:
             return (self.label,)
         plain = not self.functions
@@ -61,7 +66,15 @@ class Functional:
                      for i, label in enumerate(self.quantity.labels))  # fmt: skip
 
     def __call__(self, samples: Fields, members: Members) -> np.ndarray:
-        """Its numbers, float64: (k, n, size), or (n, size) of what looks over the path."""
+        """Evaluate the expression.
+
+        Args:
+            samples: the samples of a block, of k times.
+            members: the n members of the block.
+
+        Returns:
+            float64: (k, n, size), or (n, size) if it reduces the path.
+        """
         values = np.moveaxis(self.quantity(samples, members).astype(np.float64, copy=False), 1, 2)
         for name in self.functions:
             if name == "norm":
@@ -71,7 +84,11 @@ class Functional:
         return values if self.entry is None else values[..., self.entry : self.entry + 1]
 
     def at_each_time(self) -> Quantity:
-        """The same as a Quantity. Raises SceneError for what looks over the path."""
+        """Return the same as a Quantity.
+
+        Raises:
+            SceneError: it reduces the path, and has no number at each time.
+        """
         if self.over_path:
             remedy = f"ask for {self.quantity.name}, or for lw.PathMaximum({self.quantity.name!r}) and the like"
             raise SceneError([f"{self.label}: looks over the path, and has no number at each time; {remedy}"])
@@ -81,15 +98,20 @@ class Functional:
 
 
 def functional(key: str, of: Any) -> Functional:
-    """What `of` means: a text of the little language, a Quantity, or what `quantity` takes for one.
+    """Return the expression that `of` gives.
 
-    Raises SceneError naming `key` and what is known.
+    Args:
+        key: the key that messages name.
+        of: an expression as text, a Quantity, or anything that `quantity` takes.
+
+    Raises:
+        SceneError: `of` is no expression, or names what is not known.
     """
     if isinstance(of, Functional):
         return of
     if not isinstance(of, str):
-        found = quantity(key, of)
-        return Functional(found.name, found)
+        meaning = quantity(key, of)
+        return Functional(meaning.name, meaning)
     text = of.replace(" ", "")
     outer, entry = text, None
     if match := re.fullmatch(r"(\w+\(.*\))\[(\d+)\]", text):
@@ -113,7 +135,7 @@ def functional(key: str, of: Any) -> Functional:
 
 
 def _nested(text: str) -> tuple[list[str], str]:
-    """The functions around a name, the outermost first; what they are of."""
+    """Names of the functions around a name, the outermost first; and the name."""
     functions = []
     while match := re.fullmatch(r"(\w+)\((.*)\)", text):
         functions.append(match[1])
@@ -122,9 +144,15 @@ def _nested(text: str) -> tuple[list[str], str]:
 
 
 def quantity(key: str, of: Any) -> Quantity:
-    """The quantity that `of` means: a name, a name with an index, a Quantity, a function, or a list of these, as one.
+    """Return the quantity that `of` gives.
 
-    Raises SceneError naming `key` where it means none.
+    Args:
+        key: the key that messages name.
+        of: a name, a name with an index, a Quantity, a function of (samples, members), or a list of these, taken as one
+            quantity.
+
+    Raises:
+        SceneError: `of` gives no quantity.
     """
     if isinstance(of, Quantity):
         return of
@@ -135,6 +163,6 @@ def quantity(key: str, of: Any) -> Quantity:
     if callable(of):
         return Quantity(str(getattr(of, "__name__", type(of).__name__)), of)
     if isinstance(of, Sequence) and len(of):
-        return joined([quantity(f"{key}[{i}]", one) for i, one in enumerate(of)])
+        return joined([quantity(f"{key}[{i}]", item) for i, item in enumerate(of)])
     remedy = f"give one of {', '.join(KNOWN)}, one component as in 'position[2]', or a function of (samples, members)"
     raise SceneError([f"{key} = {shown(of)}: is no quantity; {remedy}"])

@@ -1,4 +1,4 @@
-"""Intervals that hold the true value with a stated confidence, for independent members."""
+"""Confidence intervals for independent members, and for independent replicates."""
 
 from __future__ import annotations
 
@@ -7,24 +7,57 @@ from scipy.special import bdtr, bdtrik, ndtri, stdtrit
 
 
 def normal(confidence: float) -> float:
-    """Half the width of a normal's central interval, in standard deviations."""
+    """Return half the width of a normal variable's central interval, in standard deviations.
+
+    Args:
+        confidence: confidence level, between 0 and 1.
+
+    Returns:
+        The quantile of the standard normal at 0.5 + 0.5 confidence.
+    """
     return float(ndtri(0.5 + 0.5 * confidence))
 
 
 def student(count: np.ndarray, confidence: float) -> np.ndarray:
-    """The same of Student's t with count - 1 degrees of freedom; infinite below two."""
+    """Return half the width of a mean's interval in standard errors: Student's t of count - 1 degrees of freedom.
+
+    Args:
+        count: number of members, any shape.
+        confidence: confidence level, between 0 and 1.
+
+    Returns:
+        As count; infinite for fewer than two members.
+    """
     wide = np.where(count > 1, stdtrit(np.maximum(count - 1, 1), 0.5 + 0.5 * confidence), np.inf)
     return np.asarray(wide)
 
 
 def about(value: np.ndarray, standard_error: np.ndarray, factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """value -+ factor standard errors; the whole line where the factor is infinite."""
+    """Return the interval value -+ factor standard errors.
+
+    Args:
+        value: the estimate.
+        standard_error: its standard error, in the same unit.
+        factor: number of standard errors in half the interval.
+
+    Returns:
+        Lower and upper end; -inf and inf where the factor is infinite.
+    """
     half = np.where(np.isinf(factor), np.inf, np.where(np.isinf(factor), 0.0, factor) * standard_error)
     return value - half, value + half
 
 
 def of_logarithm(value: np.ndarray, standard_error: np.ndarray, factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of what is above 0: value times exp(-+ factor standard errors of its logarithm); 0 to infinity where one is infinite."""
+    """Return the interval of a positive number from that of its logarithm: value exp(-+ factor standard_error / value).
+
+    Args:
+        value: the estimate, not below 0.
+        standard_error: its standard error, in the same unit.
+        factor: number of standard errors in half the interval.
+
+    Returns:
+        Lower and upper end; 0 and inf where the factor or the standard error is infinite.
+    """
     open_ = (np.isinf(factor) | np.isinf(standard_error)) & ~np.isnan(value)
     some = (value > 0.0) & ~open_
     with np.errstate(over="ignore", invalid="ignore"):
@@ -35,9 +68,18 @@ def of_logarithm(value: np.ndarray, standard_error: np.ndarray, factor: np.ndarr
 def wilson(
     probability: np.ndarray, count: np.ndarray, confidence: float, factor: float | np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Of a probability p that n trials estimated: where |p - p0| <= z sqrt(p0 (1 - p0) / n) (Wilson 1927).
+    """Return the interval of a probability p0 that n trials estimated as p.
 
-    factor: z, by default the normal's. 0 to 1 without trials.
+    It is where |p - p0| <= z sqrt(p0 (1 - p0) / n) (Wilson 1927).
+
+    Args:
+        probability: the fraction p of the trials.
+        count: number n of trials.
+        confidence: confidence level, between 0 and 1.
+        factor: z; by default that of the normal distribution.
+
+    Returns:
+        Lower and upper end; 0 and 1 without trials.
     """
     z2 = np.square(normal(confidence) if factor is None else factor)
     n = np.where(count > 0, count, 1.0)
@@ -45,17 +87,24 @@ def wilson(
     spread = np.maximum(probability * (1.0 - probability), 0.0) / n + 0.25 * z2 / n**2
     half = np.sqrt(z2) * np.sqrt(np.where(count > 0, spread, 0.0)) / (1.0 + z2 / n)
     some = np.asarray(count > 0)
-    # At 0 and at 1 the end of the interval is that number; rounding must not put the value outside.
+    # At 0 and at 1 the interval ends at the value itself: rounding must not put the value outside.
     lower = np.where(some, np.clip(np.fmin(centre - half, probability), 0.0, 1.0), 0.0)
     upper = np.where(some, np.clip(np.fmax(centre + half, probability), 0.0, 1.0), 1.0)
     return lower, upper
 
 
 def of_replicates(each: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-    """(standard error, half width) of the mean of R independent estimates (R, ...): Student's t with R - 1.
+    """Return standard error and half width of the mean of R independent estimates, by Student's t with R - 1.
 
-    L'Ecuyer, Nakayama, Owen & Tuffin (2023): of the intervals for randomized quasi-Monte Carlo that they compare, none
-    holds more reliably. Infinite where an estimate is missing.
+    L'Ecuyer, Nakayama, Owen & Tuffin (2023): among the intervals for randomized quasi-Monte Carlo that they compare,
+    none is more reliable.
+
+    Args:
+        each: (R, ...), the estimates.
+        confidence: confidence level, between 0 and 1.
+
+    Returns:
+        Standard error and half width (...); infinite where an estimate is missing.
     """
     R = len(each)
     with np.errstate(invalid="ignore"):
@@ -67,11 +116,21 @@ def of_replicates(each: np.ndarray, confidence: float) -> tuple[np.ndarray, np.n
 def probability_of_replicates(
     probability: np.ndarray, each: np.ndarray, count: np.ndarray, confidence: float, least: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Wilson's interval with the number of trials that has the variance of R independent estimates (R, ...), and t's factor.
+    """Return Wilson's interval with the variance of R independent estimates, and Student's t factor.
 
-    To the standard error that of `least` members of `count` is added, in squares: what is counted is whole, and replicates
-    that all count the same may owe it to chance. Where no member or each was counted the spread says nothing: the
-    interval is that of `count` independent members. 0 to 1 where an estimate is missing.
+    The standard error of `least` members among `count` is added in squares: counts are whole numbers, and replicates
+    may agree by chance. Where none or all of the members were counted there is no spread: the interval is that of
+    `count` independent members.
+
+    Args:
+        probability: the fraction of all members.
+        each: (R, ...), the fraction of each replicate.
+        count: number of members.
+        confidence: confidence level, between 0 and 1.
+        least: number of members whose share is added to the standard error, in squares; by default 1.
+
+    Returns:
+        Lower and upper end; 0 and 1 where an estimate is missing.
     """
     error, _ = of_replicates(each, confidence)
     error = np.hypot(error, least / np.maximum(count, 1))
@@ -83,7 +142,16 @@ def probability_of_replicates(
 
 
 def binomial_quantile(p: float | np.ndarray, n: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """The least k with P(B <= k) >= p for a binomial B of n trials with probability q."""
+    """Return a quantile of the binomial distribution: the least k with P(B <= k) >= p.
+
+    Args:
+        p: level of the quantile, between 0 and 1.
+        n: number of trials.
+        q: probability of success in one trial.
+
+    Returns:
+        k as float64, in the common shape of the arguments.
+    """
     n = np.asarray(n, dtype=np.float64)
     with np.errstate(invalid="ignore"):
         k = np.ceil(bdtrik(p, n, q))
@@ -93,9 +161,17 @@ def binomial_quantile(p: float | np.ndarray, n: np.ndarray, q: np.ndarray) -> np
 
 
 def ranks(count: np.ndarray, level: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-    """Ranks l < u, counted from 1, of the sorted values that hold the quantile between them: P(l <= B < u) >= confidence.
+    """Return the ranks l < u of the sorted values that hold a quantile between them: P(l <= B < u) >= confidence.
 
-    B: how many of `count` values lie below the quantile, binomial. l = 0 or u = count + 1 where there is no such value.
+    B is the number of values below the quantile, which is binomial.
+
+    Args:
+        count: number of values.
+        level: level of the quantile, between 0 and 1.
+        confidence: confidence level, between 0 and 1.
+
+    Returns:
+        l and u, counted from 1; l = 0 or u = count + 1 where there is no such value.
     """
     tail = 0.5 * (1.0 - confidence)
     return binomial_quantile(tail, count, level), binomial_quantile(1.0 - tail, count, level) + 1.0

@@ -1,4 +1,4 @@
-"""Means, covariances, and the moments that their errors follow from; joined by shifts to the common mean (Chan 1979)."""
+"""Means, covariances and the moments that their errors follow from; joined by shifts to the common mean (Chan 1979)."""
 
 from __future__ import annotations
 
@@ -16,8 +16,16 @@ from lgvi_warp.statistics.values import Values
 
 
 def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """sum over members of a_i b_j: (k, d, n) and (k, d, n) to (k, d, d)."""
-    # A few rows by thousands of members: beyond some rows BLAS pays, which makes threads of its own for larger products.
+    """Return the sums over members of a_i b_j.
+
+    Args:
+        a: (k, d, n).
+        b: (k, d, n).
+
+    Returns:
+        (k, d, d).
+    """
+    # BLAS pays only for more than a few rows; pieces keep each product too small for BLAS to start threads of its own.
     if a.shape[1] <= 4:
         return np.einsum("kin,kjn->kij", a, b)
     parts = (a[..., i : i + 512] @ np.swapaxes(b[..., i : i + 512], 1, 2) for i in range(0, a.shape[2], 512))
@@ -25,7 +33,15 @@ def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def joined_means(left: Part, right: Part) -> tuple[Part, np.ndarray, np.ndarray]:
-    """count and mean of both; and how far each one's mean lies above the common one, (k, d)."""
+    """Return the common mean of two sets of members.
+
+    Args:
+        left: part of the first set: count (k,), mean (k, d).
+        right: part of the second set.
+
+    Returns:
+        count and mean of both sets; and how far the mean of each set lies above the common mean, (k, d) each.
+    """
     n = left["count"] + right["count"]
     share = (right["count"] / np.maximum(n, 1))[:, None]
     delta = right["mean"] - left["mean"]
@@ -35,68 +51,112 @@ def joined_means(left: Part, right: Part) -> tuple[Part, np.ndarray, np.ndarray]
 
 
 def outer(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """a_i b_j, (k, d, d)."""
+    """Return the products a_i b_j at each time.
+
+    Args:
+        a: (k, d).
+        b: (k, d).
+
+    Returns:
+        (k, d, d).
+    """
     return np.asarray(a[:, :, None] * b[:, None, :])
 
 
 def moved(part: Part, a: np.ndarray) -> Part:
-    """Second to fourth moments about another point, `a` (k, d) below the mean: sums of (x_i + a_i)(x_j + a_j) and so on.
+    """Return second to fourth moments about a point that lies `a` below the mean.
 
-    m11 [i, j]: sum of x_i x_j; m21: of x_i^2 x_j; m22: of x_i^2 x_j^2; x less its mean.
+    With x less its mean: m11[i, j] is the sum of x_i x_j, m21 of x_i^2 x_j, m22 of x_i^2 x_j^2. About the point these
+    are the sums of (x_i + a_i) (x_j + a_j) and so on.
+
+    Args:
+        part: count (k,), m11 (k, d, d), and m21, m22 (k, d, d) where fourth moments are kept.
+        a: (k, d), the mean less the point.
+
+    Returns:
+        m11, and m21 and m22 where the part has them, (k, d, d) each.
     """
     n, m11, aa = part["count"][:, None, None], part["m11"], outer(a, a)
-    found = {"m11": m11 + n * aa}
+    moments = {"m11": m11 + n * aa}
     if "m21" in part:
         squares = np.einsum("kii->ki", m11)
         m20, m02, ai, aj = squares[:, :, None], squares[:, None], a[:, :, None], a[:, None]
         m21, m12 = part["m21"], np.swapaxes(part["m21"], 1, 2)
-        found["m21"] = m21 + 2.0 * ai * m11 + aj * m20 + n * ai * aa
-        found["m22"] = (
+        moments["m21"] = m21 + 2.0 * ai * m11 + aj * m20 + n * ai * aa
+        moments["m22"] = (
             part["m22"] + 2.0 * (aj * m21 + ai * m12) + aj**2 * m20 + ai**2 * m02 + 4.0 * aa * m11 + n * aa**2
         )
-    return found
+    return moments
 
 
 def joined(left: Part, right: Part) -> Part:
-    """Of two sets of members, of both."""
+    """Return the moments of two sets of members together, about their common mean.
+
+    Args:
+        left: part of the first set.
+        right: part of the second set.
+
+    Returns:
+        The part of both sets, with the same arrays.
+    """
     both, a, b = joined_means(left, right)
     first, second = moved(left, a), moved(right, b)
     return both | {key: first[key] + second[key] for key in first}
 
 
 def empty_as_nan(values: np.ndarray, count: np.ndarray, least: int = 1) -> np.ndarray:
-    """NaN at times with fewer members than `least`: the count says why."""
+    """Return the values with NaN at times that have too few members.
+
+    Args:
+        values: (k, ...).
+        count: (k,), members at each time.
+        least: the least number of members; by default 1.
+
+    Returns:
+        (k, ...), as values.
+    """
     few = (count < least).reshape(-1, *[1] * (values.ndim - 1))
     return np.asarray(np.where(few, np.nan, values))
 
 
 def component_dims(*names: str) -> Dims:
-    """Dimensions (time, component) of these arrays, and of the count."""
+    """Return the dimensions (time, component) of several arrays, and (time,) of the count.
+
+    Args:
+        *names: names of the arrays.
+    """
     return {"count": ("time",)} | along(names, "time", "component")
 
 
 @dataclass(frozen=True, eq=False)
 class Mean(Statistic):
-    """Mean and standard deviation over members: value and standard_deviation (k, d), standard_error of the mean.
+    """Mean and standard deviation over members, with Student's t interval of the mean.
 
-    Interval: Student's t.
+    Arrays of the estimate, beside lower, upper and count (k,):
+
+    * value (k, d): the mean.
+    * standard_deviation (k, d): of the members.
+    * standard_error (k, d): of the mean.
+
+    Args:
+        of: a quantity; see `Statistic`, also for name, confidence, stopped and at.
     """
 
     type: ClassVar[str] = "mean"
 
     def rows(self, values: Values) -> Part:
-        """Count, mean, and the sum of squares about it."""
+        """Return count, mean, and the sum of squares about the mean."""
         c = values.centred
         return {"count": values.count, "mean": values.mean, "m2": np.einsum("kdn,kdn->kd", c, c)}
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """Chan, Golub & LeVeque 1979."""
+        """Join as Chan, Golub & LeVeque (1979)."""
         both, a, b = joined_means(left, right)
         n, m = left["count"][:, None], right["count"][:, None]
         return both | {"m2": left["m2"] + n * a**2 + (right["m2"] + m * b**2)}
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Mean -+ t s / sqrt(n)."""
+        """Return the mean with the interval mean -+ t s / sqrt(n)."""
         count = part["count"]
         n = count[:, None]
         mean = empty_as_nan(part["mean"], count)
@@ -110,29 +170,44 @@ class Mean(Statistic):
 
 @dataclass(frozen=True, eq=False)
 class Covariance(Statistic):
-    """Covariance matrix over members, within a quantity or across several: value (k, d, d), divided by n - 1; correlation.
+    """Covariance matrix over members, within one quantity or across several.
 
-    of=("position", "speed") takes four components together. Interval: Student's t (n - 2) with the standard error that the
-    members' own fourth moments give (delta method), which needs no normal members; of a variance's logarithm, which is
-    nearer to normal. Fourth moments of few members come out small: what normal members' would lack is added, a part of
-    order 1 / n (Bonett 2006 for variances). Two members say nothing of a spread: the interval is infinite.
+    Interval: Student's t (n - 2) with the standard error from the members' own fourth moments (delta method), which
+    does not assume normal members. For a variance it is the interval of its logarithm, which is nearer to normal.
+    Fourth moments of few members are biased towards small values: the amount that normal members would lack is added, a
+    term of order 1 / n (Bonett 2006 for variances). With two members the interval is infinite.
+
+    Arrays of the estimate, beside lower, upper and count (k,):
+
+    * value (k, d, d): the covariance, divided by n - 1.
+    * standard_error (k, d, d): of the covariance.
+    * correlation (k, d, d): without an interval.
+    * mean (k, d): the mean.
+
+    Args:
+        of: a quantity, or several: of=("position", "speed") takes four components together. See `Statistic`, also for
+            name, confidence, stopped and at.
     """
 
     type: ClassVar[str] = "covariance"
 
     def rows(self, values: Values) -> Part:
-        """Count, mean, and moments about it."""
+        """Return count, mean, and second to fourth moments about the mean."""
         c = values.centred
         square = c * c
-        found = {"count": values.count, "mean": values.mean, "m11": sums(c, c)}
-        return found | {"m21": sums(square, c), "m22": sums(square, square)}
+        moments = {"count": values.count, "mean": values.mean, "m11": sums(c, c)}
+        return moments | {"m21": sums(square, c), "m22": sums(square, square)}
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """Moments about the common mean."""
+        """Join the moments about the common mean."""
         return joined(left, right)
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """s_ij -+ t sqrt((E[x_i^2 x_j^2] - E[x_i x_j]^2 + (E[x_i^2] E[x_j^2] + 2 E[x_i x_j]^2) / n) / (n - 1)) n / (n - 1)."""
+        """Return the covariance matrix with its interval.
+
+        The interval is s_ij -+ t n / (n - 1)
+        sqrt((E[x_i^2 x_j^2] - E[x_i x_j]^2 + (E[x_i^2] E[x_j^2] + 2 E[x_i x_j]^2) / n) / (n - 1)).
+        """
         count = part["count"]
         n = count[:, None, None]
         value = empty_as_nan(part["m11"] / np.maximum(n - 1, 1), count, 2)
@@ -157,19 +232,19 @@ class Covariance(Statistic):
 
     @staticmethod
     def _ends(value: np.ndarray, error: np.ndarray, factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """value -+ factor standard errors; of a variance s^2 exp(-+ that over s^2), from 0 where there is no end."""
+        """Interval value -+ factor error; for variances s^2 exp(-+ factor error / s^2), from 0 if it is unbounded."""
         diagonal = np.eye(value.shape[-1], dtype=bool)
         both = zip(intervals.of_logarithm(value, error, factor), intervals.about(value, error, factor), strict=True)
-        lower, upper = (np.where(diagonal, variance, other) for variance, other in both)
+        lower, upper = (np.where(diagonal, variance, covariance) for variance, covariance in both)
         return lower, upper
 
     def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
-        """The same with the standard errors of the replicates' estimates."""
-        error, _ = intervals.of_replicates(np.stack([one.value for one in each]), self.confidence)
+        """Form the same intervals with the standard errors of the replicates' estimates."""
+        error, _ = intervals.of_replicates(np.stack([replicate.value for replicate in each]), self.confidence)
         factor = intervals.student(np.array(len(each)), self.confidence)
-        found = dict(zip(("lower", "upper"), self._ends(whole.value, error, factor), strict=True))
+        ends = dict(zip(("lower", "upper"), self._ends(whole.value, error, factor), strict=True))
         text = f"Student's t of {len(each)} replicates; of the logarithm for variances"
-        return whole.with_interval(text, found | {"standard_error": error})
+        return whole.with_interval(text, ends | {"standard_error": error})
 
 
 def estimate(
@@ -182,7 +257,18 @@ def estimate(
     unit: str | None = None,
     labels: Sequence[str] | None = None,
 ) -> Estimate:
-    """An Estimate of this statistic; components are those of its quantity unless labels are given."""
+    """Return the Estimate of a statistic.
+
+    Args:
+        statistic: the statistic; it gives the name and the confidence level.
+        interval: how the interval was formed.
+        dims: names of each array's dimensions.
+        arrays: the arrays by name.
+        time: (k,) [s], the sample times.
+        coordinates: coordinates of dimensions other than time and component; by default none.
+        unit: unit of the value; by default that of the quantity.
+        labels: names of the components; by default those of the quantity.
+    """
     components = np.array(statistic.quantity.labels if labels is None else labels)
     return Estimate(
         statistic.key,

@@ -1,4 +1,4 @@
-"""Names of statistics: numbers in them are spelled in one way, and each makes a word that xarray and NetCDF take."""
+"""Names of statistics: one spelling of numbers in them, and variables' names for xarray and NetCDF."""
 
 from __future__ import annotations
 
@@ -8,35 +8,53 @@ from typing import Any
 
 import numpy as np
 
-# A number that stands by itself: no index in brackets.
+# A number that stands alone, not an index in brackets.
 _NUMBER = re.compile(r"(?<![\w.\[])-?\d+(?:\.\d*)?(?:e[+-]?\d+)?(?![\w.\]])")
-# Of a number or of its exponent: a hyphen between words is none.
+# The minus sign of a number or of its exponent, not a hyphen between words.
 _MINUS = re.compile(r"(?<!\w)-(?=[\d.])|(?<=\de)-(?=\d)")
 
 
 def spelled(value: Any) -> str:
-    """A number, or several, as names have them: 10 for 10.0, (2, -0.5) for [2.0, -0.5]; as many digits as it takes."""
+    """Return a number, or several, as names spell them: 10 for 10.0, (2, -0.5) for [2.0, -0.5]; with all digits needed.
+
+    Args:
+        value: a number, or an array of numbers.
+    """
     numbers = np.asarray(value, dtype=np.float64)
-    texts = [repr(one + 0.0).removesuffix(".0") for one in numbers.ravel().tolist()]
+    texts = [repr(number + 0.0).removesuffix(".0") for number in numbers.ravel().tolist()]
     return texts[0] if len(texts) == 1 else f"({', '.join(texts)})"
 
 
 def canonical(name: str) -> str:
-    """A name with its numbers as `spelled`: "exceedance depth above 10" for "... above 10.0"."""
-    return _NUMBER.sub(lambda found: spelled(float(found[0])), name)
+    """Return a name with its numbers as `spelled`: "exceedance depth above 10" for "... above 10.0".
+
+    Args:
+        name: the name of a statistic.
+    """
+    return _NUMBER.sub(lambda match: spelled(float(match[0])), name)
 
 
 def word(name: str) -> str:
-    """A name as a variable's: "exceedance velocity[0] above -0.5" is exceedance_velocity_0_above_minus_0_5."""
+    """Return a variable's name: "exceedance velocity[0] above -0.5" becomes exceedance_velocity_0_above_minus_0_5.
+
+    Args:
+        name: the name of a statistic.
+    """
     return re.sub(r"\W+", "_", _MINUS.sub(" minus ", name)).strip("_")
 
 
 def free(name: str, variables: Callable[[str], Iterable[str]], taken: set[str]) -> str:
-    """The name's word, with a number after it where one of its variables is taken; takes them."""
+    """Return the name's `word`, with a number after it where one of its variables is taken already.
+
+    Args:
+        name: the name of a statistic.
+        variables: function that returns the variables' names that a word leads to.
+        taken: names that are taken; those of the word are added.
+    """
     first, number = word(name), 1
-    found = first
-    while taken & set(variables(found)):
+    candidate = first
+    while taken & set(variables(candidate)):
         number += 1
-        found = f"{first}_{number}"
-    taken |= set(variables(found))
-    return found
+        candidate = f"{first}_{number}"
+    taken |= set(variables(candidate))
+    return candidate

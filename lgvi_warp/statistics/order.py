@@ -1,4 +1,4 @@
-"""Extremes and quantiles."""
+"""Extremes and quantiles: statistics of the members' order."""
 
 from __future__ import annotations
 
@@ -17,32 +17,41 @@ from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate
 from lgvi_warp.statistics.tree import Part
 from lgvi_warp.statistics.values import Values
 
-# Numbers of sketches: some 50 bytes are needed for each.
+# Values of sketches that are sorted together; each takes some 50 bytes.
 SORTED_AT_ONCE = 2_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class Extremes(Statistic):
-    """Smallest and largest value, and whose they are: minimum, maximum, minimum_member, maximum_member (k, d).
+    """Smallest and largest value over members, and the members that have them.
 
-    value is the maximum. No interval holds the extremes of what was not drawn; instead beyond (k,): with this confidence,
-    at most this fraction of all members that could be drawn lies above the maximum, and as much below the minimum.
+    There is no interval for extremes of members that were not drawn; `beyond` bounds what lies outside instead.
+
+    Arrays of the estimate, beside count (k,):
+
+    * minimum, maximum (k, d): the extremes; value is the maximum.
+    * minimum_member, maximum_member (k, d): indices of the members that have them; -1 where no member counts.
+    * beyond (k,): with the statistic's confidence, at most this fraction of all members that could be drawn lies above
+      the maximum, and at most this fraction below the minimum.
+
+    Args:
+        of: a quantity; see `Statistic`, also for name, confidence, stopped and at.
     """
 
     type: ClassVar[str] = "extremes"
 
     def rows(self, values: Values) -> Part:
-        """Extremes of the block."""
-        found: Part = {"count": values.count}
+        """Return the extremes of the block, and whose they are."""
+        part: Part = {"count": values.count}
         for name, best, beyond in (("minimum", np.argmin, np.inf), ("maximum", np.argmax, -np.inf)):
             x = values.filled(beyond)
             at = best(x, axis=2)
-            found[name] = np.take_along_axis(x, at[:, :, None], axis=2)[:, :, 0]
-            found[f"{name}_member"] = np.where(values.count[:, None] > 0, values.members(at), -1)
-        return found
+            part[name] = np.take_along_axis(x, at[:, :, None], axis=2)[:, :, 0]
+            part[f"{name}_member"] = np.where(values.count[:, None] > 0, values.members(at), -1)
+        return part
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """The more extreme; the first member's of equal ones."""
+        """Keep the more extreme value; of equal ones, that of the first member."""
         both: Part = {"count": left["count"] + right["count"]}
         for name, better in (
             ("minimum", right["minimum"] < left["minimum"]),
@@ -55,7 +64,7 @@ class Extremes(Statistic):
         return both
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """P(a fraction above the maximum > b) = (1 - b)^n."""
+        """Return the extremes; `beyond` = b follows from P(a fraction above the maximum > b) = (1 - b)^n."""
         count = part["count"]
         arrays = {name: empty_as_nan(part[name], count) for name in ("minimum", "maximum")}
         arrays |= {name: part[name] for name in ("minimum_member", "maximum_member")}
@@ -65,19 +74,28 @@ class Extremes(Statistic):
         return estimate(self, "none: beyond bounds what lies outside", dims, arrays, time)
 
     def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
-        """Extremes have no interval."""
+        """Return the estimate as it is: extremes have no interval."""
         return whole
 
 
 @dataclass(frozen=True, eq=False)
 class Quantiles(Statistic):
-    """Quantiles over members: value (k, levels, d). Exact up to `size` members; then from a sketch with a proven bound.
+    """Quantiles over members: exact for up to `size` members, beyond that from a sketch with a proven error bound.
 
-    levels: between 0 and 1. size: numbers that each level of the sketch keeps, a power of two; below 256 no block is
-    exact, however few its members. rank_error (k,): proven bound on the rank's error as a fraction of the members; what is
-    to be expected is several times smaller.
-    Interval: from the ranks of sorted values (binomial, no assumption on the distribution), widened by the sketch's
+    Interval: from the ranks of the sorted values (binomial, no assumption on the distribution), widened by the sketch's
     standard error; infinite where too few members lie beyond the level. Each replicate has a sketch of its own.
+
+    Arrays of the estimate, beside lower, upper and count (k,):
+
+    * value (k, levels, d): the quantiles.
+    * rank_error (k,): proven bound on the error of the rank, as a fraction of the members. Typical errors are several
+      times smaller.
+
+    Args:
+        of: a quantity; see `Statistic`, also for name, confidence, stopped and at.
+        levels: fractions between 0 and 1; by default (0.05, 0.25, 0.5, 0.75, 0.95).
+        size: number of values that each level of the sketch keeps, a power of two from 64; by default 2048. Below 256
+            no block is exact, however few its members.
     """
 
     type: ClassVar[str] = "quantiles"
@@ -87,7 +105,7 @@ class Quantiles(Statistic):
     size: int = 2048
 
     def check(self, faults: Faults) -> None:
-        """Levels lie between 0 and 1."""
+        """Note faults of the levels and of the size."""
         levels = faults.finite("levels", self.levels)
         if levels is not None:
             if levels.ndim > 1 or levels.size == 0 or np.any(levels <= 0.0) or np.any(levels >= 1.0):
@@ -100,22 +118,22 @@ class Quantiles(Statistic):
             object.__setattr__(self, "size", int(n))
 
     def rows(self, values: Values) -> Part:
-        """The block's values, sorted; every other one, and so on, down to `size`."""
+        """Return the sketch of the block: its values sorted, and thinned to `size` values where there are more."""
         x = values.filled(np.inf)
-        # Sorting is most of the work, and half as much of numbers half as long.
+        # Sorting is most of the work, and takes half as long in float32.
         x = x.astype(np.float32) if values.single else x
         return {"count": values.count} | sketch.of(x, values.size, self.size, values.block)
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """One sketch of two."""
+        """Join two sketches into one."""
         return {"count": left["count"] + right["count"]} | sketch.join(left, right, self.size, place)
 
     def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
-        """Of all members."""
+        """Return the quantiles of all members, a few sample times at once to bound memory."""
         return self._in_pieces(parts, time, 1, lambda some, when: self.read(self.whole(some), when))
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
-        """Intervals between the sorted values of all members, by ranks that the replicates' spread gives."""
+        """Return quantiles with intervals between sorted values, at ranks that the replicates' spread gives."""
 
         def read(some: Sequence[Part], when: np.ndarray) -> Estimate:
             return self._read_replicates(self.each_replicate(some, replicates), when)
@@ -125,46 +143,46 @@ class Quantiles(Statistic):
     def _in_pieces(
         self, parts: Sequence[Part], time: np.ndarray, replicates: int, read: Callable[..., Estimate]
     ) -> list[Estimate]:
-        """Some times after others: sorting all at once would take more memory than the sketches do."""
+        """Read some sample times after others: sorting all at once would take more memory than the sketches do."""
         numbers = sum(part["values"][0].size for part in parts) * replicates
         rows = max(1, SORTED_AT_ONCE // numbers)
-        found = []
+        pieces = []
         for first in range(0, len(time), rows):
             at = slice(first * replicates, (first + rows) * replicates)
             some = [part | {key: part[key][at] for key in part.keys() - self.shared} for part in parts]
-            found.append(read(some, time[first : first + rows]))
-        arrays = {name: np.concatenate([one[name] for one in found]) for name in found[0].arrays}
-        return [replace(found[0], arrays=arrays, coordinates=found[0].coordinates | {"time": time})]
+            pieces.append(read(some, time[first : first + rows]))
+        arrays = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0].arrays}
+        return [replace(pieces[0], arrays=arrays, coordinates=pieces[0].coordinates | {"time": time})]
 
     def whole(self, parts: Sequence[Part]) -> Part:
-        """All that is kept, side by side."""
+        """Return all sketches side by side."""
         return {"count": np.sum([part["count"] for part in parts], axis=0)} | sketch.together(parts)
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Linear between sorted values, as np.quantile; its interval by ranks."""
+        """Return quantiles, linear between sorted values as np.quantile, with intervals by ranks."""
         n, level = part["count"][:, None], np.array(self.levels)[None, :]
         low, high = intervals.ranks(n, level, self.confidence)
-        # The sketch's own error adds to the ranks' variance.
-        own = n * level * (1.0 - level)
-        more = intervals.normal(self.confidence) * (np.sqrt(own + part["variance"][0]) - np.sqrt(own))
+        # The variance of the sketch's error adds to that of the ranks.
+        binomial = n * level * (1.0 - level)
+        more = intervals.normal(self.confidence) * (np.sqrt(binomial + part["variance"][0]) - np.sqrt(binomial))
         ends = ((low - more)[:, :, None], (high + more)[:, :, None])
         return self._read(part, time, lambda value: ends, "order statistics: binomial ranks")
 
     def _read_replicates(self, each: Sequence[Sequence[Part]], time: np.ndarray) -> Estimate:
-        """Ranks from the spread of the replicates' fractions of members up to the quantile of all (Woodruff 1952).
+        """Take ranks from the spread of the replicates' fractions of members up to the quantile of all (Woodruff 1952).
 
-        The fractions hold the errors of their sketches.
+        The fractions contain the errors of their sketches.
         """
-        whole = self.whole(together(each))
-        n, level = whole["count"][:, None, None], np.array(self.levels)[None, :, None]
+        overall = self.whole(together(each))
+        n, level = overall["count"][:, None, None], np.array(self.levels)[None, :, None]
 
         def ends(value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             below = np.stack([sketch.fraction(parts, value) for parts in each])
-            least = float(np.sqrt(1.0 + whole["variance"][0]))
+            least = float(np.sqrt(1.0 + overall["variance"][0]))
             low, high = intervals.probability_of_replicates(level, below, n, self.confidence, least)
             return n * low, n * high + 1.0
 
-        return self._read(whole, time, ends, f"order statistics: ranks by Student's t of {len(each)} replicates")
+        return self._read(overall, time, ends, f"order statistics: ranks by Student's t of {len(each)} replicates")
 
     def _read(
         self,
@@ -173,7 +191,14 @@ class Quantiles(Statistic):
         ends: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
         interval: str,
     ) -> Estimate:
-        """ends: value (k, levels, d) to the ranks, counted from 1, of its interval's ends."""
+        """Return the quantiles, with the interval between two ranks.
+
+        Args:
+            part: the sketch of all members.
+            time: (k,) [s], the sample times.
+            ends: function from the value (k, levels, d) to the ranks, counted from 1, of the interval's ends.
+            interval: how the interval was formed.
+        """
         count = part["count"]
         level = np.array(self.levels)[None, :]
         n = count[:, None, None]

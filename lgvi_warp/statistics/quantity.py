@@ -1,4 +1,4 @@
-"""What a statistic is of: a quantity of each member at each sample time, by name or as a function of the samples."""
+"""Quantities of each member at each sample time: known by name, or functions of the samples."""
 
 from __future__ import annotations
 
@@ -26,12 +26,20 @@ Function = Callable[["Fields", "Members"], np.ndarray]
 
 @dataclass(frozen=True)
 class Quantity:
-    """A function of a block's samples, (k times, n members): numbers (k, n), or (k, n, d) for d components.
+    """A function of a block's samples, for k sample times and n members.
 
-    function(samples, members): samples["position"] (k, n, 3) and so on, samples.time (k,) [s], samples.terms; members
-    as lw.Ensemble.select gives them. fields: the samples that it needs. labels: names of the components. needs_limit:
-    whether it is never true or false, so that a condition on it wants a number. What is not finite leaves its member out at
-    that time.
+    A member whose number is not finite is left out at that time.
+
+    Args:
+        name: name in results and messages.
+        function: function(samples, members) that returns (k, n) numbers, or (k, n, d) for d components.
+            samples["position"] is (k, n, 3) and so on, samples.time (k,) [s], samples.terms the scene's terms; members
+            are those that lw.Ensemble.select returns.
+        unit: unit of the numbers; by default "".
+        fields: names of the samples that the function reads; by default all.
+        labels: names of the d components; by default `name`, for one component.
+        needs_limit: whether a condition on it needs a number to compare with; by default False: the function may return
+            true or false.
     """
 
     name: str
@@ -47,11 +55,22 @@ class Quantity:
 
     @property
     def size(self) -> int:
-        """Number of components."""
+        """The number d of components."""
         return len(self.labels)
 
     def __call__(self, samples: Fields, members: Members) -> np.ndarray:
-        """Its numbers (k, d, n), contiguous: float32 where they are numbers of such a run as they stand, else float64."""
+        """Evaluate the quantity.
+
+        Args:
+            samples: the samples of a block.
+            members: the members of the block.
+
+        Returns:
+            (k, d, n), contiguous; float32 where the function returns float32, else float64.
+
+        Raises:
+            ValueError: the function returned another shape, or numbers that are not real.
+        """
         try:
             values = real_results(self.function(samples, members))
         except NotReal as error:
@@ -90,7 +109,7 @@ def _euler(samples: Fields, members: Members) -> np.ndarray:
 
 
 def _energy(samples: Fields, members: Members) -> np.ndarray:
-    """That of `Result.energy`."""
+    """Mechanical energy [J], as `Result.energy`."""
     terms: Sequence[Term] = samples.terms
 
     def own(term: Term) -> dict[str, np.ndarray]:
@@ -125,23 +144,36 @@ KNOWN: dict[str, Quantity] = {
 
 
 def named(key: str, text: str) -> Quantity:
-    """The quantity of a name, or one component of it. Raises SceneError naming `key`."""
-    found = re.fullmatch(r"(\w+)(\[[\d, ]+\])?", text.strip())
-    base = KNOWN.get(found[1]) if found else None
+    """Return the quantity of a name, or one component of it.
+
+    Args:
+        key: the key that messages name.
+        text: a name such as "position", or a component such as "position[2]".
+
+    Raises:
+        SceneError: the name or the component is not known.
+    """
+    match = re.fullmatch(r"(\w+)(\[[\d, ]+\])?", text.strip())
+    base = KNOWN.get(match[1]) if match else None
     if base is None:
         raise SceneError([f"{key} = {shown(text)}: is not known; {closest(text, KNOWN)}"])
-    assert found is not None
-    if found[2] is None:
+    assert match is not None
+    if match[2] is None:
         return base
-    label = f"{base.name}[{', '.join(found[2][1:-1].replace(' ', '').split(','))}]"
+    label = f"{base.name}[{', '.join(match[2][1:-1].replace(' ', '').split(','))}]"
     if label not in base.labels:
-        what = "has one component" if base.size == 1 else f"has the components {', '.join(base.labels)}"
-        raise SceneError([f"{key} = {shown(text)}: {base.name} {what}; give one of them"])
+        remark = "has one component" if base.size == 1 else f"has the components {', '.join(base.labels)}"
+        raise SceneError([f"{key} = {shown(text)}: {base.name} {remark}; give one of them"])
     return component(base, base.labels.index(label))
 
 
 def component(base: Quantity, i: int) -> Quantity:
-    """One component of a quantity."""
+    """Return one component of a quantity as a quantity.
+
+    Args:
+        base: a quantity of d components.
+        i: index of the component, from 0.
+    """
     if base.size == 1:
         return base
     inner = base.function
@@ -149,7 +181,11 @@ def component(base: Quantity, i: int) -> Quantity:
 
 
 def joined(parts: Sequence[Quantity]) -> Quantity:
-    """Several as one: their components side by side."""
+    """Return several quantities as one, with their components side by side.
+
+    Args:
+        parts: the quantities, at least one.
+    """
     if len(parts) == 1:
         return parts[0]
 

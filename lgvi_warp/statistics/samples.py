@@ -1,4 +1,4 @@
-"""Samples of a block of members: what statistics and stores are handed."""
+"""Samples of a block of members, as statistics and stores receive them."""
 
 from __future__ import annotations
 
@@ -12,10 +12,15 @@ from lgvi_warp.common.status import failed
 
 
 class Fields(dict[str, np.ndarray]):
-    """Samples of a block by field, (k times, n members, ...), and what else is known of its members at these times.
+    """Samples of a block by the name of the field: arrays (k, n, ...) of k sample times and n members.
 
-    time: (k,) [s]; steps: (k,), made before each time; terms: those of the scene. ends: gives the status (n,) of the members
-    and the last step (n,) after which each was its own.
+    Args:
+        fields: the arrays by name, such as "position" (k, n, 3) [m].
+        time: (k,) [s], sample times.
+        steps: (k,), number of steps made before each sample time.
+        terms: the terms of the scene.
+        ends: function that returns the status (n,) of the members, and the last step (n,) after which each was still
+            running.
     """
 
     def __init__(
@@ -30,18 +35,25 @@ class Fields(dict[str, np.ndarray]):
         self.time, self.terms, self._steps, self._when_ended = time, terms, steps, ends
 
     def last(self) -> Fields:
-        """The last of these samples alone."""
+        """Return the samples at the last of these times."""
         last = {name: values[-1:] for name, values in self.items()}
         return Fields(last, self.time[-1:], self._steps[-1:], self.terms, self._when_ended)
 
     @functools.cached_property
     def _ends(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Status of each member and the step after which it is no more its own; None if all still are."""
+        """Status (n,) of each member and the last step (n,) after which it still ran; None if all run on."""
         status, step = self._when_ended()
         return (status, step) if np.any(status) else None
 
     def good(self, held: bool = True) -> np.ndarray | None:
-        """(k, n), which members had not failed by each time; None: none had. held: one that an event stopped has not."""
+        """Return which members are valid at each time.
+
+        Args:
+            held: whether a member that an event stopped stays valid; by default True.
+
+        Returns:
+            (k, n), or None if all members are valid at all times.
+        """
         if self._ends is None:
             return None
         status, step = self._ends

@@ -1,15 +1,15 @@
 """A sketch of sorted values: quantiles of any number of values from a few thousand, with a proven bound on the rank.
 
 A tree of buffers after Munro & Paterson (1980) with the coin flips of Karnin, Lang & Liberty (2016). Two sorted buffers
-whose values stand for w each are merged, and every other value stays, standing for 2 w: which of the two, a coin decides.
-If the first of each pair stays, the count of those up to any number grows by w or not at all, if the second, it falls by
-w or not at all; the half of it, which the coin tells, is put right by `shift`, so that the rank errs by w / 2, up or down
-as the coin fell. Of N values in buffers of s the sum of these bounds is at most N (log2(N / s) + 2) / (4 s), proven for
-every order and any coins; the sum of their squares is at most (N / 2 s)^2, so that the error exceeds t N / 2 s with a
-probability below 2 exp(-t^2 / 2) (Hoeffding 1963).
-The coin of a merge hangs on its place in the tree: so the sketch of a set of blocks has the same bits in whatever order
-they come. Many streams (times, components) of the same number of values share coins and one array.
-Values that do not count are +inf: ranks of the others are as they were.
+whose values have the weight w each are merged, and every other value is kept with the weight 2 w; a coin decides
+whether the first or the second of each pair. If the first is kept, the count of values up to any number grows by w or
+not at all; if the second, it falls by w or not at all. Half of that change is known from the coin and corrected by
+`shift`, so that the rank errs by at most w / 2, up or down with the coin. For N values in buffers of s the sum of these
+bounds is at most N (log2(N / s) + 2) / (4 s), proven for every order and any coins; the sum of their squares is at most
+(N / 2 s)^2, so that the error exceeds t N / 2 s with a probability below 2 exp(-t^2 / 2) (Hoeffding 1963). The coin of
+a merge depends only on its place in the tree: the sketch of a set of blocks has the same bits in whatever order they
+come. Many streams (times, components) of the same number of values share coins and one array. Values that do not count
+are +inf: they leave the ranks of the others unchanged.
 """
 
 from __future__ import annotations
@@ -23,13 +23,29 @@ from lgvi_warp.statistics.tree import Part
 
 
 def coin(level: int, place: int, sides: int) -> int:
-    """0 to sides - 1, fixed by the place: the same for every run."""
+    """Return a pseudo-random whole number from 0 to sides - 1 that depends on the place alone: the same for every run.
+
+    Args:
+        level: level in the tree of blocks.
+        place: index in that level.
+        sides: number of possible results.
+    """
     digest = hashlib.blake2b(b"%d %d" % (level, place), digest_size=8).digest()
     return int.from_bytes(digest, "little") % sides
 
 
 def of(x: np.ndarray, members: int, size: int, block: int) -> Part:
-    """A block's sketch: x (k, d, n), filled up to `members` values with +inf, at most `size` of them kept."""
+    """Return the sketch of one block.
+
+    Args:
+        x: (k, d, n), the values; +inf where a member does not count.
+        members: number of members of a full block; a shorter one is filled up with +inf.
+        size: largest number of values to keep.
+        block: number of the block.
+
+    Returns:
+        values (k, d, m) in order, their weights (m,), and error, variance and shift of the rank, (1,) each.
+    """
     k, d, n = x.shape
     values = np.empty((k, d, max(members, n)), x.dtype)
     values[..., :n] = x
@@ -39,7 +55,7 @@ def of(x: np.ndarray, members: int, size: int, block: int) -> Part:
     first = coin(-1, block, weight)
     if weight > 1:
         values = np.ascontiguousarray(values[..., first::weight])
-    # Of w values one stays: counts change by -first to w - 1 - first.
+    # One of `weight` values is kept: counts change by -first to weight - 1 - first.
     error = 0.5 * (weight - 1)
     return _part(values, np.full(values.shape[2], weight), error, error**2, error - first)
 
@@ -50,14 +66,32 @@ def _part(values: np.ndarray, weights: np.ndarray, error: float, variance: float
 
 
 def merged(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Sorted rows of two arrays of sorted rows: NumPy's stable sort finds the two runs and merges them."""
+    """Merge sorted rows of two arrays: NumPy's stable sort detects the two runs and merges them.
+
+    Args:
+        left: (k, d, a), sorted along the last axis.
+        right: (k, d, b), sorted along the last axis.
+
+    Returns:
+        (k, d, a + b), sorted along the last axis.
+    """
     both = np.concatenate([left, right], axis=2)
     both.sort(axis=2, kind="stable")
     return both
 
 
 def join(left: Part, right: Part, size: int, place: tuple[int, int]) -> Part:
-    """One sketch of two of equal weight and length."""
+    """Return the sketch of two sketches of equal weight and length.
+
+    Args:
+        left: sketch of the blocks that come first.
+        right: sketch of the blocks that follow.
+        size: largest number of values to keep.
+        place: (level, index) of the result in the tree of blocks.
+
+    Raises:
+        ValueError: the sketches differ in length or weight.
+    """
     a, b = left["values"].shape[2], right["values"].shape[2]
     error, variance, shift = (float(left[key][0] + right[key][0]) for key in ("error", "variance", "shift"))
     weight = int(left["weights"][0])
@@ -72,7 +106,11 @@ def join(left: Part, right: Part, size: int, place: tuple[int, int]) -> Part:
 
 
 def together(parts: Sequence[Part]) -> Part:
-    """Sketches of any weights side by side."""
+    """Return sketches of any weights side by side, as one part.
+
+    Args:
+        parts: the sketches.
+    """
     values = np.concatenate([part["values"] for part in parts], axis=2)
     weights = np.concatenate([part["weights"] for part in parts])
     numbers = (float(sum(part[key][0] for part in parts)) for key in ("error", "variance", "shift"))
@@ -80,7 +118,16 @@ def together(parts: Sequence[Part]) -> Part:
 
 
 def sorted_values(part: Part) -> tuple[np.ndarray, np.ndarray]:
-    """Values (k, d, m) in order, and their ranks, counted from 0: the middle of those that each stands for, put right."""
+    """Return the values of a sketch in order, with their ranks.
+
+    Args:
+        part: a sketch, or several side by side.
+
+    Returns:
+        Values (k, d, m) in order, and their ranks (k, d, m), counted from 0: each is the middle of the ranks that the
+        value
+        represents, corrected by the shift.
+    """
     values, weights = part["values"], part["weights"]
     if np.all(weights == 1):
         values = np.sort(values, axis=2, kind="stable")
@@ -92,7 +139,15 @@ def sorted_values(part: Part) -> tuple[np.ndarray, np.ndarray]:
 
 
 def fraction(parts: Sequence[Part], x: np.ndarray) -> np.ndarray:
-    """Which part of the members, (k, q, d), have values up to x (k, q, d); NaN where none count."""
+    """Return the fraction of the members whose values do not exceed a number.
+
+    Args:
+        parts: sketches that together hold all members.
+        x: (k, q, d), the numbers.
+
+    Returns:
+        (k, q, d); NaN where no member counts.
+    """
     below = sum(
         part["weights"][0] * np.count_nonzero(part["values"][:, None] <= x[..., None], axis=3) - part["shift"][0]
         for part in parts
@@ -102,13 +157,23 @@ def fraction(parts: Sequence[Part], x: np.ndarray) -> np.ndarray:
 
 
 def at_rank(values: np.ndarray, middles: np.ndarray, finite: np.ndarray, rank: np.ndarray) -> np.ndarray:
-    """Values at ranks (k, q, d), linear between those kept, never beyond the finite ones."""
+    """Return values at given ranks: linear between the values kept, never beyond the finite ones.
+
+    Args:
+        values: (k, d, m), in order.
+        middles: (k, d, m), their ranks, counted from 0.
+        finite: (k, d, m), which values are finite.
+        rank: (k, q, d), the ranks asked for, counted from 0.
+
+    Returns:
+        (k, q, d); NaN where no value is finite.
+    """
     k, d = values.shape[:2]
-    found = np.full(rank.shape, np.nan)
+    interpolated = np.full(rank.shape, np.nan)
     last = finite.sum(axis=2) - 1
     for i in range(k):
         for j in range(d):
             if last[i, j] >= 0:
                 stop = last[i, j] + 1
-                found[i, :, j] = np.interp(rank[i, :, j], middles[i, j, :stop], values[i, j, :stop])
-    return found
+                interpolated[i, :, j] = np.interp(rank[i, :, j], middles[i, j, :stop], values[i, j, :stop])
+    return interpolated

@@ -1,4 +1,4 @@
-"""A run's statistics at the end, as lines of text."""
+"""The estimates of a run at its end, as lines of text."""
 
 from __future__ import annotations
 
@@ -10,25 +10,27 @@ from lgvi_warp.statistics.estimate import Estimate, Estimates
 
 
 def table(estimates: Estimates) -> list[str]:
-    """One line for each number: what it is of, its value, its interval, the members that it is of."""
-    found = []
-    for one in estimates.values():
-        unit = "" if one.unit == "1" or one.unit.startswith("products") else f" {one.unit}"
-        members = _MEMBERS.get(one.settings["type"], lambda one: one.count[-1])(one)
-        for label, value, lower, upper in _LINES.get(one.settings["type"], _entries)(one):
+    """Return one line for each number: its label, its value, its interval, and its number of members.
+
+    Args:
+        estimates: the estimates of a run.
+    """
+    rows = []
+    for estimate in estimates.values():
+        unit = "" if estimate.unit == "1" or estimate.unit.startswith("products") else f" {estimate.unit}"
+        members = _MEMBERS.get(estimate.settings["type"], lambda estimate: estimate.count[-1])(estimate)
+        for label, value, lower, upper in _LINES.get(estimate.settings["type"], _entries)(estimate):
             ends = f"{lower:.5g} to {upper:.5g}" if np.isfinite(lower) or np.isfinite(upper) else "no interval"
-            found.append((label, f"{value:.6g}{unit}", ends, f"{int(members):,} members"))
-    widths = [max((len(row[i]) for row in found), default=0) for i in range(3)]
-    return [
-        "  ".join([*(text.ljust(width) for text, width in zip(row, widths, strict=False)), row[3]]) for row in found
-    ]
+            rows.append((label, f"{value:.6g}{unit}", ends, f"{int(members):,} members"))
+    widths = [max((len(row[i]) for row in rows), default=0) for i in range(3)]
+    return ["  ".join([*(text.ljust(width) for text, width in zip(row, widths, strict=False)), row[3]]) for row in rows]
 
 
 Line = tuple[str, float, float, float]
 
 
 def _labels(one: Estimate) -> list[str]:
-    """What each component is called, with the kind of statistic before it unless it has a name of its own."""
+    """Label of each component, preceded by the type of the statistic unless it was given a name."""
     kind, at = one.settings["type"], f" at {one.settings['at']}" if "at" in one.settings else ""
     if one.name != f"{kind} {', '.join(one.name.split(' ', 1)[1:])}" or len(one.coordinates["component"]) == 1:
         names = [one.name] if len(one.coordinates["component"]) == 1 else one.coordinates["component"].tolist()
@@ -37,7 +39,7 @@ def _labels(one: Estimate) -> list[str]:
 
 
 def _entries(one: Estimate) -> Iterator[Line]:
-    """Each component at the last time."""
+    """One line for each component at the last sample time."""
     for i, label in enumerate(_labels(one)):
         yield label, one.value[-1, i], one.lower[-1, i], one.upper[-1, i]
 
@@ -108,7 +110,7 @@ _LINES: dict[str, Callable[[Estimate], Iterator[Line]]] = {
     "histogram": _histogram,
 }
 
-# Members that an estimate is of, where that is not its count at the end.
+# Number of members behind an estimate, for types where it is not the count at the end.
 _MEMBERS: dict[str, Callable[[Estimate], int]] = {
     "first_passage": lambda one: int(one.count[0]),
     "outcome": lambda one: int(one.count[0] + one["ended"][0] + one["otherwise"][0]),

@@ -1,4 +1,4 @@
-"""Statistics of one number of each member, whatever that number is of."""
+"""Statistics of one number of each member, such as the maximum of its path or the time of its end."""
 
 from __future__ import annotations
 
@@ -19,53 +19,60 @@ from lgvi_warp.statistics.values import Values
 
 @dataclass(frozen=True, eq=False)
 class Then(Statistic):
-    """One number for each component of each member, then statistics of that. Abstract.
+    """One number for each component of each member, then statistics of that number. Abstract.
 
-    then: a statistic, or a list, without `of`: lw.Mean(), lw.Quantiles(levels=(0.5, 0.99)), lw.Exceedance(above=2.0).
+    Args:
+        of: see the classes derived from it.
+        then: a statistic, or a list, without `of`: lw.Mean(), lw.Quantiles(levels=(0.5, 0.99)),
+            lw.Exceedance(above=2.0).
     """
 
     then: Any = None
 
     def check(self, faults: Faults) -> None:
-        """What comes after must be statistics over members, and not of something else."""
+        """Note what in `then` is no statistic over members, or says what it is of."""
         super().check(faults)
 
-        given = self.then_default() if self.then is None else self.then
-        given = given if isinstance(given, list | tuple) else [given]
-        found: list[Statistic] = []
+        entries = self.then_default() if self.then is None else self.then
+        entries = entries if isinstance(entries, list | tuple) else [entries]
+        statistics: list[Statistic] = []
         with faults.including():
-            found = list(from_list(given, f"{self.type}.then", whole=False))
-        for i, one in enumerate(found):
-            if not one.of_numbers:
-                what = f"is of samples in time, and a {self.type} is one number of each member"
-                faults.add(f"then[{i}].type", one.type, what, "ask for its mean, quantiles, or an exceedance")
-            elif one.of is not None:
-                faults.add(f"then[{i}].of", one.of, "is given already", f"leave it out: it is of the {self.type}")
-            elif one.at is not None:
-                faults.add(f"then[{i}].at", one.at, f"says when, and a {self.type} has no time", "leave it out")
-        object.__setattr__(self, "then", tuple(found))
+            statistics = list(from_list(entries, f"{self.type}.then", whole=False))
+        for i, statistic in enumerate(statistics):
+            if not statistic.of_numbers:
+                remark = f"is of samples in time, and a {self.type} is one number of each member"
+                faults.add(f"then[{i}].type", statistic.type, remark, "ask for its mean, quantiles, or an exceedance")
+            elif statistic.of is not None:
+                faults.add(f"then[{i}].of", statistic.of, "is given already", f"leave it out: it is of the {self.type}")
+            elif statistic.at is not None:
+                faults.add(f"then[{i}].at", statistic.at, f"says when, and a {self.type} has no time", "leave it out")
+        object.__setattr__(self, "then", tuple(statistics))
         if self.of is not None and not faults:
-            with faults.including():  # a limit that is missing is told now, and not by the run
+            with faults.including():  # report a missing limit now, not during the run
                 self.parts()
 
     def then_default(self) -> Sequence[Statistic]:
-        """What comes after where nothing is said."""
+        """Return the statistics where `then` is not given."""
         return [Mean()]
 
     def then_of(self, time: np.ndarray) -> tuple[Statistic, ...]:
-        """The statistics, each knowing what it is of; time: (k,) [s], of all samples."""
+        """Return the statistics of `then`, each of this class's number.
+
+        Args:
+            time: (k,) [s], all sample times of the run.
+        """
         inner = self.quantity
-        whole = Quantity(self.key, inner.function, self.unit, inner.fields, self._labels, self.needs_limit)
-        return tuple(replace(one.over(time), of=whole, stopped=self.stopped) for one in self.then)
+        derived = Quantity(self.key, inner.function, self.unit, inner.fields, self._labels, self.needs_limit)
+        return tuple(replace(statistic.over(time), of=derived, stopped=self.stopped) for statistic in self.then)
 
     @property
     def unit(self) -> str:
-        """Of the number."""
+        """The unit of the number."""
         return self.quantity.unit
 
     @property
     def needs_limit(self) -> bool:
-        """Whether a condition on the number wants a limit."""
+        """Whether a condition on the number needs a limit."""
         return self.quantity.needs_limit
 
     @property
@@ -73,47 +80,59 @@ class Then(Statistic):
         return tuple(f"{self.type} {label}" for label in self.quantity.labels)
 
     def parts(self) -> tuple[Statistic, ...]:
-        """Those that come after."""
+        """Return the statistics of `then`, each of this class's number."""
         return self.then_of(np.array([0.0, 1.0]))
 
     def gather(self, values: Values, time: np.ndarray) -> Part:
-        """The part of a block; values: the members' numbers, of one time."""
-        found: Part = {}
-        for i, one in enumerate(self.then_of(time)):
-            gathers = one.open(time[-1:], values.x.shape[2])
+        """Return the part of a block: the parts of all statistics of `then`, their keys numbered.
+
+        Args:
+            values: the numbers of the block's members, as of one time.
+            time: (k,) [s], all sample times of the run.
+        """
+        part: Part = {}
+        for i, statistic in enumerate(self.then_of(time)):
+            gathers = statistic.open(time[-1:], values.x.shape[2])
             gathers.take(values, slice(0, 1))
-            found |= {f"{i}/{key}": array for key, array in gathers.close().items()}
-        return found
+            part |= {f"{i}/{key}": array for key, array in gathers.close().items()}
+        return part
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """Each statistic's own."""
-        found: Part = {}
-        for i, one in enumerate(self.then):
-            found |= {f"{i}/{key}": a for key, a in one.join(own(left, i), own(right, i), place).items()}
-        return found
+        """Join the parts of each statistic."""
+        both: Part = {}
+        for i, statistic in enumerate(self.then):
+            both |= {f"{i}/{key}": a for key, a in statistic.join(own(left, i), own(right, i), place).items()}
+        return both
 
     def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
-        """Each statistic's, at the end."""
-        found: list[Estimate] = []
-        for i, one in enumerate(self.then_of(time)):
-            found += one.estimates([own(part, i) for part in parts], time[-1:])
-        return found
+        """Return the estimates of each statistic, at the end."""
+        estimates: list[Estimate] = []
+        for i, statistic in enumerate(self.then_of(time)):
+            estimates += statistic.estimates([own(part, i) for part in parts], time[-1:])
+        return estimates
 
     def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
-        """Each statistic's own."""
-        found: Part = {}
-        for i, one in enumerate(self.then):
-            found |= {f"{i}/{key}": a for key, a in one.of_replicate(own(part, i), replicate, replicates).items()}
-        return found
+        """Return the part of one replicate, for each statistic."""
+        replicate_part: Part = {}
+        for i, statistic in enumerate(self.then):
+            replicate_part |= {
+                f"{i}/{key}": a for key, a in statistic.of_replicate(own(part, i), replicate, replicates).items()
+            }
+        return replicate_part
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
-        """Each statistic's, at the end."""
-        found: list[Estimate] = []
-        for i, one in enumerate(self.then_of(time)):
-            found += one.estimates_of_replicates([own(part, i) for part in parts], time[-1:], replicates)
-        return found
+        """Return the estimates of each statistic from its replicates, at the end."""
+        estimates: list[Estimate] = []
+        for i, statistic in enumerate(self.then_of(time)):
+            estimates += statistic.estimates_of_replicates([own(part, i) for part in parts], time[-1:], replicates)
+        return estimates
 
 
 def own(part: Part, i: int) -> Part:
-    """The arrays of the i-th."""
+    """Return the arrays of one of the statistics of `then`.
+
+    Args:
+        part: a part with numbered keys, such as "0/count".
+        i: index of the statistic.
+    """
     return {key.removeprefix(f"{i}/"): array for key, array in part.items() if key.startswith(f"{i}/")}

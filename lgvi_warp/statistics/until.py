@@ -1,4 +1,4 @@
-"""When a run has members enough: a statistic's interval is as narrow as was asked for."""
+"""Stopping rule of a run: it ends when a statistic's interval is narrow enough."""
 
 from __future__ import annotations
 
@@ -19,24 +19,30 @@ from lgvi_warp.statistics.naming import canonical
 from lgvi_warp.statistics.order import Quantiles
 from lgvi_warp.statistics.quantity import KNOWN
 
-# Looks are made at every block until this share of the members is a block, then whenever so many came to them.
+# After a look, the number of members grows by at least this fraction before the next one.
 GROWTH = 0.05
 
 
 @dataclass(frozen=True)
 class Until:
-    """Run blocks of members until a statistic's interval is narrow enough, the ensemble's members at most.
+    """Run blocks of members until a statistic's interval is narrow enough, at most all members of the ensemble.
 
-    statistic: the name of one of the run's statistics, such as "mean position"; one component of it, "mean position[2]";
-    one level of it, "quantiles depth 0.95" or "quantiles position[2] 0.95"; one entry of a covariance, "covariance
-    position[0], position[2]": as the command prints them. A mean of any quantity is gathered if it is not among them.
-    half_width: in the statistic's unit, above 0; every component and level of what is named must keep it. at: sample
-    time [s], by default the end; "all": at every sample time. members: no look before so many (a small sample may look
-    narrower than it is). The run stops at a block's end; looks are made in the order of the blocks, so members and bits do
-    not depend on threads; with replicates of a design, at powers of two of members. docs/statistics.md says what stopping
-    does to coverage.
+    The run stops at the end of a block. Intervals are looked at in the order of the blocks, so that neither the number
+    of members nor any bit depends on threads; with replicates of a design, at powers of two of members.
+    docs/statistics.md says how stopping affects coverage.
 
-    Raises SceneError naming every fault.
+    Args:
+        statistic: the name of one of the run's statistics as the command prints it: "mean position"; one component,
+            "mean position[2]"; one level, "quantiles depth 0.95" or "quantiles position[2] 0.95"; one entry of a
+            covariance, "covariance position[0], position[2]". A mean is gathered if it is not among the run's
+            statistics.
+        half_width: largest half width of the interval, in the statistic's unit, above 0. All components and levels of
+            the name must satisfy it.
+        at: sample time [s], by default the end; "all": every sample time.
+        members: least number of members, from 2; by default 1024 (a small sample may look narrower than it is).
+
+    Raises:
+        SceneError: with every fault.
     """
 
     statistic: str
@@ -57,13 +63,20 @@ class Until:
         object.__setattr__(self, "members", int(self.members))
 
     def to_dict(self) -> dict[str, Any]:
-        """As in a scene file."""
+        """Return the table of a scene file that gives this rule."""
         defaults = {"at": None, "members": 1024}
         return {name: value for name, value in vars(self).items() if name not in defaults or value != defaults[name]}
 
 
 def from_dict(given: Any) -> Until:
-    """An Until, or one from a table of a scene file. Raises SceneError."""
+    """Return the stopping rule of a table, or the rule itself.
+
+    Args:
+        given: an `Until`, or the table `run.until` of a scene file.
+
+    Raises:
+        SceneError: with every fault of the table.
+    """
     if isinstance(given, Until):
         return given
     faults = Faults()
@@ -81,23 +94,34 @@ def from_dict(given: Any) -> Until:
 
 @dataclass
 class Watch:
-    """An Until at work on a run's statistics: which, and which of its numbers.
+    """A stopping rule bound to the statistics of a run.
 
-    doubling: looks at powers of two of members only. With replicates a design is balanced there, and the spread of a few
-    estimates comes out small by chance too often for many looks.
+    Args:
+        until: the rule.
+        statistic: the statistic that gathers the watched estimate.
+        name: name of the estimate.
+        entry: index of the watched entries by dimension; all entries along other dimensions.
+        rows: indices of the watched sample times.
+        looked: number of members at the last look; by default 0.
+        doubling: whether to look at powers of two of members only; by default False. With replicates a design is
+            balanced there, and the spread of a few estimates comes out small by chance too often for many looks.
     """
 
     until: Until
     statistic: Statistic
     name: str
-    # Dimension -> index: which entries along it are watched, all along others.
+    # Dimension -> index of the watched entry; all entries along other dimensions.
     entry: Mapping[str, int]
     rows: np.ndarray
     looked: int = 0
     doubling: bool = False
 
     def due(self, members: int) -> bool:
-        """Whether to look, with so many members done."""
+        """Return whether to look at the interval now, and note the look.
+
+        Args:
+            members: number of members done.
+        """
         if members < self.until.members or members < self.looked * (1.0 + GROWTH):
             return False
         if self.doubling and members & (members - 1):
@@ -106,19 +130,32 @@ class Watch:
         return True
 
     def reached(self, estimates: Sequence[Estimate]) -> bool:
-        """Whether what is watched is narrow enough."""
+        """Return whether the watched intervals are narrow enough.
+
+        Args:
+            estimates: the estimates of all members so far.
+        """
         return self.widest(estimates) <= self.until.half_width
 
     def report(self, members: int, estimates: Sequence[Estimate]) -> str:
-        """How it ended, for the user."""
+        """Return a sentence for the user on whether the rule was satisfied.
+
+        Args:
+            members: number of members done.
+            estimates: the estimates of these members.
+        """
         widest = self.widest(estimates)
         word = "reached" if widest <= self.until.half_width else "not reached"
-        asked = f"half width {self.until.half_width:g} of {self.until.statistic}"
-        return f"{asked}: {word} with {members} members, {widest:.3g}"
+        goal = f"half width {self.until.half_width:g} of {self.until.statistic}"
+        return f"{goal}: {word} with {members} members, {widest:.3g}"
 
     def widest(self, estimates: Sequence[Estimate]) -> float:
-        """The largest half width of what is watched; infinite where a number has none."""
-        estimate = next(one for one in estimates if one.name == self.name)
+        """Return the largest half width of the watched intervals; infinite where an interval is missing.
+
+        Args:
+            estimates: the estimates of all members so far.
+        """
+        estimate = next(candidate for candidate in estimates if candidate.name == self.name)
         half = estimate.half_width
         dims = estimate.dims["value"]
         if "time" in dims and half.shape[0] > 1:
@@ -130,7 +167,16 @@ class Watch:
 
 
 def watch(until: Until, statistics: Sequence[Statistic], times: np.ndarray) -> Watch:
-    """Find what is to be watched; a Mean that is not among the statistics is made. Raises SceneError."""
+    """Bind a stopping rule to the statistics of a run; a mean that is not among them is added.
+
+    Args:
+        until: the rule.
+        statistics: the statistics of the run.
+        times: (k,) [s], the sample times of the run.
+
+    Raises:
+        SceneError: the rule names no statistic, no sample time, or a statistic without an interval.
+    """
     faults = Faults("until.")
     rows = np.array([len(times) - 1])
     if until.at == "all":
@@ -140,57 +186,57 @@ def watch(until: Until, statistics: Sequence[Statistic], times: np.ndarray) -> W
         if not len(rows):
             faults.add("at", until.at, "is no sample time", "give a time at which samples are kept, or leave it out")
     known = _named(statistics)
-    found = known.get(until.statistic)
-    if found is None and isinstance(until.statistic, str):
-        alike = (one for name, one in known.items() if canonical(name) == canonical(until.statistic))
-        found = next(alike, None) or _mean(until.statistic)
-    if found is None:
+    target = known.get(until.statistic)
+    if target is None and isinstance(until.statistic, str):
+        alike = (candidate for name, candidate in known.items() if canonical(name) == canonical(until.statistic))
+        target = next(alike, None) or _mean(until.statistic)
+    if target is None:
         hint = closest(until.statistic, known or KNOWN)
-        if known and not hint.startswith("did you mean"):  # of all names, those of whole statistics say enough
+        if known and not hint.startswith("did you mean"):  # list the statistics alone, not their components
             hint = closest(until.statistic, dict.fromkeys(name for _, name, _ in known.values()))
         faults.add("statistic", until.statistic, "is none of the run's statistics", hint)
     faults.raise_if_any()
-    assert found is not None
-    if found[0].type == "extremes":
+    assert target is not None
+    if target[0].type == "extremes":
         faults.add("statistic", until.statistic, "has no interval", "watch a quantile")
     faults.raise_if_any()
-    return Watch(until, *found, rows)
+    return Watch(until, *target, rows)
 
 
 Named = tuple[Statistic, str, dict[str, int]]
 
 
 def _named(statistics: Sequence[Statistic]) -> dict[str, Named]:
-    """What can be watched, by every name of it: the statistic that gathers it, the estimate's name, and which entry."""
-    every = [(whole, one) for whole in statistics for one in whole.parts()]
-    found: dict[str, Named] = {one.key: (whole, one.key, {}) for whole, one in every}
-    for whole, one in every:
-        for name, entry in _entries(one).items():
-            found.setdefault(name, (whole, one.key, entry))
-    return found
+    """Names that can be watched: the statistic that gathers each, its estimate's name, its entry's index."""
+    pairs = [(outer, inner) for outer in statistics for inner in outer.parts()]
+    names: dict[str, Named] = {inner.key: (outer, inner.key, {}) for outer, inner in pairs}
+    for outer, inner in pairs:
+        for name, entry in _entries(inner).items():
+            names.setdefault(name, (outer, inner.key, entry))
+    return names
 
 
 def _entries(one: Statistic) -> dict[str, dict[str, int]]:
-    """The names of one statistic, of its components, of their levels, and of the entries of a covariance."""
-    found: dict[str, dict[str, int]] = {one.key: {}}
+    """Names of a statistic and of its components, levels and entries of a covariance, with their indices."""
+    entries: dict[str, dict[str, int]] = {one.key: {}}
     for i, label in enumerate(one.quantity.labels):
         index = re.search(r"\[[^\]]*\]", label)
-        found[f"{one.key}{index[0] if index else f'[{i}]'}"] = found[f"{one.type} {label}{one.at_text}"] = {
+        entries[f"{one.key}{index[0] if index else f'[{i}]'}"] = entries[f"{one.type} {label}{one.at_text}"] = {
             "component": i,
             "component_2": i,
         }
     if isinstance(one, Quantiles):
-        for name, entry in list(found.items()):
+        for name, entry in list(entries.items()):
             for j, level in enumerate(one.levels):
-                found[f"{name} {level!r}"] = found[f"{name} {level:g}"] = entry | {"level": j}
+                entries[f"{name} {level!r}"] = entries[f"{name} {level:g}"] = entry | {"level": j}
     if isinstance(one, Covariance):
         pairs = itertools.product(enumerate(one.quantity.labels), repeat=2)
-        found |= {f"{one.type} {a}, {b}": {"component": i, "component_2": j} for (i, a), (j, b) in pairs}
-    return found
+        entries |= {f"{one.type} {a}, {b}": {"component": i, "component_2": j} for (i, a), (j, b) in pairs}
+    return entries
 
 
 def _mean(name: str) -> Named | None:
-    """A mean that is not among the statistics."""
+    """The mean that a name asks for; None if it asks for none."""
     mean = re.fullmatch(r"mean (.+)", name)
     if mean is None:
         return None

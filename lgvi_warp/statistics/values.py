@@ -1,4 +1,4 @@
-"""A quantity of a block's members at some sample times, with what several statistics need of it made once."""
+"""A quantity of a block's members at some sample times, with the intermediate results that several statistics share."""
 
 from __future__ import annotations
 
@@ -8,12 +8,24 @@ import numpy as np
 
 
 class Values:
-    """x (k, d, n): numbers of n members at k times, float64; good (k, n), or None where all count.
+    """Numbers of n members at k sample times.
 
-    A member counts at a time if it had not failed by then and each of its numbers is finite. first: index of the
-    block's first member; block: the block's number, and size: the members of a whole block. single: whether the numbers
-    are float32 as they stand, so that what only sorts them may do so. replicates: R where each time has R rows, one of
-    each replicate's members (`dealt`), and all sizes are theirs.
+    A member counts at a time if it had not failed by then and all of its numbers are finite. If the members belong to R
+    replicates, each time has R rows, one for each replicate (see `dealt`), and n and `size` are per replicate.
+
+    Args:
+        x: (k, d, n), the numbers.
+        good: (k, n), which members had not failed; None (the default) if none had.
+        first: index of the block's first member in the run; by default 0.
+        block: number of the block; by default 0.
+        size: number of members of a full block; by default n.
+        replicates: number R of replicates; by default 1.
+
+    Attributes:
+        x: (k, d, n), float64; 0 where a member does not count.
+        good: (k, n), which members count; None if all do.
+        count: (k,), number of members that count.
+        single: whether the numbers came as float32, so that sorting them in float32 loses nothing.
     """
 
     def __init__(
@@ -39,35 +51,58 @@ class Values:
             self.count = self.good.sum(axis=1)
 
     def members(self, at: np.ndarray) -> np.ndarray:
-        """Indices of the members at these places (rows, d) of theirs."""
+        """Return the indices in the run of some of these members.
+
+        Args:
+            at: (k, d), places along the last axis of `x`.
+
+        Returns:
+            (k, d), indices of members of the run.
+        """
         return self.first + at * self.replicates + (np.arange(len(at)) % self.replicates)[:, None]
 
     def filled(self, value: float) -> np.ndarray:
-        """x with this number where a member does not count."""
+        """Return x with a given number where a member does not count.
+
+        Args:
+            value: the number to fill in.
+
+        Returns:
+            (k, d, n), in the quantity's unit.
+        """
         return self.x if self.good is None else np.where(self.good[:, None], self.x, value)
 
     @functools.cached_property
     def mean(self) -> np.ndarray:
-        """(k, d), 0 where no member counts."""
+        """Mean over the members that count, (k, d); 0 where none counts."""
         return self.x.sum(axis=2) / np.maximum(self.count, 1)[:, None]
 
     @functools.cached_property
     def centred(self) -> np.ndarray:
-        """x less its mean, 0 where a member does not count."""
+        """x less its mean, (k, d, n); 0 where a member does not count."""
         if self.good is None:
             return self.x - self.mean[:, :, None]
         return np.where(self.good[:, None], self.x - self.mean[:, :, None], 0.0)
 
 
 def dealt(x: np.ndarray, good: np.ndarray | None, first: int, block: int, size: int, replicates: int) -> Values:
-    """Values with a row for each time and replicate, where member i is of replicate i mod R.
+    """Return values with one row for each time and replicate; member i belongs to replicate i mod R.
 
-    x (k, d, n), good (k, n): of all members, n a multiple of R.
+    Args:
+        x: (k, d, n), numbers of all members, n a multiple of R.
+        good: (k, n), which members had not failed; None if none had.
+        first: index of the block's first member in the run.
+        block: number of the block.
+        size: number of members of a full block.
+        replicates: number R of replicates.
+
+    Returns:
+        Values of k R rows and n / R members.
     """
     k, d, n = x.shape
     R = replicates
     rows = np.moveaxis(x.reshape(k, d, n // R, R), 3, 1).reshape(k * R, d, n // R)
     if good is not None:
         good = np.swapaxes(good.reshape(k, n // R, R), 1, 2).reshape(k * R, n // R)
-    # Sums along rows that lie apart would be added in another order, with other bits.
+    # Strided rows would be summed in another order, with other bits.
     return Values(np.ascontiguousarray(rows), good, first, block, size // R, R)

@@ -137,9 +137,9 @@ class Ensemble:
             attitude: Rotation matrices (n, 3, 3), body to inertial.
             velocity: Velocities (n, 3) [m/s], body axes.
             angular_velocity: Angular velocities (n, 3) [rad/s], body axes.
-            parameters: Arrays of length n by name, with names as in `vary`, single entries ("current.velocity[0]") among
-                them; "vehicle.inertia" as (n, 3) or (n, 3, 3). Also a data frame, a structured array or an xarray Dataset
-                with such names. None if no parameter varies (default).
+            parameters: Arrays of length n by name, with names as in `vary`, also of single entries
+                ("current.velocity[0]"); "vehicle.inertia" as (n, 3) or (n, 3, 3). Or a data frame, a structured array
+                or an xarray Dataset with such names. None if no parameter varies (default).
 
         Returns:
             The ensemble of n members.
@@ -192,7 +192,7 @@ class Ensemble:
             self._check_physical()
 
     def _described(self) -> list[Variation]:
-        """Return what varies, one entry for each distribution; note names and distributions that do not fit the scene."""
+        """Return what varies, one entry for each distribution; refuse what does not fit the scene."""
         faults = Faults("ensemble.vary.")
         columns = self.sampling.own_values()
         self._turn_by_matrix(faults, columns)
@@ -380,8 +380,8 @@ class Ensemble:
             stop: Position after the last member.
 
         Returns:
-            The members' numbers: parameters by name; position (n, 3) [m], attitude (n, 3, 3), velocity (n, 3) [m/s, body
-            axes] and angular velocity (n, 3) [rad/s, body axes], with n = stop - first.
+            The members' numbers, n = stop - first: parameters by name; position (n, 3) [m], attitude (n, 3, 3),
+            velocity (n, 3) [m/s, body axes] and angular velocity (n, 3) [rad/s, body axes].
 
         Raises:
             IndexError: If there are no such members.
@@ -467,8 +467,8 @@ class Ensemble:
         """Return the numbers that were given as arrays, which settings do not describe.
 
         Returns:
-            Arrays by name, (members of the whole, ...): given states and parameters, the values that the sampling holds,
-            and "indices" if they were set. Empty for an ensemble that is drawn.
+            Arrays by name, (members of the whole, ...): given states and parameters, the values that the sampling
+            holds, and "indices" if they were set. Empty if there are none of these.
         """
         indices = {} if self._indices is None else {"indices": np.asarray(self._indices, dtype=np.int64)}
         sampled = {name: values[: self._whole] for name, values in self.sampling.arrays().items()}

@@ -134,8 +134,8 @@ class Scene:
 
         Args:
             name: Name of the vehicle, such as "remus_100".
-            **sections: Sections as in a scene file. Keys of vehicle={...} and environment={...} replace single values. An
-                entry of terms=[...] replaces the vehicle's term of the same name or type, or is added to its terms.
+            **sections: Sections as in a scene file. Keys of vehicle={...} and environment={...} replace single values.
+                An entry of terms=[...] replaces the vehicle's term of the same name or type, or is added to its terms.
 
         Returns:
             The scene, with the vehicle's own terms and the water that its numbers were found in.

@@ -116,8 +116,8 @@ class RunSettings:
         """Return the integration method of this section, or another one by name.
 
         Args:
-            name: Name of a method. None, or the name in this section, gives the method with the options in this section;
-                any other name gives that method with its defaults.
+            name: Name of a method. None (default), or the name in this section, gives the method with the options in
+                this section; any other name gives that method with its defaults.
 
         Returns:
             The method.

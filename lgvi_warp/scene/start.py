@@ -67,7 +67,8 @@ class Environment:
 class Start:
     """The state at t = 0.
 
-    Whatever is None is zero, or no rotation. At most one of the four attitudes and one of the two velocities may be given.
+    Whatever is None (default) is zero, or no rotation. At most one of the four attitudes and one of the two velocities
+    may be given.
 
     Args:
         position: Position of the body origin (3,) [m], inertial axes (north, east, down).

@@ -1,8 +1,8 @@
 """Vehicles from the usual forms of hydrodynamic coefficients, and the vehicles that come with the package.
 
 Every importer returns a plain dict in the scene file's form, {"vehicle": {...}, "environment": {...}, "terms": [...]},
-about the body origin, in body axes x ahead, y to starboard, z down, linear before angular. All faults come at once, as a
-SceneError.
+about the body origin, in body axes x ahead, y to starboard, z down, linear before angular. All faults come at once, as
+a SceneError.
 """
 
 from __future__ import annotations
@@ -358,11 +358,11 @@ def from_fossen(
     Of a pair such as Y_rdot, N_vdot one suffices. These are refused:
 
     * X_qq and the like, which are even in the velocity and so no drag;
-    * products (Y_uv, X_wq): those of the added mass follow from its matrix, and those with u are a hull's lift, which the
-      term body_lift has;
-    * second-order moduli such as Y_|v|r (Fossen 2021, nonlinear damping), which are drag of the flow across the hull: the
-      force of speed and yaw rate together, for which a drag matrix has no place. The term cross_flow has that force,
-      found along the hull.
+    * products (Y_uv, X_wq): those of the added mass follow from its matrix, and those with u are a hull's lift, which
+      the term body_lift has;
+    * second-order moduli such as Y_|v|r (Fossen 2021, nonlinear damping), which are drag of the flow across the hull:
+      the force of speed and yaw rate together, for which a drag matrix has no place. The term cross_flow has that
+      force, found along the hull.
 
     Args:
         coefficients: Values by name: X_udot ... N_rdot [kg, kg m, kg m2], X_u ... N_r [N s/m, N m s],

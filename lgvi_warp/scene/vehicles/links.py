@@ -1,4 +1,4 @@
-"""Links of a robot description lumped into one rigid body: mass, inertia, added mass, displaced volume and its centre."""
+"""Links of a robot description, and their lumping into one rigid body."""
 
 from __future__ import annotations
 

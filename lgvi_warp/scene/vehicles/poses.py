@@ -1,4 +1,4 @@
-"""Poses of robot descriptions: where links, frames and shapes lie in their model (SDF's frame semantics; URDF's tree)."""
+"""Poses of robot descriptions: where links, frames and shapes lie in their model, by the rules of SDF and URDF."""
 
 from __future__ import annotations
 
@@ -182,7 +182,8 @@ class Scope:
         """Return the full name of the link that a name stands for.
 
         Args:
-            name: Name of a link, of a frame or joint that is attached to one, or of a model, which stands for its own link.
+            name: Name of a link, of a frame or joint that is attached to one, or of a model, which stands for its
+                canonical link.
 
         Returns:
             Full name of the link; None if there is none.

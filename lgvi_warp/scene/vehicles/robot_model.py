@@ -92,7 +92,7 @@ def refuse_crowd(elements: Sequence[Element]) -> None:
         raise SceneError([f"SDF model: {problem}; give the vehicle alone"])
 
 
-# URDF and SDF ---------------------------------------------------------------------------------------------------------------
+# URDF and SDF -------------------------------------------------------------------------------------------------------
 
 
 def read_model(faults: Faults, root: Element, name: str | None, link: str | None) -> Model:

@@ -162,7 +162,7 @@ def is_true(text: str | None) -> bool:
         text: The text; None if there is none.
 
     Returns:
-        True for "1" and "true", in any case of the letters.
+        True for "1" and "true", in upper or lower case.
     """
     return (text or "").strip().lower() in ("1", "true")
 

@@ -34,12 +34,12 @@ def from_sdf(
 
     * mass, pose, inertia and fluid_added_mass of every link;
     * volume and centre of the collision shapes (box, sphere, cylinder, capsule, ellipsoid, cone);
-    * the coefficients xDotU ..., xU ..., xUabsU ... (older: xUU ...) of the Hydrodynamics plugin, in Fossen's signs or all
-      positive, and the plugin of uuv_simulator;
+    * the coefficients xDotU ..., xU ..., xUabsU ... (older: xUU ...) of the Hydrodynamics plugin, in Fossen's signs or
+      all positive, and the plugin of uuv_simulator;
     * gravity and the Buoyancy plugin of a <world>.
 
-    Links that joints join become one body about the origin of the main link. Links that can move are held where the file
-    has them, and warnings name them. Gazebo's axes x ahead, y to port, z up become x ahead, y to starboard, z down.
+    Links that joints join become one body about the origin of the main link. Links that can move are held where the
+    file has them, and warnings name them. Gazebo's axes x ahead, y to port, z up become x ahead, y to starboard, z down.
 
     Args:
         source: Path of the file, or its text.
@@ -56,8 +56,8 @@ def from_sdf(
         The tables "vehicle", "environment" and "terms" of a scene file. Without a shape the vehicle is neutral.
 
     Raises:
-        SceneError: If anything is wrong, such as a mass that is no number, a mesh without a volume given, or a template;
-            the message lists every fault.
+        SceneError: If anything is wrong, such as a mass that is no number, a mesh without a volume given, or a
+            template; the message lists every fault.
     """
     faults = Faults()
     read = read_model(faults, parse_xml(source, "SDF"), model, link)

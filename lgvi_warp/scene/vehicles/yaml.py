@@ -65,8 +65,8 @@ def from_yaml(
 
     * mass; inertia (3, 3x3 or ixx ...) about the centre of gravity; cog, cob;
     * volume (with density), buoyancy or neutrally_buoyant;
-    * added_mass (6x6 or 6); linear_damping, linear_damping_forward_speed and quadratic_damping (6 or 6x6), as derivatives
-      or magnitudes; or a map `coefficients` of Fossen's names.
+    * added_mass (6x6 or 6); linear_damping, linear_damping_forward_speed and quadratic_damping (6 or 6x6), as
+      derivatives or magnitudes; or a map `coefficients` of Fossen's names.
 
     Damping in proportion to the forward speed, force_i = -u d_ij v_j, becomes a term body_lift.
 

@@ -39,7 +39,8 @@ def from_sdf(
     * gravity and the Buoyancy plugin of a <world>.
 
     Links that joints join become one body about the origin of the main link. Links that can move are held where the
-    file has them, and warnings name them. Gazebo's axes x ahead, y to port, z up become x ahead, y to starboard, z down.
+    file has them, and warnings name them. Gazebo's axes (x ahead, y to port, z up) are turned into those of the scene
+    file (x ahead, y to starboard, z down).
 
     Args:
         source: Path of the file, or its text.

@@ -125,7 +125,6 @@ class Scene:
         Raises:
             SceneError: If anything is wrong; the message lists every fault.
         """
-
         return from_dict(content)
 
     @classmethod
@@ -143,7 +142,6 @@ class Scene:
         Raises:
             SceneError: If anything is wrong; the message lists every fault.
         """
-
         return from_dict({**sections, "vehicle": {**sections.get("vehicle", {}), "name": name}})
 
     def to_dict(self) -> dict[str, Any]:

@@ -1,1 +1,1 @@
-"""To be said in one sentence."""
+"""Scenes: what is simulated, what varies from member to member, and the files that describe both."""

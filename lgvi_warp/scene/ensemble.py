@@ -1,4 +1,4 @@
-"""What varies from member to member, and the members' numbers, block by block."""
+"""Ensembles: what varies from member to member, and the members' numbers, block by block."""
 
 from __future__ import annotations
 
@@ -29,19 +29,33 @@ from lgvi_warp.scene.variations import MATRICES, Target, Variation
 
 
 class Ensemble:
-    """A scene and what varies in it.
+    """A scene and what varies in it from member to member.
 
-    scene: the Scene. members: how many, >= 1 (default: as many as the sampling has, else 1). seed: whole number >= 0.
-    vary: name -> distribution, of lgvi_warp or a frozen one of scipy.stats; names are every number that the scene has:
-    "vehicle.mass", "drag.quadratic", "current.velocity" (a term's name or type, and its field), ... (`scene.parameters()`
-    lists them), and what the scene's start gives ("start.position", "start.angular_velocity", ...) and "start.attitude";
-    an entry of one, "start.position[2]"; several that one law draws together, "vehicle.mass, vehicle.buoyancy".
-    One law varies every entry; of a symmetric matrix, the entries on and above the diagonal (of a diagonal one, those on
-    it). sampling: "random" (a draw depends on the seed, the member's index and the name only), "sobol", "halton",
-    "saltelli", lw.LatinHypercube(...), lw.Grid(...), lw.Table(...) and others, or a table as in a scene file. A member is
-    the same in whatever block, subset or order it is drawn.
+    A member's numbers depend on the seed, its index and the varied names alone, not on the block, subset or order in
+    which they are drawn.
 
-    Raises SceneError naming every fault; members that would be unphysical are counted and the first is shown.
+    Names of what varies:
+
+    * every number of the scene, as `scene.parameters()` lists them: "vehicle.mass", "drag.quadratic" (a term's name or
+      type, and its field), ...
+    * what the scene's start gives: "start.position", "start.angular_velocity", ..., and always "start.attitude";
+    * one entry of these: "start.position[2]";
+    * several that one distribution draws together: "vehicle.mass, vehicle.buoyancy".
+
+    A distribution of a vector applies to each entry; of a symmetric matrix, to the entries on and above the diagonal
+    (only those on it, where the matrix is diagonal).
+
+    Args:
+        scene: The scene that the members vary.
+        members: Number of members, >= 1; None for as many as the sampling has, or 1 (default).
+        seed: Whole number >= 0; by default 0.
+        vary: Distributions by name, of lgvi_warp or frozen ones of scipy.stats; None if nothing varies (default).
+        sampling: "random" (default), "sobol", "halton", "saltelli", lw.LatinHypercube(...), lw.Grid(...),
+            lw.Table(...) and others, or a table as in a scene file.
+
+    Raises:
+        SceneError: If anything is wrong; the message lists every fault. Unphysical members are counted, and the first
+            of them is shown.
     """
 
     def __init__(
@@ -62,9 +76,20 @@ class Ensemble:
 
     @classmethod
     def of(cls, scene: SceneLike, settings: EnsembleSettings) -> Ensemble:
-        """The ensemble that settings describe; only their `indices` of it where they name some."""
+        """Build the ensemble that settings describe.
+
+        Args:
+            scene: The scene that the members vary.
+            settings: Members, seed, distributions and sampling. Where they name indices, only those members are taken.
+
+        Returns:
+            The ensemble.
+
+        Raises:
+            SceneError: If the settings do not fit the scene, or a member is unphysical.
+        """
         ensemble = cls.__new__(cls)
-        # A scene file's own ensemble was looked at when the file was read.
+        # The ensemble of a scene file was checked when the file was read.
         ensemble._setup(scene, settings, {}, checked=vars(scene).get("_checked") is settings)
         if scene.ensemble_settings is settings:
             object.__setattr__(scene, "_checked", settings)
@@ -79,7 +104,17 @@ class Ensemble:
 
     @classmethod
     def from_scene(cls, scene: SceneLike) -> Ensemble:
-        """The ensemble that the scene file describes; one member if it describes none."""
+        """Build the ensemble that the scene file describes.
+
+        Args:
+            scene: The scene, with its ensemble_settings.
+
+        Returns:
+            The ensemble; of one member if the scene has no ensemble_settings.
+
+        Raises:
+            SceneError: If the settings do not fit the scene, or a member is unphysical.
+        """
         return cls.of(scene, scene.ensemble_settings or EnsembleSettings())
 
     @classmethod
@@ -92,12 +127,25 @@ class Ensemble:
         angular_velocity: Any,
         parameters: Any = None,
     ) -> Ensemble:
-        """Members with given states: (n, 3) [m], (n, 3, 3) body to inertial, (n, 3) [m/s, body], (n, 3) [rad/s, body].
+        """Build an ensemble of members with given states and parameters.
 
-        parameters: name -> array of length n ("vehicle.inertia": (n, 3) or (n, 3, 3)), names as in `vary`, also of single
-        entries ("current.velocity[0]"); or a data frame, a structured array or an xarray Dataset with such names. States
-        that are not finite are let through: the run gives such a member its status. Raises SceneError for what is no real
-        number, wrong shapes and unphysical values.
+        States that are not finite are accepted: the run marks such members as failed.
+
+        Args:
+            scene: The scene that the members vary.
+            position: Positions (n, 3) [m], inertial axes (north, east, down).
+            attitude: Rotation matrices (n, 3, 3), body to inertial.
+            velocity: Velocities (n, 3) [m/s], body axes.
+            angular_velocity: Angular velocities (n, 3) [rad/s], body axes.
+            parameters: Arrays of length n by name, with names as in `vary`, also of single entries
+                ("current.velocity[0]"); "vehicle.inertia" as (n, 3) or (n, 3, 3). Or a data frame, a structured array
+                or an xarray Dataset with such names. None if no parameter varies (default).
+
+        Returns:
+            The ensemble of n members.
+
+        Raises:
+            SceneError: If an array holds no real numbers, has a wrong shape or unphysical values.
         """
         faults = Faults()
         states = dict(zip(STATES, (position, attitude, velocity, angular_velocity), strict=True))
@@ -114,8 +162,8 @@ class Ensemble:
         R = explicit["start.attitude"]
         bad = np.isfinite(R).all(axis=(1, 2)) & ~notation.rotations(R)
         if bad.any():
-            what = f"is not a rotation to 1e-9 ({bad.sum()} of {n} members)"
-            faults.add(f"attitude of member {bad.argmax()}", R[bad.argmax()], what, "give R^T R = I, det R = 1")
+            problem = f"is not a rotation to 1e-9 ({bad.sum()} of {n} members)"
+            faults.add(f"attitude of member {bad.argmax()}", R[bad.argmax()], problem, "give R^T R = I, det R = 1")
         explicit |= _given_parameters(faults, scene.parameters(), parameters, n)
         faults.raise_if_any()
         ensemble = cls.__new__(cls)
@@ -133,7 +181,7 @@ class Ensemble:
         if explicit:
             self._start = {key: value for key, value in explicit.items() if key.startswith("start.")}
         self._base = scene.parameters()
-        # Which members of the whole it holds, and by which indices their noise is keyed; None for all, by their own.
+        # Positions of these members in the whole ensemble, and the indices that key their noise; None: all, in order.
         self._places: np.ndarray | None = None
         self._indices: np.ndarray | None = None
         self._variations = self._described()
@@ -144,7 +192,7 @@ class Ensemble:
             self._check_physical()
 
     def _described(self) -> list[Variation]:
-        """What varies, by law; notes every name and law that does not fit the scene."""
+        """Return what varies, one entry for each distribution; refuse what does not fit the scene."""
         faults = Faults("ensemble.vary.")
         columns = self.sampling.own_values()
         self._turn_by_matrix(faults, columns)
@@ -154,8 +202,8 @@ class Ensemble:
             faults.add(
                 f'"{key}"', self.vary[key], f"varies what the {self.sampling.kind} gives values", "drop one of them"
             )
-        found = [variations.variation(faults, key, law, known) for key, law in sorted(laws.items())]
-        named = [(one.key, one.targets) for one in found if one]
+        described = [variations.variation(faults, key, law, known) for key, law in sorted(laws.items())]
+        named = [(variation.key, variation.targets) for variation in described if variation]
         self._columns: list[tuple[Target, np.ndarray]] = []
         tables = Faults("ensemble.sampling.table.")
         for key, column in columns.items():
@@ -181,10 +229,10 @@ class Ensemble:
         with faults.including():
             tables.raise_if_any()
         faults.raise_if_any()
-        return [one for one in found if one]
+        return [variation for variation in described if variation]
 
     def _turn_by_matrix(self, faults: Faults, columns: Mapping[str, Any]) -> None:
-        """Where the attitude itself varies, the scene's attitude is a matrix, however the scene gives it."""
+        """Write the scene's attitude as a matrix, whatever form it has, if the attitude itself varies."""
         keys = [*self.vary, *self.sampling.laws(), *columns]
         names = {target.name for key in keys for target in variations.targets(key)}
         if variations.ATTITUDE not in names or self._explicit:
@@ -193,18 +241,18 @@ class Ensemble:
         for way in sorted(ways & names):
             faults.add(f'"{way}"', "...", f'varies beside "{variations.ATTITUDE}"', "keep one of them")
         faults.raise_if_any()
-        given = {way: self._start.pop(f"start.{way}") for way in ATTITUDES if f"start.{way}" in self._start}
-        R = resolve_attitude({way: np.asarray(value)[None] for way, value in given.items()})
+        attitude = {way: self._start.pop(f"start.{way}") for way in ATTITUDES if f"start.{way}" in self._start}
+        R = resolve_attitude({way: np.asarray(value)[None] for way, value in attitude.items()})
         self._start[variations.ATTITUDE] = R[0]
 
     def _counted(self, settings: EnsembleSettings) -> int:
-        """How many members there are; refuses a number that the sampling cannot have."""
+        """Return the number of members; raise SceneError for a number that the sampling cannot have."""
         faults = Faults("ensemble.")
-        own, group = self.sampling.own_members(self.space), self.sampling.group_size(self.space)
-        members = int(settings.members or own or group)
+        designed, group = self.sampling.own_members(self.space), self.sampling.group_size(self.space)
+        members = int(settings.members or designed or group)
         if members > MOST_MEMBERS:
-            what = f"are more members than the {MOST_MEMBERS} that there can be"
-            faults.add(f"sampling.{self.sampling.kind}", members, what, "give fewer values, of fewer names")
+            problem = f"are more members than the {MOST_MEMBERS} that there can be"
+            faults.add(f"sampling.{self.sampling.kind}", members, problem, "give fewer values, of fewer names")
         else:
             self.sampling.check(faults, self.space, members)
         faults.raise_if_any()
@@ -212,7 +260,7 @@ class Ensemble:
 
     @property
     def indices(self) -> np.ndarray:
-        """(members,), which members of the whole they are: what their noise is keyed by."""
+        """Indices (members,) of these members in the whole ensemble, by which their noise is keyed."""
         if self._indices is not None:
             return self._indices
         return np.arange(self.members) if self._places is None else self._places
@@ -222,37 +270,45 @@ class Ensemble:
         self._indices = indices
 
     def indices_of(self, first: int, stop: int) -> np.ndarray:
-        """The same of the members first to stop alone."""
+        """Return the indices of some of these members in the whole ensemble.
+
+        Args:
+            first: Position of the first member.
+            stop: Position after the last member.
+
+        Returns:
+            Indices (stop - first,).
+        """
         return np.arange(first, stop) if self._indices is self._places is None else self.indices[first:stop]
 
     def _check_physical(self) -> None:
-        """Refuse members that are unphysical: all are looked at, so many at a time that memory stays small."""
-        targets = [target for one in self._variations for target in one.targets] + [one for one, _ in self._columns]
+        """Refuse unphysical members: all are checked, so few at a time that memory stays small."""
+        targets = [target for v in self._variations for target in v.targets] + [target for target, _ in self._columns]
         varied = {name for name in (*(target.name for target in targets), *self._explicit) if name in self._base}
-        found: dict[str, _Unphysical] = {}
-        for part in over_members(functools.partial(self._look_at, varied), self.members if varied else 0):
-            for key, one in part.items():
-                if key not in found:
-                    found[key] = one
-                elif not one.shared:
-                    found[key].count += one.count
+        findings: dict[str, _Unphysical] = {}
+        for block_findings in over_members(functools.partial(self._look_at, varied), self.members if varied else 0):
+            for key, finding in block_findings.items():
+                if key not in findings:
+                    findings[key] = finding
+                elif not finding.shared:
+                    findings[key].count += finding.count
         faults = Faults()
-        for key, one in found.items():
+        for key, finding in findings.items():
             drawn = any(name in {t.name for v in self._variations for t in v.targets} for name in key.split(" + "))
             remedy = "use a smaller spread, TruncatedNormal or LogNormal" if drawn else "give finite, physical values"
-            what = f"is unphysical ({one.count} of {one.of if one.shared else self.members} members)"
-            faults.add(f"{key} of member {one.first}", one.value, what, remedy)
+            problem = f"is unphysical ({finding.count} of {finding.of if finding.shared else self.members} members)"
+            faults.add(f"{key} of member {finding.first}", finding.value, problem, remedy)
         faults.raise_if_any()
 
     def _look_at(self, varied: set[str], first: int, stop: int) -> dict[str, _Unphysical]:
         with np.errstate(over="ignore", invalid="ignore"):
             p = self.parameters(first, stop)
             checks = _vehicle_checks(p, varied, self.scene.vehicle.inertia_tolerance)
-            for one in (*self.scene.terms, *self.scene.events):
-                own = self.own(one, p)
-                if any(f"{one.key}.{name}" in varied for name in own):
-                    checks |= {f"{one.key}.{name}": bad for name, bad in one.unphysical(own).items()}
-        found = {}
+            for term in (*self.scene.terms, *self.scene.events):
+                numbers = self.own(term, p)
+                if any(f"{term.key}.{name}" in varied for name in numbers):
+                    checks |= {f"{term.key}.{name}": bad for name, bad in term.unphysical(numbers).items()}
+        unphysical = {}
         for key, bad in checks.items():
             bad = np.atleast_1d(bad)
             if np.any(bad):
@@ -260,41 +316,76 @@ class Ensemble:
                 i = int(np.argmax(bad))
                 value = sum(p[name][i % len(p[name])] for name in names if p[name].ndim == p[names[-1]].ndim)
                 shared = len(bad) == 1 and stop - first > 1
-                found[key] = _Unphysical(first + i, value, shared, len(bad), int(bad.sum()))
-        return found
+                unphysical[key] = _Unphysical(first + i, value, shared, len(bad), int(bad.sum()))
+        return unphysical
 
     @staticmethod
     def own(term: Any, parameters: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """A term's own numbers, by field, out of all parameters."""
+        """Return the numbers of one term out of those of all.
+
+        Args:
+            term: A term or an event.
+            parameters: Values of all parameters by name, such as "drag.quadratic".
+
+        Returns:
+            The term's values by field, such as "quadratic".
+        """
         return {name: parameters[f"{term.key}.{name}"] for name in term.parameters()}
 
     def _values(self, first: int, stop: int, start: bool = True) -> dict[str, np.ndarray]:
-        """Numbers of the members first to stop by name, shared ones with a leading dimension of 1; with the start or not."""
-        whole = self._base | (self._start if start and not self._explicit else {})
-        values = {name: np.asarray(value)[None] for name, value in whole.items()}
+        """Return the numbers of the members first to stop - 1 by name, with those of the start or without.
+
+        Values that all members share have a leading dimension of 1.
+        """
+        scene_values = self._base | (self._start if start and not self._explicit else {})
+        values = {name: np.asarray(value)[None] for name, value in scene_values.items()}
         if self._explicit:
             rows = slice(first, stop) if self._places is None else self._places[first:stop]
             values |= {name: column[rows] for name, column in self._explicit.items() if start or name in self._base}
-        wanted = [one for one in self._variations if start or any(target.name in self._base for target in one.targets)]
+        wanted = [
+            variation
+            for variation in self._variations
+            if start or any(target.name in self._base for target in variation.targets)
+        ]
         if not (wanted or self._columns):
             return values
         members = np.arange(first, stop) if self._places is None else self._places[first:stop]
-        space = self.space.of([one.key for one in wanted]) if self.sampling.kind == "random" else self.space
+        space = self.space.of([variation.key for variation in wanted]) if self.sampling.kind == "random" else self.space
         levels = self.sampling.draw(space, members) if wanted else {}
         drawn = [(target, column[members]) for target, column in self._columns]
-        for one in wanted:
-            drawn += one.values(levels[one.key])
+        for variation in wanted:
+            drawn += variation.values(levels[variation.key])
         for target, column in drawn:
             if target.name in values:
                 variations.put(values, target, column)
         return values
 
     def parameters(self, first: int, stop: int) -> dict[str, np.ndarray]:
-        """Parameters of the members first to stop, shared ones with a leading dimension of 1."""
+        """Return the parameters of some members.
+
+        Args:
+            first: Position of the first member.
+            stop: Position after the last member.
+
+        Returns:
+            Values by name, (stop - first, ...) or, where all members share them, (1, ...).
+        """
         return self._values(first, stop, start=False)
 
     def select(self, first: int, stop: int) -> Members:
-        """The numbers of the members first to stop (not included). Raises IndexError where there are none."""
+        """Return parameters and initial states of some members.
+
+        Args:
+            first: Position of the first member.
+            stop: Position after the last member.
+
+        Returns:
+            The members' numbers, n = stop - first: parameters by name; position (n, 3) [m], attitude (n, 3, 3),
+            velocity (n, 3) [m/s, body axes] and angular velocity (n, 3) [rad/s, body axes].
+
+        Raises:
+            IndexError: If there are no such members.
+        """
         if not 0 <= first < stop <= self.members:
             raise IndexError(f"members {first} to {stop} of {self.members}")
         m = stop - first
@@ -302,7 +393,7 @@ class Ensemble:
         start = {key.removeprefix("start."): values.pop(key) for key in self._start}
         R = np.broadcast_to(resolve_attitude(start), (m, 3, 3))
         if "velocity_inertial" in start:
-            # Written out: the sum's order, and so the bits, must not depend on how many members are asked for.
+            # Written out: the order of the sum, and so its bits, must not depend on the number of members.
             v = start["velocity_inertial"]
             nu = R[:, 0] * v[:, :1] + R[:, 1] * v[:, 1:2] + R[:, 2] * v[:, 2:]
         else:
@@ -311,63 +402,104 @@ class Ensemble:
         return Members(values, position, R, nu, Om, self.indices_of(first, stop), self.seed)
 
     def varied(self) -> list[str]:
-        """Names of the parameters that have a number for each member."""
-        drawn = {target.name for one in self._variations for target in one.targets}
-        own = drawn | {target.name for target, _ in self._columns} | self._explicit.keys()
-        return [name for name in self._base if name in own]
+        """Return the names of the parameters that vary from member to member.
+
+        Returns:
+            Names in the order of `scene.parameters()`; those of the start are not among them.
+        """
+        drawn = {target.name for variation in self._variations for target in variation.targets}
+        varied = drawn | {target.name for target, _ in self._columns} | self._explicit.keys()
+        return [name for name in self._base if name in varied]
 
     @property
     def starts_vary(self) -> bool:
-        """Whether members start differently."""
-        names = {target.name for one in self._variations for target in one.targets}
+        """Whether the initial state differs from member to member."""
+        names = {target.name for variation in self._variations for target in variation.targets}
         return not {*names, *(target.name for target, _ in self._columns), *self._explicit} <= self._base.keys()
 
     def subset(self, indices: Sequence[int] | np.ndarray) -> Ensemble:
-        """These members, in this order, as an ensemble of its own with the same numbers. Raises IndexError."""
+        """Return some members as an ensemble of their own, with the same numbers.
+
+        Args:
+            indices: Positions of the members (k,), in the order wanted.
+
+        Returns:
+            The ensemble of k members.
+
+        Raises:
+            IndexError: If this is no list of whole numbers, or there are no such members.
+        """
         chosen = np.asarray(indices)
         if chosen.ndim != 1 or not len(chosen) or chosen.dtype.kind not in "iu" or np.ma.is_masked(indices):
             raise IndexError(f"members {shown(indices)}: give a list of one or more whole numbers")
         if chosen.min() < 0 or chosen.max() >= self.members:
             raise IndexError(f"members {chosen.min()} to {chosen.max()} of {self.members}")
         chosen = chosen.astype(np.int64)
-        part = copy.copy(self)
-        part._places = chosen if self._places is None else self._places[chosen]
-        part._indices = None if self._indices is None else self._indices[chosen]
-        part.members = len(chosen)
-        return part
+        ensemble = copy.copy(self)
+        ensemble._places = chosen if self._places is None else self._places[chosen]
+        ensemble._indices = None if self._indices is None else self._indices[chosen]
+        ensemble.members = len(chosen)
+        return ensemble
 
     def member(self, index: int) -> Ensemble:
-        """One member alone, with the bits that it has among all. Raises IndexError where there is none."""
+        """Return one member as an ensemble of its own, with bitwise the same numbers.
+
+        Args:
+            index: Position of the member.
+
+        Returns:
+            The ensemble of one member.
+
+        Raises:
+            IndexError: If there is no such member.
+        """
         return self.subset([operator.index(index)])
 
     @property
     def replicates(self) -> int:
-        """Independent replicates of its design, member i of the i-th mod so many; 1 for chosen members: they are no design."""
+        """Number r of independent replicates of the sampling: member i belongs to replicate i mod r.
+
+        It is 1 for a subset and for members with given states, which are no design.
+        """
         return self.sampling.replicates_of_members() if self._places is None and not self._explicit else 1
 
     def explicit(self) -> dict[str, np.ndarray]:
-        """What was given as arrays, by name: states and parameters of the whole, (members of the whole, ...), or what its
-        sampling has of them, and "indices".
+        """Return the numbers that were given as arrays, which settings do not describe.
 
-        Empty for an ensemble that is drawn, with `indices` of its own alone if they were set.
+        Returns:
+            Arrays by name, (members of the whole, ...): given states and parameters, the values that the sampling
+            holds, and "indices" if they were set. Empty if there are none of these.
         """
-        own = {} if self._indices is None else {"indices": np.asarray(self._indices, dtype=np.int64)}
+        indices = {} if self._indices is None else {"indices": np.asarray(self._indices, dtype=np.int64)}
         sampled = {name: values[: self._whole] for name, values in self.sampling.arrays().items()}
-        return dict(self._explicit) | sampled | own
+        return dict(self._explicit) | sampled | indices
 
     def to_dict(self) -> dict[str, Any]:
-        """members, seed, vary, sampling and indices as in a scene file, and the names that were given as arrays."""
+        """Return the section [ensemble] of a scene file.
+
+        Returns:
+            members, seed, vary, sampling and indices as in a scene file, and under "explicit" the names of the numbers
+            that were given as arrays.
+        """
         settings = EnsembleSettings(self._whole, self.seed, self.vary, self.sampling, self._places)
         return settings.to_dict() | ({"explicit": sorted(self._explicit)} if self._explicit else {})
 
 
-# Members whose numbers are looked at together before a run: some tens of megabytes a thread.
+# Members that are checked together before a run: some tens of megabytes per thread.
 AT_ONCE = 16_384
 Found = TypeVar("Found")
 
 
 def over_members(look: Callable[[int, int], Found], members: int) -> list[Found]:
-    """What look(first, stop) finds of all members, so many at a time that memory stays small, on all cores; in order."""
+    """Apply a function to all members, some at a time so that memory stays small, on all cores.
+
+    Args:
+        look: Function of the first member and the one after the last.
+        members: Number of members.
+
+    Returns:
+        The function's results, in the order of the members.
+    """
     firsts = range(0, members, AT_ONCE)
     with ThreadPoolExecutor(min(machine.thread_count(), max(1, len(firsts)))) as pool:
         return list(pool.map(lambda first: look(first, min(first + AT_ONCE, members)), firsts))
@@ -375,7 +507,7 @@ def over_members(look: Callable[[int, int], Found], members: int) -> list[Found]
 
 @dataclass
 class _Unphysical:
-    """What was found of one quantity: the first member, its value, and how many. shared: one number of all members."""
+    """Unphysical values of one quantity: the first such member, its value, and how many; shared: one value for all."""
 
     first: int
     value: Any
@@ -385,12 +517,12 @@ class _Unphysical:
 
 
 def _is_name(name: Any) -> bool:
-    """A text, or several for one law."""
-    return isinstance(name, str) or (isinstance(name, tuple) and all(isinstance(one, str) for one in name))
+    """Return whether this is a text, or a tuple of texts that one distribution draws together."""
+    return isinstance(name, str) or (isinstance(name, tuple) and all(isinstance(entry, str) for entry in name))
 
 
 def _vehicle_checks(p: Mapping[str, np.ndarray], varied: set[str], tolerance: float) -> dict[str, np.ndarray]:
-    """Name -> (n,), which members' numbers of vehicle and environment are unphysical. tolerance: see Vehicle."""
+    """Return masks (n,) by name: which members' numbers of vehicle and environment are unphysical."""
     checks: dict[str, np.ndarray] = {}
     if "vehicle.mass" in p:
         mass = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
@@ -419,7 +551,7 @@ def _vehicle_checks(p: Mapping[str, np.ndarray], varied: set[str], tolerance: fl
 
 
 def _state(faults: Faults, key: str, value: Any) -> np.ndarray:
-    """A state's float64 copy, which may hold NaN: the caller's later writes to his array do not reach the ensemble.
+    """Return a copy of a state in float64, which may hold NaN; later changes of the argument do not reach the ensemble.
 
     A data frame's columns may be called position[0], position[1], position[2], in any order.
     """
@@ -437,7 +569,7 @@ def _state(faults: Faults, key: str, value: Any) -> np.ndarray:
 
 
 def _given_parameters(faults: Faults, base: Mapping[str, np.ndarray], given: Any, n: int) -> dict[str, np.ndarray]:
-    """Name -> (n, *shape) of the parameters that are given by name, whole or by their entries."""
+    """Return arrays (n, *shape) by name, from parameters given whole or by their entries."""
     if given is None or (isinstance(given, Mapping) and not given):
         return {}
     if not is_labelled(given):
@@ -445,7 +577,7 @@ def _given_parameters(faults: Faults, base: Mapping[str, np.ndarray], given: Any
             "parameters", given, "has no names", 'give {"vehicle.mass": array, ...} or a DataFrame with such names'
         )
         return {}
-    found: dict[str, np.ndarray] = {}
+    parameters: dict[str, np.ndarray] = {}
     named = []
     for key, column in columns_by_name(faults, "parameters", given).items():
         (target, *more) = variations.targets(key)
@@ -456,16 +588,24 @@ def _given_parameters(faults: Faults, base: Mapping[str, np.ndarray], given: Any
             name = key if target.index is not None else target.name
             values = _explicit_parameter(faults, name, column, (n, *target.of(base[target.name]).shape))
             if target.index is None:
-                found[target.name] = values
+                parameters[target.name] = values
             elif values.shape == (n,):
-                found.setdefault(target.name, np.repeat(base[target.name][None], n, axis=0))
-                variations.put(found, target, values)
+                parameters.setdefault(target.name, np.repeat(base[target.name][None], n, axis=0))
+                variations.put(parameters, target, values)
     variations.clashes(faults, named)
-    return found
+    return parameters
 
 
 def check_names(vary: Mapping[str, Any], parameters: Sequence[str]) -> None:
-    """Refuse names that a scene with these parameters has not. Raises SceneError."""
+    """Check that a scene has the names that vary.
+
+    Args:
+        vary: Distributions by name.
+        parameters: Names of the scene's parameters.
+
+    Raises:
+        SceneError: If a name is not among them and is none of the start; the message lists every such name.
+    """
     faults = Faults("ensemble.vary.")
     known = [*parameters, *(f"start.{name}" for name in SHAPES)]
     for key, law in vary.items():
@@ -491,13 +631,13 @@ def _explicit_parameter(faults: Faults, key: str, value: Any, shape: tuple[int, 
 
 
 def _positive_definite(matrices: np.ndarray) -> np.ndarray:
-    """Which symmetric matrices (n, d, d) are positive definite, by the pivots of elimination; False where not finite."""
+    """Return which symmetric matrices (n, d, d) are positive definite, by elimination; False where not finite."""
     d = matrices.shape[-1]
-    left = matrices.copy()
+    remainder = matrices.copy()
     good = np.isfinite(matrices).all(axis=(1, 2))
     for k in range(d):
-        pivot = left[:, k, k]
+        pivot = remainder[:, k, k]
         good &= pivot >= vehicles.LEAST
-        row = left[:, k, k + 1 :] / np.where(good, pivot, 1.0)[:, None]
-        left[:, k + 1 :, k + 1 :] -= left[:, k + 1 :, k, None] * row[:, None, :]
+        row = remainder[:, k, k + 1 :] / np.where(good, pivot, 1.0)[:, None]
+        remainder[:, k + 1 :, k + 1 :] -= remainder[:, k + 1 :, k, None] * row[:, None, :]
     return np.asarray(good)

@@ -1,4 +1,4 @@
-"""The scene file: a path or a text in, tables out, with what replaces them and the vehicle that they name."""
+"""Scene files: from a path or a text to tables, with overrides applied and a named vehicle inserted."""
 
 from __future__ import annotations
 
@@ -14,7 +14,18 @@ from lgvi_warp.common.toml_text import parsed
 
 
 def tables_of_file(path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """The tables of a scene file; overrides (dotted key -> value) replace what it says. Raises SceneError."""
+    """Read the tables of a scene file (TOML).
+
+    Args:
+        path: Path of the file.
+        overrides: Values by dotted key ("vehicle.mass") that replace those of the file; by default none.
+
+    Returns:
+        Tables by section name.
+
+    Raises:
+        SceneError: If the file cannot be read, is no TOML, or an override does not fit.
+    """
     text = file_text(path, "scene file")
     return tables_of_text(text, overrides, os.fspath(path), Path(path).parent)
 
@@ -22,7 +33,20 @@ def tables_of_file(path: str | os.PathLike[str], overrides: Mapping[str, Any] | 
 def tables_of_text(
     text: str, overrides: Mapping[str, Any] | None = None, name: str = "scene", folder: Path | None = None
 ) -> dict[str, Any]:
-    """The same from a text. folder: where the files that it names are looked for, by default the current one."""
+    """Read the tables of the text of a scene file (TOML).
+
+    Args:
+        text: Content of a scene file.
+        overrides: Values by dotted key ("vehicle.mass") that replace those of the text; by default none.
+        name: Name of the text in messages; by default "scene".
+        folder: Folder that relative paths in the text refer to; None for the current one (default).
+
+    Returns:
+        Tables by section name.
+
+    Raises:
+        SceneError: If the text is no TOML, or an override does not fit.
+    """
     content = parsed(text, name)
     for key, value in (overrides or {}).items():
         override(content, key, value)
@@ -30,7 +54,7 @@ def tables_of_text(
 
 
 def _files_in(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
-    """The same with the file of a table of members in that folder, where its path is relative."""
+    """Return the content with the path of a table of members, where it is relative, put below the folder."""
     try:
         ensemble = content["ensemble"]
         sampling = ensemble["sampling"]
@@ -45,7 +69,16 @@ def _files_in(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
 
 
 def override(content: dict[str, Any], key: str, value: Any) -> None:
-    """Set a dotted key, such as vehicle.mass or ensemble.members; a text is read as TOML if it is TOML."""
+    """Set the value of a dotted key in the tables of a scene file, in place.
+
+    Args:
+        content: Tables by section name; changed in place.
+        key: Dotted key, such as vehicle.mass or ensemble.members.
+        value: The new value. A text is read as a TOML value where it is one, else it is taken as a text.
+
+    Raises:
+        SceneError: If the key is not dotted, its section is no table, or the text holds several values.
+    """
     if isinstance(value, str):
         value = _value_of(key, value)
     section, _, rest = key.partition(".")
@@ -60,12 +93,12 @@ def override(content: dict[str, Any], key: str, value: Any) -> None:
 
 
 def _value_of(key: str, text: str) -> Any:
-    """What a text says as a TOML value; itself if it is none. Raises SceneError where it says more than one value."""
+    """Return what a text says as a TOML value, or the text itself; raise SceneError if it holds several values."""
     try:
         content = parsed(f"value = {text}", key)
     except SceneError as error:
         if not isinstance(error.__cause__, tomllib.TOMLDecodeError):
-            raise SceneError((key + one.removeprefix("value") for one in error.faults), error.more) from None
+            raise SceneError((key + fault.removeprefix("value") for fault in error.faults), error.more) from None
         if "\n" not in text.strip():
             return text
         content = {}
@@ -77,9 +110,18 @@ def _value_of(key: str, text: str) -> Any:
 
 
 def with_named_vehicle(content: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The same with what [vehicle] name = "remus_100" stands for: that vehicle, its terms and the water it was given for.
+    """Insert the vehicle that [vehicle] name = "remus_100" refers to.
 
-    Keys beside the name replace the vehicle's own, a term of the same name or type replaces its term. Raises SceneError.
+    Keys beside the name replace the vehicle's own values. A term of the same name or type replaces the vehicle's term.
+
+    Args:
+        content: Tables by section name.
+
+    Returns:
+        The tables with the vehicle, its terms and its water; the argument itself if it names no vehicle.
+
+    Raises:
+        SceneError: If no vehicle has that name.
     """
     table = content.get("vehicle")
     if not isinstance(table, Mapping) or "name" not in table:
@@ -89,9 +131,11 @@ def with_named_vehicle(content: Mapping[str, Any]) -> Mapping[str, Any]:
     known = tomllib.loads(vehicle_file(str(table["name"])).read_text(encoding="utf-8"))
     merged = dict(content)
     for section in ("vehicle", "environment"):
-        own = content.get(section, {})
-        if isinstance(own, Mapping):
-            merged[section] = known.get(section, {}) | {key: value for key, value in own.items() if key != "name"}
+        section_table = content.get(section, {})
+        if isinstance(section_table, Mapping):
+            merged[section] = known.get(section, {}) | {
+                key: value for key, value in section_table.items() if key != "name"
+            }
     terms = content.get("terms", [])
     if isinstance(terms, list | tuple):
         names = {_name_of(term) for term in terms}
@@ -100,7 +144,7 @@ def with_named_vehicle(content: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _name_of(term: Any) -> Any:
-    """What a term is called by: its name, or its type."""
+    """Return the name of a term, or its type if it has no name."""
     if isinstance(term, Mapping):
         return term.get("name") or term.get("type")
     return getattr(term, "key", None)

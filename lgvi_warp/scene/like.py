@@ -1,4 +1,4 @@
-"""What an ensemble asks of a scene."""
+"""The part of a scene that an ensemble uses, as a protocol."""
 
 from __future__ import annotations
 
@@ -14,38 +14,46 @@ from lgvi_warp.scene.start import Environment, Start
 
 @runtime_checkable
 class SceneLike(Protocol):
-    """The parts of a scene: see Scene, which has them."""
+    """What an ensemble needs of a scene; `Scene` fulfils this protocol."""
 
     @property
     def vehicle(self) -> Vehicle:
-        """The body."""
+        """The vehicle, with mass, inertia and buoyancy."""
 
     @property
     def environment(self) -> Environment:
-        """The water and gravity."""
+        """Gravity and density of the water."""
 
     @property
     def terms(self) -> Sequence[Any]:
-        """What else acts."""
+        """Terms that act besides weight and buoyancy."""
 
     @property
     def events(self) -> Sequence[Any]:
-        """What stops a member."""
+        """Events that stop a member's run."""
 
     @property
     def start(self) -> Start:
-        """The first state."""
+        """The state at t = 0, before variation."""
 
     @property
     def run(self) -> RunSettings:
-        """Settings of a run."""
+        """Settings of the run: method, step, duration, ..."""
 
     @property
     def ensemble_settings(self) -> EnsembleSettings | None:
-        """What varies."""
+        """Settings of the ensemble; None if nothing varies."""
 
     def parameters(self) -> dict[str, np.ndarray]:
-        """All numbers by name."""
+        """Return every number that may vary from member to member.
+
+        Returns:
+            Values by name, such as "vehicle.mass".
+        """
 
     def to_dict(self) -> dict[str, Any]:
-        """In the shape of a scene file."""
+        """Return the scene as tables in the form of a scene file.
+
+        Returns:
+            Tables by section name.
+        """

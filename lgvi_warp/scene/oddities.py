@@ -1,4 +1,4 @@
-"""What is odd of many members: counted, and the first of them named."""
+"""Odd values of many members: counted, and described by the first member that has one."""
 
 from __future__ import annotations
 
@@ -10,9 +10,13 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Odd:
-    """What is odd of one quantity.
+    """How many members have an odd value of one quantity.
 
-    text: of the first member that has it. first: its index. count: how many have it; shared: all do, by one number.
+    Args:
+        text: Sentence about the first member that has an odd value.
+        first: Index of that member.
+        count: Number of members with an odd value.
+        shared: True if all members share one value.
     """
 
     text: str
@@ -23,19 +27,31 @@ class Odd:
 
 @dataclass(frozen=True)
 class Oddities:
-    """What is odd by name, of some members; `|` joins those of more members after them."""
+    """Odd values by quantity; `a | b` joins those of members `a` with those of members `b` after them.
+
+    Args:
+        found: Odd values by name of the quantity.
+    """
 
     found: Mapping[str, Odd]
 
     def __or__(self, other: Oddities) -> Oddities:
         joined = dict(self.found)
         for key, odd in other.found.items():
-            mine = joined.get(key)
-            joined[key] = odd if mine is None else replace(mine, count=mine.count + odd.count)
+            earlier = joined.get(key)
+            joined[key] = odd if earlier is None else replace(earlier, count=earlier.count + odd.count)
         return Oddities(joined)
 
     def messages(self, members: int, most: int | None = None) -> tuple[str, ...]:
-        """A sentence each, with how many of so many members; most: how many of them were looked at."""
+        """Return one sentence for each odd quantity.
+
+        Args:
+            members: Number of members of the ensemble.
+            most: Number of members that were looked at; None for all (default).
+
+        Returns:
+            Sentences that end with the number of members concerned.
+        """
         return tuple(f"{key}: {odd.text}{_whose(odd, members, most)}" for key, odd in self.found.items())
 
 
@@ -44,31 +60,32 @@ def _whose(odd: Odd, members: int, most: int | None) -> str:
         return ""
     if odd.shared or odd.count == members:
         return f" (all {members:,} members)"
-    whole = f"{members:,}" if most is None or members <= most else f"the first {most:,}"
-    return f" ({odd.count:,} of {whole} members; first: member {odd.first})"
+    looked_at = f"{members:,}" if most is None or members <= most else f"the first {most:,}"
+    return f" ({odd.count:,} of {looked_at} members; first: member {odd.first})"
 
 
-# A quantity's name, which members are odd (1 or n,), and what to say of member i.
+# Name of a quantity, mask (1,) or (n,) of the odd members, and the text about member i.
 Look = tuple[str, np.ndarray, Callable[[int], str]]
 
 
 def gathered(looks: Iterable[Look], first: int, stop: int) -> Oddities:
-    """What is odd of the members first to stop.
+    """Count the odd values of the members first to stop - 1.
 
     Args:
-        looks: By quantity; of one name the first that is odd is said.
+        looks: For each check the name of a quantity, the members that are odd (1,) or (n,), and the text about one
+            member. Where several checks bear one name, the first that finds an odd member counts.
         first: Index of the first member.
-        stop: Index after the last.
+        stop: Index after the last member.
 
     Returns:
-        What is odd, by name.
+        Odd values by name of the quantity.
     """
-    found: dict[str, Odd] = {}
+    odd_by_name: dict[str, Odd] = {}
     for key, odd, text in looks:
         odd = np.atleast_1d(odd)
-        if key not in found and odd.any():
+        if key not in odd_by_name and odd.any():
             i = int(odd.argmax())
             # One number for many, or the only one that was looked at for all; the last of many may be alone, too.
             shared = len(odd) == 1 and (stop - first > 1 or first == 0)
-            found[key] = Odd(text(i), first + i, stop - first if shared else int(odd.sum()), shared)
-    return Oddities(found)
+            odd_by_name[key] = Odd(text(i), first + i, stop - first if shared else int(odd.sum()), shared)
+    return Oddities(odd_by_name)

@@ -1,6 +1,6 @@
-"""What is possible and yet odd, and most likely a unit: said in messages, refused nowhere.
+"""Values that are possible yet odd, most often by a wrong unit: messages name them, nothing is refused.
 
-Every check looks at the numbers of many members at once. Members that are odd are counted, and the first is named.
+Every check looks at the numbers of many members at once. Members with odd values are counted, and the first is named.
 """
 
 from __future__ import annotations
@@ -26,7 +26,13 @@ Numbers = Mapping[str, np.ndarray]
 
 
 class Limit(NamedTuple):
-    """What is odd beyond a value [unit], and why."""
+    """A bound beyond which a value is odd.
+
+    Args:
+        value: The bound, in `unit`.
+        unit: Its unit.
+        reason: Why a value beyond it is odd.
+    """
 
     value: float
     unit: str
@@ -53,25 +59,41 @@ CURRENTS = {
 }
 # Fields of terms and events that hold depths [m].
 DEPTHS = {"floor": "depth", "current_profile": "depths", "stratification": "reference_depth"}
-# Samples that are looked at after a run, in numbers: of more, the last times alone.
+# Most numbers of samples that are looked at after a run; where there are more, only the last time is.
 MOST_SAMPLES = 30_000_000
 
 
 def net_weight(scene: SceneLike, p: Numbers) -> Iterator[Look]:
-    """Weight and buoyancy that nearly no vehicle has."""
+    """Look for a net weight that hardly any vehicle has.
+
+    Args:
+        scene: The scene of all members.
+        p: Parameters by name, (1, ...) or (n, ...).
+
+    Yields:
+        Name of the quantity, mask of the odd members, and the text about one of them.
+    """
     weight, buoyancy = np.broadcast_arrays(vehicles.weight(p), p["vehicle.buoyancy"])
     net = weight - buoyancy
 
     def text(i: int) -> str:
         way = "down" if net[i] > 0.0 else "up"
-        asked = "is the mass in kg, and are weight and buoyancy in N" if buoyancy[i] else "is buoyancy [N] left out"
-        return f"the net weight, {abs(net[i]):.4g} N {way}, is beyond half the weight, {weight[i]:.4g} N: {asked}?"
+        question = "is the mass in kg, and are weight and buoyancy in N" if buoyancy[i] else "is buoyancy [N] left out"
+        return f"the net weight, {abs(net[i]):.4g} N {way}, is beyond half the weight, {weight[i]:.4g} N: {question}?"
 
     yield "vehicle.buoyancy", np.abs(net) > LIMITS["net weight"].value * weight, text
 
 
 def density(scene: SceneLike, p: Numbers) -> Iterator[Look]:
-    """Water that is none."""
+    """Look for a density that water cannot have.
+
+    Args:
+        scene: The scene of all members.
+        p: Parameters by name, (1, ...) or (n, ...).
+
+    Yields:
+        Name of the quantity, mask of the odd members, and the text about one of them.
+    """
     rho = p["environment.water_density"]
     odd = (rho < LIMITS["light water"].value) | (rho > LIMITS["heavy water"].value)
     yield (
@@ -82,7 +104,15 @@ def density(scene: SceneLike, p: Numbers) -> Iterator[Look]:
 
 
 def currents(scene: SceneLike, p: Numbers) -> Iterator[Look]:
-    """Water that is too fast."""
+    """Look for currents that are faster than any tide.
+
+    Args:
+        scene: The scene of all members.
+        p: Parameters by name, (1, ...) or (n, ...).
+
+    Yields:
+        Name of the quantity, mask of the odd members, and the text about one of them.
+    """
     for term in scene.terms:
         field = CURRENTS.get(term.type)
         if field is None:
@@ -98,7 +128,15 @@ def _too_fast(speed: np.ndarray) -> Callable[[int], str]:
 
 
 def fin_angles(scene: SceneLike, p: Numbers) -> Iterator[Look]:
-    """Fins that turn beyond 90 degrees; of one term its limit and its commands, in whichever way they are given."""
+    """Look for fins that turn beyond 90 degrees, by their limit or by their command.
+
+    Args:
+        scene: The scene of all members.
+        p: Parameters by name, (1, ...) or (n, ...).
+
+    Yields:
+        Name of the quantity, mask of the odd members, and the text about one of them.
+    """
     for term in scene.terms:
         if not isinstance(term, ControlFins):
             continue
@@ -115,7 +153,16 @@ def _too_far(angle: np.ndarray) -> Callable[[int], str]:
 
 
 def depths(scene: SceneLike, p: Numbers) -> Iterator[Look]:
-    """Floors above the surface, and tables of which no depth is below it: their depths are heights."""
+    """Look for depths above the surface: most likely they are heights.
+
+    Args:
+        scene: The scene of all members.
+        p: Parameters by name, (1, ...) or (n, ...).
+
+    Yields:
+        Name of the quantity, mask of the odd members, and the text about one of them. A table of depths is odd if it
+        begins above the surface and holds no depth below it.
+    """
     for term in (*scene.terms, *scene.events):
         field = DEPTHS.get(term.type)
         if field is not None:
@@ -131,11 +178,18 @@ def _too_high(depth: np.ndarray) -> Callable[[int], str]:
 
 
 def inertia(scene: SceneLike, p: Numbers) -> Iterator[Look]:
-    """Inertia that a body of this mass and length cannot have.
+    """Look for inertia that a body of this mass and length cannot have.
 
     The length is that of the stations of a cross flow. Within a length L along x and a breadth D, the variance of a
     coordinate is at most a quarter of its range squared (Popoviciu 1935), so that the rigid body's inertia is at most
     m (L^2 + D^2)/4. Added inertia is that of strips: at most the added mass times the largest distance squared.
+
+    Args:
+        scene: The scene of all members.
+        p: Parameters by name, (1, ...) or (n, ...).
+
+    Yields:
+        Name of the quantity, mask of the odd members, and the text about one of them.
     """
     for term in scene.terms:
         if isinstance(term, CrossFlow):
@@ -146,13 +200,13 @@ def inertia(scene: SceneLike, p: Numbers) -> Iterator[Look]:
 
 
 def _inertia(p: Numbers, rigid: np.ndarray, arm: np.ndarray, length: np.ndarray) -> Iterator[Look]:
-    """The largest inertia about an axis of the body beside its limit: the largest of all is no less."""
+    """Compare the largest moment of inertia about a body axis with its limit; the largest principal one is no less."""
     both = "vehicle.inertia" in p
     name = "vehicle.inertia" if both else "vehicle.rigid_body_mass_matrix"
     added = p["vehicle.added_mass" if both else "vehicle.added_mass_matrix"]
     strips = _diagonal(added)[:, :3].max(axis=1) * arm
-    own = p[name] if both else vehicles.about_center(p[name])
-    limits = {name: (_diagonal(own).max(axis=1), rigid + strips if both else rigid)}
+    rigid_inertia = p[name] if both else vehicles.about_center(p[name])
+    limits = {name: (_diagonal(rigid_inertia).max(axis=1), rigid + strips if both else rigid)}
     if not both:
         limits["vehicle.added_mass_matrix"] = _diagonal(added)[:, 3:].max(axis=1), strips
     for key, pair in limits.items():
@@ -171,34 +225,34 @@ def _diagonal(matrices: np.ndarray) -> np.ndarray:
     return np.diagonal(matrices, axis1=1, axis2=2)
 
 
-# What is looked at of every member before a run.
+# Checks of every member before a run.
 OF_NUMBERS = (net_weight, density, currents, fin_angles, depths, inertia)
 
 
 def of_numbers(scene: SceneLike, p: Numbers, first: int, stop: int) -> Oddities:
-    """What is odd of the numbers of some members.
+    """Return the odd parameters of some members.
 
     Args:
-        scene: Of all members.
-        p: Its parameters by name, of 1 (shared) or of stop - first members.
+        scene: The scene of all members.
+        p: Parameters by name, of 1 (shared) or of stop - first members.
         first: Index of the first member.
-        stop: Index after the last.
+        stop: Index after the last member.
 
     Returns:
-        What is odd.
+        Odd values by name.
     """
     with np.errstate(all="ignore"):
         return gathered((look for check in OF_NUMBERS for look in check(scene, p)), first, stop)
 
 
 def of_ensemble(ensemble: Ensemble) -> Oddities:
-    """What is odd of the numbers and the starts of all members.
+    """Return the odd parameters and starts of all members.
 
     Args:
-        ensemble: Whose members are drawn, so many at a time that memory stays small.
+        ensemble: The ensemble; its members are drawn some at a time so that memory stays small.
 
     Returns:
-        What is odd.
+        Odd values by name.
     """
 
     def look(first: int, stop: int) -> Oddities:
@@ -209,15 +263,15 @@ def of_ensemble(ensemble: Ensemble) -> Oddities:
 
 
 def of_start(scene: SceneLike, members: Members, first: int = 0) -> Oddities:
-    """What is odd of the starts of some members, and of the water that laws of the user's move there.
+    """Return the odd starts of some members, and the odd velocities of water that user-defined terms give there.
 
     Args:
-        scene: Of all members.
+        scene: The scene of all members.
         members: Their numbers and states, as Ensemble.select gives them.
-        first: Index of the first.
+        first: Index of the first member; by default 0.
 
     Returns:
-        What is odd.
+        Odd values by name.
     """
     with np.errstate(all="ignore"):
         return gathered(_of_start(scene, members), first, first + members.count)
@@ -230,34 +284,50 @@ def _of_start(scene: SceneLike, members: Members) -> Iterator[Look]:
     if not ends_at_the_surface(scene):
         yield "start.position", depth < LIMITS["depth"].value, _too_high(depth)
     for term in own_flows(scene):
-        own = {name: members.parameters[f"{term.key}.{name}"] for name in term.parameters()}
-        water = term.water(own, members.position[None], np.zeros(1), members.parameters)
+        numbers = {name: members.parameters[f"{term.key}.{name}"] for name in term.parameters()}
+        water = term.water(numbers, members.position[None], np.zeros(1), members.parameters)
         if water is not None:
             flow = _speed(water[0])
             yield term.key, flow > LIMITS["current"].value, _too_fast(flow)
 
 
 def own_flows(scene: SceneLike) -> list[Term]:
-    """Laws of the user's that move the water. Of waves the water may be faster than any current."""
+    """Return the user-defined terms that move the water.
+
+    Waves are left out, too: in waves, water may be faster than in any current.
+
+    Args:
+        scene: The scene.
+
+    Returns:
+        The terms.
+    """
     known = (*CURRENTS, "waves")
     return [term for term in scene.terms if term.type not in known and type(term).water is not Term.water]
 
 
 def ends_at_the_surface(scene: SceneLike) -> bool:
-    """Whether an event stops a member that rises through the surface."""
+    """Return whether an event stops a member that rises through the surface.
+
+    Args:
+        scene: The scene.
+
+    Returns:
+        True with an event of type "surface", or with a box that does not reach above the surface.
+    """
     boxes = (event.lower[2] for event in scene.events if event.type == "box")
     return any(event.type == "surface" for event in scene.events) or any(top >= 0.0 for top in boxes)
 
 
 def on_the_way(scene: SceneLike, samples: Mapping[str, np.ndarray]) -> Oddities:
-    """What became odd of members that began well, by samples that are kept in memory anyway.
+    """Return what became odd of members that began well, by samples that are in memory anyway.
 
     Args:
-        scene: Of all members.
+        scene: The scene of all members.
         samples: "position" and "velocity", (k, n, 3) [m, m/s], of which the first is the start.
 
     Returns:
-        What is odd; nothing where there is no such sample.
+        Odd values by name; none where there are no such samples.
     """
     limit = LIMITS["speed"].value
     with np.errstate(all="ignore"):
@@ -282,7 +352,7 @@ def _higher(position: np.ndarray) -> np.ndarray:
 def _later(
     samples: np.ndarray | None, size: Callable[[np.ndarray], np.ndarray], limit: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Of each member (n,): whether its largest size after the start is beyond a limit that the start keeps, and the size."""
+    """Return for each member (n,) whether its size passed the limit only after the start, and its largest size then."""
     if not isinstance(samples, np.ndarray) or len(samples) < 2:
         return np.zeros(0, dtype=bool), np.zeros(0)
     times = range(1, len(samples)) if samples.size <= MOST_SAMPLES else range(len(samples) - 1, len(samples))

@@ -25,11 +25,22 @@ from lgvi_warp.scene.start import Environment, Start
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Everything that one simulated vehicle needs. Weight, buoyancy and restoring moment follow from the vehicle.
+    """One vehicle, its environment, the terms that act on it and the state it starts from.
 
-    terms: what else acts, such as lw.Drag(...), or tables as in a scene file. events: what stops a member, such as
-    lw.Surface(). controller: this version knows none, and says so. run, ensemble_settings: what a scene file holds
-    besides. Raises SceneError naming every fault.
+    Weight, buoyancy and restoring moment follow from the vehicle; they are not listed as terms.
+
+    Args:
+        vehicle: The body, as lw.Vehicle(...).
+        environment: Gravity and water, as lw.Environment(...); by default the standard values.
+        terms: What else acts, such as lw.Drag(...), or tables as in a scene file.
+        start: The state at t = 0, as lw.Start(...); by default at rest at the origin.
+        controller: Must be None: this version has no controllers.
+        run: Settings of the run, the section [run] of a scene file.
+        ensemble_settings: What varies, the section [ensemble] of a scene file; None if nothing does.
+        events: What stops a member, such as lw.Surface(), or tables as in a scene file.
+
+    Raises:
+        SceneError: If anything is wrong; the message lists every fault.
     """
 
     vehicle: Vehicle
@@ -58,52 +69,87 @@ class Scene:
         faults.raise_if_any()
 
     def _check_names(self, faults: Faults) -> None:
-        """Terms and events have different names, on every file system."""
-        keys = [one.key for one in (*self.terms, *self.events)]
+        """Require different names of all terms and events, on every file system."""
+        keys = [term.key for term in (*self.terms, *self.events)]
         counts = Counter(keys)
-        for key in sorted({one.key for one in self.events}):
+        for key in sorted({event.key for event in self.events}):
             if folded(key) in terms.RESERVED:
                 faults.add("events", key, "is the name of a section of the scene", f'write name = "{key}_event"')
             elif counts[key] > 1:
                 faults.add("events", key, "is the name of two events or of a term too",
                            f'give each a name of its own: name = "{key}_2"')  # fmt: skip
-        for first, other in alike(keys):
-            what = f"is the same folder as {first!r} on file systems that do not tell capitals apart"
-            faults.add("terms and events", other, what, f'give each a name of its own: name = "{other}_2"')
+        for first, second in alike(keys):
+            problem = f"is the same folder as {first!r} on file systems that do not tell capitals apart"
+            faults.add("terms and events", second, problem, f'give each a name of its own: name = "{second}_2"')
 
     def parameters(self) -> dict[str, np.ndarray]:
-        """Every number that may vary by member, by name: "vehicle.mass", "drag.quadratic", ..., as this scene has it."""
+        """Return every number that may vary from member to member, with the value that this scene has.
+
+        Returns:
+            Values by name: "vehicle.mass", "environment.gravity", "drag.quadratic" (a term's name and its field), ...
+            Shapes and units are those of the fields.
+        """
         values = {f"vehicle.{name}": value for name, value in self.vehicle.parameters().items()}
         values["environment.gravity"] = np.asarray(float(self.environment.gravity))
         values["environment.water_density"] = np.asarray(float(self.environment.water_density))
-        for one in (*self.terms, *self.events):
-            values |= {f"{one.key}.{name}": value for name, value in one.parameters().items()}
+        for term in (*self.terms, *self.events):
+            values |= {f"{term.key}.{name}": value for name, value in term.parameters().items()}
         return values
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None) -> Scene:
-        """Read a scene file (TOML). overrides: dotted key -> value, replacing what the file says. Raises SceneError."""
+        """Read a scene from a scene file (TOML).
+
+        Args:
+            path: Path of the file.
+            overrides: Values by dotted key ("vehicle.mass") that replace those of the file; by default none.
+
+        Returns:
+            The scene.
+
+        Raises:
+            SceneError: If the file cannot be read or its content is wrong; the message lists every fault.
+        """
         return from_dict(tables_of_file(path, overrides))
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Scene:
-        """A scene from tables in the form of a scene file, such as the importers return. Raises SceneError."""
+        """Build a scene from tables in the form of a scene file, such as the importers return.
 
+        Args:
+            content: Tables by section name: "vehicle", "environment", "terms", ...
+
+        Returns:
+            The scene.
+
+        Raises:
+            SceneError: If anything is wrong; the message lists every fault.
+        """
         return from_dict(content)
 
     @classmethod
     def named(cls, name: str, **sections: Any) -> Scene:
-        """A scene of a vehicle that comes with the package (`lw.vehicles()` lists them), with its own terms and water.
+        """Build a scene of a vehicle that comes with the package; `lw.vehicles()` lists their names.
 
-        sections: as in a scene file; vehicle={...} and environment={...} replace single keys, a term in terms=[...]
-        replaces the vehicle's of the same name or type or is added; start={...}, run={...}, events=[...].
-        Raises SceneError naming every fault.
+        Args:
+            name: Name of the vehicle, such as "remus_100".
+            **sections: Sections as in a scene file. Keys of vehicle={...} and environment={...} replace single values.
+                An entry of terms=[...] replaces the vehicle's term of the same name or type, or is added to its terms.
+
+        Returns:
+            The scene, with the vehicle's own terms and the water that its numbers were found in.
+
+        Raises:
+            SceneError: If anything is wrong; the message lists every fault.
         """
-
         return from_dict({**sections, "vehicle": {**sections.get("vehicle", {}), "name": name}})
 
     def to_dict(self) -> dict[str, Any]:
-        """In the shape of a scene file."""
+        """Return the scene as tables in the form of a scene file.
+
+        Returns:
+            Tables by section name. `Scene.from_dict` builds the same scene from them.
+        """
         content: dict[str, Any] = {
             "vehicle": self.vehicle.to_dict(),
             "environment": self.environment.to_dict(),
@@ -121,12 +167,33 @@ SECTIONS = ("vehicle", "environment", "start", "ensemble", "run", "terms", "even
 
 
 def loads(text: str, overrides: Mapping[str, Any] | None = None) -> Scene:
-    """A Scene from the text of a scene file. Raises SceneError naming every fault."""
+    """Build a scene from the text of a scene file (TOML).
+
+    Args:
+        text: Content of a scene file.
+        overrides: Values by dotted key ("vehicle.mass") that replace those of the text; by default none.
+
+    Returns:
+        The scene.
+
+    Raises:
+        SceneError: If anything is wrong; the message lists every fault.
+    """
     return from_dict(tables_of_text(text, overrides))
 
 
 def from_dict(content: Mapping[str, Any]) -> Scene:
-    """A Scene from the tables of a scene file. Raises SceneError naming every fault."""
+    """Build a scene from the tables of a scene file.
+
+    Args:
+        content: Tables by section name.
+
+    Returns:
+        The scene.
+
+    Raises:
+        SceneError: If anything is wrong; the message lists every fault.
+    """
     content = with_named_vehicle(content)
     faults = Faults()
     faults.keys("", content, SECTIONS)
@@ -146,7 +213,7 @@ def from_dict(content: Mapping[str, Any]) -> Scene:
     settings = _build(faults, "ensemble", EnsembleSettings, {**tables["ensemble"], "vary": laws})
     scene = None
     with faults.including():
-        # Another stands in for a section that failed, so that the faults of the rest are found as well.
+        # A default replaces each section that failed, so that the faults of the other sections are found as well.
         scene = Scene(
             vehicle or Vehicle(**_STAND_INS), environment or Environment(), content.get("terms", ()), start or Start(),
             content.get("controller"), run or RunSettings(), settings if tables["ensemble"] else None,
@@ -154,20 +221,20 @@ def from_dict(content: Mapping[str, Any]) -> Scene:
         )  # fmt: skip
     with faults.including():
         if scene is None:
-            # What varies of a term that has a fault itself cannot be told: the names of the rest are looked at.
+            # Names of a faulty term's parameters are unknown: only names of the other sections can be checked.
             sections = ("vehicle.", "environment.", "start.")
             laws = {name: law for name, law in laws.items() if str(name).startswith(sections)}
             settings = EnsembleSettings(vary=laws)
-        whole = scene if vehicle and environment and start else None
+        sound_scene = scene if vehicle and environment and start else None
         names = (scene or Scene(vehicle or Vehicle(**_STAND_INS))).parameters()
-        _check_ensemble(settings or EnsembleSettings(vary=laws), whole, tuple(names))
+        _check_ensemble(settings or EnsembleSettings(vary=laws), sound_scene, tuple(names))
     faults.raise_if_any()
     assert scene is not None
     return scene
 
 
 def _check_ensemble(settings: EnsembleSettings, scene: Scene | None, parameters: Sequence[str]) -> None:
-    """What varies must fit the scene: found here, before anything runs. Names alone if the scene has faults itself."""
+    """Check that what varies fits the scene, before anything runs; if the scene has faults, check names alone."""
     if scene is None:
         check_names(settings.vary, parameters)
     else:
@@ -178,7 +245,7 @@ def _check_ensemble(settings: EnsembleSettings, scene: Scene | None, parameters:
 
 
 def _build(faults: Faults, name: str, kind: Callable[..., Any], table: Mapping[str, Any]) -> Any:
-    """Construct a section's object, or note what is wrong with it."""
+    """Construct a section's object from its table; on failure note the faults and return None."""
     signature = [key for key in inspect.signature(kind).parameters]
     faults.keys(name, table, signature)
     known = {key: value for key, value in table.items() if key in signature}
@@ -191,7 +258,7 @@ _STAND_INS: dict[str, Any] = {"mass": 1.0, "inertia": (1.0, 1.0, 1.0)}
 
 
 def _laws(faults: Faults, vary: Any) -> dict[str, Any]:
-    """The distributions of the [ensemble.vary] table."""
+    """Build the distributions of the table [ensemble.vary], by name."""
     laws = {}
     if not isinstance(vary, Mapping):
         faults.add("ensemble.vary", vary, "is not a table", 'write [ensemble.vary] and "vehicle.mass" = {...} below')

@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""Settings that a scene file holds: its sections [run] and [ensemble]."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from lgvi_warp.sampling.distributions import named as laws
 from lgvi_warp.statistics import until as stopping
 from lgvi_warp.statistics.base import from_list
 
-# Of one ensemble, whatever its sampling: a kernel keys a member's noise by its index in a signed word of 32 bits.
+# Largest ensemble: a kernel keys a member's noise by its index, a signed word of 32 bits.
 MOST_MEMBERS = 2**31
 
 
@@ -26,13 +26,20 @@ KEEP = ("all", "none", "failed")
 
 
 def check_keep(faults: Faults, key: str, keep: Any, members: int | None = None) -> None:
-    """Which members' samples to keep: all, none, those that failed (not those that an event stopped), or some by index."""
+    """Check which members' samples are to be kept, and note what is wrong.
+
+    Args:
+        faults: Collects what is wrong.
+        key: Name of the setting in messages.
+        keep: "all", "none", "failed" (members that failed, not those that an event stopped), or indices of members.
+        members: Number of members, which every index must be below; None if it is not known yet (default).
+    """
     if isinstance(keep, str):
         faults.choice(key, keep, KEEP)
         return
     indices = np.asarray(keep) if isinstance(keep, list | tuple | np.ndarray | range) else np.array(None)
-    whole = indices.ndim == 1 and indices.size > 0 and indices.dtype.kind in "iu" and not np.ma.is_masked(keep)
-    if not whole or np.any(indices < 0):
+    is_list = indices.ndim == 1 and indices.size > 0 and indices.dtype.kind in "iu" and not np.ma.is_masked(keep)
+    if not is_list or np.any(indices < 0):
         faults.add(key, keep, "names no members", f"give {', '.join(map(repr, KEEP))}, or a list of indices from 0")
     elif members is not None and np.any(indices >= members):
         faults.add(
@@ -42,11 +49,27 @@ def check_keep(faults: Faults, key: str, keep: Any, members: int | None = None) 
 
 @dataclass(frozen=True)
 class RunSettings:
-    """The [run] section of a scene file: method, step [s], duration [s], save_every [s], dtype. Raises SceneError.
+    """The section [run] of a scene file.
 
-    solver, iterations, tolerance, rtol, atol: of the method, as in Method. checks, on_failure: as in solve.
-    statistics: tables as in [[run.statistics]] or Statistic objects; keep: "all" samples of members, "none", "failed", or
-    indices of members; until: a table as in [run.until], or an Until.
+    Args:
+        method: Name of the integration method; by default "psi_s".
+        step: Length of a step [s]; None leaves it to the call of solve.
+        duration: Simulated time [s]; None leaves it to the call of solve.
+        save_every: Time between samples [s]; None leaves it to the call of solve.
+        dtype: Number type of the computation; by default "float64".
+        solver: As in Method.
+        iterations: As in Method.
+        tolerance: As in Method.
+        rtol: As in Method.
+        atol: As in Method.
+        checks: As in solve; by default "safe".
+        on_failure: As in solve; by default "freeze".
+        keep: Members whose samples are kept: "all" (default), "none", "failed", or a list of indices.
+        statistics: Tables as in [[run.statistics]], or Statistic objects; by default none.
+        until: A table as in [run.until], or an Until; None for a fixed number of members (default).
+
+    Raises:
+        SceneError: If anything is wrong; the message lists every fault.
     """
 
     method: str = "psi_s"
@@ -90,22 +113,37 @@ class RunSettings:
         faults.raise_if_any()
 
     def method_of(self, name: str | None = None) -> Method:
-        """The method of this section; of another name, without what this section says of its own. Raises SceneError."""
+        """Return the integration method of this section, or another one by name.
+
+        Args:
+            name: Name of a method. None (default), or the name in this section, gives the method with the options in
+                this section; any other name gives that method with its defaults.
+
+        Returns:
+            The method.
+
+        Raises:
+            SceneError: If the name is not known or an option does not fit the method.
+        """
         if name is not None and name != self.method:
             return Method(name)
-        given = {key: getattr(self, key) for key in ("solver", "iterations", "tolerance", "rtol", "atol")}
-        return Method(self.method, **{key: value for key, value in given.items() if value is not None})
+        options = {key: getattr(self, key) for key in ("solver", "iterations", "tolerance", "rtol", "atol")}
+        return Method(self.method, **{key: value for key, value in options.items() if value is not None})
 
     def to_dict(self) -> dict[str, Any]:
-        """As in a scene file: what is not left to the default, and the method and dtype."""
-        kept = {"method", "dtype"}
-        for one in fields(self):
-            value = getattr(self, one.name)
-            if not isinstance(value, type(one.default)) or value != one.default:
-                kept.add(one.name)
-        content = {key: value for key, value in vars(self).items() if key in kept}
+        """Return the section [run] of a scene file.
+
+        Returns:
+            Method, dtype and every setting that differs from its default, by name.
+        """
+        names = {"method", "dtype"}
+        for setting in fields(self):
+            value = getattr(self, setting.name)
+            if not isinstance(value, type(setting.default)) or value != setting.default:
+                names.add(setting.name)
+        content = {key: value for key, value in vars(self).items() if key in names}
         if "statistics" in content:
-            content["statistics"] = [one.to_dict() for one in self.statistics]
+            content["statistics"] = [statistic.to_dict() for statistic in self.statistics]
         if "until" in content:
             content["until"] = self.until.to_dict()
         return content
@@ -113,10 +151,17 @@ class RunSettings:
 
 @dataclass(frozen=True)
 class EnsembleSettings:
-    """The [ensemble] section: members, seed, what varies (name -> distribution), how it is sampled (sampling/).
+    """The section [ensemble] of a scene file.
 
-    members: None for as many as the sampling has, or one. indices: which of them to run, all by default.
-    Raises SceneError.
+    Args:
+        members: Number of members, from 1 to 2**31; None for as many as the sampling has, or 1 (default).
+        seed: Whole number from 0; by default 0.
+        vary: Distributions by name of what varies, as in Ensemble; by default nothing varies.
+        sampling: How points are drawn: a name, an object such as lw.Grid(...), or a table; by default "random".
+        indices: Indices of the members to run; None for all (default).
+
+    Raises:
+        SceneError: If anything is wrong; the message lists every fault.
     """
 
     members: int | None = None
@@ -134,8 +179,8 @@ class EnsembleSettings:
             if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
                 faults.add(name, value, f"is not a whole number from {least}", f"give {least} or more")
             elif name == "members" and value > MOST_MEMBERS:
-                what = f"are more members than the {MOST_MEMBERS} that there can be"
-                faults.add(name, value, what, f"give {MOST_MEMBERS} or less")
+                problem = f"are more members than the {MOST_MEMBERS} that there can be"
+                faults.add(name, value, problem, f"give {MOST_MEMBERS} or less")
         if self.indices is not None and not _whole_numbers(self.indices):
             faults.add("indices", self.indices, "is no list of whole numbers from 0", "give members: indices = [17]")
         if isinstance(self.vary, Mapping):
@@ -149,7 +194,11 @@ class EnsembleSettings:
         faults.raise_if_any()
 
     def to_dict(self) -> dict[str, Any]:
-        """As in a scene file."""
+        """Return the section [ensemble] of a scene file.
+
+        Returns:
+            The seed and every setting that differs from its default, by name.
+        """
         content: dict[str, Any] = {} if self.members is None else {"members": int(self.members)}
         content["seed"] = int(self.seed)
         if self.vary:
@@ -160,7 +209,7 @@ class EnsembleSettings:
 
 
 def _whole_numbers(value: Any) -> bool:
-    """Whether it is a list of one or more whole numbers from 0."""
+    """Return whether a value is a list of one or more whole numbers from 0."""
     try:
         if holds_words(value):
             return False

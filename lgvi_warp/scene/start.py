@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""The environment of a scene and the state that its members start from."""
 
 from __future__ import annotations
 
@@ -35,7 +35,15 @@ UNITS = {"position": "m", "rotation_vector": "rad", "euler_deg": "deg", "velocit
 
 @dataclass(frozen=True)
 class Environment:
-    """gravity [m/s2] (may be 0), water_density [kg/m3]. Raises SceneError for what is negative or not finite."""
+    """Gravity and density of the water around the vehicle.
+
+    Args:
+        gravity: Acceleration of free fall [m/s2], >= 0; by default 9.80665 (standard gravity).
+        water_density: Density of the water [kg/m3], > 0; by default 1025 (sea water).
+
+    Raises:
+        SceneError: If a number is negative or not finite; the message lists every fault.
+    """
 
     gravity: float = 9.80665
     water_density: float = 1025.0
@@ -47,19 +55,33 @@ class Environment:
         faults.raise_if_any()
 
     def to_dict(self) -> dict[str, float]:
-        """As in a scene file."""
+        """Return the section [environment] of a scene file.
+
+        Returns:
+            gravity [m/s2] and water_density [kg/m3], by name.
+        """
         return {"gravity": float(self.gravity), "water_density": float(self.water_density)}
 
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """The state at t = 0. What is left out is zero, or no rotation.
+    """The state at t = 0.
 
-    position (3,) [m], inertial (north, east, down). Attitude, body to inertial, in one of four ways: attitude (3, 3),
-    rotation_vector (3,) [rad], quaternion_wxyz (4,) (any length), euler_deg (roll, pitch, yaw) [deg]. Velocity in one
-    of two: velocity (3,) [m/s, body axes] or velocity_inertial (3,) [m/s]. angular_velocity (3,) [rad/s, body axes].
+    Whatever is None (default) is zero, or no rotation. At most one of the four attitudes and one of the two velocities
+    may be given.
 
-    Raises SceneError naming every fault.
+    Args:
+        position: Position of the body origin (3,) [m], inertial axes (north, east, down).
+        attitude: Rotation matrix (3, 3), body to inertial.
+        rotation_vector: Axis times angle (3,) [rad], body to inertial.
+        quaternion_wxyz: Quaternion (4,), scalar first, body to inertial, of any length but 0.
+        euler_deg: Roll, pitch, yaw (3,) [deg].
+        velocity: Velocity of the body origin (3,) [m/s], body axes.
+        velocity_inertial: Velocity of the body origin (3,) [m/s], inertial axes.
+        angular_velocity: Angular velocity (3,) [rad/s], body axes.
+
+    Raises:
+        SceneError: If anything is wrong; the message lists every fault.
     """
 
     position: Any = None
@@ -74,9 +96,9 @@ class Start:
     def __post_init__(self) -> None:
         faults = Faults("start.")
         for names in (ATTITUDES, VELOCITIES):
-            given = [name for name in names if getattr(self, name) is not None]
-            if len(given) > 1:
-                faults.add(" and ".join(given), "...", "say the same thing twice", "keep one of them")
+            chosen = [name for name in names if getattr(self, name) is not None]
+            if len(chosen) > 1:
+                faults.add(" and ".join(chosen), "...", "say the same thing twice", "keep one of them")
         for name, shape in SHAPES.items():
             value = getattr(self, name)
             if value is not None:
@@ -97,7 +119,11 @@ class Start:
             faults.add("quaternion_wxyz", q, "is zero", "give a quaternion that is not")
 
     def given(self) -> dict[str, np.ndarray]:
-        """What the user gave, and zeros for the rest: position, one attitude, one velocity, angular_velocity."""
+        """Return the start as the user gave it, completed with zeros.
+
+        Returns:
+            Values by name: position (3,) [m], one attitude, one velocity (3,) [m/s] and angular_velocity (3,) [rad/s].
+        """
         chosen = {name: getattr(self, name) for name in SHAPES if getattr(self, name) is not None}
         for names in (("position",), ATTITUDES[1:], VELOCITIES, ("angular_velocity",)):
             alternatives = ATTITUDES if names == ATTITUDES[1:] else names
@@ -106,12 +132,24 @@ class Start:
         return chosen
 
     def to_dict(self) -> dict[str, Any]:
-        """As in a scene file: what was given."""
+        """Return the section [start] of a scene file.
+
+        Returns:
+            The values that the user gave, by name, as lists.
+        """
         return {name: getattr(self, name).tolist() for name in SHAPES if getattr(self, name) is not None}
 
 
 def resolve_attitude(values: Mapping[str, np.ndarray]) -> np.ndarray:
-    """R (n, 3, 3), body to inertial, from whichever way the attitude was given, each (n, ...)."""
+    """Return the attitude as matrices, from whichever form is given.
+
+    Args:
+        values: Start values by name, one attitude among them: "attitude" (n, 3, 3), "quaternion_wxyz" (n, 4),
+            "euler_deg" (n, 3) [deg] or "rotation_vector" (n, 3) [rad].
+
+    Returns:
+        R (n, 3, 3), body to inertial.
+    """
     if "attitude" in values:
         return np.asarray(values["attitude"])
     if "quaternion_wxyz" in values:

@@ -1,7 +1,7 @@
-"""What varies, by name: which numbers of a scene a law draws, and the unit cube that its levels are points of.
+"""What varies, by name: the numbers of a scene that a distribution draws, and the unit cube of the sampling points.
 
-A name is that of a number of the scene, "vehicle.mass", of an entry of it, "start.position[2]" or "vehicle.inertia[0,1]",
-or of several that one law draws together, "vehicle.mass, vehicle.buoyancy".
+A name is that of a number of the scene, "vehicle.mass", of an entry of it, "start.position[2]" or
+"vehicle.inertia[0,1]", or of several that one distribution draws together, "vehicle.mass, vehicle.buoyancy".
 """
 
 from __future__ import annotations
@@ -24,46 +24,72 @@ from lgvi_warp.sampling.distributions.joint import PhysicalInertia, PositiveDefi
 # Parameters that are symmetric matrices, and stay so when they vary.
 MATRICES = tuple(f"vehicle.{name}" for name in vehicles.SYMMETRIC)
 ATTITUDE = "start.attitude"
-# Characters of a key: a longer one names nothing.
+# Most characters of a key: a longer one is not read.
 LONGEST_KEY = 1000
-# Which of them are of a rigid body by itself or may be.
+# Those of MATRICES that belong to the rigid body, without added mass.
 RIGID = ("vehicle.inertia", "vehicle.rigid_body_mass_matrix")
 
 
 @dataclass(frozen=True)
 class Target:
-    """A number of the scene by name, or the entry of it at `index`."""
+    """A number of the scene, or one entry of it.
+
+    Args:
+        name: Name of the number, such as "start.position".
+        index: Index of the entry; None for the whole number (default).
+    """
 
     name: str
     index: tuple[int, ...] | None = None
 
     @property
     def label(self) -> str:
-        """As it is written."""
+        """The name with the index, such as "start.position[2]"."""
         return self.name if self.index is None else f"{self.name}[{','.join(map(str, self.index))}]"
 
     def of(self, whole: np.ndarray) -> np.ndarray:
-        """Its value, where the number is `whole`."""
+        """Return the target's value out of the whole number.
+
+        Args:
+            whole: Value of the number that the target names.
+
+        Returns:
+            That value, or its entry at `index`.
+        """
         return np.asarray(whole if self.index is None else whole[self.index])
 
 
 def targets(key: str) -> tuple[Target, ...]:
-    """The numbers that a key names: "vehicle.mass", "start.position[2]", or several with commas between."""
+    """Read the targets that a key names.
+
+    Args:
+        key: "vehicle.mass", "start.position[2]", or several of these with commas between.
+
+    Returns:
+        The targets, in the order of the key.
+    """
     if len(key) > LONGEST_KEY:
         return (Target(key),)
-    found = []
+    listed = []
     for text in re.split(r",(?![^\[]*\])", key):
         match = re.fullmatch(r"([^\[\]]+)\[\s*(\d+(?:\s*,\s*\d+)*)\s*\]", text.strip())
         if match:
-            found.append(Target(match[1].strip(), tuple(int(one) for one in match[2].split(","))))
+            listed.append(Target(match[1].strip(), tuple(int(digits) for digits in match[2].split(","))))
         else:
-            found.append(Target(text.strip()))
-    return tuple(found)
+            listed.append(Target(text.strip()))
+    return tuple(listed)
 
 
 @dataclass(frozen=True, eq=False)
 class Variation:
-    """One key of `vary`: its law, what it draws, and the scene's values of that (of a symmetric matrix its entries)."""
+    """One key of `vary`, with its distribution and the scene's values of what it draws.
+
+    Args:
+        key: The key as it was given.
+        law: The distribution.
+        targets: What the key names.
+        wholes: The scene's value of each target's number.
+    """
 
     key: str
     law: Any
@@ -72,8 +98,8 @@ class Variation:
 
     @property
     def bases(self) -> list[np.ndarray]:
-        """The scene's values in the form that the law draws."""
-        return [self._base(target, whole) for target, whole in zip(self.targets, self.wholes, strict=True)]
+        """The scene's values in the form that the distribution draws: of a symmetric matrix, its free entries."""
+        return [self._base(target, array) for target, array in zip(self.targets, self.wholes, strict=True)]
 
     def _base(self, target: Target, whole: np.ndarray) -> np.ndarray:
         matrix = target.name in MATRICES and target.index is None and not self._takes_matrices
@@ -85,12 +111,16 @@ class Variation:
 
     @property
     def size(self) -> int:
-        """Uniform numbers that a draw takes."""
+        """Number of uniform numbers that one draw takes."""
         bases = self.bases
         return int(self.law.size(bases)) if self.law.joint else max(1, bases[0].size)
 
     def labels(self) -> list[str]:
-        """Of each factor: the entries, or the key of a joint law."""
+        """Return a label of each factor of the sampling.
+
+        Returns:
+            One label for each entry that is drawn by itself; the key alone for a joint distribution.
+        """
         (target, *_), (base, *_) = self.targets, self.bases
         if self.law.joint or base.ndim == 0:
             return [self.key]
@@ -101,30 +131,59 @@ class Variation:
         return [Target(target.name, tuple(int(i) for i in entry)).label for entry in entries]
 
     def values(self, u: np.ndarray) -> list[tuple[Target, np.ndarray]]:
-        """(target, values (n, *shape)) of each target, at the levels u (n, size)."""
+        """Return the values of the targets at points of the unit cube.
+
+        Args:
+            u: Levels in (0, 1), (n, size).
+
+        Returns:
+            For each target the target and its values (n, *shape).
+        """
         bases = self.bases
         if self.law.joint:
             drawn = self.law.draw(u, bases)
         else:
             drawn = [self.law.quantile(u.reshape(len(u), *bases[0].shape), bases[0])]
         return [
-            (target, symmetric(part, whole) if part.shape[1:] != target.of(whole).shape else part)
-            for target, whole, part in zip(self.targets, self.wholes, drawn, strict=True)
+            (target, symmetric(values, array) if values.shape[1:] != target.of(array).shape else values)
+            for target, array, values in zip(self.targets, self.wholes, drawn, strict=True)
         ]
 
 
 def diagonal(matrix: np.ndarray) -> bool:
-    """Whether a matrix is."""
+    """Return whether all entries off a matrix's diagonal are zero.
+
+    Args:
+        matrix: A square matrix (d, d).
+
+    Returns:
+        True for a diagonal matrix.
+    """
     return not np.any(matrix - np.diag(np.diag(matrix)))
 
 
 def drawn_entries(whole: np.ndarray) -> np.ndarray:
-    """Of a symmetric matrix, what varies: its upper triangle, or the diagonal of a diagonal one."""
+    """Return the entries of a symmetric matrix that vary.
+
+    Args:
+        whole: A symmetric matrix (d, d).
+
+    Returns:
+        The diagonal (d,) of a diagonal matrix; else the upper triangle (d (d + 1)/2,), row by row.
+    """
     return np.diag(whole) if diagonal(whole) else whole[np.triu_indices(len(whole))]
 
 
 def symmetric(drawn: np.ndarray, whole: np.ndarray) -> np.ndarray:
-    """Symmetric matrices (n, d, d) from such entries, where the scene's matrix is `whole`."""
+    """Build symmetric matrices from the entries that vary.
+
+    Args:
+        drawn: Entries (n, k), in the order of `drawn_entries`.
+        whole: The scene's matrix (d, d), which decides whether they are diagonal.
+
+    Returns:
+        Matrices (n, d, d).
+    """
     size = len(whole)
     if diagonal(whole):
         return drawn[:, :, None] * np.eye(size)
@@ -135,34 +194,52 @@ def symmetric(drawn: np.ndarray, whole: np.ndarray) -> np.ndarray:
 
 
 def put(values: dict[str, np.ndarray], target: Target, drawn: np.ndarray) -> None:
-    """Put a target's values (n, ...) into the numbers by name, which have a leading dimension of 1 or n."""
+    """Set the values of a target among the numbers by name, in place.
+
+    Args:
+        values: Arrays by name, (1, ...) or (n, ...); changed in place.
+        target: What the values belong to. An entry of a symmetric matrix is set on both sides of the diagonal.
+        drawn: Values (n, ...).
+    """
     if target.index is None:
         values[target.name] = drawn
         return
-    whole = values[target.name]
-    if len(whole) != len(drawn) or not whole.flags.writeable:
-        whole = np.array(np.broadcast_to(whole, (len(drawn), *whole.shape[1:])))
+    array = values[target.name]
+    if len(array) != len(drawn) or not array.flags.writeable:
+        array = np.array(np.broadcast_to(array, (len(drawn), *array.shape[1:])))
     else:
-        whole = whole.copy()
+        array = array.copy()
     every: tuple[Any, ...] = (slice(None),)
-    whole[every + target.index] = drawn
+    array[every + target.index] = drawn
     if target.name in MATRICES:
-        whole[every + target.index[::-1]] = drawn
-    values[target.name] = whole
+        array[every + target.index[::-1]] = drawn
+    values[target.name] = array
 
 
 def _hint(name: str, known: Mapping[str, np.ndarray], also: str) -> str:
-    """How to mend a name that the scene has not."""
+    """Return how to mend a name that the scene does not have."""
     section = name.split(".")[0]
-    others = [one for one in known if one.split(".")[0] == section]
-    given = section == "start" and others
-    return (f"the scene gives {', '.join(others)}" if given else closest(name, known)) + also
+    others = [key for key in known if key.split(".")[0] == section]
+    of_start = section == "start" and others
+    return (f"the scene gives {', '.join(others)}" if of_start else closest(name, known)) + also
 
 
 def known_target(
     faults: Faults, key: str, law: Any, target: Target, known: Mapping[str, np.ndarray], also: str = ""
 ) -> bool:
-    """Whether the scene has a target; notes what is wrong with it if not. also: another remedy for a name it has not."""
+    """Check that the scene has a target, and note what is wrong.
+
+    Args:
+        faults: Collects what is wrong.
+        key: The key that names the target, for messages.
+        law: Its distribution, for messages.
+        target: What is to vary.
+        known: The scene's values by name.
+        also: Another remedy for a name that the scene does not have; by default none.
+
+    Returns:
+        True if the scene has the target.
+    """
     if target.name not in known:
         remedy = functools.partial(_hint, target.name, known, also)
         faults.add(f'"{key}"', law, "does not name what the scene has", remedy)
@@ -173,9 +250,9 @@ def known_target(
             faults.add(f'"{key}"', law, "varies an entry of a rotation", ROTATIONS)
             return False
         if len(target.index) != len(shape) or any(i >= n for i, n in zip(target.index, shape, strict=True)):
-            what = f"is no entry of {target.name}, of shape {shape}"
+            problem = f"is no entry of {target.name}, of shape {shape}"
             faults.add(
-                f'"{key}"', law, what, f"give {len(shape)} numbers from 0" if shape else f'write "{target.name}"'
+                f'"{key}"', law, problem, f"give {len(shape)} numbers from 0" if shape else f'write "{target.name}"'
             )
             return False
     return True
@@ -187,7 +264,17 @@ ROTATIONS = (
 
 
 def variation(faults: Faults, key: str, law: Any, known: Mapping[str, np.ndarray]) -> Variation | None:
-    """What a key of `vary` and its law say about a scene with these numbers; None after noting every fault."""
+    """Match a key of `vary` and its distribution with a scene, and note what is wrong.
+
+    Args:
+        faults: Collects what is wrong.
+        key: The key.
+        law: The distribution.
+        known: The scene's values by name.
+
+    Returns:
+        The variation; None if anything is wrong.
+    """
     if not isinstance(law, Distribution):
         remedy = "give lw.Normal(std=...) or another, or an object with ppf(u), such as scipy.stats.gamma(2.0)"
         faults.add(f'"{key}"', law, "is not a distribution", remedy)
@@ -195,16 +282,16 @@ def variation(faults: Faults, key: str, law: Any, known: Mapping[str, np.ndarray
     named = targets(key)
     if not all([known_target(faults, key, law, target, known) for target in named]):
         return None
-    found = Variation(key, law, named, tuple(known[target.name] for target in named))
-    wrong = _misfit(found)
+    described = Variation(key, law, named, tuple(known[target.name] for target in named))
+    wrong = _misfit(described)
     if wrong:
         faults.add(f'"{key}"', law, *wrong)
         return None
-    return found
+    return described
 
 
 def _misfit(found: Variation) -> tuple[str, str] | None:
-    """(what is wrong, the remedy) with a law and its targets; None if they fit."""
+    """Return what is wrong with a distribution and its targets, and the remedy; None if they fit."""
     law, named = found.law, found.targets
     turns = isinstance(law, RotationNormal | UniformRotation)
     chosen = law.kind == "choice" and law.joint
@@ -231,7 +318,7 @@ def _misfit(found: Variation) -> tuple[str, str] | None:
 
 
 def _no_such_matrices(target: Target, values: np.ndarray) -> tuple[str, str] | None:
-    """(what is wrong, the remedy) with values (k, d, d) of a quantity that is a symmetric matrix or a rotation."""
+    """Return what is wrong with matrices (k, d, d) to choose from, and the remedy; None if they fit the target."""
     if target.name == ATTITUDE and not notation.rotations(values).all():
         which = int(np.argmin(notation.rotations(values)))
         return f"holds a matrix that is no rotation to 1e-9 (number {which + 1})", "give R^T R = I, det R = 1"
@@ -242,30 +329,45 @@ def _no_such_matrices(target: Target, values: np.ndarray) -> tuple[str, str] | N
 
 
 def clashes(faults: Faults, named: Iterable[tuple[str, tuple[Target, ...]]]) -> None:
-    """Note every number that is varied twice: by two keys, or twice by one."""
-    seen: dict[str, list[tuple[tuple[int, ...] | None, str]]] = {}
+    """Note every number that is varied twice, by two keys or by one.
+
+    Args:
+        faults: Collects what is wrong.
+        named: Each key with its targets.
+    """
+    taken: dict[str, list[tuple[tuple[int, ...] | None, str]]] = {}
     for key, wanted in named:
         for target in wanted:
             index = target.index
             if index is not None and target.name in MATRICES:
                 index = tuple(sorted(index))
-            for other, by in seen.setdefault(target.name, []):
-                if index is None or other is None or index == other:
-                    faults.add(f'"{key}"', target.label, f'is varied by "{by}" as well', "keep one of them")
+            for earlier, by_key in taken.setdefault(target.name, []):
+                if index is None or earlier is None or index == earlier:
+                    faults.add(f'"{key}"', target.label, f'is varied by "{by_key}" as well', "keep one of them")
                     break
-            seen[target.name].append((index, key))
+            taken[target.name].append((index, key))
 
 
 def space(seed: int, found: Sequence[Variation]) -> Space:
-    """The unit cube of these variations, in the order of their keys."""
-    ordered = sorted(found, key=lambda one: one.key)
+    """Return the unit cube of the sampling points.
+
+    Args:
+        seed: Seed of the ensemble.
+        found: What varies.
+
+    Returns:
+        The cube, with its dimensions in the order of the keys.
+    """
+    ordered = sorted(found, key=lambda varied: varied.key)
     factors: list[tuple[str, tuple[int, ...]]] = []
     first = 0
-    for one in ordered:
-        labels, size = one.labels(), one.size
+    for varied in ordered:
+        labels, size = varied.labels(), varied.size
         if len(labels) == size:
             factors += [(label, (first + i,)) for i, label in enumerate(labels)]
         else:
             factors.append((labels[0], tuple(range(first, first + size))))
         first += size
-    return Space(seed, tuple(one.key for one in ordered), tuple(one.size for one in ordered), tuple(factors))
+    return Space(
+        seed, tuple(varied.key for varied in ordered), tuple(varied.size for varied in ordered), tuple(factors)
+    )

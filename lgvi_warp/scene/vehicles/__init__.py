@@ -1,1 +1,1 @@
-"""To be said in one sentence."""
+"""Vehicles that come with the package, and importers of Fossen's coefficients, YAML, SDF and URDF."""

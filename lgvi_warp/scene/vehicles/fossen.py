@@ -1,8 +1,8 @@
 """Vehicles from the usual forms of hydrodynamic coefficients, and the vehicles that come with the package.
 
 Every importer returns a plain dict in the scene file's form, {"vehicle": {...}, "environment": {...}, "terms": [...]},
-about the body origin, in body axes x ahead, y to starboard, z down, linear before angular. All faults come at once, as a
-SceneError.
+about the body origin, in body axes x ahead, y to starboard, z down, linear before angular. All faults come at once, as
+a SceneError.
 """
 
 from __future__ import annotations
@@ -35,20 +35,44 @@ RELATIVE = 1e-6  # how far two printed values of one number, or a sum of them, m
 
 
 def vehicles() -> list[str]:
-    """The names of the vehicles that come with the package."""
+    """Return the names of the vehicles that come with the package.
+
+    Returns:
+        Names in alphabetical order.
+    """
     folder = resources.files("lgvi_warp.scene") / "vehicles"
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
 def vehicle_file(name: str) -> Path:
-    """The path of a vehicle's TOML file: the scene file's form, and a table [source]. Raises SceneError if unknown."""
+    """Return the path of a vehicle's file.
+
+    Args:
+        name: One of the names that `vehicles()` lists.
+
+    Returns:
+        Path of a TOML file in the scene file's form, with a table [source].
+
+    Raises:
+        SceneError: If no vehicle has that name.
+    """
     if name not in (known := vehicles()):
         raise SceneError([f"vehicle file {name!r}: is not known; {closest(name, known)}"])
     return Path(str(resources.files("lgvi_warp.scene") / "vehicles" / f"{name}.toml"))
 
 
 def vehicle_source(name: str) -> dict[str, str]:
-    """The table [source] of a vehicle's file: title, reference, what it was checked against, what is missing."""
+    """Return where a vehicle's numbers come from: the table [source] of its file.
+
+    Args:
+        name: One of the names that `vehicles()` lists.
+
+    Returns:
+        Title, reference, what the numbers were checked against, and what is missing.
+
+    Raises:
+        SceneError: If no vehicle has that name.
+    """
     return tomllib.loads(vehicle_file(name).read_text(encoding="utf-8"))["source"]
 
 
@@ -59,10 +83,23 @@ def vehicle_source(name: str) -> dict[str, str]:
 class Coefficients:
     """What an importer has read, before it is checked.
 
-    Mass [kg]; inertia (3, 3) about the centre of gravity [kg m2]; centres (3,) from the body origin [m]; weight and
-    buoyancy [N]; added_mass (6, 6), positive; linear and quadratic drag (6, 6): force_i = -(l_ij + q_ij |v_j|) v_j;
-    forward (6, 6), drag in proportion to the speed ahead u: force_i = -u f_ij v_j; current: velocity (3,) [m/s] of the
-    water, north, east, down; gravity [m/s2] and water_density [kg/m3] that the forces were found with; warnings: texts.
+    Drag is force_i = -(l_ij + q_ij |v_j|) v_j - u f_ij v_j, with u the speed ahead.
+
+    Args:
+        mass: Mass [kg].
+        inertia: Inertia (3, 3) [kg m2] about the centre of gravity.
+        center_of_gravity: Position (3,) [m] from the body origin.
+        center_of_buoyancy: Position (3,) [m] from the body origin.
+        weight: Weight [N].
+        buoyancy: Buoyancy [N].
+        added_mass: Added mass (6, 6) [kg, kg m, kg m2], positive; by default zero.
+        linear: Linear drag l (6, 6) [N s/m, N s, N m s]; by default zero.
+        quadratic: Quadratic drag q (6, 6) [N s2/m2, N s2/m, N s2, N m s2]; by default zero.
+        forward: Drag in proportion to the speed ahead, f (6, 6), in the units of `quadratic`; by default zero.
+        current: Velocity (3,) [m/s] of the water, north, east, down; by default zero.
+        gravity: Acceleration of free fall [m/s2] that the forces were found with; None if unknown (default).
+        water_density: Density of the water [kg/m3]; None if unknown (default).
+        warnings: Texts about what the user should know.
     """
 
     mass: float | None
@@ -81,7 +118,17 @@ class Coefficients:
     warnings: list[str] = field(default_factory=list)
 
     def to_dict(self, faults: Faults) -> dict[str, Any]:
-        """The scene file's tables. Raises SceneError with every fault noted so far and those of the sums."""
+        """Return the tables of a scene file, after the checks that need all numbers.
+
+        Args:
+            faults: Faults noted so far, which are raised with those of the sums.
+
+        Returns:
+            The tables "vehicle" and "environment", and the list "terms".
+
+        Raises:
+            SceneError: If there are faults; the message lists every one.
+        """
         faults.raise_if_any()
         assert self.mass is not None and self.inertia is not None and self.center_of_gravity is not None
         rigid = rigid_body_matrix(self.mass, self.inertia, self.center_of_gravity)
@@ -110,16 +157,26 @@ class Coefficients:
         return tables
 
     def unstable(self) -> list[str]:
-        """A text if the centre of gravity is above the centre of buoyancy: what floats so turns upside down."""
+        """Return a warning if the centre of gravity is above the centre of buoyancy: such a vehicle turns upside down.
+
+        Returns:
+            The warning, or an empty list.
+        """
         assert self.center_of_gravity is not None and self.center_of_buoyancy is not None
         above = float(self.center_of_buoyancy[2] - self.center_of_gravity[2])
         if not self.buoyancy or above <= RELATIVE:
             return []
-        what = f"the centre of gravity is {above:.3g} m above the centre of buoyancy"
-        return [f"{what}: the vehicle turns upside down; check both, and that z is down"]
+        problem = f"the centre of gravity is {above:.3g} m above the centre of buoyancy"
+        return [f"{problem}: the vehicle turns upside down; check both, and that z is down"]
 
     def terms(self) -> list[dict[str, Any]]:
-        """The drag: by axis where it is diagonal, as matrices where it is not; lift, current. None of what is zero."""
+        """Return the terms of drag, lift and current, without those that are zero.
+
+        Drag is a term "drag" where its matrices are diagonal, else a term "drag_matrix".
+
+        Returns:
+            Tables as in a scene file.
+        """
         terms: list[dict[str, Any]] = []
         pair = (self.linear, self.quadratic)
         if any(np.any(matrix) for matrix in pair):
@@ -135,24 +192,56 @@ class Coefficients:
 
 
 def plain(value: Any) -> Any:
-    """Lists and floats instead of arrays, 0.0 instead of -0.0."""
+    """Convert an array to lists of floats, with 0.0 in place of -0.0.
+
+    Args:
+        value: A number or an array.
+
+    Returns:
+        A float, or nested lists of the same shape.
+    """
     return (np.asarray(value) + 0.0).tolist()
 
 
 def cross(r: np.ndarray) -> np.ndarray:
-    """The matrix r^ of r^ v = r x v."""
+    """Return the matrix of a cross product.
+
+    Args:
+        r: A vector (3,).
+
+    Returns:
+        The matrix (3, 3) with cross(r) @ v = r x v.
+    """
     x, y, z = r
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def rigid_body_matrix(mass: float, inertia: np.ndarray, center: np.ndarray) -> np.ndarray:
-    """M_RB about the body origin, (6, 6), from the inertia (3, 3) [kg m2] about the centre of gravity."""
+    """Return the rigid body's mass matrix about the body origin.
+
+    Args:
+        mass: Mass [kg].
+        inertia: Inertia (3, 3) [kg m2] about the centre of gravity.
+        center: Centre of gravity (3,) [m] from the body origin.
+
+    Returns:
+        M_RB (6, 6) [kg, kg m, kg m2].
+    """
     S = cross(center)
     return np.block([[mass * np.eye(3), -mass * S], [mass * S, inertia - mass * S @ S]])
 
 
 def symmetric(faults: Faults, key: str, matrix: np.ndarray) -> np.ndarray:
-    """The symmetric part of a matrix that is symmetric to the digits given; a fault if it is not."""
+    """Return the symmetric part of a matrix that is symmetric to the digits given.
+
+    Args:
+        faults: Collects what is wrong.
+        key: Name of the matrix in messages.
+        matrix: A square matrix; a difference across the diagonal beyond a part in 1e6 of the largest entry is a fault.
+
+    Returns:
+        The mean of the matrix and its transpose.
+    """
     if np.abs(matrix - matrix.T).max() > RELATIVE * np.abs(matrix).max():
         faults.add(
             key, matrix, "is not symmetric", "added mass of a body in unbounded water is symmetric: mend the pair"
@@ -170,7 +259,21 @@ def rigid_body(
     buoyancy: Any,
     gravity: Any,
 ) -> Coefficients:
-    """Mass, centres and forces, checked. Not given: weight is mass x gravity, buoyancy is the weight."""
+    """Check mass, inertia, centres and forces of a body, and note what is wrong.
+
+    Args:
+        faults: Collects what is wrong.
+        mass: Mass [kg].
+        inertia: Inertia (3,) or (3, 3) [kg m2] about the centre of gravity.
+        center_of_gravity: Position (3,) [m] from the body origin.
+        center_of_buoyancy: Position (3,) [m] from the body origin.
+        weight: Weight [N]; None for mass times gravity.
+        buoyancy: Buoyancy [N]; None for the weight.
+        gravity: Acceleration of free fall [m/s2].
+
+    Returns:
+        The body without added mass and drag; None in place of what is wrong.
+    """
     mass, gravity = faults.positive("mass", mass, "kg"), faults.number("gravity", gravity, "m/s2", least=0.0)
     inertia = faults.symmetric("inertia", inertia, "kg m2")
     centers = [
@@ -194,7 +297,13 @@ _NAMES = "X_udot (or Xudot, X_du, X_{\\dot u}), X_u, X_uu (or X_u|u|, X_{u|u|}, 
 
 @dataclass(frozen=True)
 class Name:
-    """A coefficient's name, read: "dot", "linear", "quadratic", "even", "product" or "modulus", and the row and columns."""
+    """The name of a coefficient, as read.
+
+    Args:
+        kind: "dot", "linear", "quadratic", "even", "product" or "modulus".
+        row: Index of the force or moment in X Y Z K M N.
+        columns: Indices of the velocities in u v w p q r.
+    """
 
     kind: str
     row: int
@@ -202,7 +311,14 @@ class Name:
 
 
 def read_name(name: str) -> Name | None:
-    """A hydrodynamic derivative's name in any of the usual spellings; None if it is none."""
+    """Read the name of a hydrodynamic derivative, in any of the usual spellings.
+
+    Args:
+        name: A name, such as "X_udot", "Xuu" or "X_{u|u|}".
+
+    Returns:
+        What the name says; None if it is no such name.
+    """
     text = re.sub(r"[\s_{}\\$,()*]", "", str(name))
     if len(text) < 2 or text[0] not in FORCES:
         return None
@@ -219,7 +335,7 @@ def read_name(name: str) -> Name | None:
         return Name("linear", row, columns)
     if columns[0] != columns[1]:
         return Name("product", row, columns)
-    # X_qq q^2, unlike X_|q|q, is the same for +q and -q: what symmetry asks of X in w, q and of X, Z, M in v, p, r.
+    # X_qq q^2, unlike X_|q|q, is the same for +q and -q. Symmetry requires it of X in w, q and of X, Z, M in v, p, r.
     even = (text[0] in "XZM" and tail[0] in "vpr") or (text[0] == "X" and tail[0] in "wq")
     return Name("even" if even else "quadratic", row, columns)
 
@@ -237,19 +353,35 @@ def from_fossen(
     gravity: float = STANDARD_GRAVITY,
     ignore: Iterable[str] = (),
 ) -> dict[str, Any]:
-    """A vehicle and its drag from hydrodynamic derivatives in Fossen's (SNAME) names and signs.
+    """Build a vehicle and its drag from hydrodynamic derivatives in Fossen's (SNAME) names and signs.
 
-    coefficients: X_udot ... N_rdot [kg, kg m, kg m2], X_u ... N_r [N s/m, N m s], X_uu ... N_rr [N s2/m2, N m s2], in
-    any spelling of read_name, negative on the diagonal. Of a pair such as Y_rdot, N_vdot one suffices. Refused are X_qq and
-    the like, which are even; products (Y_uv, X_wq), of which those of the added mass follow from its matrix, and those
-    with u are a hull's lift, the term body_lift; and second-order moduli such as Y_|v|r (Fossen 2021, nonlinear
-    damping), which are drag of the flow across the hull: the force of speed and yaw rate together, for which a drag matrix
-    has no place. The term cross_flow has that force, found along the hull. `ignore` names the coefficients to leave out.
-    mass [kg]; inertia (3,) or (3, 3) [kg m2], about the body "origin" or the centre of "gravity" (inertia_about);
-    centers (3,) from the body origin [m]; weight [N], mass x gravity [m/s2] if not given; buoyancy [N], the weight if
-    not given.
+    Of a pair such as Y_rdot, N_vdot one suffices. These are refused:
 
-    Raises SceneError naming every fault.
+    * X_qq and the like, which are even in the velocity and so no drag;
+    * products (Y_uv, X_wq): those of the added mass follow from its matrix, and those with u are a hull's lift, which
+      the term body_lift has;
+    * second-order moduli such as Y_|v|r (Fossen 2021, nonlinear damping), which are drag of the flow across the hull:
+      the force of speed and yaw rate together, for which a drag matrix has no place. The term cross_flow has that
+      force, found along the hull.
+
+    Args:
+        coefficients: Values by name: X_udot ... N_rdot [kg, kg m, kg m2], X_u ... N_r [N s/m, N m s],
+            X_uu ... N_rr [N s2/m2, N m s2], in any usual spelling; negative on the diagonal.
+        mass: Mass [kg].
+        inertia: Inertia (3,) or (3, 3) [kg m2], about the point that `inertia_about` names.
+        center_of_gravity: Position (3,) [m] from the body origin; by default the origin.
+        center_of_buoyancy: Position (3,) [m] from the body origin; by default the origin.
+        inertia_about: "origin" of the body (default), or centre of "gravity".
+        weight: Weight [N]; by default mass times gravity.
+        buoyancy: Buoyancy [N]; by default the weight.
+        gravity: Acceleration of free fall [m/s2]; by default 9.80665.
+        ignore: Names of coefficients to leave out; by default none.
+
+    Returns:
+        The tables "vehicle", "environment" and "terms" of a scene file.
+
+    Raises:
+        SceneError: If anything is wrong; the message lists every fault.
     """
     faults = Faults()
     body = rigid_body(faults, mass, inertia, center_of_gravity, center_of_buoyancy, weight, buoyancy, gravity)
@@ -259,7 +391,13 @@ def from_fossen(
 
 
 def about_gravity(faults: Faults, body: Coefficients, inertia_about: str) -> None:
-    """Carry an inertia that is given about the body origin to the centre of gravity."""
+    """Carry an inertia that is given about the body origin to the centre of gravity, in place.
+
+    Args:
+        faults: Collects what is wrong.
+        body: The body; its inertia is changed in place.
+        inertia_about: "origin" if the inertia is about the body origin, "gravity" if it needs no change.
+    """
     known = faults.choice("inertia_about", inertia_about, ("origin", "gravity"))
     if not known or inertia_about == "gravity" or body.mass is None or body.inertia is None:
         return
@@ -269,7 +407,14 @@ def about_gravity(faults: Faults, body: Coefficients, inertia_about: str) -> Non
 
 
 def add_derivatives(faults: Faults, body: Coefficients, given: Mapping[str, Any], ignore: Iterable[str] = ()) -> None:
-    """Put derivatives, by name, into the matrices of the body: minus their values."""
+    """Put derivatives into the body's matrices of added mass and drag, which are minus their values.
+
+    Args:
+        faults: Collects what is wrong.
+        body: The body; its matrices are set in place.
+        given: Values by name, in any spelling of `read_name`.
+        ignore: Names to leave out; by default none.
+    """
     if not isinstance(given, Mapping):
         faults.add("coefficients", given, "is not a map of names", 'write {"X_udot": -30.0, "X_u": -4.0, ...}')
         given = {}
@@ -296,7 +441,14 @@ def add_derivatives(faults: Faults, body: Coefficients, given: Mapping[str, Any]
 
 
 def refuse_name(faults: Faults, key: str, value: Any, name: Name | None) -> None:
-    """Why a name cannot be taken."""
+    """Note why a coefficient cannot be taken.
+
+    Args:
+        faults: Collects what is wrong.
+        key: The coefficient's name as given.
+        value: Its value.
+        name: What the name says; None if it is not a coefficient's name.
+    """
     if name is None:
         faults.add(key, value, "is not a coefficient's name", f"known: {_NAMES}")
     elif name.kind == "even":
@@ -304,8 +456,10 @@ def refuse_name(faults: Faults, key: str, value: Any, name: Name | None) -> None
         remedy = f"leave it out (ignore=) if it comes from the added mass, or write {bars} if it is drag"
         faults.add(key, value, "is the same for either sign of the velocity, so it is no drag", remedy)
     elif name.kind == "modulus":
-        what = "is the product of one velocity and the modulus of another, drag of the flow across the hull"
-        faults.add(key, value, what, "give the hull's cross-flow drag as a term cross_flow, and leave it out (ignore=)")
+        problem = "is the product of one velocity and the modulus of another, drag of the flow across the hull"
+        faults.add(
+            key, value, problem, "give the hull's cross-flow drag as a term cross_flow, and leave it out (ignore=)"
+        )
     else:
         remedy = "leave it out (ignore=) if it comes from the added mass, which implies it"
         lift = "; lift with the speed ahead is a term body_lift, lift of fins a term fins" if 0 in name.columns else ""
@@ -313,16 +467,33 @@ def refuse_name(faults: Faults, key: str, value: Any, name: Name | None) -> None
 
 
 def refuse_sign(faults: Faults, key: str, number: float, name: Name) -> None:
-    """A diagonal derivative above zero would be negative added mass or drag that drives."""
+    """Note a diagonal derivative above zero, which would be negative added mass, or drag that drives.
+
+    Args:
+        faults: Collects what is wrong.
+        key: The coefficient's name as given.
+        number: Its value.
+        name: What the name says.
+    """
     if name.row == name.columns[0] and number > 0.0:
-        what = "is positive; the sign convention is Fossen's, in which this derivative is negative"
-        faults.add(key, number, what, f"write {-number:g} if it is meant as added mass or drag")
+        problem = "is positive; the sign convention is Fossen's, in which this derivative is negative"
+        faults.add(key, number, problem, f"write {-number:g} if it is meant as added mass or drag")
 
 
 def with_partners(
     faults: Faults, matrix: np.ndarray, keys: Mapping[tuple[str, int, int], str], given: Mapping[str, Any]
 ) -> np.ndarray:
-    """The added mass matrix with the missing one of each pair filled in; two that differ are a fault."""
+    """Fill in the missing one of each pair of added masses, and note pairs that differ.
+
+    Args:
+        faults: Collects what is wrong.
+        matrix: Added mass (6, 6) of the coefficients that are given.
+        keys: Names as given, by kind, row and column.
+        given: Values by name.
+
+    Returns:
+        The added mass matrix (6, 6), symmetric if no fault was noted.
+    """
     full = matrix.copy()
     for row, column in combinations(range(6), 2):
         upper, lower = keys.get(("dot", row, column)), keys.get(("dot", column, row))
@@ -331,8 +502,8 @@ def with_partners(
         elif lower is None:
             full[column, row] = matrix[row, column]
         elif abs(matrix[row, column] - matrix[column, row]) > RELATIVE * abs(matrix[row, column]):
-            what = f"differs from its partner {lower} = {given[lower]}"
-            faults.add(upper, given[upper], what, "the added mass matrix is symmetric: mend one or leave it out")
+            problem = f"differs from its partner {lower} = {given[lower]}"
+            faults.add(upper, given[upper], problem, "the added mass matrix is symmetric: mend one or leave it out")
         else:
             full[column, row] = full[row, column]
     return full
@@ -342,7 +513,16 @@ def with_partners(
 
 
 def as_positive(faults: Faults, key: str, matrix: np.ndarray) -> np.ndarray:
-    """Added mass or drag, positive on its diagonal, from either sign convention; Fossen's if it is zero there."""
+    """Return a matrix of added mass or drag that is positive on its diagonal, from either sign convention.
+
+    Args:
+        faults: Collects what is wrong.
+        key: Name of the matrix in messages.
+        matrix: Magnitudes, or derivatives in Fossen's signs; taken as derivatives if the diagonal is zero.
+
+    Returns:
+        The matrix, or minus the matrix.
+    """
     diagonal = np.diag(matrix)
     if np.any(diagonal > 0.0) and np.any(diagonal < 0.0):
         remedy = "give all as derivatives (Fossen's signs, negative) or all as magnitudes (positive)"
@@ -354,19 +534,46 @@ PAIRS = ("xx", "xy", "xz", "yy", "yz", "zz")
 
 
 def inertia_from_names(named: Mapping[str, Any]) -> np.ndarray:
-    """(3, 3) from ixx, ixy, ixz, iyy, iyz, izz; products of inertia are 0 if not given."""
+    """Build an inertia matrix from its six named entries.
+
+    Args:
+        named: ixx, ixy, ixz, iyy, iyz, izz [kg m2]; 0 where one is missing.
+
+    Returns:
+        The matrix (3, 3) [kg m2].
+    """
     xx, xy, xz, yy, yz, zz = (named.get(f"i{pair}", 0.0) for pair in PAIRS)
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def turned(value: Any, axes: np.ndarray) -> Any:
-    """A vector in turned axes; left as it is if it is none, for the check to refuse."""
+    """Turn a vector into other axes.
+
+    Args:
+        value: A vector (3,); anything else is returned as it is, to be refused by a later check.
+        axes: Sign of each axis (3,).
+
+    Returns:
+        The vector (3,) in the other axes.
+    """
     checked = Faults().finite("", value, (3,))
     return value if checked is None else axes * checked
 
 
 def read_text(source: str | os.PathLike[str], is_text: bool, what: str) -> str:
-    """The text itself, or that of the file it names."""
+    """Return a text, or the content of the file that it names.
+
+    Args:
+        source: The text itself, or the path of a file.
+        is_text: True if it is the text itself.
+        what: Kind of the content in messages, such as "YAML file".
+
+    Returns:
+        The text.
+
+    Raises:
+        SceneError: If the text is too long or the file cannot be read.
+    """
     if is_text:
         text = str(source)
         if len(text) > (most := MOST_BYTES.get(what, MOST_OTHERS)):

@@ -1,4 +1,4 @@
-"""Links of a robot description lumped into one rigid body: mass, inertia, added mass, displaced volume and its centre."""
+"""Links of a robot description, and their lumping into one rigid body."""
 
 from __future__ import annotations
 
@@ -20,10 +20,19 @@ def _zeros() -> np.ndarray:
 
 @dataclass
 class Link:
-    """One link: mass [kg], inertia (3, 3) [kg m2] about the centre of mass (3,) [m], volume [m3] and its centre (3,) [m],
-    in the link's axes (x ahead, y to port, z up) from its origin; added_mass (6, 6) about that; pose in the model.
+    """One link of a robot description, in its own axes (x ahead, y to port, z up) from its own origin.
 
-    weighed: whether the file gives its mass; shapeless: names of collision shapes whose volume the file does not hold.
+    Args:
+        name: Full name of the link.
+        pose: Pose of the link in the model; by default at the origin.
+        mass: Mass [kg]; by default 0.
+        center: Centre of mass (3,) [m]; by default the origin.
+        inertia: Inertia (3, 3) [kg m2] about the centre of mass; by default zero.
+        volume: Displaced volume [m3]; by default 0.
+        volume_center: Centre of that volume (3,) [m]; by default the origin.
+        added_mass: Added mass (6, 6) about the origin; by default zero.
+        weighed: Whether the file gives the link's mass; by default True.
+        shapeless: Names of collision shapes whose volume the file does not hold; by default none.
     """
 
     name: str
@@ -40,7 +49,13 @@ class Link:
 
 @dataclass(frozen=True)
 class Joint:
-    """What joins two links: its type, and the full names of the links."""
+    """A joint between two links.
+
+    Args:
+        type: Type of the joint, such as "fixed" or "revolute".
+        parent: Full name of the parent link.
+        child: Full name of the child link.
+    """
 
     type: str
     parent: str
@@ -49,7 +64,16 @@ class Joint:
 
 @dataclass
 class Lump:
-    """Links as one body, in the axes of its main link: as a Link has them; inertia about the centre of mass."""
+    """Several links as one rigid body, in the axes of its main link.
+
+    Args:
+        mass: Mass [kg].
+        center: Centre of mass (3,) [m].
+        inertia: Inertia (3, 3) [kg m2] about the centre of mass.
+        volume: Displaced volume [m3].
+        volume_center: Centre of that volume (3,) [m].
+        added_mass: Added mass (6, 6) about the main link's origin.
+    """
 
     mass: float
     center: np.ndarray
@@ -59,12 +83,12 @@ class Lump:
     added_mass: np.ndarray
 
 
-# The largest robots of public repositories have some hundred.
+# The largest robots in public repositories have some hundred links.
 MOST_LINKS = 2_000
 
 # Shapes -------------------------------------------------------------------------------------------------------------
 
-# Shape -> its sizes in SDF, with SDF's defaults, and its volume [m3] from them.
+# For each shape its sizes in SDF, with SDF's defaults, and its volume [m3] as a function of them.
 SHAPES: dict[str, tuple[dict[str, str], Callable[..., float]]] = {
     "box": ({"size": "1 1 1"}, lambda size: float(np.prod(size))),
     "sphere": ({"radius": "1"}, lambda r: 4.0 / 3.0 * np.pi * r[0] ** 3),
@@ -80,7 +104,16 @@ FLAT = ("plane", "empty")
 
 
 def volume_of(faults: Faults, where: str, collision: Element) -> float | None:
-    """The volume [m3] of a collision's shape; 0 of a plane; None of a mesh and the like, which lie in another file."""
+    """Return the volume of a collision's shape.
+
+    Args:
+        faults: Collects what is wrong.
+        where: Beginning of the names in messages.
+        collision: The element <collision>.
+
+    Returns:
+        Volume [m3]; 0 for a plane; None for a mesh and the like, whose volume the file does not hold.
+    """
     geometry = collision.find("geometry")
     if geometry is None:
         if text_of(collision):
@@ -101,15 +134,31 @@ def volume_of(faults: Faults, where: str, collision: Element) -> float | None:
 
 
 def size_of(faults: Faults, where: str, shape: Element, key: str, default: str) -> np.ndarray:
-    """A size of a shape: an element in SDF, an attribute in URDF."""
-    given = shape.get(key)
-    if given is not None:
-        return numbers_in(faults, f"{where}{key}", given, len(default.split()))
+    """Return one size of a shape, which is an element in SDF and an attribute in URDF.
+
+    Args:
+        faults: Collects what is wrong.
+        where: Beginning of the names in messages.
+        shape: The element of the shape.
+        key: Name of the size, such as "radius".
+        default: Numbers to take if the size is missing, as a text.
+
+    Returns:
+        As many numbers [m] as the default holds.
+    """
+    attribute = shape.get(key)
+    if attribute is not None:
+        return numbers_in(faults, f"{where}{key}", attribute, len(default.split()))
     return numbers(faults, where, shape, key, default)
 
 
 def add_volumes(link: Link, shapes: Iterable[tuple[str, float | None, np.ndarray]]) -> None:
-    """Set volume and centre from (name, volume, centre) of each collision shape, as Gazebo's Buoyancy system does."""
+    """Set volume and centre of a link from its collision shapes, as Gazebo's Buoyancy system does.
+
+    Args:
+        link: The link, changed in place.
+        shapes: Name, volume [m3] and centre (3,) [m] of each shape; volume None if the file does not hold it.
+    """
     known = []
     for name, volume, center in shapes:
         if volume is None:
@@ -122,13 +171,23 @@ def add_volumes(link: Link, shapes: Iterable[tuple[str, float | None, np.ndarray
 
 
 def read_inertia(faults: Faults, where: str, element: Element | None, default: str = "1") -> np.ndarray:
-    """The inertia (3, 3) [kg m2] of six names, as elements (SDF) or attributes (URDF); SDF's defaults where one is missing."""
+    """Read an inertia matrix from its six names, which are elements in SDF and attributes in URDF.
+
+    Args:
+        faults: Collects what is wrong.
+        where: Beginning of the names in messages.
+        element: The element <inertia>; None if there is none.
+        default: Diagonal entry where one is missing, as a text; by default "1", as in SDF. Off the diagonal it is 0.
+
+    Returns:
+        The matrix (3, 3) [kg m2].
+    """
     named = {}
     for pair in PAIRS:
         key, fallback = f"i{pair}", default if pair[0] == pair[1] else "0"
-        given = None if element is None else element.get(key)
-        if given is not None:
-            named[key] = float(numbers_in(faults, f"{where}<inertia {key}>", given, 1)[0])
+        attribute = None if element is None else element.get(key)
+        if attribute is not None:
+            named[key] = float(numbers_in(faults, f"{where}<inertia {key}>", attribute, 1)[0])
         else:
             named[key] = number(faults, f"{where}<inertia> ", element, key, fallback)
     return inertia_from_names(named)
@@ -138,7 +197,15 @@ def read_inertia(faults: Faults, where: str, element: Element | None, default: s
 
 
 def beside(joints: Iterable[Joint], types: tuple[str, ...] | None = None) -> dict[str, list[str]]:
-    """Each link's neighbours across joints of these types, or of any."""
+    """Return the neighbours of each link across joints.
+
+    Args:
+        joints: The joints.
+        types: Types of joints to follow; None for any (default).
+
+    Returns:
+        Names of neighbours by name of the link.
+    """
     neighbours: dict[str, list[str]] = {}
     for joint in joints:
         if types is None or joint.type in types:
@@ -148,7 +215,15 @@ def beside(joints: Iterable[Joint], types: tuple[str, ...] | None = None) -> dic
 
 
 def joined(first: str, neighbours: Mapping[str, Sequence[str]]) -> list[str]:
-    """All that a link is joined to, itself first."""
+    """Return all links that a link is joined to, directly or through others.
+
+    Args:
+        first: Name of the link.
+        neighbours: Names of neighbours by name of the link.
+
+    Returns:
+        Names, the link itself first.
+    """
     reached, waiting = {first: None}, [first]
     while waiting:
         for name in neighbours.get(waiting.pop(), ()):
@@ -159,12 +234,20 @@ def joined(first: str, neighbours: Mapping[str, Sequence[str]]) -> list[str]:
 
 
 def main_link(links: Mapping[str, Link], joints: Sequence[Joint]) -> str:
-    """Of the heaviest set of joined links, the one that is no other's child, else the heaviest."""
-    sets, left, neighbours = [], dict.fromkeys(links), beside(joints)
-    while left:
-        sets.append([name for name in joined(next(iter(left)), neighbours) if name in links])
+    """Return the main link: of the heaviest set of joined links the heaviest that is no joint's child.
+
+    Args:
+        links: Links by full name.
+        joints: The joints.
+
+    Returns:
+        Full name of the link; the heaviest of the set if each is a joint's child.
+    """
+    sets, remaining, neighbours = [], dict.fromkeys(links), beside(joints)
+    while remaining:
+        sets.append([name for name in joined(next(iter(remaining)), neighbours) if name in links])
         for name in sets[-1]:
-            left.pop(name, None)
+            remaining.pop(name, None)
     heaviest = max(sets, key=lambda names: sum(links[name].mass for name in names))
     children = {joint.child for joint in joints}
     roots = [name for name in heaviest if name not in children]
@@ -172,13 +255,28 @@ def main_link(links: Mapping[str, Link], joints: Sequence[Joint]) -> str:
 
 
 def carried(pose: Pose) -> np.ndarray:
-    """X (6, 6) with which a link of that pose has the velocity X v, in its own axes, where the body has v."""
+    """Return the matrix that carries a velocity from the body's frame to a link's.
+
+    Args:
+        pose: Pose of the link in the body.
+
+    Returns:
+        X (6, 6): the link has the velocity X v, in its own axes, where the body has v.
+    """
     R, p = pose.rotation, pose.position
     return np.block([[R.T, -R.T @ cross(p)], [np.zeros((3, 3)), R.T]])
 
 
 def lumped(links: Iterable[Link], main: Link) -> Lump:
-    """Rigidly joined links as one body, in the main link's axes about its origin (parallel axes for inertia)."""
+    """Lump rigidly joined links into one body; inertia by the parallel axis theorem.
+
+    Args:
+        links: The links.
+        main: The link in whose axes, and about whose origin, the body is given.
+
+    Returns:
+        The body.
+    """
     placed = [(link, main.pose.inverse().then(link.pose)) for link in links]
     mass = sum(link.mass for link, _ in placed)
     volume = sum(link.volume for link, _ in placed)
@@ -194,7 +292,7 @@ def lumped(links: Iterable[Link], main: Link) -> Lump:
 
 
 def _mean(weights: Sequence[float], points: Sequence[np.ndarray]) -> np.ndarray:
-    """The weighted mean of points; 0 where all weights are. Of one point alone, that point to the last digit."""
+    """Return the weighted mean of points; 0 if all weights are. A single point is returned to the last digit."""
     total = sum(weights)
     for weight, point in zip(weights, points, strict=True):
         if weight == total:
@@ -203,11 +301,22 @@ def _mean(weights: Sequence[float], points: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def link_named(links: Mapping[str, Link], name: str) -> str:
-    """The full name of a link: given in full, or by its last part alone. Raises SceneError if none or several fit."""
+    """Return the full name of a link.
+
+    Args:
+        links: Links by full name.
+        name: The full name, or its last part alone.
+
+    Returns:
+        The full name.
+
+    Raises:
+        SceneError: If no link fits, or several do.
+    """
     if name in links:
         return name
     fitting = [key for key in links if key.endswith((f"::{name}", f"/{name}")) or name.endswith(f"/{key}")]
     if len(fitting) == 1:
         return fitting[0]
-    what = "is not in the file" if not fitting else f"stands for several: {', '.join(fitting)}"
-    raise SceneError([f"SDF link = {name!r}: {what}; {closest(name, links)}"])
+    problem = "is not in the file" if not fitting else f"stands for several: {', '.join(fitting)}"
+    raise SceneError([f"SDF link = {name!r}: {problem}; {closest(name, links)}"])

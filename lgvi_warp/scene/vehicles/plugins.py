@@ -1,4 +1,4 @@
-"""What the plugins of a robot description say of one link: gz-sim's Hydrodynamics, and uuv_simulator's underwater object."""
+"""Plugins of a robot description that give a link's coefficients: gz-sim's Hydrodynamics and that of uuv_simulator."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from lgvi_warp.scene.vehicles.poses import Pose
 from lgvi_warp.scene.vehicles.robot_xml import floats, is_true, number, numbers_in, plugin_name, text_of
 
 _TERM = re.compile(r"^([xyzkmn])(Dot)?([UVWPQR])(abs)?([UVWPQR])?$")
-# Plugins that push a vehicle and that are not read: in whose name one of these stands, and what takes their place here.
+# Plugins that push a vehicle and are not read: parts of their names, and what to give here in their place.
 UNREAD = {
     "thruster": (("thruster",), "give a term thrusters"),
     "lift and drag": (("liftdrag", "lift-drag"), "give a term fins or control_fins"),
@@ -27,10 +27,19 @@ UNREAD = {
 
 @dataclass
 class Hydrodynamics:
-    """Of one link, in axes x ahead, y to starboard, z down, about its origin: all (6, 6) and positive as in Coefficients.
+    """Hydrodynamic coefficients of one link, in axes x ahead, y to starboard, z down, about its origin.
 
-    volume [m3], volume_center (3,) [m] (link's own axes, z up): of uuv_simulator, which does not look at shapes.
-    current: velocity (3,) [m/s] of the water, north, east, down.
+    Args:
+        link: Name of the link.
+        added_mass: As in Coefficients.
+        linear: As in Coefficients.
+        quadratic: As in Coefficients.
+        forward: As in Coefficients.
+        density: Density of the water [kg/m3]; None if the plugin does not give it (default).
+        volume: Displaced volume [m3] that uuv_simulator gives and does not take from shapes; None for gz-sim (default).
+        volume_center: Centre of that volume (3,) [m], in the link's own axes (z up).
+        neutral: Whether the buoyancy is the weight; by default False.
+        current: Velocity (3,) [m/s] of the water, north, east, down.
     """
 
     link: str
@@ -46,19 +55,42 @@ class Hydrodynamics:
 
 
 def is_hydrodynamics(plugin: Element) -> bool:
-    """Whether a plugin has the coefficients of Gazebo's Hydrodynamics, or its name and a link. Others have that name too,
-    and a controller's gain may be called kP as a drag is."""
+    """Return whether a plugin is Gazebo's Hydrodynamics.
+
+    It is if it holds a coefficient, or bears the name and has a link. Other plugins bear that name, too, and a
+    controller's gain may be called kP as a drag coefficient is.
+
+    Args:
+        plugin: The element <plugin>.
+
+    Returns:
+        True for Gazebo's Hydrodynamics.
+    """
     named = "hydrodynamics" in plugin_name(plugin) and plugin.find("link_name") is not None
     return named or any(_TERM.match(child.tag) and child.tag[0] in "xyz" for child in plugin)
 
 
 def is_underwater_object(plugin: Element) -> bool:
-    """Whether a plugin is uuv_simulator's: it holds links with a hydrodynamic model or a volume."""
+    """Return whether a plugin is uuv_simulator's, which holds links with a hydrodynamic model.
+
+    Args:
+        plugin: The element <plugin>.
+
+    Returns:
+        True for uuv_simulator's plugin.
+    """
     return any(link.find("hydrodynamic_model") is not None for link in plugin.findall("link"))
 
 
 def unread(plugins: Sequence[Element]) -> list[str]:
-    """A line about each kind of plugin that pushes the vehicle and is not read."""
+    """Return a warning for each kind of plugin that pushes the vehicle but is not read.
+
+    Args:
+        plugins: Elements <plugin>.
+
+    Returns:
+        The warnings.
+    """
     lines = []
     for kind, (parts, remedy) in UNREAD.items():
         count = sum(any(part in plugin_name(plugin) for part in parts) and not is_read(plugin) for plugin in plugins)
@@ -68,7 +100,14 @@ def unread(plugins: Sequence[Element]) -> list[str]:
 
 
 def is_read(plugin: Element) -> bool:
-    """Whether a plugin is one whose numbers are read."""
+    """Return whether the coefficients of a plugin are read.
+
+    Args:
+        plugin: The element <plugin>.
+
+    Returns:
+        True for Gazebo's Hydrodynamics and uuv_simulator's plugin.
+    """
     return is_hydrodynamics(plugin) or is_underwater_object(plugin)
 
 
@@ -76,8 +115,18 @@ def is_read(plugin: Element) -> bool:
 
 
 def read_hydrodynamics(faults: Faults, warnings: list[str], plugin: Element, link: str) -> Hydrodynamics:
-    """The coefficients of gz-sim's Hydrodynamics, of either sign convention."""
-    found = Hydrodynamics(link, density=plugin_density(faults, plugin))
+    """Read the coefficients of gz-sim's Hydrodynamics, in either sign convention.
+
+    Args:
+        faults: Collects what is wrong.
+        warnings: Collects what the user should know.
+        plugin: The element <plugin>.
+        link: Name of the link that it acts on.
+
+    Returns:
+        The coefficients.
+    """
+    hydrodynamics = Hydrodynamics(link, density=plugin_density(faults, plugin))
     matrices = {"added mass": np.zeros((6, 6)), "linear drag": np.zeros((6, 6)), "quadratic drag": np.zeros((6, 6))}
     even = []
     for child in plugin:
@@ -97,9 +146,9 @@ def read_hydrodynamics(faults: Faults, warnings: list[str], plugin: Element, lin
             remedy = "only |v| v of one velocity is a drag: leave it out, or add a term of your own"
             faults.add(f"<{child.tag}>", value, "is a product of velocities", remedy)
     if even:
-        told = ", ".join(f"<{tag}>" for tag in even)
+        tags = ", ".join(f"<{tag}>" for tag in even)
         warnings.append(
-            f"{told}: read as |v| v, as older versions of Gazebo do; newer ones take v v, which drives astern"
+            f"{tags}: read as |v| v, as older versions of Gazebo do; newer ones take v v, which drives astern"
         )
     if is_true(plugin.findtext("disable_added_mass")):
         matrices["added mass"] = np.zeros((6, 6))
@@ -109,18 +158,26 @@ def read_hydrodynamics(faults: Faults, warnings: list[str], plugin: Element, lin
         HALF_TURN_6[:, None] * as_positive(faults, f"plugin's {key}", matrix) * HALF_TURN_6
         for key, matrix in matrices.items()
     ]
-    found.added_mass = symmetric(faults, "plugin's added mass", frd[0])
-    found.linear, found.quadratic = frd[1], frd[2]
+    hydrodynamics.added_mass = symmetric(faults, "plugin's added mass", frd[0])
+    hydrodynamics.linear, hydrodynamics.quadratic = frd[1], frd[2]
     if text_of(plugin.find("default_current")):
         east, north, up = numbers_in(faults, "<default_current>", text_of(plugin.find("default_current")), 3)
-        found.current = np.array([north, east, -up])
+        hydrodynamics.current = np.array([north, east, -up])
     if any(child.tag.startswith("lookup_current") for child in plugin):
         warnings.append("lookup_current is not read: give the water's velocity as a term current_profile")
-    return found
+    return hydrodynamics
 
 
 def plugin_density(faults: Faults, plugin: Element) -> float | None:
-    """The water density [kg/m3] that a plugin names, if it does."""
+    """Return the water density that a plugin gives.
+
+    Args:
+        faults: Collects what is wrong.
+        plugin: The element <plugin>.
+
+    Returns:
+        Density [kg/m3]; None if the plugin does not give it.
+    """
     for tag in ("water_density", "waterDensity", "fluid_density"):
         if text_of(plugin.find(tag)):
             return faults.positive(f"<{tag}>", number(faults, "", plugin, tag, "1"), "kg/m3")
@@ -131,45 +188,73 @@ def plugin_density(faults: Faults, plugin: Element) -> float | None:
 
 
 def read_underwater_object(faults: Faults, warnings: list[str], plugin: Element) -> list[Hydrodynamics]:
-    """The links of uuv_simulator's plugin. Its matrices are in axes x ahead, y to starboard, z down already."""
+    """Read the links of uuv_simulator's plugin; its matrices are in axes x ahead, y to starboard, z down already.
+
+    Args:
+        faults: Collects what is wrong.
+        warnings: Collects what the user should know.
+        plugin: The element <plugin>.
+
+    Returns:
+        Coefficients of each link.
+    """
     density = plugin_density(faults, plugin)
     density = 1028.0 if density is None else density  # kg/m3: the plugin's default
     return [read_underwater_link(faults, warnings, link, density) for link in plugin.findall("link")]
 
 
 def read_underwater_link(faults: Faults, warnings: list[str], link: Element, density: float) -> Hydrodynamics:
-    """Volume, centre and matrices of one link."""
+    """Read volume, centre and matrices of one link of uuv_simulator's plugin.
+
+    Args:
+        faults: Collects what is wrong.
+        warnings: Collects what the user should know.
+        link: The element <link> of the plugin.
+        density: Density of the water [kg/m3].
+
+    Returns:
+        The link's coefficients.
+    """
     name = link.get("name", "")
-    found = Hydrodynamics(name, density=density, neutral=is_true(link.findtext("neutrally_buoyant")))
-    found.volume = number(faults, f"{name} ", link, "volume", "0")
+    hydrodynamics = Hydrodynamics(name, density=density, neutral=is_true(link.findtext("neutrally_buoyant")))
+    hydrodynamics.volume = number(faults, f"{name} ", link, "volume", "0")
     if text_of(link.find("center_of_buoyancy")):
-        found.volume_center = numbers_in(
+        hydrodynamics.volume_center = numbers_in(
             faults, f"{name} <center_of_buoyancy>", text_of(link.find("center_of_buoyancy")), 3
         )
     model = link.find("hydrodynamic_model")
     if model is None:
-        return found
+        return hydrodynamics
     kind = text_of(model.find("type")) or "fossen"
     if kind != "fossen":
         remedy = 'its numbers follow from shape and speed: give added mass and damping as type "fossen"'
         faults.add(f"{name} <type>", kind, "is not read", remedy)
-        return found
+        return hydrodynamics
     matrices = {
         tag: block_matrix(faults, f"{name} <{tag}>", text_of(model.find(tag)))
         for tag in ("added_mass", "linear_damping", "linear_damping_forward_speed", "quadratic_damping")
     }
-    found.added_mass = symmetric(faults, f"{name} <added_mass>", matrices["added_mass"])
-    found.linear = as_positive(faults, f"{name} <linear_damping>", matrices["linear_damping"])
-    found.forward = as_positive(
+    hydrodynamics.added_mass = symmetric(faults, f"{name} <added_mass>", matrices["added_mass"])
+    hydrodynamics.linear = as_positive(faults, f"{name} <linear_damping>", matrices["linear_damping"])
+    hydrodynamics.forward = as_positive(
         faults, f"{name} <linear_damping_forward_speed>", matrices["linear_damping_forward_speed"]
     )
     quadratic = as_positive(faults, f"{name} <quadratic_damping>", matrices["quadratic_damping"])
-    found.quadratic = by_diagonal(warnings, quadratic)
-    return found
+    hydrodynamics.quadratic = by_diagonal(warnings, quadratic)
+    return hydrodynamics
 
 
 def block_matrix(faults: Faults, key: str, text: str) -> np.ndarray:
-    """(6, 6) from 36 numbers or the 6 of a diagonal; zeros if there are none."""
+    """Read a matrix from 36 numbers, or from the 6 of its diagonal.
+
+    Args:
+        faults: Collects what is wrong.
+        key: Name of the matrix in messages.
+        text: The numbers, separated by spaces.
+
+    Returns:
+        The matrix (6, 6); zeros if the text is empty.
+    """
     if not text:
         return np.zeros((6, 6))
     values = floats(text)
@@ -179,7 +264,15 @@ def block_matrix(faults: Faults, key: str, text: str) -> np.ndarray:
 
 
 def by_diagonal(warnings: list[str], quadratic: np.ndarray) -> np.ndarray:
-    """The diagonal of a quadratic damping matrix: the rest uuv_simulator reads and does not use."""
+    """Return the diagonal part of a quadratic damping matrix; uuv_simulator does not use the other entries.
+
+    Args:
+        warnings: Collects what the user should know.
+        quadratic: Quadratic damping (6, 6).
+
+    Returns:
+        The diagonal matrix (6, 6).
+    """
     diagonal = np.diag(np.diag(quadratic))
     if not np.array_equal(quadratic, diagonal):
         warnings.append("quadratic damping: read by its diagonal, as uuv_simulator does; what is beside it is left out")
@@ -190,7 +283,14 @@ def by_diagonal(warnings: list[str], quadratic: np.ndarray) -> np.ndarray:
 
 
 def add_to(faults: Faults, body: Coefficients, found: Hydrodynamics, pose: Pose) -> None:
-    """Add a link's coefficients to a body's, where the link has that pose (axes z up) in the body."""
+    """Add a link's coefficients to those of the body.
+
+    Args:
+        faults: Collects what is wrong.
+        body: The body, changed in place.
+        found: Coefficients of the link.
+        pose: Pose of the link in the body (axes z up).
+    """
     X = HALF_TURN_6[:, None] * carried(pose) * HALF_TURN_6
     for name in ("added_mass", "linear"):
         setattr(body, name, getattr(body, name) + X.T @ getattr(found, name) @ X)

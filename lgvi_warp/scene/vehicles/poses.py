@@ -1,4 +1,4 @@
-"""Poses of robot descriptions: where links, frames and shapes lie in their model (SDF's frame semantics; URDF's tree)."""
+"""Poses of robot descriptions: where links, frames and shapes lie in their model, by the rules of SDF and URDF."""
 
 from __future__ import annotations
 
@@ -12,22 +12,38 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.scene.vehicles.robot_xml import is_true, numbers_in, text_of
 
-# Of frames of which each is given relative to the next.
+# Most frames of which each is given relative to the next.
 LONGEST_CHAIN = 200
 
 
 class Pose(NamedTuple):
-    """position (3,) [m] and rotation (3, 3) of a frame in another."""
+    """Where a frame lies in another one.
+
+    Args:
+        position: Position of its origin (3,) [m].
+        rotation: Rotation matrix (3, 3).
+    """
 
     position: np.ndarray
     rotation: np.ndarray
 
     def then(self, inner: Pose) -> Pose:
-        """The pose in the outer frame of what has the pose `inner` in this one."""
+        """Return the pose in the outer frame of what has a pose in this frame.
+
+        Args:
+            inner: Pose in this frame.
+
+        Returns:
+            The pose in the outer frame.
+        """
         return Pose(self.position + self.rotation @ inner.position, self.rotation @ inner.rotation)
 
     def inverse(self) -> Pose:
-        """The pose of the outer frame in this one."""
+        """Return the pose of the outer frame in this frame.
+
+        Returns:
+            The inverse pose.
+        """
         return Pose(-self.rotation.T @ self.position, self.rotation.T)
 
 
@@ -35,7 +51,14 @@ HERE = Pose(np.zeros(3), np.eye(3))
 
 
 def rotation_from_rpy(angles: np.ndarray) -> np.ndarray:
-    """Rz(yaw) Ry(pitch) Rx(roll), (3, 3), from (roll, pitch, yaw) [rad]."""
+    """Return the rotation matrix of roll, pitch and yaw.
+
+    Args:
+        angles: Roll, pitch, yaw (3,) [rad].
+
+    Returns:
+        Rz(yaw) Ry(pitch) Rx(roll), (3, 3).
+    """
     (sr, sp, sy), (cr, cp, cy) = np.sin(angles), np.cos(angles)
     return np.array(
         [
@@ -47,14 +70,30 @@ def rotation_from_rpy(angles: np.ndarray) -> np.ndarray:
 
 
 def rotation_from_xyzw(quaternion: np.ndarray) -> np.ndarray:
-    """(3, 3) from a quaternion of any length but 0."""
+    """Return the rotation matrix of a quaternion.
+
+    Args:
+        quaternion: x, y, z, w (4,), scalar last, of any length but 0.
+
+    Returns:
+        The matrix (3, 3).
+    """
     x, y, z, w = quaternion / (np.linalg.norm(quaternion) or 1.0)
     S = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + 2.0 * w * S + 2.0 * S @ S)
 
 
 def read_pose(faults: Faults, where: str, pose: Element | None) -> Pose:
-    """The pose that a <pose> of SDF holds: x y z roll pitch yaw, or x y z and a quaternion; none: no offset."""
+    """Read the pose in an element <pose> of SDF.
+
+    Args:
+        faults: Collects what is wrong.
+        where: Beginning of the names in messages.
+        pose: The element, with x y z roll pitch yaw, or x y z and a quaternion; None if there is none.
+
+    Returns:
+        The pose; without offset where the element is missing or empty.
+    """
     if pose is None or not text_of(pose):
         return HERE
     if pose.get("rotation_format") == "quat_xyzw":
@@ -66,7 +105,16 @@ def read_pose(faults: Faults, where: str, pose: Element | None) -> Pose:
 
 
 def read_origin(faults: Faults, where: str, parent: Element | None) -> Pose:
-    """The pose that an <origin> of URDF holds: xyz and rpy."""
+    """Read the pose in an element <origin> of URDF, from its xyz and rpy.
+
+    Args:
+        faults: Collects what is wrong.
+        where: Beginning of the names in messages.
+        parent: The element that holds <origin>; None if there is none.
+
+    Returns:
+        The pose; without offset where <origin> is missing.
+    """
     origin = None if parent is None else parent.find("origin")
     if origin is None:
         return HERE
@@ -76,9 +124,14 @@ def read_origin(faults: Faults, where: str, parent: Element | None) -> Pose:
 
 @dataclass
 class Scope:
-    """The names of one <model> of an SDF file: its links, joints, frames and nested models, which have names of their own.
+    """The names of one <model> of an SDF file: its links, joints, frames and nested models.
 
-    prefix: of the names within ("" or "nested::"); parent: the scope that the model is nested in.
+    Args:
+        model: The element <model>.
+        prefix: Beginning of the full names of what it holds, "" (default) or "nested::".
+        parent: Scope of the model that this one is nested in; None for the root (default).
+        named: Elements by name, filled from the model.
+        nested: Scopes of nested models by name, filled from the model.
     """
 
     model: Element
@@ -96,13 +149,27 @@ class Scope:
                     self.nested[name] = Scope(child, f"{self.prefix}{name}::", self)
 
     def each(self) -> Iterator[Scope]:
-        """This scope and those nested in it."""
+        """Iterate over this scope and those nested in it.
+
+        Yields:
+            This scope, then each nested one.
+        """
         yield self
         for scope in self.nested.values():
             yield from scope.each()
 
     def find(self, name: str) -> tuple[Scope, str]:
-        """The scope that a name such as "nested::link" belongs to, and the name in it. Raises KeyError if unknown."""
+        """Find the scope that a name belongs to.
+
+        Args:
+            name: A name such as "link" or "nested::link".
+
+        Returns:
+            The scope, and the name within it.
+
+        Raises:
+            KeyError: If there is no such name.
+        """
         scope, rest = self, name
         while "::" in rest:
             head, rest = rest.split("::", 1)
@@ -112,7 +179,15 @@ class Scope:
         return scope, rest
 
     def link_of(self, name: str) -> str | None:
-        """The full name of the link that a name stands for: itself, what a frame is attached to, a model's own link."""
+        """Return the full name of the link that a name stands for.
+
+        Args:
+            name: Name of a link, of a frame or joint that is attached to one, or of a model, which stands for its
+                canonical link.
+
+        Returns:
+            Full name of the link; None if there is none.
+        """
         scope, rest = self, name
         for _ in range(LONGEST_CHAIN):
             try:
@@ -132,14 +207,28 @@ class Scope:
 
 
 class Poses:
-    """Resolves the poses of one model, each once. Faults are noted under the name of what is placed."""
+    """Poses of all names of one model, each computed once.
+
+    Args:
+        faults: Collects what is wrong, under the name of what is placed.
+        root: Scope of the model in which the poses are given.
+    """
 
     def __init__(self, faults: Faults, root: Scope):
         self.faults, self.root = faults, root
         self.known: dict[tuple[int, str], Pose] = {(id(root), "__model__"): HERE}
 
     def of(self, scope: Scope, name: str, chain: tuple[tuple[int, str], ...] = ()) -> Pose:
-        """The pose of a name of that scope in the root model."""
+        """Return the pose of a name in the root model.
+
+        Args:
+            scope: Scope that the name belongs to.
+            name: The name.
+            chain: Names whose poses wait for this one, to detect circles; by default none.
+
+        Returns:
+            The pose; without offset after noting a fault.
+        """
         key = (id(scope), name)
         if key in self.known:
             return self.known[key]
@@ -152,7 +241,7 @@ class Poses:
             pose = self.placed(scope.parent, scope.model, "__model__", chain)
             placement = scope.model.get("placement_frame")
             if placement:
-                # The pose given is that of the placement frame: within the model, its own frame is the origin.
+                # The file gives the pose of the placement frame; the pose wanted is that of the model's own frame.
                 pose = pose.then(Poses(self.faults, scope).of(*self.lookup(scope, placement), chain).inverse())
         else:
             element = scope.named[name]
@@ -162,14 +251,32 @@ class Poses:
         return pose
 
     def placed(self, scope: Scope, element: Element, frame: str, chain: tuple[tuple[int, str], ...] = ()) -> Pose:
-        """The pose of an element with a <pose>, by default given in that frame of the scope."""
+        """Return the pose in the root model of an element that holds a <pose>.
+
+        Args:
+            scope: Scope that the element belongs to.
+            element: The element.
+            frame: Name of the frame that the pose is given in, unless the element names one.
+            chain: Names whose poses wait for this one, to detect circles; by default none.
+
+        Returns:
+            The pose.
+        """
         where = f"{scope.prefix}{element.get('name', element.tag)} "
         pose = element.find("pose")
         relative_to = (pose.get("relative_to") if pose is not None else None) or frame
         return self.of(*self.lookup(scope, relative_to), chain).then(read_pose(self.faults, where, pose))
 
     def lookup(self, scope: Scope, name: str) -> tuple[Scope, str]:
-        """What a name of a scope stands for; the model itself after noting a fault."""
+        """Find what a name of a scope stands for.
+
+        Args:
+            scope: The scope.
+            name: The name.
+
+        Returns:
+            The scope that it belongs to, and the name within it; the model itself after noting a fault.
+        """
         try:
             return scope.find(name)
         except KeyError:

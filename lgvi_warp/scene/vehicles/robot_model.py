@@ -1,4 +1,4 @@
-"""Models of SDF and URDF files, as read: links, joints, what plugins say, and the water of the world they stand in."""
+"""Models of SDF and URDF files, as read: links, joints, what plugins give, and the water of the world around them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,13 @@ GAZEBO_DENSITY = 1000.0  # kg/m3: of Gazebo's Buoyancy system, if none is given
 
 @dataclass
 class Water:
-    """What a file's <world> says: gravity [m/s2], density [kg/m3], and which models have buoyancy (none named: all)."""
+    """What the <world> of a file says about the water.
+
+    Args:
+        gravity: Acceleration of free fall [m/s2]; None if the file does not give it (default).
+        density: Density of the water [kg/m3]; None if the file does not give it (default).
+        enabled: Names of the models or links that have buoyancy; empty for all (default).
+    """
 
     gravity: float | None = None
     density: float | None = None
@@ -39,7 +45,16 @@ class Water:
 
 @dataclass
 class Model:
-    """A model as read: its links by full name, joints, what its plugins say, its water, and what the user should know."""
+    """A model as read from a file.
+
+    Args:
+        name: Name of the model.
+        links: Links by full name.
+        joints: Joints between the links.
+        hydrodynamics: Coefficients that plugins give, by link.
+        water: What the world says about the water.
+        warnings: Texts about what the user should know.
+    """
 
     name: str
     links: dict[str, Link]
@@ -50,28 +65,67 @@ class Model:
 
 
 def listed(names: Sequence[str], most: int = 20) -> str:
-    """Names, at most so many, and how many more there are."""
+    """Return names as one text, and how many more there are.
+
+    Args:
+        names: The names.
+        most: Most names to list; by default 20.
+
+    Returns:
+        The names with commas between.
+    """
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more
 
 
 def refuse_crowd(elements: Sequence[Element]) -> None:
-    """Raises SceneError for more links, joints, shapes or plugins than any vehicle has, for which time is not bounded."""
+    """Refuse more elements than any vehicle has, since the time to read them would have no bound.
+
+    Args:
+        elements: Elements of one kind.
+
+    Raises:
+        SceneError: If there are more than MOST_LINKS.
+    """
     if len(elements) > MOST_LINKS:
-        what = f"the model has {len(elements):,} of <{elements[0].tag}>, more than {MOST_LINKS:,}"
-        raise SceneError([f"SDF model: {what}; give the vehicle alone"])
+        problem = f"the model has {len(elements):,} of <{elements[0].tag}>, more than {MOST_LINKS:,}"
+        raise SceneError([f"SDF model: {problem}; give the vehicle alone"])
 
 
-# URDF and SDF ---------------------------------------------------------------------------------------------------------------
+# URDF and SDF -------------------------------------------------------------------------------------------------------
 
 
 def read_model(faults: Faults, root: Element, name: str | None, link: str | None) -> Model:
-    """The model of a file: of a URDF, or of an SDF the one that is asked for."""
+    """Read the model of a file: that of a URDF, or the chosen one of an SDF file.
+
+    Args:
+        faults: Collects what is wrong.
+        root: Root element of the file.
+        name: Name of the model; None where the file holds one only.
+        link: Name of a link of the model; None if none is named.
+
+    Returns:
+        The model.
+
+    Raises:
+        SceneError: If there is no such model, several fit, or the model is too large.
+    """
     return model_of_urdf(faults, root) if root.tag == "robot" else model_of_sdf(faults, root, name, link)
 
 
 def model_of_urdf(faults: Faults, root: Element) -> Model:
-    """The model of a URDF."""
+    """Read the model of a URDF file.
+
+    Args:
+        faults: Collects what is wrong.
+        root: Root element of the file.
+
+    Returns:
+        The model.
+
+    Raises:
+        SceneError: If the file holds xacro, or the model is too large.
+    """
     for tag in ("link", "joint", "plugin", "collision"):
         refuse_crowd(list(root.iter(tag)))
     links, joints = read_urdf(faults, root)
@@ -84,7 +138,20 @@ def model_of_urdf(faults: Faults, root: Element) -> Model:
 
 
 def model_of_sdf(faults: Faults, root: Element, name: str | None, link: str | None) -> Model:
-    """The model that is asked for, or the only one, or the only one with hydrodynamics. Raises SceneError otherwise."""
+    """Read one model of an SDF file.
+
+    Args:
+        faults: Collects what is wrong.
+        root: Root element of the file.
+        name: Name of the model; None for the only one, or the only one with hydrodynamics.
+        link: Name of a link of the model; None if none is named.
+
+    Returns:
+        The model.
+
+    Raises:
+        SceneError: If there is no such model, several fit, or the model is too large.
+    """
     element, world = chosen_model(root, name, link)
     for tag in ("link", "joint", "plugin", "collision", "frame", "model"):
         refuse_crowd(list(element.iter(tag)))
@@ -107,7 +174,17 @@ def model_of_sdf(faults: Faults, root: Element, name: str | None, link: str | No
 
 
 def world_of(root: Element) -> Element:
-    """The first <world> of a file. Raises SceneError if there is none."""
+    """Return the first <world> of a file.
+
+    Args:
+        root: Root element of the file.
+
+    Returns:
+        The element <world>.
+
+    Raises:
+        SceneError: If there is none.
+    """
     world = next(root.iter("world"), None)
     if world is None:
         raise SceneError(["world: the file has no <world>; give an SDF file with one"])
@@ -115,7 +192,19 @@ def world_of(root: Element) -> Element:
 
 
 def chosen_model(root: Element, name: str | None, link: str | None) -> tuple[Element, Element | None]:
-    """A top-level <model>, and the <world> that it stands in, if any."""
+    """Choose a top-level <model> of an SDF file.
+
+    Args:
+        root: Root element of the file.
+        name: Name of the model; None for the only one, or the only one with hydrodynamics.
+        link: Name of a link of the model; None if none is named.
+
+    Returns:
+        The element <model>, and the <world> that holds it or None.
+
+    Raises:
+        SceneError: If there is no such model, or several fit.
+    """
     known: list[tuple[Element, Element | None]] = []
     known += [(child, world) for world in root.iter("world") for child in world.findall("model")]
     known += [(child, None) for child in ([root] if root.tag == "model" else root.findall("model"))]
@@ -123,8 +212,8 @@ def chosen_model(root: Element, name: str | None, link: str | None) -> tuple[Ele
         return root, None
     if not known:
         included = listed([text_of(child) for child in root.iter("uri")])
-        what = f"the file has none of its own, it includes {included}" if included else "the file has none"
-        raise SceneError([f"SDF link: {what}; give an SDF model with a <link>"])
+        problem = f"the file has none of its own, it includes {included}" if included else "the file has none"
+        raise SceneError([f"SDF link: {problem}; give an SDF model with a <link>"])
     fitting = [pair for pair in known if not is_true(pair[0].findtext("static"))] or known
     if name is not None:
         fitting = [pair for pair in known if pair[0].get("name") == name]
@@ -145,7 +234,16 @@ def _names(pairs: Sequence[tuple[Element, Element | None]]) -> list[str]:
 
 
 def read_water(faults: Faults, warnings: list[str], world: Element) -> Water:
-    """Gravity and density of a world; where the density changes with depth, that below all layers."""
+    """Read gravity and density of a world.
+
+    Args:
+        faults: Collects what is wrong.
+        warnings: Collects what the user should know.
+        world: The element <world>.
+
+    Returns:
+        The water; where its density changes with depth, with the density below all layers.
+    """
     vector = numbers(faults, "<world> ", world, "gravity", f"0 0 {-GAZEBO_GRAVITY}")
     if np.any(vector[:2]) or vector[2] > 0.0:
         faults.add("<gravity>", vector, "does not point down", "turn the world so that it is along -z")
@@ -170,12 +268,30 @@ def read_water(faults: Faults, warnings: list[str], world: Element) -> Water:
 
 
 def is_buoyancy(plugin: Element) -> bool:
-    """Whether a plugin is Gazebo's Buoyancy, not its BuoyancyEngine."""
+    """Return whether a plugin is Gazebo's Buoyancy, which is not its BuoyancyEngine.
+
+    Args:
+        plugin: The element <plugin>.
+
+    Returns:
+        True for Gazebo's Buoyancy.
+    """
     return "buoyancy" in plugin_name(plugin) and "engine" not in plugin_name(plugin)
 
 
 def read_link(faults: Faults, warnings: list[str], poses: Poses, scope: Scope, name: str) -> Link:
-    """Mass, inertia, added mass and displaced volume of one link, and where it lies."""
+    """Read one link of an SDF file: mass, inertia, added mass, displaced volume and pose.
+
+    Args:
+        faults: Collects what is wrong.
+        warnings: Collects what the user should know.
+        poses: Poses of the model.
+        scope: Scope that the link belongs to.
+        name: Name of the link in that scope.
+
+    Returns:
+        The link.
+    """
     element = scope.named[name]
     link, where = Link(scope.prefix + name, poses.of(scope, name)), f"{scope.prefix}{name} "
     inertial = element.find("inertial")
@@ -211,7 +327,15 @@ def read_link(faults: Faults, warnings: list[str], poses: Poses, scope: Scope, n
 
 
 def joints_of(root: Scope, scope: Scope) -> list[Joint]:
-    """The joints of a scope, and what a detachable joint holds together at the start."""
+    """Read the joints of a scope; a detachable joint counts as fixed, as at the start.
+
+    Args:
+        root: Scope of the whole model.
+        scope: Scope whose joints are read.
+
+    Returns:
+        The joints, with full names of the links.
+    """
     joints = []
     for element in scope.named.values():
         if element.tag == "joint":
@@ -228,19 +352,35 @@ def joints_of(root: Scope, scope: Scope) -> list[Joint]:
 
 
 def read_fluid_added_mass(faults: Faults, where: str, element: Element | None) -> np.ndarray:
-    """<fluid_added_mass> xx, xy ... rr as (6, 6), in the link's axes about its origin."""
+    """Read the added mass in an element <fluid_added_mass>: xx, xy ... rr.
+
+    Args:
+        faults: Collects what is wrong.
+        where: Beginning of the names in messages.
+        element: The element; None if there is none.
+
+    Returns:
+        The matrix (6, 6) in the link's axes about its origin; 0 where an entry is missing.
+    """
     matrix = np.zeros((6, 6))
     for row, column in combinations_with_replacement(range(6), 2):
         value = number(faults, f"{where}<fluid_added_mass> ", element, "xyzpqr"[row] + "xyzpqr"[column], "0")
         matrix[row, column] = matrix[column, row] = value
     if np.any(np.diag(matrix) < 0.0):
-        what = "is negative on its diagonal"
-        faults.add(f"{where}<fluid_added_mass>", np.diag(matrix), what, "SDF's added mass is positive")
+        problem = "is negative on its diagonal"
+        faults.add(f"{where}<fluid_added_mass>", np.diag(matrix), problem, "SDF's added mass is positive")
     return matrix
 
 
 def add_plugins(faults: Faults, read: Model, plugins: Sequence[Element], prefix: str) -> None:
-    """What the plugins of a model say of its links."""
+    """Add the coefficients that plugins give to the model.
+
+    Args:
+        faults: Collects what is wrong.
+        read: The model, changed in place.
+        plugins: Elements <plugin>.
+        prefix: Beginning of the full names of the links that the plugins name.
+    """
     for plugin in plugins:
         if is_underwater_object(plugin):
             read.hydrodynamics += read_underwater_object(faults, read.warnings, plugin)

@@ -13,9 +13,9 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, SceneError, shown
 from lgvi_warp.common.reading import MOST_OTHERS, UnreadableError, file_bytes
 
-# What one file may hold. The largest robot descriptions are far below: some 1 MB, 20,000 elements, 20 levels.
+# Limits of one file. The largest robot descriptions are far below: some 1 MB, 20,000 elements, 20 levels.
 MOST_BYTES, MOST_ELEMENTS, MOST_LEVELS = MOST_OTHERS, 100_000, 200
-# Marks of templates, whose values another program fills in, and what to do with each.
+# Marks of templates, whose values another program fills in, and the remedy for each.
 TEMPLATES = {
     "${": "run xacro on it (xacro FILE > FILE.urdf) and read what it writes",
     "$(": "run xacro on it (xacro FILE > FILE.urdf) and read what it writes",
@@ -27,17 +27,25 @@ TEMPLATES = {
 
 
 class Refused(Exception):  # noqa: N818
-    """What the parser meets and does not read; its text says what and the remedy."""
+    """Raised for XML that is well-formed but not read; the text names the problem and the remedy."""
 
 
 class Reader:
-    """Handlers of expat that build a tree of elements. Prefixes of names are kept as they are, bound or not."""
+    """Handlers of expat that build a tree of elements; prefixes of names are kept as they are, bound or not."""
 
     def __init__(self) -> None:
         self.tree, self.level, self.elements = TreeBuilder(), 0, 0
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
-        """Open an element. Raises Refused beyond the limits."""
+        """Open an element and count it.
+
+        Args:
+            tag: Name of the element.
+            attributes: Its attributes by name.
+
+        Raises:
+            Refused: If there are more elements or levels than the limits allow.
+        """
         self.level, self.elements = self.level + 1, self.elements + 1
         if self.level > MOST_LEVELS:
             raise Refused(f"is nested more than {MOST_LEVELS} levels deep; give the model alone")
@@ -46,17 +54,39 @@ class Reader:
         self.tree.start(tag, attributes)
 
     def end(self, tag: str) -> None:
-        """Close an element."""
+        """Close the element that was opened last.
+
+        Args:
+            tag: Name of the element.
+        """
         self.level -= 1
         self.tree.end(tag)
 
     def doctype(self, *_: Any) -> None:
-        """Raises Refused: a document type may declare entities, which can grow without end or name other files."""
+        """Refuse a document type, since it may declare entities, which can grow without end or name other files.
+
+        Args:
+            *_: What expat says about it, which is not used.
+
+        Raises:
+            Refused: Always.
+        """
         raise Refused("has a document type declaration (<!DOCTYPE>), which is not read; remove it")
 
 
 def parse_xml(source: str | os.PathLike[str], what: str = "SDF") -> Element:
-    """The root element of a text or of a file. Raises SceneError, in one line, for what cannot be read."""
+    """Parse the XML of a text or of a file.
+
+    Args:
+        source: The text itself, or the path of a file.
+        what: Kind of the content in messages; by default "SDF".
+
+    Returns:
+        The root element.
+
+    Raises:
+        SceneError: If the content cannot be read; the message has one line.
+    """
     is_text = isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
     content = str(source).encode() if is_text else read_bytes(source, what)
     content = content.removeprefix(b"\xef\xbb\xbf").lstrip(b" \t\r\n")
@@ -76,7 +106,14 @@ def parse_xml(source: str | os.PathLike[str], what: str = "SDF") -> Element:
 
 
 def remedy_for(content: bytes) -> str:
-    """What to do with a text that is not XML: the program that it is a template of, or mend it."""
+    """Return what to do with a text that is not XML.
+
+    Args:
+        content: The text.
+
+    Returns:
+        The program to run, if the text looks like its template; else to mend that line.
+    """
     mark = next((mark for mark in (b"<%", b"{%", b"{{", b"@(", b"@{", b"=@") if mark in content), None)
     if mark is None:
         return "mend that line"
@@ -85,7 +122,18 @@ def remedy_for(content: bytes) -> str:
 
 
 def read_bytes(source: Any, what: str) -> bytes:
-    """The bytes of a file. Raises SceneError for what is no regular file of a bounded size."""
+    """Return the content of a file.
+
+    Args:
+        source: Path of the file.
+        what: Kind of the content in messages.
+
+    Returns:
+        The bytes of the file.
+
+    Raises:
+        SceneError: If this is no regular file of a bounded size.
+    """
     try:
         return file_bytes(source, f"{what} file")
     except UnreadableError as error:
@@ -96,17 +144,38 @@ def read_bytes(source: Any, what: str) -> bytes:
 
 
 def text_of(element: Element | None) -> str:
-    """The text of an element without the spaces around it; "" if there is none."""
+    """Return the text of an element, without spaces around it.
+
+    Args:
+        element: The element; None if there is none.
+
+    Returns:
+        The text; "" if there is none.
+    """
     return (element.text or "").strip() if element is not None else ""
 
 
 def is_true(text: str | None) -> bool:
-    """A truth value as SDF writes it."""
+    """Return the truth value that a text stands for in SDF.
+
+    Args:
+        text: The text; None if there is none.
+
+    Returns:
+        True for "1" and "true", in upper or lower case.
+    """
     return (text or "").strip().lower() in ("1", "true")
 
 
 def floats(text: str) -> np.ndarray | None:
-    """The numbers of a text, separated by spaces; None if it holds something else."""
+    """Return the numbers in a text, separated by spaces.
+
+    Args:
+        text: The text.
+
+    Returns:
+        Numbers (n,); None if the text holds anything else.
+    """
     try:
         return np.array([float(word) for word in text.split()]) if text.isascii() and "_" not in text else None
     except ValueError:
@@ -114,7 +183,17 @@ def floats(text: str) -> np.ndarray | None:
 
 
 def numbers_in(faults: Faults, key: str, text: str, count: int) -> np.ndarray:
-    """`count` finite numbers of a text; zeros after noting a fault under that key."""
+    """Return the numbers in a text that must hold a fixed count of finite ones.
+
+    Args:
+        faults: Collects what is wrong.
+        key: Name of the numbers in messages.
+        text: The numbers, separated by spaces.
+        count: How many there must be.
+
+    Returns:
+        Numbers (count,); zeros after noting a fault.
+    """
     values = floats(text)
     if values is not None and values.shape == (count,) and np.all(np.isfinite(values)):
         return values
@@ -130,18 +209,47 @@ def numbers_in(faults: Faults, key: str, text: str, count: int) -> np.ndarray:
 
 
 def numbers(faults: Faults, where: str, parent: Element | None, tag: str, default: str) -> np.ndarray:
-    """The numbers in a child element, as many as its default holds; the default where it is missing or empty."""
+    """Return the numbers in a child element.
+
+    Args:
+        faults: Collects what is wrong.
+        where: Beginning of the names in messages.
+        parent: The element that holds the child; None if there is none.
+        tag: Name of the child element.
+        default: Numbers to take if the child is missing or empty, as a text.
+
+    Returns:
+        As many numbers as the default holds; zeros after noting a fault.
+    """
     child = None if parent is None else parent.find(tag)
     return numbers_in(faults, f"{where}<{tag}>", text_of(child) or default, len(default.split()))
 
 
 def number(faults: Faults, where: str, parent: Element | None, tag: str, default: str) -> float:
-    """The number in a child element."""
+    """Return the number in a child element.
+
+    Args:
+        faults: Collects what is wrong.
+        where: Beginning of the names in messages.
+        parent: The element that holds the child; None if there is none.
+        tag: Name of the child element.
+        default: Number to take if the child is missing or empty, as a text.
+
+    Returns:
+        The number; 0 after noting a fault.
+    """
     return float(numbers(faults, where, parent, tag, default)[0])
 
 
 def plugins_of(element: Element) -> Iterator[Element]:
-    """The plugins of a model and of the models nested in it; not those of what it includes."""
+    """Iterate over the plugins of a model and of the models nested in it, without those of included files.
+
+    Args:
+        element: The element <model> or <robot>.
+
+    Yields:
+        Elements <plugin>.
+    """
     for child in element:
         if child.tag == "plugin":
             yield child
@@ -150,5 +258,12 @@ def plugins_of(element: Element) -> Iterator[Element]:
 
 
 def plugin_name(plugin: Element) -> str:
-    """Name and file of a plugin, in small letters."""
+    """Return name and file name of a plugin, by which it is recognised.
+
+    Args:
+        plugin: The element <plugin>.
+
+    Returns:
+        Both with a space between, in lower case.
+    """
     return (plugin.get("name", "") + " " + plugin.get("filename", "")).lower()

@@ -28,31 +28,37 @@ def from_sdf(
     center_of_buoyancy: Sequence[float] | None = None,
     gravity: float | None = None,
 ) -> dict[str, Any]:
-    """A vehicle, its drag and its water from an SDF file (Gazebo) or a URDF, given as a path or as text.
+    """Build a vehicle, its drag and its water from an SDF file (Gazebo) or a URDF.
 
-    Read as Gazebo does: mass, pose, inertia and fluid_added_mass of every link; volume and centre of the collision shapes
-    (box, sphere, cylinder, capsule, ellipsoid, cone); the coefficients xDotU ..., xU ..., xUabsU ... (older: xUU ...) of
-    the Hydrodynamics plugin, in Fossen's signs or all positive; the plugin of uuv_simulator; of a <world> gravity and the
-    Buoyancy plugin. Links that joints join are one body about the origin of the main link; those that can move are held
-    where the file has them and named in the warnings. Gazebo's axes x ahead, y to port, z up become x ahead, y to
-    starboard, z down.
+    The file is read as Gazebo reads it:
+
+    * mass, pose, inertia and fluid_added_mass of every link;
+    * volume and centre of the collision shapes (box, sphere, cylinder, capsule, ellipsoid, cone);
+    * the coefficients xDotU ..., xU ..., xUabsU ... (older: xUU ...) of the Hydrodynamics plugin, in Fossen's signs or
+      all positive, and the plugin of uuv_simulator;
+    * gravity and the Buoyancy plugin of a <world>.
+
+    Links that joints join become one body about the origin of the main link. Links that can move are held where the
+    file has them, and warnings name them. Gazebo's axes (x ahead, y to port, z up) are turned into those of the scene
+    file (x ahead, y to starboard, z down).
 
     Args:
-        source: path of the file, or its text.
-        model: its name, where the file holds several.
-        world: another SDF file (path or text), whose <world> the model of this one is put into: gravity, density.
-        link: name of the main link; by default that of the plugin, else the first of the heaviest joined links.
-        buoyancy: [N], in place of that of the shapes.
-        volume: displaced volume [m3], in place of that of the shapes.
-        water_density: [kg/m3]; by default that of the world or of a plugin, else 1000.
-        center_of_buoyancy: (3,) [m] in the main link's axes (z up), in place of that of the shapes.
-        gravity: [m/s2]; by default the world's, else 9.80665.
+        source: Path of the file, or its text.
+        model: Name of the model, where the file holds several.
+        link: Name of the main link; by default that of the plugin, else the first of the heaviest joined links.
+        world: Another SDF file (path or text), in whose <world> the model is placed: it gives gravity and density.
+        buoyancy: Buoyancy [N], in place of that of the shapes.
+        volume: Displaced volume [m3], in place of that of the shapes.
+        water_density: Density of the water [kg/m3]; by default that of the world or of a plugin, else 1000.
+        center_of_buoyancy: Position (3,) [m] in the main link's axes (z up), in place of that of the shapes.
+        gravity: Acceleration of free fall [m/s2]; by default the world's, else 9.80665.
 
     Returns:
         The tables "vehicle", "environment" and "terms" of a scene file. Without a shape the vehicle is neutral.
 
     Raises:
-        SceneError: naming every fault: a mass that is no number, a mesh without a volume given, a template.
+        SceneError: If anything is wrong, such as a mass that is no number, a mesh without a volume given, or a
+            template; the message lists every fault.
     """
     faults = Faults()
     read = read_model(faults, parse_xml(source, "SDF"), model, link)
@@ -63,17 +69,17 @@ def from_sdf(
     main = read.links[chosen_link(read, link)]
     parts = [read.links[name] for name in together(read, main)]
     refuse_unweighed(read, main, parts)
-    names = {part.name for part in parts}
-    own = [each for each in read.hydrodynamics if each.link in names]
-    displaced, center = displaced_by(read, parts, main, own)
+    names = {body_link.name for body_link in parts}
+    hydrodynamics = [each for each in read.hydrodynamics if each.link in names]
+    displaced, center = displaced_by(read, parts, main, hydrodynamics)
     if volume is not None:
         displaced = faults.positive("volume", volume, "m3") or 0.0
     elif buoyancy is None:
-        refuse_shapeless(faults, read, parts, own)
+        refuse_shapeless(faults, read, parts, hydrodynamics)
     buoyancy = weight_of(read, displaced) if buoyancy is None else buoyancy
     at = turned(center if center_of_buoyancy is None else center_of_buoyancy, HALF_TURN)
     body = body_of(faults, lumped(parts, main), buoyancy, at, read.water.gravity)
-    add_hydrodynamics(faults, body, read, main, own)
+    add_hydrodynamics(faults, body, read, main, hydrodynamics)
     body.water_density, body.warnings = read.water.density, read.warnings
     return body.to_dict(faults)
 
@@ -81,17 +87,33 @@ def from_sdf(
 def add_hydrodynamics(
     faults: Faults, body: Coefficients, read: Model, main: Link, own: Sequence[Hydrodynamics]
 ) -> None:
-    """What plugins say of the links of the body."""
-    for each in own:
-        part = read.links[each.link]
-        if np.any(each.added_mass) and np.any(part.added_mass):
-            what, remedy = "and the plugin's xDotU ... both give added mass", "keep one, or set disable_added_mass"
-            faults.add(f"{part.name} <fluid_added_mass>", "...", what, remedy)
-        add_to(faults, body, each, main.pose.inverse().then(part.pose))
+    """Add the coefficients that plugins give to the body.
+
+    Args:
+        faults: Collects what is wrong.
+        body: The body, changed in place.
+        read: The model as read.
+        main: The main link, in whose axes the body is given.
+        own: Coefficients of the links of the body.
+    """
+    for hydrodynamics in own:
+        body_link = read.links[hydrodynamics.link]
+        if np.any(hydrodynamics.added_mass) and np.any(body_link.added_mass):
+            problem, remedy = "and the plugin's xDotU ... both give added mass", "keep one, or set disable_added_mass"
+            faults.add(f"{body_link.name} <fluid_added_mass>", "...", problem, remedy)
+        add_to(faults, body, hydrodynamics, main.pose.inverse().then(body_link.pose))
 
 
 def refuse_empty(faults: Faults, read: Model) -> None:
-    """Raises SceneError for a model without a link."""
+    """Refuse a model that has no link.
+
+    Args:
+        faults: Collects what is wrong.
+        read: The model as read.
+
+    Raises:
+        SceneError: If the model has no link.
+    """
     if not read.links:
         faults.raise_if_any()
         known = "; ".join(["the model has none", *read.warnings])
@@ -99,16 +121,33 @@ def refuse_empty(faults: Faults, read: Model) -> None:
 
 
 def refuse_unweighed(read: Model, main: Link, parts: Sequence[Link]) -> None:
-    """Raises SceneError for a main link without inertia. Others that have none weigh 1 kg in Gazebo, which is noted."""
+    """Refuse a main link without inertia; note other links without it, to which Gazebo gives 1 kg.
+
+    Args:
+        read: The model as read; its warnings are extended.
+        main: The main link.
+        parts: Links of the body.
+
+    Raises:
+        SceneError: If the file gives no inertia of the main link.
+    """
     if not main.weighed:
         raise SceneError([f"SDF link {main.name!r}: has no <inertial>; add mass, pose and inertia"])
-    unweighed = [part.name for part in parts if not part.weighed]
+    unweighed = [body_link.name for body_link in parts if not body_link.weighed]
     if unweighed:
         read.warnings.append(f"links without <inertial>, to which Gazebo gives 1 kg and 1 kg m2: {listed(unweighed)}")
 
 
 def weight_of(read: Model, volume: float | None) -> float | None:
-    """The weight [N] of that volume [m3] of water; None where nothing is displaced though nothing forbids it."""
+    """Return the weight of the displaced water.
+
+    Args:
+        read: The model as read; its warnings are extended if no shape displaces water.
+        volume: Displaced volume [m3].
+
+    Returns:
+        Weight [N]; None if it is unknown, or nothing is displaced though buoyancy is not restricted to some models.
+    """
     water = read.water
     if not volume and not water.enabled:
         read.warnings.append("no collision shape displaces water: buoyancy is taken as the weight")
@@ -117,7 +156,18 @@ def weight_of(read: Model, volume: float | None) -> float | None:
 
 
 def body_of(faults: Faults, lump: Lump, buoyancy: float | None, at: Any, gravity: float | None) -> Coefficients:
-    """The rigid body of the lump, with its added mass, in axes x ahead, y to starboard, z down."""
+    """Build the rigid body of lumped links, in axes x ahead, y to starboard, z down.
+
+    Args:
+        faults: Collects what is wrong.
+        lump: The lumped links, z up.
+        buoyancy: Buoyancy [N]; None for the weight.
+        at: Centre of buoyancy (3,) [m], z down.
+        gravity: Acceleration of free fall [m/s2]; None if it is at fault.
+
+    Returns:
+        The body, with its added mass.
+    """
     inertia = HALF_TURN[:, None] * lump.inertia * HALF_TURN
     gravity = 0.0 if gravity is None else gravity  # a fault by then
     body = rigid_body(faults, lump.mass, inertia, HALF_TURN * lump.center, at, None, buoyancy, gravity)
@@ -126,7 +176,18 @@ def body_of(faults: Faults, lump: Lump, buoyancy: float | None, at: Any, gravity
 
 
 def chosen_link(read: Model, link: str | None) -> str:
-    """The full name of the main link."""
+    """Return the full name of the main link.
+
+    Args:
+        read: The model as read.
+        link: Name of the link; None for that of the plugin, else the first of the heaviest joined links.
+
+    Returns:
+        Full name of the link.
+
+    Raises:
+        SceneError: If no link fits the name, or several do.
+    """
     if link is not None:
         return link_named(read.links, link)
     if read.hydrodynamics:
@@ -135,7 +196,15 @@ def chosen_link(read: Model, link: str | None) -> str:
 
 
 def together(read: Model, main: Link) -> list[str]:
-    """The links of the main one's body. What moves or is left out is noted."""
+    """Return the links that form one body with the main link; warn of moving links and of those left out.
+
+    Args:
+        read: The model as read; its warnings are extended.
+        main: The main link.
+
+    Returns:
+        Full names of the links.
+    """
     every = [name for name in joined(main.name, beside(read.joints)) if name in read.links]
     fixed = set(joined(main.name, beside(read.joints, ("fixed",))))
     moving = [name for name in every if name not in fixed]
@@ -149,7 +218,14 @@ def together(read: Model, main: Link) -> list[str]:
 
 
 def set_water(faults: Faults, read: Model, density: float | None, gravity: float | None) -> None:
-    """Settle density [kg/m3] and gravity [m/s2]: given, else the world's, else a plugin's, else the default."""
+    """Set density and gravity of the model: as given, else the world's, else a plugin's, else the default.
+
+    Args:
+        faults: Collects what is wrong.
+        read: The model as read, changed in place.
+        density: Density of the water [kg/m3]; None if not given.
+        gravity: Acceleration of free fall [m/s2]; None if not given.
+    """
     named = [each.density for each in read.hydrodynamics if each.density is not None]
     density = next(x for x in (density, read.water.density, *named, GAZEBO_DENSITY) if x is not None)
     gravity = next(x for x in (gravity, read.water.gravity, STANDARD_GRAVITY) if x is not None)
@@ -160,14 +236,28 @@ def set_water(faults: Faults, read: Model, density: float | None, gravity: float
 def displaced_by(
     read: Model, parts: Sequence[Link], main: Link, own: Sequence[Hydrodynamics]
 ) -> tuple[float, np.ndarray]:
-    """Volume [m3] and its centre (3,) [m] in the main link's axes: of the shapes, or as uuv_simulator's plugin gives it."""
-    by_plugin = [each for each in own if each.volume is not None]
-    for each in by_plugin:
-        part = read.links[each.link]
-        part.volume = part.mass / (each.density or 1.0) if each.neutral else float(each.volume or 0.0)
-        part.volume_center = each.volume_center
-    floating = [read.links[each.link] for each in by_plugin] or [
-        part for part in parts if has_buoyancy(read, part.name)
+    """Return displaced volume and its centre, of the shapes or as uuv_simulator's plugin gives it.
+
+    Args:
+        read: The model as read; its warnings are extended.
+        parts: Links of the body.
+        main: The main link.
+        own: Coefficients of the links of the body.
+
+    Returns:
+        Volume [m3] and its centre (3,) [m] in the main link's axes (z up).
+    """
+    by_plugin = [hydrodynamics for hydrodynamics in own if hydrodynamics.volume is not None]
+    for hydrodynamics in by_plugin:
+        body_link = read.links[hydrodynamics.link]
+        body_link.volume = (
+            body_link.mass / (hydrodynamics.density or 1.0)
+            if hydrodynamics.neutral
+            else float(hydrodynamics.volume or 0.0)
+        )
+        body_link.volume_center = hydrodynamics.volume_center
+    floating = [read.links[hydrodynamics.link] for hydrodynamics in by_plugin] or [
+        body_link for body_link in parts if has_buoyancy(read, body_link.name)
     ]
     if not by_plugin and len(floating) < len(parts):
         read.warnings.append(f"the Buoyancy plugin is enabled for {listed(read.water.enabled)} alone")
@@ -176,7 +266,15 @@ def displaced_by(
 
 
 def has_buoyancy(read: Model, name: str) -> bool:
-    """Whether Gazebo's Buoyancy system acts on a link: on all, or on those named by <enable>, or on their model."""
+    """Return whether Gazebo's Buoyancy system acts on a link.
+
+    Args:
+        read: The model as read.
+        name: Full name of the link.
+
+    Returns:
+        True if no element <enable> restricts it, or one names the link or a model that holds it.
+    """
     scoped = f"{read.name}::{name}"
     return not read.water.enabled or any(
         scoped == enabled or scoped.startswith(f"{enabled}::") for enabled in read.water.enabled
@@ -184,10 +282,22 @@ def has_buoyancy(read: Model, name: str) -> bool:
 
 
 def refuse_shapeless(faults: Faults, read: Model, parts: Sequence[Link], own: Sequence[Hydrodynamics]) -> None:
-    """Shapes whose volume lies in another file cannot be left out: the vehicle would sink."""
-    if any(each.volume is not None for each in own):
+    """Note shapes whose volume lies in another file: without them the vehicle would sink.
+
+    Args:
+        faults: Collects what is wrong.
+        read: The model as read.
+        parts: Links of the body.
+        own: Coefficients of the links of the body; one with a volume makes shapes superfluous.
+    """
+    if any(hydrodynamics.volume is not None for hydrodynamics in own):
         return
-    for part in parts:
-        if part.shapeless and has_buoyancy(read, part.name):
+    for body_link in parts:
+        if body_link.shapeless and has_buoyancy(read, body_link.name):
             remedy = "give volume= [m3] or buoyancy= [N], and center_of_buoyancy=, of the whole vehicle"
-            faults.add(f"{part.name} <collision>", listed(part.shapeless), "is no shape whose volume is known", remedy)
+            faults.add(
+                f"{body_link.name} <collision>",
+                listed(body_link.shapeless),
+                "is no shape whose volume is known",
+                remedy,
+            )

@@ -11,16 +11,34 @@ from lgvi_warp.scene.vehicles.robot_xml import TEMPLATES, numbers_in
 
 
 def refuse_xacro(root: Element) -> None:
-    """Raises SceneError for a file with xacro's elements in it, naming the first."""
+    """Refuse a file with elements of xacro, naming the first.
+
+    Args:
+        root: Root element of the file.
+
+    Raises:
+        SceneError: If the file holds such an element.
+    """
     for element in root.iter():
         if element.tag.startswith("xacro:"):
             shown = " ".join([element.tag, *(f'{key}="{value}"' for key, value in element.attrib.items())])[:80]
-            what = f"is xacro, a program that writes URDF and is not executed here; its first instruction: <{shown}>"
-            raise SceneError([f"URDF {what}; {TEMPLATES['${']}"])
+            problem = f"is xacro, a program that writes URDF and is not executed here; its first instruction: <{shown}>"
+            raise SceneError([f"URDF {problem}; {TEMPLATES['${']}"])
 
 
 def read_urdf(faults: Faults, root: Element) -> tuple[dict[str, Link], list[Joint]]:
-    """The links, each with its pose in the frame of the root link, and the joints."""
+    """Read the links and joints of a URDF file.
+
+    Args:
+        faults: Collects what is wrong.
+        root: Root element of the file.
+
+    Returns:
+        Links by name, each with its pose in the frame of the root link, and the joints.
+
+    Raises:
+        SceneError: If the file holds xacro.
+    """
     refuse_xacro(root)
     links = {link.name: link for link in (read_link(faults, element) for element in root.findall("link"))}
     joints, origins = [], {}
@@ -35,7 +53,15 @@ def read_urdf(faults: Faults, root: Element) -> tuple[dict[str, Link], list[Join
 
 
 def read_link(faults: Faults, element: Element) -> Link:
-    """One link. Without <inertial> it is a frame, and weighs nothing."""
+    """Read one link of a URDF file; without <inertial> it is a frame, and weighs nothing.
+
+    Args:
+        faults: Collects what is wrong.
+        element: The element <link>.
+
+    Returns:
+        The link, without its pose.
+    """
     link = Link(element.get("name", ""))
     inertial = element.find("inertial")
     if inertial is not None:
@@ -56,13 +82,19 @@ def read_link(faults: Faults, element: Element) -> Link:
 
 
 def place(faults: Faults, links: dict[str, Link], origins: dict[str, tuple[str, Pose]]) -> None:
-    """Set the pose of each link from those of the joints above it."""
+    """Set the pose of each link from those of the joints above it.
+
+    Args:
+        faults: Collects what is wrong.
+        links: Links by name, changed in place.
+        origins: For each link the name of its parent, and its joint's pose in the parent.
+    """
     for name, link in links.items():
-        above, seen = name, {name}
+        above, passed = name, {name}
         while above in origins:
             above, pose = origins[above]
             link.pose = pose.then(link.pose)
-            if above in seen:
+            if above in passed:
                 faults.add("<joint>", name, "is above itself", "mend <parent> and <child>")
                 break
-            seen.add(above)
+            passed.add(above)

@@ -46,7 +46,7 @@ _ALIASES = {
     "neutrally_buoyant": ("neutrally_buoyant",),
     "coefficients": ("coefficients", "hydrodynamics", "hydrodynamic_coefficients", "derivatives"),
 }
-# Of uuv_simulator's files: names, and sizes that matter near the surface alone. Known, and not needed.
+# Keys of uuv_simulator's files that are not needed: names, and sizes that matter only near the surface.
 _NOT_NEEDED = ("model", "name", "type", "base_link", "body_frame", "tf_prefix", "length", "width", "height", "radius")
 
 
@@ -59,28 +59,33 @@ def from_yaml(
     ignore: Iterable[str] = (),
     **given: Any,
 ) -> dict[str, Any]:
-    """A vehicle, its drag and its water from a YAML file of a robotics package (uuv_simulator, Plankton).
+    """Build a vehicle, its drag and its water from a YAML file of a robotics package (uuv_simulator, Plankton).
 
-    Keys, at the top or below a table: mass, inertia (3, 3x3 or ixx ...) about the centre of gravity, volume (with
-    density), buoyancy or neutrally_buoyant, cog, cob, added_mass (6x6 or 6), linear_damping,
-    linear_damping_forward_speed and quadratic_damping (6 or 6x6; derivatives or magnitudes), or a map `coefficients` of
-    Fossen's names. Damping in proportion to the forward speed, force_i = -u d_ij v_j, becomes a term body_lift.
+    Keys, at the top or one table below:
+
+    * mass; inertia (3, 3x3 or ixx ...) about the centre of gravity; cog, cob;
+    * volume (with density), buoyancy or neutrally_buoyant;
+    * added_mass (6x6 or 6); linear_damping, linear_damping_forward_speed and quadratic_damping (6 or 6x6), as
+      derivatives or magnitudes; or a map `coefficients` of Fossen's names.
+
+    Damping in proportion to the forward speed, force_i = -u d_ij v_j, becomes a term body_lift.
 
     Args:
-        source: path of the file, or its text.
-        position_axes: axes of the centres and of the inertia, "flu" (x ahead, y to port, z up, as uuv_simulator has
-            them) or "frd" (x ahead, y to starboard, z down).
-        matrix_axes: axes of added mass and damping, which uuv_simulator gives in "frd".
-        quadratic: what a 6x6 matrix of quadratic damping stands for: its "diagonal", as in uuv_simulator, or "full".
-        ignore: keys to leave out; others that are not known are refused.
-        given: values by key (mass=..., density=...) that add to the file's or replace them.
+        source: Path of the file, or its text.
+        position_axes: Axes of the centres and of the inertia: "flu" (x ahead, y to port, z up, as in uuv_simulator;
+            default) or "frd" (x ahead, y to starboard, z down).
+        matrix_axes: Axes of added mass and damping: "frd" (as in uuv_simulator; default) or "flu".
+        quadratic: What a 6x6 matrix of quadratic damping stands for: its "diagonal" (as in uuv_simulator; default), or
+            "full" for the whole matrix.
+        ignore: Keys to leave out; other unknown keys are refused. By default none.
+        **given: Values by key (mass=..., density=...) that add to the file's or replace them.
 
     Returns:
         The tables "vehicle", "environment" and "terms" of a scene file.
 
     Raises:
-        SceneError: naming every fault.
-        ImportError: if PyYAML is not installed.
+        SceneError: If anything is wrong; the message lists every fault.
+        ImportError: If PyYAML is not installed.
     """
     faults = Faults()
     faults.choice("quadratic", quadratic, ("diagonal", "full"))
@@ -106,7 +111,17 @@ def from_yaml(
 
 
 def parse_yaml(source: str | os.PathLike[str]) -> Mapping[str, Any]:
-    """The map of a YAML text or file."""
+    """Parse the map in a YAML text or file.
+
+    Args:
+        source: The text itself, or the path of a file.
+
+    Returns:
+        Values by key.
+
+    Raises:
+        SceneError: If the content cannot be read or is no map.
+    """
     text = read_text(source, isinstance(source, str) and ("\n" in source or ": " in source), "YAML file")
     content = yaml_text.parsed(text)
     if not isinstance(content, Mapping):
@@ -115,7 +130,16 @@ def parse_yaml(source: str | os.PathLike[str]) -> Mapping[str, Any]:
 
 
 def by_meaning(faults: Faults, content: Mapping[str, Any], ignore: set[str]) -> dict[str, Any]:
-    """The values by what they mean: aliases resolved, one level of tables opened, Fossen's names gathered."""
+    """Sort values by what their keys mean: aliases resolved, tables opened, Fossen's names gathered.
+
+    Args:
+        faults: Collects what is wrong.
+        content: Values by key, as in the file.
+        ignore: Keys to leave out.
+
+    Returns:
+        Values by meaning, such as "mass"; those under Fossen's names as a map "coefficients".
+    """
     meanings = {alias: name for name, aliases in _ALIASES.items() for alias in aliases}
     read: dict[str, Any] = {}
     for key, value in content.items():
@@ -139,7 +163,16 @@ def by_meaning(faults: Faults, content: Mapping[str, Any], ignore: set[str]) -> 
 
 
 def yaml_body(faults: Faults, read: Mapping[str, Any], positions: np.ndarray) -> Coefficients:
-    """Mass, inertia, centres and forces of a YAML map."""
+    """Build mass, inertia, centres and forces of a body from a YAML map.
+
+    Args:
+        faults: Collects what is wrong.
+        read: Values by meaning.
+        positions: Sign of each axis (3,), to turn positions and inertia into x ahead, y to starboard, z down.
+
+    Returns:
+        The body without added mass and drag.
+    """
     inertia = read.get("inertia")
     if isinstance(inertia, Mapping):
         faults.keys("inertia", inertia, [f"i{pair}" for pair in PAIRS])
@@ -168,14 +201,33 @@ def yaml_body(faults: Faults, read: Mapping[str, Any], positions: np.ndarray) ->
 
 
 def is_neutral(faults: Faults, read: Mapping[str, Any]) -> bool:
-    """Whether the file asks for a buoyancy that is the weight."""
-    given = read.get("neutrally_buoyant", False)
-    faults.choice("neutrally_buoyant", bool(given) if given in (0, 1) else given, (True, False))
-    return bool(given)
+    """Return whether the file declares the vehicle neutrally buoyant.
+
+    Args:
+        faults: Collects what is wrong.
+        read: Values by meaning.
+
+    Returns:
+        True if the buoyancy is to be the weight.
+    """
+    value = read.get("neutrally_buoyant", False)
+    faults.choice("neutrally_buoyant", bool(value) if value in (0, 1) else value, (True, False))
+    return bool(value)
 
 
 def displaced_weight(faults: Faults, volume: Any, density: Any, gravity: Any, is_given: bool) -> float | None:
-    """The weight [N] of the displaced water; None after noting a fault."""
+    """Return the weight of the displaced water.
+
+    Args:
+        faults: Collects what is wrong.
+        volume: Displaced volume [m3].
+        density: Density of the water [kg/m3].
+        gravity: Acceleration of free fall [m/s2].
+        is_given: Whether the file gives the density, without which a volume has no weight.
+
+    Returns:
+        Weight [N]; None after noting a fault.
+    """
     if not is_given:
         faults.positive("density", "not given", "kg/m3 (with volume)")
     values = [faults.positive("volume", volume, "m3"), density, Faults().number("gravity", gravity, least=0.0)]
@@ -183,7 +235,16 @@ def displaced_weight(faults: Faults, volume: Any, density: Any, gravity: Any, is
 
 
 def matrix_6(faults: Faults, key: str, value: Any) -> np.ndarray:
-    """6x6, 36 numbers or the 6 of a diagonal, positive on it, from either sign convention; zeros if not given."""
+    """Return a matrix of added mass or damping, positive on its diagonal, from either sign convention.
+
+    Args:
+        faults: Collects what is wrong.
+        key: Name of the matrix in messages.
+        value: 6x6 or 36 numbers, or the 6 of a diagonal; None if not given.
+
+    Returns:
+        The matrix (6, 6); zeros if it is not given or at fault.
+    """
     if value is None:
         return np.zeros((6, 6))
     array = faults.finite(key, value)

@@ -67,7 +67,7 @@ def make_model(
     seen = survey(ensemble, method, h)
     explicit = method.tableau is not None
     acting = _acting(ensemble, seen, laws)
-    events = tuple((one, _module(one, one.device, stops, "distance")) for one in ensemble.scene.events)
+    events = tuple((one, device_module(one, one.device, stops, "distance")) for one in ensemble.scene.events)
     damping = any(hasattr(module, "damping") for term, module in acting if not isinstance(term, Drag))
     flow = _flow([module for _, module in acting])
     drags = [(term, module) for term, module in acting if isinstance(term, Drag)]
@@ -187,7 +187,7 @@ def _check_backward_drag(ensemble: Ensemble, method: Method, term: Drag, h: floa
         faults.raise_if_any()
 
 
-def _module(term: Term, device: Any, known: Mapping[str, Any], *roles: str) -> Any:
+def device_module(term: Term, device: Any, known: Mapping[str, Any], *roles: str) -> Any:
     """The device code of a term. Raises SceneError where it lacks what it must have."""
     module = known.get(device) if isinstance(device, str) else device
     faults = Faults()
@@ -231,7 +231,9 @@ FLOWS = ("none", "steady", "uniform", "varying")
 def _acting(ensemble: Ensemble, seen: Survey, laws: Mapping[str, Any]) -> list[tuple[Term, Any]]:
     """The terms that some member feels, with their device code, in a fixed order."""
     acting = [(term, laws[term.device]) for term in terms.IMPLIED]
-    acting += [(term, _module(term, term.device_in(not seen.turned), laws, *ROLES)) for term in ensemble.scene.terms]
+    acting += [
+        (term, device_module(term, term.device_in(not seen.turned), laws, *ROLES)) for term in ensemble.scene.terms
+    ]
     return [(term, module) for term, module in acting if term.key in seen.felt]
 
 

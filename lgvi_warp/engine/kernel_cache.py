@@ -90,7 +90,14 @@ def one_at_a_time(kernel: str) -> Iterator[None]:
 
 
 def is_whole(code: Path) -> bool:
-    """Whether a kernel's code and all that its checksums name are as they were compiled."""
+    """Whether a kernel's code, and all files that its checksums name, are as they were compiled.
+
+    Args:
+        code: the file with the kernel's code.
+
+    Returns:
+        False also where a file or the checksums are missing or unreadable.
+    """
     try:
         sums = json.loads(code.with_name(code.name + SUMS).read_bytes())
         return code.name in sums and all(_sha256(code.with_name(name)) == value for name, value in sums.items())
@@ -119,16 +126,16 @@ def _compile(module: Any, cache: Path, code: Path) -> None:
             _move(scratch / code.parent.name, code)
 
 
-def _move(made: Path, code: Path) -> None:
+def _move(compiled: Path, code: Path) -> None:
     """Put a compiled kernel's files into their places: what lies there is damaged, or of other processors."""
-    names = [code.name, *(path.name for path in made.glob("*.meta"))]
-    (made / (code.name + SUMS)).write_text(json.dumps({name: _sha256(made / name) for name in names}))
+    names = [code.name, *(path.name for path in compiled.glob("*.meta"))]
+    (compiled / (code.name + SUMS)).write_text(json.dumps({name: _sha256(compiled / name) for name in names}))
     if code.parent.exists() and not code.parent.is_dir():
         code.parent.unlink()
     code.parent.mkdir(exist_ok=True)
     last = code.name + SUMS
     code.with_name(last).unlink(missing_ok=True)
-    for path in sorted(made.iterdir(), key=lambda path: path.name == last):
+    for path in sorted(compiled.iterdir(), key=lambda path: path.name == last):
         path.replace(code.with_name(path.name))
 
 
@@ -167,14 +174,14 @@ def _temporary_room() -> bool:
 
 
 def seek_room(folder: Path, wanted: int = ROOM_BYTES) -> None:
-    """See that a folder takes so many bytes and some files, by a trial: quotas and limits are told by nothing else.
+    """Check by trial that a folder has room for some bytes and files: nothing else reveals quotas and limits.
 
     Args:
         folder: where to look.
-        wanted: bytes [1].
+        wanted: room needed [bytes].
 
     Raises:
-        OSError: ENOSPC and the like, where it does not take them.
+        OSError: ENOSPC and the like, where there is no such room.
     """
     if hasattr(os, "statvfs"):
         system = os.statvfs(folder)
@@ -191,11 +198,11 @@ def seek_room(folder: Path, wanted: int = ROOM_BYTES) -> None:
 
 
 def sweep(cache: Path, folder: Path) -> None:
-    """Remove what killed processes left in the cache: their scratch folders, and what Warp left of this kernel or of old.
+    """Remove what killed processes left in the cache: their scratch folders, and Warp's folders of this kernel or of old.
 
     Args:
         cache: Warp's kernel cache.
-        folder: that of a kernel which this process alone may compile.
+        folder: folder of a kernel which this process alone may compile.
     """
     with one_at_a_time(SCRATCH):
         for path in cache.glob(f"{SCRATCH}*"):

@@ -53,8 +53,8 @@ def executor_of(given: Any, threads: int | None = None, scheduler: str | None = 
     if scheduler is not None and given != "dask":
         faults.add("scheduler", scheduler, "is for the executor dask alone", 'give executor="dask", or leave it out')
     if given in STARTING and scheduler is None and multiprocessing.current_process().daemon:
-        what = "starts processes, which a worker of multiprocessing or Celery may not"
-        faults.add("executor", given, what, 'use executor="threads" in it, or run outside of it')
+        problem = "starts processes, which a worker of multiprocessing or Celery may not"
+        faults.add("executor", given, problem, 'use executor="threads" in it, or run outside of it')
     faults.raise_if_any()
     if isinstance(given, Executor):
         return given

@@ -2,11 +2,11 @@
 
     CACHE/wp_NAME_HASH/NAME.cpuTARGET.o          code of one kind of processor
     CACHE/wp_NAME_HASH/NAME.cpuTARGET.o.sha256   checksums of that file and of its .meta, written last
-    CACHE/lgvi_warp_locks/                       who compiles
-    CACHE/lgvi_warp_scratch_RANDOM/              a kernel on its way, locked by the process that compiles it
+    CACHE/lgvi_warp_locks/                       locks held while a kernel is compiled
+    CACHE/lgvi_warp_scratch_RANDOM/              a kernel being compiled, locked by the process that compiles it
 
-Damaged code would end the process when it is loaded or run, so nothing is loaded whose checksums do not fit. LLVM ends
-the process when it cannot write, so room is looked for before it begins.
+Damaged code would crash the process, so nothing is loaded whose checksums do not match. LLVM aborts the process when it
+cannot write, so free room is checked before it begins.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ ROOM_BYTES, ROOM_FILES = 16_000_000, 16
 # CPU kernels are launched with one thread a block: a variant of the module of its own.
 BLOCK_DIM = 1
 LOCKS, SCRATCH, SUMS = "lgvi_warp_locks", "lgvi_warp_scratch_", ".sha256"
-# What Warp leaves of a process that is killed while it compiles, and when it is old enough to be of no one [s].
+# Folders that Warp leaves when it is killed while it compiles, and the age at which they belong to no process [s].
 TORN, OURS, OLD = re.compile(r"(\w+)_p\d+_t\d+"), "wp_make_", 86_400.0
 
 _loaded: weakref.WeakSet[Any] = weakref.WeakSet()
@@ -72,11 +72,13 @@ def load(module: Any) -> None:
 def one_at_a_time(kernel: str) -> Iterator[None]:
     """Let one process compile a kernel while others that want the same one wait for what it puts into the cache.
 
-    Other kernels wait for nothing, unless the first two digits of their hashes are the same: so there are at most 256
-    files to lock.
+    Kernels whose hashes begin with the same two digits share a lock, so that there are at most 256 files to lock.
 
     Args:
-        kernel: its hash.
+        kernel: hash of the kernel, hexadecimal.
+
+    Returns:
+        A context manager.
     """
     path = Path(wp.config.kernel_cache_dir) / LOCKS / kernel[:2]
     try:
@@ -127,7 +129,7 @@ def _compile(module: Any, cache: Path, code: Path) -> None:
 
 
 def _move(compiled: Path, code: Path) -> None:
-    """Put a compiled kernel's files into their places: what lies there is damaged, or of other processors."""
+    """Move a compiled kernel's files into the cache; files already there are damaged, or for other processors."""
     names = [code.name, *(path.name for path in compiled.glob("*.meta"))]
     (compiled / (code.name + SUMS)).write_text(json.dumps({name: _sha256(compiled / name) for name in names}))
     if code.parent.exists() and not code.parent.is_dir():
@@ -198,7 +200,9 @@ def seek_room(folder: Path, wanted: int = ROOM_BYTES) -> None:
 
 
 def sweep(cache: Path, folder: Path) -> None:
-    """Remove what killed processes left in the cache: their scratch folders, and Warp's folders of this kernel or of old.
+    """Remove what killed processes left in the cache: their scratch folders, and Warp's unfinished folders.
+
+    The latter are removed if they are of this kernel, or old.
 
     Args:
         cache: Warp's kernel cache.

@@ -84,7 +84,7 @@ def run_blocks(
     with contextlib.closing(_in_turn(work, runs, runs if left is None else left, executor, advanced)) as done:
         for block, results in done:
             merged.begun = block.stop
-            # Parts that come from the store may be somebody else's.
+            # Results from the store may not be this run's own: errors in them are reported as faults of the store.
             source = work.sink if left is not None and block not in fresh else None
             with source.understood(block) if source else nullcontext():
                 for keeper, result in zip(work.keepers, results, strict=True):
@@ -98,7 +98,7 @@ def run_blocks(
 def _in_turn(
     work: Work, runs: Sequence[Block], left: Sequence[Block], executor: Executor, advanced: Callable[[Block, int], None]
 ) -> Generator[tuple[Block, Any], None, None]:
-    """Blocks and their results in order, from the store or as they are run; nothing runs before the first is wanted."""
+    """Blocks and their results in order, from the store or as they run; nothing runs before it is needed."""
     wanted = {block.first for block in left}
     with contextlib.ExitStack() as stack:
         fresh: Iterator[tuple[Block, Any]] | None = None

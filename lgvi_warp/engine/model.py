@@ -124,19 +124,19 @@ def make_model(
     if method.turns and coupled:
         program = with_hops(program)
     if method.halved and (drag or flow != "none"):
-        program = divided(program)  # then K is symmetric but no flow: one of its own for each half
+        program = divided(program)  # K with drag or water is symmetric but no flow: each half has its own
     lead, maps = merged(program) if program else (None, ())
-    # A kick that cannot be undone must not be divided between two steps, nor what events look at.
+    # A kick that is no flow must not be split between two steps, nor the state at which events are evaluated.
     undone = all(getattr(module, "POTENTIAL", False) for _, module in acting)
     if method.two_part:
-        # B joins that of the next step exactly, A as far as its order goes.
+        # B merges with that of the next step exactly, A up to the order of the method.
         lead, maps = method.program[0], method.program[1:]
         if events:
             lead, maps = None, method.program
     elif events or (lead is not None and lead[0] == "K" and not undone):
         lead, maps = None, program
     conservative = checked and _conservative(facts, acting, laws)
-    # Events, water and the potential are where the user or the forces have their origin.
+    # Events, water and the potential are evaluated at the user's origin, or at that of the forces.
     elsewhere = bool(events) or flow != "none" or (conservative and facts.apart)
     parts = {"rates": explicit,
              "turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
@@ -177,7 +177,7 @@ def _conservative(facts: Survey, acting: list[tuple[Term, Any]], laws: Mapping[s
     tethered = any(module is laws["tether"] for _, module in acting)
     for term, module in acting:
         if module is laws["current"]:
-            # A uniform current carries the vehicle past an anchor, or along the vertical that weight acts on.
+            # A uniform current does work against a tether, and its vertical part against weight.
             passive = not tethered and term.key not in facts.rising
         else:
             dissipates = term.dissipative or not hasattr(module, "damping")
@@ -189,7 +189,7 @@ def _conservative(facts: Survey, acting: list[tuple[Term, Any]], laws: Mapping[s
     return True
 
 
-# A stage that goes backward speeds a damped vehicle up, and at a drag number of 1 without end.
+# A backward stage accelerates a damped vehicle, and at a drag number of 1 without bound.
 MOST_BACKWARD_DRAG = 0.5
 
 
@@ -203,7 +203,7 @@ def _check_backward_drag(ensemble: Ensemble, method: Method, term: Drag, h: floa
         members = ensemble.select(first, stop)
         coefficients = ensemble.own(term, members.parameters)
         speeds = np.abs(np.concatenate([members.velocity, members.angular_velocity], axis=1))
-        # What an axis of the user's gives way with to a force along it, the other axes free.
+        # Acceleration per unit force along each of the user's axes, the other axes being free.
         mobilities = np.einsum("nii->ni", np.linalg.inv(vehicle.inertia6(members.parameters)))
         return float((back * (coefficients["linear"] + coefficients["quadratic"] * speeds) * mobilities).max())
 
@@ -266,7 +266,7 @@ def _check_signature(faults: Faults, term: Term, module: Any, role: str) -> None
 
 
 ROLES = ("law", "damping", "flow", "evolve")
-# How water may move, the least first.
+# How water may move, the most special first.
 FLOWS = ("none", "steady", "uniform", "varying")
 
 

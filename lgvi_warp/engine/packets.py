@@ -247,7 +247,7 @@ class Packets:
             memory.append(np.zeros((1, 2 * len(self.plan.spec.gauss[1]) * SLOPE_FIELDS)))
         table = self._lanes(_side_by_side(rows))
         start = np.broadcast_to(_side_by_side(memory), (self.members.count, sum(m.shape[1] for m in memory)))
-        # The second half is the copy that a repeated chunk starts from.
+        # The second half is a backup, from which a chunk of steps is repeated.
         return data, table, np.concatenate([self._lanes_each(start)] * 2, axis=1)
 
     def _lanes_each(self, values: np.ndarray) -> np.ndarray:
@@ -388,7 +388,7 @@ class Packets:
             return bits, step, value if len(value) else np.full(len(bits), np.nan)
         monitor = self.monitor
         noted = self._of_members(monitor.warned, np.uint16)
-        # More serious than all of the others: its highest bit is in none of them.
+        # The kernel's warning is more serious if its highest bit is above all bits of the start.
         later = (noted & ~bits) > bits
         step = np.where(later, self._of_members(monitor.warned_step, np.int64), 0)
         value = np.where(later, np.sqrt(self._of_members(monitor.warned_size, np.float64)), value)
@@ -414,8 +414,8 @@ def _rows(values: np.ndarray, Lane: Any) -> Any:
 def _structs(values: np.ndarray, struct: Any) -> Any:
     """A Warp array of structs from a structured array (n,) of the plan's type.
 
-    Not by wp.array(values), which lets NumPy read the struct's type from text: in several threads that fails now and then
-    (Python before 3.11.8 and 3.12.2, python/cpython#106905), and the run with it.
+    Copied byte by byte: wp.array(values) lets NumPy parse the struct's type from text, which in several threads
+    occasionally fails (Python before 3.11.8 and 3.12.2, python/cpython#106905) and would end the run.
     """
     array = wp.empty(len(values), dtype=struct, device="cpu")
     assert values.flags.c_contiguous and values.itemsize == ctypes.sizeof(struct.ctype)

@@ -35,8 +35,7 @@ from lgvi_warp.scene.ensemble import Ensemble
 # Sub-maps whose equation may have no solution.
 SOLVING = {"D", "W", "A", "Phi", "Phi*"}
 
-# One launch advances at most this many vehicle-steps and samples: so progress moves, an interrupt is heard, and the
-# buffer that samples pass through stays small, however long the run is.
+# Limits of one launch: they keep progress current, interrupts prompt and the sample buffer small in long runs.
 SEGMENT_VEHICLE_STEPS = 20_000_000
 SEGMENT_SAMPLE_BYTES = 16_000_000
 
@@ -75,7 +74,7 @@ class Plan:
     model: Model = field(init=False)
     spec: Spec = field(init=False)
     advance: Advance = field(init=False)
-    # The plan that it is a part of, its members and fields.
+    # Of a plan made by part(): the whole plan, the members and the fields.
     _whole: tuple[Plan, Sequence[int], Sequence[str]] | None = field(
         default=None, init=False, compare=False, repr=False
     )
@@ -101,8 +100,8 @@ class Plan:
         object.__setattr__(self, "model", model)
         self._check_substep()
         if self.width is None:
-            # The turns of psi_x follow one another; the implicit step V of damping laws fills the registers by itself, and so
-            # do compensated sums.
+            # Each turn of psi_x waits for the one before, so two registers pay; the implicit step V of damping laws and
+            # compensated sums fill the registers by themselves.
             full = "dense" in self.model.parts or self.dtype == "float32_compensated"
             chained = self.method.turns and not full
             object.__setattr__(self, "width", default_width(self.dtype, chained=chained))
@@ -248,7 +247,7 @@ class Plan:
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the settings alone: a kernel cannot be pickled, and the other process finds it in Warp's cache."""
         if self._whole:
-            # Of its members alone another kernel may be enough.
+            # Made anew from these members alone, the plan might choose another kernel.
             return Plan.part, self._whole
         settings = (
             self.ensemble,
@@ -300,7 +299,7 @@ class Plan:
 
     @functools.cached_property
     def lengths(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Lengths of the stages and of the leads, as fractions of a step [1]."""
+        """Lengths of the stages and of the leads, in units of the step h [1]."""
         lead = self.model.lead
         return self.method.lengths(lead[1] if lead else None)
 

@@ -1,4 +1,4 @@
-"""Warnings about the step: which the kernel watches for, their limits, and those that a member's start already gives."""
+"""Warnings about the step: which the kernel watches for, their limits, and those that a member's start gives."""
 
 from __future__ import annotations
 
@@ -41,26 +41,27 @@ class Watched(Protocol):
         """All that decides the kernel's source (see `Spec`)."""
 
 
-# h w beyond which an oscillation is coarsely resolved, in the longest stage.
+# h w above which an oscillation is coarsely resolved, h being the length of the longest stage [1].
 COARSE = 0.5
 
 
-# Largest h (l + 2 q|v|) / I of drag that is treated explicitly.
+# Largest drag number h (l + 2 q|v|) / I of drag that is treated explicitly [1].
 DRAG_NUMBER = 1.0
 
 
-# Least part of a step's way that the spacing of numbers at the position may be.
+# Largest spacing of floating-point numbers at the position, as a fraction of the distance covered in a step [1].
 PRECISION = 0.05
 
 
+# Largest |R^T R - I|, by dtype [1].
 ORTHOGONAL = {"float64": 1e-10, "float32": 1e-4}
 
 
-# The same of methods whose R leaves the rotations by their error: there it says no more than that.
+# The same for methods whose R departs from a rotation by their own truncation error.
 ORTHOGONAL_TO_ERROR = 1e-3
 
 
-# Energy created over what there was to exchange.
+# Largest energy gained, as a fraction of the energy available for exchange [1].
 ENERGY = 0.5
 
 

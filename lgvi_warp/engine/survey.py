@@ -19,14 +19,14 @@ from lgvi_warp.scene.plausibility import of_numbers
 
 Parameters = Mapping[str, np.ndarray]
 
-# Off-diagonal elements below this fraction of the largest element are the round-off of turning the axes.
+# Off-diagonal elements below this fraction of the largest element are round-off from turning the axes.
 DIAGONAL = 1e-14
-# A coupling norm below this is the round-off of moving the origin.
+# A coupling norm below this is round-off from moving the origin.
 UNCOUPLED = 1e-9
 
-# By rank: a kernel for one does for those before it.
+# By rank: a kernel for one shape also serves those before it.
 SHAPES_OF_MASS = ("isotropic", "diagonal", "full")
-# Which of the matrix U of psi_x a kernel may have.
+# Entries of the matrix U of psi_x that a kernel may hold.
 COUPLINGS = ((0, 1), (0, 2), (1, 2), (0, 0), (1, 1), (2, 2))
 
 
@@ -54,8 +54,8 @@ def frame_of(method: Method, parameters: Parameters) -> tuple[Frame, np.ndarray,
         parameters: parameters of n members by name.
 
     Returns:
-        (frame, U, coupling): the frame; U (n, 3, 3) of the turns of psi_x, zero for other methods; and the coupling norm
-        (n,) that is left in this frame and that the method cannot treat.
+        (frame, U, coupling): the frame; U (n, 3, 3) of the turns of psi_x, zero for other methods; and the coupling
+        norm (n,) that is left in this frame and that the method cannot treat.
     """
     I6 = vehicle.inertia6(parameters)
     coupling = np.zeros(len(I6))
@@ -142,7 +142,7 @@ def survey(ensemble: Ensemble, method: Method, h: float) -> Survey:
     """
 
     def look(first: int, stop: int) -> Survey:
-        # A member too large for its arithmetic gets its status, or its fault, elsewhere; NumPy need not remark.
+        # Members that overflow get their status, or their fault, elsewhere: no warning from NumPy.
         with np.errstate(over="ignore", invalid="ignore"):
             return _look(ensemble, method, h, first, stop)
 

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Work:
-    """What an executor does with each block: advance it, and write it to the store if there is one. Picklable.
+    """What an executor does with each block: advance it, and write it to the store if there is one.
 
-    Calling it with a block returns what each keeper closed with, or None if the block was halted. A block that the store
-    already holds is not run again. A copy in another process returns once its block is durable; in the run's own process
-    the run waits at its end for blocks that are not durable yet.
+    It can be pickled. Calling it with a block returns what each keeper closed with, or None if the block was halted. A
+    block that the store already holds is not run again. A copy in another process returns once its block is durable; in
+    the run's own process the run waits at its end for blocks that are not durable yet.
 
     Args:
         plan: the plan of the run.
@@ -94,7 +94,7 @@ def run_block(
     """
     from lgvi_warp.engine.packets import Packets
 
-    # A member that is not finite, or not within float32, gets its status from the kernel; NumPy need not remark.
+    # Members that are not finite, or exceed float32, get their status from the kernel: no warning from NumPy.
     with np.errstate(invalid="ignore", over="ignore"):
         members = plan.ensemble.select(block.first, block.stop)
         packets = Packets(plan, members)

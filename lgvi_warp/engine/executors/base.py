@@ -13,11 +13,11 @@ from lgvi_warp.common.errors import SceneError
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.work import Work
 
-# Called with a block and the vehicle-steps made of it so far, from any thread.
+# Progress callback: takes a block and the vehicle-steps made of it so far, from any thread.
 Advanced = Callable[[Block, int], None]
 
 
-# A block whose worker died this many times is not tried again: the block itself may be what kills them.
+# A block whose worker died this many times is not tried again: the block itself may be the cause.
 MOST_DEATHS = 3
 
 
@@ -40,7 +40,11 @@ class Executor(Protocol):
 
 @contextlib.contextmanager
 def deaf() -> Iterator[None]:
-    """Let processes started inside ignore interrupts from the terminal, from their first moment on."""
+    """Let processes started inside ignore interrupts from the terminal, from their first moment on.
+
+    Returns:
+        A context manager.
+    """
     before: dict[int, Any] = {}
     try:
         for number in (getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(signal, name)):

@@ -18,7 +18,7 @@ from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.executors.base import MOST_DEATHS, Advanced, deaf, received, sent
 from lgvi_warp.engine.work import Work
 
-# How often a worker tells how far it is [s].
+# Interval at which a worker reports its progress [s].
 PERIOD = 0.2
 # How long a scheduler may take to answer [s].
 TIMEOUT = 10.0
@@ -75,7 +75,7 @@ class Dask:
                 client.unsubscribe_topic(topic)
                 if waiting:
                     client.cancel(list(waiting))
-                    # A block that is at work when the run ends must not write into its store afterwards.
+                    # A block that is running when the run ends must not write into the store afterwards.
                     with contextlib.suppress(OSError, TimeoutError):
                         client.run(_end, topic, on_error="ignore")
 
@@ -141,7 +141,7 @@ def _work(data: bytes, block: Block, topic: str, kind: dict[str, str]) -> Any:
         _at_work[topic] -= 1
 
 
-# On a worker: blocks at work of each run, and runs that ended early.
+# On a worker: number of running blocks of each run, and runs that ended early.
 _at_work: Counter[str] = Counter()
 _ended: set[str] = set()
 

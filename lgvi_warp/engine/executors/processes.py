@@ -66,9 +66,9 @@ class Processes:
     def _until_death(
         self, data: bytes, unfinished: dict[int, Block], advanced: Advanced, deaths: Counter[int]
     ) -> Generator[tuple[Block, Any], None, None]:
-        """Run the unfinished blocks until all are done or a process died; finished ones leave `unfinished`."""
+        """Run blocks until all are done or a process died; those that finish are removed from `unfinished`."""
         context = multiprocessing.get_context("spawn")
-        # Steps made of each block, and a word to all. Without a lock: a process that is killed holds none.
+        # Steps made of each block, and a flag that halts all. No lock: a killed process could hold it for ever.
         steps_made = context.RawArray("q", max(unfinished) + 2)
         with deaf():  # Python's tracker of resources is a process too
             pool = ProcessPoolExecutor(
@@ -88,7 +88,7 @@ class Processes:
                     block = unfinished.pop(waiting.pop(future))
                     yield block, value
         except BrokenProcessPool:
-            # What was finished in the same moment is kept, the rest runs again in a new pool.
+            # Blocks that finished at the same moment are kept, the others run again in a new pool.
             for future, i in waiting.items():
                 if future.done() and future.exception() is None:
                     yield unfinished.pop(i), future.result()

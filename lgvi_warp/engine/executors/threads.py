@@ -14,7 +14,7 @@ from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.executors.base import Advanced, ended
 from lgvi_warp.engine.work import Work
 
-# A signal that comes just before the main thread begins to wait is heard so much later [s].
+# Longest delay of a signal that arrives just before the main thread begins to wait [s].
 PERIOD = 0.2
 
 

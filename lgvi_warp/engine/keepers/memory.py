@@ -60,7 +60,7 @@ class Outcomes(_Unsent):
         at = slice(block.first, block.stop)
         for field in dataclasses.fields(part):
             values = getattr(part, field.name)
-            # Memory that nothing is written into is none: runs without faults have no outcomes to hold.
+            # Untouched pages of zeros take no memory, so runs without faults need none for their outcomes.
             if np.any(values):
                 getattr(self.all, field.name)[at] = values
 

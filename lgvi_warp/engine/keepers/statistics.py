@@ -32,7 +32,7 @@ class Gathered:
         replicates: R, number of independent replicates (default 1).
     """
 
-    # What a store calls its parts.
+    # Name of its results in a store.
     name = "statistics"
 
     def __init__(self, time: np.ndarray, members: int, statistics: Sequence[Statistic], replicates: int = 1):
@@ -61,7 +61,7 @@ class Gathered:
             block: the block.
             part: for each statistic, arrays by name.
         """
-        # A member that is about to fail may be too large to be squared: the statistic then says so, and NumPy need not.
+        # Squares of a failing member may overflow: the statistic reports it, so no warning from NumPy.
         with np.errstate(invalid="ignore", over="ignore"):
             for tree, statistic_part in zip(self._trees, part, strict=True):
                 tree.add(block.first // self._size, statistic_part)
@@ -158,7 +158,7 @@ class _BlockStatistics:
     ):
         self._statistics, self._members, self._place = statistics, members, place
         self._plan, self._replicates, self._times = plan, replicates, len(time)
-        # Of those that are of members' ends: the quantity at the last sample.
+        # For statistics of members' ends: the quantity at the last sample.
         self._last: dict[Statistic, np.ndarray] = {}
         self._open = [
             statistic.open(time if statistic.at is None else time[-1:], members.count) for statistic in statistics

@@ -24,9 +24,9 @@ from lgvi_warp.physics.vehicle import Vehicle
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import Environment
 
-# Length [s] and number of the kick that the views are of.
+# Length [s] and step number of the kick at which laws are evaluated.
 KICK, STEP = 0.01, 3
-# Other axes and another origin [m] that a method might choose: what a law does must not depend on them.
+# Other body axes and another origin [m], as a method might choose them: a law must not depend on them.
 TURN = notation.matrix_from_rotation_vector(np.array([0.4, -0.7, 1.2]))
 ORIGIN = np.array([0.1, -0.2, 0.15])
 
@@ -85,7 +85,11 @@ class Views:
         return self.changed(attitude=self.attitude @ notation.matrix_from_rotation_vector(by * np.eye(3)[axis]))
 
     def elsewhere(self) -> Views:
-        """The same states, as seen in the body axes TURN at the origin ORIGIN."""
+        """The same states, expressed in the body axes TURN about the origin ORIGIN.
+
+        Returns:
+            The views in the other axes.
+        """
         return Views(
             self.attitude @ TURN,
             self.position + notation.rotate_out(self.attitude, ORIGIN[None]),

@@ -1,1 +1,1 @@
-"""To be said in one sentence."""
+"""The engine: chooses a kernel for a scene, packs members into lanes, and runs them block by block."""

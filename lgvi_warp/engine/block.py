@@ -1,4 +1,4 @@
-"""The unit of work: a run of members through all steps, and what is kept of it."""
+"""Blocks: runs of consecutive members, the unit of work of executors and stores."""
 
 from __future__ import annotations
 
@@ -18,19 +18,33 @@ SHAPES: dict[str, tuple[int, ...]] = {
 
 @dataclass(frozen=True)
 class Block:
-    """A run of members, first to stop: the unit of work."""
+    """A run of consecutive members, the unit of work.
+
+    Attributes:
+        first: index of its first member.
+        stop: index after its last member.
+    """
 
     first: int
     stop: int
 
     @property
     def count(self) -> int:
-        """Members in it."""
+        """Number of members in the block."""
         return self.stop - self.first
 
 
 def block_size(members: int) -> int:
-    """256 to 4096 members, a power of two. Depends on the number of members only, so bits and files do too."""
+    """Number of members of a block: a power of two from 256 to 4096.
+
+    It depends on the number of members only, so that bits and files do not depend on the machine.
+
+    Args:
+        members: number of members of the run.
+
+    Returns:
+        Members of each block but the last.
+    """
     size = 256
     while size < 4096 and size * 64 <= members:
         size *= 2
@@ -38,6 +52,13 @@ def block_size(members: int) -> int:
 
 
 def blocks(members: int) -> list[Block]:
-    """Runs of so many members as `block_size` says, the last one of what is left."""
+    """Divide the members of a run into blocks.
+
+    Args:
+        members: number of members of the run.
+
+    Returns:
+        Blocks of `block_size(members)` members in order; the last one has the rest.
+    """
     size = block_size(members)
     return [Block(i, min(i + size, members)) for i in range(0, members, size)]

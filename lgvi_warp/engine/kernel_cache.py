@@ -2,11 +2,11 @@
 
     CACHE/wp_NAME_HASH/NAME.cpuTARGET.o          code of one kind of processor
     CACHE/wp_NAME_HASH/NAME.cpuTARGET.o.sha256   checksums of that file and of its .meta, written last
-    CACHE/lgvi_warp_locks/                       who compiles
-    CACHE/lgvi_warp_scratch_RANDOM/              a kernel on its way, locked by the process that compiles it
+    CACHE/lgvi_warp_locks/                       locks held while a kernel is compiled
+    CACHE/lgvi_warp_scratch_RANDOM/              a kernel being compiled, locked by the process that compiles it
 
-Damaged code would end the process when it is loaded or run, so nothing is loaded whose checksums do not fit. LLVM ends
-the process when it cannot write, so room is looked for before it begins.
+Damaged code would crash the process, so nothing is loaded whose checksums do not match. LLVM aborts the process when it
+cannot write, so free room is checked before it begins.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ ROOM_BYTES, ROOM_FILES = 16_000_000, 16
 # CPU kernels are launched with one thread a block: a variant of the module of its own.
 BLOCK_DIM = 1
 LOCKS, SCRATCH, SUMS = "lgvi_warp_locks", "lgvi_warp_scratch_", ".sha256"
-# What Warp leaves of a process that is killed while it compiles, and when it is old enough to be of no one [s].
+# Folders that Warp leaves when it is killed while it compiles, and the age at which they belong to no process [s].
 TORN, OURS, OLD = re.compile(r"(\w+)_p\d+_t\d+"), "wp_make_", 86_400.0
 
 _loaded: weakref.WeakSet[Any] = weakref.WeakSet()
@@ -72,11 +72,13 @@ def load(module: Any) -> None:
 def one_at_a_time(kernel: str) -> Iterator[None]:
     """Let one process compile a kernel while others that want the same one wait for what it puts into the cache.
 
-    Other kernels wait for nothing, unless the first two digits of their hashes are the same: so there are at most 256
-    files to lock.
+    Kernels whose hashes begin with the same two digits share a lock, so that there are at most 256 files to lock.
 
     Args:
-        kernel: its hash.
+        kernel: hash of the kernel, hexadecimal.
+
+    Returns:
+        A context manager.
     """
     path = Path(wp.config.kernel_cache_dir) / LOCKS / kernel[:2]
     try:
@@ -90,7 +92,14 @@ def one_at_a_time(kernel: str) -> Iterator[None]:
 
 
 def is_whole(code: Path) -> bool:
-    """Whether a kernel's code and all that its checksums name are as they were compiled."""
+    """Whether a kernel's code, and all files that its checksums name, are as they were compiled.
+
+    Args:
+        code: the file with the kernel's code.
+
+    Returns:
+        False also where a file or the checksums are missing or unreadable.
+    """
     try:
         sums = json.loads(code.with_name(code.name + SUMS).read_bytes())
         return code.name in sums and all(_sha256(code.with_name(name)) == value for name, value in sums.items())
@@ -119,16 +128,16 @@ def _compile(module: Any, cache: Path, code: Path) -> None:
             _move(scratch / code.parent.name, code)
 
 
-def _move(made: Path, code: Path) -> None:
-    """Put a compiled kernel's files into their places: what lies there is damaged, or of other processors."""
-    names = [code.name, *(path.name for path in made.glob("*.meta"))]
-    (made / (code.name + SUMS)).write_text(json.dumps({name: _sha256(made / name) for name in names}))
+def _move(compiled: Path, code: Path) -> None:
+    """Move a compiled kernel's files into the cache; files already there are damaged, or for other processors."""
+    names = [code.name, *(path.name for path in compiled.glob("*.meta"))]
+    (compiled / (code.name + SUMS)).write_text(json.dumps({name: _sha256(compiled / name) for name in names}))
     if code.parent.exists() and not code.parent.is_dir():
         code.parent.unlink()
     code.parent.mkdir(exist_ok=True)
     last = code.name + SUMS
     code.with_name(last).unlink(missing_ok=True)
-    for path in sorted(made.iterdir(), key=lambda path: path.name == last):
+    for path in sorted(compiled.iterdir(), key=lambda path: path.name == last):
         path.replace(code.with_name(path.name))
 
 
@@ -167,14 +176,14 @@ def _temporary_room() -> bool:
 
 
 def seek_room(folder: Path, wanted: int = ROOM_BYTES) -> None:
-    """See that a folder takes so many bytes and some files, by a trial: quotas and limits are told by nothing else.
+    """Check by trial that a folder has room for some bytes and files: nothing else reveals quotas and limits.
 
     Args:
         folder: where to look.
-        wanted: bytes [1].
+        wanted: room needed [bytes].
 
     Raises:
-        OSError: ENOSPC and the like, where it does not take them.
+        OSError: ENOSPC and the like, where there is no such room.
     """
     if hasattr(os, "statvfs"):
         system = os.statvfs(folder)
@@ -191,11 +200,13 @@ def seek_room(folder: Path, wanted: int = ROOM_BYTES) -> None:
 
 
 def sweep(cache: Path, folder: Path) -> None:
-    """Remove what killed processes left in the cache: their scratch folders, and what Warp left of this kernel or of old.
+    """Remove what killed processes left in the cache: their scratch folders, and Warp's unfinished folders.
+
+    The latter are removed if they are of this kernel, or old.
 
     Args:
         cache: Warp's kernel cache.
-        folder: that of a kernel which this process alone may compile.
+        folder: folder of a kernel which this process alone may compile.
     """
     with one_at_a_time(SCRATCH):
         for path in cache.glob(f"{SCRATCH}*"):

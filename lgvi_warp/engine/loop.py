@@ -1,4 +1,4 @@
-"""Blocks through an executor, their parts to the keepers in the order of the blocks; with a store, from where it stopped."""
+"""The loop of a run: blocks through an executor, or from a store, and their results to the keepers in block order."""
 
 from __future__ import annotations
 
@@ -15,7 +15,12 @@ from lgvi_warp.engine.work import Work, in_order
 
 
 class Progress:
-    """Fraction of the vehicle-steps made so far, told by blocks from several threads."""
+    """The fraction of a run's vehicle-steps made so far, reported from any thread.
+
+    Args:
+        total: vehicle-steps of the run.
+        report: called with the fraction [1] at each advance; None for no report.
+    """
 
     def __init__(self, total: int, report: Callable[[float], None] | None):
         self._total, self._report, self._lock = total, report, threading.Lock()
@@ -23,7 +28,12 @@ class Progress:
         self._sum = 0
 
     def at(self, block: Block, vehicle_steps: int) -> None:
-        """A block has made so many; a block that runs again begins anew."""
+        """Note how far a block is; one that runs again starts from zero.
+
+        Args:
+            block: the block.
+            vehicle_steps: vehicle-steps made of it so far.
+        """
         if self._report is None:
             return
         with self._lock:
@@ -34,7 +44,12 @@ class Progress:
 
 @dataclass
 class Merged:
-    """Where the members end that keepers have begun to take, and have taken."""
+    """How many members the keepers have received.
+
+    Attributes:
+        begun: index after the last member whose merge has begun.
+        done: index after the last member whose merge is complete.
+    """
 
     begun: int = 0
     done: int = 0
@@ -49,23 +64,31 @@ def run_blocks(
     enough: Callable[[int], bool] = lambda members: False,
     merged: Merged | None = None,
 ) -> int:
-    """Run blocks and hand their parts to the keepers in order. Returns where the members end that were merged.
+    """Run blocks and merge their results into the keepers, in block order.
 
-    merged: is told so after each block, for when an exception is what ends the run.
+    Args:
+        work: what is done with each block.
+        runs: the blocks of the run, in order.
+        executor: where they run.
+        advanced: called with a block and the vehicle-steps made of it so far.
+        left: blocks that the store does not hold yet; None (default) for all.
+        enough: asked after each block, with the number of members so far, whether the run may end (default: never); later
+            blocks are then dropped.
+        merged: updated before and after each merge, for when an exception ends the run.
 
-    left: those of the blocks that the store of the work has not, by default all. enough: asked after each block, with the
-    members so far: the first yes ends the run, and blocks that are ahead of it are lost or of no account.
+    Returns:
+        Index after the last member merged.
     """
     fresh = set(left or ())
     merged = merged or Merged()
     with contextlib.closing(_in_turn(work, runs, runs if left is None else left, executor, advanced)) as done:
-        for block, parts in done:
+        for block, results in done:
             merged.begun = block.stop
-            # Parts that come from the store may be somebody else's.
-            old = work.sink if left is not None and block not in fresh else None
-            with old.understood(block) if old else nullcontext():
-                for keeper, part in zip(work.keepers, parts, strict=True):
-                    keeper.merge(block, part)
+            # Results from the store may not be this run's own: errors in them are reported as faults of the store.
+            source = work.sink if left is not None and block not in fresh else None
+            with source.understood(block) if source else nullcontext():
+                for keeper, result in zip(work.keepers, results, strict=True):
+                    keeper.merge(block, result)
             merged.done = block.stop
             if enough(block.stop):
                 return block.stop
@@ -75,7 +98,7 @@ def run_blocks(
 def _in_turn(
     work: Work, runs: Sequence[Block], left: Sequence[Block], executor: Executor, advanced: Callable[[Block, int], None]
 ) -> Generator[tuple[Block, Any], None, None]:
-    """Blocks and their parts, in order: from the store, or as they are run; nothing runs before the first is wanted."""
+    """Blocks and their results in order, from the store or as they run; nothing runs before it is needed."""
     wanted = {block.first for block in left}
     with contextlib.ExitStack() as stack:
         fresh: Iterator[tuple[Block, Any]] | None = None

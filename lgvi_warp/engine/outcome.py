@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""The outcome of a block's members: status, failure, warnings and event of each."""
 
 from __future__ import annotations
 
@@ -12,10 +12,18 @@ from lgvi_warp.statistics.ends import Ends
 
 @dataclass
 class Outcome:
-    """What a block's members came to: arrays over its members. chosen: steps made and tried (count, 2), where they choose.
+    """The outcome of m members, arrays with one entry each.
 
-    warnings: bits of Warnings; warning_step, warning_value: steps made and value at the first crossing of the most serious
-    one. substeps: steps that were divided. event: the number of the event that stopped a member, from 1; 0 for none.
+    Attributes:
+        status: (m,), of `Status`.
+        failed_step: (m,), number of steps made before the failure or the event.
+        failed_size: (m,), value that crossed its limit; for an event the fraction of the step made before it [1].
+        chosen: (m, 2), adaptive steps made and tried; (m, 0) where steps are not adaptive.
+        warnings: (m,), bits of `Warnings`.
+        warning_step: (m,), steps made at the first crossing of the most serious warning.
+        warning_value: (m,), value at that crossing.
+        substeps: (m,), number of steps that were divided.
+        event: (m,), number of the event that stopped the member, counted from 1; 0 for none.
     """
 
     status: np.ndarray
@@ -30,7 +38,15 @@ class Outcome:
 
     @classmethod
     def clear(cls, members: int, paces: int = 0) -> Outcome:
-        """Of so many members that came through without fault; paces: columns of `chosen`."""
+        """The outcome of members that reached the end without a fault.
+
+        Args:
+            members: number of members, m.
+            paces: number of columns of `chosen`: 2 for adaptive steps, else 0 (default).
+
+        Returns:
+            An outcome whose entries are all zero.
+        """
         steps, values = (lambda: np.zeros(members, np.int64)), (lambda: np.zeros(members))
         return cls(
             status=np.zeros(members, np.uint8),
@@ -45,12 +61,26 @@ class Outcome:
         )
 
     def end_time(self, plan: Plan) -> np.ndarray:
-        """(n,) [s], until when each member went on: its event, its failure, or the end of the run."""
+        """The time at which each member ended: at its event, at its failure, or at the end of the run.
+
+        Args:
+            plan: the plan of the run.
+
+        Returns:
+            (m,) [s].
+        """
         # An event's size is the part of its step that was made before it.
-        part = np.where(self.event != 0, self.failed_size, 0.0)
-        return np.where(self.status != 0, (self.failed_step + part) * plan.grid.h, plan.grid.times[-1])
+        fraction = np.where(self.event != 0, self.failed_size, 0.0)
+        return np.where(self.status != 0, (self.failed_step + fraction) * plan.grid.h, plan.grid.times[-1])
 
     def ends(self, plan: Plan) -> Ends:
-        """How and when the members ended, for statistics."""
-        events = tuple(one.key for one in plan.ensemble.scene.events)
+        """How and when the members ended, as statistics need it.
+
+        Args:
+            plan: the plan of the run.
+
+        Returns:
+            Statuses, events and end times of the m members.
+        """
+        events = tuple(event.key for event in plan.ensemble.scene.events)
         return Ends(self.status, self.event, self.end_time(plan), events)

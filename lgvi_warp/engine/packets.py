@@ -1,4 +1,4 @@
-"""One block's members in lanes, ready to launch: their numbers as the kernel's arrays."""
+"""A block's members packed into lanes as the kernel's arrays, and the launches that advance them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,15 @@ from lgvi_warp.scene.ensemble import Ensemble
 
 
 def pack(values: np.ndarray, width: int) -> np.ndarray:
-    """Members' rows (m, d) as packets (ceil(m / width), d, width); the last packet is filled up with its last member."""
+    """Pack members' rows into lanes; the last packet is filled up with copies of the last member.
+
+    Args:
+        values: (m, d), one row a member.
+        width: members of a packet.
+
+    Returns:
+        (ceil(m / width), d, width), contiguous.
+    """
     m, d = values.shape
     packets = -(-m // width)
     filled = np.concatenate([values, np.repeat(values[-1:], packets * width - m, axis=0)])
@@ -50,7 +58,17 @@ def _symmetric(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 class Packets:
-    """One block's members in lanes, ready to launch."""
+    """The members of one block packed into lanes, ready to launch.
+
+    Args:
+        plan: the plan of the run.
+        members: the m members of the block.
+
+    Attributes:
+        count: number of packets.
+        frame: axes and origins that the kernel works in.
+        scale: (1 or m,) [kg m^2], number that momenta are divided by in the kernel; 1 for methods that need none.
+    """
 
     def __init__(self, plan: Plan, members: Members):
         self.plan, self.members = plan, members
@@ -83,7 +101,7 @@ class Packets:
         self.monitor = self._monitor()
 
     def _monitor(self) -> Any:
-        """What the kernel compares with now and then, and where it notes what it saw."""
+        """The limits that the kernel compares with at intervals, and the arrays where it notes what it saw."""
         plan, monitor = self.plan, self.plan.advance.types.Monitor()
         Lane, Ints = plan.advance.types.Lane, int_lane(plan.spec.width)
         if plan.spec.looks:
@@ -101,7 +119,7 @@ class Packets:
         return monitor
 
     def _limits(self) -> np.ndarray:
-        """Limits of the rows that are looked at, squared, and what they are in this block's numbers."""
+        """Limits of the watched rows, squared, in the block's scaled numbers."""
         rows, h = self.plan.spec.looks, self.plan.grid.h
         fields: dict[str, Any] = {f"{row}_limit": limit**2 for row, limit in row_limits(self.plan).items()}
         if "munk_coarse" in rows:
@@ -153,7 +171,7 @@ class Packets:
         return self._filled(self.plan.dtypes[0], fields)
 
     def _water(self) -> dict[str, np.ndarray]:
-        """What water that accelerates pushes: displaced mass less mass, at their centres."""
+        """What accelerating water acts on: displaced mass minus dry mass, and its lever."""
         p = self.members.parameters
         displaced, dry = vehicle.displaced_mass(p), vehicle.dry_mass(p)
         lever = displaced[:, None] * p["vehicle.center_of_buoyancy"] - (dry[:, None] * vehicle.center_of_mass(p))
@@ -172,11 +190,11 @@ class Packets:
     def _fill(self, target: np.ndarray, value: Any) -> None:
         names = target.dtype.names or ()
         if isinstance(value, dict):
-            for name, part in value.items():
-                self._fill(target[name], part)
+            for name, entry in value.items():
+                self._fill(target[name], entry)
         elif isinstance(value, tuple):
-            for name, part in zip(("diagonal", "off_diagonal"), value, strict=True):
-                _set_vector(target[name], self._lanes(part))
+            for name, entry in zip(("diagonal", "off_diagonal"), value, strict=True):
+                _set_vector(target[name], self._lanes(entry))
         elif names == ("x", "y", "z"):
             _set_vector(target, self._lanes(value))
         elif names:
@@ -190,35 +208,37 @@ class Packets:
             target[...] = self._lanes(value[:, None])[:, 0]
 
     def _laws(self, setting: Setting) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Params, table and memory: each term's numbers, one after the other."""
+        """Params, table and memory of the laws: each term's numbers, one after the other."""
         packed: list[Packed] = []
         for i, (term, module) in enumerate(self.plan.model.laws):
-            own = Ensemble.own(term, setting.parameters)
+            parameters = Ensemble.own(term, setting.parameters)
             if i == 0 and self.plan.spec.drag:
                 assert isinstance(term, Drag)
                 by_axes = module is LAWS["drag"]
                 exact = (
-                    term.packed_exact(own, self.frame, self.scale) if by_axes else term.packed_directions(own, setting)
+                    term.packed_exact(parameters, self.frame, self.scale)
+                    if by_axes
+                    else term.packed_directions(parameters, setting)
                 )
                 packed.append(exact)
             else:
-                packed.append(term.packed(own, setting))
+                packed.append(term.packed(parameters, setting))
         dtype = self.plan.dtypes[1]
-        varied = any(len(leaf) > 1 for one in packed for leaf in _leaves(one.values))
+        varied = any(len(leaf) > 1 for numbers in packed for leaf in _leaves(numbers.values))
         data = np.zeros(self.count if varied else 1, dtype)
         rows, memory = [np.zeros((1, 1))], [np.zeros((1, 0))]
         node: Any = data
-        for one in packed:
-            values = dict(one.values)
-            if one.rows is not None:
+        for numbers in packed:
+            values = dict(numbers.values)
+            if numbers.rows is not None:
                 values["first"] = sum(part.shape[1] for part in rows)
-                rows.append(one.rows)
-            if one.memory is not None:
+                rows.append(numbers.rows)
+            if numbers.memory is not None:
                 values["memory"] = sum(part.shape[1] for part in memory)
-                memory.append(one.memory)
-            if one.work:
+                memory.append(numbers.memory)
+            if numbers.work:
                 values["work"] = sum(part.shape[1] for part in memory)
-                memory.append(np.zeros((1, one.work)))
+                memory.append(np.zeros((1, numbers.work)))
             for key, value in values.items():
                 self._fill(node["own"][key], value)
             node = node["rest"]
@@ -227,7 +247,7 @@ class Packets:
             memory.append(np.zeros((1, 2 * len(self.plan.spec.gauss[1]) * SLOPE_FIELDS)))
         table = self._lanes(_side_by_side(rows))
         start = np.broadcast_to(_side_by_side(memory), (self.members.count, sum(m.shape[1] for m in memory)))
-        # The second half is the copy that a repeated chunk starts from.
+        # The second half is a backup, from which a chunk of steps is repeated.
         return data, table, np.concatenate([self._lanes_each(start)] * 2, axis=1)
 
     def _lanes_each(self, values: np.ndarray) -> np.ndarray:
@@ -235,12 +255,12 @@ class Packets:
         return pack(values, self.plan.spec.width).astype(DTYPES[self.plan.dtype])
 
     def _events(self, setting: Setting) -> np.ndarray:
-        packed = [one.packed(Ensemble.own(one, setting.parameters), setting) for one, _ in self.plan.model.events]
-        varied = any(len(leaf) > 1 for one in packed for leaf in _leaves(one.values))
+        packed = [event.packed(Ensemble.own(event, setting.parameters), setting) for event, _ in self.plan.model.events]
+        varied = any(len(leaf) > 1 for numbers in packed for leaf in _leaves(numbers.values))
         data = np.zeros(self.count if varied else 1, self.plan.dtypes[2])
         node: Any = data
-        for one in packed:
-            for key, value in one.values.items():
+        for numbers in packed:
+            for key, value in numbers.values.items():
                 self._fill(node["own"][key], value)
             node = node["rest"]
         return data
@@ -267,24 +287,40 @@ class Packets:
         return rows
 
     def _water_at_start(self) -> np.ndarray:
-        """R^T u (m, 3) [m/s], user's axes, where each member starts."""
+        """R^T u (m, 3) [m/s]: velocity of the water in the user's body axes where each member starts."""
         m = self.members
         setting = Setting(m.parameters, self.frame, m.indices, m.seed, self.plan.grid.h)
         total = np.zeros_like(m.position)
         for term, _ in self.plan.model.laws:
-            own = Ensemble.own(term, m.parameters)
-            total = total + term.water_at_start(own, m.position, setting)
+            parameters = Ensemble.own(term, m.parameters)
+            total = total + term.water_at_start(parameters, m.position, setting)
         return notation.rotate_into(m.attitude, total)
 
     def advance(self, k0: int, k1: int) -> np.ndarray:
-        """Make the steps k0 to k1. Returns the samples due then, (s1 - s0, packets * width, numbers of a sample)."""
+        """Make the steps from k0 to k1, and return the samples by member.
+
+        Args:
+            k0: number of steps made before.
+            k1: number of steps made after.
+
+        Returns:
+            Samples due after step k0 and no later than step k1: (samples, count * width, numbers of a sample), a copy.
+        """
         packed = self.launch(k0, k1)
         packets, samples, numbers, width = packed.shape
         return packed.transpose(1, 0, 3, 2).copy().reshape(samples, packets * width, numbers)
 
     def launch(self, k0: int, k1: int) -> np.ndarray:
-        """Make the steps k0 to k1. Returns the samples due then as the kernel has them, (packets, s1 - s0, numbers, width),
-        in memory that the next launch writes to again."""
+        """Make the steps from k0 to k1, and return the samples as the kernel wrote them.
+
+        Args:
+            k0: number of steps made before.
+            k1: number of steps made after.
+
+        Returns:
+            Samples due after step k0 and no later than step k1: (count, samples, numbers of a sample, width), in memory
+            that the next launch overwrites.
+        """
         plan = self.plan
         s0, s1 = plan.due(k0, k1)
         numbers = sum(plan.spec.sample_fields.values())
@@ -304,7 +340,11 @@ class Packets:
         return self.out.numpy()[:, : (s1 - s0) * numbers].reshape(self.count, s1 - s0, numbers, width)
 
     def outcome(self) -> Outcome:
-        """Status, steps made before the failure and the value that crossed its limit, of each member; warnings likewise."""
+        """The outcome of each member so far.
+
+        Returns:
+            Status, steps before the failure, value that crossed its limit, warnings and event of the m members.
+        """
         m = self.members.count
         kept = PACE_FIELDS if self.plan.method.adaptive else 0
         pace = self.state.numpy()[:, STATE_FIELDS + 2 : STATE_FIELDS + kept]
@@ -325,38 +365,45 @@ class Packets:
         )
 
     def ended(self) -> tuple[np.ndarray, np.ndarray]:
-        """Status of each member, and the last step after which it was its own."""
+        """Status of each member, and the last step of those it made itself.
+
+        Returns:
+            (status, step): both (m,); after that step a member that ended keeps its state.
+        """
         outcome = self.outcome()
         return outcome.status, outcome.failed_step
 
     def _of_members(self, lanes: Any, kind: Any) -> np.ndarray:
-        """One number of each member from an array of lanes."""
+        """One number of each member, from an array of lanes."""
         return np.asarray(lanes.numpy().reshape(-1)[: self.members.count].astype(kind))
 
     def _warnings(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(bits, step, value) of the start and of the kernel's looks: the more serious of the two, of equals the start's."""
+        """(bits, step, value) of the warnings at the start and of those the kernel noted.
+
+        Step and value are those of the more serious of the two; of two equals, those of the start.
+        """
         bits, value = self.warned
         step = np.zeros(len(bits), np.int64)
         if not self.plan.spec.looks:
             return bits, step, value if len(value) else np.full(len(bits), np.nan)
         monitor = self.monitor
-        seen = self._of_members(monitor.warned, np.uint16)
-        # More serious than all of the others: its highest bit is in none of them.
-        later = (seen & ~bits) > bits
+        noted = self._of_members(monitor.warned, np.uint16)
+        # The kernel's warning is more serious if its highest bit is above all bits of the start.
+        later = (noted & ~bits) > bits
         step = np.where(later, self._of_members(monitor.warned_step, np.int64), 0)
         value = np.where(later, np.sqrt(self._of_members(monitor.warned_size, np.float64)), value)
-        return bits | seen, step, value
+        return bits | noted, step, value
 
 
 def _leaves(fields: dict[str, Any]) -> list[np.ndarray]:
-    """The arrays of a term's numbers."""
+    """The arrays among a term's numbers, nested dicts and tuples flattened."""
     flat: list[np.ndarray] = []
     for value in fields.values():
         if isinstance(value, dict):
             flat += _leaves(value)
         else:
             flat += value if isinstance(value, tuple) else (value,)
-    return [part for part in flat if np.ndim(part) > 0]
+    return [array for array in flat if np.ndim(array) > 0]
 
 
 def _rows(values: np.ndarray, Lane: Any) -> Any:
@@ -367,8 +414,8 @@ def _rows(values: np.ndarray, Lane: Any) -> Any:
 def _structs(values: np.ndarray, struct: Any) -> Any:
     """A Warp array of structs from a structured array (n,) of the plan's type.
 
-    Not by wp.array(values), which lets NumPy read the struct's type from text: in several threads that fails now and then
-    (Python before 3.11.8 and 3.12.2, python/cpython#106905), and the run with it.
+    Copied byte by byte: wp.array(values) lets NumPy parse the struct's type from text, which in several threads
+    occasionally fails (Python before 3.11.8 and 3.12.2, python/cpython#106905) and would end the run.
     """
     array = wp.empty(len(values), dtype=struct, device="cpu")
     assert values.flags.c_contiguous and values.itemsize == ctypes.sizeof(struct.ctype)
@@ -377,6 +424,6 @@ def _structs(values: np.ndarray, struct: Any) -> Any:
 
 
 def _side_by_side(parts: list[np.ndarray]) -> np.ndarray:
-    """Rows (1 or n, d) joined along d."""
+    """Rows (1 or n, d) joined along d, those of one entry repeated n times."""
     n = max(len(part) for part in parts)
     return np.concatenate([np.broadcast_to(part, (n, part.shape[1])) for part in parts], axis=1)

@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""The peak arithmetic rate of one core, measured by a kernel of fused multiply-adds."""
 
 from __future__ import annotations
 
@@ -10,7 +10,17 @@ from lgvi_warp.common.machine import default_width
 
 
 def fma_peak(dtype: str = "float64", width: int | None = None, rounds: int = 5, loops: int = 1_000_000) -> float:
-    """Fused multiply-adds per second of one core [1/s], the best of several rounds of a loop of nothing else."""
+    """Measure how many fused multiply-adds one core makes per second.
+
+    Args:
+        dtype: "float64" (default) or "float32".
+        width: lanes of a packet; None (default) for what suits this machine's registers.
+        rounds: number of timed launches, of which the fastest counts (default 5).
+        loops: passes of the kernel's loop per launch (default 1,000,000).
+
+    Returns:
+        Fused multiply-adds per second of one core [1/s].
+    """
     import warp as wp
 
     from lgvi_kernels.peak import CHAINS, make_peak

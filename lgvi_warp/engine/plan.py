@@ -1,4 +1,4 @@
-"""From an ensemble to kernel launches: the kernel with only what the scene has, and packets of lanes for its blocks."""
+"""The plan of a run: the kernel that holds only what the scene needs, and the launches that make up the run."""
 
 from __future__ import annotations
 
@@ -35,18 +35,32 @@ from lgvi_warp.scene.ensemble import Ensemble
 # Sub-maps whose equation may have no solution.
 SOLVING = {"D", "W", "A", "Phi", "Phi*"}
 
-# One launch advances at most this many vehicle-steps and samples: so progress moves, an interrupt is heard, and the
-# buffer that samples pass through stays small, however long the run is.
+# Limits of one launch: they keep progress current, interrupts prompt and the sample buffer small in long runs.
 SEGMENT_VEHICLE_STEPS = 20_000_000
 SEGMENT_SAMPLE_BYTES = 16_000_000
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Everything decided before a run: which kernel, which width, which steps.
+    """All that is decided before a run: the kernel, the lanes of a packet, and the steps and samples.
 
-    Raises SceneError for a dtype, width, checks or on_failure that do not exist, and where the method cannot do what the
-    scene asks.
+    Args:
+        ensemble: the members.
+        method: the integration method.
+        grid: the steps and the sample times.
+        fields: names of the sample fields to keep; stored in the order of `SAMPLE_FIELDS`.
+        dtype: numbers of the kernel: "float64" (default), "float32" or "float32_compensated".
+        width: members of a packet, one a lane; None (default) for what suits this machine's registers.
+        checks: "safe" (default), "all" for warnings as well, or "none".
+        on_failure: "freeze" (default), "raise" or "substep".
+
+    Attributes:
+        model: the laws that act and the method's program for them.
+        spec: all that decides the kernel's source.
+        advance: the kernel and its types.
+
+    Raises:
+        SceneError: if dtype, width, checks or on_failure is none of these, or the method cannot do what the scene asks.
     """
 
     ensemble: Ensemble
@@ -60,7 +74,7 @@ class Plan:
     model: Model = field(init=False)
     spec: Spec = field(init=False)
     advance: Advance = field(init=False)
-    # The plan that it is a part of, its members and fields.
+    # Of a plan made by part(): the whole plan, the members and the fields.
     _whole: tuple[Plan, Sequence[int], Sequence[str]] | None = field(
         default=None, init=False, compare=False, repr=False
     )
@@ -75,19 +89,19 @@ class Plan:
         if self.checks == "none" and self.ensemble.scene.events:
             faults.add("checks", self.checks, "leaves events unseen", 'use checks="safe", or drop the events')
         if self.dtype == "float32_compensated" and (self.method.tableau or self.method.gauss or self.method.two_part):
-            what = f"sums up what a method of sub-maps changes, which {self.method.name} is not"
-            faults.add("dtype", self.dtype, what, "use float64, or psi_s, psi_x and their compositions")
+            problem = f"sums up what a method of sub-maps changes, which {self.method.name} is not"
+            faults.add("dtype", self.dtype, problem, "use float64, or psi_s, psi_x and their compositions")
         if self.checks == "none" and self.on_failure in ON_FAILURE[1:]:
-            what = f"leaves failures unseen, which on_failure={self.on_failure!r} waits for"
-            faults.add("checks", self.checks, what, 'use checks="safe", or on_failure="freeze"')
+            problem = f"leaves failures unseen, which on_failure={self.on_failure!r} waits for"
+            faults.add("checks", self.checks, problem, 'use checks="safe", or on_failure="freeze"')
         faults.raise_if_any()
         checked = self.checks != "none"
         model = make_model(self.ensemble, self.method, self.grid.h, LAWS, STOPS, checked)
         object.__setattr__(self, "model", model)
         self._check_substep()
         if self.width is None:
-            # The turns of psi_x follow one another; the implicit step V of damping laws fills the registers by itself, and so
-            # do compensated sums.
+            # Each turn of psi_x waits for the one before, so two registers pay; the implicit step V of damping laws and
+            # compensated sums fill the registers by themselves.
             full = "dense" in self.model.parts or self.dtype == "float32_compensated"
             chained = self.method.turns and not full
             object.__setattr__(self, "width", default_width(self.dtype, chained=chained))
@@ -121,29 +135,45 @@ class Plan:
         faults.raise_if_any()
 
     def with_neighbours(self, indices: np.ndarray) -> np.ndarray:
-        """(m,), these members, and where packets choose their steps the others of their packets: their bits hang on them."""
+        """The members whose run gives these members the bits of the whole run.
+
+        Adaptive steps are chosen for a whole packet, so a member's bits depend on the others of its packet.
+
+        Args:
+            indices: (m,), indices of members.
+
+        Returns:
+            Indices of these members, and for adaptive steps of all members of their packets, in rising order.
+        """
         if not self.method.adaptive:
             return indices
         width = self.spec.width
-        found = np.unique(indices // width)[:, None] * width + np.arange(width)
-        return found[found < self.ensemble.members]
+        lanes = np.unique(indices // width)[:, None] * width + np.arange(width)
+        return lanes[lanes < self.ensemble.members]
 
     def part(self, indices: Sequence[int], fields: Sequence[str]) -> Plan:
-        """The plan for these members alone, whose samples have these fields; all that was chosen for the whole stays.
+        """The plan for some of the members, with all choices made for the whole ensemble.
 
-        So its members' bits are those of the whole, for methods whose packets do not choose their steps.
+        The members' bits are therefore those of the whole run, unless steps are adaptive (see `with_neighbours`).
+
+        Args:
+            indices: (m,), indices of the members.
+            fields: names of the sample fields to keep.
+
+        Returns:
+            A plan for m members.
         """
-        part = copy.copy(self)
+        subplan = copy.copy(self)
         for name in ("dtypes", "times"):
-            part.__dict__.pop(name, None)
-        object.__setattr__(part, "ensemble", self.ensemble.subset(indices))
-        object.__setattr__(part, "fields", tuple(name for name in SAMPLE_FIELDS if name in fields))
-        part._choose_kernel()
-        object.__setattr__(part, "_whole", (self, indices, fields))
-        return part
+            subplan.__dict__.pop(name, None)
+        object.__setattr__(subplan, "ensemble", self.ensemble.subset(indices))
+        object.__setattr__(subplan, "fields", tuple(name for name in SAMPLE_FIELDS if name in fields))
+        subplan._choose_kernel()
+        object.__setattr__(subplan, "_whole", (self, indices, fields))
+        return subplan
 
     def _sampled(self) -> tuple[str, ...]:
-        """The fields that samples hold: those asked for, and what they are made of where the origin is moved."""
+        """The fields that the kernel writes: those kept, and those needed to move them back to the user's origin."""
         needed = set(self.fields)
         if self.model.moved:
             needed |= {"attitude"} if "position" in needed else set()
@@ -199,36 +229,57 @@ class Plan:
 
     @contextlib.contextmanager
     def _laws_compile(self) -> Iterator[None]:
-        """Where a scene has laws of a user, what does not compile is theirs. Raises SceneError for it."""
+        """Turn an exception raised while a user's law compiles into a SceneError that names the law."""
         try:
             yield
         except OSError:  # of the kernel cache
             raise
         except Exception as error:
             known = (*LAWS.values(), *STOPS.values())
-            own = [term.key for term, module in (*self.model.laws, *self.model.events) if module not in known]
-            if not own:
+            user_laws = [term.key for term, module in (*self.model.laws, *self.model.events) if module not in known]
+            if not user_laws:
                 raise
-            what = f"one of them does not compile ({type(error).__name__}: {error})"
+            problem = f"one of them does not compile ({type(error).__name__}: {error})"
             raise SceneError(
-                [f"law {', '.join(own)}: {what}; lw.check_law(term) says where, docs/add_a_law.md how"]
+                [f"law {', '.join(user_laws)}: {problem}; lw.check_law(term) says where, docs/add_a_law.md how"]
             ) from error
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Made again from its settings: kernels cannot be sent, and are found in Warp's cache."""
+        """Pickle the settings alone: a kernel cannot be pickled, and the other process finds it in Warp's cache."""
         if self._whole:
-            # Of its members alone another kernel may be enough.
+            # Made anew from these members alone, the plan might choose another kernel.
             return Plan.part, self._whole
-        own = (self.ensemble, self.method, self.grid, self.fields, self.dtype, self.width, self.checks, self.on_failure)
-        return Plan, own
+        settings = (
+            self.ensemble,
+            self.method,
+            self.grid,
+            self.fields,
+            self.dtype,
+            self.width,
+            self.checks,
+            self.on_failure,
+        )
+        return Plan, settings
 
     @property
     def kernel_hash(self) -> str:
-        """What Warp's cache knows the kernel by: its source, its constants and the options of the compiler."""
+        """Hash of the kernel in Warp's cache: of its source, its constants and the compiler's options.
+
+        Returns:
+            Hexadecimal digits.
+        """
         return str(self.advance.kernel.module.get_module_hash().hex())
 
     def compile(self) -> float:
-        """Load the kernel, compiling it if Warp's cache has none. Returns the seconds it took."""
+        """Load the kernel, and compile it first if Warp's cache has none.
+
+        Returns:
+            How long it took [s].
+
+        Raises:
+            SceneError: if the device code of a user's law does not compile.
+            OSError: if the kernel cache cannot be written.
+        """
         start = time.perf_counter()
         with self._laws_compile():
             kernel_cache.load(self.advance.kernel.module)
@@ -237,25 +288,30 @@ class Plan:
 
     @functools.cached_property
     def dtypes(self) -> tuple[np.dtype, ...]:
-        """NumPy's types of the kernel's Inertia, Params, Events and Limits."""
+        """NumPy dtypes of the kernel's structs Inertia, Params, Events and Limits, in this order."""
         types = (
             self.advance.types.Inertia,
             self.advance.types.Params,
             self.advance.types.Events,
             self.advance.types.Limits,
         )
-        return tuple(np.dtype(one.numpy_dtype()) for one in types)
+        return tuple(np.dtype(struct.numpy_dtype()) for struct in types)
 
     @functools.cached_property
     def lengths(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Of the stages and of the leads, in steps."""
+        """Lengths of the stages and of the leads, in units of the step h [1]."""
         lead = self.model.lead
         return self.method.lengths(lead[1] if lead else None)
 
     @functools.cached_property
     def times(self) -> tuple[Any, Any, Any]:
-        """Kernel arguments that all blocks share: stage_h, lead_h and sample_step."""
-        stages, leads = (np.array(one) * self.grid.h for one in self.lengths)
+        """Kernel arguments that all blocks share.
+
+        Returns:
+            (stage_h, lead_h, sample_step): lengths of stages and leads [s], and the numbers of steps after which samples
+            are due.
+        """
+        stages, leads = (np.array(fractions) * self.grid.h for fractions in self.lengths)
         due = np.append(self.grid.sample_steps, 2**31 - 1).astype(np.int32)
         return (
             wp.array(stages, dtype=self.spec.real, device="cpu"),
@@ -264,12 +320,27 @@ class Plan:
         )
 
     def due(self, k0: int, k1: int) -> tuple[int, int]:
-        """(s0, s1): the samples s0 to s1 fall due after step k0 and up to step k1."""
+        """Which samples fall due in a launch.
+
+        Args:
+            k0: number of steps made before the launch.
+            k1: number of steps made after it.
+
+        Returns:
+            (s0, s1): samples s0 to s1 - 1 are due after step k0 and no later than step k1.
+        """
         s0, s1 = np.searchsorted(self.grid.sample_steps, (k0, k1), side="right")
         return int(s0), int(s1)
 
     def segments(self, count: int) -> Iterator[tuple[int, int]]:
-        """(k0, k1): launches from step k0 to step k1, for a block of `count` members."""
+        """The launches of a block: each is short enough to be interrupted, and its samples fit into a small buffer.
+
+        Args:
+            count: number of members of the block.
+
+        Yields:
+            (k0, k1): a launch makes the steps from k0 to k1.
+        """
         due = self.grid.sample_steps
         per_sample = sum(self.spec.sample_fields.values()) * count * np.dtype(DTYPES[self.dtype]).itemsize
         most_samples = max(1, SEGMENT_SAMPLE_BYTES // max(per_sample, 1))

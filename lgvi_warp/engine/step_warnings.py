@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""Warnings about the step: which the kernel watches for, their limits, and those that a member's start gives."""
 
 from __future__ import annotations
 
@@ -18,54 +18,62 @@ if TYPE_CHECKING:
 
 
 class Watched(Protocol):
-    """What is asked of a plan: see Plan, which has it."""
+    """The attributes of a plan that warnings need; `Plan` has them."""
 
     @property
     def method(self) -> Method:
-        """The method."""
+        """The integration method of the run."""
 
     @property
     def grid(self) -> TimeGrid:
-        """Steps and samples."""
+        """The steps and the sample times."""
 
     @property
     def dtype(self) -> str:
-        """Of the kernel."""
+        """The kernel's numbers, such as "float64"."""
 
     @property
     def model(self) -> Any:
-        """What the kernel contains."""
+        """The laws that act and the method's program (see `Model`)."""
 
     @property
     def spec(self) -> Any:
-        """What decides the kernel's code."""
+        """All that decides the kernel's source (see `Spec`)."""
 
 
-# h w beyond which an oscillation is coarsely resolved, in the longest stage.
+# h w above which an oscillation is coarsely resolved, h being the length of the longest stage [1].
 COARSE = 0.5
 
 
-# Largest h (l + 2 q|v|) / I of drag that is treated explicitly.
+# Largest drag number h (l + 2 q|v|) / I of drag that is treated explicitly [1].
 DRAG_NUMBER = 1.0
 
 
-# Least part of a step's way that the spacing of numbers at the position may be.
+# Largest spacing of floating-point numbers at the position, as a fraction of the distance covered in a step [1].
 PRECISION = 0.05
 
 
+# Largest |R^T R - I|, by dtype [1].
 ORTHOGONAL = {"float64": 1e-10, "float32": 1e-4}
 
 
-# The same of methods whose R leaves the rotations by their error: there it says no more than that.
+# The same for methods whose R departs from a rotation by their own truncation error.
 ORTHOGONAL_TO_ERROR = 1e-3
 
 
-# Energy created over what there was to exchange.
+# Largest energy gained, as a fraction of the energy available for exchange [1].
 ENERGY = 0.5
 
 
 def watched(plan: Watched) -> tuple[str, ...]:
-    """The rows of lgvi_kernels.monitor that a run with checks="all" looks at: those that its method and scene can cross."""
+    """The warnings that a kernel with checks="all" looks for: those that its method and scene can give.
+
+    Args:
+        plan: the plan of the run.
+
+    Returns:
+        Names of rows of lgvi_kernels.monitor, the least serious first.
+    """
     method, model = plan.method, plan.model
     rows = ["precision"] * (plan.dtype == "float32") + ["orthogonality"]
     if not method.adaptive:
@@ -79,14 +87,28 @@ def watched(plan: Watched) -> tuple[str, ...]:
 
 
 def orthogonality_limit(plan: Watched) -> float:
-    """Of |R^T R - I|."""
+    """The largest |R^T R - I| that gives no warning.
+
+    Args:
+        plan: the plan of the run.
+
+    Returns:
+        The limit [1]: looser for methods whose R leaves the rotations by their own error.
+    """
     if plan.spec.explicit is not None and plan.spec.explicit.kind in ("vector", "inertial"):
         return ORTHOGONAL_TO_ERROR
     return ORTHOGONAL["float64" if plan.dtype == "float64" else "float32"]
 
 
 def row_limits(plan: Watched) -> dict[str, float]:
-    """The limit of each row that is watched."""
+    """The limit of each watched row.
+
+    Args:
+        plan: the plan of the run.
+
+    Returns:
+        Limits by row, in the row's unit.
+    """
     method = plan.method
     known = {
         "precision": PRECISION,
@@ -101,15 +123,29 @@ def row_limits(plan: Watched) -> dict[str, float]:
 
 
 def munk_factor(frame: Frame) -> np.ndarray:
-    """(1 or n,) [1/(kg^2 m^2)]: w^2 of the Munk moment's fastest oscillation, per |p|^2."""
+    """Squared frequency of the fastest oscillation that the Munk moment causes, per |p|^2.
+
+    Args:
+        frame: mass matrix and inertia of 1 or n members.
+
+    Returns:
+        (1 or n,) [1/(kg^2 m^2)].
+    """
     M = np.linalg.eigvalsh(frame.M) if np.any(frame.M[:, ~np.eye(3, dtype=bool)]) else np.einsum("nii->ni", frame.M)
     return np.asarray((1.0 / M.min(axis=1) - 1.0 / M.max(axis=1)) / frame.J.min(axis=1))
 
 
 def at_start(plan: Watched, members: Members, frame: Frame, momentum: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(bits, value) of every member (m,): warnings that its numbers and its start give, and the most serious one's value.
+    """The warnings that follow from the members' numbers and starts.
 
-    momentum: (m, 3) [N s], linear, relative to the water.
+    Args:
+        plan: the plan of the run.
+        members: the m members.
+        frame: axes, origins and inertia that the kernel works in.
+        momentum: (m, 3) [N s], linear momentum relative to the water.
+
+    Returns:
+        (bits, value), both (m,): bits of `Warnings`, and the value of the most serious one; NaN for none.
     """
     m, h, method = members.count, plan.grid.h, plan.method
     bits, value = np.zeros(m, np.uint16), np.full(m, np.nan)

@@ -1,4 +1,4 @@
-"""What the numbers of all members ask of a kernel, looked at so many members at a time that memory stays small."""
+"""A survey of all members: what their numbers require of a kernel, read in slices so that memory use stays small."""
 
 from __future__ import annotations
 
@@ -19,19 +19,26 @@ from lgvi_warp.scene.plausibility import of_numbers
 
 Parameters = Mapping[str, np.ndarray]
 
-# Off-diagonal elements below this fraction of the largest element are the round-off of turning the axes.
+# Off-diagonal elements below this fraction of the largest element are round-off from turning the axes.
 DIAGONAL = 1e-14
-# A coupling norm below this is the round-off of moving the origin.
+# A coupling norm below this is round-off from moving the origin.
 UNCOUPLED = 1e-9
 
-# By rank: a kernel for one does for those before it.
+# By rank: a kernel for one shape also serves those before it.
 SHAPES_OF_MASS = ("isotropic", "diagonal", "full")
-# Which of the matrix U of psi_x a kernel may have.
+# Entries of the matrix U of psi_x that a kernel may hold.
 COUPLINGS = ((0, 1), (0, 2), (1, 2), (0, 0), (1, 1), (2, 2))
 
 
 def shape_of_mass(M: np.ndarray) -> str:
-    """ "isotropic", "diagonal" or "full": the simplest that holds every matrix of M (n, 3, 3)."""
+    """The simplest shape that fits every mass matrix.
+
+    Args:
+        M: (n, 3, 3) [kg], mass matrices.
+
+    Returns:
+        "isotropic", "diagonal" or "full".
+    """
     off = np.abs(M[:, ~np.eye(3, dtype=bool)]).max(axis=1)
     diagonal = np.einsum("nii->ni", M)
     if np.any(off > DIAGONAL * np.abs(diagonal).max(axis=1)):
@@ -40,38 +47,57 @@ def shape_of_mass(M: np.ndarray) -> str:
 
 
 def frame_of(method: Method, parameters: Parameters) -> tuple[Frame, np.ndarray, np.ndarray]:
-    """The frame that the method wants, U (n, 3, 3) of the turns (zero without), and the coupling (n,) that it cannot have."""
+    """The axes and origins that a method works in.
+
+    Args:
+        method: the integration method.
+        parameters: parameters of n members by name.
+
+    Returns:
+        (frame, U, coupling): the frame; U (n, 3, 3) of the turns of psi_x, zero for other methods; and the coupling
+        norm (n,) that is left in this frame and that the method cannot treat.
+    """
     I6 = vehicle.inertia6(parameters)
-    left = np.zeros(len(I6))
+    coupling = np.zeros(len(I6))
     if method.turns:
-        return *inertia.turns_frame(I6, middle_axis(method.program)), left
+        return *inertia.turns_frame(I6, middle_axis(method.program)), coupling
     if method.base == "psi_w":
         frame = inertia.symmetric_frame(I6)
     elif method.tableau:
         frame = _explicit_frame(I6)
     else:
-        frame, left = inertia.uncoupled_frame(I6)
-    return frame, np.zeros_like(frame.M), left
+        frame, coupling = inertia.uncoupled_frame(I6)
+    return frame, np.zeros_like(frame.M), coupling
 
 
 def _explicit_frame(I6: np.ndarray) -> Frame:
-    """Where E is symmetric, so that a vehicle without coupling has none in the kernel."""
+    """The frame about the origin where E is symmetric, with E set to zero for members without coupling."""
     frame = inertia.symmetric_frame(I6)
-    left = inertia.uncoupled_frame(I6)[1]
-    E = np.where(left[:, None, None] > UNCOUPLED, frame.E, 0.0)
+    coupling = inertia.uncoupled_frame(I6)[1]
+    E = np.where(coupling[:, None, None] > UNCOUPLED, frame.E, 0.0)
     return replace(frame, E=E, E_forces=E)
 
 
 @dataclass(frozen=True)
 class Survey:
-    """What is so for some member of a run, and largest values.
+    """What holds for at least one member, and the largest values.
 
-    turned: axes that are not the user's, or forces about another origin (see Setting.aligned); bent: no exact flow of drag
-    along the kernel's axes; mass: rank among SHAPES_OF_MASS; coupled: velocities and rates; moved, forces_moved: the
-    origins of the state and of the forces are not the user's; apart: nor the same; couplings: indices among COUPLINGS of
-    what U has; left: the largest coupling norm that the method cannot have.
-    felt: keys of the terms; drag: parts of the exact flow; rising: keys of currents with a vertical velocity.
-    weightless: no gravity; buoyant: buoyancy. odd: what is, of the members' numbers.
+    Attributes:
+        turned: axes other than the user's, or forces about another origin (see `Setting.aligned`).
+        bent: drag has no exact flow along the kernel's axes.
+        mass: rank of the mass matrix among SHAPES_OF_MASS.
+        coupled: velocities and angular velocities are coupled.
+        moved: the origin of the state is not the user's.
+        forces_moved: the origin of the forces is not the user's.
+        apart: the two origins differ.
+        couplings: indices among COUPLINGS of the non-zero entries of U.
+        left: largest coupling norm that the method cannot treat.
+        felt: keys of the terms that act.
+        drag: parts of the exact flow of drag.
+        rising: keys of currents with a vertical velocity.
+        weightless: gravity is zero.
+        buoyant: buoyancy is not zero.
+        odd: what is odd about the members' numbers.
     """
 
     turned: bool
@@ -91,16 +117,32 @@ class Survey:
     odd: Oddities
 
     def joined(self, other: Survey) -> Survey:
-        """Of the members of both."""
+        """The survey of the members of both.
+
+        Args:
+            other: survey of other members.
+
+        Returns:
+            The joint survey.
+        """
         pairs = zip(vars(self).values(), vars(other).values(), strict=True)
         return Survey(*(a | b if isinstance(a, frozenset | Oddities) else max(a, b) for a, b in pairs))
 
 
 def survey(ensemble: Ensemble, method: Method, h: float) -> Survey:
-    """Look at all members; at one alone where no number of the vehicle, the water or the laws varies."""
+    """Look at all members, or at one alone where no number of the vehicle, the water or the laws varies.
+
+    Args:
+        ensemble: the members.
+        method: the integration method.
+        h: step [s].
+
+    Returns:
+        What holds for at least one member, and the largest values.
+    """
 
     def look(first: int, stop: int) -> Survey:
-        # A member too large for its arithmetic gets its status, or its fault, elsewhere; NumPy need not remark.
+        # Members that overflow get their status, or their fault, elsewhere: no warning from NumPy.
         with np.errstate(over="ignore", invalid="ignore"):
             return _look(ensemble, method, h, first, stop)
 
@@ -109,10 +151,10 @@ def survey(ensemble: Ensemble, method: Method, h: float) -> Survey:
 
 def _look(ensemble: Ensemble, method: Method, h: float, first: int, stop: int) -> Survey:
     p = ensemble.parameters(first, stop)
-    frame, U, left = frame_of(method, p)
+    frame, U, coupling = frame_of(method, p)
     setting = Setting(p, frame, ensemble.indices_of(first, stop), ensemble.seed, h, frame.aligned)
     implied = {t.key for t in terms.IMPLIED if any(np.any(v) for v in t.packed({}, setting).values.values())}
-    own = {term.key: (term, ensemble.own(term, p)) for term in ensemble.scene.terms}
+    terms_and_numbers = {term.key: (term, ensemble.own(term, p)) for term in ensemble.scene.terms}
     return Survey(
         turned=not frame.aligned,
         bent=not has_exact_flow(frame),
@@ -122,13 +164,18 @@ def _look(ensemble: Ensemble, method: Method, h: float, first: int, stop: int) -
         forces_moved=bool(np.any(frame.forces)),
         apart=bool(np.any(frame.origin != frame.forces)),
         couplings=frozenset(i for i, at in enumerate(COUPLINGS) if np.any(U[:, *at])),
-        left=float(left.max()),
-        felt=frozenset(implied | {key for key, (term, numbers) in own.items() if term.present(numbers)}),
+        left=float(coupling.max()),
+        felt=frozenset(implied | {key for key, (term, numbers) in terms_and_numbers.items() if term.present(numbers)}),
         drag=frozenset(
-            part for term, numbers in own.values() if isinstance(term, Drag) for part in term.parts(numbers)
+            part
+            for term, numbers in terms_and_numbers.values()
+            if isinstance(term, Drag)
+            for part in term.parts(numbers)
         ),
         rising=frozenset(
-            key for key, (term, numbers) in own.items() if term.type == "current" and np.any(numbers["velocity"][:, 2])
+            key
+            for key, (term, numbers) in terms_and_numbers.items()
+            if term.type == "current" and np.any(numbers["velocity"][:, 2])
         ),
         weightless=bool(np.any(p["environment.gravity"] == 0.0)),
         buoyant=bool(np.any(p["vehicle.buoyancy"])),

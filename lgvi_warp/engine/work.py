@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""The work on one block: advance its members through all steps and hand their samples to the keepers."""
 
 from __future__ import annotations
 
@@ -22,12 +22,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Work:
-    """What executors do to each block: advance it, and put it into the store if there is one. Can be pickled.
+    """What an executor does with each block: advance it, and write it to the store if there is one.
 
-    sink: the store. Called with a block, it returns what each keeper closed with, or None if it was halted; a block that
-    the store has is not run again. A copy in another process returns when its block is durable; in the run's own process
-    the run waits at its end for the blocks that are not durable yet.
-    advanced: called with the vehicle-steps made of this block so far.
+    It can be pickled. Calling it with a block returns what each keeper closed with, or None if the block was halted. A
+    block that the store already holds is not run again. A copy in another process returns once its block is durable; in
+    the run's own process the run waits at its end for blocks that are not durable yet.
+
+    Args:
+        plan: the plan of the run.
+        keepers: what is kept of the members.
+        sink: the store; None (default) for none.
     """
 
     plan: Plan
@@ -40,24 +44,33 @@ class Work:
         halted: Callable[[], bool] = lambda: False,
         advanced: Callable[[int], None] = lambda vehicle_steps: None,
     ) -> tuple[Any, ...] | None:
-        """Do the work of one block."""
-        made = 0
+        """Advance one block, or take it from the store.
+
+        Args:
+            block: the block.
+            halted: asked before each launch whether to give up (default: never).
+            advanced: called with the vehicle-steps made of this block so far (default: nothing).
+
+        Returns:
+            What each keeper closed with; None if the block was halted.
+        """
+        steps_made = 0
 
         def add(vehicle_steps: int) -> None:
-            nonlocal made
-            made += vehicle_steps
-            advanced(made)
+            nonlocal steps_made
+            steps_made += vehicle_steps
+            advanced(steps_made)
 
         if self.sink is None:
             return run_block(self.plan, block, self.keepers, halted, add)
-        there = self.sink.parts(block, self.keepers)
-        if there is not None:
-            return there
-        parts = run_block(self.plan, block, (*self.keepers, self.sink), halted, add)
-        if parts is None:
+        stored = self.sink.parts(block, self.keepers)
+        if stored is not None:
+            return stored
+        results = run_block(self.plan, block, (*self.keepers, self.sink), halted, add)
+        if results is None:
             return None
-        self.sink.finish(block, parts[-1], self.keepers, parts[:-1])
-        return parts[:-1]
+        self.sink.finish(block, results[-1], self.keepers, results[:-1])
+        return results[:-1]
 
 
 def run_block(
@@ -67,83 +80,123 @@ def run_block(
     halted: Callable[[], bool] = lambda: False,
     advanced: Callable[[int], None] = lambda vehicle_steps: None,
 ) -> tuple[Any, ...] | None:
-    """Advance a block through all steps. Returns what each keeper closed with; None if it was halted before the end.
+    """Advance a block through all steps.
 
-    advanced: called with the vehicle-steps made since the last call.
+    Args:
+        plan: the plan of the run.
+        block: the block.
+        keepers: what is kept of the members.
+        halted: asked before each launch whether to give up (default: never).
+        advanced: called with the vehicle-steps made since the last call (default: nothing).
+
+    Returns:
+        What each keeper closed with; None if the block was halted before the end.
     """
     from lgvi_warp.engine.packets import Packets
 
-    # A member that is not finite, or not within float32, gets its status from the kernel; NumPy need not remark.
+    # Members that are not finite, or exceed float32, get their status from the kernel: no warning from NumPy.
     with np.errstate(invalid="ignore", over="ignore"):
         members = plan.ensemble.select(block.first, block.stop)
         packets = Packets(plan, members)
-        kept = [keeper.open(plan, block, members) for keeper in keepers]
-        for one in kept:
-            one.take(slice(0, 1), samples_of(plan, slice(0, 1), at_start(plan, members), packets.ended))
+        block_keepers = [keeper.open(plan, block, members) for keeper in keepers]
+        for block_keeper in block_keepers:
+            block_keeper.take(slice(0, 1), samples_of(plan, slice(0, 1), at_start(plan, members), packets.ended))
         for k0, k1 in plan.segments(block.count):
             if halted():
                 return None
             raw = packets.advance(k0, k1)[:, : block.count]
             when = slice(*plan.due(k0, k1))
-            if when.start < when.stop and kept:
-                found = unpacked(plan.spec.sample_fields, raw, packets.frame)
-                samples = samples_of(plan, when, {name: found[name] for name in plan.fields}, packets.ended)
-                for one in kept:
-                    one.take(when, samples)
+            if when.start < when.stop and block_keepers:
+                values = unpacked(plan.spec.sample_fields, raw, packets.frame)
+                samples = samples_of(plan, when, {name: values[name] for name in plan.fields}, packets.ended)
+                for block_keeper in block_keepers:
+                    block_keeper.take(when, samples)
             advanced(block.count * (k1 - k0))
         outcome = packets.outcome()
-        return tuple(one.close(outcome) for one in kept)
+        return tuple(block_keeper.close(outcome) for block_keeper in block_keepers)
 
 
 def at_start(plan: Plan, members: Members) -> dict[str, np.ndarray]:
-    """The samples at t = 0, of the type of those that follow."""
+    """The samples at t = 0, in the dtype of those that follow.
+
+    Args:
+        plan: the plan of the run.
+        members: the m members.
+
+    Returns:
+        By field: (1, m, ...), in the field's unit.
+    """
     real = np.dtype(DTYPES[plan.dtype])
     types = {"position": np.dtype(np.float64)} if plan.spec.compensated else {}
     return {name: getattr(members, name)[None].astype(types.get(name, real), copy=False) for name in plan.fields}
 
 
 def in_order(runs: Sequence[Block], done: Iterable[tuple[Block, Any]]) -> Iterator[tuple[Block, Any]]:
-    """Blocks that finish in any order, in theirs."""
+    """Put blocks that finish in any order into their own order.
+
+    Args:
+        runs: the blocks, in order.
+        done: blocks with their results, as they finish.
+
+    Yields:
+        The same pairs, in the order of `runs`.
+    """
     waiting: dict[int, Any] = {}
-    place = 0
+    position = 0
     for block, value in done:
         waiting[block.first] = value
-        while place < len(runs) and runs[place].first in waiting:
-            yield runs[place], waiting.pop(runs[place].first)
-            place += 1
+        while position < len(runs) and runs[position].first in waiting:
+            yield runs[position], waiting.pop(runs[position].first)
+            position += 1
 
 
 def unpacked(fields: Mapping[str, int], raw: np.ndarray, frame: Frame) -> dict[str, np.ndarray]:
-    """Raw samples (samples, members, numbers) as fields, from the kernel's origin and axes to the user's.
+    """Convert the kernel's raw samples to fields, from the kernel's origin and axes to the user's.
 
-    fields: numbers of each field; twice as many as it has for a sum of two numbers, which is made in float64.
+    Args:
+        fields: numbers of each field in a raw sample; twice the field's own for pairs that are summed in float64.
+        raw: (samples, members, numbers), as `Packets.advance` returns them.
+        frame: the kernel's axes and origins.
+
+    Returns:
+        By field: (samples, members, ...), in the field's unit.
     """
-    parts: dict[str, np.ndarray] = {}
+    samples: dict[str, np.ndarray] = {}
     column = 0
     for name, size in fields.items():
         shape = SHAPES[name]
         values = raw[..., column : column + size]
         if size == 2 * int(np.prod(shape)):
             values = np.add(*np.split(values, 2, axis=-1), dtype=np.float64)
-        parts[name] = values.reshape(*raw.shape[:2], *shape)
+        samples[name] = values.reshape(*raw.shape[:2], *shape)
         column += size
     if not np.array_equal(frame.Q, np.broadcast_to(np.eye(3), frame.Q.shape)):
         turns = {"attitude": lambda R: R @ np.swapaxes(frame.Q, -1, -2)}
-        for name in parts.keys() - {"position"}:
+        for name in samples.keys() - {"position"}:
             turn = turns.get(name, lambda v: notation.rotate_out(frame.Q, v))
-            parts[name] = turn(parts[name])
+            samples[name] = turn(samples[name])
     if np.any(frame.origin):
         o = np.broadcast_to(frame.origin, (raw.shape[1], 3))
-        if "position" in parts:
-            parts["position"] = parts["position"] - np.einsum("knij,nj->kni", parts["attitude"], o)
-        if "velocity" in parts:
-            parts["velocity"] = parts["velocity"] - np.cross(parts["angular_velocity"], o)
-    return parts
+        if "position" in samples:
+            samples["position"] = samples["position"] - np.einsum("knij,nj->kni", samples["attitude"], o)
+        if "velocity" in samples:
+            samples["velocity"] = samples["velocity"] - np.cross(samples["angular_velocity"], o)
+    return samples
 
 
 def samples_of(
     plan: Plan, when: slice, fields: Mapping[str, np.ndarray], ends: Callable[[], tuple[np.ndarray, np.ndarray]]
 ) -> Fields:
-    """Samples `when` of a block of this plan; ends: see Fields."""
+    """Fields of a block with the times, steps and terms that belong to them.
+
+    Args:
+        plan: the plan of the run.
+        when: slice of the sample times.
+        fields: values by field, (times, members, ...).
+        ends: returns status and last own step of each member (see `Fields`).
+
+    Returns:
+        The samples as keepers receive them.
+    """
     grid = plan.grid
     return Fields(fields, grid.times[when], grid.sample_steps[when], plan.ensemble.scene.terms, ends)

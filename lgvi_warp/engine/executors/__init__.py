@@ -1,4 +1,4 @@
-"""Where blocks run: threads of this process, processes of this machine, or workers of a Dask cluster."""
+"""Executors: where blocks run, in threads of this process, processes of this machine, or workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -17,7 +17,12 @@ MOST_THREADS = 100_000
 
 
 def check_threads(faults: Faults, threads: Any) -> None:
-    """Note what is wrong with a number of threads."""
+    """Add a fault where a number of threads is not a whole number from 1 to MOST_THREADS.
+
+    Args:
+        faults: the list that faults are added to.
+        threads: the number to check; None stands for all cores.
+    """
     if threads is None:
         return
     remedy = "give 1 or more, or leave it out for all cores"
@@ -28,10 +33,18 @@ def check_threads(faults: Faults, threads: Any) -> None:
 
 
 def executor_of(given: Any, threads: int | None = None, scheduler: str | None = None) -> Executor:
-    """The executor that a name stands for, with so many threads (default: all cores), or the one given.
+    """The executor that a name stands for, or the executor itself where an object is given.
 
-    scheduler: the address of a Dask scheduler; without one, "dask" starts a cluster on this machine.
-    Raises SceneError, also where no scheduler answers.
+    Args:
+        given: "threads", "processes", "dask", or an object with a method `run` as `Executor` has it.
+        threads: number of threads, processes or workers; None (default) for all cores.
+        scheduler: address of a Dask scheduler; without one (default), "dask" starts a cluster on this machine.
+
+    Returns:
+        An executor, ready to run blocks.
+
+    Raises:
+        SceneError: if the name is not known, an argument does not fit the executor, or no scheduler answers.
     """
     faults = Faults()
     check_threads(faults, threads)
@@ -40,8 +53,8 @@ def executor_of(given: Any, threads: int | None = None, scheduler: str | None = 
     if scheduler is not None and given != "dask":
         faults.add("scheduler", scheduler, "is for the executor dask alone", 'give executor="dask", or leave it out')
     if given in STARTING and scheduler is None and multiprocessing.current_process().daemon:
-        what = "starts processes, which a worker of multiprocessing or Celery may not"
-        faults.add("executor", given, what, 'use executor="threads" in it, or run outside of it')
+        problem = "starts processes, which a worker of multiprocessing or Celery may not"
+        faults.add("executor", given, problem, 'use executor="threads" in it, or run outside of it')
     faults.raise_if_any()
     if isinstance(given, Executor):
         return given

@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""What executors share: their protocol, and how work travels to other processes."""
 
 from __future__ import annotations
 
@@ -13,25 +13,38 @@ from lgvi_warp.common.errors import SceneError
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.work import Work
 
-# Called with a block and the vehicle-steps made of it so far, from any thread.
+# Progress callback: takes a block and the vehicle-steps made of it so far, from any thread.
 Advanced = Callable[[Block, int], None]
 
 
-# A block whose worker died this many times is not tried again: the block itself may be what kills them.
+# A block whose worker died this many times is not tried again: the block itself may be the cause.
 MOST_DEATHS = 3
 
 
 @runtime_checkable
 class Executor(Protocol):
-    """Runs blocks, in any order and anywhere: the bits do not depend on it."""
+    """Runs blocks in any order and anywhere; results do not depend on it."""
 
     def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
-        """Do the work of every block; each block and its result, as they are done. Closing it ends what still runs."""
+        """Do the work of every block; closing the generator ends what still runs.
+
+        Args:
+            work: what is done with each block.
+            blocks: the blocks.
+            advanced: called with a block and the vehicle-steps made of it so far, from any thread.
+
+        Yields:
+            Each block and its result, as it finishes.
+        """
 
 
 @contextlib.contextmanager
 def deaf() -> Iterator[None]:
-    """Processes that are started inside leave what a terminal sends to all of them to this one, from their first moment."""
+    """Let processes started inside ignore interrupts from the terminal, from their first moment on.
+
+    Returns:
+        A context manager.
+    """
     before: dict[int, Any] = {}
     try:
         for number in (getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(signal, name)):
@@ -47,7 +60,18 @@ def deaf() -> Iterator[None]:
 
 
 def sent(work: Work, name: str) -> bytes:
-    """The work as bytes for another process. Raises SceneError naming what cannot be sent, and why."""
+    """Pickle the work for another process.
+
+    Args:
+        work: what is done with each block.
+        name: name of the executor, for messages.
+
+    Returns:
+        The pickled work.
+
+    Raises:
+        SceneError: if something in it cannot be pickled; the message names it and says why.
+    """
     try:
         return pickle.dumps(work, pickle.HIGHEST_PROTOCOL)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
@@ -55,7 +79,18 @@ def sent(work: Work, name: str) -> bytes:
 
 
 def received(data: bytes, name: str) -> Work:
-    """The work again, in the process that got it. Raises SceneError where it cannot be read there."""
+    """Unpickle the work in another process, and load its kernel.
+
+    Args:
+        data: the pickled work.
+        name: name of the executor, for messages.
+
+    Returns:
+        The work, ready to be called with blocks.
+
+    Raises:
+        SceneError: if it cannot be unpickled here.
+    """
     try:
         work: Work = pickle.loads(data)
     except (pickle.UnpicklingError, AttributeError, ImportError) as error:
@@ -72,7 +107,14 @@ def _refusal(name: str, what: str, error: Exception) -> str:
 
 
 def ended(futures: Mapping[Future[Any], Block]) -> Iterator[tuple[Block, Any]]:
-    """Blocks that came to their end, of those whose run was interrupted."""
+    """The blocks that finished although their run was interrupted.
+
+    Args:
+        futures: futures of the blocks' results.
+
+    Yields:
+        Each finished block and its result.
+    """
     for future, block in futures.items():
         if future.done() and not future.cancelled() and future.exception() is None and future.result() is not None:
             yield block, future.result()

@@ -1,4 +1,4 @@
-"""Blocks on the workers of a Dask cluster, of this machine or of many. A worker that dies costs the block it was at."""
+"""Blocks on the workers of a Dask cluster, of one machine or of many; a worker that dies costs the block it was at."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.executors.base import MOST_DEATHS, Advanced, deaf, received, sent
 from lgvi_warp.engine.work import Work
 
-# How often a worker tells how far it is [s].
+# Interval at which a worker reports its progress [s].
 PERIOD = 0.2
 # How long a scheduler may take to answer [s].
 TIMEOUT = 10.0
@@ -26,13 +26,31 @@ TIMEOUT = 10.0
 
 @dataclass(frozen=True)
 class Dask:
-    """scheduler: its address, or a distributed.Client; None starts a cluster of `workers` processes on this machine."""
+    """Runs blocks on a Dask cluster.
+
+    Args:
+        scheduler: address of the scheduler, or a distributed.Client; None (default) starts a cluster on this machine.
+        workers: number of processes of a cluster that is started here (default 1).
+    """
 
     scheduler: Any = None
     workers: int = 1
 
     def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
-        """Each block and its result, as they are done. Raises SceneError for work that cannot be sent."""
+        """Do the work of every block.
+
+        Args:
+            work: what is done with each block.
+            blocks: the blocks.
+            advanced: called with a block and the vehicle-steps made of it so far.
+
+        Yields:
+            Each block and its result, as it finishes.
+
+        Raises:
+            SceneError: if the work cannot be pickled, or a worker's machine is of another kind.
+            RuntimeError: if workers die again and again over a block.
+        """
         data, topic = sent(work, "dask"), f"lgvi_warp-{uuid.uuid4()}"
         with self._client() as client:
             from distributed import KilledWorker, as_completed
@@ -57,12 +75,16 @@ class Dask:
                 client.unsubscribe_topic(topic)
                 if waiting:
                     client.cancel(list(waiting))
-                    # A block that is at work when the run ends must not write into its store afterwards.
+                    # A block that is running when the run ends must not write into the store afterwards.
                     with contextlib.suppress(OSError, TimeoutError):
                         client.run(_end, topic, on_error="ignore")
 
     def check(self) -> None:
-        """See that the scheduler answers, before anything is written. Raises SceneError."""
+        """Check that the scheduler answers, before anything is written.
+
+        Raises:
+            SceneError: if it does not.
+        """
         if isinstance(self.scheduler, str):
             with self._client():
                 pass
@@ -80,9 +102,9 @@ class Dask:
             try:
                 client = distributed.Client(self.scheduler, timeout=TIMEOUT)
             except (OSError, ValueError, MemoryError) as error:  # memory: what answers is no scheduler
-                what = f"does not answer ({type(error).__name__}: {error})"
+                problem = f"does not answer ({type(error).__name__}: {error})"
                 raise SceneError(
-                    [f"scheduler = {self.scheduler!r}: {what}; give the address that dask scheduler prints"]
+                    [f"scheduler = {self.scheduler!r}: {problem}; give the address that dask scheduler prints"]
                 ) from error
             with client:
                 yield client
@@ -105,11 +127,11 @@ def _received(data: bytes) -> Work:
 
 
 def _work(data: bytes, block: Block, topic: str, kind: dict[str, str]) -> Any:
-    """On a worker: one block, if it is a machine of the same kind."""
-    own = machine.kind()
-    if own != kind:
+    """On a worker: run one block, if the machine is of the same kind as the one that asks."""
+    worker_kind = machine.kind()
+    if worker_kind != kind:
         raise SceneError(
-            [f"worker {own}: is not of the kind of the machine that asks, {kind}, and would give other bits; "
+            [f"worker {worker_kind}: is not of the kind of the machine that asks, {kind}, and would give other bits; "
              "let workers be of one kind, and run from one of them"]
         )  # fmt: skip
     _at_work[topic] += 1
@@ -119,20 +141,20 @@ def _work(data: bytes, block: Block, topic: str, kind: dict[str, str]) -> Any:
         _at_work[topic] -= 1
 
 
-# On a worker: blocks at work of each run, and runs that ended early.
+# On a worker: number of running blocks of each run, and runs that ended early.
 _at_work: Counter[str] = Counter()
 _ended: set[str] = set()
 
 
 async def _end(topic: str) -> None:
-    """On a worker: halt the blocks of a run, and wait until none is at work."""
+    """On a worker: halt the blocks of a run, and wait until none is running."""
     _ended.add(topic)
     while _at_work[topic] > 0:
         await asyncio.sleep(0.05)
 
 
 def _teller(topic: str, block: Block) -> Callable[[int], None]:
-    """Tell the client how far a block is, now and then."""
+    """A function that reports a block's progress to the client, at most once every PERIOD."""
     from distributed import get_worker
 
     worker, last = get_worker(), 0.0

@@ -1,4 +1,4 @@
-"""Blocks on the cores of one machine: a kernel launch releases the interpreter's lock, so threads are enough."""
+"""Blocks in threads of one process: a kernel launch releases the interpreter's lock, so threads are enough."""
 
 from __future__ import annotations
 
@@ -14,38 +14,50 @@ from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.executors.base import Advanced, ended
 from lgvi_warp.engine.work import Work
 
-# A signal that comes just before the main thread begins to wait is heard so much later [s].
+# Longest delay of a signal that arrives just before the main thread begins to wait [s].
 PERIOD = 0.2
 
 
 @dataclass(frozen=True)
 class Threads:
-    """So many threads of this process."""
+    """Runs blocks in threads of this process.
+
+    Args:
+        threads: number of threads.
+    """
 
     threads: int
 
     def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
-        """Each block and its result, as they are done.
+        """Do the work of every block.
 
-        The first exception halts what runs; blocks that have not begun are dropped, and the exception is raised. After an
-        interrupt from the keyboard those come first that ended nevertheless: a launch is made to its end.
+        The first exception halts running blocks, drops those that have not begun, and is raised. After an interrupt from
+        the keyboard, blocks that finished nevertheless are yielded first, since a launch cannot be cut short.
+
+        Args:
+            work: what is done with each block.
+            blocks: the blocks.
+            advanced: called with a block and the vehicle-steps made of it so far.
+
+        Yields:
+            Each block and its result, as it finishes.
         """
         stop = threading.Event()
 
-        def one(block: Block) -> Any:
+        def run_one(block: Block) -> Any:
             return work(block, stop.is_set, functools.partial(advanced, block))
 
         # The main thread waits, so that it hears an interrupt at once.
         if self.threads == 1 and threading.current_thread() is not threading.main_thread():
             for block in blocks:
-                yield block, one(block)
+                yield block, run_one(block)
             return
         with ThreadPoolExecutor(self.threads, thread_name_prefix="lgvi_warp") as pool:
             futures: dict[Future[Any], Block] = {}
             done: queue.SimpleQueue[Future[Any]] = queue.SimpleQueue()
             try:
                 for block in blocks:
-                    future = pool.submit(one, block)
+                    future = pool.submit(run_one, block)
                     futures[future] = block
                     future.add_done_callback(done.put)
                 while futures:

@@ -1,1 +1,1 @@
-"""To be said in one sentence."""
+"""Keepers: what a run retains of each block, namely outcomes, samples and statistics."""

@@ -1,4 +1,4 @@
-"""What a run keeps in memory: the outcome of every member, and every sample."""
+"""Keepers that hold their results in memory: the outcome of every member, and every sample."""
 
 from __future__ import annotations
 
@@ -18,45 +18,74 @@ from lgvi_warp.statistics.samples import Fields
 
 
 class _Unsent:
-    """A keeper of which other processes get the class alone: what it gathers stays where it is gathered."""
+    """A keeper that is pickled without its contents: what it gathers stays in the run's own process."""
 
     def __getstate__(self) -> dict[str, Any]:
         return {}
 
 
 class Outcomes(_Unsent):
-    """What became of every member: `all`, of all n."""
+    """Keeps the outcome of every member.
+
+    Args:
+        plan: the plan of the run.
+
+    Attributes:
+        all: the outcome of all n members.
+    """
 
     def __init__(self, plan: Plan):
         self.all = Outcome.clear(plan.ensemble.members, 2 if plan.method.adaptive else 0)
 
     def open(self, plan: Plan, block: Block, members: Members) -> _BlockOutcome:
-        """Nothing to prepare."""
+        """The keeper of a block's outcome.
+
+        Args:
+            plan: the plan of the run.
+            block: the block.
+            members: its members.
+
+        Returns:
+            A keeper that takes no samples.
+        """
         return _BlockOutcome()
 
     def merge(self, block: Block, part: Outcome) -> None:
-        """Put a block's outcome into its place."""
+        """Copy a block's outcome into its place.
+
+        Args:
+            block: the block.
+            part: the outcome of its members.
+        """
         at = slice(block.first, block.stop)
         for field in dataclasses.fields(part):
             values = getattr(part, field.name)
-            # Memory that nothing is written into is none: runs without faults have no outcomes to hold.
+            # Untouched pages of zeros take no memory, so runs without faults need none for their outcomes.
             if np.any(values):
                 getattr(self.all, field.name)[at] = values
 
 
 class _BlockOutcome:
     def take(self, when: slice, samples: Fields) -> None:
-        """Samples say nothing about the outcome."""
+        """Ignore the samples, which do not affect the outcome."""
 
     def close(self, outcome: Outcome) -> Outcome:
-        """The outcome itself."""
+        """Return the outcome as it is."""
         return outcome
 
 
 class Samples(_Unsent):
-    """Every sample of every member: fields (k, n, ...), which blocks in threads of this process write into.
+    """Keeps every sample of every member; threads of this process write into it directly.
 
-    From other processes a block's samples come as its part.
+    From other processes a block's samples come as its result.
+
+    Args:
+        plan: the plan of the run.
+        fields: names of the fields to keep; None (default) for those of the plan.
+
+    Attributes:
+        names: names of the fields.
+        fields: by name, (k times, n members, ...); None in another process.
     """
 
     fields: dict[str, np.ndarray] | None = None
@@ -67,29 +96,50 @@ class Samples(_Unsent):
 
     @classmethod
     def elsewhere(cls, names: Sequence[str]) -> Samples:
-        """As another process has it: each block's samples are its part."""
-        made = cls.__new__(cls)
-        made.names = tuple(names)
-        return made
+        """The keeper as another process has it: without room for all members.
+
+        Args:
+            names: names of the fields.
+
+        Returns:
+            A keeper whose blocks return their samples as results.
+        """
+        samples = cls.__new__(cls)
+        samples.names = tuple(names)
+        return samples
 
     def __getstate__(self) -> dict[str, Any]:
         return {"names": self.names}
 
     def open(self, plan: Plan, block: Block, members: Members) -> _BlockSamples:
-        """A view of the block's places, or places of its own far from them."""
+        """The keeper of a block's samples.
+
+        Args:
+            plan: the plan of the run.
+            block: the block.
+            members: its members.
+
+        Returns:
+            A keeper that writes into this one's arrays, or in another process into arrays of its own.
+        """
         if self.fields is None:
             return _BlockSamples(_empty(plan, self.names, block.count), sent=True)
         return _BlockSamples({name: values[:, block.first : block.stop] for name, values in self.fields.items()})
 
     def merge(self, block: Block, part: dict[str, np.ndarray] | None) -> None:
-        """The samples are in their places already, unless they were sent here."""
+        """Copy samples that came from another process; others are in their places already.
+
+        Args:
+            block: the block.
+            part: samples by field, (k, members of the block, ...); None if they are in their places.
+        """
         assert self.fields is not None
         for name, values in (part or {}).items():
             self.fields[name][:, block.first : block.stop] = values
 
 
 def _empty(plan: Plan, names: Sequence[str], members: int) -> dict[str, np.ndarray]:
-    """Room for all samples of so many members."""
+    """Uninitialised arrays for all samples of so many members, by field."""
     k, real = len(plan.grid.times), machine.DTYPES[plan.dtype]
     fields = {name: np.empty((k, members, *SHAPES[name]), real) for name in names}
     if plan.spec.compensated and "position" in fields:
@@ -103,10 +153,10 @@ class _BlockSamples:
     sent: bool = False
 
     def take(self, when: slice, samples: Fields) -> None:
-        """Put samples into their places."""
+        """Write the samples into their places."""
         for name, place in self.places.items():
             place[when] = samples[name]
 
     def close(self, outcome: Outcome) -> dict[str, np.ndarray] | None:
-        """The samples, if they lie where only this process sees them."""
+        """Return the samples if only this process has them, else None."""
         return self.places if self.sent else None

@@ -1,4 +1,4 @@
-"""What a run keeps of its members: samples, statistics, or both; and when it has members enough."""
+"""What a run keeps of its members, samples, statistics or both, and the condition under which it stops early."""
 
 from __future__ import annotations
 
@@ -24,7 +24,14 @@ EVENLY_SPREAD = ("latin_hypercube", "sobol", "halton")
 
 
 def replicates_of(ensemble: Mapping[str, Any]) -> int:
-    """Independent replicates of an ensemble's design, from its provenance; 1 for chosen members: they are no design."""
+    """The number of independent replicates of an ensemble's design, from its provenance.
+
+    Args:
+        ensemble: provenance of the ensemble.
+
+    Returns:
+        1 where there are none, and for members that were chosen by index or given explicitly.
+    """
     sampling = ensemble.get("sampling", "random")
     if isinstance(sampling, str) or "indices" in ensemble or ensemble.get("explicit"):
         return 1
@@ -33,9 +40,12 @@ def replicates_of(ensemble: Mapping[str, Any]) -> int:
 
 @dataclass(frozen=True)
 class Observation:
-    """statistics: gathered while the run goes. keep: "all" samples of members, "none", "failed", or indices of members.
+    """What is to be kept of a run, and when it stops.
 
-    until: when to stop before the last member.
+    Args:
+        statistics: statistics to gather during the run (default none).
+        keep: members whose samples are kept: "all" (default), "none", "failed", or indices of members.
+        until: condition that ends the run before the last member; None (default) for no such condition.
     """
 
     statistics: tuple[Statistic, ...] = ()
@@ -44,12 +54,19 @@ class Observation:
 
     @property
     def samples(self) -> bool:
-        """Whether the samples of every member are kept while the run goes."""
+        """Whether the samples of all members are kept during the run."""
         return isinstance(self.keep, str) and self.keep == "all"
 
     def fields(self, asked: Sequence[str]) -> tuple[str, ...]:
-        """Sample fields that the kernel must write: those to be kept, and those that statistics are of."""
-        wanted = {name for one in self.statistics for name in one.quantity.fields}
+        """The sample fields that the kernel must write: those to keep and those that statistics need.
+
+        Args:
+            asked: fields of the samples to keep.
+
+        Returns:
+            Names of the fields, in the order of FIELDS.
+        """
+        wanted = {name for statistic in self.statistics for name in statistic.quantity.fields}
         if self.until is not None:
             wanted |= set(watch_fields(self.until, self.statistics))
         if self.samples:
@@ -57,40 +74,73 @@ class Observation:
         return tuple(name for name in FIELDS if name in wanted)
 
     def watch(self, times: np.ndarray) -> tuple[tuple[Statistic, ...], Watch | None]:
-        """The statistics, with what is watched among them, and the watch. Raises SceneError."""
+        """The statistics to gather, and the watch of the stopping condition.
+
+        Args:
+            times: (k,) [s], sample times.
+
+        Returns:
+            (statistics, watch): the watched statistic is added where it is not among them; without a condition the watch
+            is None.
+
+        Raises:
+            SceneError: if the condition names no statistic or no sample time of the run.
+        """
         if self.until is None:
             return self.statistics, None
-        found = watch(self.until, self.statistics, times)
-        added = () if any(one is found.statistic for one in self.statistics) else (found.statistic,)
-        return (*self.statistics, *added), found
+        watching = watch(self.until, self.statistics, times)
+        added = () if any(statistic is watching.statistic for statistic in self.statistics) else (watching.statistic,)
+        return (*self.statistics, *added), watching
 
     def again(self, status: np.ndarray) -> np.ndarray:
-        """Indices of the members to be run again for their samples, of those whose status is given."""
+        """The members to run again in order to store their samples.
+
+        Args:
+            status: (n,), status of the members.
+
+        Returns:
+            Indices of members.
+        """
         if isinstance(self.keep, str):
             return np.flatnonzero(failed(status)) if self.keep == "failed" else np.empty(0, np.int64)
         return np.array([i for i in self.keep if i < len(status)], dtype=np.int64)
 
     def to_dict(self) -> dict[str, Any]:
-        """As in a scene file."""
+        """The observation as a table, as in a scene file.
+
+        Returns:
+            Keep, statistics and condition; "functions" names the statistics that depend on Python functions.
+        """
         content: dict[str, Any] = {"keep": self.keep if isinstance(self.keep, str) else [int(i) for i in self.keep]}
         if self.statistics:
-            content["statistics"] = [one.to_dict() for one in self.statistics]
+            content["statistics"] = [statistic.to_dict() for statistic in self.statistics]
         content |= {"until": self.until.to_dict()} if self.until else {}
-        own = [one.key for one in self.statistics if _of_functions(one)]
-        return content | ({"functions": own} if own else {})
+        function_keys = [statistic.key for statistic in self.statistics if _of_functions(statistic)]
+        return content | ({"functions": function_keys} if function_keys else {})
 
 
 def _of_functions(value: Any) -> bool:
-    """Whether a statistic is of functions or quantities of the user, which its table does not tell."""
+    """Whether a statistic depends on the user's functions or quantities, which its table cannot hold."""
     if isinstance(value, Statistic):
-        return any(_of_functions(getattr(value, one.name)) for one in fields(value))
+        return any(_of_functions(getattr(value, field.name)) for field in fields(value))
     if isinstance(value, list | tuple):
-        return any(_of_functions(one) for one in value)
+        return any(_of_functions(entry) for entry in value)
     return isinstance(value, Quantity) or callable(value)
 
 
 def observation_of(told: Mapping[str, Any] | None, statistics: Any = None) -> Observation:
-    """What `to_dict` told. statistics: the run's own, needed where they are of functions. Raises SceneError."""
+    """Restore an observation from its table.
+
+    Args:
+        told: what `to_dict` returned; None for a run that kept nothing but samples.
+        statistics: the run's statistics; needed where they depend on functions (default None).
+
+    Returns:
+        The observation.
+
+    Raises:
+        SceneError: if statistics are needed and missing, or are not those of the run.
+    """
     if told is None:
         if statistics:
             raise SceneError([f"statistics = {statistics}: the run gathered none; leave them out"])
@@ -102,19 +152,26 @@ def observation_of(told: Mapping[str, Any] | None, statistics: Any = None) -> Ob
         )
     keep = told["keep"] if isinstance(told["keep"], str) else tuple(told["keep"])
     until = from_dict(told["until"]) if "until" in told else None
-    found = Observation(from_list(told.get("statistics", ()) if statistics is None else statistics), keep, until)
-    made, wanted = found.to_dict(), {name: value for name, value in told.items() if name != "fields"}
-    if made != wanted:
+    observation = Observation(from_list(told.get("statistics", ()) if statistics is None else statistics), keep, until)
+    table, expected = observation.to_dict(), {name: value for name, value in told.items() if name != "fields"}
+    if table != expected:
         raise SceneError(
-            [f"statistics = {made.get('statistics')}: are not the run's, {wanted.get('statistics')}; give those"]
+            [f"statistics = {table.get('statistics')}: are not the run's, {expected.get('statistics')}; give those"]
         )
-    return found
+    return observation
 
 
 class Observing:
-    """An Observation at work: the keeper of its statistics, when there are members enough, and what it then says.
+    """An observation during a run: gathers the statistics, and decides whether the run may stop.
 
-    time: (k,) [s], of the samples; members: of the whole ensemble; replicates: of its design. Raises SceneError.
+    Args:
+        observed: what is to be kept.
+        time: (k,) [s], sample times.
+        members: members of the whole ensemble.
+        replicates: independent replicates of the ensemble's design (default 1).
+
+    Raises:
+        SceneError: if the stopping condition names no statistic or no sample time of the run.
     """
 
     def __init__(self, observed: Observation, time: np.ndarray, members: int, replicates: int = 1):
@@ -125,11 +182,18 @@ class Observing:
 
     @property
     def keepers(self) -> tuple[Gathered, ...]:
-        """That of the statistics, if there are any."""
+        """The keeper of the statistics, or none if there are no statistics."""
         return (self._gathered,) if self._gathered else ()
 
     def enough(self, members: int) -> bool:
-        """Whether the run may end with so many members: asked in the order of the blocks, after each."""
+        """Whether the run may end; asked after each block, in block order.
+
+        Args:
+            members: number of members so far.
+
+        Returns:
+            True once the condition of the observation is met.
+        """
         watch = self._watch
         return bool(watch and watch.due(members) and watch.reached(self._watched()))
 
@@ -137,56 +201,94 @@ class Observing:
         return self._gathered.estimates(self._watch.statistic) if self._gathered and self._watch else []
 
     def read(self, ensemble: Mapping[str, Any], status: np.ndarray) -> tuple[Estimates, tuple[str, ...]]:
-        """(statistics, what the user should know of them); ensemble: its provenance; status: of the members that ran."""
+        """The statistics, and messages about them.
+
+        Args:
+            ensemble: provenance of the ensemble.
+            status: (m,), status of the members that ran.
+
+        Returns:
+            (estimates, messages): the estimates by name, and what the user should know about them.
+        """
         estimates, members = self._gathered.result() if self._gathered else Estimates(), len(status)
-        said = notes(estimates, ensemble, status, self._gathered.apart if self._gathered else ())
-        return estimates, said + ((self._watch.report(members, self._watched()),) if self._watch else ())
+        messages = notes(estimates, ensemble, status, self._gathered.apart if self._gathered else ())
+        return estimates, messages + ((self._watch.report(members, self._watched()),) if self._watch else ())
 
 
 def watch_fields(until: Until, statistics: Sequence[Statistic]) -> tuple[str, ...]:
-    """Sample fields of what is watched. Raises SceneError where it is nothing."""
+    """The sample fields that a stopping condition needs.
+
+    Args:
+        until: the condition.
+        statistics: statistics of the run.
+
+    Returns:
+        Names of the fields.
+
+    Raises:
+        SceneError: if the condition names no statistic.
+    """
     return watch(Until(until.statistic, until.half_width), statistics, np.zeros(1)).statistic.quantity.fields
 
 
 def observe(
     plan_members: int, settings: Any, given: Any, keep: Any, until: Any, events: Sequence[Event] = ()
 ) -> Observation:
-    """From the arguments of solve, and from the scene's [run] for those that are None. Raises SceneError.
+    """The observation that the arguments of solve describe; those that are None come from the scene's [run].
 
-    events: those of the scene.
+    Args:
+        plan_members: number of members of the run.
+        settings: the scene's [run] settings.
+        given: the argument `statistics` of solve.
+        keep: the argument `keep` of solve.
+        until: the argument `until` of solve; False for no condition.
+        events: events of the scene (default none).
+
+    Returns:
+        What is to be kept, and when the run stops.
+
+    Raises:
+        SceneError: naming every fault.
     """
     faults = Faults()
-    found: tuple[Statistic, ...] = ()
+    gathered: tuple[Statistic, ...] = ()
     stop: Until | None = None
     keep = settings.keep if keep is None else keep
     with faults.including():
-        found = from_list(settings.statistics if given is None else given)
-    known = outcomes([one.key for one in events], [one.status for one in events])
-    for one in found:
+        gathered = from_list(settings.statistics if given is None else given)
+    known = outcomes([event.key for event in events], [event.status for event in events])
+    for statistic in gathered:
         with faults.including():
-            check_outcomes(f"{one.type}.{'at' if one.at else 'of'}", one.outcomes, known)
+            check_outcomes(f"{statistic.type}.{'at' if statistic.at else 'of'}", statistic.outcomes, known)
     with faults.including():
-        asked = settings.until if until is None else until
-        stop = None if asked is None or asked is False else from_dict(asked)
+        condition = settings.until if until is None else until
+        stop = None if condition is None or condition is False else from_dict(condition)
     check_keep(faults, "keep", keep, plan_members)
     if stop is not None and not faults:
         with faults.including():
-            watch_fields(stop, found)
+            watch_fields(stop, gathered)
     faults.raise_if_any()
     chosen = keep if isinstance(keep, str) else tuple(sorted({int(i) for i in keep}))
-    return Observation(found, chosen, stop)
+    return Observation(gathered, chosen, stop)
 
 
 def notes(
     estimates: Mapping[str, Estimate], ensemble: Mapping[str, Any], status: np.ndarray, apart: Collection[str] = ()
 ) -> tuple[str, ...]:
-    """What a user should know of his statistics; ensemble: its provenance; status: of the members that ran.
+    """Messages about statistics: members left out, and intervals that do not fit the sampling.
 
-    apart: names of estimates that are not of all members on purpose.
+    Args:
+        estimates: the estimates by name.
+        ensemble: provenance of the ensemble.
+        status: (m,), status of the members that ran.
+        apart: names of estimates that leave members out on purpose (default none).
+
+    Returns:
+        The messages; none where there are no estimates.
     """
     if not estimates:
         return ()
-    members, found = len(status), _left_out(estimates, status, apart)
+    members, messages = len(status), _left_out(estimates, status, apart)
     sampling, R = ensemble.get("sampling", "random"), replicates_of(ensemble)
     kind = sampling if isinstance(sampling, str) else next(iter(sampling))
     if R > 1:
@@ -194,33 +296,41 @@ def notes(
         if kind == "sobol" and points & (points - 1):
             low = 1 << (points.bit_length() - 1)
             text = f"each of {R} replicates has {points} points of a Sobol sequence, which is balanced at powers of two"
-            found += (f"{text}: {low * R} or {2 * low * R} members would have narrower intervals for what they cost",)
+            messages += (
+                f"{text}: {low * R} or {2 * low * R} members would have narrower intervals for what they cost",
+            )
     elif kind in EVENLY_SPREAD:
         text = f"intervals are those of independent members, wider than need be for sampling {kind!r}"
-        found += (f"{text}: with replicates, {{ {kind} = {{ replicates = 16 }} }}, they are those of its own spread",)
+        messages += (
+            f"{text}: with replicates, {{ {kind} = {{ replicates = 16 }} }}, they are those of its own spread",
+        )
     elif kind != "random":
         text = f"intervals are those of independent members, which a {kind} does not give"
-        found += (f"{text}: do not rely on them",)
-    return found
+        messages += (f"{text}: do not rely on them",)
+    return messages
 
 
 def _left_out(estimates: Mapping[str, Estimate], status: np.ndarray, apart: Collection[str]) -> tuple[str, ...]:
-    """That some members do not count, and why; first passages tell of theirs as lost.
+    """A message that some members do not count, and why; first passages report theirs as lost.
 
-    apart: names of estimates that are not of all members on purpose.
+    apart: names of estimates that leave members out on purpose.
     """
     members = len(status)
-    of_all = (one for one in estimates.values() if one.name not in apart and one.settings["type"] != "first_passage")
-    count = {one: int(one.count.min()) for one in of_all}
-    fewer = [one for one, number in count.items() if number < members]
+    of_all = (
+        estimate
+        for estimate in estimates.values()
+        if estimate.name not in apart and estimate.settings["type"] != "first_passage"
+    )
+    count = {estimate: int(estimate.count.min()) for estimate in of_all}
+    fewer = [estimate for estimate, number in count.items() if number < members]
     if not fewer:
         return ()
     failures, ended = int(failed(status).sum()), int(stopped(status).sum())
-    out = {one: ended if one.settings.get("stopped") == "left_out" else 0 for one in fewer}
+    stopped_early = {estimate: ended if estimate.settings.get("stopped") == "left_out" else 0 for estimate in fewer}
     why = [f"{failures} members from their failure on"] if failures else []
-    if any(out.values()):
+    if any(stopped_early.values()):
         why += [f'{ended} members from the event on that stopped them (stopped = "left_out")']
-    if any(count[one] < members - failures - out[one] for one in fewer):
+    if any(count[estimate] < members - failures - stopped_early[estimate] for estimate in fewer):
         why += ["members where a number of theirs is not finite"]
     text = f"statistics leave out {', and '.join(why)}: {min(count.values())} of {members} count where fewest do"
     return (f"{text} (count of each statistic)",)

@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""The protocols of keepers: what a run calls to keep something of its members."""
 
 from __future__ import annotations
 
@@ -18,48 +18,111 @@ if TYPE_CHECKING:
 
 
 class BlockKeeper(Protocol):
-    """What is kept of one block, where that block runs."""
+    """What keeps something of one block, in the thread or process that runs the block."""
 
     def take(self, when: slice, samples: Fields) -> None:
-        """Samples `when` (of all times) by field, (times, members of the block, ...): each time once, in order."""
+        """Receive samples of the block; each time comes once, in order.
+
+        Args:
+            when: slice of the sample times.
+            samples: by field, (times, members of the block, ...).
+        """
 
     def close(self, outcome: Outcome) -> Any:
-        """What the run is to have of this block: small, and picklable."""
+        """Return the block's result, small and picklable.
+
+        Args:
+            outcome: the outcome of the block's members.
+
+        Returns:
+            What `Keeper.merge` receives.
+        """
 
 
 class Keeper(Protocol):
-    """What a run keeps of its members: all samples, statistics, files."""
+    """What a run keeps of its members: all samples, statistics or files."""
 
     def open(self, plan: Plan, block: Block, members: Members) -> BlockKeeper:
-        """Before a block's first step, in the thread or process that runs it."""
+        """Prepare for a block, before its first step, in the thread or process that runs it.
+
+        Args:
+            plan: the plan of the run.
+            block: the block.
+            members: its members.
+
+        Returns:
+            The keeper of this block.
+        """
 
     def merge(self, block: Block, part: Any) -> None:
-        """What a block's keeper closed with; in the order of the blocks, in the thread that asked for the run."""
+        """Merge the result of a block; called in block order, in the thread that started the run.
+
+        Args:
+            block: the block.
+            part: what the block's keeper closed with.
+        """
 
 
 @runtime_checkable
 class PartKeeper(Keeper, Protocol):
-    """A keeper whose parts a store can hold, so that a run that goes on later has those of its finished blocks."""
+    """A keeper whose block results a store can hold, so that a resumed run has those of finished blocks."""
 
     @property
     def name(self) -> str:
-        """What its parts are called by: unlike those of any other keeper of the run."""
+        """Name of its results in the store, unique among the keepers of a run."""
 
     def to_arrays(self, part: Any) -> tuple[dict[str, np.ndarray], Any]:
-        """A part as arrays by name, and what JSON holds."""
+        """Split a block's result into what a store can hold.
+
+        Args:
+            part: what the block's keeper closed with.
+
+        Returns:
+            (arrays, content): arrays by name, and what JSON can hold.
+        """
 
     def from_arrays(self, arrays: dict[str, np.ndarray], content: Any) -> Any:
-        """The part again, with the same bits."""
+        """Restore a block's result, with the same bits.
+
+        Args:
+            arrays: arrays by name.
+            content: the JSON content.
+
+        Returns:
+            What `merge` receives.
+        """
 
 
 class BlockStore(Keeper, Protocol):
-    """A keeper that writes blocks to where they outlive the run, and knows those that are there."""
+    """A keeper that writes blocks to disk, where they outlive the run, and knows which it already holds."""
 
     def parts(self, block: Block, keepers: Sequence[Keeper]) -> tuple[Any, ...] | None:
-        """What the keepers closed with where the block is there; None where it is not."""
+        """The results that the store holds for a block.
+
+        Args:
+            block: the block.
+            keepers: the keepers of the run.
+
+        Returns:
+            What each keeper closed with; None if the store does not hold the block.
+        """
 
     def finish(self, block: Block, own: Any, keepers: Sequence[Keeper], parts: Sequence[Any]) -> None:
-        """Make a block durable; own: what the store closed with, parts: what the keepers did."""
+        """Make a block durable.
+
+        Args:
+            block: the block.
+            own: what the store's block keeper closed with.
+            keepers: the other keepers of the run.
+            parts: what their block keepers closed with.
+        """
 
     def understood(self, block: Block) -> AbstractContextManager[None]:
-        """While the parts of a block that was there are used: what is wrong with them is told as theirs."""
+        """A context in which a stored block's results are used: errors are reported as faults of the store.
+
+        Args:
+            block: the block.
+
+        Returns:
+            The context manager.
+        """

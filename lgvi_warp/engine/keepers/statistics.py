@@ -1,4 +1,4 @@
-"""Statistics as what a run keeps: gathered block by block, joined in the order of the blocks."""
+"""The keeper of statistics: gathers them block by block and joins the blocks in their order."""
 
 from __future__ import annotations
 
@@ -21,71 +21,129 @@ if TYPE_CHECKING:
 
 
 class Gathered:
-    """The statistics of a run of n members, so far: a tree of parts for each; time: (k,) [s], of its samples.
+    """The statistics of a run so far: for each, a tree of parts.
 
-    replicates: R where members are of so many independent ones, member i of the i-th mod R. Parts then hold each
-    replicate's numbers by themselves, R times as many.
+    With replicates, member i belongs to replicate i mod R, and parts hold the numbers of each replicate separately.
+
+    Args:
+        time: (k,) [s], sample times.
+        members: number of members of the run.
+        statistics: the statistics to gather.
+        replicates: R, number of independent replicates (default 1).
     """
 
-    # What a store calls its parts.
+    # Name of its results in a store.
     name = "statistics"
 
     def __init__(self, time: np.ndarray, members: int, statistics: Sequence[Statistic], replicates: int = 1):
         self._statistics, self.time, self._replicates = tuple(statistics), time, replicates
         self._size = blocks(members)[0].count
-        self._trees = [Tree(one.join) for one in self._statistics]
+        self._trees = [Tree(statistic.join) for statistic in self._statistics]
 
     def open(self, plan: Plan, block: Block, members: Members) -> _BlockStatistics:
-        """What gathers those of one block."""
+        """The keeper of a block's statistics.
+
+        Args:
+            plan: the plan of the run.
+            block: the block.
+            members: its members.
+
+        Returns:
+            A keeper that closes with one part for each statistic.
+        """
         place = (block.first, block.first // self._size, self._size)
         return _BlockStatistics(self._statistics, plan, members, place, self.time, self._replicates)
 
     def merge(self, block: Block, part: list[Part]) -> None:
-        """Take in a block's part: of each statistic, named arrays."""
-        # A member that is about to fail may be too large to be squared: the statistic then says so, and NumPy need not.
+        """Add a block's parts to the trees.
+
+        Args:
+            block: the block.
+            part: for each statistic, arrays by name.
+        """
+        # Squares of a failing member may overflow: the statistic reports it, so no warning from NumPy.
         with np.errstate(invalid="ignore", over="ignore"):
-            for tree, one in zip(self._trees, part, strict=True):
-                tree.add(block.first // self._size, one)
+            for tree, statistic_part in zip(self._trees, part, strict=True):
+                tree.add(block.first // self._size, statistic_part)
 
     def estimates(self, chosen: Statistic | None = None) -> list[Estimate]:
-        """What all say of the blocks so far, or one of them."""
-        found: list[Estimate] = []
+        """Estimates from the blocks so far.
+
+        Args:
+            chosen: the statistic wanted; None (default) for all.
+
+        Returns:
+            The estimates, in the order of the statistics.
+        """
+        estimates: list[Estimate] = []
         for statistic, tree in zip(self._statistics, self._trees, strict=True):
             if chosen is None or statistic is chosen:
                 with np.errstate(invalid="ignore", over="ignore"):
-                    found += self.said(statistic, tree.parts())
-        return found
+                    estimates += self.said(statistic, tree.parts())
+        return estimates
 
     def said(self, statistic: Statistic, parts: Sequence[Part]) -> list[Estimate]:
-        """What one statistic says of the parts of a tree."""
+        """Estimates of one statistic from given parts.
+
+        Args:
+            statistic: the statistic.
+            parts: parts of its tree.
+
+        Returns:
+            The estimates of the statistic.
+        """
         time = self.time if statistic.at is None else self.time[-1:]
         if self._replicates > 1:
             return statistic.estimates_of_replicates(parts, time, self._replicates)
         return statistic.estimates(parts, time)
 
     def result(self) -> Estimates:
-        """All of them, by name."""
+        """All estimates by name.
+
+        Returns:
+            The estimates from the blocks so far.
+        """
         return Estimates(self.estimates())
 
     @property
     def apart(self) -> set[str]:
-        """Names of estimates that are not of all members on purpose: those of their ends."""
-        return {part.key for one in self._statistics if one.at_end for part in one.parts()}
+        """Names of estimates that leave members out on purpose: those of how members end."""
+        return {part.key for statistic in self._statistics if statistic.at_end for part in statistic.parts()}
 
     def __getstate__(self) -> dict[str, Any]:
-        """What another process needs to gather blocks: not what was gathered here."""
+        """What another process needs to gather blocks, without what was gathered here."""
         return {name: value for name, value in vars(self).items() if name != "_trees"}
 
     @staticmethod
     def to_arrays(part: Sequence[Part]) -> tuple[dict[str, np.ndarray], Any]:
-        """A block's part as named arrays, for a file, and the number of statistics."""
-        return {f"{i}/{name}": array for i, one in enumerate(part) for name, array in one.items()}, len(part)
+        """A block's parts as arrays for a file.
+
+        Args:
+            part: for each statistic, arrays by name.
+
+        Returns:
+            (arrays, number): arrays by name, and the number of statistics.
+        """
+        return {
+            f"{i}/{name}": array for i, statistic_part in enumerate(part) for name, array in statistic_part.items()
+        }, len(part)
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, np.ndarray], content: Any) -> list[Part]:
-        """What `to_arrays` gave: merged later, it gives the same bits."""
+        """Restore a block's parts; merging them gives the same bits.
+
+        Args:
+            arrays: arrays by name, from `to_arrays`.
+            content: the number of statistics.
+
+        Returns:
+            For each statistic, arrays by name.
+        """
         prefixes = [f"{i}/" for i in range(content)]
-        return [{n.removeprefix(one): a for n, a in arrays.items() if n.startswith(one)} for one in prefixes]
+        return [
+            {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
+            for prefix in prefixes
+        ]
 
 
 class _BlockStatistics:
@@ -100,13 +158,15 @@ class _BlockStatistics:
     ):
         self._statistics, self._members, self._place = statistics, members, place
         self._plan, self._replicates, self._times = plan, replicates, len(time)
-        # Of those that are of members' ends: the quantity at the last sample.
+        # For statistics of members' ends: the quantity at the last sample.
         self._last: dict[Statistic, np.ndarray] = {}
-        self._open = [one.open(time if one.at is None else time[-1:], members.count) for one in statistics]
+        self._open = [
+            statistic.open(time if statistic.at is None else time[-1:], members.count) for statistic in statistics
+        ]
 
     def take(self, when: slice, samples: Fields) -> None:
-        """Hand each statistic the values of its quantity; statistics of the same quantity share them."""
-        made: dict[Any, Values] = {}
+        """Pass to each statistic the values of its quantity; statistics of the same quantity share them."""
+        values: dict[Any, Values] = {}
         for statistic, gathers in zip(self._statistics, self._open, strict=True):
             if statistic.at_end:
                 if when.stop == self._times and not statistic.of_ends:
@@ -114,22 +174,22 @@ class _BlockStatistics:
                 continue
             quantity = statistic.quantity
             key = (quantity.name, quantity.function, statistic.stopped)
-            if key not in made:
+            if key not in values:
                 x = quantity(samples, self._members)
-                made[key] = self._values(x, samples.good(statistic.stopped == "held"))
-            gathers.take(made[key], when)
+                values[key] = self._values(x, samples.good(statistic.stopped == "held"))
+            gathers.take(values[key], when)
 
     def _values(self, x: np.ndarray, good: np.ndarray | None) -> Values:
-        """Values of all members, or of each replicate's."""
+        """The values of all members, or of each replicate's members."""
         if self._replicates == 1:
             return Values(x, good, *self._place)
         return dealt(x, good, *self._place, self._replicates)
 
     def close(self, outcome: Outcome) -> list[Part]:
-        """Of each statistic, named arrays."""
+        """Return, for each statistic, arrays by name."""
         ends = outcome.ends(self._plan)
         for statistic, gathers in zip(self._statistics, self._open, strict=True):
             if statistic.at_end:
                 gathers.take(self._values(*statistic.at_ends(ends, self._last.get(statistic))), slice(0, 1))
             gathers.end(ends, self._replicates)
-        return [one.close() for one in self._open]
+        return [gathers.close() for gathers in self._open]

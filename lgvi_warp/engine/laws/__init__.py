@@ -1,1 +1,1 @@
-"""To be said in one sentence."""
+"""Tests of a law's device code against finite differences, linear algebra and the host code of its term."""

@@ -1,4 +1,4 @@
-"""A law alone, its numbers packed as for a run, at random views: what law_check looks at."""
+"""A law evaluated alone, its numbers packed as for a run, at random views: the means of check_law."""
 
 from __future__ import annotations
 
@@ -24,16 +24,24 @@ from lgvi_warp.physics.vehicle import Vehicle
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import Environment
 
-# Length [s] and number of the kick that the views are of.
+# Length [s] and step number of the kick at which laws are evaluated.
 KICK, STEP = 0.01, 3
-# Other axes and another origin [m] that a method might choose: what a law does must not depend on them.
+# Other body axes and another origin [m], as a method might choose them: a law must not depend on them.
 TURN = notation.matrix_from_rotation_vector(np.array([0.4, -0.7, 1.2]))
 ORIGIN = np.array([0.1, -0.2, 0.15])
 
 
 @dataclass(frozen=True)
 class Views:
-    """k views: attitude (k, 3, 3), position (k, 3) [m], velocity and rate (k, 3), time (k,) [s], one for a packet."""
+    """States and times at which a law is evaluated.
+
+    Attributes:
+        attitude: (k, 3, 3), rotation matrices from body to inertial axes.
+        position: (k, 3) [m], in inertial axes.
+        velocity: (k, 3) [m/s], in body axes.
+        rate: (k, 3) [rad/s], angular velocity in body axes.
+        time: (k,) [s], the same for all lanes of a packet.
+    """
 
     attitude: np.ndarray
     position: np.ndarray
@@ -42,19 +50,46 @@ class Views:
     time: np.ndarray
 
     def changed(self, **new: Any) -> Views:
-        """The same views but for what is named."""
+        """A copy with some of the fields replaced.
+
+        Args:
+            **new: the new values, by field.
+
+        Returns:
+            The views with the new values.
+        """
         return Views(**(vars(self) | new))
 
     def moved(self, axis: int, by: float) -> Views:
-        """Every position moved along an inertial axis [m]."""
+        """The views with every position displaced along an inertial axis.
+
+        Args:
+            axis: index of the axis, 0 to 2.
+            by: displacement [m].
+
+        Returns:
+            The displaced views.
+        """
         return self.changed(position=self.position + by * np.eye(3)[axis])
 
     def turned(self, axis: int, by: float) -> Views:
-        """Every attitude turned about its own body axis [rad]."""
+        """The views with every attitude turned about one of its body axes.
+
+        Args:
+            axis: index of the axis, 0 to 2.
+            by: angle [rad].
+
+        Returns:
+            The turned views.
+        """
         return self.changed(attitude=self.attitude @ notation.matrix_from_rotation_vector(by * np.eye(3)[axis]))
 
     def elsewhere(self) -> Views:
-        """The same views of the axes TURN at ORIGIN."""
+        """The same states, expressed in the body axes TURN about the origin ORIGIN.
+
+        Returns:
+            The views in the other axes.
+        """
         return Views(
             self.attitude @ TURN,
             self.position + notation.rotate_out(self.attitude, ORIGIN[None]),
@@ -64,20 +99,47 @@ class Views:
         )
 
     def told(self, i: int) -> str:
-        """One view in words."""
+        """One view in words, for a message.
+
+        Args:
+            i: index of the view.
+
+        Returns:
+            Position, quaternion, time, velocity and angular velocity, with their units.
+        """
         turn = notation.quaternion_from_matrix(self.attitude[i])
         where = f"at position {short(self.position[i])} m, quaternion {short(turn)}, t = {self.time[i]:.3g} s"
         return f"{where}, velocity {sizes(self.velocity[i])} m/s, rate {sizes(self.rate[i])} rad/s"
 
 
 def simple_scene() -> Scene:
-    """A vehicle of 20 kg whose numbers all differ, a little heavy, its centre of buoyancy off all axes."""
+    """A scene of one vehicle without symmetry, for laws that are checked without a scene.
+
+    Returns:
+        A vehicle of 20 kg, slightly heavy, whose inertias all differ and whose centre of buoyancy is off all axes.
+    """
     body = Vehicle(20.0, (5.0, 22.0, 25.0), (1.5, 4.0, 4.5), 190.0, (0.01, 0.005, -0.02))
     return Scene(body, Environment())
 
 
 class Bench:
-    """A term with its numbers packed as for a run, ready to be evaluated at views."""
+    """A term with its numbers packed as for a run, ready to be evaluated at views.
+
+    Args:
+        term: the term.
+        module: its device code.
+        scene: scene with the vehicle and the environment.
+        packets: number of packets of views.
+        seed: seed of the random views.
+
+    Attributes:
+        views: random views, `count` of them.
+        corners: views at rest and along single axes.
+        packets: the term's numbers on the device; set once packed() has been checked.
+
+    Raises:
+        SceneError: if the device code does not compile.
+    """
 
     packets: Bank
 
@@ -85,8 +147,8 @@ class Bench:
         self.term, self.module, self.width = term, module, default_width("float64")
         self.noisy = bool(getattr(module, "NOISE", False))
         self.roles = tuple(role for role in COLUMNS if hasattr(module, role))
-        given = scene.parameters() | {f"{term.key}.{name}": value for name, value in term.parameters().items()}
-        self.parameters = {name: np.asarray(value)[None] for name, value in given.items()}
+        numbers = scene.parameters() | {f"{term.key}.{name}": value for name, value in term.parameters().items()}
+        self.parameters = {name: np.asarray(value)[None] for name, value in numbers.items()}
         self.own = {name: self.parameters[f"{term.key}.{name}"] for name in term.parameters()}
         self.count = packets * self.width
         self.seed = seed
@@ -98,7 +160,15 @@ class Bench:
         self.Params = np.dtype(self.examine.Params.numpy_dtype())
 
     def setting(self, parameters: Mapping[str, np.ndarray], elsewhere: bool = False) -> Setting:
-        """What packed() may look at: the kernel's axes are the user's, or TURN at ORIGIN."""
+        """The setting that packed() receives.
+
+        Args:
+            parameters: parameters of the scene by name, each (1, ...) or (n, ...).
+            elsewhere: whether the kernel's axes are TURN at ORIGIN; by default they are the user's.
+
+        Returns:
+            The setting for `count` members.
+        """
         I6 = vehicle.inertia6(parameters)
         n, none = len(I6), np.zeros((len(I6), 3, 3))
         Q = np.broadcast_to(TURN if elsewhere else np.eye(3), (n, 3, 3))
@@ -109,12 +179,25 @@ class Bench:
         return Setting(parameters, frame, np.arange(self.count), self.seed, KICK)
 
     def at(self, views: Views) -> dict[str, np.ndarray]:
-        """What every role of the law gives at k views, by role: (k, numbers)."""
+        """Evaluate every role of the law.
+
+        Args:
+            views: as many views as the bench has.
+
+        Returns:
+            By role: (count, numbers of the role).
+        """
         return self.packets.evaluate(views)
 
 
 class Bank(Packets):
-    """A term's parameters, table and memory as Packets makes them for a run, without a run's kernel."""
+    """A term's parameters, table and memory, packed as Packets does for a run but without a run's kernel.
+
+    Args:
+        bench: the bench with the term and the compiled kernel.
+        setting: what packed() receives.
+        views: views at which the law's memory is first updated.
+    """
 
     def __init__(self, bench: Bench, setting: Setting, views: Views):
         # What Packets asks of a Plan and of Members to pack laws.
@@ -134,7 +217,14 @@ class Bank(Packets):
         self._launch(views, 0)
 
     def evaluate(self, views: Views) -> dict[str, np.ndarray]:
-        """What the law gives at views as many as the bench has, by role: (k, numbers)."""
+        """Evaluate every role of the law, and its energy where it has one.
+
+        Args:
+            views: as many views as the bench has.
+
+        Returns:
+            By role: (count, numbers of the role).
+        """
         out = self._launch(views, -1)
         roles = (*self.bench.roles, *["energy"] * hasattr(self.bench.module, "energy"))
         return {role: out[:, COLUMNS[role][0] : sum(COLUMNS[role])] for role in roles}
@@ -143,17 +233,17 @@ class Bank(Packets):
         width, Lane = self.bench.width, self.bench.examine.Lane
         flat = [views.attitude.reshape(-1, 9), views.position, views.velocity, views.rate]
         rows = pack(np.concatenate(flat, axis=1), width)
-        given = wp.array(rows, dtype=Lane, shape=rows.shape[:2], device="cpu")
+        view_lanes = wp.array(rows, dtype=Lane, shape=rows.shape[:2], device="cpu")
         times = wp.array(views.time[::width], dtype=wp.float64, device="cpu")
         out = wp.zeros((self.count, OUT_FIELDS), dtype=Lane, device="cpu")
-        inputs = [self.params, self.table, given, times, wp.float64(KICK), STEP, second, self.memory, out]
+        inputs = [self.params, self.table, view_lanes, times, wp.float64(KICK), STEP, second, self.memory, out]
         with build_lock:
             wp.launch(self.bench.examine.kernel, dim=self.count, inputs=inputs, device="cpu")
         return np.asarray(out.numpy().transpose(0, 2, 1).reshape(-1, OUT_FIELDS))
 
 
 def _built(term: Term, module: Any, width: int) -> Any:
-    """The kernel, compiled. Raises SceneError with Warp's words where it cannot be."""
+    """The compiled kernel that evaluates a law. Raises SceneError with Warp's message where it does not compile."""
     try:
         hash(module)
     except TypeError:
@@ -175,7 +265,17 @@ def _built(term: Term, module: Any, width: int) -> Any:
 
 
 def random_views(packets: int, width: int, seed: int, around: np.ndarray) -> Views:
-    """Random views some metres around a position, the lanes of a packet at one time."""
+    """Random views around a position.
+
+    Args:
+        packets: number of packets.
+        width: lanes of a packet; all lanes of a packet have the same time.
+        seed: seed of the random numbers.
+        around: (3,) [m], mean of the positions, whose standard deviation is 4 m.
+
+    Returns:
+        packets * width views.
+    """
     rng = np.random.default_rng(seed)
     k = packets * width
     quaternion, position, velocity, rate = rng.normal(size=(k, 4)), *rng.normal(size=(3, k, 3))
@@ -184,10 +284,18 @@ def random_views(packets: int, width: int, seed: int, around: np.ndarray) -> Vie
 
 
 def corner_views(packets: int, width: int, around: np.ndarray) -> Iterator[Views]:
-    """Views where a law divides by zero that is careless, as many at a time as a bench has.
+    """Views at which a careless law divides by zero.
 
-    Velocity and rate are zero, along one axis, or of numbers so small that their squares vanish; attitude is none, the
-    position is the scene's start or the origin, and the time is 0.
+    Velocity and rate are zero, along one axis, or so small that their squares vanish. The attitude is the identity, the
+    position is `around` or the origin, and the time is 0.
+
+    Args:
+        packets: number of packets.
+        width: lanes of a packet.
+        around: (3,) [m], the first of the two positions.
+
+    Yields:
+        packets * width views at a time, until each corner was among them.
     """
     axes = np.concatenate([np.eye(6), -np.eye(6)])
     twists = np.concatenate([np.zeros((1, 6)), axes, 1e-200 * axes])
@@ -202,10 +310,24 @@ def corner_views(packets: int, width: int, around: np.ndarray) -> Iterator[Views
 
 
 def short(values: np.ndarray) -> str:
-    """Numbers in a message."""
+    """Numbers for a message, rounded to three decimals.
+
+    Args:
+        values: numbers of any shape.
+
+    Returns:
+        A list in brackets.
+    """
     return str(np.round(np.asarray(values), 3).tolist())
 
 
 def sizes(values: np.ndarray) -> str:
-    """The same of numbers that may be very small."""
-    return "[" + ", ".join(f"{one:.3g}" for one in values) + "]"
+    """Numbers for a message with three significant digits, for those that may be very small.
+
+    Args:
+        values: (n,), numbers.
+
+    Returns:
+        A list in brackets.
+    """
+    return "[" + ", ".join(f"{value:.3g}" for value in values) + "]"

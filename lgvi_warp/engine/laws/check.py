@@ -1,4 +1,4 @@
-"""Is a law right? Its device code at random views, against finite differences and linear algebra."""
+"""Whether a law is right: its device code at random views, against finite differences and linear algebra."""
 
 from __future__ import annotations
 
@@ -26,7 +26,15 @@ FLOWS = ("steady", "uniform", "varying")
 
 
 class Check(NamedTuple):
-    """One thing that was checked: the worst value found, what is allowed there, and where it was found, or a remedy."""
+    """The result of one check.
+
+    Attributes:
+        name: what was checked, such as "law: torque = -dU/dR".
+        worst: the worst deviation found, in the unit of what was checked.
+        allowed: the largest deviation allowed at that view, in the same unit.
+        ok: whether the check passed.
+        text: where it failed and the remedy, or a note; "" for none.
+    """
 
     name: str
     worst: float
@@ -37,21 +45,26 @@ class Check(NamedTuple):
 
 @dataclass(frozen=True)
 class LawReport:
-    """What check_law found about a term. `ok`: whether every check passed; print it for a table."""
+    """The checks of one law; printing it gives a table.
+
+    Attributes:
+        term: the term that was checked.
+        checks: one entry for each check, in the order they were made.
+    """
 
     term: Term
     checks: tuple[Check, ...]
 
     @property
     def ok(self) -> bool:
-        """Whether every check passed."""
-        return all(one.ok for one in self.checks)
+        """Whether all checks of the law passed."""
+        return all(check.ok for check in self.checks)
 
     def __str__(self) -> str:
         head = f"{type(self.term).__name__} ({self.term.key}): {'ok' if self.ok else 'WRONG'}"
         rows = [
-            (one.name, f"{one.worst:.2e}", f"{one.allowed:.2e}", "ok" if one.ok else "WRONG", one.text)
-            for one in self.checks
+            (check.name, f"{check.worst:.2e}", f"{check.allowed:.2e}", "ok" if check.ok else "WRONG", check.text)
+            for check in self.checks
         ]
         rows = [("check", "worst", "allowed", "", ""), *rows]
         widths = [max(len(row[i]) for row in rows) for i in range(4)]
@@ -64,39 +77,48 @@ class LawReport:
 def check_law(
     term: Term, *, scene: Scene | None = None, samples: int = 64, seed: int = 0, step: float = 1e-5
 ) -> LawReport:
-    """Check the device code of a term, built-in or the user's, against its own host code, at random views.
+    """Check a term's device code against its host code, at random views.
 
-    scene: whose vehicle and environment the law gets (a simple vehicle by default). samples: how many views: any attitude,
-    positions some metres around the scene's start, velocities and rates of order 1, times from 0 to 10 s.
-    step [m, rad, s]: of the finite differences. Compiles one small kernel for each new law. What is checked, each where
-    the law has it:
+    Each new law costs the compilation of one small kernel. The checks, each made where the law has the role:
 
-    All: finite, at rest and along single axes as well.
-    law: blind to velocities, and to the time unless `timed`; with POTENTIAL, the derivatives of potential(),
-    which energy() adds.
-    damping: nu.D nu >= 0; where the term says `dissipative = False`, its least value is told and is no fault.
-    flow: rate and gradient are the derivatives of velocity, and water() gives the same velocity; FLOW is what it does.
-    All: lanes do not mix; numbers that vary by member give what shared ones do; packed() fills what params() names, and
-    gives the same law whatever axes and origin of the body the method works in.
+    * All roles: numbers are finite, also at rest and along single axes. Lanes do not mix. Numbers that vary by member
+      give the same as shared ones. `packed` fills the fields that `params` names, and the law is the same in all body
+      axes and about all origins that a method may choose.
+    * `law`: independent of velocities, and of the time unless `timed`. With POTENTIAL, force and torque are the
+      derivatives of `potential`, and `energy` adds the same potential.
+    * `damping`: nu . D nu >= 0. With `dissipative = False` the least power is reported and is no fault.
+    * `flow`: rate and gradient are the derivatives of the velocity, `water` gives the same velocity, and FLOW fits it.
 
-    Raises SceneError where the device code lacks something, has a wrong signature or does not compile.
+    Args:
+        term: the term, built-in or the user's own.
+        scene: scene with the vehicle and the environment to use; None (default) for a simple vehicle.
+        samples: number of views (default 64): any attitude, positions some metres around the scene's start, velocities
+            [m/s] and angular velocities [rad/s] of order 1, times from 0 to 10 s.
+        seed: seed of the random views (default 0).
+        step: step of the finite differences [m, rad, s] (default 1e-5).
+
+    Returns:
+        A report of all checks; `ok` says whether all passed.
+
+    Raises:
+        SceneError: if `term` is no term, or its device code lacks something, has a wrong signature or does not compile.
     """
     if not isinstance(term, Term):
         raise SceneError([f"term = {term!r}: is no term; give an object such as lw.Drag(...), not its class"])
     known, roles = (STOPS, ("distance",)) if isinstance(term, Event) else (LAWS, model.ROLES)
-    module = model._module(term, term.device_in(False), known, *roles)
+    module = model.device_module(term, term.device_in(False), known, *roles)
     bench = Bench(term, module, scene or simple_scene(), max(1, -(-samples // default_width("float64"))), seed)
     checks: list[Check] = []
-    for part in (_numbers, _finite, _whole, _potential, _damping, _flow):
+    for examine in (_numbers, _finite, _whole, _potential, _damping, _flow):
         with np.errstate(all="ignore"):  # what is not finite is found by its check
-            checks += part(bench, step)
-        if part in (_numbers, _finite) and not all(one.ok for one in checks):
+            checks += examine(bench, step)
+        if examine in (_numbers, _finite) and not all(check.ok for check in checks):
             break
     return LawReport(term, tuple(checks))
 
 
 def _judged(name: str, difference: np.ndarray, allowed: np.ndarray | float, views: Views, remedy: str) -> Check:
-    """A Check of differences (k,) or (k, d): the one that is worst beside what is allowed, and where, if it is too large."""
+    """A Check of deviations (k,) or (k, d): the one that exceeds its limit by most, and the view where it occurs."""
     k = len(difference)
     worst = np.abs(difference).reshape(k, -1)
     limit = np.broadcast_to(np.reshape(allowed, (-1, 1)) if np.ndim(allowed) == 1 else allowed, worst.shape)
@@ -122,12 +144,12 @@ def _numbers(bench: Bench, step: float) -> Iterator[Check]:
         remedy = "write packed(self, own, setting) that returns lw.Packed({name: numbers}), names as in params()"
         yield Check("packed", 1.0, 0.0, False, f"packed() {text}; {remedy}")
         return
-    given = set(packed.values) | ({"first"} if packed.rows is not None else set())
-    given |= {"memory"} if packed.memory is not None else set()
-    given |= {"work"} if packed.work else set()
+    filled = set(packed.values) | ({"first"} if packed.rows is not None else set())
+    filled |= {"memory"} if packed.memory is not None else set()
+    filled |= {"work"} if packed.work else set()
     wanted = set(bench.Params["own"].names or ()) - {"unused"}
-    wrong = [f"{name} is not in packed().values" for name in sorted(wanted - given)]
-    wrong += [f"{name} is no field of params()" for name in sorted(given - wanted - {"first", "memory", "work"})]
+    wrong = [f"{name} is not in packed().values" for name in sorted(wanted - filled)]
+    wrong += [f"{name} is no field of params()" for name in sorted(filled - wanted - {"first", "memory", "work"})]
     yield Check("numbers", len(wrong), 0.0, not wrong, "; ".join(wrong))
     remembers = packed.memory is not None and packed.memory.size > 0
     good = remembers == bool(term.memory)
@@ -144,17 +166,17 @@ def _numbers(bench: Bench, step: float) -> Iterator[Check]:
 
 
 def _finite(bench: Bench, step: float) -> Iterator[Check]:
-    """Numbers at every view, and at rest and along single axes; a law that is zero at all views is told."""
+    """Whether numbers are finite at all views, at rest and along single axes; notes a law that is zero everywhere."""
     here = bench.at(bench.views)
-    found = _all_finite("finite", here, bench.views)
+    at_random = _all_finite("finite", here, bench.views)
     for views in bench.corners:
-        corner = _all_finite("finite at rest, along axes", bench.at(views), views)
-        if not corner.ok:
+        at_corners = _all_finite("finite at rest, along axes", bench.at(views), views)
+        if not at_corners.ok:
             break
-    yield corner
+    yield at_corners
     asleep = not any(np.any(value) for value in here.values())
     note = "note: zero at every view, so little was checked; give a scene that starts where the law acts"
-    yield found._replace(text=note) if asleep else found
+    yield at_random._replace(text=note) if asleep else at_random
 
 
 def _all_finite(name: str, values: dict[str, np.ndarray], views: Views) -> Check:
@@ -195,17 +217,17 @@ def _packing(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
             remedy = "packed() must give n entries where its numbers have n"
             yield _judged(f"{role}: varied numbers", varied[role] - value, limit, views, remedy)
     # Weight and restoring moment keep their promise together, not each.
-    if not any(isinstance(bench.term, type(one)) for one in terms.IMPLIED):
+    if not any(isinstance(bench.term, type(implied)) for implied in terms.IMPLIED):
         yield from _axes(bench, here)
 
 
 def _tried(bench: Bench, setting: Setting, views: Views, where: str) -> dict[str, np.ndarray] | str:
-    """What the law gives in another setting; words where packed() fails in it."""
+    """The law's numbers by role in another setting, or a message where packed() fails in it."""
     return _attempt(lambda: Bank(bench, setting, views).evaluate(views), where)
 
 
 def _attempt(make: Callable[[], Any], where: str) -> Any:
-    """What `make` gives; words where it fails."""
+    """The result of `make`, or a message where it fails."""
     try:
         return make()
     except Exception as error:
@@ -214,18 +236,20 @@ def _attempt(make: Callable[[], Any], where: str) -> Any:
 
 def _axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
     """The same wrench from a frame with other axes and origin."""
-    views, other = bench.views, bench.views.elsewhere()
-    there = _tried(bench, bench.setting(bench.parameters, True), other, "in other axes of the body")
+    views, turned_views = bench.views, bench.views.elsewhere()
+    turned = _tried(bench, bench.setting(bench.parameters, True), turned_views, "in other axes of the body")
     for role in set(here) & {"law", "damping"}:
-        if isinstance(there, str):
-            yield Check(f"{role}: any axes", np.inf, 0.0, False, there)
+        if isinstance(turned, str):
+            yield Check(f"{role}: any axes", np.inf, 0.0, False, turned)
             continue
-        mine, its = _wrench(role, here[role], views), _wrench(role, there[role], other)
-        force = its[:, :3] @ TURN.T
-        torque = its[:, 3:] @ TURN.T + np.cross(ORIGIN, force)
-        difference = np.concatenate([force, torque], axis=1) - mine
+        wrench, turned_wrench = _wrench(role, here[role], views), _wrench(role, turned[role], turned_views)
+        force = turned_wrench[:, :3] @ TURN.T
+        torque = turned_wrench[:, 3:] @ TURN.T + np.cross(ORIGIN, force)
+        difference = np.concatenate([force, torque], axis=1) - wrench
         # Moving the origin and turning add up numbers as large as these.
-        limit = ROUNDINGS * EPS * max(np.abs(here[role]).max(), np.abs(there[role]).max(), np.abs(mine).max()) * 100.0
+        limit = (
+            ROUNDINGS * EPS * max(np.abs(here[role]).max(), np.abs(turned[role]).max(), np.abs(wrench).max()) * 100.0
+        )
         remedy = "turn vectors by setting.frame.vector(), points by .point(), torques by .torque() in packed()"
         yield _judged(f"{role}: any axes", difference, limit, views, remedy)
 
@@ -239,14 +263,19 @@ def _wrench(role: str, value: np.ndarray, views: Views) -> np.ndarray:
 
 
 class Slope(NamedTuple):
-    """A central difference (k, ...) and how far it may be wrong: by its step, seen at twice the step, and by rounding."""
+    """A central difference and a bound of its error.
+
+    Attributes:
+        value: (k, ...), the difference quotient.
+        allowed: (k, ...), its error: that of the step, estimated with twice the step, and that of rounding.
+    """
 
     value: np.ndarray
     allowed: np.ndarray
 
 
 def _slope(values: Any, step: float, reach: np.ndarray) -> Slope:
-    """From values(by) at by = +-step, +-2 step. reach (k,): the size of what is stepped in, whose rounding shows."""
+    """Slope of values(by), from by = +-step and +-2 step; reach (k,): size of what varies, which sets the rounding."""
     near, far = [(np.asarray(values(by)), np.asarray(values(-by))) for by in (step, 2.0 * step)]
     first, second = (near[0] - near[1]) / (2.0 * step), (far[0] - far[1]) / (4.0 * step)
     size = np.maximum.reduce([np.abs(value) for value in (*near, *far)])
@@ -270,20 +299,20 @@ def _potential(bench: Bench, step: float) -> Iterator[Check]:
         [_slope(lambda by, f=f, i=i: U(f(i, by)), step, reach) for i in range(3)] for f in (views.moved, views.turned)
     )
     R = views.attitude
-    force = -notation.rotate_into(R, np.stack([one.value for one in moves], axis=1))
-    allowed = np.linalg.norm([one.allowed for one in moves], axis=0)
-    torque = -np.stack([one.value for one in turns], axis=1)
+    force = -notation.rotate_into(R, np.stack([slope.value for slope in moves], axis=1))
+    allowed = np.linalg.norm([slope.allowed for slope in moves], axis=0)
+    torque = -np.stack([slope.value for slope in turns], axis=1)
     wrench = bench.at(views)["law"]
     remedy = "is it the gradient of potential()?"
     if not np.any(U(views)):
         remedy = "potential() gives 0 everywhere: write it, or drop POTENTIAL"
     yield _judged("law: force = -R^T dU/db", wrench[:, :3] - force, allowed, views, remedy)
-    limits = np.stack([one.allowed for one in turns], axis=1)
+    limits = np.stack([slope.allowed for slope in turns], axis=1)
     yield _judged("law: torque = -dU/dR", wrench[:, 3:] - torque, limits, views, remedy)
     if hasattr(bench.module, "energy"):
-        known, told = U(views), bench.at(views)["energy"][:, 0]
-        round_off = 100.0 * ROUNDINGS * EPS * max(np.abs(known).max(), np.abs(told).max())
-        difference = (told - told[0]) - (known - known[0])
+        known, energy = U(views), bench.at(views)["energy"][:, 0]
+        round_off = 100.0 * ROUNDINGS * EPS * max(np.abs(known).max(), np.abs(energy).max())
+        difference = (energy - energy[0]) - (known - known[0])
         yield _judged("energy: as potential()", difference, round_off, views, "is it u + U, with u as given?")
 
 
@@ -294,8 +323,8 @@ def _damping(bench: Bench, step: float) -> Iterator[Check]:
     views = bench.views
     D = bench.at(views)["damping"].reshape(-1, 6, 6)
     weakest = np.linalg.eigh(D + np.swapaxes(D, 1, 2))[1][:, :, 0]
-    tried = [views, *(views.changed(velocity=s * weakest[:, :3], rate=s * weakest[:, 3:]) for s in (1.0, -1.0))]
-    power, allowed, twist = (np.concatenate(x) for x in zip(*(_power(bench, one) for one in tried), strict=True))
+    trials = [views, *(views.changed(velocity=s * weakest[:, :3], rate=s * weakest[:, 3:]) for s in (1.0, -1.0))]
+    power, allowed, twist = (np.concatenate(x) for x in zip(*(_power(bench, trial) for trial in trials), strict=True))
     endless = ~(np.isfinite(power) & np.isfinite(allowed))
     if endless.any():
         i = int(endless.argmax())
@@ -326,7 +355,7 @@ def _flow(bench: Bench, step: float) -> Iterator[Check]:
     if "flow" not in bench.roles or bench.noisy:
         return
     views, kind = bench.views, getattr(bench.module, "FLOW", None)
-    found = bench.at(views)["flow"]
+    flow = bench.at(views)["flow"]
 
     def u(at: Views) -> np.ndarray:
         return bench.at(at)["flow"][:, :3]
@@ -334,35 +363,35 @@ def _flow(bench: Bench, step: float) -> Iterator[Check]:
     reach = np.linalg.norm(views.position, axis=1) + 1.0
     moves = [_slope(lambda by, i=i: u(views.moved(i, by)), step, reach) for i in range(3)]
     passes = _slope(lambda by: u(views.changed(time=views.time + by)), step, views.time + 1.0)
-    yield _judged("flow: rate = du/dt", found[:, 3:6] - passes.value, passes.allowed, views, "add it to f.rate")
+    yield _judged("flow: rate = du/dt", flow[:, 3:6] - passes.value, passes.allowed, views, "add it to f.rate")
     for i, name in enumerate(("by_north", "by_east", "by_depth")):
-        got = found[:, 6 + 3 * i : 9 + 3 * i]
+        gradient = flow[:, 6 + 3 * i : 9 + 3 * i]
         yield _judged(
-            f"flow: {name} = du/db{i + 1}", got - moves[i].value, moves[i].allowed, views, f"add it to f.{name}"
+            f"flow: {name} = du/db{i + 1}", gradient - moves[i].value, moves[i].allowed, views, f"add it to f.{name}"
         )
     yield _flow_kind(kind, moves, passes)
-    yield _water(bench, u, sum(reach * np.abs(one.value).max(axis=1) for one in moves))
+    yield _water(bench, u, sum(reach * np.abs(slope.value).max(axis=1) for slope in moves))
 
 
 def _water(bench: Bench, u: Callable[[Views], np.ndarray], rounded: np.ndarray) -> Check:
     """water(), or water_at_start() at t = 0, is what flow() gives. rounded (k,): what a position's rounding moves."""
     term, views = bench.term, bench.views
-    given = term.water(bench.own, views.position[:, None], views.time, bench.parameters)
-    if given is None and type(term).water_at_start is Term.water_at_start:
+    velocity = term.water(bench.own, views.position[:, None], views.time, bench.parameters)
+    if velocity is None and type(term).water_at_start is Term.water_at_start:
         text = f"write water(own, position, time, parameters) in {type(term).__name__}: start and energy need it"
         return Check("flow: water()", np.inf, 0.0, False, text)
-    if given is None:
+    if velocity is None:
         views = views.changed(time=0.0 * views.time)
         host = term.water_at_start(bench.own, views.position, bench.setting(bench.parameters))
     else:
-        host = given[:, 0]
+        host = velocity[:, 0]
     limit = ROUNDINGS * EPS * (max(np.abs(host).max(), 1e-300) + rounded)
     return _judged("flow: water()", u(views) - host, limit, views, "the host's water() must be what flow() gives")
 
 
 def _flow_kind(kind: Any, moves: list[Slope], passes: Slope) -> Check:
     """Whether FLOW allows what the velocity does."""
-    varies = any(np.any(np.abs(one.value) > one.allowed) for one in moves)
+    varies = any(np.any(np.abs(slope.value) > slope.allowed) for slope in moves)
     changes = bool(np.any(np.abs(passes.value) > passes.allowed))
     least = "varying" if varies else "uniform" if changes else "steady"
     good = kind in FLOWS and FLOWS.index(kind) >= FLOWS.index(least)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.special import ndtri
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.random import uniforms_of
@@ -71,6 +70,8 @@ class GaussMarkovCurrent(Term):
 
     def _first(self, own: Numbers, setting: Setting) -> np.ndarray:
         """u at t = 0, (1 or n, 3) [m/s], drawn by seed, member and the term's name, as every number that varies by member."""
+        from scipy.special import ndtri
+
         if self.start == "zero":
             return np.zeros((1, 3))
         name, members = f"{self.key}.start", setting.members

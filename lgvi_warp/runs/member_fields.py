@@ -61,13 +61,13 @@ def _adaptive(plan: Plan) -> bool:
 
 STATUS = {
     "long_name": "outcome of the member",
-    "flag_values": [int(one) for one in Status],
-    "flag_meanings": " ".join(one.name.lower() for one in Status),
+    "flag_values": [int(status) for status in Status],
+    "flag_meanings": " ".join(status.name.lower() for status in Status),
 }
 WARNINGS = {
     "long_name": "bits of lgvi_warp.Warnings",
-    "flag_masks": [int(one) for one in Warnings],
-    "flag_meanings": " ".join(str(one.name).lower() for one in Warnings),
+    "flag_masks": [int(bit) for bit in Warnings],
+    "flag_meanings": " ".join(str(bit.name).lower() for bit in Warnings),
 }
 FIELDS = (
     MemberField("status", "|u1", STATUS, lambda plan, outcome: outcome.status),

@@ -39,7 +39,7 @@ from lgvi_warp.runs.store.sink import Sink, marker
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 
-# A trial's time [s]; bytes, and small files, written to learn how fast a disk is.
+# Least time of a trial [s]; bytes, and number of small files, written to measure the speed of a disk.
 TRIAL_SECONDS = 0.3
 PROBE_BYTES, SYNCS = 64_000_000, 4
 
@@ -194,7 +194,7 @@ def costs(plan: Plan, threads: int, observed: Observation | None = None) -> tupl
     high = min(high, _seconds(plan, steps, chosen, threads, observed))
     low = min(_seconds(plan, half, chosen, threads, observed) for _ in range(2))
     slope = (high - low) / (steps - half) if steps > half and high > low else high / steps
-    # In the last round of a run of few blocks some threads are idle.
+    # With few blocks, some threads are idle in the last round: count whole rounds.
     rounds = math.ceil(len(runs) / threads) if len(runs) < 8 * threads else len(runs) / threads
     return max(0.0, high - slope * steps) * rounds, slope * rounds
 
@@ -283,8 +283,8 @@ class Sized:
         count = min(len(runs), threads)
         row = sum(plan.spec.sample_fields.values()) * np.dtype(machine.DTYPES[plan.dtype]).itemsize
         segment = min(SEGMENT_SAMPLE_BYTES, row * runs[0].count * len(plan.grid.times))
-        # A segment's samples: the kernel's, the members' in order, and turned or moved copies. Parts: their rows, and
-        # all together.
+        # A segment's samples are held three times: as the kernel wrote them, in order of members, and as rotated or moved
+        # copies. Parts are held twice: their rows, and all joined.
         each = 3 * segment + 2 * self.statistics.part + self.statistics.taking
         if self.store:
             each += self.statistics.file + sum(column.bytes for column in columns(plan, self.store))
@@ -350,11 +350,11 @@ def writing(runs: Sequence[Sized], folder: Path, threads: int) -> tuple[float, i
             create(replace(sized.store, path=place), sized.plan, content, messages(sized.plan))
         Folder(path).finish()
         begin = time.perf_counter() - start
-        metadata = sum(sized.stat().st_size for sized in path.rglob("*") if sized.is_file())
+        metadata = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
         start = time.perf_counter()
         for i in range(SYNCS):
             durable.write_whole(Path(name) / f"{i}", b"0")
-        # The files of a run's last blocks, then their markers.
+        # At the end of a run it waits twice: for the files of the last blocks, then for their markers.
         wait = 2.0 * (time.perf_counter() - start) / SYNCS * len(runs)
     return begin + sum(sized.disk for sized in runs) / disk_speed(folder, threads) + wait, metadata
 

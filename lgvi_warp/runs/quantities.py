@@ -139,8 +139,8 @@ def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:
             results.append(OfResult(getattr(request, "__name__", type(request).__name__), request))
         elif isinstance(request, str | Quantity) or callable(request):
             with faults.including():
-                value = functional("of", request)
-                results.append(OfResult(value.label, value, not isinstance(request, str)))
+                function = functional("of", request)
+                results.append(OfResult(function.label, function, not isinstance(request, str)))
         else:
             faults.add("of", request, "is no quantity", REMEDY)
     if not requests:

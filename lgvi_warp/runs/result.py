@@ -174,7 +174,7 @@ class Result:
 
     @property
     def members(self) -> int:
-        """Number of members, n."""
+        """Number of members in the result, n."""
         return len(self.status)
 
     @functools.cached_property

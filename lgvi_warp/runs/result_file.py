@@ -13,7 +13,7 @@ from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.runs import member_fields
 
-# Of the samples, by name: the shape of one member's at one time.
+# Shape of one member's sample at one time, by field.
 SHAPES: dict[str, tuple[int, ...]] = {
     "position": (3,), "attitude": (3, 3), "quaternion_wxyz": (4,), "velocity": (3,), "angular_velocity": (3,), "energy": (),
 }  # fmt: skip

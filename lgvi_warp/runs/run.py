@@ -150,7 +150,7 @@ def _in_memory(
     estimates, remarks = Estimates(), tuple[str, ...]()
     if observing is not None:
         estimates, remarks = observing.read(content["ensemble"], of_members["status"])
-    # What lies beyond the last member was never written.
+    # The arrays have room for all members; beyond the last one that ran nothing was written.
     kept = samples.fields if samples and samples.fields else {}
     histories = {name: values[:, :n] for name, values in kept.items()}
     return Result(

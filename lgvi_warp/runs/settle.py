@@ -29,7 +29,7 @@ def blocks_there(only: range | None, plan: Plan) -> range | None:
         The indices that exist, or None for all blocks.
 
     Raises:
-        SceneError: If none of the blocks exists.
+        SceneError: If the range has another step or a negative start, or none of its blocks exists.
     """
     count = len(blocks(plan.ensemble.members))
     if only is None:
@@ -91,7 +91,7 @@ def make_plan(
         faults.add("save", save, "is no SaveAt", "give lw.SaveAt(every=1.0) or lw.SaveAt(at=[...])")
     faults.raise_if_any()
     every = settings.save_every
-    # A spacing that the scene gave for its own duration says nothing about a shorter run.
+    # The scene's save_every is meant for its own duration; a shorter run ignores it.
     dropped = save is None and every is not None and every > float(t1)  # type: ignore[arg-type]
     if save is None:
         save = SaveAt(every=None if dropped else every)
@@ -110,7 +110,7 @@ def make_plan(
     return Plan(ensemble, chosen, grid, fields(save.fields), dtype, width, checks, on_failure or settings.on_failure)
 
 
-# Beyond so many Newton steps a fixed number gains nothing over iterating to the tolerance.
+# With more Newton steps than this, a fixed number gains nothing over iterating to the tolerance.
 MOST_FIXED = 4
 
 
@@ -120,7 +120,7 @@ def enough_iterations(ensemble: Ensemble, method: Method, h: float, dtype: str) 
     The residual after a fixed number grows with h |Omega|: twice the step leaves room for members that spin up.
 
     Args:
-        ensemble: The members, which are run for one step from their starts.
+        ensemble: The members, which are run for one step, of twice the length, from their starts.
         method: The method, whose own `iterations` is ignored.
         h: Step of the run [s].
         dtype: Number type of the run.

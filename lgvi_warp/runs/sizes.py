@@ -20,7 +20,7 @@ from lgvi_warp.statistics.tree import Part
 if TYPE_CHECKING:
     from lgvi_warp.engine.plan import Plan
 
-# Sample times of the two small runs that tell what all take: arrays have a row for each time, or none.
+# Sample times of the two small measurements. Two are enough: an array has a row for each time, or none.
 FEW, MORE = 2, 4
 
 
@@ -65,7 +65,7 @@ def sizes(plan: Plan, statistics: Sequence[Statistic]) -> Sizes:
         return round(getattr(few, name) + slope * (count - FEW))
 
     values = {name: at(name, times) for name in ("file", "part", "joined", "estimates")}
-    # Samples come a launch at a time, and sketches are read so many numbers at a time.
+    # Samples come one launch at a time; sketches are read at_once times together, which bounds the memory.
     launch = max(s1 - s0 for s0, s1 in (plan.due(*segment) for segment in plan.segments(runs[0].count)))
     at_once = max(1, SORTED_AT_ONCE * times * 8 // max(values["joined"], 1))
     return Sizes(**values, taking=at("taking", launch), reading=at("reading", min(times, at_once)))
@@ -91,7 +91,7 @@ def _of_times(plan: Plan, statistics: Sequence[Statistic], count: int) -> Sizes:
             tree = _fullest(statistic, block_part, 1 + len(others))
             read, more = _peak(lambda: keeper.said(statistic, tree))  # noqa: B023
             joined, reading = joined + sum(map(_bytes, tree)), max(reading, more)
-            estimates += sum(_bytes(block_part.arrays) for block_part in read)
+            estimates += sum(_bytes(estimate.arrays) for estimate in read)
     return Sizes(file, sum(map(_bytes, part)), joined, estimates, taking, reading)
 
 

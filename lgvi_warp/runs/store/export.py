@@ -64,7 +64,7 @@ def export(path: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | 
     except ImportError as error:
         raise SceneError([f"to = {to!r}: {error}; install it: pip install 'lgvi-warp[export]'"]) from error
     except (OSError, RuntimeError) as error:
-        # Neither library names the file, and netCDF4 not what the system said.
+        # Neither library names the file, and netCDF4 hides the system's error.
         reason = getattr(error, "strerror", None) or f"was not written ({error}); is the disk full?"
         raise OSError(getattr(error, "errno", None) or errno.EIO, reason, str(target)) from error
     return target

@@ -60,7 +60,7 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
     except OSError as error:
         raise explained(error, target) from error
     if again:
-        # Another machine, or laws of a user's own: then it waits for lw.resume.
+        # On another machine, or with a user's own distributions, this is refused: the run then waits for lw.resume.
         with contextlib.suppress(SceneError, MembersFailed):
             resume(target)
     return Folder(target)

@@ -87,7 +87,7 @@ def folder_of(path: str | os.PathLike[str]) -> Path:
         return location
     stores = sorted(location.glob("*.zarr")) if location.is_dir() else []
     if len(stores) == 1 and stores[0].is_symlink():
-        # A folder from elsewhere would lead to any run of the user's.
+        # A folder from elsewhere could otherwise lead to any run of the user.
         raise SceneError([f"{stores[0]}: is a link; name the store that it leads to: {stores[0].resolve()}"])
     if len(stores) == 1:
         return stores[0]
@@ -329,7 +329,7 @@ def dataset(path: Path) -> xarray.Dataset:
         path: The store.
 
     Returns:
-        The dataset, of the members that the run has and keeps.
+        The dataset of the members that the run has; for a group of kept members, of these alone.
     """
     import importlib.util
 

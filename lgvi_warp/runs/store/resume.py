@@ -72,7 +72,7 @@ def resume(
     )
     messages = refuse_another(folder.path, folder.provenance, now, force)
     runner = executor_of(executor, threads, scheduler)
-    # What the store says stays as it was when it was made, on whatever machine the run goes on.
+    # Provenance and messages stay those of the start of the run, on whatever machine it goes on.
     run = Stored(
         plan, store_of(folder, force), folder.provenance, folder.messages, (*keepers, *observing.keepers), None,
         observing.enough, KeptRun(observed, tuple((observed_content or {}).get("fields", ()))),

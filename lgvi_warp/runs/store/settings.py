@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from lgvi_warp.engine.plan import Plan
 
 
-# Few enough bytes a chunk for its memory, enough that files and their syncs cost little.
+# Small enough for the memory of the blocks at work, large enough that files and their syncs cost little [bytes].
 CHUNK_BYTES = 10_000_000
 
 
@@ -87,9 +87,9 @@ class Store:
             group: zarr group of the store.
             plan: Plan of the run.
         """
-        values_by_name, units = plan.ensemble.explicit(), parameter_units(plan.ensemble.scene)
+        arrays, units = plan.ensemble.explicit(), parameter_units(plan.ensemble.scene)
         explicit = group.create_group("explicit")
-        for name, values in values_by_name.items():
+        for name, values in arrays.items():
             dims = (
                 f"{MEMBER}_given" if name != "indices" else MEMBER,
                 *(f"{name}_{i}" for i in range(values.ndim - 1)),

@@ -88,7 +88,14 @@ FIELDS = (
 
 
 def present(plan: Plan) -> tuple[MemberField, ...]:
-    """Select the fields that a run of this plan has."""
+    """Select the fields that a run of this plan has.
+
+    Args:
+        plan: Plan of the run.
+
+    Returns:
+        The fields, in their fixed order.
+    """
     return tuple(member_field for member_field in FIELDS if member_field.when(plan))
 
 

@@ -13,7 +13,14 @@ if TYPE_CHECKING:
 
 
 def outcomes(result: Result) -> list[Status]:
-    """List the statuses that occur among the members of a result, in order of their codes: OK first."""
+    """List the statuses that occur among the members of a result.
+
+    Args:
+        result: Result of a run.
+
+    Returns:
+        The statuses in order of their codes: OK first.
+    """
     return [Status(int(code)) for code in np.unique(np.asarray(result.status))]
 
 
@@ -37,6 +44,13 @@ def outcome_text(result: Result, code: Status) -> str:
 
 
 def failure_text(result: Result) -> str:
-    """Describe each kind of failure in a line with its remedy; "" if no member failed."""
+    """Describe each kind of failure in a line with its remedy.
+
+    Args:
+        result: Result of a run.
+
+    Returns:
+        The lines; "" if no member failed.
+    """
     failures = [code for code in outcomes(result) if code != Status.OK and not code.stopped]
     return "\n".join(outcome_text(result, code) for code in failures)

@@ -274,10 +274,13 @@ class Sized:
         return held + each * self.plan.ensemble.members
 
     def working(self, threads: int) -> int:
-        """Memory of the blocks at work [bytes].
+        """Compute the memory of the blocks at work.
 
         Args:
             threads: Number of threads.
+
+        Returns:
+            Memory [bytes].
         """
         plan, runs = self.plan, blocks(self.plan.ensemble.members)
         count = min(len(runs), threads)
@@ -292,11 +295,14 @@ class Sized:
 
 
 def memory(runs: Sequence[Sized], threads: int) -> int:
-    """Peak memory that several runs, one after the other, add to the process [bytes].
+    """Compute the memory that several runs, one after the other, add to the process.
 
     Args:
         runs: The runs, in order; the results of earlier ones stay in memory.
         threads: Number of threads.
+
+    Returns:
+        The peak [bytes].
     """
     peaks = [
         sum(earlier.held for earlier in runs[: i + 1]) + max(run.working(threads), run.statistics.reading)

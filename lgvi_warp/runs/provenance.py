@@ -13,7 +13,14 @@ from lgvi_warp.scene.ensemble import AT_ONCE
 
 
 def messages(plan: Plan) -> tuple[str, ...]:
-    """Messages about a plan that the user should know before the run: on times, vehicle, parameters and starts."""
+    """List what the user should know before the run: on times, vehicle, parameters and starts.
+
+    Args:
+        plan: Plan of the run.
+
+    Returns:
+        The messages.
+    """
     return plan.grid.messages + tuple(plan.ensemble.scene.vehicle.warnings) + odd_before(plan)
 
 
@@ -58,7 +65,14 @@ def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence
 
 
 def odd_before(plan: Plan) -> tuple[str, ...]:
-    """List messages on implausible parameters and starts of the members; of a large fleet, on the first members' starts."""
+    """List messages on implausible parameters and starts of the members.
+
+    Args:
+        plan: Plan of the run; of a large fleet only the first members' starts are checked.
+
+    Returns:
+        The messages.
+    """
     ensemble = plan.ensemble
     varies = ensemble.starts_vary or bool(ensemble.varied() and plausibility.own_flows(ensemble.scene))
     starts = plausibility.of_start(ensemble.scene, ensemble.select(0, min(AT_ONCE, ensemble.members) if varies else 1))

@@ -88,6 +88,9 @@ class OfResult:
 
         Args:
             count: How many numbers it has for a member.
+
+        Returns:
+            A label for each.
         """
         if isinstance(self.of, Functional):
             return list(self.of.labels)

@@ -148,7 +148,14 @@ class Result:
         return np.where(np.isnan(self.failure_time), self.time[-1], self.failure_time)
 
     def own(self, term: Term) -> dict[str, np.ndarray]:
-        """Return the parameters of a term by field, each with a leading dimension of 1 or n."""
+        """Select the parameters of a term.
+
+        Args:
+            term: A term of the scene.
+
+        Returns:
+            Arrays by field of the term, each with a leading dimension of 1 or n.
+        """
         return {name: self.parameters[f"{term.key}.{name}"] for name in term.parameters()}
 
     def part(self, places: np.ndarray) -> Result:

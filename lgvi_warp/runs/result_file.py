@@ -27,6 +27,9 @@ def understood(path: str | os.PathLike[str]) -> Iterator[None]:
     Args:
         path: The file, which the message names.
 
+    Yields:
+        Nothing; the file is read in this context.
+
     Raises:
         SceneError: In place of any error that the content of the file causes.
     """

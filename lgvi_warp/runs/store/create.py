@@ -58,7 +58,14 @@ def create(
 
 
 def names_of(keepers: Sequence[Keeper]) -> list[str]:
-    """List the names of the keepers that leave parts in a store."""
+    """List the names of the keepers that leave parts in a store.
+
+    Args:
+        keepers: The keepers of a run.
+
+    Returns:
+        The names, in the order of the keepers.
+    """
     return [keeper.name for keeper in keepers if isinstance(keeper, PartKeeper)]
 
 
@@ -121,7 +128,7 @@ def skeleton(
                column.attributes)  # fmt: skip
     store.write_given(group, plan)
     with warnings.catch_warnings():
-        # Consolidated metadata let xarray open the store in one read; zarr warns that the format, version 3, does not define them.
+        # Consolidated metadata let xarray open the store in one read; zarr warns that version 3 of the format has none.
         warnings.simplefilter("ignore")
         zarr.consolidate_metadata(memory, zarr_format=3)
     for folder in {os.path.dirname(key) for key in inside} | {"blocks", "parts"}:

@@ -264,12 +264,26 @@ def below(path: Path) -> dict[str, Any]:
 
 
 def checksum_of(texts: Sequence[str]) -> int:
-    """Compute the joint CRC-32C checksum of several texts."""
+    """Compute one checksum of several texts.
+
+    Args:
+        texts: The texts, in order.
+
+    Returns:
+        CRC-32C of the texts joined by zero bytes.
+    """
     return durable.checksum("\0".join(texts).encode())
 
 
 def check_names(found: Sequence[Column]) -> None:
-    """Check that each array's name can be that of a folder. Raises SceneError."""
+    """Check that each array's name can be that of a folder.
+
+    Args:
+        found: The arrays.
+
+    Raises:
+        SceneError: If a name cannot; the message names every fault.
+    """
     faults = Faults("store.")
     for name in (column.name for column in found if not store_check.is_name(column.name)):
         remedy = 'give the term or event another name, without / \\ : * ? " < > | and of 200 bytes at most'
@@ -283,6 +297,9 @@ def held(path: Path) -> Iterator[None]:
 
     Args:
         path: Folder of the store.
+
+    Yields:
+        Nothing; the lock is held in this context.
 
     Raises:
         SceneError: If another run works in it; the message names that run.
@@ -324,6 +341,13 @@ def foreign(path: Path) -> str | None:
 
 
 def refuse_foreign(path: Path) -> None:
-    """Raise SceneError if a folder that is to be replaced holds what no run wrote."""
+    """Check that a folder that is to be replaced holds only what a run wrote.
+
+    Args:
+        path: The folder, which need not exist.
+
+    Raises:
+        SceneError: If it holds something else.
+    """
     if os.path.lexists(path) and (fault := foreign(Path(os.path.realpath(path)))):
         raise SceneError([f"{path}: {fault}; it is not overwritten: move it away, or give another folder"])

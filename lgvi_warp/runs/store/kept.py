@@ -161,5 +161,12 @@ def members_kept(keep: Any, folder: Folder, members: int | None = None) -> np.nd
 
 
 def keep_of(provenance: Mapping[str, Any]) -> Any:
-    """Read from provenance which samples a run keeps, as the `keep` of solve."""
+    """Read from provenance which samples a run keeps.
+
+    Args:
+        provenance: Provenance of the run.
+
+    Returns:
+        The `keep` of solve.
+    """
     return provenance.get("observed", {}).get("keep", "all")

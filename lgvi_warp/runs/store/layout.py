@@ -87,25 +87,34 @@ class Column:
         Args:
             samples: Number of sample times, k.
             members: Number of members, n.
+
+        Returns:
+            (k, n, *tail), or (n, *tail) without times.
         """
         return (*((samples,) if self.times else ()), members, *self.tail)
 
     def key(self, block: Block, time: int = 0) -> str:
-        """Return the path of a chunk's file, below the store's root.
+        """Return the path of a chunk's file.
 
         Args:
             block: The block of members.
-            time: Number of the chunk along the times.
+            time: Number of the chunk along the times; default the first.
+
+        Returns:
+            The path below the store's root.
         """
         index = (*((time,) if self.times else ()), block.first // self.length, *(0,) * len(self.tail))
         return f"{self.name}/c." + ".".join(map(str, index))
 
     def keys(self, block: Block, samples: int) -> list[str]:
-        """Return the paths of all chunks of a block, below the store's root.
+        """Return the paths of all chunks of a block.
 
         Args:
             block: The block of members.
             samples: Number of sample times, k.
+
+        Returns:
+            The paths below the store's root, in order of time.
         """
         return [self.key(block, time) for time in range(-(-samples // self.times) if self.times else 1)]
 
@@ -183,11 +192,14 @@ def parameter_units(scene: Any) -> dict[str, str]:
 
 
 def size(plan: Plan, store: Chunking) -> int:
-    """Compute the size of all chunks of a run [bytes].
+    """Compute the size of all chunks of a run.
 
     Args:
         plan: Plan of the run.
         store: Fields, dtype and size of chunks.
+
+    Returns:
+        Size [bytes].
     """
     k, runs = len(plan.grid.times), len(blocks(plan.ensemble.members))
     each = sum(column.bytes * len(column.keys(Block(0, column.length), k)) for column in columns(plan, store))

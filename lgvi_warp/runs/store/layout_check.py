@@ -51,7 +51,14 @@ class NotOursError(ValueError):
 
 
 def is_name(name: Any) -> bool:
-    """Tell whether a name is safe for a folder on every system: printable, no path, no drive, no wild card."""
+    """Tell whether a name is safe for a folder on every system.
+
+    Args:
+        name: The name, of any type.
+
+    Returns:
+        True for a printable text that is not too long and no path, drive or wild card.
+    """
     return isinstance(name, str) and 0 < len(name.encode(errors="replace")) <= MOST_NAME and not UNFIT.search(name)
 
 
@@ -60,6 +67,9 @@ def is_file_of_store(name: str) -> bool:
 
     Args:
         name: Path of the file below the store's root.
+
+    Returns:
+        True if it may.
     """
     folder, _, last = name.rpartition("/")
     if scratch.is_unfinished(last):
@@ -149,10 +159,13 @@ class Layout:
         return files
 
     def chunk_bytes(self, key: str) -> int | None:
-        """Return the size of a chunk's file [bytes]; None if the layout has no such file.
+        """Look up the size of a chunk's file.
 
         Args:
             key: Path of the file below the root.
+
+        Returns:
+            Size [bytes]; None if the layout has no such file.
         """
         name, _, last = key.rpartition("/")
         array = self.arrays.get(name)
@@ -164,10 +177,13 @@ class Layout:
         return array.bytes if inside else None
 
     def root(self, attributes: Mapping[str, Any]) -> bytes:
-        """Return the root's metadata for zarr, with those of all arrays in it, as JSON.
+        """Write the root's metadata for zarr, with those of all arrays in it.
 
         Args:
             attributes: Attributes of the group.
+
+        Returns:
+            The metadata as JSON.
         """
         group = {"attributes": {}, "zarr_format": 3, "node_type": "group"}
         empty = {"kind": "inline", "must_understand": False, "metadata": {}}
@@ -254,7 +270,14 @@ def _plain(attributes: Mapping[str, Any], name: str) -> None:
 
 
 def is_text(value: Any) -> bool:
-    """Tell whether a value is a text of printable characters and line breaks, which cannot control a terminal."""
+    """Tell whether a value is a text that cannot control a terminal.
+
+    Args:
+        value: The value, of any type.
+
+    Returns:
+        True for a text of printable characters and line breaks.
+    """
     return isinstance(value, str) and (value.isprintable() or value.replace("\n", " ").isprintable())
 
 
@@ -301,6 +324,9 @@ def understood(path: Path) -> Iterator[None]:
     Args:
         path: The file, which the message names.
 
+    Yields:
+        Nothing; the file is read in this context.
+
     Raises:
         SceneError: In place of any error that the content of the file causes.
     """
@@ -317,5 +343,12 @@ def understood(path: Path) -> Iterator[None]:
 
 
 def is_sum(value: Any) -> bool:
-    """Tell whether a value is a list of a size and a checksum."""
+    """Tell whether a value is a list of a size and a checksum.
+
+    Args:
+        value: The value, of any type.
+
+    Returns:
+        True for a list of two integers that are not negative.
+    """
     return isinstance(value, list) and len(value) == 2 and all(type(number) is int and number >= 0 for number in value)

@@ -57,7 +57,14 @@ class Arrays(Mapping[str, np.ndarray]):
         return np.asarray(array[at] if isinstance(chosen, slice) else array.oindex[at])
 
     def dataset(self, path: Path) -> xarray.Dataset:
-        """Open the whole store as an xarray Dataset."""
+        """Open the whole store as an xarray Dataset.
+
+        Args:
+            path: The store.
+
+        Returns:
+            The dataset; see the function `dataset`.
+        """
         return dataset(path)
 
     def __contains__(self, name: object) -> bool:
@@ -146,7 +153,13 @@ def open_run(
 
 
 def times_of(folder: Folder) -> np.ndarray:
-    """Read the times of a run's samples [s], shape (k,).
+    """Read the times of a run's samples.
+
+    Args:
+        folder: The store.
+
+    Returns:
+        Times [s], shape (k,).
 
     Raises:
         SceneError: If they are lost.

@@ -24,7 +24,14 @@ if TYPE_CHECKING:
 
 
 def recipe(plan: Plan) -> dict[str, Any]:
-    """Write a plan's settings, without its ensemble and its times, as JSON holds them with all digits."""
+    """Write a plan's settings without its ensemble and its times.
+
+    Args:
+        plan: Plan of the run.
+
+    Returns:
+        A table that JSON holds with all digits.
+    """
     return {
         "members": plan.ensemble.members,
         "method": dataclasses.asdict(plan.method),

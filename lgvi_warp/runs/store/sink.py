@@ -29,7 +29,14 @@ if TYPE_CHECKING:
 
 
 def name_of(block: Block) -> str:
-    """Return the name of a block's files without their suffix: its first member, with nine digits."""
+    """Return the name of a block's files without their suffix.
+
+    Args:
+        block: The block.
+
+    Returns:
+        Its first member, with nine digits.
+    """
     return f"{block.first:09d}"
 
 
@@ -56,15 +63,30 @@ class Sink:
             plan: Plan of the run.
             block: The block.
             members: Its members.
+
+        Returns:
+            The writer.
         """
         return BlockWriter(self.root, self.columns, self.room, plan, block, members)
 
     def understood(self, block: Block) -> AbstractContextManager[None]:
-        """Return a context in which errors are faults of the file with a block's parts."""
+        """Turn errors that arise while a block's parts are used into faults of their file.
+
+        Args:
+            block: The block.
+
+        Returns:
+            The context in which the parts are used.
+        """
         return understood(self.root / self.parts_key(block))
 
     def merge(self, block: Block, part: Any) -> None:
-        """Do nothing: the block is in its place already."""
+        """Do nothing: the block is in its place already.
+
+        Args:
+            block: The block.
+            part: What its writer closed it with.
+        """
 
     def finish(self, block: Block, files: durable.Files, keepers: Sequence[Keeper], parts: Sequence[Any]) -> None:
         """Hand over a block to be made durable and marked.
@@ -84,7 +106,14 @@ class Sink:
 
     @staticmethod
     def parts_key(block: Block) -> str:
-        """Return the path of the file with a block's parts of the keepers, below the root."""
+        """Return the path of the file with a block's parts of the keepers.
+
+        Args:
+            block: The block.
+
+        Returns:
+            The path below the store's root.
+        """
         return f"parts/{name_of(block)}.npy"
 
     def sums(self, block: Block) -> dict[str, list[int]] | None:
@@ -102,7 +131,14 @@ class Sink:
         return read_marker(self.root, f"blocks/{name_of(block)}.json")
 
     def marker(self, block: Block) -> Path:
-        """Return the path of a block's marker, the file that says that the block is finished."""
+        """Return the path of a block's marker, the file that says that the block is finished.
+
+        Args:
+            block: The block.
+
+        Returns:
+            The path.
+        """
         return self.root / "blocks" / f"{name_of(block)}.json"
 
     def parts(self, block: Block, keepers: Sequence[Keeper]) -> tuple[Any, ...] | None:
@@ -233,6 +269,9 @@ def marker(sums: Mapping[str, list[int]]) -> bytes:
 
     Args:
         sums: [size, checksum] by path of the file.
+
+    Returns:
+        Content of the marker.
     """
     text = json.dumps(dict(sorted(sums.items())), indent=0).encode()
     return text + b"\n%08x\n" % durable.checksum(text)

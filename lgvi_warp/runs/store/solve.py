@@ -69,7 +69,14 @@ def run_stored(
 
 
 def went_on(folder: Folder) -> tuple[str, ...]:
-    """Tell how many blocks of a run were in the store already; nothing if there were none."""
+    """Tell how many blocks of a run were in the store already.
+
+    Args:
+        folder: Store of the run that has ended.
+
+    Returns:
+        A message; none if no block was there.
+    """
     present, ran, ran_kept = folder.found, folder.ran, folder.ran_kept
     if not present:
         return ()

@@ -19,7 +19,10 @@ def store_of(folder: Folder, force: bool = False) -> Store:
 
     Args:
         folder: The store.
-        force: Whether to continue on another machine or with other versions.
+        force: Whether to continue on another machine or with other versions; default False.
+
+    Returns:
+        The settings, with existing="resume".
     """
     layout = folder.recipe["store"]
     fields = None if layout["fields"] is None else tuple(layout["fields"])

@@ -27,7 +27,14 @@ class Room(list[dict[str, np.ndarray]]):
 
     @staticmethod
     def made(columns: tuple[Column, ...]) -> dict[str, np.ndarray]:
-        """Allocate a chunk for each field with samples, with undefined content."""
+        """Allocate a chunk for each array that has times.
+
+        Args:
+            columns: The arrays of a store.
+
+        Returns:
+            Chunks by name, with undefined content.
+        """
         return {column.name: np.empty(column.chunk, column.dtype) for column in columns if column.times}
 
 

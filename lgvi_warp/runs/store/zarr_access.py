@@ -69,7 +69,14 @@ def _class() -> Any:
             return f"file://{self.root.absolute().as_posix()}"
 
         def with_read_only(self, read_only: bool = False) -> CheckedStore:
-            """Return the store itself, which is read-only; raises ValueError if it should not be."""
+            """Return the store itself, which is read-only.
+
+            Args:
+                read_only: Must be True.
+
+            Raises:
+                ValueError: If it is not.
+            """
             if not read_only:
                 raise ValueError("a run's store is only read by zarr")
             return self
@@ -129,11 +136,21 @@ def _class() -> Any:
             Args:
                 prototype: zarr's kind of buffer.
                 key_ranges: Path and range of each.
+
+            Returns:
+                The bytes of each; None for a missing file.
             """
             return [await self.get(key, prototype, part) for key, part in key_ranges]
 
         async def exists(self, key: str) -> bool:
-            """Tell whether a file is there, with the right size."""
+            """Tell whether a file is there.
+
+            Args:
+                key: Path of the file below the root.
+
+            Raises:
+                SceneError: If it has not the size that it must have.
+            """
             return await asyncio.to_thread(self.content, key) is not None
 
         async def set(self, key: str, value: Buffer) -> None:
@@ -149,12 +166,26 @@ def _class() -> Any:
             yield ROOT
 
         async def list_prefix(self, prefix: str) -> AsyncIterator[str]:
-            """List the root's metadata, if its name begins with the prefix."""
+            """List the root's metadata, if its name begins with a prefix.
+
+            Args:
+                prefix: The prefix.
+
+            Yields:
+                The name of the metadata.
+            """
             if ROOT.startswith(prefix):
                 yield ROOT
 
         async def list_dir(self, prefix: str) -> AsyncIterator[str]:
-            """List the names of arrays and groups below a prefix."""
+            """List the arrays and groups in a folder.
+
+            Args:
+                prefix: Path of the folder below the root.
+
+            Yields:
+                Their names, sorted.
+            """
             names: set[Any] = set()
             head = f"{prefix.rstrip('/')}/" if prefix else ""
             for name in (*self.layout.arrays, *self.layout.groups):

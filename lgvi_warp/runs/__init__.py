@@ -1,1 +1,1 @@
-"""To be said in one sentence."""
+"""Runs of an ensemble: solving in memory or into a store, and the results they leave."""

@@ -1,4 +1,4 @@
-"""What a run says of each member besides its samples: one line a field, for memory, files and stores alike."""
+"""What a run records of each member besides samples: one line per field, for memory, files and stores alike."""
 
 from __future__ import annotations
 
@@ -17,9 +17,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class MemberField:
-    """One number of each member: its name, NumPy's type, CF attributes, and how an outcome gives it, (n,).
+    """One number of each member: its name, type and attributes, and the function that computes it.
 
-    when: whether a plan has it.
+    Attributes:
+        name: Name of the field.
+        dtype: NumPy's type string.
+        attributes: CF attributes.
+        of: Function of a plan and an outcome that gives the values, shape (n,).
+        when: Function of a plan that tells whether its runs have the field; default always.
     """
 
     name: str
@@ -30,23 +35,23 @@ class MemberField:
 
 
 def _failure_time(plan: Plan, outcome: Outcome) -> np.ndarray:
-    """The time of the last good state, for an event its own; NaN where there was neither."""
+    """Time of the last good state, or of the event [s]; NaN where there was neither."""
     return np.where(outcome.status != 0, outcome.end_time(plan), np.nan)
 
 
 def _failure_value(plan: Plan, outcome: Outcome) -> np.ndarray:
-    """What crossed its limit; 0 for an event."""
+    """The value that crossed its limit; 0 for an event, NaN without."""
     size = np.where(stopped(outcome.status), 0.0, outcome.failed_size)
     return np.where(outcome.status != 0, size, np.nan)
 
 
 def _warning_time(plan: Plan, outcome: Outcome) -> np.ndarray:
-    """When the most serious warning was first seen."""
+    """Time when the most serious warning was first seen [s]; NaN without."""
     return np.where(outcome.warnings != 0, outcome.warning_step * plan.grid.h, np.nan)
 
 
 def _warning_value(plan: Plan, outcome: Outcome) -> np.ndarray:
-    """What was seen then."""
+    """The value that was seen at that time; NaN without."""
     return np.where(outcome.warnings != 0, outcome.warning_value, np.nan)
 
 
@@ -56,13 +61,13 @@ def _adaptive(plan: Plan) -> bool:
 
 STATUS = {
     "long_name": "outcome of the member",
-    "flag_values": [int(one) for one in Status],
-    "flag_meanings": " ".join(one.name.lower() for one in Status),
+    "flag_values": [int(status) for status in Status],
+    "flag_meanings": " ".join(status.name.lower() for status in Status),
 }
 WARNINGS = {
     "long_name": "bits of lgvi_warp.Warnings",
-    "flag_masks": [int(one) for one in Warnings],
-    "flag_meanings": " ".join(str(one.name).lower() for one in Warnings),
+    "flag_masks": [int(bit) for bit in Warnings],
+    "flag_meanings": " ".join(str(bit.name).lower() for bit in Warnings),
 }
 FIELDS = (
     MemberField("status", "|u1", STATUS, lambda plan, outcome: outcome.status),
@@ -83,10 +88,28 @@ FIELDS = (
 
 
 def present(plan: Plan) -> tuple[MemberField, ...]:
-    """The fields that a run of this plan has."""
-    return tuple(one for one in FIELDS if one.when(plan))
+    """Select the fields that a run of this plan has.
+
+    Args:
+        plan: Plan of the run.
+
+    Returns:
+        The fields, in their fixed order.
+    """
+    return tuple(member_field for member_field in FIELDS if member_field.when(plan))
 
 
 def of(plan: Plan, outcome: Outcome) -> dict[str, np.ndarray]:
-    """The fields of these members, by name."""
-    return {one.name: one.of(plan, outcome).astype(one.dtype, copy=False) for one in present(plan)}
+    """Compute the fields of an outcome's members.
+
+    Args:
+        plan: Plan of the run.
+        outcome: How n members ended.
+
+    Returns:
+        Arrays of shape (n,), by name.
+    """
+    return {
+        member_field.name: member_field.of(plan, outcome).astype(member_field.dtype, copy=False)
+        for member_field in present(plan)
+    }

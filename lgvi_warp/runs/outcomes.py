@@ -1,4 +1,4 @@
-"""What became of a run's members: until when each was under way, and a sentence for each outcome."""
+"""How the members of a run ended, in words: a sentence for each status that occurs."""
 
 from __future__ import annotations
 
@@ -13,19 +13,26 @@ if TYPE_CHECKING:
 
 
 def outcomes(result: Result) -> list[Status]:
-    """The statuses that occur, those that ran to the end first."""
+    """List the statuses that occur among the members of a result.
+
+    Args:
+        result: Result of a run.
+
+    Returns:
+        The statuses in order of their codes: OK first.
+    """
     return [Status(int(code)) for code in np.unique(np.asarray(result.status))]
 
 
 def outcome_text(result: Result, code: Status) -> str:
-    """How many members have a status, the first of them in time, and what it means.
+    """Describe one status: how many members have it, which of them had it first, and what it means.
 
     Args:
-        result: Of a run.
-        code: A status that some member has.
+        result: Result of a run.
+        code: A status that at least one member has.
 
     Returns:
-        One line; of a failure with the value that passed its limit, and the remedy.
+        One line; for a failure with the value that passed its limit, and the remedy.
     """
     members = np.flatnonzero(np.asarray(result.status) == code)
     many = f"{code.name.lower()}, {len(members):,} of {result.members:,} members"
@@ -37,6 +44,13 @@ def outcome_text(result: Result, code: Status) -> str:
 
 
 def failure_text(result: Result) -> str:
-    """A line for each kind of failure, with the remedy; "" where no member failed."""
+    """Describe each kind of failure in a line with its remedy.
+
+    Args:
+        result: Result of a run.
+
+    Returns:
+        The lines; "" if no member failed.
+    """
     failures = [code for code in outcomes(result) if code != Status.OK and not code.stopped]
     return "\n".join(outcome_text(result, code) for code in failures)

@@ -1,4 +1,4 @@
-"""What a run will take before it begins: time, memory and disk, from a small run of the same plan on this machine."""
+"""Prediction of a run's time, memory and disk space, from a short trial of the same plan on this machine."""
 
 from __future__ import annotations
 
@@ -39,17 +39,30 @@ from lgvi_warp.runs.store.sink import Sink, marker
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 
-# A trial's time [s]; bytes, and small files, written to learn how fast a disk is.
+# Least time of a trial [s]; bytes, and number of small files, written to measure the speed of a disk.
 TRIAL_SECONDS = 0.3
 PROBE_BYTES, SYNCS = 64_000_000, 4
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a run takes. compile, set_up, advance, write: seconds of each part; seconds: of the run without compilation.
+    """Time, memory and disk space that a run will take.
 
-    compile is what loading the kernel took now, near 0 if Warp's cache had it. Writing goes on while blocks advance: the
-    slower of the two decides. memory: of the process at its peak [bytes], what it holds already included; disk [bytes].
+    Blocks are written while others advance: the slower of the two decides how long a run takes.
+
+    Attributes:
+        members: Number of members.
+        steps: Number of steps.
+        blocks: Number of blocks.
+        threads: Number of threads.
+        compile: Time to load the kernel in the trial [s]; near 0 if Warp's cache had it.
+        set_up: Time to set up all blocks [s].
+        advance: Time of the steps of all members [s].
+        write: Time to write the store [s].
+        memory: Peak memory of the process [bytes], including what it holds already.
+        disk: Size of the store, or about that of the result's file [bytes].
+        free_memory: Memory of the machine [bytes]; None if the system does not tell.
+        free_disk: Free space on the disk [bytes]; None if unknown.
     """
 
     members: int
@@ -67,7 +80,7 @@ class Prediction:
 
     @property
     def seconds(self) -> float:
-        """Of the run, without compilation."""
+        """Time of the run without compilation [s]."""
         return self.set_up + max(self.advance, self.write)
 
     def __str__(self) -> str:
@@ -100,13 +113,24 @@ def _share(wanted: int, there: int | None, of: str) -> str:
 def predict(
     fleet: Ensemble | Scene, *, threads: int | None = None, store: Store | str | None = None, **settings: Any
 ) -> Prediction:
-    """What lw.solve(fleet, **settings) will take, from a trial of about a second on so many threads.
+    """Predict what lw.solve(fleet, **settings) will take, from a trial of about a second.
 
-    settings: those of solve that decide the plan and what is kept (method, h, t1, save, dtype, width, checks, statistics,
-    keep, until: the whole ensemble is predicted). store: as for solve; the disk is that of its folder. Statistics count
-    for time, memory and disk, and so do members of keep=[...], which are run again for their samples; those of
-    keep="failed" do not: how many will fail is not known. A run whose cost changes on the way (events, steps that are
-    chosen) costs something else. Raises SceneError.
+    Statistics count for time, memory and disk, and so do the members of keep=[...], which are run again for their samples.
+    Those of keep="failed" do not count: how many will fail is not known. With `until`, the whole ensemble is predicted. A
+    run whose cost changes on the way (events, adaptive steps) takes another time than predicted.
+
+    Args:
+        fleet: An Ensemble, or a Scene, which stands for its own ensemble.
+        threads: Number of threads; default all cores.
+        store: As for solve; the disk is the one that its folder lies on. None: a run in memory.
+        **settings: Arguments of solve that decide the plan and what is kept: method, h, t1, save, dtype, width, checks,
+            on_failure, statistics, keep, until.
+
+    Returns:
+        The prediction.
+
+    Raises:
+        SceneError: If arguments are at fault.
     """
     from lgvi_warp.runs.settle import make_plan
     from lgvi_warp.runs.store.solve import settled
@@ -130,7 +154,7 @@ def predict(
     runs += again(plan, observed, asked_store, fields)
     write, metadata = writing(runs, place, count) if into else (0.0, 0)
     n, steps = ensemble.members, plan.grid.steps
-    more = sum(one.plan.ensemble.members for one in runs) / n
+    more = sum(sized.plan.ensemble.members for sized in runs) / n
     return Prediction(
         members=n,
         steps=steps,
@@ -141,17 +165,25 @@ def predict(
         advance=step * steps * more,
         write=write,
         memory=_resident() + memory(runs, count),
-        disk=metadata + sum(one.disk for one in runs),
+        disk=metadata + sum(sized.disk for sized in runs),
         free_memory=machine.memory_bytes(),
         free_disk=shutil.disk_usage(place).free,
     )
 
 
 def costs(plan: Plan, threads: int, observed: Observation | None = None) -> tuple[float, float]:
-    """Seconds to set up, and of one step of all members with its samples, of all threads together.
+    """Measure the time to set up a run, and the time of one step of all members with its samples.
 
-    From trials of one block a thread: the steps are doubled until they take long enough, and half of them are taken away
-    again, so that what they cost is told from what a block costs before its first step.
+    Trials run one block per thread. The number of steps is doubled until a trial takes long enough; a second trial of half
+    the steps separates the cost of a step from what a block costs before its first step.
+
+    Args:
+        plan: The plan, compiled.
+        threads: Number of threads.
+        observed: What the run keeps; None: samples of all members and no statistics.
+
+    Returns:
+        (set-up, one step) [s], for all blocks on all threads.
     """
     runs = blocks(plan.ensemble.members)
     chosen = runs[:threads]
@@ -162,13 +194,13 @@ def costs(plan: Plan, threads: int, observed: Observation | None = None) -> tupl
     high = min(high, _seconds(plan, steps, chosen, threads, observed))
     low = min(_seconds(plan, half, chosen, threads, observed) for _ in range(2))
     slope = (high - low) / (steps - half) if steps > half and high > low else high / steps
-    # In the last round of a run of few blocks some threads are idle.
+    # With few blocks, some threads are idle in the last round: count whole rounds.
     rounds = math.ceil(len(runs) / threads) if len(runs) < 8 * threads else len(runs) / threads
     return max(0.0, high - slope * steps) * rounds, slope * rounds
 
 
 def _seconds(plan: Plan, steps: int, chosen: list[Block], threads: int, observed: Observation | None) -> float:
-    """Time of these blocks until a step, with the samples due by then."""
+    """Time of a trial of these blocks up to a step [s], with the samples due by then."""
     due = plan.grid.sample_steps[plan.grid.sample_steps < steps]
     due = np.append(due, steps)
     trial = replace(plan, grid=TimeGrid(plan.grid.h, due, due * plan.grid.h), width=plan.spec.width)
@@ -186,14 +218,14 @@ def _seconds(plan: Plan, steps: int, chosen: list[Block], threads: int, observed
 
 
 def _result_bytes(plan: Plan, fields: Sequence[str] | None = None) -> int:
-    """Of a result in memory, and about those of its file; fields: of its samples, by default all of the plan."""
+    """Size of a result in memory, and about that of its file [bytes]; fields: of its samples, by default all of the plan."""
     k, n = len(plan.grid.times), plan.ensemble.members
     real = np.dtype(machine.DTYPES[plan.dtype]).itemsize
     rows = {name: int(np.prod(SHAPES[name])) * real for name in (plan.fields if fields is None else fields)}
     if plan.spec.compensated and "position" in rows:
         rows["position"] = 24
-    one = plan.ensemble.parameters(0, 1)
-    varied = sum(one[name].nbytes for name in plan.ensemble.varied())
+    first = plan.ensemble.parameters(0, 1)
+    varied = sum(first[name].nbytes for name in plan.ensemble.varied())
     return n * (k * sum(rows.values()) + varied + sum(np.dtype(f.dtype).itemsize for f in member_fields.present(plan)))
 
 
@@ -202,7 +234,14 @@ NO_STATISTICS = Sizes()
 
 @dataclass(frozen=True)
 class Sized:
-    """A run whose bytes are told: its plan, store (None: in memory), fields of its samples, and its statistics."""
+    """A run whose size in memory and on disk is computed.
+
+    Attributes:
+        plan: Plan of the run.
+        store: Where it is written; None: kept in memory.
+        fields: Names of the fields whose samples are kept; None: all of the plan.
+        statistics: Sizes of its statistics.
+    """
 
     plan: Plan
     store: Store | None = None
@@ -211,89 +250,131 @@ class Sized:
 
     @property
     def disk(self) -> int:
-        """Bytes of its files but for a store's metadata; in memory, about those of its result's file."""
+        """Size of the files without a store's metadata [bytes]; for a run in memory about that of its result's file."""
         if self.store is None:
             return _result_bytes(self.plan, self.fields) + self.statistics.estimates
         each = self.statistics.file + len(marker(self._sums()))
         return size(self.plan, self.store) + each * len(blocks(self.plan.ensemble.members))
 
     def _sums(self) -> dict[str, list[int]]:
-        """What a block's marker lists."""
+        """What the marker of a block lists: files with sizes and checksums, here the longest possible ones."""
         assert self.store is not None
         block, k = blocks(self.plan.ensemble.members)[0], len(self.plan.grid.times)
-        keys = {key: one.bytes for one in columns(self.plan, self.store) for key in one.keys(block, k)}
+        keys = {key: column.bytes for column in columns(self.plan, self.store) for key in column.keys(block, k)}
         keys |= {Sink.parts_key(block): self.statistics.file} if self.statistics.file else {}
         return {key: [count, 2**32 - 1] for key, count in keys.items()}
 
     @property
     def held(self) -> int:
-        """Bytes that it holds at its end: its result, or what a store leaves of it in memory."""
+        """Memory held at the end of the run [bytes]: its result, or what stays in memory beside a store."""
         held = self.statistics.joined + self.statistics.estimates
         if self.store is None:
             return held + _result_bytes(self.plan, self.fields)
-        each = sum(np.dtype(one.dtype).itemsize for one in member_fields.present(self.plan))
+        each = sum(np.dtype(member_field.dtype).itemsize for member_field in member_fields.present(self.plan))
         return held + each * self.plan.ensemble.members
 
     def working(self, threads: int) -> int:
-        """Bytes of the blocks at work."""
+        """Compute the memory of the blocks at work.
+
+        Args:
+            threads: Number of threads.
+
+        Returns:
+            Memory [bytes].
+        """
         plan, runs = self.plan, blocks(self.plan.ensemble.members)
         count = min(len(runs), threads)
         row = sum(plan.spec.sample_fields.values()) * np.dtype(machine.DTYPES[plan.dtype]).itemsize
         segment = min(SEGMENT_SAMPLE_BYTES, row * runs[0].count * len(plan.grid.times))
-        # A segment's samples: the kernel's, the members' in order, and turned or moved copies. Parts: their rows, and
-        # all together.
+        # A segment's samples are held three times: as the kernel wrote them, in order of members, and as rotated or moved
+        # copies. Parts are held twice: their rows, and all joined.
         each = 3 * segment + 2 * self.statistics.part + self.statistics.taking
         if self.store:
-            each += self.statistics.file + sum(one.bytes for one in columns(plan, self.store))
+            each += self.statistics.file + sum(column.bytes for column in columns(plan, self.store))
         return count * each
 
 
 def memory(runs: Sequence[Sized], threads: int) -> int:
-    """Bytes that a run and those after it add to the process, at most."""
+    """Compute the memory that several runs, one after the other, add to the process.
+
+    Args:
+        runs: The runs, in order; the results of earlier ones stay in memory.
+        threads: Number of threads.
+
+    Returns:
+        The peak [bytes].
+    """
     peaks = [
-        sum(one.held for one in runs[: i + 1]) + max(run.working(threads), run.statistics.reading)
+        sum(earlier.held for earlier in runs[: i + 1]) + max(run.working(threads), run.statistics.reading)
         for i, run in enumerate(runs)
     ]
     return max(peaks)
 
 
 def again(plan: Plan, observed: Observation, store: Store | None, fields: Sequence[str]) -> list[Sized]:
-    """The run of the members that are kept after all, where their indices are known."""
+    """Find the run of the members that are run again for their samples.
+
+    Args:
+        plan: Plan of the whole run.
+        observed: What the run keeps.
+        store: Where the run is written; None: in memory.
+        fields: Names of the fields whose samples are kept.
+
+    Returns:
+        A list with this run; empty if there is none, or if its members are not known before the run.
+    """
     if isinstance(observed.keep, str):
         return []
     wanted = observed.again(np.zeros(plan.ensemble.members, np.uint8))
     if store is None:
         return [Sized(plan.part(plan.with_neighbours(wanted).tolist(), fields))]
     group = group_of(store, plan, wanted)
-    own = tuple(name for name in fields if store.fields is None or name in store.fields)
-    return [Sized(plan.part(group.members.tolist(), own), group)]
+    stored_fields = tuple(name for name in fields if store.fields is None or name in store.fields)
+    return [Sized(plan.part(group.members.tolist(), stored_fields), group)]
 
 
 def writing(runs: Sequence[Sized], folder: Path, threads: int) -> tuple[float, int]:
-    """(seconds, bytes): what the disk takes for metadata, chunks and the wait until blocks are safe; bytes of metadata."""
+    """Predict the time that writing takes, from metadata that are written and removed again, and the speed of the disk.
+
+    Args:
+        runs: The runs, each with its store.
+        folder: An existing folder on the disk that is used.
+        threads: Number of threads.
+
+    Returns:
+        Time for metadata, chunks and the wait until the last blocks are safe [s]; size of the metadata [bytes].
+    """
     from lgvi_warp.runs.provenance import messages, provenance
 
     with tempfile.TemporaryDirectory(dir=folder) as name:
         path = Path(name) / "run.zarr"
         start = time.perf_counter()
-        for one in runs:
-            assert one.store is not None
-            place = path / one.store.folder.relative_to(one.store.whole)
-            told = of_store(provenance(one.plan), one.plan.ensemble)
-            create(replace(one.store, path=place), one.plan, told, messages(one.plan))
+        for sized in runs:
+            assert sized.store is not None
+            place = path / sized.store.folder.relative_to(sized.store.whole)
+            content = of_store(provenance(sized.plan), sized.plan.ensemble)
+            create(replace(sized.store, path=place), sized.plan, content, messages(sized.plan))
         Folder(path).finish()
         begin = time.perf_counter() - start
-        metadata = sum(one.stat().st_size for one in path.rglob("*") if one.is_file())
+        metadata = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
         start = time.perf_counter()
         for i in range(SYNCS):
             durable.write_whole(Path(name) / f"{i}", b"0")
-        # The files of a run's last blocks, then their markers.
+        # At the end of a run it waits twice: for the files of the last blocks, then for their markers.
         wait = 2.0 * (time.perf_counter() - start) / SYNCS * len(runs)
-    return begin + sum(one.disk for one in runs) / disk_speed(folder, threads) + wait, metadata
+    return begin + sum(sized.disk for sized in runs) / disk_speed(folder, threads) + wait, metadata
 
 
 def disk_speed(folder: Path, threads: int) -> float:
-    """Bytes per second that so many threads write into a folder, synced."""
+    """Measure the speed of a disk with files that are written, synced and removed again.
+
+    Args:
+        folder: An existing folder on the disk.
+        threads: Number of threads that write at the same time.
+
+    Returns:
+        Speed of all threads together [bytes/s].
+    """
     data = np.random.default_rng(0).bytes(PROBE_BYTES // threads)
 
     def write(i: int) -> None:
@@ -307,7 +388,7 @@ def disk_speed(folder: Path, threads: int) -> float:
 
 
 def _existing(folder: Path) -> Path:
-    """The nearest folder above that is there."""
+    """The nearest folder above that exists."""
     folder = folder.absolute()
     while not folder.is_dir():
         folder = folder.parent
@@ -315,7 +396,7 @@ def _existing(folder: Path) -> Path:
 
 
 def _resident() -> int:
-    """Bytes of this process in memory; 0 where the system does not tell."""
+    """Memory of this process [bytes]; 0 where the system does not tell."""
     try:
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError):

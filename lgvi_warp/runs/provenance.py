@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""Provenance of a run, and the messages that the user should see about its settings and starts."""
 
 from __future__ import annotations
 
@@ -13,14 +13,27 @@ from lgvi_warp.scene.ensemble import AT_ONCE
 
 
 def messages(plan: Plan) -> tuple[str, ...]:
-    """What the user should know before the run."""
+    """List what the user should know before the run: on times, vehicle, parameters and starts.
+
+    Args:
+        plan: Plan of the run.
+
+    Returns:
+        The messages.
+    """
     return plan.grid.messages + tuple(plan.ensemble.scene.vehicle.warnings) + odd_before(plan)
 
 
 def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence[str] | None = None) -> dict[str, Any]:
-    """Everything that the result follows from: scene, ensemble, settings, versions, machine.
+    """Everything that a result follows from: scene, ensemble, settings, versions and machine.
 
-    observed: what is kept of it, told where that is not all; fields: of the samples that are.
+    Args:
+        plan: Plan of the run.
+        observed: What the run keeps; recorded only if that is not simply the samples of all members.
+        fields: Names of the fields whose samples are kept; default all of the plan.
+
+    Returns:
+        A table that JSON can hold.
     """
     content = {
         "scene": plan.ensemble.scene.to_dict(),
@@ -52,7 +65,14 @@ def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence
 
 
 def odd_before(plan: Plan) -> tuple[str, ...]:
-    """What is odd of the members' numbers, and of where they start: of a large fleet, of where the first ones do."""
+    """List messages on implausible parameters and starts of the members.
+
+    Args:
+        plan: Plan of the run; of a large fleet only the first members' starts are checked.
+
+    Returns:
+        The messages.
+    """
     ensemble = plan.ensemble
     varies = ensemble.starts_vary or bool(ensemble.varied() and plausibility.own_flows(ensemble.scene))
     starts = plausibility.of_start(ensemble.scene, ensemble.select(0, min(AT_ONCE, ensemble.members) if varies else 1))

@@ -24,10 +24,15 @@ OfInterest = str | Quantity | Callable[..., Any]
 
 @dataclass(frozen=True)
 class OfResult:
-    """A quantity of interest: a `Functional`, or a function of a Result.
+    """A quantity of interest of a result: a `Functional`, or a function of a Result.
 
-    "position[2]" is that at the end; max(...), min(...), mean(...) and range(...) are over the samples that were kept;
-    norm(...) is the length of a vector. looks_at_members: whether it may ask for more of the members than their parameters.
+    "position[2]" is the value at the end; max(...), min(...), mean(...) and range(...) are over the samples that were kept;
+    norm(...) is the length of a vector.
+
+    Attributes:
+        label: Its name.
+        of: The functional or function.
+        looks_at_members: Whether it may use more of the members than their parameters.
     """
 
     label: str
@@ -36,12 +41,12 @@ class OfResult:
 
     @property
     def fields(self) -> tuple[str, ...]:
-        """The samples that it needs: all for a function, since what it looks at cannot be told."""
+        """Names of the samples it needs; all of them for a function, because what that uses cannot be known."""
         return self.of.quantity.fields if isinstance(self.of, Functional) else FIELDS
 
     @property
     def over_path(self) -> bool:
-        """Whether it needs the whole path."""
+        """Whether it needs the samples at all times."""
         return isinstance(self.of, Functional) and self.of.over_path
 
     @property
@@ -50,40 +55,50 @@ class OfResult:
         return not isinstance(self.of, Functional)
 
     def values(self, result: Result, members: Any = None) -> np.ndarray:
-        """Its numbers (n, m), float64.
+        """Compute its numbers for each member.
 
         Args:
-            result: with the fields that it needs.
-            members: as lw.Ensemble.select gives them, for a Quantity that looks at them; by default the result's own
+            result: A result with the fields that it needs.
+            members: As lw.Ensemble.select gives them, for a Quantity that looks at them; by default the result's own
                 parameters and first samples.
 
+        Returns:
+            float64 array, shape (n, m).
+
         Raises:
-            SceneError: for a function's result of another shape.
+            SceneError: If a function returns something else than n rows of real numbers.
         """
         if isinstance(self.of, Functional):
-            found = self.of(*samples_of(result, slice(None) if self.over_path else slice(-1, None), members))
-            return found if self.over_path else found[-1]
+            numbers = self.of(*samples_of(result, slice(None) if self.over_path else slice(-1, None), members))
+            return numbers if self.over_path else numbers[-1]
         faults = Faults()
         try:
-            found = real_results(self.of(result)).astype(np.float64)
+            numbers = real_results(self.of(result)).astype(np.float64)
         except NotReal as error:
             faults.add(self.label, "...", error.what, "return an array of real numbers")
         faults.raise_if_any()
-        if found.ndim not in (1, 2) or len(found) != result.members:
+        if numbers.ndim not in (1, 2) or len(numbers) != result.members:
             remedy = f"return an array of shape ({result.members},) or ({result.members}, m)"
-            faults.add(self.label, "...", f"gave an array of shape {found.shape}", remedy)
+            faults.add(self.label, "...", f"gave an array of shape {numbers.shape}", remedy)
             faults.raise_if_any()
-        return found.reshape(result.members, -1)
+        return numbers.reshape(result.members, -1)
 
     def labels(self, count: int) -> list[str]:
-        """One for each of its `count` numbers."""
+        """Name each of its numbers.
+
+        Args:
+            count: How many numbers it has for a member.
+
+        Returns:
+            A label for each.
+        """
         if isinstance(self.of, Functional):
             return list(self.of.labels)
         return [self.label] if count == 1 else [f"{self.label}[{i}]" for i in range(count)]
 
 
 class _Samples(dict[str, np.ndarray]):
-    """Samples of a result as functions of (samples, members) see them."""
+    """Samples of a result in the form that functions of (samples, members) take."""
 
     def __init__(self, fields: Mapping[str, np.ndarray], time: np.ndarray, terms: Sequence[Any]):
         super().__init__(fields)
@@ -91,7 +106,16 @@ class _Samples(dict[str, np.ndarray]):
 
 
 def samples_of(result: Result, when: slice = slice(None), members: Any = None) -> tuple[Any, Any]:
-    """(samples, members) of a result at some of its times, as a Quantity's function takes them."""
+    """Give the samples and members of a result in the form that a Quantity's function takes.
+
+    Args:
+        result: The result.
+        when: Which of its times; default all.
+        members: The members; default the result's own parameters and first samples.
+
+    Returns:
+        The pair (samples, members).
+    """
     fields = {name: result.samples[name][when] for name in FIELDS if name in result.samples}
     start = {name: result.samples[name][0] for name in fields}
     known = SimpleNamespace(parameters=result.parameters, count=result.members, **start)
@@ -99,34 +123,45 @@ def samples_of(result: Result, when: slice = slice(None), members: Any = None) -
 
 
 def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:
-    """What is asked for, one or several. Raises SceneError naming every fault."""
-    asked = list(of) if isinstance(of, list | tuple) else [of]
+    """Read one or several quantities of interest.
+
+    Args:
+        of: A text such as "max(depth)", a Quantity, a function of a Result or of (samples, members), or several of these.
+
+    Returns:
+        The quantities, in order.
+
+    Raises:
+        SceneError: If any of them is at fault; the message names every fault.
+    """
+    requests = list(of) if isinstance(of, list | tuple) else [of]
     faults = Faults()
-    found: list[OfResult] = []
-    for one in asked:
-        if callable(one) and not isinstance(one, Quantity) and not _of_samples(one):
-            found.append(OfResult(getattr(one, "__name__", type(one).__name__), one))
-        elif isinstance(one, str | Quantity) or callable(one):
+    results: list[OfResult] = []
+    for request in requests:
+        if callable(request) and not isinstance(request, Quantity) and not _of_samples(request):
+            results.append(OfResult(getattr(request, "__name__", type(request).__name__), request))
+        elif isinstance(request, str | Quantity) or callable(request):
             with faults.including():
-                meant = functional("of", one)
-                found.append(OfResult(meant.label, meant, not isinstance(one, str)))
+                function = functional("of", request)
+                results.append(OfResult(function.label, function, not isinstance(request, str)))
         else:
-            faults.add("of", one, "is no quantity", REMEDY)
-    if not asked:
+            faults.add("of", request, "is no quantity", REMEDY)
+    if not requests:
         faults.add("of", of, "names nothing", REMEDY)
     faults.raise_if_any()
-    return tuple(found)
+    return tuple(results)
 
 
 def _of_samples(function: Callable[..., Any]) -> bool:
-    """Whether a function is one of (samples, members), as statistics take them, and not of a Result."""
+    """Whether a function is one of (samples, members), as statistics take them, and not one of a Result."""
     try:
-        given = inspect.signature(function).parameters.values()
+        parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):
         return False
     plain = [
-        one
-        for one in given
-        if one.kind in (one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD) and one.default is one.empty
+        parameter
+        for parameter in parameters
+        if parameter.kind in (parameter.POSITIONAL_ONLY, parameter.POSITIONAL_OR_KEYWORD)
+        and parameter.default is parameter.empty
     ]
     return len(plain) == 2

@@ -1,4 +1,4 @@
-"""What a run leaves: samples, status, and everything they follow from."""
+"""The result of a run: samples, status of each member, statistics, and the provenance they follow from."""
 
 from __future__ import annotations
 
@@ -49,22 +49,35 @@ END_TIME = {"units": "s", "long_name": "time of the event or of the failure of a
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """Samples of n members at k times; the initial state is sample 0. Arrays are float64 or float32, as asked.
+    """Samples of n members at k times, the status of each member, and the provenance they follow from.
 
-    With float32_compensated all are float32 but the position, float64, which nothing of its two numbers is lost in.
+    Sample 0 is the initial state. Samples are float64 or float32, as the run's dtype. With float32_compensated everything is
+    float32 except position, which is float64 so that no digit of the compensated sum is lost.
 
-    time: (k,) [s]. samples: the fields that were kept, by name (also attributes: position (k, n, 3) [m, inertial],
-    attitude (k, n, 3, 3) body to inertial, velocity (k, n, 3) [m/s, body], angular_velocity (k, n, 3) [rad/s, body]).
-    status: (n,), see Status. A member that an event stopped stands at it from then on. failure_time: (n,) [s], the time of
-    the last good state, for an event its own time; NaN where there was neither; end_time: the same, and the end of the
-    run. failure_value: (n,), the |J^-1 a| or relative residual that crossed its limit (psi_x: half the angle of its turns),
-    0 for a non-finite state and for an event.
-    warnings: (n,), bits of Warnings; warning_time (n,) [s] and warning_value (n,): when a member's most serious warning was
-    first seen (0 for one that its start gives), and the value then; NaN without. Motion is looked at once in 128 steps and at
-    the end, with checks="all" only. substeps: (n,), steps that were divided (on_failure="substep").
-    statistics: what was gathered while the run went, by name. kept: samples of the members kept_members (m,), where not
-    all were kept. messages: what the user should know; provenance: scene, settings, versions, seed, machine.
-    store: the folder that samples and parameters are read from, each time that they are asked for; None in memory.
+    Attributes:
+        time: Times of the samples [s], shape (k,).
+        samples: Arrays of the fields that were kept, by name. Each is also an attribute: position (k, n, 3) [m, inertial],
+            attitude (k, n, 3, 3) body to inertial, velocity (k, n, 3) [m/s, body], angular_velocity (k, n, 3) [rad/s, body].
+        status: Status of each member, shape (n,). A member that an event stopped stays at its state from then on.
+        failure_time: Time of each member's last good state, or of the event that stopped it [s], shape (n,); NaN where there
+            was neither.
+        failure_value: The value that crossed its limit, shape (n,): |J^-1 a| or the relative residual (psi_x: half the angle
+            of its turns); 0 for a non-finite state and for an event, NaN without.
+        warnings: Bits of Warnings, shape (n,). Motion is checked every 128 steps and at the end, with checks="all" only.
+        warning_time: When each member's most serious warning was first seen [s], shape (n,); 0 for one that follows from its
+            start, NaN without.
+        warning_value: The value at that time, shape (n,); NaN without.
+        substeps: Number of steps that were divided (on_failure="substep"), shape (n,).
+        parameters: Parameters of the members by name, each with a leading dimension of 1 or n.
+        messages: What the user should know.
+        provenance: Scene, ensemble with its seed, settings, versions and machine.
+        terms: The scene's terms.
+        statistics: Estimates of the statistics gathered during the run, by name.
+        kept: Samples of the members in kept_members, where not those of all members were kept; else None.
+        kept_members: Indices of these members, shape (m,).
+        store: Folder from which samples and parameters are read each time they are used; None for a result in memory.
+        compile_seconds: Time to load the kernel [s].
+        run_seconds: Time of the run without that [s].
     """
 
     time: np.ndarray
@@ -98,68 +111,87 @@ class Result:
 
     @property
     def position(self) -> np.ndarray:
-        """(k, n, 3) [m], inertial axes (north, east, down)."""
+        """Positions in inertial axes (north, east, down) [m], shape (k, n, 3)."""
         return self._kept("position")
 
     @property
     def attitude(self) -> np.ndarray:
-        """(k, n, 3, 3), body to inertial axes."""
+        """Rotations from body to inertial axes, shape (k, n, 3, 3)."""
         return self._kept("attitude")
 
     @property
     def velocity(self) -> np.ndarray:
-        """(k, n, 3) [m/s], body axes."""
+        """Velocities in body axes [m/s], shape (k, n, 3)."""
         return self._kept("velocity")
 
     @property
     def angular_velocity(self) -> np.ndarray:
-        """(k, n, 3) [rad/s], body axes."""
+        """Angular velocities in body axes [rad/s], shape (k, n, 3)."""
         return self._kept("angular_velocity")
 
     @functools.cached_property
     def quaternion_wxyz(self) -> np.ndarray:
-        """(k, n, 4), unit quaternions of the attitude, scalar first and not negative."""
+        """Unit quaternions of the attitudes, scalar first and not negative, shape (k, n, 4)."""
         return notation.quaternion_from_matrix(self.attitude).astype(self.attitude.dtype)
 
     @functools.cached_property
     def energy(self) -> np.ndarray:
-        """(k, n) [J], kinetic and potential energy, float64."""
+        """Kinetic and potential energy [J], float64, shape (k, n)."""
         return invariants.energy(self)
 
     @property
     def end_time(self) -> np.ndarray:
-        """(n,) [s], until when each member went on: its event, its failure, or the end of the run.
+        """Time up to which each member ran [s], shape (n,): its event, its failure, or the end of the run.
 
-        With `status` these are the times and the kinds of what survival analysis is of.
+        With `status` these are the event times and event types of survival analysis.
         """
         return np.where(np.isnan(self.failure_time), self.time[-1], self.failure_time)
 
     def own(self, term: Term) -> dict[str, np.ndarray]:
-        """A term's numbers, by field, with a leading dimension of 1 or n."""
+        """Select the parameters of a term.
+
+        Args:
+            term: A term of the scene.
+
+        Returns:
+            Arrays by field of the term, each with a leading dimension of 1 or n.
+        """
         return {name: self.parameters[f"{term.key}.{name}"] for name in term.parameters()}
 
     def part(self, places: np.ndarray) -> Result:
-        """The same of the members in these places, in this order."""
-        own = {name: values[places] if len(values) > 1 else values for name, values in self.parameters.items()}
+        """Select members, in the order given.
+
+        Args:
+            places: Indices of the members in this result, shape (m,).
+
+        Returns:
+            A result of these members alone; statistics stay those of the whole run.
+        """
+        parameters = {name: values[places] if len(values) > 1 else values for name, values in self.parameters.items()}
         samples = {name: values[:, places] for name, values in self.samples.items()}
-        of_members = {one.name: getattr(self, one.name)[places] for one in self._member_fields()}
-        return replace(self, samples=samples, parameters=own, **of_members)
+        of_members = {
+            member_field.name: getattr(self, member_field.name)[places] for member_field in self._member_fields()
+        }
+        return replace(self, samples=samples, parameters=parameters, **of_members)
 
     def _member_fields(self) -> list[member_fields.MemberField]:
-        """Those that are attributes of a result."""
-        own = {one.name for one in fields(self)}
-        return [one for one in member_fields.FIELDS if one.name in own]
+        """The member fields that are attributes of a result."""
+        attributes = {item.name for item in fields(self)}
+        return [item for item in member_fields.FIELDS if item.name in attributes]
 
     @property
     def members(self) -> int:
-        """n."""
+        """Number of members in the result, n."""
         return len(self.status)
 
     @functools.cached_property
     def dataset(self) -> xarray.Dataset:
-        """The samples as an xarray Dataset with dimensions time, realization, component (extra: store).
+        """The samples as an xarray Dataset with dimensions time, realization, component (needs the extra `store`).
 
-        Of a run in a store, a view of it: values are read when they are used, and energy is left out.
+        For a run in a store it is a view: values are read when they are used, and energy is left out.
+
+        Raises:
+            ImportError: If xarray is not installed.
         """
         try:
             import xarray as xr
@@ -175,26 +207,41 @@ class Result:
             values = getattr(self, name)
             attributes = {"units": UNITS[name], "long_name": MEANINGS[name]}
             data[name] = (("time", "realization", *dims.get(values.ndim - 2, ())), values, attributes)
-        for one in self._member_fields():
-            data[one.name] = (("realization",), np.asarray(getattr(self, one.name)), one.attributes)
+        for member_field in self._member_fields():
+            data[member_field.name] = (
+                ("realization",),
+                np.asarray(getattr(self, member_field.name)),
+                member_field.attributes,
+            )
         data["end_time"] = (("realization",), self.end_time, END_TIME)
         coordinates = {"time": ("time", self.time, {"units": "s", "long_name": "time since the start"})}
         attributes = {"Conventions": "CF-1.11", "provenance": json.dumps(self.provenance)}
         return xr.Dataset(data, coordinates, attributes)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write everything to an .npz file, durable and whole or not at all. Returns its path. Raises OSError.
+        """Write the result to an .npz file, durable, and either whole or not at all.
 
         Where no samples were kept, parameters are left out too: they follow from the provenance's ensemble.
+
+        Args:
+            path: The file; one that exists is replaced.
+
+        Returns:
+            The path.
+
+        Raises:
+            OSError: If the file cannot be written.
         """
         arrays = {"time": self.time, **self.samples}
-        arrays |= {one.name: np.asarray(getattr(self, one.name)) for one in self._member_fields()}
+        arrays |= {
+            member_field.name: np.asarray(getattr(self, member_field.name)) for member_field in self._member_fields()
+        }
         if self.samples:
             arrays |= {f"parameters/{name}": value for name, value in self.parameters.items()}
         texts = {"messages": json.dumps(self.messages), "provenance": json.dumps(self.provenance)}
         if self.statistics:
-            found, texts["statistics"] = self.statistics.to_arrays()
-            arrays |= {f"statistics/{name}": value for name, value in found.items()}
+            estimates, texts["statistics"] = self.statistics.to_arrays()
+            arrays |= {f"statistics/{name}": value for name, value in estimates.items()}
         if self.kept is not None:
             arrays |= {f"kept/{name}": value for name, value in self.kept.samples.items()}
             arrays |= {"kept/members": self.kept_members}
@@ -205,16 +252,38 @@ class Result:
 
     @classmethod
     def per_member(cls, arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
-        """Arguments of a result that are arrays over members, out of arrays by name."""
-        own = {one.name for one in fields(cls)}
-        found: dict[str, Any] = {f.name: arrays[f.name] for f in member_fields.FIELDS if f.name in own & arrays.keys()}
-        return found | {"status": found["status"].view(StatusArray), "warnings": found["warnings"].view(WarningArray)}
+        """Select from arrays those that are arguments of a result, one number for each member.
+
+        Args:
+            arrays: Arrays of shape (n,), by name, status and warnings among them.
+
+        Returns:
+            Arguments of Result, by name.
+        """
+        attributes = {item.name for item in fields(cls)}
+        values: dict[str, Any] = {
+            f.name: arrays[f.name] for f in member_fields.FIELDS if f.name in attributes & arrays.keys()
+        }
+        return values | {
+            "status": values["status"].view(StatusArray),
+            "warnings": values["warnings"].view(WarningArray),
+        }
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Result:
-        """Read what `save` wrote, maybe somewhere else: nothing in it is executed, and it takes no more memory than the file.
+        """Read a file that `save` wrote, also one from elsewhere: nothing in it is executed.
 
-        Raises OSError, or SceneError (a ValueError) if it is not such a file, or a damaged one.
+        Reading takes no more memory than the size of the file.
+
+        Args:
+            path: The .npz file.
+
+        Returns:
+            The result, in memory.
+
+        Raises:
+            OSError: If the file cannot be read.
+            SceneError: If it is damaged, or no result (SceneError is a ValueError).
         """
         try:
             with result_file.understood(path):
@@ -226,7 +295,7 @@ class Result:
 
     @classmethod
     def _from(cls, content: Mapping[str, np.ndarray], texts: Mapping[str, Any]) -> Result:
-        """From arrays and texts that were checked."""
+        """A result from arrays and texts that were checked."""
         estimates = Estimates()
         if "statistics" in content:
             estimates = Estimates.from_arrays(_below("statistics/", content), str(content["statistics"]))
@@ -251,12 +320,17 @@ class Result:
 
 
 def _below(prefix: str, content: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """What is named so, without the prefix."""
+    """The arrays whose names begin with a prefix, under their names without it."""
     return {name.removeprefix(prefix): value for name, value in content.items() if name.startswith(prefix)}
 
 
 class Drawn(Mapping[str, np.ndarray]):
-    """Parameters of an ensemble's first members, drawn when they are asked for: they take no memory before."""
+    """Parameters of the first members of an ensemble, drawn when they are first read: before that they take no memory.
+
+    Args:
+        ensemble: The ensemble.
+        members: How many of its first members.
+    """
 
     def __init__(self, ensemble: Ensemble, members: int):
         self._ensemble, self._members = ensemble, members

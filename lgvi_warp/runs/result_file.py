@@ -1,4 +1,4 @@
-"""What the arrays of a result.npz must be, so that one that was damaged or made by somebody else is refused in a line."""
+"""Checks of the arrays in a result.npz, so that a damaged or foreign file is rejected with one clear line."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.runs import member_fields
 
-# Of the samples, by name: the shape of one member's at one time.
+# Shape of one member's sample at one time, by field.
 SHAPES: dict[str, tuple[int, ...]] = {
     "position": (3,), "attitude": (3, 3), "quaternion_wxyz": (4,), "velocity": (3,), "angular_velocity": (3,), "energy": (),
 }  # fmt: skip
@@ -22,22 +22,42 @@ TEXTS = ("messages", "provenance", "statistics")
 
 @contextlib.contextmanager
 def understood(path: str | os.PathLike[str]) -> Iterator[None]:
-    """What fails while a result is read is a fault of its file. Raises SceneError."""
+    """Turn errors that arise while a result is read into faults of its file.
+
+    Args:
+        path: The file, which the message names.
+
+    Yields:
+        Nothing; the file is read in this context.
+
+    Raises:
+        SceneError: In place of any error that the content of the file causes.
+    """
     try:
         yield
     except SceneError as error:
         raise SceneError(f"{os.fspath(path)}: {text}" for text in error.faults) from error
     except (ValueError, KeyError, TypeError, AttributeError, IndexError, ArithmeticError, RecursionError) as error:
-        what = " ".join(str(error).split())[:200] or type(error).__name__
+        reason = " ".join(str(error).split())[:200] or type(error).__name__
         remedy = "run the scene again, or ask for the file anew"
-        raise SceneError([f"{os.fspath(path)}: is damaged, or no result of lgvi-warp: {what}; {remedy}"]) from error
+        raise SceneError([f"{os.fspath(path)}: is damaged, or no result of lgvi-warp: {reason}; {remedy}"]) from error
 
 
 def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """The texts of a result whose arrays fit each other. Raises ValueError naming what does not."""
+    """Check that the arrays of a result fit each other, and read its texts.
+
+    Args:
+        content: Arrays of the file, by name.
+
+    Returns:
+        "messages" and "provenance", parsed.
+
+    Raises:
+        ValueError: If something is missing or does not fit; the message names it.
+    """
     if missing := [name for name in ("time", "status", *TEXTS[:2]) if name not in content]:
         raise ValueError(f"it has no {', '.join(missing)}")
-    of_members = {one.name: np.dtype(one.dtype) for one in member_fields.FIELDS}
+    of_members = {item.name: np.dtype(item.dtype) for item in member_fields.FIELDS}
     k, n = content["time"].size, content["status"].size
     m = content["kept/members"].size if "kept/members" in content else 0
     for name, array in content.items():
@@ -60,14 +80,14 @@ def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
         if not good:
             raise ValueError(f"{name[:100]!r} has the type {array.dtype} and shape {array.shape}")
     texts = {name: parsed(str(content[name])) for name in TEXTS[:2]}
-    if not isinstance(texts["messages"], list) or not all(isinstance(one, str) for one in texts["messages"]):
+    if not isinstance(texts["messages"], list) or not all(isinstance(item, str) for item in texts["messages"]):
         raise ValueError("its messages are no texts")
     _provenance(texts["provenance"])
     return texts
 
 
 def _provenance(told: Any) -> None:
-    """What the summary and the pictures ask of it. Raises ValueError."""
+    """Check what the summary and the pictures read of the provenance. Raises ValueError."""
     good = isinstance(told, dict) and isinstance(told.get("scene"), dict) and isinstance(told.get("method"), dict)
     if not good or not isinstance(told["method"].get("name"), str) or not isinstance(told.get("step"), int | float):
         raise ValueError("its provenance tells no scene, method or step")

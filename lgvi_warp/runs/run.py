@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""Runs in memory: all blocks of a plan, gathered into a Result."""
 
 from __future__ import annotations
 
@@ -29,7 +29,21 @@ from lgvi_warp.statistics.estimate import Estimates
 def finished(
     result: Result, plan: Plan, observed: Observation, fields: Sequence[str], threads: int | None = None
 ) -> Result:
-    """The result with the samples of members that are wanted after all, which a store has. Raises MembersFailed."""
+    """Complete a result with the samples of members that are run again, which a store has already.
+
+    Args:
+        result: Result of the run.
+        plan: Plan of the run.
+        observed: What the run keeps.
+        fields: Names of the fields kept of the members that are run again.
+        threads: Number of threads; default all cores.
+
+    Returns:
+        The result with `kept` and `kept_members`.
+
+    Raises:
+        MembersFailed: If members failed and the plan's on_failure is "raise".
+    """
     if result.store is None:
         indices, kept = again(plan, observed, result.status, fields, threads or machine.thread_count())
         result = replace(result, kept=kept, kept_members=indices)
@@ -48,10 +62,22 @@ def run_plan(
     executor: Executor | None = None,
     partial: bool = False,
 ) -> Result:
-    """Run every block of the plan, or as many as its statistics need, and gather the result in memory.
+    """Run the blocks of a plan, all or as many as its statistics need, and gather the result in memory.
 
-    observed: what is kept, by default the samples of all members; fields: which of them, by default all of the plan.
-    executor: by default so many threads. partial: an interrupt raises Interrupted with the members that were finished.
+    Args:
+        plan: The plan.
+        threads: Number of threads.
+        progress: Called with the fraction of the work that is done, in [0, 1].
+        observed: What is kept; default the samples of all members.
+        fields: Names of the fields whose samples are kept; default all of the plan.
+        executor: What runs the blocks; default this number of threads.
+        partial: Whether an interrupt raises Interrupted with the members that were finished.
+
+    Returns:
+        The result of all members, or of the first ones where `until` ended the run.
+
+    Raises:
+        Interrupted: On KeyboardInterrupt, if `partial` and a block was finished.
     """
     observed = observed or Observation()
     compile_seconds = plan.compile()
@@ -59,7 +85,7 @@ def run_plan(
     outcomes, samples = Outcomes(plan), Samples(plan, fields) if observed.samples else None
     observing = Observing(observed, plan.grid.times, total, plan.ensemble.replicates)
     keepers = (outcomes, *((samples,) if samples else ()), *observing.keepers)
-    made = Progress(total * plan.grid.steps, progress)
+    overall = Progress(total * plan.grid.steps, progress)
     start = time.perf_counter()
     merged = Merged()
 
@@ -70,7 +96,7 @@ def run_plan(
         )  # fmt: skip
 
     try:
-        n = run_blocks(Work(plan, keepers), blocks(total), executor or Threads(threads), made.at, enough=observing.enough,
+        n = run_blocks(Work(plan, keepers), blocks(total), executor or Threads(threads), overall.at, enough=observing.enough,
                        merged=merged)  # fmt: skip
     except KeyboardInterrupt as stop:
         if not (partial and merged.done):
@@ -86,7 +112,18 @@ def run_plan(
 def again(
     plan: Plan, observed: Observation, status: np.ndarray, fields: Sequence[str], threads: int
 ) -> tuple[np.ndarray, Result | None]:
-    """Indices of the members whose samples are wanted after all, and their result: the same members, to the same bits."""
+    """Run the members again whose samples are wanted after the run; they have the same bits as in the run.
+
+    Args:
+        plan: Plan of the run.
+        observed: What the run keeps.
+        status: Status of each member, shape (n,).
+        fields: Names of the fields whose samples are kept.
+        threads: Number of threads.
+
+    Returns:
+        Indices of these members, shape (m,), and their result, or None if there are none.
+    """
     indices = observed.again(status)
     if not len(indices):
         return indices, None
@@ -106,14 +143,14 @@ def _in_memory(
     compile_seconds: float,
     run_seconds: float,
 ) -> Result:
-    """The result of the first n members; observing: their statistics, None where some are of others as well."""
-    told = provenance(plan, observed, fields)
+    """The result of the first n members; observing: their statistics, None if these include other members."""
+    content = provenance(plan, observed, fields)
     parameters = Drawn(plan.ensemble, n)
     of_members = {name: values[:n] for name, values in member_fields.of(plan, outcomes.all).items()}
-    estimates, said = Estimates(), tuple[str, ...]()
+    estimates, remarks = Estimates(), tuple[str, ...]()
     if observing is not None:
-        estimates, said = observing.read(told["ensemble"], of_members["status"])
-    # What lies beyond the last member was never written.
+        estimates, remarks = observing.read(content["ensemble"], of_members["status"])
+    # The arrays have room for all members; beyond the last one that ran nothing was written.
     kept = samples.fields if samples and samples.fields else {}
     histories = {name: values[:, :n] for name, values in kept.items()}
     return Result(
@@ -121,8 +158,8 @@ def _in_memory(
         samples=histories,
         **Result.per_member(of_members),
         parameters=dict(parameters) if samples is not None else parameters,
-        messages=messages(plan) + said + plausibility.on_the_way(plan.ensemble.scene, histories).messages(n),
-        provenance=told
+        messages=messages(plan) + remarks + plausibility.on_the_way(plan.ensemble.scene, histories).messages(n),
+        provenance=content
         | {name: float(of_members[name].mean()) for name in ("steps_made", "steps_tried") if name in of_members}
         | ({"members": n} if n < plan.ensemble.members else {}),
         terms=tuple(plan.ensemble.scene.terms),

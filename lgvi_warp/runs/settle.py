@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""Settling of a run's settings from arguments and scene: its plan, its number of Newton steps, and its blocks."""
 
 from __future__ import annotations
 
@@ -19,16 +19,27 @@ from lgvi_warp.scene.ensemble import Ensemble
 
 
 def blocks_there(only: range | None, plan: Plan) -> range | None:
-    """The blocks of a run in parts that it has: the last part may ask for more. Raises SceneError where it has none."""
+    """Limit the blocks asked for to those that the run has.
+
+    Args:
+        only: Indices of blocks, in steps of 1; the end may lie beyond the last block. None: all blocks.
+        plan: Plan of the whole run.
+
+    Returns:
+        The indices that exist, or None for all blocks.
+
+    Raises:
+        SceneError: If the range has another step or a negative start, or none of its blocks exists.
+    """
     count = len(blocks(plan.ensemble.members))
     if only is None:
         return None
-    there = range(only.start, min(only.stop, count))
-    if only.step != 1 or only.start < 0 or not there:
+    present = range(only.start, min(only.stop, count))
+    if only.step != 1 or only.start < 0 or not present:
         raise SceneError(
             [f"blocks {only.start}:{only.stop}: are not within the {count} of this run; give 0:{count} or less"]
         )
-    return there
+    return present
 
 
 def make_plan(
@@ -44,9 +55,25 @@ def make_plan(
     on_failure: str | None = None,
     fields: Callable[[Sequence[str]], tuple[str, ...]] = tuple,
 ) -> Plan:
-    """Settle a run's settings, from the arguments and then from the scene's [run]. Raises SceneError.
+    """Settle the settings of a run, from the arguments and, where they are None, from the scene's [run] section.
 
-    fields: from the fields that `save` asks for, those that the kernel writes.
+    Args:
+        ensemble: The members.
+        method: A name or a Method.
+        h: Step [s].
+        t1: End of the run [s].
+        save: Which samples to save, and when.
+        dtype: "float64", "float32" or "float32_compensated".
+        width: Vehicles per packet; default from the CPU.
+        checks: "safe", "all" or "none".
+        on_failure: "freeze", "raise" or "substep".
+        fields: Function from the names of the fields that `save` asks for to those that the kernel writes; default the same.
+
+    Returns:
+        The plan, with a fixed number of Newton steps where the method says iterations="auto".
+
+    Raises:
+        SceneError: If settings are missing or at fault.
     """
     settings = ensemble.scene.run
     h = settings.step if h is None else h
@@ -64,7 +91,7 @@ def make_plan(
         faults.add("save", save, "is no SaveAt", "give lw.SaveAt(every=1.0) or lw.SaveAt(at=[...])")
     faults.raise_if_any()
     every = settings.save_every
-    # A spacing that the scene gave for its own duration says nothing about a shorter run.
+    # The scene's save_every is meant for its own duration; a shorter run ignores it.
     dropped = save is None and every is not None and every > float(t1)  # type: ignore[arg-type]
     if save is None:
         save = SaveAt(every=None if dropped else every)
@@ -83,14 +110,23 @@ def make_plan(
     return Plan(ensemble, chosen, grid, fields(save.fields), dtype, width, checks, on_failure or settings.on_failure)
 
 
-# Beyond so many Newton steps a fixed number gains nothing over iterating to the tolerance.
+# With more Newton steps than this, a fixed number gains nothing over iterating to the tolerance.
 MOST_FIXED = 4
 
 
 def enough_iterations(ensemble: Ensemble, method: Method, h: float, dtype: str) -> int | None:
-    """The least Newton steps that leave every member's residual below the tolerance at twice the step; None above 4.
+    """Find the least number of Newton steps that leaves every member's residual below the tolerance at twice the step.
 
-    The residual of a fixed number grows with h |Omega|: twice the step leaves room for members that spin up.
+    The residual after a fixed number grows with h |Omega|: twice the step leaves room for members that spin up.
+
+    Args:
+        ensemble: The members, which are run for one step, of twice the length, from their starts.
+        method: The method, whose own `iterations` is ignored.
+        h: Step of the run [s].
+        dtype: Number type of the run.
+
+    Returns:
+        The number of Newton steps, or None if more than MOST_FIXED would be needed.
     """
     for n in range(MOST_FIXED + 1):
         fixed = replace(method, iterations=n)

@@ -1,4 +1,4 @@
-"""What statistics will take on disk and in memory, told by a block's parts of a few sample times."""
+"""Sizes of statistics on disk and in memory, measured on the parts of one block at a few sample times."""
 
 from __future__ import annotations
 
@@ -20,16 +20,21 @@ from lgvi_warp.statistics.tree import Part
 if TYPE_CHECKING:
     from lgvi_warp.engine.plan import Plan
 
-# Sample times of the two small runs that tell what all take: arrays have a row for each time, or none.
+# Sample times of the two small measurements. Two are enough: an array has a row for each time, or none.
 FEW, MORE = 2, 4
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """Bytes. file, part: of a block's parts in a file and in memory; joined: of all parts that a run has joined, at most.
+    """Sizes of a run's statistics [bytes].
 
-    estimates: of what is read from them; taking: what a block needs beside while it gathers, reading: what is needed while
-    they are read.
+    Attributes:
+        file: A block's parts in a file.
+        part: A block's parts in memory.
+        joined: All parts that a run has joined, at their largest.
+        estimates: The estimates that are read from these.
+        taking: Further memory of a block while it gathers.
+        reading: Further memory while estimates are read.
     """
 
     file: int = 0
@@ -41,7 +46,15 @@ class Sizes:
 
 
 def sizes(plan: Plan, statistics: Sequence[Statistic]) -> Sizes:
-    """Of these statistics in a run of the plan, which is compiled."""
+    """Measure the sizes of statistics in a run.
+
+    Args:
+        plan: The plan, compiled.
+        statistics: The statistics.
+
+    Returns:
+        The sizes, extrapolated to all sample times of the plan.
+    """
     times, runs = len(plan.grid.times), blocks(plan.ensemble.members)
     if not statistics:
         return Sizes()
@@ -51,15 +64,15 @@ def sizes(plan: Plan, statistics: Sequence[Statistic]) -> Sizes:
         slope = (getattr(more, name) - getattr(few, name)) / (min(MORE, times) - FEW) if times > FEW else 0.0
         return round(getattr(few, name) + slope * (count - FEW))
 
-    found = {name: at(name, times) for name in ("file", "part", "joined", "estimates")}
-    # Samples come a launch at a time, and sketches are read so many numbers at a time.
-    launch = max(s1 - s0 for s0, s1 in (plan.due(*one) for one in plan.segments(runs[0].count)))
-    at_once = max(1, SORTED_AT_ONCE * times * 8 // max(found["joined"], 1))
-    return Sizes(**found, taking=at("taking", launch), reading=at("reading", min(times, at_once)))
+    values = {name: at(name, times) for name in ("file", "part", "joined", "estimates")}
+    # Samples come one launch at a time; sketches are read at_once times together, which bounds the memory.
+    launch = max(s1 - s0 for s0, s1 in (plan.due(*segment) for segment in plan.segments(runs[0].count)))
+    at_once = max(1, SORTED_AT_ONCE * times * 8 // max(values["joined"], 1))
+    return Sizes(**values, taking=at("taking", launch), reading=at("reading", min(times, at_once)))
 
 
 def _of_times(plan: Plan, statistics: Sequence[Statistic], count: int) -> Sizes:
-    """The sizes if there were so many sample times, of members that stay as they start."""
+    """The sizes for this many sample times, measured on members that stay at their starts."""
     from lgvi_warp.engine.packets import Packets
 
     block, *others = blocks(plan.ensemble.members)
@@ -74,16 +87,16 @@ def _of_times(plan: Plan, statistics: Sequence[Statistic], count: int) -> Sizes:
     file = len(packed([keeper], [part]))
     joined, reading, estimates = 0, 0, 0
     with np.errstate(all="ignore"):
-        for statistic, one in zip(statistics, part, strict=True):
-            tree = _fullest(statistic, one, 1 + len(others))
+        for statistic, block_part in zip(statistics, part, strict=True):
+            tree = _fullest(statistic, block_part, 1 + len(others))
             read, more = _peak(lambda: keeper.said(statistic, tree))  # noqa: B023
             joined, reading = joined + sum(map(_bytes, tree)), max(reading, more)
-            estimates += sum(_bytes(one.arrays) for one in read)
+            estimates += sum(_bytes(estimate.arrays) for estimate in read)
     return Sizes(file, sum(map(_bytes, part)), joined, estimates, taking, reading)
 
 
 def _fullest(statistic: Statistic, part: Part, count: int) -> list[Part]:
-    """A tree of so many blocks' parts at its fullest: one of each level, the largest first."""
+    """A tree of the parts of `count` blocks at its fullest: one part of each level, the largest first."""
     tree = [part]
     for level in range(1, count.bit_length()):
         tree.append(statistic.join(tree[-1], tree[-1], (level, 0)))
@@ -95,7 +108,7 @@ def _bytes(arrays: Any) -> int:
 
 
 def _peak(action: Callable[[], Any]) -> tuple[Any, int]:
-    """(what an action gives, bytes of memory that it took at most)."""
+    """(result of an action, memory that it took at most [bytes])."""
     mine = not tracemalloc.is_tracing()
     if mine:
         tracemalloc.start()

@@ -1,4 +1,4 @@
-"""The walk from an ensemble to a result."""
+"""`solve`: from an ensemble and its settings to a result, in memory or in a store."""
 
 from __future__ import annotations
 
@@ -43,34 +43,49 @@ def solve(
     scheduler: str | None = None,
     only: range | None = None,
 ) -> Result:
-    """Advance every member of the fleet from t = 0 to t1 and keep the samples asked for.
+    """Advance every member of the fleet from t = 0 to t1 and return the samples and statistics asked for.
 
-    fleet: an Ensemble, or a Scene for its own ensemble (one vehicle if it has none).
-    method: a name or a Method. h, t1: step and end [s]. dtype: "float64", "float32", or "float32_compensated", which
-    keeps each number of the state as a sum of two (many short steps, far from the origin). What is left out is taken from
-    the scene's [run] section (method "psi_s" and float64 where it says nothing).
-    save: what to keep (default: every [run] save_every of the scene, else the start and the end).
-    threads: default all cores. width: vehicles per packet, default from the CPU.
-    checks: "safe" (default) gives each member a status and freezes it when it fails, and warns of what its numbers and its
-    start say against the step; "all" also warns of what arises on the way; "none" leaves all that code out.
-    on_failure: "freeze" (default) keeps a member that fails at its last good state; "raise" raises MembersFailed after the
-    run; "substep" makes a step that has no solution again in 2, 4, ... 1024 parts, for that member alone: order and the
-    symmetry of each step are kept, symplecticity is not.
-    progress: called with the fraction of the work that is done, from the threads that do it.
-    statistics: gathered over the members at every sample time while the run goes: lw.Mean("position"), ...; they are
-    in result.statistics. keep: "all" samples of members (default); "none", so that memory grows with neither members nor
-    steps; "failed" (not those that an event stopped), or indices of members: those are run again after the run, to the same
-    bits, and are result.kept.
-    until: lw.Until(...), to stop before the last member, once a statistic's interval is narrow enough; False: never, whatever
-    the scene says (statistics=() likewise gathers none).
-    store: a folder "runs/x/run.zarr", or a Store with more settings: samples go there block by block and not into memory,
-    and a run that was stopped goes on with lw.resume. executor: "threads", "processes" or "dask", or an object that runs
-    blocks; scheduler: the address of Dask's. only: with a store, the blocks to run, range(0, 100), for a run in parts
-    (the last may ask for more than there are): the result then is of their members.
+    What is left out is taken from the scene's [run] section; the defaults below hold where that says nothing. Nothing is
+    printed. The same inputs give the same bits for any number of threads, on one type of machine.
 
-    Raises SceneError naming every fault of the arguments, MembersFailed as asked. Prints nothing. The same inputs give the
-    same bits for any number of threads, on one type of machine. A run in memory that Ctrl-C interrupts raises Interrupted, a
-    KeyboardInterrupt whose `result` has the members that were finished.
+    Args:
+        fleet: An Ensemble, or a Scene, which stands for its own ensemble (one vehicle if it has none).
+        method: A name or a Method; default "psi_s".
+        h: Step [s].
+        t1: End of the run [s].
+        save: Which samples to save, and when; default every [run] save_every of the scene, else the start and the end.
+        dtype: "float64" (default), "float32", or "float32_compensated", which keeps each number of the state as a sum of two
+            (for many short steps, far from the origin).
+        threads: Number of threads; default all cores.
+        width: Vehicles per packet; default from the CPU.
+        checks: "safe" (default) gives each member a status, freezes it when it fails, and warns if its parameters and its
+            start do not suit the step; "all" also warns of what arises on the way; "none" leaves all that code out.
+        on_failure: "freeze" (default) keeps a member that fails at its last good state. "raise" raises MembersFailed after
+            the run. "substep" repeats a step that has no solution in 2, 4, ... 1024 parts, for that member alone: order and
+            the symmetry of each step are kept, symplecticity is not.
+        progress: Called with the fraction of the work that is done, in [0, 1], from the threads that do it.
+        statistics: Statistics gathered over the members at every sample time during the run, such as lw.Mean("position");
+            they are in result.statistics. An empty sequence gathers none, whatever the scene says.
+        keep: Members whose samples are kept. "all" (default). "none": memory grows with neither members nor steps.
+            "failed" (without those that an event stopped) or indices of members: these are run again after the run, with the
+            same bits, and are in result.kept.
+        until: lw.Until(...) ends the run before the last member, once the interval of a statistic is narrow enough. False
+            runs all members, whatever the scene says.
+        store: A folder "runs/x/run.zarr", or a Store with more settings. Samples are written there block by block and are
+            not held in memory; lw.resume continues such a run after it was stopped.
+        executor: "threads" (default), "processes" or "dask", or an object that runs blocks.
+        scheduler: Address of Dask's scheduler.
+        only: With a store, the blocks to run, such as range(0, 100), for a run in parts. The last part may ask for more
+            blocks than there are. The result is of the members of these blocks.
+
+    Returns:
+        A Result, of every member unless `until` or `only` says otherwise.
+
+    Raises:
+        SceneError: If arguments are at fault; the message names every fault.
+        MembersFailed: If members failed and on_failure is "raise".
+        Interrupted: If Ctrl-C interrupts a run in memory. It is a KeyboardInterrupt whose `result` has the members that
+            were finished.
     """
     if not isinstance(fleet, Ensemble | Scene):
         raise SceneError(
@@ -92,11 +107,11 @@ def solve(
     plan = make_plan(
         ensemble, method, h, t1, save, dtype, width=width, checks=checks, on_failure=on_failure, fields=observed.fields
     )
-    asked, count = (save or SaveAt()).fields, threads or machine.thread_count()
+    fields, count = (save or SaveAt()).fields, threads or machine.thread_count()
     if store is None:
-        result = run_plan(plan, count, progress, observed, asked, runner, partial=True)
-        return finished(result, plan, observed, asked, count)
+        result = run_plan(plan, count, progress, observed, fields, runner, partial=True)
+        return finished(result, plan, observed, fields, count)
     only = blocks_there(only, plan)
     into = store if isinstance(store, Store) else Store(store)
-    result = run_stored(plan, into, runner, progress, only, observed, asked)
-    return result if only is not None else finished(result, plan, observed, asked, count)
+    result = run_stored(plan, into, runner, progress, only, observed, fields)
+    return result if only is not None else finished(result, plan, observed, fields, count)

@@ -1,1 +1,1 @@
-"""To be said in one sentence."""
+"""Runs in zarr stores on disk: written block by block, resumed, merged, opened and exported."""

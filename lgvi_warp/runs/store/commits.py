@@ -1,4 +1,4 @@
-"""Blocks on their way to the disk: made durable several at a time, while others are computed."""
+"""Commits of blocks: files are made durable several blocks at a time, while others are computed."""
 
 from __future__ import annotations
 
@@ -11,13 +11,20 @@ from typing import Any
 
 from lgvi_warp.common.files import Files, finish_together
 
-# How long a block waits for others that are made durable with it [s], and how many of them at most.
+# How long a block waits for others that are made durable with it [s], and the most blocks in the queue.
 PERIOD, MOST = 0.1, 64
 
 
 @dataclass
 class Commit:
-    """The files of a block, and the marker that will say that all of them are safe."""
+    """The files of one block, and its marker, which says that all of them are safe.
+
+    Attributes:
+        files: The files, written and not synced.
+        path: Path of the marker.
+        marker: Content of the marker.
+        done: Done when the block is durable, or failed.
+    """
 
     files: Files
     path: Path
@@ -26,12 +33,15 @@ class Commit:
 
 
 class Commits:
-    """The blocks of a run that are written and not durable yet; as a context, waits for them at its end.
+    """Queue of the blocks that are written but not durable yet; as a context, it waits for them at its end.
 
-    A thread takes all that wait as one group: their files are synced and put in their places, then each folder is synced
-    once, and only then the same is done with the markers. The first error is raised by the next `add` or at the end; what
-    can be made durable nevertheless is.
-    waits: `add` returns when its block is durable. So do copies in other processes, whose end nobody waits for.
+    A thread takes all blocks that wait as one group: it syncs their files and puts them in their places, then syncs each
+    folder once, and only then does the same with the markers. The first error is raised by the next `add`, or at the end;
+    blocks that can be made durable nevertheless are.
+
+    Args:
+        waits: Whether `add` returns only when its block is durable. Copies in other processes wait, because nothing waits
+            for the end of these processes. Default False.
     """
 
     def __init__(self, waits: bool = False):
@@ -44,17 +54,26 @@ class Commits:
         return Commits, (True,)
 
     def add(self, files: Files, path: Path, marker: bytes) -> None:
-        """Hand over a block; waits where the disk is far behind. Raises OSError, of this or an earlier block."""
-        one = Commit(files, path, marker)
+        """Add a block; waits where too many blocks are in the queue.
+
+        Args:
+            files: The block's files, written and not synced.
+            path: Path of its marker.
+            marker: Content of its marker.
+
+        Raises:
+            OSError: If this or an earlier block could not be written.
+        """
+        commit = Commit(files, path, marker)
         with self._changed:
             self._changed.wait_for(lambda: len(self._waiting) < MOST)
-            self._waiting.append(one)
+            self._waiting.append(commit)
             self._changed.notify_all()
             if not self._at_work:
                 self._at_work = True
                 threading.Thread(target=self._work, name="lgvi_warp_commits").start()
         if self._waits:
-            one.done.result()
+            commit.done.result()
         elif self._error is not None:
             raise self._error
 
@@ -70,19 +89,19 @@ class Commits:
             raise self._error
 
     def _work(self) -> None:
-        """In a thread of its own: group after group, until nothing waits."""
+        """In a thread of its own: make group after group durable, until none waits."""
         while group := self._group():
             try:
                 _make_durable(group)
             except BaseException as failure:
-                for one in group:
-                    if not one.done.done():
-                        one.done.set_exception(failure)
-            found = (one.done.exception() for one in group)
-            self._error = self._error or next((error for error in found if error is not None), None)
+                for commit in group:
+                    if not commit.done.done():
+                        commit.done.set_exception(failure)
+            errors = (commit.done.exception() for commit in group)
+            self._error = self._error or next((error for error in errors if error is not None), None)
 
     def _group(self) -> list[Commit]:
-        """What waits, after some time in which more may come."""
+        """Take the blocks that wait, after some time in which more may come."""
         with self._changed:
             self._changed.wait_for(lambda: self._waits or self._ending or len(self._waiting) == MOST, PERIOD)
             group, self._waiting = self._waiting, []
@@ -92,27 +111,27 @@ class Commits:
 
 
 def _make_durable(group: Sequence[Commit]) -> None:
-    safe = _finished(group, [one.files for one in group])
+    safe = _finished(group, [commit.files for commit in group])
     marked, markers = [], []
-    for one in safe:
-        files = Files(one.path.parent)
+    for commit in safe:
+        files = Files(commit.path.parent)
         try:
-            files.write(one.path.name, one.marker)
+            files.write(commit.path.name, commit.marker)
         except OSError as error:
-            one.done.set_exception(error)
+            commit.done.set_exception(error)
             continue
-        marked.append(one)
+        marked.append(commit)
         markers.append(files)
-    for one in _finished(marked, markers):
-        one.done.set_result(None)
+    for commit in _finished(marked, markers):
+        commit.done.set_result(None)
 
 
 def _finished(group: Sequence[Commit], files: Sequence[Files]) -> list[Commit]:
-    """Those whose files are safe; the others are told what went wrong."""
+    """The commits whose files are safe now; the others get their error."""
     safe = []
-    for one, error in zip(group, finish_together(files), strict=True):
+    for commit, error in zip(group, finish_together(files), strict=True):
         if error is None:
-            safe.append(one)
+            safe.append(commit)
         else:
-            one.done.set_exception(error)
+            commit.done.set_exception(error)
     return safe

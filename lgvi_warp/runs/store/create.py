@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""Creation of a store: its folder with all metadata and no blocks."""
 
 from __future__ import annotations
 
@@ -25,16 +25,25 @@ if TYPE_CHECKING:
     from lgvi_warp.engine.plan import Plan
 
 
-# Room that is left on a disk: markers, metadata, folders.
+# Room on the disk for markers, metadata and folders [bytes].
 SPARE_BYTES = 20_000_000
 
 
 def create(
     store: Store, plan: Plan, provenance: Mapping[str, Any], messages: Sequence[str], keepers: Sequence[Keeper] = ()
 ) -> None:
-    """Make the store's folder with all of its metadata, whole or not at all. Raises SceneError or OSError.
+    """Create the store's folder with all of its metadata, either whole or not at all.
 
-    keepers: whose parts it will hold; the recipe has their names.
+    Args:
+        store: Folder and settings.
+        plan: Plan of the run.
+        provenance: Provenance as a store keeps it.
+        messages: What the user should know.
+        keepers: Keepers whose parts the store will hold; its recipe lists their names.
+
+    Raises:
+        SceneError: If an array's name cannot be a folder, or the disk has too little room.
+        OSError: If the disk cannot be written.
     """
     target = Path(os.path.realpath(store.folder))
     check_names(columns(plan, store))
@@ -49,20 +58,32 @@ def create(
 
 
 def names_of(keepers: Sequence[Keeper]) -> list[str]:
-    """What the parts of keepers are called by."""
+    """List the names of the keepers that leave parts in a store.
+
+    Args:
+        keepers: The keepers of a run.
+
+    Returns:
+        The names, in the order of the keepers.
+    """
     return [keeper.name for keeper in keepers if isinstance(keeper, PartKeeper)]
 
 
 def free_enough(path: Path, wanted: int) -> None:
-    """Raise SceneError where a disk has less room than a run needs."""
-    there = path.absolute()
-    while not there.exists():
-        there = there.parent
-    free = shutil.disk_usage(there).free
+    """Raise SceneError if a disk has less room than a run needs.
+
+    Args:
+        path: Where the run will be written; need not exist.
+        wanted: Size of the run [bytes].
+    """
+    existing = path.absolute()
+    while not existing.exists():
+        existing = existing.parent
+    free = shutil.disk_usage(existing).free
     if wanted + SPARE_BYTES > free:
-        what = f"needs {wanted / 1e9:.2f} GB, and the disk has {free / 1e9:.2f} GB left"
+        shortage = f"needs {wanted / 1e9:.2f} GB, and the disk has {free / 1e9:.2f} GB left"
         remedy = "save less often or fewer fields (SaveAt), store float32 (--store-dtype float32), or use another disk"
-        raise SceneError([f"store = {path}: {what}; {remedy}"])
+        raise SceneError([f"store = {path}: {shortage}; {remedy}"])
 
 
 def skeleton(
@@ -73,7 +94,16 @@ def skeleton(
     messages: Sequence[str],
     keepers: Sequence[Keeper] = (),
 ) -> None:
-    """Groups and arrays without their blocks, on the disk."""
+    """Write groups and arrays without their blocks to disk.
+
+    Args:
+        root: Folder of the store, which is made.
+        store: Settings.
+        plan: Plan of the run.
+        provenance: Provenance as a store keeps it.
+        messages: What the user should know.
+        keepers: Keepers whose parts the store will hold.
+    """
     import zarr
     from zarr.storage import MemoryStore
 
@@ -82,12 +112,12 @@ def skeleton(
         for name, values in plan.ensemble.parameters(0, 1).items()
         if name not in plan.ensemble.varied()
     }
-    made = recipe(plan) | {"store": store.layout(), "keepers": names_of(keepers)}
-    texts = [json.dumps(one) for one in (provenance, made, list(messages), shared)]
-    # zarr writes into memory and `files` onto the disk, side by side: one by one the files would take several times as long.
+    content = recipe(plan) | {"store": store.layout(), "keepers": names_of(keepers)}
+    texts = [json.dumps(item) for item in (provenance, content, list(messages), shared)]
+    # zarr writes into memory, and `files` writes to disk and syncs together: file by file it would take several times as long.
     inside: dict[str, Any] = {}
-    own = MemoryStore(inside)
-    group = zarr.create_group(own, zarr_format=3, attributes=_attributes(texts, provenance))
+    memory = MemoryStore(inside)
+    group = zarr.create_group(memory, zarr_format=3, attributes=_attributes(texts, provenance))
     k, n = len(plan.grid.times), plan.ensemble.members
     whole_array(
         group, "time", plan.grid.times, ("time",), {"units": "s", "long_name": "time since the start", "axis": "T"}
@@ -98,16 +128,16 @@ def skeleton(
                column.attributes)  # fmt: skip
     store.write_given(group, plan)
     with warnings.catch_warnings():
-        # Consolidated metadata is what lets xarray open the store in one read; zarr remarks that version 3 has no rule for it.
+        # Consolidated metadata let xarray open the store in one read; zarr warns that version 3 of the format has none.
         warnings.simplefilter("ignore")
-        zarr.consolidate_metadata(own, zarr_format=3)
+        zarr.consolidate_metadata(memory, zarr_format=3)
     for folder in {os.path.dirname(key) for key in inside} | {"blocks", "parts"}:
         (root / folder).mkdir(parents=True, exist_ok=True)
     files = durable.Files(root)
     for key in sorted(inside):
         files.write(key, inside.pop(key).as_numpy_array())
-    # The root's metadata will change: it has a checksum of its own.
-    files.write(CREATED, marker({key: one for key, one in files.sums.items() if key != ROOT}))
+    # The root's metadata changes when the run ends: its texts have a checksum of their own.
+    files.write(CREATED, marker({key: item for key, item in files.sums.items() if key != ROOT}))
     files.finish()
 
 

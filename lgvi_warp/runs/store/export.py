@@ -1,4 +1,4 @@
-"""A run in a store as one NetCDF file or as Parquet, for programs that read those; piece by piece, whatever its size."""
+"""Export of a run in a store to one NetCDF or Parquet file, piece by piece, whatever its size."""
 
 from __future__ import annotations
 
@@ -29,12 +29,23 @@ MEMBERS = (MEMBER, KEPT_MEMBER)
 
 
 def export(path: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | None = None) -> Path:
-    """Write a complete run as "netcdf" (one NetCDF-4 file) or "parquet" (one file, a row for each member and time).
+    """Export a complete run to a file of another format.
 
-    NetCDF has the members that the run keeps after all in the group "kept", and its statistics in "statistics". Parquet
-    has one table: of all samples, else of those of the kept members, else a row for each member without time.
-    path: a store, or a folder with one. out: the file, default beside the store; one that is there is replaced. Returns
-    its path. Raises SceneError, or OSError.
+    "netcdf" writes one NetCDF-4 file; the members that the run keeps are in its group "kept", statistics in its group
+    "statistics". "parquet" writes one table with a row for each member and time: of all samples, else of those of the kept
+    members, else a row for each member without time.
+
+    Args:
+        path: A store, or a folder with one store.
+        to: "netcdf" or "parquet".
+        out: The file; default beside the store. A file that exists is replaced.
+
+    Returns:
+        Path of the file.
+
+    Raises:
+        SceneError: If the run is not complete or is damaged, or a library is missing.
+        OSError: If the file cannot be written.
     """
     faults = Faults()
     faults.choice("to", to, FORMATS)
@@ -53,22 +64,31 @@ def export(path: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | 
     except ImportError as error:
         raise SceneError([f"to = {to!r}: {error}; install it: pip install 'lgvi-warp[export]'"]) from error
     except (OSError, RuntimeError) as error:
-        # Neither library names the file, and netCDF4 not what the system said.
-        what = getattr(error, "strerror", None) or f"was not written ({error}); is the disk full?"
-        raise OSError(getattr(error, "errno", None) or errno.EIO, what, str(target)) from error
+        # Neither library names the file, and netCDF4 hides the system's error.
+        reason = getattr(error, "strerror", None) or f"was not written ({error}); is the disk full?"
+        raise OSError(getattr(error, "errno", None) or errno.EIO, reason, str(target)) from error
     return target
 
 
 def check_whole(folder: Folder) -> None:
-    """Every file must be as it was written: one that is missing would be exported as NaN. Raises SceneError."""
-    found = state(folder.path)
-    if not found["complete"]:
-        damage = found["damage"][:5] or [f"{found['blocks'] - found['finished']} blocks are not marked as finished"]
+    """Check that every file is as it was written: a missing chunk would be exported as NaN.
+
+    Args:
+        folder: The store.
+
+    Raises:
+        SceneError: If the run is not complete or is damaged.
+    """
+    content = state(folder.path)
+    if not content["complete"]:
+        damage = content["damage"][:5] or [
+            f"{content['blocks'] - content['finished']} blocks are not marked as finished"
+        ]
         raise SceneError(f"{folder.path}: {text}; `lgvi-warp resume {folder.path}` mends it" for text in damage)
 
 
 def _netcdf(folder: Folder, target: Path) -> None:
-    """The run, and in groups of their own the kept members and the statistics, where it has them."""
+    """Write the run, and its kept members and statistics in groups of their own."""
     import netCDF4
 
     with netCDF4.Dataset(target, "w") as file:
@@ -80,7 +100,7 @@ def _netcdf(folder: Folder, target: Path) -> None:
 
 
 def _netcdf_group(folder: Folder, file: Any) -> None:
-    """Every array with its attributes, a block of members at a time."""
+    """Write every array with its attributes, a block of members at a time."""
     group = folder.group()
     for name, value in group.attrs.asdict().items():
         file.setncattr(name, np.int8(value) if isinstance(value, bool) else value)
@@ -99,7 +119,7 @@ def _netcdf_group(folder: Folder, file: Any) -> None:
 
 
 def _pieces(array: zarr.Array[Any], runs: list[Block]) -> Iterator[tuple[slice, ...]]:
-    """Slices that cover an array, a block of members at a time, all of it where it has none."""
+    """Slices that cover an array, a block of members at a time, or at once if it has no dimension of members."""
     axis = next((i for i, dim in enumerate(array.metadata.dimension_names) if dim in MEMBERS), None)
     if axis is None:
         yield (slice(None),) * array.ndim
@@ -109,10 +129,10 @@ def _pieces(array: zarr.Array[Any], runs: list[Block]) -> Iterator[tuple[slice, 
 
 
 def _parquet(folder: Folder, target: Path) -> None:
-    """A row for each member and time that there are samples of, or for each member where there are none.
+    """Write a row for each member and time that has samples, or for each member if there are none.
 
-    A row group a block. Columns realization, time, each component of the samples and of what varies, status,
-    failure_time; units in the metadata of columns, and for pandas in its `attrs`.
+    A row group is a block. Columns: realization, time, each component of the samples and of what varies, status,
+    failure_time. Units are in the metadata of the columns, and for pandas in its `attrs`.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -125,11 +145,14 @@ def _parquet(folder: Folder, target: Path) -> None:
     try:
         for run in folder.runs:
             rows = _rows(group, run)
-            of = {name: units[array] for name, (array, _) in rows.items() if array in units}
+            unit_of = {name: units[array] for name, (array, _) in rows.items() if array in units}
             table = pa.table({name: values for name, (_, values) in rows.items()})
-            fields = [one.with_metadata({"units": of[one.name]}) if one.name in of else one for one in table.schema]
+            fields = [
+                column.with_metadata({"units": unit_of[column.name]}) if column.name in unit_of else column
+                for column in table.schema
+            ]
             content = {name: str(group.attrs[name]) for name in ("Conventions", "source", "provenance")}
-            table = table.cast(pa.schema(fields, content | {"PANDAS_ATTRS": json.dumps({"units": of})}))
+            table = table.cast(pa.schema(fields, content | {"PANDAS_ATTRS": json.dumps({"units": unit_of})}))
             writer = writer or pq.ParquetWriter(target, table.schema)
             writer.write_table(table)
     finally:
@@ -138,12 +161,12 @@ def _parquet(folder: Folder, target: Path) -> None:
 
 
 def _timed(group: Any) -> list[str]:
-    """Names of the samples."""
+    """Names of the fields with samples."""
     return [name for name in FIELDS if name in group]
 
 
 def _rows(group: Any, run: Block) -> dict[str, tuple[str, np.ndarray]]:
-    """A block's columns, member by member: by name the array that each is of, and its numbers."""
+    """A block's columns, member by member: by column name, the name of its array and its numbers."""
     at, timed = np.arange(run.first, run.stop), _timed(group)
     if "chosen" in group:
         at = at[group["chosen"][run.first : run.stop] == 1]
@@ -159,7 +182,7 @@ def _rows(group: Any, run: Block) -> dict[str, tuple[str, np.ndarray]]:
 
 
 def _components(name: str, values: np.ndarray) -> dict[str, tuple[str, np.ndarray]]:
-    """Rows (n, ...) of an array, a column for each component: position_0, attitude_12, vehicle.mass."""
+    """Split an array of rows (n, ...) into a column for each component: position_0, attitude_12, vehicle.mass."""
     if values.ndim == 1:
         return {name: (name, values)}
     places = itertools.product(*map(range, values.shape[1:]))

@@ -1,12 +1,12 @@
 """A run on disk: a zarr v3 group, written block by block, each block marked when all of it is safe.
 
     run.zarr/zarr.json            attributes: provenance, recipe, messages, complete
-    run.zarr/position/c.0.3.0     chunk: times 0, block 3 (see store_layout)
-    run.zarr/parts/000000768.npy  what keepers closed the block with
-    run.zarr/blocks/000000768.json   the block that begins with member 768 is finished: its files, sizes, checksums
+    run.zarr/position/c.0.3.0     chunk: times 0, block 3 (see layout)
+    run.zarr/parts/000000768.npy  the block's parts of the keepers
+    run.zarr/blocks/000000768.json   marker of the finished block that begins with member 768: its files, sizes, checksums
     run.zarr/kept/                a group like the run's own, of members that were run again for their samples (see kept)
 
-Nothing in it tells the time of day: the same run leaves the same bytes.
+No file holds a date or time of day: the same run leaves the same bytes.
 """
 
 from __future__ import annotations
@@ -43,9 +43,25 @@ ROOT, CREATED, KEPT = "zarr.json", "created.json", "kept"
 
 
 class Folder:
-    """A store that exists, maybe somebody else's: what it says is checked before it is used. Its folder may be a link.
+    """An existing store, which may come from elsewhere: everything it says is checked before it is used.
 
-    within: the run that it is a group of. Raises SceneError where there is none, or its metadata is damaged.
+    Args:
+        path: Its folder, or a link to it.
+        within: The run that it is a group of; default itself.
+
+    Attributes:
+        attributes: The attributes of its zarr group.
+        provenance: Scene, ensemble, settings, versions and machine of the run.
+        recipe: Settings of its plan.
+        shared: Parameters that all members have in common.
+        messages: What the user should know.
+        layout: Its arrays.
+        found: Blocks that this process found finished.
+        ran: Blocks that this process ran.
+        ran_kept: Blocks of kept members that this process ran.
+
+    Raises:
+        SceneError: If there is no store, or its metadata is damaged.
     """
 
     def __init__(self, path: Path, within: Path | None = None):
@@ -71,17 +87,21 @@ class Folder:
             store_texts.check(self.attributes, self.provenance, self.recipe, messages, self.shared)
             self.messages: tuple[str, ...] = tuple(messages)
             self.layout = store_check.layout_of(content, int(self.recipe["members"]))
-        # What this process did: blocks that it found whole, those that it ran, and those of kept members that it ran.
+        # Blocks that this process found finished, those that it ran, and those of kept members that it ran.
         self.found, self.ran, self.ran_kept = 0, 0, 0
 
     def _root(self) -> Any:
-        """The root's metadata. Raises ValueError, SceneError, OSError."""
+        """Read the root's metadata. Raises ValueError, SceneError, OSError."""
         if not self.path.is_dir():
             raise FileNotFoundError
         return safe_files.read_json(self.within, (self.path / ROOT).relative_to(self.within).as_posix())
 
     def kept(self) -> Folder | None:
-        """The group of its kept members; None where there is none. Raises SceneError where it is damaged."""
+        """Open the group of the kept members; None if there is none.
+
+        Raises:
+            SceneError: If it is damaged.
+        """
         return Folder(self.path / KEPT, self.path) if os.path.lexists(self.path / KEPT) else None
 
     @property
@@ -91,7 +111,7 @@ class Folder:
 
     @property
     def members(self) -> int:
-        """n; fewer than the ensemble has where the run ended because there were enough."""
+        """Number of members; fewer than the ensemble has where `until` ended the run."""
         return int(self.attributes.get("members", self.recipe["members"]))
 
     @property
@@ -101,45 +121,59 @@ class Folder:
 
     @property
     def sink(self) -> Sink:
-        """What knows its blocks and their files."""
+        """The keeper that knows its blocks and their files."""
         return Sink(self.path, self.layout.columns)
 
     def checked(self) -> Any:
-        """What zarr and xarray read it through."""
+        """Return the zarr store through which zarr and xarray read the folder, with all checks."""
         from lgvi_warp.runs.store.zarr_access import checked_store
 
-        own = {name: value for name, value in self.attributes.items() if value is not None}
-        return checked_store(self.path, self.layout, self.layout.root(own))
+        present = {name: value for name, value in self.attributes.items() if value is not None}
+        return checked_store(self.path, self.layout, self.layout.root(present))
 
     def group(self) -> Any:
-        """The zarr group, for reading."""
+        """Open the zarr group, for reading only."""
         import zarr
 
         return zarr.open_group(self.checked(), mode="r", zarr_format=3)
 
     def refuse_too_large(self) -> None:
-        """Raise SceneError where what is read at once, numbers of members without times, is more than the memory."""
-        each = sum(one.bytes for one in self.layout.columns if not one.times) * len(self.runs)
+        """Check that what is read at once, numbers of members without times, fits into memory.
+
+        Raises:
+            SceneError: If it does not.
+        """
+        each = sum(column.bytes for column in self.layout.columns if not column.times) * len(self.runs)
         memory = machine.memory_bytes() or 2**40
         if each > memory:
-            what = f"has {self.members:,} members, of which {each / 1e9:.0f} GB are read at once, and the memory is"
+            size = f"has {self.members:,} members, of which {each / 1e9:.0f} GB are read at once, and the memory is"
             raise SceneError(
-                [f"{self.path}: {what} {memory / 1e9:.0f} GB; read it on a larger machine, or run it again"]
+                [f"{self.path}: {size} {memory / 1e9:.0f} GB; read it on a larger machine, or run it again"]
             )
 
     def unfinished(self) -> list[Block]:
-        """Blocks without a marker."""
+        """List the blocks that have no valid marker."""
         sink, marked = self.sink, safe_files.names(self.path, "blocks")
         return [block for block in self.runs if f"{name_of(block)}.json" not in marked or sink.sums(block) is None]
 
     def plan(self, ensemble: Ensemble | None = None) -> Plan:
-        """The run's plan, made again; ensemble: where a scene file cannot tell it (laws of your own). Raises SceneError."""
+        """Build the plan of the run again.
+
+        Args:
+            ensemble: The run's ensemble. Needed if a scene file cannot describe it (distributions of your own).
+
+        Returns:
+            The plan.
+
+        Raises:
+            SceneError: If the store is damaged, or does not describe the ensemble.
+        """
         try:
-            # A chunk that is missing reads as NaN or 0.
+            # A missing chunk raises no error: it reads as NaN or 0.
             lost = [text for text in self.damage() if text.startswith(("time/", "step/", "explicit/"))]
             group = self.group()
             steps, times = group["step"][:].astype(np.int64), group["time"][:]
-            given = {name: np.asarray(array[:]) for name, array in group["explicit"].arrays()}
+            explicit = {name: np.asarray(array[:]) for name, array in group["explicit"].arrays()}
             if lost or not np.isfinite(times).all():
                 raise ValueError("times are missing")
         except (ValueError, OSError, KeyError) as error:
@@ -147,22 +181,26 @@ class Folder:
             raise SceneError([f"{self.path}: {'; '.join(self.damage()) or error}; {remedy}"]) from error
         with understood(self.path / ROOT):
             if ensemble is None:
-                noise = given.pop("indices", None)
-                ensemble = ensemble_of(self.provenance["scene"], self.provenance["ensemble"], given, noise, self.path)
+                noise = explicit.pop("indices", None)
+                ensemble = ensemble_of(
+                    self.provenance["scene"], self.provenance["ensemble"], explicit, noise, self.path
+                )
             return plan_of(self.recipe, ensemble, steps, times)
 
     def damage(self) -> list[str]:
-        """What is wrong with the files that do not belong to a block."""
+        """List what is wrong with the files that belong to no block."""
         sums, wanted = read_marker(self.path, CREATED), self.layout.frame()
         if sums is None:
             return [f"{CREATED} is damaged"]
         if sums.keys() != wanted.keys() or any(size not in (None, sums[key][0]) for key, size in wanted.items()):
             return [f"{CREATED} does not fit the arrays in {ROOT}"]
-        found = {key: text for key, one in sums.items() if (text := durable.fault(self.path, key, *one))}
-        return [f"{key} {text}" for key, text in found.items()] + self._unlike(found)
+        faults = {
+            key: text for key, size_and_sum in sums.items() if (text := durable.fault(self.path, key, *size_and_sum))
+        }
+        return [f"{key} {text}" for key, text in faults.items()] + self._unlike(faults)
 
     def _unlike(self, damaged: Container[str]) -> list[str]:
-        """Arrays whose own metadata is whole and says something else than that of the root."""
+        """Arrays whose own metadata is undamaged but differs from that in the root."""
         unlike = []
         for name, array in self.layout.arrays.items():
             key = f"{name}/{ROOT}"
@@ -171,52 +209,83 @@ class Folder:
         return unlike
 
     def finish(self, members: int | None = None) -> None:
-        """Say that the run is complete; members: with so many, where it ended before the last of the ensemble."""
+        """Mark the run as complete.
+
+        Args:
+            members: Number of members, where it ended before the last of the ensemble.
+        """
         if not self.complete:
             self._say({"complete": True} | ({} if members is None else {"members": members}), below(self.path / KEPT))
 
     def take_layout(self, other: Path) -> None:
-        """Say of the arrays what the root's metadata of another folder of the same run says; then it is not complete."""
+        """Take over the layout in the root's metadata of another folder of the same run.
+
+        If it differs from this folder's, the run is marked as incomplete.
+
+        Args:
+            other: The other folder.
+        """
         content, right = self._root(), safe_files.read_json(other, ROOT)
         if Folder(other).layout != self.layout:
             right["attributes"] = content["attributes"] | {"complete": False}
             durable.write_whole(self.path / ROOT, json.dumps(right, indent=2).encode())
 
     def reopen(self) -> None:
-        """Say that the run is not complete."""
+        """Mark the run as incomplete."""
         if self.complete:
             self._say({"complete": False}, {})
 
     def _say(self, said: dict[str, Any], kept: dict[str, Any]) -> None:
-        """Write attributes of the run, and what lies in the group of its kept members."""
+        """Write attributes of the run, and the metadata of the group of its kept members."""
         content = self._root()
         content["attributes"] |= said
         arrays = content["consolidated_metadata"]["metadata"]
-        own = {name: one for name, one in arrays.items() if name.partition("/")[0] != KEPT}
-        content["consolidated_metadata"]["metadata"] = own | kept
+        of_run = {name: metadata for name, metadata in arrays.items() if name.partition("/")[0] != KEPT}
+        content["consolidated_metadata"]["metadata"] = of_run | kept
         durable.write_whole(self.path / ROOT, json.dumps(content, indent=2).encode())
         self.attributes |= said
 
 
 def below(path: Path) -> dict[str, Any]:
-    """Metadata of a group and its arrays, as that of the group it lies in has them; none of one that is not there."""
+    """Read the metadata of a group and its arrays, in the form that the enclosing group holds them.
+
+    Args:
+        path: Folder of the group.
+
+    Returns:
+        Metadata by name; empty if there is no such group.
+    """
     if not path.exists():
         return {}
-    own = safe_files.read_json(path.parent, f"{path.name}/{ROOT}")
-    arrays = own["consolidated_metadata"]["metadata"]
-    own["consolidated_metadata"] = {**own["consolidated_metadata"], "metadata": {}}
-    return {path.name: own} | {f"{path.name}/{name}": one for name, one in arrays.items()}
+    root = safe_files.read_json(path.parent, f"{path.name}/{ROOT}")
+    arrays = root["consolidated_metadata"]["metadata"]
+    root["consolidated_metadata"] = {**root["consolidated_metadata"], "metadata": {}}
+    return {path.name: root} | {f"{path.name}/{name}": metadata for name, metadata in arrays.items()}
 
 
 def checksum_of(texts: Sequence[str]) -> int:
-    """Of several texts."""
+    """Compute one checksum of several texts.
+
+    Args:
+        texts: The texts, in order.
+
+    Returns:
+        CRC-32C of the texts joined by zero bytes.
+    """
     return durable.checksum("\0".join(texts).encode())
 
 
 def check_names(found: Sequence[Column]) -> None:
-    """Each array's name becomes that of a folder. Raises SceneError."""
+    """Check that each array's name can be that of a folder.
+
+    Args:
+        found: The arrays.
+
+    Raises:
+        SceneError: If a name cannot; the message names every fault.
+    """
     faults = Faults("store.")
-    for name in (one.name for one in found if not store_check.is_name(one.name)):
+    for name in (column.name for column in found if not store_check.is_name(column.name)):
         remedy = 'give the term or event another name, without / \\ : * ? " < > | and of 200 bytes at most'
         faults.add("fields", name, "cannot be the name of a folder", remedy)
     faults.raise_if_any()
@@ -224,9 +293,17 @@ def check_names(found: Sequence[Column]) -> None:
 
 @contextlib.contextmanager
 def held(path: Path) -> Iterator[None]:
-    """Keep other runs out of a store that is there or will be, from before the look at it; mend what a killed one left.
+    """Hold the lock of a store, which need not exist yet, and clean up what a killed run left.
 
-    Raises SceneError naming the run that is at work in it, OSError.
+    Args:
+        path: Folder of the store.
+
+    Yields:
+        Nothing; the lock is held in this context.
+
+    Raises:
+        SceneError: If another run works in it; the message names that run.
+        OSError: If the disk cannot be written.
     """
     with write_lock(path):
         place = Path(os.path.realpath(path))
@@ -238,7 +315,14 @@ def held(path: Path) -> Iterator[None]:
 
 
 def foreign(path: Path) -> str | None:
-    """What no run has written of a folder, or why it is none of a run; None where all of it is a run's."""
+    """Find what no run wrote in a folder.
+
+    Args:
+        path: The folder.
+
+    Returns:
+        A text on the first such file, or on why the folder is none of a run; None if it holds a run alone.
+    """
     if path.is_symlink() or not path.is_dir():
         return "is no folder of a run"
     names = []
@@ -247,12 +331,23 @@ def foreign(path: Path) -> str | None:
         if not folder and not (entry.is_file(follow_symlinks=False) and store_check.is_file_of_store(name)):
             return f"holds {name}, which no run wrote"
         names += [] if folder else [name]
-    if names and not {ROOT, CREATED} & set(names) and not any(scratch.is_unfinished(one) for one in names):
+    if (
+        names
+        and not {ROOT, CREATED} & set(names)
+        and not any(scratch.is_unfinished(folder_name) for folder_name in names)
+    ):
         return f"holds {names[0]}, and nothing that says that it is a run"
     return None
 
 
 def refuse_foreign(path: Path) -> None:
-    """Raise SceneError where a folder that is to be replaced holds what no run wrote."""
-    if os.path.lexists(path) and (what := foreign(Path(os.path.realpath(path)))):
-        raise SceneError([f"{path}: {what}; it is not overwritten: move it away, or give another folder"])
+    """Check that a folder that is to be replaced holds only what a run wrote.
+
+    Args:
+        path: The folder, which need not exist.
+
+    Raises:
+        SceneError: If it holds something else.
+    """
+    if os.path.lexists(path) and (fault := foreign(Path(os.path.realpath(path)))):
+        raise SceneError([f"{path}: {fault}; it is not overwritten: move it away, or give another folder"])

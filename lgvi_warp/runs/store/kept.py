@@ -1,9 +1,9 @@
-"""Members whose samples are wanted after all: run again when the run has ended, into the group `kept` of its store.
+"""Members that are run again for their samples when a run has ended, into the group `kept` of its store.
 
-    run.zarr/kept/member/c.0      which members of the run they are
+    run.zarr/kept/member/c.0      indices of these members in the run
     run.zarr/kept/position/...    chunks, markers and checksums like those of the run itself
 
-The group is written by what writes a run: in blocks, each marked when all of it is safe.
+The group is written like a run: in blocks, each marked when all of it is safe.
 """
 
 from __future__ import annotations
@@ -38,9 +38,11 @@ CHOSEN = {
 
 @dataclass(frozen=True)
 class KeptStore(Store):
-    """The group of a store for kept members.
+    """The group of a store that holds the samples of kept members.
 
-    members: (m,) indices of those that it holds; chosen: (m,), which are kept, where others must run beside them.
+    Attributes:
+        members: Indices of the members that it holds, shape (m,).
+        chosen: Which of them are kept, shape (m,); the others share a packet with a kept one, so they run too.
     """
 
     members: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64), compare=False)
@@ -48,22 +50,27 @@ class KeptStore(Store):
 
     @property
     def along(self) -> str:
-        """Its own: xarray wants a group's dimensions as long as those of the group it lies in."""
+        """Name of its own dimension of members: a dimension shared with the run's group would have to be as long as there."""
         return KEPT_MEMBER
 
     @property
     def whole(self) -> Path:
-        """The run that it is a group of."""
+        """Folder of the run that it is a group of."""
         return self.folder.parent
 
     def write_given(self, group: Any, plan: Plan) -> None:
-        """Which members they are; what they were given as arrays is in the run's own group."""
+        """Write which members the group holds; what they were given as arrays is in the run's own group.
+
+        Args:
+            group: zarr group of the store.
+            plan: Plan of the run of these members.
+        """
         whole_array(group, KEPT_MEMBER, self.members, (KEPT_MEMBER,), MEMBERS)
         if not self.chosen.all():
             whole_array(group, "chosen", self.chosen.astype(np.uint8), (KEPT_MEMBER,), CHOSEN)
 
     def is_there(self) -> bool:
-        """Whether the folder holds the group, of these members; one that cannot be read does not."""
+        """Tell whether the folder holds a readable group of exactly these members."""
         try:
             return np.array_equal(Folder(self.folder, self.whole).group()[KEPT_MEMBER][:], self.members)
         except (SceneError, OSError, ValueError, KeyError):
@@ -72,7 +79,12 @@ class KeptStore(Store):
 
 @dataclass(frozen=True)
 class KeptRun:
-    """What a stored run does before it is complete: it runs again the members that are kept; fields: of their samples."""
+    """Last stage of a stored run: runs the members selected by `keep` again, this time storing their samples.
+
+    Attributes:
+        observed: What the run keeps.
+        fields: Names of the fields whose samples are kept.
+    """
 
     observed: Observation
     fields: tuple[str, ...]
@@ -80,7 +92,21 @@ class KeptRun:
     def __call__(
         self, run: Stored, members: int, executor: Executor, progress: Callable[[float], None] | None = None
     ) -> int:
-        """Write what is missing or damaged of those among the first `members`. Returns blocks run. Raises as the run does."""
+        """Run the blocks that are missing or damaged.
+
+        Args:
+            run: The stored run.
+            members: The run's number of members.
+            executor: What runs the blocks.
+            progress: Called with the fraction of the work that is done, in [0, 1].
+
+        Returns:
+            Number of blocks run.
+
+        Raises:
+            SceneError: As the run does.
+            OSError: As the run does.
+        """
         store, path = run.store, run.store.folder / KEPT
         wanted = members_kept(self.observed.keep, Folder(store.folder), members)
         group = group_of(store, run.plan, wanted)
@@ -91,25 +117,43 @@ class KeptRun:
         if not len(wanted):
             return 0
         plan = run.plan.part(group.members.tolist(), self.fields)
-        told = {key: value for key, value in run.provenance.items() if key != "observed"}
-        again = Stored(plan, group, told | {"kernel": plan.kernel_hash}, run.messages)
+        content = {key: value for key, value in run.provenance.items() if key != "observed"}
+        again = Stored(plan, group, content | {"kernel": plan.kernel_hash}, run.messages)
         return again.run(executor, progress and _after(progress, members, len(group.members))).ran
 
 
 def group_of(store: Store, plan: Plan, wanted: np.ndarray) -> KeptStore:
-    """The group of a store for these members of its run; resumed where it is there."""
+    """Build the group of a store for kept members.
+
+    Args:
+        store: Store of the run.
+        plan: Plan of the run.
+        wanted: Indices of the kept members, shape (m,).
+
+    Returns:
+        The group, to be resumed if it exists.
+    """
     beside = plan.with_neighbours(wanted)
     chosen = np.isin(beside, wanted)
     return KeptStore(store.folder / KEPT, store.dtype, None, "resume", store.force, store.chunk_bytes, beside, chosen)
 
 
 def _after(progress: Callable[[float], None], before: int, more: int) -> Callable[[float], None]:
-    """Progress of the whole from that of `more` members after those before."""
-    return lambda part: progress((before + part * more) / (before + more))
+    """Progress of the whole, from that of `more` members which follow `before` others."""
+    return lambda fraction: progress((before + fraction * more) / (before + more))
 
 
 def members_kept(keep: Any, folder: Folder, members: int | None = None) -> np.ndarray:
-    """(m,), indices of the members, of the first so many, whose samples are kept after all. keep: as of solve."""
+    """Find the members whose samples are kept, where those of all members are not.
+
+    Args:
+        keep: As for solve.
+        folder: Store of the run.
+        members: Number of members to look at, from the first; default all.
+
+    Returns:
+        Indices of the members, shape (m,).
+    """
     if isinstance(keep, str) and keep in ("all", "none"):
         return np.empty(0, np.int64)
     status = folder.group()["status"][: folder.members if members is None else members]
@@ -117,5 +161,12 @@ def members_kept(keep: Any, folder: Folder, members: int | None = None) -> np.nd
 
 
 def keep_of(provenance: Mapping[str, Any]) -> Any:
-    """Which samples a run keeps, as its provenance tells."""
+    """Read from provenance which samples a run keeps.
+
+    Args:
+        provenance: Provenance of the run.
+
+    Returns:
+        The `keep` of solve.
+    """
     return provenance.get("observed", {}).get("keep", "all")

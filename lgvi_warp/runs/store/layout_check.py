@@ -1,7 +1,7 @@
-"""What a store says of its arrays and files, checked against what this package writes: names, types, shapes, sizes.
+"""Check of what a store says of its arrays and files against what this package writes: names, types, shapes, sizes.
 
-Nothing that a store says is joined to a path, opened or read before it has been found here. zarr gets metadata that is
-written anew from what was found, so that no other codec, data type or kind of chunk is ever looked for.
+Nothing that a store says is joined to a path, opened or read before this check. zarr gets metadata that is written anew
+from what was checked, so that it never looks for another codec, data type or kind of chunk.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from lgvi_warp.engine.block import SHAPES, block_size
 from lgvi_warp.runs import member_fields
 from lgvi_warp.runs.store.layout import KEPT_MEMBER, MEMBER, Column
 
-# Types of arrays: zarr's names, NumPy's.
+# Types of arrays: NumPy's type strings by zarr's names.
 TYPES = {"float64": "<f8", "float32": "<f4", "int64": "<i8", "uint16": "<u2", "uint8": "|u1"}
 CODECS = ("bytes", "crc32c")
 ARRAY_KEYS = {
@@ -31,15 +31,15 @@ ARRAY_KEYS = {
     "zarr_format", "node_type", "storage_transformers",
 }  # fmt: skip
 GROUP_KEYS = {"attributes", "zarr_format", "node_type", "consolidated_metadata"}
-# Of a chunk, as a file.
+# Size of the file of a chunk [bytes].
 MOST_CHUNK_BYTES = 1_000_000_000
 MOST_DIMENSIONS, MOST_NAME = 8, 200
-# Of an array, along the time.
+# Chunks of an array along the times.
 MOST_CHUNKS = 1_000_000
 KEPT = "kept"
-# What a file system somewhere takes for a path, a drive or a pattern, and what would write on a terminal.
+# Characters that some file system takes for a path, a drive or a pattern, and those that control a terminal.
 UNFIT = re.compile(r"""[/\\:*?"<>|]|[^ -~\w]|^[. ]|[. ]$""")
-REQUIRED = (MEMBER, *(one.name for one in member_fields.FIELDS if not one.name.startswith("steps_")))
+REQUIRED = (MEMBER, *(field.name for field in member_fields.FIELDS if not field.name.startswith("steps_")))
 FILE = re.compile(
     r"(?:kept(?:\.[^/]+)?/)?(?:zarr\.json|created\.json|blocks/\d{9,12}\.json|parts/\d{9,12}\.npy"
     r"|(?:explicit/)?(?:[^/]+/)?(?:zarr\.json|c(?:\.\d{1,12})*))"
@@ -47,16 +47,30 @@ FILE = re.compile(
 
 
 class NotOursError(ValueError):
-    """A store says what this package does not write; the text says what."""
+    """Raised when a store says what this package does not write; the text says what."""
 
 
 def is_name(name: Any) -> bool:
-    """Whether a folder of a store may be called so on every system: printed letters, no path, no drive, no wild card."""
+    """Tell whether a name is safe for a folder on every system.
+
+    Args:
+        name: The name, of any type.
+
+    Returns:
+        True for a printable text that is not too long and no path, drive or wild card.
+    """
     return isinstance(name, str) and 0 < len(name.encode(errors="replace")) <= MOST_NAME and not UNFIT.search(name)
 
 
 def is_file_of_store(name: str) -> bool:
-    """Whether a run, or a writer of one that was killed, may have left a file called so below its folder."""
+    """Tell whether a run, or a killed writer of one, may have left a file of this name.
+
+    Args:
+        name: Path of the file below the store's root.
+
+    Returns:
+        True if it may.
+    """
     folder, _, last = name.rpartition("/")
     if scratch.is_unfinished(last):
         return any(bool(FILE.fullmatch(f"{folder}/{last[:place]}".lstrip("/"))) for place in _dots(last))
@@ -69,7 +83,15 @@ def _dots(text: str) -> list[int]:
 
 @dataclass(frozen=True)
 class StoredArray:
-    """An array of a store as its metadata tells, after the check: shape of the array and of its chunks, NumPy's type."""
+    """An array of a store, as its checked metadata describes it.
+
+    Attributes:
+        shape: Shape of the array.
+        chunk: Shape of a chunk.
+        dtype: NumPy's type string.
+        dims: Names of the dimensions.
+        attributes: Its attributes.
+    """
 
     shape: tuple[int, ...]
     chunk: tuple[int, ...]
@@ -79,16 +101,16 @@ class StoredArray:
 
     @property
     def bytes(self) -> int:
-        """Of a chunk's file: its numbers and their checksum."""
+        """Size of a chunk's file [bytes]: its numbers and their checksum."""
         return math.prod(self.chunk) * np.dtype(self.dtype).itemsize + 4
 
     @property
     def whole(self) -> bool:
-        """Whether it has one chunk."""
+        """Whether the array has exactly one chunk."""
         return self.chunk == self.shape
 
     def metadata(self) -> dict[str, Any]:
-        """As zarr writes it, of this package's own codecs."""
+        """Return its metadata as zarr writes them, with this package's own codecs."""
         (kind,) = (name for name, dtype in TYPES.items() if dtype == self.dtype)
         real = self.dtype[1] == "f"
         numbers = {"name": "bytes"} | ({} if self.dtype == "|u1" else {"configuration": {"endian": "little"}})
@@ -109,7 +131,14 @@ class StoredArray:
 
 @dataclass(frozen=True)
 class Layout:
-    """The arrays of a store: those of its run, by name, and the names of its groups; columns: those written by blocks."""
+    """The arrays of a store.
+
+    Attributes:
+        arrays: Arrays of the run by name, without those of its kept members.
+        groups: Names of its groups.
+        columns: Those of the arrays that are written block by block.
+        times: Number of sample times.
+    """
 
     arrays: dict[str, StoredArray]
     groups: tuple[str, ...]
@@ -117,48 +146,77 @@ class Layout:
     times: int
 
     def frame(self) -> dict[str, int | None]:
-        """Files that belong to no block, below the root, and their sizes where these are known."""
+        """List the files that belong to no block.
+
+        Returns:
+            Sizes [bytes] by path below the root; None where the size is not known.
+        """
         files: dict[str, int | None] = {f"{name}/zarr.json": None for name in (*self.arrays, *self.groups)}
-        own = {one.name for one in self.columns}
+        block_names = {column.name for column in self.columns}
         for name, array in self.arrays.items():
-            if name not in own:
+            if name not in block_names:
                 files[f"{name}/c{'.0' * len(array.shape)}"] = array.bytes
         return files
 
     def chunk_bytes(self, key: str) -> int | None:
-        """The size of a chunk's file; None where the layout has no such file."""
+        """Look up the size of a chunk's file.
+
+        Args:
+            key: Path of the file below the root.
+
+        Returns:
+            Size [bytes]; None if the layout has no such file.
+        """
         name, _, last = key.rpartition("/")
         array = self.arrays.get(name)
         if array is None or not re.fullmatch(r"c(\.\d{1,12})*", last):
             return None
-        places = [int(one) for one in last.split(".")[1:]]
+        places = [int(index) for index in last.split(".")[1:]]
         counts = [-(-size // chunk) for size, chunk in zip(array.shape, array.chunk, strict=True)]
         inside = len(places) == len(counts) and all(p < c for p, c in zip(places, counts, strict=True))
         return array.bytes if inside else None
 
     def root(self, attributes: Mapping[str, Any]) -> bytes:
-        """The root's metadata for zarr, with that of all arrays in it."""
+        """Write the root's metadata for zarr, with those of all arrays in it.
+
+        Args:
+            attributes: Attributes of the group.
+
+        Returns:
+            The metadata as JSON.
+        """
         group = {"attributes": {}, "zarr_format": 3, "node_type": "group"}
         empty = {"kind": "inline", "must_understand": False, "metadata": {}}
         inner = {name: group | {"consolidated_metadata": empty} for name in self.groups}
         inner |= {name: array.metadata() for name, array in self.arrays.items()}
-        whole = {"kind": "inline", "must_understand": False, "metadata": inner}
-        return json.dumps(group | {"attributes": dict(attributes), "consolidated_metadata": whole}).encode()
+        consolidated = {"kind": "inline", "must_understand": False, "metadata": inner}
+        return json.dumps(group | {"attributes": dict(attributes), "consolidated_metadata": consolidated}).encode()
 
 
 def layout_of(content: Mapping[str, Any], members: int) -> Layout:
-    """The layout that the root's metadata tells, of a run of so many members. Raises NotOursError."""
+    """Read and check the layout in a root's metadata.
+
+    Args:
+        content: The root's metadata.
+        members: Number of members of the run.
+
+    Returns:
+        The layout.
+
+    Raises:
+        NotOursError: If this package writes no such metadata.
+    """
     inner = _table(_table(content, "zarr.json").get("consolidated_metadata"), "consolidated_metadata").get("metadata")
     arrays, groups = dict[str, StoredArray](), list[str]()
-    for name, one in _table(inner, "metadata").items():
+    for name, metadata in _table(inner, "metadata").items():
         if name.partition("/")[0] == KEPT:
             continue  # a group with metadata of its own, which is looked at when it is opened
         if not all(is_name(part) for part in name.split("/")) or name.count("/") > 1:
             raise NotOursError(f"{name!r} is no name of an array")
-        if _table(one, name).get("node_type") == "group":
+        if _table(metadata, name).get("node_type") == "group":
             groups.append(name)
         else:
-            arrays[name] = _array(name, one)
+            arrays[name] = _array(name, metadata)
     if any(name != "explicit" for name in groups) or any(
         "/" in name and not (name.startswith("explicit/") and "explicit" in groups) for name in arrays
     ):
@@ -173,7 +231,7 @@ def _table(value: Any, name: str) -> dict[str, Any]:
 
 
 def _array(name: str, one: dict[str, Any]) -> StoredArray:
-    """An array whose metadata is the same as this package would write. Raises NotOursError."""
+    """An array whose metadata is exactly what this package would write. Raises NotOursError."""
     shape, dims = one.get("shape"), one.get("dimension_names")
     grid = _table(one.get("chunk_grid"), f"chunk_grid of {name}").get("configuration")
     chunk = _table(grid, f"chunk_grid of {name}").get("chunk_shape")
@@ -188,14 +246,14 @@ def _array(name: str, one: dict[str, Any]) -> StoredArray:
         raise NotOursError(f"{name} has the shape {_short(shape)} and chunks {_short(chunk)}")
     attributes = _table(one.get("attributes"), f"attributes of {name}")
     _plain(attributes, f"attributes of {name}")
-    found = StoredArray(tuple(shape), tuple(chunk), dtype, tuple(dims), attributes)
-    if found.bytes > MOST_CHUNK_BYTES:
-        raise NotOursError(f"{name} has chunks of {found.bytes:,} bytes")
-    wanted = found.metadata()
+    described = StoredArray(tuple(shape), tuple(chunk), dtype, tuple(dims), attributes)
+    if described.bytes > MOST_CHUNK_BYTES:
+        raise NotOursError(f"{name} has chunks of {described.bytes:,} bytes")
+    wanted = described.metadata()
     for key in sorted(ARRAY_KEYS | one.keys()):
         if one.get(key) != wanted.get(key):
             raise NotOursError(f"{key} of {name} is {_short(one.get(key))}, not {_short(wanted.get(key))}")
-    return found
+    return described
 
 
 def _short(value: Any) -> str:
@@ -204,20 +262,27 @@ def _short(value: Any) -> str:
 
 
 def _plain(attributes: Mapping[str, Any], name: str) -> None:
-    """Attributes of an array are texts, numbers and lists of them. Raises NotOursError."""
+    """Check that attributes of an array are texts, numbers and lists of them. Raises NotOursError."""
     for key, value in attributes.items():
         single = value if isinstance(value, list) else [value]
-        if not is_text(key) or not all(is_text(one) or type(one) in (int, float) for one in single):
+        if not is_text(key) or not all(is_text(item) or type(item) in (int, float) for item in single):
             raise NotOursError(f"{name}: {_short(key)} is {_short(value)}")
 
 
 def is_text(value: Any) -> bool:
-    """Whether it is a text without what would write on a terminal but letters."""
+    """Tell whether a value is a text that cannot control a terminal.
+
+    Args:
+        value: The value, of any type.
+
+    Returns:
+        True for a text of printable characters and line breaks.
+    """
     return isinstance(value, str) and (value.isprintable() or value.replace("\n", " ").isprintable())
 
 
 def _checked(arrays: dict[str, StoredArray], groups: tuple[str, ...], members: int) -> Layout:
-    """Arrays that fit each other and the run. Raises NotOursError."""
+    """The layout of arrays, which must fit each other and the run. Raises NotOursError."""
     missing = [name for name in ("time", "step", *REQUIRED) if name not in arrays]
     if missing:
         raise NotOursError(f"it has no {', '.join(missing)}")
@@ -229,7 +294,7 @@ def _checked(arrays: dict[str, StoredArray], groups: tuple[str, ...], members: i
         KEPT_MEMBER: ("<i8", (members,)),
         "chosen": ("|u1", (members,)),
     }
-    of_members = {one.name: one.dtype for one in member_fields.FIELDS} | {MEMBER: "<i8"}
+    of_members = {member_field.name: member_field.dtype for member_field in member_fields.FIELDS} | {MEMBER: "<i8"}
     columns = []
     for name, array in arrays.items():
         timed = name in SHAPES
@@ -254,19 +319,36 @@ def _checked(arrays: dict[str, StoredArray], groups: tuple[str, ...], members: i
 
 @contextlib.contextmanager
 def understood(path: Path) -> Iterator[None]:
-    """What is no error of its own while a file is read is one of the file. Raises SceneError."""
+    """Turn errors that arise while a file is read into faults of the file.
+
+    Args:
+        path: The file, which the message names.
+
+    Yields:
+        Nothing; the file is read in this context.
+
+    Raises:
+        SceneError: In place of any error that the content of the file causes.
+    """
     try:
         yield
     except SceneError:
         raise
     except (ValueError, KeyError, TypeError, AttributeError, IndexError, ArithmeticError, RecursionError) as error:
         text = " ".join(str(error).split())[:200] or type(error).__name__
-        what = text if isinstance(error, NotOursError) else f"cannot be used ({type(error).__name__}: {text})"
+        reason = text if isinstance(error, NotOursError) else f"cannot be used ({type(error).__name__}: {text})"
         raise SceneError(
-            [f"{path}: is not what lgvi-warp writes: {what}; ask for the run anew, or run it again"]
+            [f"{path}: is not what lgvi-warp writes: {reason}; ask for the run anew, or run it again"]
         ) from error
 
 
 def is_sum(value: Any) -> bool:
-    """Whether it is a size and a checksum."""
-    return isinstance(value, list) and len(value) == 2 and all(type(one) is int and one >= 0 for one in value)
+    """Tell whether a value is a list of a size and a checksum.
+
+    Args:
+        value: The value, of any type.
+
+    Returns:
+        True for a list of two integers that are not negative.
+    """
+    return isinstance(value, list) and len(value) == 2 and all(type(number) is int and number >= 0 for number in value)

@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""`merge`: one store from the parts of a run that were computed separately."""
 
 from __future__ import annotations
 
@@ -22,19 +22,33 @@ from lgvi_warp.runs.store.sink import marker
 
 
 def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], overwrite: bool = False) -> Folder:
-    """Put the blocks of several stores of one run (`run --blocks`) into a new one. Returns it, complete or not.
+    """Merge stores that hold blocks of one run (`run --blocks`) into a new store.
 
-    Every file is compared with its checksum on the way. Members that the run keeps (keep="failed" or indices) are run
-    again here when all blocks are there, as `resume` does; a run that only its own ensemble can resume is not complete
-    before that. Raises SceneError where they are not of one run, OSError.
+    Every file is compared with its checksum on the way. Members that the run keeps (keep="failed" or indices) are run again
+    here, as `resume` does, once all blocks are there. A run that only its own ensemble can resume is not complete before
+    that.
+
+    Args:
+        paths: Stores, or folders with one store each.
+        out: The new store, or the folder for it.
+        overwrite: Whether to replace a run that is there; default False.
+
+    Returns:
+        The new store, complete or not.
+
+    Raises:
+        SceneError: If the stores are not of one run, or damaged.
+        OSError: If the disk cannot be written.
     """
     parts = [Folder(folder_of(path)) for path in paths]
     first = parts[0]
-    for other in parts[1:]:
-        found = same_run(other.provenance, first.provenance, str(other.path), str(first.path))
-        if found or other.recipe != first.recipe:
-            found = found or ["another recipe"]
-            raise SceneError(f"{text}: these are parts of different runs; merge parts of one run" for text in found)
+    for further in parts[1:]:
+        mismatches = same_run(further.provenance, first.provenance, str(further.path), str(first.path))
+        if mismatches or further.recipe != first.recipe:
+            mismatches = mismatches or ["another recipe"]
+            raise SceneError(
+                f"{text}: these are parts of different runs; merge parts of one run" for text in mismatches
+            )
     target = Path(out)
     target = target if target.suffix == ".zarr" else target / first.path.name
     try:
@@ -46,24 +60,24 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
     except OSError as error:
         raise explained(error, target) from error
     if again:
-        # Another machine, or laws of a user's own: then it waits for lw.resume.
+        # On another machine, or with a user's own distributions, this is refused: the run then waits for lw.resume.
         with contextlib.suppress(SceneError, MembersFailed):
             resume(target)
     return Folder(target)
 
 
 def _undamaged(parts: Sequence[Folder]) -> Folder:
-    """The first of them that is whole but for its blocks. Raises SceneError where none is."""
+    """The first of the stores whose files outside the blocks are whole. Raises SceneError if there is none."""
     damage = []
     for part in parts:
-        if not (found := part.damage()):
+        if not (faults := part.damage()):
             return part
-        damage += [f"{part.path}: {text}; `lgvi-warp resume {part.path}` first" for text in found]
+        damage += [f"{part.path}: {text}; `lgvi-warp resume {part.path}` first" for text in faults]
     raise SceneError(damage)
 
 
 def _copy_frame(part: Folder, target: Path) -> None:
-    """All of a store that belongs to no block: what was made with it. Raises SceneError, OSError."""
+    """Copy all files of a store that belong to no block. Raises SceneError, OSError."""
     files = durable.Files(target)
     for name in ("blocks", "parts"):
         (target / name).mkdir(parents=True)
@@ -74,7 +88,7 @@ def _copy_frame(part: Folder, target: Path) -> None:
 
 
 def _copy_block(parts: Sequence[Folder], block: Block, target: Path, commits: Commits) -> None:
-    """A block from the first of the stores that has it whole. Raises SceneError where each has it damaged."""
+    """Copy a block from the first store that has it whole. Raises SceneError if it is damaged in each that has it."""
     damage = []
     for part in parts:
         sink = part.sink
@@ -102,19 +116,19 @@ def _copy_block(parts: Sequence[Folder], block: Block, target: Path, commits: Co
 
 
 def _put_together(parts: Sequence[Folder], target: Path) -> bool:
-    """Copy frame and blocks into a new store in the place of the target. Whether members are to be run again for it."""
+    """Copy frame and blocks into a new store at the target; return whether members are to be run again for it."""
     beside = scratch.beside(target, scratch.NEW)
     try:
         _copy_frame(_undamaged(parts), beside)
-        made = Folder(beside)
-        made.reopen()
+        merged = Folder(beside)
+        merged.reopen()
         with Commits() as commits:
             for block in parts[0].runs:
                 _copy_block(parts, block, beside, commits)
-        whole = not made.unfinished()
-        again = whole and len(members_kept(keep_of(made.provenance), made)) > 0
-        if whole and not again:
-            made.finish()
+        all_there = not merged.unfinished()
+        again = all_there and len(members_kept(keep_of(merged.provenance), merged)) > 0
+        if all_there and not again:
+            merged.finish()
         durable.put_folder(beside, target)
     finally:
         scratch.remove_folder(beside)

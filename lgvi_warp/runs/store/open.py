@@ -1,4 +1,4 @@
-"""Runs that lie in a store, read when they are asked for."""
+"""Results that read from a store: opening a run, its statistics and its kept members."""
 
 from __future__ import annotations
 
@@ -30,7 +30,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Arrays(Mapping[str, np.ndarray]):
-    """Arrays of a store by name, read anew each time; `whole` ones are in memory. members: which to read, along `axis`."""
+    """Arrays of a store by name, read from disk at each access.
+
+    Attributes:
+        group: zarr group of the store.
+        names: Names of the arrays.
+        axis: Axis of the members.
+        members: Slice or indices of the members to read; None: all.
+        whole: Further arrays by name, which are in memory.
+    """
 
     group: Any
     names: tuple[str, ...]
@@ -49,7 +57,14 @@ class Arrays(Mapping[str, np.ndarray]):
         return np.asarray(array[at] if isinstance(chosen, slice) else array.oindex[at])
 
     def dataset(self, path: Path) -> xarray.Dataset:
-        """All of the store as xarray sees it."""
+        """Open the whole store as an xarray Dataset.
+
+        Args:
+            path: The store.
+
+        Returns:
+            The dataset; see the function `dataset`.
+        """
         return dataset(path)
 
     def __contains__(self, name: object) -> bool:
@@ -63,23 +78,33 @@ class Arrays(Mapping[str, np.ndarray]):
 
 
 def folder_of(path: str | os.PathLike[str]) -> Path:
-    """The store that a path is, or the one .zarr in it. Raises SceneError."""
-    given = Path(path)
-    if given.suffix == ".zarr":
-        return given
-    found = sorted(given.glob("*.zarr")) if given.is_dir() else []
-    if len(found) == 1 and found[0].is_symlink():
-        # A folder from elsewhere would lead to any run of the user's.
-        raise SceneError([f"{found[0]}: is a link; name the store that it leads to: {found[0].resolve()}"])
-    if len(found) == 1:
-        return found[0]
-    what = "is not there" if not given.exists() else "is a file" if given.is_file() else "holds no store"
-    if found:
-        what = f"holds {len(found)} stores"
+    """Find the store at a path: the path itself if it ends in .zarr, else the one .zarr in that folder.
+
+    Args:
+        path: A store, or a folder with one store.
+
+    Returns:
+        Path of the store, which need not exist if the name ends in .zarr.
+
+    Raises:
+        SceneError: If the folder holds no store, several, or a link to one.
+    """
+    location = Path(path)
+    if location.suffix == ".zarr":
+        return location
+    stores = sorted(location.glob("*.zarr")) if location.is_dir() else []
+    if len(stores) == 1 and stores[0].is_symlink():
+        # A folder from elsewhere could otherwise lead to any run of the user.
+        raise SceneError([f"{stores[0]}: is a link; name the store that it leads to: {stores[0].resolve()}"])
+    if len(stores) == 1:
+        return stores[0]
+    fault = "is not there" if not location.exists() else "is a file" if location.is_file() else "holds no store"
+    if stores:
+        fault = f"holds {len(stores)} stores"
     remedy = (
-        f"name one: {', '.join(map(str, found[:5]))}" if found else "give the folder of a run made with --store zarr"
+        f"name one: {', '.join(map(str, stores[:5]))}" if stores else "give the folder of a run made with --store zarr"
     )
-    raise SceneError([f"{given}: {what}; {remedy}"])
+    raise SceneError([f"{location}: {fault}; {remedy}"])
 
 
 def open_run(
@@ -88,33 +113,57 @@ def open_run(
     incomplete: bool = False,
     statistics: Sequence[Any] | None = None,
 ) -> Result:
-    """A run in a store, or in a folder with one store: a Result whose samples and parameters are read when asked for.
+    """Open a run in a store as a Result that reads samples and parameters when they are used.
 
-    members: only these, (m,) indices or a slice. `result.dataset` is a view of all of it by xarray, read piece by piece.
-    incomplete: also a run that has not ended; what its blocks have not reached reads as NaN and status 0.
-    result.statistics and result.kept are those of a complete run's members, all of them; statistics: the run's own, needed
-    for those of functions, which a store does not hold. Raises SceneError where there is no run, or it is not complete,
-    IndexError for members that it has not.
+    `result.dataset` is a view of the whole run by xarray, read piece by piece. `result.statistics` and `result.kept` are
+    those of all members of a complete run; opened with `members`, a result has neither.
+
+    Args:
+        path: A store, or a folder with one store.
+        members: Indices or a slice of the members to open; default all.
+        incomplete: Whether to open a run that has not ended as well; members that were not reached read as NaN and status 0.
+        statistics: The statistics that the run was given. Needed if they are of functions, which a store does not hold.
+
+    Returns:
+        The result.
+
+    Raises:
+        SceneError: If there is no run, or it is not complete.
+        IndexError: If there are no such members.
     """
     folder = Folder(folder_of(path))
     messages = folder.messages
     if not folder.complete:
-        left = len(folder.unfinished())
-        missing = f"{left} blocks are missing" if left else "the members that it keeps have not been run again yet"
+        unfinished_blocks = len(folder.unfinished())
+        missing = (
+            f"{unfinished_blocks} blocks are missing"
+            if unfinished_blocks
+            else "the members that it keeps have not been run again yet"
+        )
         text = f"{folder.path}: is not complete: {missing}"
         if not incomplete:
             raise SceneError([f"{text}; go on with `lgvi-warp resume {folder.path.parent}`, or give incomplete=True"])
         return result_of(folder, members, (*messages, text))
-    told = folder.provenance.get("observed")
-    if members is not None or told is None or (statistics is None and told.get("functions")):
+    observed_content = folder.provenance.get("observed")
+    if members is not None or observed_content is None or (statistics is None and observed_content.get("functions")):
         return result_of(folder, members, messages)
     with understood(folder.path / ROOT):
-        observed = observation_of(told, statistics)
+        observed = observation_of(observed_content, statistics)
     return result_of(folder, None, messages, observing=gathered(folder, observed))
 
 
 def times_of(folder: Folder) -> np.ndarray:
-    """(k,) [s], of the samples. Raises SceneError where they are lost."""
+    """Read the times of a run's samples.
+
+    Args:
+        folder: The store.
+
+    Returns:
+        Times [s], shape (k,).
+
+    Raises:
+        SceneError: If they are lost.
+    """
     try:
         time = np.asarray(folder.group()["time"][:])
         if np.isfinite(time).all():
@@ -126,7 +175,18 @@ def times_of(folder: Folder) -> np.ndarray:
 
 
 def gathered(folder: Folder, observed: Observation) -> Observing:
-    """The statistics of a complete run, from the parts of its blocks."""
+    """Read the statistics of a complete run from the parts of its blocks.
+
+    Args:
+        folder: The store.
+        observed: What the run keeps.
+
+    Returns:
+        The keepers of its statistics, with all blocks merged.
+
+    Raises:
+        SceneError: If parts are missing or damaged.
+    """
     replicates = replicates_of(folder.provenance["ensemble"])
     observing = Observing(observed, times_of(folder), int(folder.recipe["members"]), replicates)
     sink = folder.sink
@@ -139,18 +199,18 @@ def gathered(folder: Folder, observed: Observation) -> Observing:
 
 
 def _check_parts(folder: Folder, sums: Mapping[str, Sequence[int]] | None, block: Block) -> None:
-    """A block's parts must be those that were written. Raises SceneError."""
+    """Check that a block's parts are those that were written. Raises SceneError."""
     key = folder.sink.parts_key(block)
     if sums is None:
-        found = [f"blocks/{name_of(block)}.json is missing or damaged"]
+        faults = [f"blocks/{name_of(block)}.json is missing or damaged"]
     elif key not in sums and not folder.recipe["keepers"]:
-        found = []
+        faults = []
     elif key not in sums:
-        found = [f"{key} is not in the marker of its block"]
+        faults = [f"{key} is not in the marker of its block"]
     else:
-        found = [f"{key} {text}" for text in [durable.fault(folder.path, key, *sums[key])] if text]
-    if found:
-        raise SceneError(f"{folder.path}: {text}; `lgvi-warp resume {folder.path}` mends it" for text in found)
+        faults = [f"{key} {text}" for text in [durable.fault(folder.path, key, *sums[key])] if text]
+    if faults:
+        raise SceneError(f"{folder.path}: {text}; `lgvi-warp resume {folder.path}` mends it" for text in faults)
 
 
 def result_of(
@@ -160,10 +220,25 @@ def result_of(
     terms: Sequence[Term] | None = None,
     observing: Observing | None = None,
 ) -> Result:
-    """The Result of a folder; terms: those of the scene, where its file does not tell them; observing: its statistics."""
+    """Build the Result of a store.
+
+    Args:
+        folder: The store.
+        members: Indices or a slice of the members; None: all.
+        messages: Messages of the result.
+        terms: Terms of the scene; default those in its provenance.
+        observing: Keepers of its statistics, with all blocks merged; None: no statistics.
+
+    Returns:
+        A result that reads samples and parameters when they are used.
+
+    Raises:
+        SceneError: If the store is damaged, or too large for the memory.
+        IndexError: If there are no such members.
+    """
     folder.refuse_too_large()
     group, time = folder.group(), times_of(folder)
-    n, whole = folder.members, int(folder.recipe["members"])
+    n, planned = folder.members, int(folder.recipe["members"])
     at = _places(members, n)
     arrays = {name: array for name, array in group.arrays()}
     fields = tuple(name for name in arrays if name in UNITS)
@@ -171,18 +246,18 @@ def result_of(
     small = Arrays(group, tuple(name for name in arrays if name not in (*fields, *varied, "time", "step")), 0, at)
     with understood(folder.path / ROOT):
         shared = {name: np.asarray(value, dtype=np.float64) for name, value in folder.shared.items()}
-    strange = np.setdiff1d(small["status"], np.array([int(one) for one in Status]))
+    strange = np.setdiff1d(small["status"], np.array([int(code) for code in Status]))
     if len(strange):
         raise SceneError([f"{folder.path}: has the status {strange[0]}, which no member ends with; run it again"])
     provenance = dict(folder.provenance)
     for name in ("steps_made", "steps_tried"):
         if name in arrays:
             provenance[name] = float(small[name].mean())
-    if n < whole:
+    if n < planned:
         provenance["members"] = n
-    estimates, said = Estimates(), tuple[str, ...]()
+    estimates, remarks = Estimates(), tuple[str, ...]()
     if observing is not None:
-        estimates, said = observing.read(provenance["ensemble"], small["status"])
+        estimates, remarks = observing.read(provenance["ensemble"], small["status"])
     with understood(folder.path / ROOT):
         of_scene = tuple(from_list(provenance["scene"].get("terms", ())) if terms is None else terms)
     indices, kept = kept_of(folder, of_scene) if members is None else (np.empty(0, np.int64), None)
@@ -191,7 +266,7 @@ def result_of(
         samples=Arrays(group, fields, 1, at),
         **Result.per_member(small),
         parameters=Arrays(group, varied, 0, at, shared),
-        messages=messages + said,
+        messages=messages + remarks,
         provenance=provenance,
         statistics=estimates,
         terms=of_scene,
@@ -202,22 +277,33 @@ def result_of(
 
 
 def kept_of(folder: Folder, terms: Sequence[Term]) -> tuple[np.ndarray, Result | None]:
-    """(indices, samples) of the members that a complete run keeps after all. Raises SceneError where they are lost."""
+    """Read the members that a complete run keeps.
+
+    Args:
+        folder: The store.
+        terms: Terms of the scene.
+
+    Returns:
+        Indices of the members, shape (m,), and their result; None if there are none.
+
+    Raises:
+        SceneError: If they are missing or damaged.
+    """
     wanted = members_kept(keep_of(folder.provenance), folder) if folder.complete else np.empty(0, np.int64)
     if not len(wanted):
         return wanted, None
     group = folder.kept()
     if group is None:
         raise SceneError([f"{folder.path / KEPT}: is missing; `lgvi-warp resume {folder.path}` makes it again"])
-    found = result_of(group, _chosen_places(group.group()), group.messages, terms)
-    ensemble = found.provenance["ensemble"]
-    if found.members != len(wanted):
+    kept = result_of(group, _chosen_places(group.group()), group.messages, terms)
+    ensemble = kept.provenance["ensemble"]
+    if kept.members != len(wanted):
         raise SceneError(
-            [f"{group.path}: holds {found.members} members, not {len(wanted)}; `lgvi-warp resume` mends it"]
+            [f"{group.path}: holds {kept.members} members, not {len(wanted)}; `lgvi-warp resume` mends it"]
         )
     with understood(folder.path / ROOT):
         places = np.asarray(ensemble.get("indices", range(folder.members)))[wanted]
-    return wanted, replace(found, provenance=found.provenance | {"ensemble": ensemble | {"indices": places.tolist()}})
+    return wanted, replace(kept, provenance=kept.provenance | {"ensemble": ensemble | {"indices": places.tolist()}})
 
 
 def _chosen_places(group: Any) -> np.ndarray | None:
@@ -226,34 +312,49 @@ def _chosen_places(group: Any) -> np.ndarray | None:
 
 
 def _places(members: Any, n: int) -> slice | np.ndarray:
-    """Which of n members are meant, all by default. Raises IndexError."""
+    """Slice or indices of the members asked for among n; all by default. Raises IndexError."""
     if members is None or isinstance(members, slice):
         return slice(*(members or slice(None)).indices(n))
-    found = np.asarray(members, dtype=int)
-    if len(found) and (found.min() < 0 or found.max() >= n):
-        raise IndexError(f"members {found.min()} to {found.max()} of {n}")
-    return found
+    indices = np.asarray(members, dtype=int)
+    if len(indices) and (indices.min() < 0 or indices.max() >= n):
+        raise IndexError(f"members {indices.min()} to {indices.max()} of {n}")
+    return indices
 
 
 def chosen(result: Result, members: Sequence[int]) -> Result:
-    """Some members of a run in a store, in memory."""
-    part = result_of(Folder(Path(result.store or "")), members, result.messages, result.terms)
-    return replace(part, samples=dict(part.samples), parameters=dict(part.parameters), store=None)
+    """Read some members of a run in a store into memory.
+
+    Args:
+        result: Result of the run.
+        members: Indices of the members.
+
+    Returns:
+        A result in memory.
+    """
+    selection = result_of(Folder(Path(result.store or "")), members, result.messages, result.terms)
+    return replace(selection, samples=dict(selection.samples), parameters=dict(selection.parameters), store=None)
 
 
 def dataset(path: Path) -> xarray.Dataset:
-    """A store as xarray sees it, in pieces of its chunks if dask is there."""
+    """Open a store as an xarray Dataset, in pieces of its chunks if dask is installed.
+
+    Args:
+        path: The store.
+
+    Returns:
+        The dataset of the members that the run has; for a group of kept members, of these alone.
+    """
     import importlib.util
 
     import xarray
 
     chunks: Any = {} if importlib.util.find_spec("dask") else None
-    whole = xarray.open_dataset(Folder(path).checked(), engine="zarr", chunks=chunks)
-    if KEPT_MEMBER in whole.dims:
-        whole = whole.swap_dims({KEPT_MEMBER: MEMBER})
-    if "chosen" in whole:
-        whole = whole.isel(realization=np.flatnonzero(whole.chosen.values))
-    if "failure_time" in whole:
-        ends = whole.failure_time.fillna(whole.time[-1]).drop_vars("time", errors="ignore")
-        whole = whole.assign(end_time=ends.assign_attrs(END_TIME))
-    return whole.isel(realization=slice(0, whole.attrs["members"])) if "members" in whole.attrs else whole
+    stored = xarray.open_dataset(Folder(path).checked(), engine="zarr", chunks=chunks)
+    if KEPT_MEMBER in stored.dims:
+        stored = stored.swap_dims({KEPT_MEMBER: MEMBER})
+    if "chosen" in stored:
+        stored = stored.isel(realization=np.flatnonzero(stored.chosen.values))
+    if "failure_time" in stored:
+        ends = stored.failure_time.fillna(stored.time[-1]).drop_vars("time", errors="ignore")
+        stored = stored.assign(end_time=ends.assign_attrs(END_TIME))
+    return stored.isel(realization=slice(0, stored.attrs["members"])) if "members" in stored.attrs else stored

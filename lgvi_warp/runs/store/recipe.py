@@ -1,4 +1,4 @@
-"""A plan as plain numbers and texts, and back: what a store keeps so that a run can go on elsewhere and later."""
+"""Recipes: a plan as plain numbers and texts, and back, so that a stored run can go on elsewhere and later."""
 
 from __future__ import annotations
 
@@ -24,7 +24,14 @@ if TYPE_CHECKING:
 
 
 def recipe(plan: Plan) -> dict[str, Any]:
-    """Settings of a plan beyond its ensemble and its times: JSON has all of their digits."""
+    """Write a plan's settings without its ensemble and its times.
+
+    Args:
+        plan: Plan of the run.
+
+    Returns:
+        A table that JSON holds with all digits.
+    """
     return {
         "members": plan.ensemble.members,
         "method": dataclasses.asdict(plan.method),
@@ -39,7 +46,20 @@ def recipe(plan: Plan) -> dict[str, Any]:
 
 
 def plan_of(made: Mapping[str, Any], ensemble: Ensemble, sample_steps: np.ndarray, times: np.ndarray) -> Plan:
-    """The plan of a recipe. Raises SceneError."""
+    """Build the plan of a recipe.
+
+    Args:
+        made: The recipe.
+        ensemble: The members.
+        sample_steps: Number of steps made until each sample, shape (k,).
+        times: Times of the samples [s], shape (k,).
+
+    Returns:
+        The plan.
+
+    Raises:
+        SceneError: If the recipe is at fault.
+    """
     from lgvi_warp.engine.plan import Plan
 
     grid = TimeGrid(made["step"], sample_steps, times, tuple(made["messages"]))
@@ -48,32 +68,39 @@ def plan_of(made: Mapping[str, Any], ensemble: Ensemble, sample_steps: np.ndarra
     return Plan(ensemble, method, grid, fields, *settings)
 
 
-# In a store's provenance of an ensemble: the SHA-256 of what was given as arrays, which lies in its group "explicit".
+# Key in the stored provenance of an ensemble: SHA-256 of the arrays that it was given, which lie in the group "explicit".
 ARRAYS = "arrays_sha256"
 
 
 def of_store(provenance: Mapping[str, Any], ensemble: Ensemble) -> dict[str, Any]:
-    """Provenance as a store keeps it: of what was given as arrays the checksum alone, and of a table the names.
+    """Shorten provenance for a store: instead of arrays it holds their checksum, of a table its column names.
 
-    A table of a file is told by its name and the checksum that it has already.
+    A table read from a file keeps the file's name and checksum, which it has already.
+
+    Args:
+        provenance: Provenance of the run.
+        ensemble: Its members.
+
+    Returns:
+        The provenance that the store holds.
     """
-    given, sampling = ensemble.explicit(), ensemble.sampling
-    arrays, told = sampling.arrays(), dict(provenance["ensemble"])
+    explicit, sampling = ensemble.explicit(), ensemble.sampling
+    arrays, content = sampling.arrays(), dict(provenance["ensemble"])
     if getattr(sampling, "file", None) is not None:
-        given = {name: values for name, values in given.items() if name not in arrays}
+        explicit = {name: values for name, values in explicit.items() if name not in arrays}
     elif arrays:
-        left = {name: value for name, value in sampling.to_dict()[sampling.kind].items() if name not in arrays}
-        told["sampling"] = {sampling.kind: {"columns": sorted(arrays)} if sampling.kind == "table" else left}
-    return {**provenance, "ensemble": told | ({ARRAYS: _checksum(given)} if given else {})}
+        settings = {name: value for name, value in sampling.to_dict()[sampling.kind].items() if name not in arrays}
+        content["sampling"] = {sampling.kind: {"columns": sorted(arrays)} if sampling.kind == "table" else settings}
+    return {**provenance, "ensemble": content | ({ARRAYS: _checksum(explicit)} if explicit else {})}
 
 
 def _checksum(arrays: Mapping[str, np.ndarray]) -> str:
-    """SHA-256 of names, shapes and bytes."""
-    found = hashlib.sha256()
+    """SHA-256 of the names, shapes and bytes of arrays."""
+    digest = hashlib.sha256()
     for name, values in sorted(arrays.items()):
-        found.update(f"{name} {values.shape} {values.dtype.str}\n".encode())
-        found.update(np.ascontiguousarray(values).data)
-    return found.hexdigest()
+        digest.update(f"{name} {values.shape} {values.dtype.str}\n".encode())
+        digest.update(np.ascontiguousarray(values).data)
+    return digest.hexdigest()
 
 
 def ensemble_of(
@@ -83,9 +110,20 @@ def ensemble_of(
     noise: np.ndarray | None,
     store: Path,
 ) -> Ensemble:
-    """The ensemble that provenance tells of; explicit: its arrays; noise: `indices` where they were set. Raises SceneError.
+    """Build the ensemble that provenance describes.
 
-    store: the folder that the provenance is of, beside which a table's file is looked for.
+    Args:
+        scene: Table of the scene.
+        settings: Table of the ensemble.
+        explicit: Arrays that the ensemble was given, by name.
+        noise: Indices of the members for noise, if they were set.
+        store: Folder of the store, beside which a table's file is looked for.
+
+    Returns:
+        The ensemble.
+
+    Raises:
+        SceneError: If the tables are at fault, or a file of a table is missing or changed.
     """
     _check_table(settings.get("sampling"))
     settings = {key: value for key, value in settings.items() if key != ARRAYS}
@@ -94,27 +132,27 @@ def ensemble_of(
         settings["sampling"] = table
         if "ensemble" in scene:
             scene = {**scene, "ensemble": {**scene["ensemble"], "sampling": table}}
-    own = Scene.from_dict(scene)
+    bare_scene = Scene.from_dict(scene)
     if "explicit" in settings:
         states = {name: explicit[f"start.{name}"] for name in STATES}
         parameters = {name: value for name, value in explicit.items() if not name.startswith("start.")}
-        ensemble = Ensemble.from_states(own, **states, parameters=parameters)
+        ensemble = Ensemble.from_states(bare_scene, **states, parameters=parameters)
         ensemble.seed = int(settings["seed"])
         if "indices" in settings:
             ensemble = ensemble.subset(settings["indices"])
     else:
         if explicit and table is None:
-            ((kind, left),) = settings["sampling"].items()
-            settings["sampling"] = {kind: {"values": explicit} if kind == "table" else {**left, **explicit}}
+            ((kind, arguments),) = settings["sampling"].items()
+            settings["sampling"] = {kind: {"values": explicit} if kind == "table" else {**arguments, **explicit}}
         ensemble = Ensemble.from_scene(Scene.from_dict({**scene, "ensemble": settings}))
-        ensemble.scene = own
+        ensemble.scene = bare_scene
     if noise is not None:
         ensemble.indices = noise
     return ensemble
 
 
 def _check_table(sampling: Any) -> None:
-    """A table's file that a store names is taken only with the checksum that it had. Raises SceneError."""
+    """Require a checksum for a table's file that a store names. Raises SceneError."""
     table = sampling.get("table") if isinstance(sampling, Mapping) else None
     if isinstance(table, Mapping) and "file" in table and not isinstance(table.get("sha256"), str):
         faults = Faults("ensemble.sampling.table.")
@@ -123,31 +161,38 @@ def _check_table(sampling: Any) -> None:
 
 
 def _table(settings: Mapping[str, Any], explicit: Mapping[str, np.ndarray], store: Path) -> Any:
-    """The table of a file that an ensemble was drawn from, from its numbers in the store, or read again; None without."""
+    """The table of a file that an ensemble was drawn from: its numbers in the store, else the file; None without a file."""
     sampling = settings.get("sampling")
-    told = sampling.get("table") if isinstance(sampling, Mapping) else None
-    if not isinstance(told, Mapping) or "file" not in told:
+    table = sampling.get("table") if isinstance(sampling, Mapping) else None
+    if not isinstance(table, Mapping) or "file" not in table:
         return None
     if explicit:
-        return Table.kept(told, explicit)
-    return Table(**{**told, "file": moved(told["file"], told.get("sha256"), store)})
+        return Table.kept(table, explicit)
+    return Table(**{**table, "file": moved(table["file"], table.get("sha256"), store)})
 
 
 def same_run(
     stored: Mapping[str, Any], now: Mapping[str, Any], name: str = "the store", other: str | None = None
 ) -> list[str]:
-    """What differs between two provenances that the bits depend on, one text each: key, value there, value here.
+    """List the differences between two provenances that the bits of a run depend on.
 
-    name, other: what the two are called; no other is this run.
+    Args:
+        stored: One provenance.
+        now: The other.
+        name: What the first is called in the texts.
+        other: What the second is called; default "here", this run.
+
+    Returns:
+        A text for each difference: the key and both values.
     """
     return [
-        f"{key} is {there!r} in {name} and {here!r} {f'in {other}' if other else 'here'}"
-        for key, there, here in differences(_comparable(stored), _comparable(now))
+        f"{key} is {first!r} in {name} and {second!r} {f'in {other}' if other else 'here'}"
+        for key, first, second in differences(_comparable(stored), _comparable(now))
     ]
 
 
 def _comparable(provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """Without what changes no bit: threads, the version of Python, the scene's own [ensemble] and [run], a file's place."""
+    """Provenance without what changes no bit: threads, Python's version, the scene's [ensemble] and [run], a file's place."""
     content = dict(provenance)
     content["scene"] = {key: value for key, value in content["scene"].items() if key not in ("ensemble", "run")}
     content["machine"] = {key: value for key, value in content["machine"].items() if key in ("cpu", "simd")}
@@ -157,16 +202,25 @@ def _comparable(provenance: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _without_place(ensemble: Mapping[str, Any]) -> dict[str, Any]:
-    """Of a table of a file what its numbers depend on: its checksum, and not where it lies."""
+    """Ensemble whose table of a file has its checksum, but not the file's path."""
     sampling = ensemble.get("sampling")
-    told = sampling.get("table") if isinstance(sampling, Mapping) else None
-    if not isinstance(told, Mapping) or told.get("sha256") is None:
+    table = sampling.get("table") if isinstance(sampling, Mapping) else None
+    if not isinstance(table, Mapping) or table.get("sha256") is None:
         return dict(ensemble)
-    return {**ensemble, "sampling": {"table": {key: value for key, value in told.items() if key != "file"}}}
+    return {**ensemble, "sampling": {"table": {key: value for key, value in table.items() if key != "file"}}}
 
 
 def differences(there: Any, here: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """(dotted key, value, value) of each leaf that is not the same in two nested tables."""
+    """Find the leaves that differ between two nested tables.
+
+    Args:
+        there: One table, or value.
+        here: The other.
+        key: Dotted key of both; "" at the top.
+
+    Yields:
+        Tuples (dotted key, one value, other value).
+    """
     if isinstance(there, Mapping) and isinstance(here, Mapping):
         for name in [*there, *(name for name in here if name not in there)]:
             yield from differences(there.get(name), here.get(name), f"{key}.{name}" if key else name)
@@ -175,17 +229,29 @@ def differences(there: Any, here: Any, key: str = "") -> Iterator[tuple[str, Any
 
 
 def refuse_another(path: Any, stored: Mapping[str, Any], now: Mapping[str, Any], force: bool) -> tuple[str, ...]:
-    """Raise SceneError where two provenances are of different runs; with `force`, say so in messages instead.
+    """Check that two provenances are of the same run.
 
     Only machine and versions can be forced: another scene or method makes another run.
+
+    Args:
+        path: The store, which the message names.
+        stored: Provenance in the store.
+        now: Provenance of this run.
+        force: Whether to accept another machine or other versions.
+
+    Returns:
+        Messages on differences that were accepted.
+
+    Raises:
+        SceneError: If they are of different runs.
     """
-    found = same_run(stored, json.loads(json.dumps(now)))
-    machine = [text for text in found if text.startswith(("machine.", "versions.", "kernel"))]
-    if found and (not force or len(machine) < len(found)):
-        what = "is another run; give --overwrite, or another folder"
-        if len(machine) == len(found):
-            what = (
+    mismatches = same_run(stored, json.loads(json.dumps(now)))
+    machine = [text for text in mismatches if text.startswith(("machine.", "versions.", "kernel"))]
+    if mismatches and (not force or len(machine) < len(mismatches)):
+        remedy = "is another run; give --overwrite, or another folder"
+        if len(machine) == len(mismatches):
+            remedy = (
                 "the same bits cannot be promised; go on where it began, or give --force and take it that some differ"
             )
-        raise SceneError(f"{path}: {text}: {what}" for text in found)
-    return tuple(f"continued although {text}" for text in found)
+        raise SceneError(f"{path}: {text}: {remedy}" for text in mismatches)
+    return tuple(f"continued although {text}" for text in mismatches)

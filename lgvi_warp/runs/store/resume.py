@@ -1,4 +1,4 @@
-"""Go on with a run that was stopped; put the parts of one run together; say what a store holds."""
+"""`resume`: continue a run in a store that was stopped."""
 
 from __future__ import annotations
 
@@ -37,29 +37,47 @@ def resume(
     keepers: Sequence[Keeper] = (),
     statistics: Sequence[Any] | None = None,
 ) -> Result:
-    """Go on with a run in a store, or in a folder with one store: it ends with the bytes of a run that was never stopped.
+    """Continue a run in a store: it ends with the same bytes as a run that was never stopped.
 
-    Every finished block is read and compared with its checksums; what is torn, missing or changed runs again. fleet: the
-    ensemble, needed where a scene file cannot tell it (laws of your own). force: on another machine or with other
-    versions, where the bits may differ. keepers: those that the run had. statistics: those that it had, needed where they
-    are of functions. Raises SceneError, OSError, or MembersFailed as the run was asked to.
+    Every finished block is read and compared with its checksums; blocks that are torn, missing or changed run again.
+
+    Args:
+        path: A store, or a folder with one store.
+        fleet: The run's Ensemble, or Scene. Needed if a scene file cannot describe it (distributions of your own).
+        executor: "threads" (default), "processes" or "dask", or an object that runs blocks.
+        threads: Number of threads; default all cores.
+        scheduler: Address of Dask's scheduler.
+        progress: Called with the fraction of the work that is done, in [0, 1].
+        force: Whether to continue on another machine or with other versions, where the bits may differ.
+        keepers: The keepers that the run was given.
+        statistics: The statistics that the run was given. Needed if they are of functions.
+
+    Returns:
+        The result of the complete run, which reads from the store.
+
+    Raises:
+        SceneError: If there is no run, or it is not the same run.
+        OSError: If the disk cannot be written.
+        MembersFailed: If members failed and the run's on_failure is "raise".
     """
     folder = Folder(folder_of(path))
-    given = Ensemble.from_scene(fleet) if isinstance(fleet, Scene) else fleet
-    plan = folder.plan(given)
-    told = folder.provenance.get("observed")
+    ensemble = Ensemble.from_scene(fleet) if isinstance(fleet, Scene) else fleet
+    plan = folder.plan(ensemble)
+    observed_content = folder.provenance.get("observed")
     with understood(folder.path / ROOT):
-        observed = observation_of(told, statistics)
+        observed = observation_of(observed_content, statistics)
     observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
-    now = of_store(provenance(plan), plan.ensemble) | ({} if told is None else {"observed": told})
+    now = of_store(provenance(plan), plan.ensemble) | (
+        {} if observed_content is None else {"observed": observed_content}
+    )
     messages = refuse_another(folder.path, folder.provenance, now, force)
     runner = executor_of(executor, threads, scheduler)
-    # What the store says stays as it was when it was made, on whatever machine the run goes on.
+    # Provenance and messages stay those of the start of the run, on whatever machine it goes on.
     run = Stored(
         plan, store_of(folder, force), folder.provenance, folder.messages, (*keepers, *observing.keepers), None,
-        observing.enough, KeptRun(observed, tuple((told or {}).get("fields", ()))),
+        observing.enough, KeptRun(observed, tuple((observed_content or {}).get("fields", ()))),
     )  # fmt: skip
-    made = run.run(runner, progress)
-    told_now = messages + went_on(made)
-    result = result_of(made, None, folder.messages + told_now, plan.ensemble.scene.terms, observing)
-    return finished(result, plan, observed, (told or {}).get("fields", ()), threads)
+    finished_folder = run.run(runner, progress)
+    remarks = messages + went_on(finished_folder)
+    result = result_of(finished_folder, None, folder.messages + remarks, plan.ensemble.scene.terms, observing)
+    return finished(result, plan, observed, (observed_content or {}).get("fields", ()), threads)

@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""The run loop of a store: what is missing or damaged is run, what is finished is kept."""
 
 from __future__ import annotations
 
@@ -24,18 +24,26 @@ from lgvi_warp.runs.store.recipe import refuse_another
 from lgvi_warp.runs.store.settings import Store
 from lgvi_warp.runs.store.sink import Sink, check
 
-# What the system says when a disk takes no more, or not from us.
+# Errors of the system for a full disk, a quota and a file that is too large.
 FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
 @dataclass(frozen=True)
 class Stored:
-    """A run into a store, begun or gone on with.
+    """A run into a store, new or continued.
 
-    keepers: what else is kept of it, beside the store: their parts lie in it. only: indices of the blocks to run, default
-    all; the run is complete when every block is there, or as many as `enough` (see run_blocks) asks for, and `last` has
-    done what there is to do then: called with this run, its members, the executor and the progress, it says how many
-    blocks it ran.
+    It is complete when every block is there, or as many as `enough` asks for, and `last` is done.
+
+    Attributes:
+        plan: Plan of the run.
+        store: Folder and settings of the store.
+        provenance: Provenance as the store keeps it.
+        messages: What the user should know.
+        keepers: Further keepers, whose parts lie in the store.
+        only: Indices of the blocks to run; None: all.
+        enough: Tells whether this many members are enough (see run_blocks).
+        last: Last stage of the run; called with this run, its members, the executor and the progress, it returns how many
+            blocks it ran.
     """
 
     plan: Plan
@@ -48,7 +56,19 @@ class Stored:
     last: Callable[[Stored, int, Executor, Callable[[float], None] | None], int] = lambda *_: 0
 
     def run(self, executor: Executor, progress: Callable[[float], None] | None = None) -> Folder:
-        """Run what is missing. Raises SceneError for what is refused, OSError where the disk takes no more."""
+        """Run the blocks that are missing or damaged.
+
+        Args:
+            executor: What runs the blocks.
+            progress: Called with the fraction of the work that is done, in [0, 1].
+
+        Returns:
+            The store, with the numbers of blocks found and run.
+
+        Raises:
+            SceneError: If the folder holds something else, or settings are refused.
+            OSError: If the disk cannot be written.
+        """
         check_keepers(self.keepers)
         path = self.store.folder
         with self._alone():
@@ -56,20 +76,20 @@ class Stored:
             sink = Sink(path, columns(self.plan, self.store))
             sink.remove_unfinished()
             self._mend()
-            left = self._left(sink)
+            missing = self._left(sink)
             try:
                 with sink.commits:
-                    members = self._blocks(sink, left, executor, progress)
+                    members = self._blocks(sink, missing, executor, progress)
             except OSError as error:
                 raise explained(error, self.store.whole) from error
             finally:
                 sink.remove_unfinished()
             folder = Folder(path, self.store.whole)
-            folder.ran = sum(block.first < members for block in left)
+            folder.ran = sum(block.first < members for block in missing)
             folder.found = sum(block.first < members for block in self._runs()) - folder.ran
             beyond = [] if self.only else [block for block in self._runs() if block.first >= members]
             if beyond:
-                # Blocks that were ahead of the last one depend on the number of threads: the store holds none of them.
+                # How many blocks ran beyond the last one depends on the number of threads: the store keeps none of them.
                 sink.remove(beyond, len(self.plan.grid.times))
             if beyond or not folder.unfinished():
                 folder.ran_kept = self.last(self, members if beyond else self.plan.ensemble.members, executor, progress)
@@ -78,7 +98,7 @@ class Stored:
 
     @contextlib.contextmanager
     def _alone(self) -> Iterator[None]:
-        """No other run writes into the store, from the look at what is there to the end; of a group, its run sees to that."""
+        """Lock the store from the first look at it to the end of the run; a group is locked by the run that it belongs to."""
         if self.store.whole != self.store.folder:
             yield
             return
@@ -95,25 +115,25 @@ class Stored:
         return runs if self.only is None else [runs[i] for i in self.only]
 
     def _begin(self) -> None:
-        """Make the folder, or see that what lies there is this run."""
+        """Make the folder, or check that what lies there is this run."""
         path, store = self.store.folder, self.store
-        there = os.path.lexists(path) and bool(os.listdir(path) if path.is_dir() else True)
-        if there and store.existing == "refuse":
-            if what := foreign(path):
-                raise SceneError([f"{path}: {what}; give another folder"])
+        exists = os.path.lexists(path) and bool(os.listdir(path) if path.is_dir() else True)
+        if exists and store.existing == "refuse":
+            if fault := foreign(path):
+                raise SceneError([f"{path}: {fault}; give another folder"])
             remedy = 'go on with `lgvi-warp resume` (existing="resume"), or replace it with --overwrite (existing="overwrite")'
             raise SceneError([f"{path}: holds a run already; {remedy}"])
-        if there and store.existing == "resume":
+        if exists and store.existing == "resume":
             safe_files.refuse_links(path)
             folder = Folder(path, store.whole)
             refuse_another(path, folder.provenance, self.provenance, store.force)
-            there_is, asked = (
+            stored, requested = (
                 (folder.recipe["store"], folder.recipe["keepers"]),
                 (store.layout(), names_of(self.keepers)),
             )
-            for one, other in zip(there_is, asked, strict=True):
-                if one != other:
-                    raise SceneError([f"{path}: stores {one}, not {other}; ask for the same, or overwrite"])
+            for present, wanted in zip(stored, requested, strict=True):
+                if present != wanted:
+                    raise SceneError([f"{path}: stores {present}, not {wanted}; ask for the same, or overwrite"])
             return
         refuse_foreign(path)
         try:
@@ -122,7 +142,7 @@ class Stored:
             raise explained(error, self.store.whole) from error
 
     def _mend(self) -> None:
-        """Write anew what is damaged of the files that belong to no block."""
+        """Write those files anew that belong to no block and are damaged."""
         path = self.store.folder
         for name in ("blocks", "parts"):
             (path / name).mkdir(exist_ok=True)
@@ -133,39 +153,46 @@ class Stored:
         try:
             skeleton(beside, self.store, self.plan, self.provenance, self.messages, self.keepers)
             folder.take_layout(beside)
-            for one in sorted(beside.rglob("*")):
-                target = path / one.relative_to(beside)
-                if one.is_file() and one != beside / ROOT:
+            for file in sorted(beside.rglob("*")):
+                target = path / file.relative_to(beside)
+                if file.is_file() and file != beside / ROOT:
                     target.parent.mkdir(parents=True, exist_ok=True)
-                    one.replace(target)
+                    file.replace(target)
         finally:
             scratch.remove_folder(beside)
 
     def _left(self, sink: Sink) -> list[Block]:
-        """Blocks to be run, without those that are finished and whole; a damaged one loses its marker."""
-        left = []
+        """Blocks that are not finished or not whole; a damaged one loses its marker."""
+        missing = []
         for block, faults in check(sink, self._runs(), len(self.plan.grid.times), self.keepers):
             if faults:
                 sink.marker(block).unlink(missing_ok=True)
-                left.append(block)
-        return left
+                missing.append(block)
+        return missing
 
     def _blocks(
         self, sink: Sink, left: Sequence[Block], executor: Executor, progress: Callable[[float], None] | None
     ) -> int:
-        """Run blocks; parts of the finished ones come from the store, all in order. Returns where their members end."""
+        """Run the blocks left, and merge the parts of all in order. Returns where their members end."""
         runs, n, steps = self._runs(), self.plan.ensemble.members, self.plan.grid.steps
-        made = Progress(n * steps, progress)
+        overall = Progress(n * steps, progress)
         for block in set(runs) - set(left):
-            made.at(block, block.count * steps)
-        members = run_blocks(Work(self.plan, self.keepers, sink), runs, executor, made.at, left, self.enough)
+            overall.at(block, block.count * steps)
+        members = run_blocks(Work(self.plan, self.keepers, sink), runs, executor, overall.at, left, self.enough)
         if progress and members < runs[-1].stop:
             progress(1.0)
         return members
 
 
 def check_keepers(keepers: Sequence[Keeper]) -> None:
-    """Each must be able to leave its parts in a store, under a name of its own. Raises SceneError."""
+    """Check that each keeper can leave its parts in a store, under its own name.
+
+    Args:
+        keepers: The keepers.
+
+    Raises:
+        SceneError: If one cannot; the message names every fault.
+    """
     faults = Faults("keepers.")
     for keeper in keepers:
         if not isinstance(keeper, PartKeeper):
@@ -177,7 +204,15 @@ def check_keepers(keepers: Sequence[Keeper]) -> None:
 
 
 def explained(error: OSError, path: os.PathLike[str]) -> OSError:
-    """The same error with what it means for the run."""
+    """Add to an error of the disk what it means for the run.
+
+    Args:
+        error: The error.
+        path: The store.
+
+    Returns:
+        The same error with a longer text, or itself.
+    """
     if error.errno in FULL:
         text = f"{error.strerror}: the blocks that were finished are kept; make room, then `lgvi-warp resume {path}`"
     elif error.errno in (errno.EROFS, errno.EACCES, errno.EPERM):

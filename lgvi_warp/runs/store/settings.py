@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""`Store`: the folder and the settings of a run that is written to disk."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from lgvi_warp.engine.plan import Plan
 
 
-# Few enough bytes a chunk for its memory, enough that files and their syncs cost little.
+# Small enough for the memory of the blocks at work, large enough that files and their syncs cost little [bytes].
 CHUNK_BYTES = 10_000_000
 
 
@@ -25,13 +25,19 @@ EXISTING = ("refuse", "resume", "overwrite")
 
 @dataclass(frozen=True)
 class Store:
-    """Where a run is written, and how.
+    """Folder and settings of a run that is written to disk as a zarr store.
 
-    path: a folder whose name ends in .zarr. dtype: "float32" stores the samples of a float64 run in single precision.
-    fields: those of the samples to store, default all that are kept. chunk_bytes: about so large a chunk becomes at most;
-    each block at work holds one of each field. existing: what to do where a run lies already:
-    "refuse", "resume" (go on where it stopped, if it is the same run) or "overwrite". force: go on even on another
-    machine or with other versions. Raises SceneError naming every fault.
+    Args:
+        path: A folder whose name ends in .zarr.
+        dtype: "float32" stores the samples of a float64 run in single precision; default the dtype of the run.
+        fields: Names of the fields whose samples are stored; default all that are kept.
+        existing: What to do if the folder holds a run already: "refuse" (default), "resume" (continue it, if it is the same
+            run) or "overwrite".
+        force: Whether to continue on another machine or with other versions, where the bits may differ; default False.
+        chunk_bytes: Size that a chunk has at most, about [bytes]; default 10 MB. Each block at work holds one chunk per field.
+
+    Raises:
+        SceneError: If settings are at fault or a library is missing; the message names every fault.
     """
 
     path: str | os.PathLike[str]
@@ -55,30 +61,35 @@ class Store:
         needed()
 
     def layout(self) -> dict[str, Any]:
-        """What the bytes in it depend on, as JSON has it."""
+        """Return the settings that the bytes in the store depend on, as JSON holds them."""
         fields = None if self.fields is None else list(self.fields)
         return {"dtype": self.dtype, "fields": fields, "chunk_bytes": int(self.chunk_bytes)}
 
     @property
     def folder(self) -> Path:
-        """Its path."""
+        """The store's folder as a Path."""
         return Path(self.path)
 
     @property
     def along(self) -> str:
-        """What its arrays call the dimension of members."""
+        """Name of the dimension of members in its arrays."""
         return MEMBER
 
     @property
     def whole(self) -> Path:
-        """The folder of the whole run."""
+        """Folder of the whole run that the store is part of: here its own."""
         return self.folder
 
     def write_given(self, group: Any, plan: Plan) -> None:
-        """States and parameters that were given as arrays: nothing else tells them."""
-        given, units = plan.ensemble.explicit(), parameter_units(plan.ensemble.scene)
+        """Write the states and parameters that the ensemble was given as arrays: nothing else in the store holds them.
+
+        Args:
+            group: zarr group of the store.
+            plan: Plan of the run.
+        """
+        arrays, units = plan.ensemble.explicit(), parameter_units(plan.ensemble.scene)
         explicit = group.create_group("explicit")
-        for name, values in given.items():
+        for name, values in arrays.items():
             dims = (
                 f"{MEMBER}_given" if name != "indices" else MEMBER,
                 *(f"{name}_{i}" for i in range(values.ndim - 1)),
@@ -87,7 +98,7 @@ class Store:
 
 
 def needed() -> None:
-    """Raise SceneError where the libraries of stores are not installed."""
+    """Raise SceneError if the libraries that stores need are not installed."""
     try:
         import google_crc32c  # noqa: F401
         import xarray  # noqa: F401

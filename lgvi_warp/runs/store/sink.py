@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""`Sink`: the keeper that writes blocks into a store and knows their files, and the format of markers and parts."""
 
 from __future__ import annotations
 
@@ -29,13 +29,27 @@ if TYPE_CHECKING:
 
 
 def name_of(block: Block) -> str:
-    """What a block's files are called by."""
+    """Return the name of a block's files without their suffix.
+
+    Args:
+        block: The block.
+
+    Returns:
+        Its first member, with nine digits.
+    """
     return f"{block.first:09d}"
 
 
 @dataclass(frozen=True)
 class Sink:
-    """The keeper that writes blocks into a store, from threads, processes or other machines that see its folder."""
+    """Keeper that writes blocks into a store, from threads, processes or other machines that see its folder.
+
+    Attributes:
+        root: Folder of the store.
+        columns: The arrays that are written block by block.
+        room: Memory for chunks.
+        commits: Queue of the blocks that are not durable yet.
+    """
 
     root: Path
     columns: tuple[Column, ...]
@@ -43,37 +57,103 @@ class Sink:
     commits: Commits = field(default_factory=Commits, compare=False)
 
     def open(self, plan: Plan, block: Block, members: Any) -> BlockWriter:
-        """A writer of the block's chunks."""
+        """Open a writer of a block's chunks.
+
+        Args:
+            plan: Plan of the run.
+            block: The block.
+            members: Its members.
+
+        Returns:
+            The writer.
+        """
         return BlockWriter(self.root, self.columns, self.room, plan, block, members)
 
     def understood(self, block: Block) -> AbstractContextManager[None]:
-        """While the parts of a block that was there are used: what is wrong with them is told as theirs."""
+        """Turn errors that arise while a block's parts are used into faults of their file.
+
+        Args:
+            block: The block.
+
+        Returns:
+            The context in which the parts are used.
+        """
         return understood(self.root / self.parts_key(block))
 
     def merge(self, block: Block, part: Any) -> None:
-        """The block is in its place already."""
+        """Do nothing: the block is in its place already.
+
+        Args:
+            block: The block.
+            part: What its writer closed it with.
+        """
 
     def finish(self, block: Block, files: durable.Files, keepers: Sequence[Keeper], parts: Sequence[Any]) -> None:
-        """Hand a block over to be made durable, with the parts of keepers, and marked. Raises OSError."""
+        """Hand over a block to be made durable and marked.
+
+        Args:
+            block: The block.
+            files: Its files, written and not synced.
+            keepers: Further keepers.
+            parts: What each of them closed the block with.
+
+        Raises:
+            OSError: If this or an earlier block could not be written.
+        """
         if keepers:
             files.write(self.parts_key(block), packed(keepers, parts))
         self.commits.add(files, self.marker(block), marker(files.sums))
 
     @staticmethod
     def parts_key(block: Block) -> str:
-        """The file of what keepers closed a block with, below the root."""
+        """Return the path of the file with a block's parts of the keepers.
+
+        Args:
+            block: The block.
+
+        Returns:
+            The path below the store's root.
+        """
         return f"parts/{name_of(block)}.npy"
 
     def sums(self, block: Block) -> dict[str, list[int]] | None:
-        """What the marker of a block lists; None if it is not finished. Raises SceneError where that is a link."""
+        """Read the sizes and checksums in a block's marker.
+
+        Args:
+            block: The block.
+
+        Returns:
+            [size, checksum] by path of the file; None if the block is not finished.
+
+        Raises:
+            SceneError: If the marker is a link.
+        """
         return read_marker(self.root, f"blocks/{name_of(block)}.json")
 
     def marker(self, block: Block) -> Path:
-        """The file that says that a block is finished."""
+        """Return the path of a block's marker, the file that says that the block is finished.
+
+        Args:
+            block: The block.
+
+        Returns:
+            The path.
+        """
         return self.root / "blocks" / f"{name_of(block)}.json"
 
     def parts(self, block: Block, keepers: Sequence[Keeper]) -> tuple[Any, ...] | None:
-        """The parts of a finished block; None if it is not finished."""
+        """Read the parts of the keepers for a block.
+
+        Args:
+            block: The block.
+            keepers: The keepers.
+
+        Returns:
+            A part for each keeper; None if the block is not finished.
+
+        Raises:
+            SceneError: If the file is damaged.
+        """
         if self.sums(block) is None:
             return None
         if not keepers:
@@ -82,26 +162,54 @@ class Sink:
             return unpacked(keepers, self.root, self.parts_key(block))
 
     def faults(self, block: Block, samples: int, keepers: Sequence[Any]) -> list[str]:
-        """What is wrong with a finished block's files; "is not finished" alone for one that is not."""
+        """Compare a block's files with its marker.
+
+        Args:
+            block: The block.
+            samples: Number of sample times.
+            keepers: The keepers that leave parts.
+
+        Returns:
+            A text for each fault; only "is not finished" for a block that is not.
+        """
         sums = self.sums(block)
         if sums is None:
             return ["is not finished"]
         if unfit := self.unfit(block, sums, samples, keepers):
             return unfit
-        return [f"{key} {text}" for key, one in sums.items() if (text := durable.fault(self.root, key, *one))]
+        return [
+            f"{key} {text}"
+            for key, size_and_sum in sums.items()
+            if (text := durable.fault(self.root, key, *size_and_sum))
+        ]
 
     def unfit(self, block: Block, sums: Mapping[str, Sequence[int]], samples: int, keepers: Sequence[Any]) -> list[str]:
-        """What is wrong with the names and sizes in a block's marker: only its own chunks may be there, and its parts."""
+        """Check the names and sizes in a block's marker: only the block's own chunks and parts may be there.
+
+        Args:
+            block: The block.
+            sums: Sizes and checksums in its marker.
+            samples: Number of sample times.
+            keepers: The keepers that leave parts.
+
+        Returns:
+            A text for each fault.
+        """
         sizes = {key: column.bytes for column in self.columns for key in column.keys(block, samples)}
         parts = self.parts_key(block)
-        found = [f"{key} is not in the marker" for key in (*sizes, *([parts] if keepers else [])) if key not in sums]
+        faults = [f"{key} is not in the marker" for key in (*sizes, *([parts] if keepers else [])) if key not in sums]
         strange = [key for key in sums if key not in sizes and key != parts]
-        found += [f"{key!r:.100} is in the marker of block {name_of(block)}, and is no file of it" for key in strange]
+        faults += [f"{key!r:.100} is in the marker of block {name_of(block)}, and is no file of it" for key in strange]
         wrong = [key for key, size in sizes.items() if key in sums and sums[key][0] != size]
-        return found + [f"{key} has {sums[key][0]} bytes in the marker, not {sizes[key]}" for key in wrong]
+        return faults + [f"{key} has {sums[key][0]} bytes in the marker, not {sizes[key]}" for key in wrong]
 
     def remove(self, runs: Sequence[Block], samples: int) -> None:
-        """Remove all there is of these blocks, their markers first."""
+        """Remove all files of blocks, their markers first.
+
+        Args:
+            runs: The blocks.
+            samples: Number of sample times.
+        """
         for block in runs:
             self.marker(block).unlink(missing_ok=True)
         for block in runs:
@@ -111,48 +219,83 @@ class Sink:
             (self.root / self.parts_key(block)).unlink(missing_ok=True)
 
     def remove_unfinished(self) -> None:
-        """Remove what killed writers left."""
+        """Remove the unfinished files that killed writers left."""
         names = ("blocks", "parts", *(column.name for column in self.columns))
         durable.remove_unfinished([self.root, *(self.root / name for name in names)])
 
 
 def packed(keepers: Sequence[Keeper], parts: Sequence[Any]) -> bytes:
-    """What keepers closed a block with, always the same bytes: a JSON text, then the arrays, each as in an .npy file."""
-    told: list[tuple[str, list[str], Any]] = []
+    """Pack a block's parts into a file: a JSON text, then the arrays, each as in an .npy file.
+
+    Args:
+        keepers: The keepers.
+        parts: What each of them closed the block with.
+
+    Returns:
+        The file's content, the same bytes for the same parts.
+    """
+    headers: list[tuple[str, list[str], Any]] = []
     arrays: list[np.ndarray] = []
     for keeper, part in zip(keepers, parts, strict=True):
         assert isinstance(keeper, PartKeeper)
-        own, content = keeper.to_arrays(part)
-        told.append((keeper.name, list(own), content))
-        arrays += own.values()
+        part_arrays, content = keeper.to_arrays(part)
+        headers.append((keeper.name, list(part_arrays), content))
+        arrays += part_arrays.values()
     buffer = io.BytesIO()
-    for values in (np.array(json.dumps(told, sort_keys=True)), *arrays):
+    for values in (np.array(json.dumps(headers, sort_keys=True)), *arrays):
         np.save(buffer, values, allow_pickle=False)
     return buffer.getvalue()
 
 
 def unpacked(keepers: Sequence[Keeper], root: Path, key: str) -> tuple[Any, ...]:
-    """The parts of these keepers, of all that were packed into a file below the root."""
+    """Read a block's parts from a file.
+
+    Args:
+        keepers: The keepers whose parts are wanted.
+        root: Folder of the store.
+        key: Path of the file below it.
+
+    Returns:
+        A part for each keeper.
+    """
     with npy_files.opened(root, key) as arrays:
-        told = parsed(npy_files.text(arrays))
-        found = {name: (dict(zip(names, arrays, strict=False)), content) for name, names, content in told}
-    return tuple(keeper.from_arrays(*found[keeper.name]) for keeper in keepers if isinstance(keeper, PartKeeper))
+        headers = parsed(npy_files.text(arrays))
+        contents = {name: (dict(zip(names, arrays, strict=False)), content) for name, names, content in headers}
+    return tuple(keeper.from_arrays(*contents[keeper.name]) for keeper in keepers if isinstance(keeper, PartKeeper))
 
 
 def marker(sums: Mapping[str, list[int]]) -> bytes:
-    """A list of files with sizes and checksums, and its own checksum in its last line."""
+    """Write a block's marker: files with their sizes and checksums, and the marker's own checksum in its last line.
+
+    Args:
+        sums: [size, checksum] by path of the file.
+
+    Returns:
+        Content of the marker.
+    """
     text = json.dumps(dict(sorted(sums.items())), indent=0).encode()
     return text + b"\n%08x\n" % durable.checksum(text)
 
 
 def read_marker(root: Path, key: str) -> dict[str, list[int]] | None:
-    """What a marker below the root lists; None if there is none, or a damaged one. Raises SceneError where it is a link."""
+    """Read a marker.
+
+    Args:
+        root: Folder of the store.
+        key: Path of the marker below it.
+
+    Returns:
+        [size, checksum] by path of the file; None if there is no marker, or a damaged one.
+
+    Raises:
+        SceneError: If the marker is a link.
+    """
     try:
         content = safe_files.read(root, key, safe_files.MOST_JSON)
         text, _, last = content.rstrip(b"\n").rpartition(b"\n")
         if int(last, 16) == durable.checksum(text):
             sums = dict(parsed(text))
-            return sums if all(is_sum(one) for one in sums.values()) else None
+            return sums if all(is_sum(size_and_sum) for size_and_sum in sums.values()) else None
     except SceneError:
         raise
     except (OSError, ValueError, TypeError):
@@ -163,7 +306,17 @@ def read_marker(root: Path, key: str) -> dict[str, list[int]] | None:
 def check(
     sink: Sink, runs: Sequence[Block], samples: int, keepers: Sequence[Any] = ()
 ) -> Iterator[tuple[Block, list[str]]]:
-    """Each block and what is wrong with it (see Sink.faults), every file read, in order."""
+    """Compare the files of blocks with their markers, reading every file.
+
+    Args:
+        sink: The store's blocks.
+        runs: The blocks to check.
+        samples: Number of sample times.
+        keepers: The keepers that leave parts.
+
+    Yields:
+        Tuples (block, its faults), in order; see Sink.faults.
+    """
     with ThreadPoolExecutor(machine.thread_count()) as pool:
-        found = pool.map(lambda block: sink.faults(block, samples, keepers), runs)
-        yield from zip(runs, found, strict=True)
+        faults = pool.map(lambda block: sink.faults(block, samples, keepers), runs)
+        yield from zip(runs, faults, strict=True)

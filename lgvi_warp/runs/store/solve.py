@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""Runs of a plan into a store, as `solve` makes them."""
 
 from __future__ import annotations
 
@@ -30,43 +30,74 @@ def run_stored(
     observed: Observation | None = None,
     fields: Sequence[str] | None = None,
 ) -> Result:
-    """Run the blocks of the plan, or `only` some, into a store, and give a result that reads from it.
+    """Run the blocks of a plan into a store.
 
-    observed, fields: as for run_plan; where samples of all members are not kept, the store has none.
+    Args:
+        plan: The plan.
+        store: Folder and settings of the store.
+        executor: What runs the blocks.
+        progress: Called with the fraction of the work that is done, in [0, 1].
+        only: Indices of the blocks to run; default all.
+        observed: What is kept; default the samples of all members. If these are not kept, the store has no samples.
+        fields: Names of the fields whose samples are kept; default all of the plan.
+
+    Returns:
+        A result that reads from the store, of the members of the blocks that were asked for.
+
+    Raises:
+        SceneError: If the folder holds another run, or the disk has too little room.
+        OSError: If the disk cannot be written.
     """
     observed = observed or Observation()
     compile_seconds = plan.compile()
     start = time.perf_counter()
     observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
     into = settled(store, plan, observed, fields)
-    asked = plan.fields if fields is None else fields
-    kept = tuple(name for name in asked if store.fields is None or name in store.fields)
-    told = of_store(provenance(plan, observed, kept), plan.ensemble)
+    saved_fields = plan.fields if fields is None else fields
+    kept = tuple(name for name in saved_fields if store.fields is None or name in store.fields)
+    content = of_store(provenance(plan, observed, kept), plan.ensemble)
     folder = Stored(
-        plan, into, told, messages(plan), observing.keepers, only, observing.enough, KeptRun(observed, kept)
+        plan, into, content, messages(plan), observing.keepers, only, observing.enough, KeptRun(observed, kept)
     ).run(executor, progress)
     runs = blocks(plan.ensemble.members)
     members = None if only is None else slice(runs[only[0]].first, runs[only[-1]].stop)
-    there = went_on(folder)
-    result = result_of(folder, members, messages(plan) + there, plan.ensemble.scene.terms, observing)
-    if there:
+    remarks = went_on(folder)
+    result = result_of(folder, members, messages(plan) + remarks, plan.ensemble.scene.terms, observing)
+    if remarks:
         return result  # what was measured is not the whole run
     return replace(result, compile_seconds=compile_seconds, run_seconds=time.perf_counter() - start)
 
 
 def went_on(folder: Folder) -> tuple[str, ...]:
-    """What the user should know of a run of which some blocks were there already."""
-    found, ran, ran_kept = folder.found, folder.ran, folder.ran_kept
-    if not found:
+    """Tell how many blocks of a run were in the store already.
+
+    Args:
+        folder: Store of the run that has ended.
+
+    Returns:
+        A message; none if no block was there.
+    """
+    present, ran, ran_kept = folder.found, folder.ran, folder.ran_kept
+    if not present:
         return ()
     if not ran and not ran_kept:
-        return (f"nothing was missing: {found} of {found} blocks were there and whole",)
+        return (f"nothing was missing: {present} of {present} blocks were there and whole",)
     kept = f", and {ran_kept} of kept members" if ran_kept else ""
-    return (f"went on: {found} of {found + ran} blocks were there and whole, {ran} ran{kept}",)
+    return (f"went on: {present} of {present + ran} blocks were there and whole, {ran} ran{kept}",)
 
 
 def settled(store: Store, plan: Plan, observed: Observation, fields: Sequence[str] | None) -> Store:
-    """The store with the fields of the samples that it will hold: none where those of all members are not kept."""
-    asked = set(plan.fields if fields is None else fields) if observed.samples else set()
-    own = asked if store.fields is None else asked & set(store.fields)
-    return replace(store, fields=tuple(name for name in FIELDS if name in own))
+    """Settle which samples a store holds: none if those of all members are not kept.
+
+    Args:
+        store: The store asked for.
+        plan: Plan of the run.
+        observed: What the run keeps.
+        fields: Names of the fields whose samples are kept; None: all of the plan.
+
+    Returns:
+        The store with its fields.
+    """
+    wanted = set(plan.fields if fields is None else fields) if observed.samples else set()
+    stored = wanted if store.fields is None else wanted & set(store.fields)
+    return replace(store, fields=tuple(name for name in FIELDS if name in stored))

@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""State of a store: what it holds, what is finished, and what is damaged."""
 
 from __future__ import annotations
 
@@ -15,16 +15,32 @@ from lgvi_warp.runs.store.sink import check, name_of
 
 
 def store_of(folder: Folder, force: bool = False) -> Store:
-    """The settings that a folder was made with, to go on with."""
-    own = folder.recipe["store"]
-    fields = None if own["fields"] is None else tuple(own["fields"])
-    return Store(folder.path, own["dtype"], fields, "resume", force, own["chunk_bytes"])
+    """Restore the settings that a store was made with, to continue its run.
+
+    Args:
+        folder: The store.
+        force: Whether to continue on another machine or with other versions; default False.
+
+    Returns:
+        The settings, with existing="resume".
+    """
+    layout = folder.recipe["store"]
+    fields = None if layout["fields"] is None else tuple(layout["fields"])
+    return Store(folder.path, layout["dtype"], fields, "resume", force, layout["chunk_bytes"])
 
 
 def state(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """What a store holds: members, samples, blocks finished and in all, members kept, complete, bytes, damage as texts.
+    """Report what a store holds; every file is read.
 
-    Every file is read. Raises SceneError where there is no run.
+    Args:
+        path: A store, or a folder with one store.
+
+    Returns:
+        A table: path, members, samples (times), fields, keepers, blocks (in all), finished (blocks), kept (members),
+        complete, bytes, damage (texts) and provenance.
+
+    Raises:
+        SceneError: If there is no run.
     """
     folder = Folder(folder_of(path))
     runs = folder.runs
@@ -40,7 +56,9 @@ def state(path: str | os.PathLike[str]) -> dict[str, Any]:
         "path": folder.path,
         "members": folder.members,
         "samples": samples,
-        "fields": list(folder.recipe["fields"] if (own := folder.recipe["store"]["fields"]) is None else own),
+        "fields": list(
+            folder.recipe["fields"] if (stored_fields := folder.recipe["store"]["fields"]) is None else stored_fields
+        ),
         "keepers": list(folder.recipe["keepers"]),
         "blocks": len(runs),
         "finished": finished,
@@ -53,7 +71,15 @@ def state(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def kept_state(folder: Folder, sound: bool) -> tuple[int, list[str]]:
-    """(members kept, what is wrong with their files); sound: nothing is wrong with those of the run."""
+    """Report on the members that a run keeps.
+
+    Args:
+        folder: The store of the run.
+        sound: Whether the files of the run itself are undamaged.
+
+    Returns:
+        The number of members that are kept, and a text for each damaged file of theirs.
+    """
     wanted = len(members_kept(keep_of(folder.provenance), folder)) if folder.complete and sound else 0
     try:
         group = folder.kept()

@@ -1,4 +1,4 @@
-"""What a store tells of its run in words and numbers: its provenance, recipe, messages and shared parameters, checked."""
+"""Check of a store's texts: provenance, recipe, messages and shared parameters."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lgvi_warp.scene.settings import MOST_MEMBERS
 ATTRIBUTES = {
     "Conventions", "title", "source", "format", "complete", "members", "provenance", "recipe", "messages", "shared", "crc32c",
 }  # fmt: skip
-# Lanes of a packet: beyond what any processor has.
+# Most lanes of a packet: more than any processor has.
 MOST_WIDTH = 1024
 Rule = Callable[[Any], bool]
 
@@ -28,11 +28,11 @@ def _number(value: Any) -> bool:
 
 
 def _texts(value: Any) -> bool:
-    return isinstance(value, list) and all(is_text(one) for one in value)
+    return isinstance(value, list) and all(is_text(item) for item in value)
 
 
 def _known(value: Any) -> bool:
-    return _texts(value) and all(one in FIELDS for one in value)
+    return _texts(value) and all(name in FIELDS for name in value)
 
 
 def _table(value: Any) -> bool:
@@ -44,7 +44,7 @@ def _maybe(rule: Rule) -> Rule:
 
 
 def _of_texts(value: Any) -> bool:
-    return isinstance(value, dict) and all(is_text(name) and is_text(one) for name, one in value.items())
+    return isinstance(value, dict) and all(is_text(name) and is_text(text) for name, text in value.items())
 
 
 PROVENANCE: dict[str, Rule] = {
@@ -65,13 +65,24 @@ OBSERVED: dict[str, Rule] = {
 
 
 def _store(value: Mapping[str, Any]) -> bool:
-    rules = {"dtype": _maybe(lambda one: one in ("float32", "float64")), "fields": _maybe(_known),
+    rules = {"dtype": _maybe(lambda dtype: dtype in ("float32", "float64")), "fields": _maybe(_known),
              "chunk_bytes": _whole(1, 2**40)}  # fmt: skip
     return value.keys() == rules.keys() and all(rule(value[name]) for name, rule in rules.items())
 
 
 def check(attributes: Mapping[str, Any], provenance: Any, recipe: Any, messages: Any, shared: Any) -> None:
-    """Raise NotOursError naming the first that no run says."""
+    """Check the attributes and texts of a store.
+
+    Args:
+        attributes: Attributes of its group.
+        provenance: Provenance, parsed.
+        recipe: Recipe, parsed.
+        messages: Messages, parsed.
+        shared: Shared parameters, parsed.
+
+    Raises:
+        NotOursError: If a run never writes this; the message names the first fault.
+    """
     unknown = sorted(attributes.keys() - ATTRIBUTES)
     if unknown:
         raise NotOursError(f"attribute {unknown[0][:60]!r} is not known")

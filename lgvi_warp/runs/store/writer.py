@@ -1,4 +1,4 @@
-"""One block on its way into a store: samples gather in chunks, full chunks go to the disk."""
+"""Writer of one block: samples are gathered in chunks, and full chunks are written to disk."""
 
 from __future__ import annotations
 
@@ -19,20 +19,36 @@ if TYPE_CHECKING:
 
 
 class Room(list[dict[str, np.ndarray]]):
-    """Chunks that no block uses at the moment: fresh memory costs more than what is written into it."""
+    """Pool of chunks that no block uses at the moment: getting fresh memory costs more than filling it."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Each process has its own."""
+        """Each process has its own pool: it is pickled empty."""
         return Room, ()
 
     @staticmethod
     def made(columns: tuple[Column, ...]) -> dict[str, np.ndarray]:
-        """A chunk of each field, with anything in it."""
-        return {one.name: np.empty(one.chunk, one.dtype) for one in columns if one.times}
+        """Allocate a chunk for each array that has times.
+
+        Args:
+            columns: The arrays of a store.
+
+        Returns:
+            Chunks by name, with undefined content.
+        """
+        return {column.name: np.empty(column.chunk, column.dtype) for column in columns if column.times}
 
 
 class BlockWriter:
-    """The keeper of one block of a store."""
+    """Writer of one block into a store.
+
+    Args:
+        root: Folder of the store.
+        columns: The arrays that are written block by block.
+        room: Pool of chunks.
+        plan: Plan of the run.
+        block: The block.
+        members: Its members.
+    """
 
     def __init__(self, root: Path, columns: tuple[Column, ...], room: Room, plan: Plan, block: Block, members: Members):
         self._plan, self._block, self._members = plan, block, members
@@ -45,12 +61,17 @@ class BlockWriter:
         except IndexError:
             self._chunks = room.made(columns)
         if block.count < columns[0].length:
-            for one in columns:
-                if one.times:
-                    self._chunks[one.name][:, block.count :] = one.fill
+            for column in columns:
+                if column.times:
+                    self._chunks[column.name][:, block.count :] = column.fill
 
     def take(self, when: slice, samples: dict[str, np.ndarray]) -> None:
-        """Put samples into their chunks, and write the chunks that are full."""
+        """Put samples into their chunks, and write the chunks that are full.
+
+        Args:
+            when: Which sample times.
+            samples: Arrays (times, members of the block, ...), by name.
+        """
         for column in self._columns:
             if column.times:
                 self._take(column, when, samples[column.name])
@@ -72,7 +93,14 @@ class BlockWriter:
         self._files.write(column.key(self._block, number), chunk, checked=True)
 
     def close(self, outcome: Outcome) -> Files:
-        """Write what is known of each member. Returns the files, which are not durable yet."""
+        """Write the fields and parameters of the members.
+
+        Args:
+            outcome: How the members ended.
+
+        Returns:
+            The block's files, which are not durable yet.
+        """
         values = {MEMBER: self._members.indices} | self._members.parameters
         values |= member_fields.of(self._plan, outcome)
         for column in self._columns:

@@ -1,4 +1,4 @@
-"""What zarr reads a store through: metadata that was checked, and chunks that are plain files of the size they must have."""
+"""The zarr store that zarr and xarray read through: checked metadata, and chunks of exactly the size they must have."""
 
 from __future__ import annotations
 
@@ -20,18 +20,33 @@ ROOT = "zarr.json"
 
 
 def checked_store(root: Path, layout: Layout, metadata: bytes) -> Any:
-    """A folder for zarr to read, and to do nothing else; metadata: of its root, as `Layout.root` gives it."""
+    """Open a folder for zarr, for reading only.
+
+    Args:
+        root: Folder of the store.
+        layout: Its arrays.
+        metadata: Metadata of its root, as `Layout.root` gives it.
+
+    Returns:
+        The zarr store.
+    """
     return _class()(root, layout, metadata)
 
 
 @functools.cache
 def _class() -> Any:
-    """Zarr's kind of store; made when zarr is wanted."""
+    """Define the class of zarr store, when zarr is first needed."""
     from zarr.abc.store import RangeByteRequest, Store
     from zarr.core.buffer.core import default_buffer_prototype
 
     class CheckedStore(Store):
-        """A store's folder, for reading alone; metadata: of its root, as `Layout.root` gives it."""
+        """A store's folder, for reading only.
+
+        Args:
+            root: Folder of the store.
+            layout: Its arrays.
+            metadata: Metadata of its root, as `Layout.root` gives it.
+        """
 
         supports_writes = supports_deletes = supports_partial_writes = False
         supports_listing = True
@@ -47,20 +62,37 @@ def _class() -> Any:
             return hash((self.root, self.metadata))
 
         def __reduce__(self) -> tuple[Any, ...]:
-            """Made again in another process, as of Dask."""
+            """It is built again in another process, such as one of Dask."""
             return checked_store, (self.root, self.layout, self.metadata)
 
         def __str__(self) -> str:
             return f"file://{self.root.absolute().as_posix()}"
 
         def with_read_only(self, read_only: bool = False) -> CheckedStore:
-            """The same: it is read only."""
+            """Return the store itself, which is read-only.
+
+            Args:
+                read_only: Must be True.
+
+            Raises:
+                ValueError: If it is not.
+            """
             if not read_only:
                 raise ValueError("a run's store is only read by zarr")
             return self
 
         def content(self, key: str) -> bytes | None:
-            """A file's bytes; None for one that is missing. Raises SceneError where it is not what it must be."""
+            """Read the content of a file.
+
+            Args:
+                key: Path of the file below the root.
+
+            Returns:
+                Its bytes; None if it is missing, or no file of the layout.
+
+            Raises:
+                SceneError: If it has not the size that it must have.
+            """
             if key == ROOT:
                 return self.metadata
             size = self.layout.chunk_bytes(key)
@@ -77,7 +109,16 @@ def _class() -> Any:
         async def get(
             self, key: str, prototype: BufferPrototype | None = None, byte_range: ByteRequest | None = None
         ) -> Buffer | None:
-            """A file's bytes, or a range of them."""
+            """Read a file, or a range of its bytes.
+
+            Args:
+                key: Path of the file below the root.
+                prototype: zarr's kind of buffer.
+                byte_range: First and last byte; None: the whole file.
+
+            Returns:
+                The bytes; None if the file is missing.
+            """
             data = await asyncio.to_thread(self.content, key)
             if data is None:
                 return None
@@ -90,32 +131,61 @@ def _class() -> Any:
         async def get_partial_values(
             self, prototype: BufferPrototype, key_ranges: Iterable[tuple[str, ByteRequest | None]]
         ) -> list[Buffer | None]:
-            """Several files, or ranges of them."""
+            """Read several files, or ranges of their bytes.
+
+            Args:
+                prototype: zarr's kind of buffer.
+                key_ranges: Path and range of each.
+
+            Returns:
+                The bytes of each; None for a missing file.
+            """
             return [await self.get(key, prototype, part) for key, part in key_ranges]
 
         async def exists(self, key: str) -> bool:
-            """Whether a file is there."""
+            """Tell whether a file is there.
+
+            Args:
+                key: Path of the file below the root.
+
+            Raises:
+                SceneError: If it has not the size that it must have.
+            """
             return await asyncio.to_thread(self.content, key) is not None
 
         async def set(self, key: str, value: Buffer) -> None:
-            """Nothing is written by zarr."""
+            """Refuse to write: the store is read-only."""
             self._check_writable()
 
         async def delete(self, key: str) -> None:
-            """Nothing is removed by zarr."""
+            """Refuse to remove: the store is read-only."""
             self._check_writable()
 
         async def list(self) -> AsyncIterator[str]:
-            """The root's metadata, which has that of all arrays."""
+            """List the root's metadata, which hold those of all arrays."""
             yield ROOT
 
         async def list_prefix(self, prefix: str) -> AsyncIterator[str]:
-            """As `list`."""
+            """List the root's metadata, if its name begins with a prefix.
+
+            Args:
+                prefix: The prefix.
+
+            Yields:
+                The name of the metadata.
+            """
             if ROOT.startswith(prefix):
                 yield ROOT
 
         async def list_dir(self, prefix: str) -> AsyncIterator[str]:
-            """Names of arrays and groups."""
+            """List the arrays and groups in a folder.
+
+            Args:
+                prefix: Path of the folder below the root.
+
+            Yields:
+                Their names, sorted.
+            """
             names: set[Any] = set()
             head = f"{prefix.rstrip('/')}/" if prefix else ""
             for name in (*self.layout.arrays, *self.layout.groups):

@@ -195,11 +195,7 @@ def one_line(fault: str) -> str:
         The text without control characters; of a long one, its beginning and its end.
     """
     text = fault if len(fault) <= HEAD + END else f"{fault[:HEAD]} ... {fault[-END:]}"
-    return (
-        text
-        if text.isprintable()
-        else "".join(character if character.isprintable() else ascii(character)[1:-1] for character in text)
-    )
+    return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 def ragged(value: Any) -> bool:

@@ -1,4 +1,4 @@
-"""YAML from anybody: no objects, no bombs of aliases, and no number that two versions of YAML read differently."""
+"""Read YAML of unknown origin: no objects, no bombs of aliases, and no number that two versions of YAML read differently."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ PLAIN = {f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "int", "float"
 
 
 def parsed(text: str) -> Any:
-    """What a YAML text says, in plain tables, lists, texts and numbers.
+    """Parse a YAML text into plain tables, lists, texts and numbers.
 
     Args:
-        text: In YAML 1.1, or in 1.2 where the two agree.
+        text: YAML 1.1, or 1.2 where the two agree.
 
     Returns:
         Its only document.
@@ -60,7 +60,7 @@ def parsed(text: str) -> Any:
 
 
 def _depth(text: str) -> int:
-    """How deep brackets are open in a text, those within its words as well: PyYAML's time grows with it."""
+    """Largest depth of open brackets in a text, those in words included: PyYAML's time grows with it."""
     depth = deepest = 0
     for bracket in re.finditer(r"[\[\]{}]", text):
         depth += 1 if bracket[0] in "[{" else -1
@@ -70,30 +70,30 @@ def _depth(text: str) -> int:
 
 @functools.cache
 def _loader(yaml: Any) -> Any:
-    """PyYAML's safe loader, in Python: the one in C calls itself as deep as a text is, and crashes."""
+    """PyYAML's safe loader in Python: the one in C recurses as deep as the text is nested, and crashes."""
 
     class Loader(yaml.SafeLoader):
-        """With numbers such as 1e3, which YAML 1.2 has."""
+        """PyYAML's safe loader that also reads numbers such as 1e3, as YAML 1.2 does."""
 
     Loader.add_implicit_resolver("tag:yaml.org,2002:float", EXPONENT, list("-+.0123456789"))
     return Loader
 
 
 def _look(yaml: Any, faults: Faults, root: Any) -> None:
-    """Note what is refused of a tree of nodes, before anything is made of it."""
+    """Note everything refused in a tree of nodes, before any object is constructed from it."""
     sizes: dict[int, int] = {}
     _size(yaml, root, sizes, set())
     if sizes[id(root)] > MOST_VALUES:
-        what = f"are {sizes[id(root)]:,} with every alias (*name) written out"
-        faults.add("values", "...", what, f"give at most {MOST_VALUES:,}")
+        problem = f"are {sizes[id(root)]:,} with every alias (*name) written out"
+        faults.add("values", "...", problem, f"give at most {MOST_VALUES:,}")
         return
-    seen: set[int] = set()
+    visited: set[int] = set()
     waiting = [root]
     while waiting:
         node = waiting.pop()
-        if id(node) in seen:
+        if id(node) in visited:
             continue
-        seen.add(id(node))
+        visited.add(id(node))
         if isinstance(node, yaml.MappingNode):
             _check_keys(yaml, faults, node)
             waiting += [child for pair in reversed(node.value) for child in reversed(pair)]
@@ -106,7 +106,7 @@ def _look(yaml: Any, faults: Faults, root: Any) -> None:
 
 
 def _size(yaml: Any, node: Any, sizes: dict[int, int], above: set[int]) -> int:
-    """How many values a node has, aliases written out. Raises SceneError where one holds itself."""
+    """Number of values of a node, aliases written out. Raises SceneError where a node contains itself."""
     if id(node) in above:
         raise SceneError([f"YAML: {_line(node)}: holds itself by an alias; write it out"])
     if id(node) not in sizes:
@@ -148,7 +148,7 @@ def _check_scalar(faults: Faults, node: Any) -> None:
 
 
 def _is_merge(node: Any) -> bool:
-    """Whether it is the key of a merge, <<."""
+    """Tell whether a node is the key of a merge, <<."""
     return bool(node.tag == "tag:yaml.org,2002:merge")
 
 

@@ -118,7 +118,7 @@ def _add_sensitivity(verbs: Any) -> None:
     """Add the verb sensitivity with its arguments."""
     verb = verbs.add_parser(
         "sensitivity",
-        help="what of that which varies matters: Sobol indices or Morris screening; .txt, .csv, .json, .png",
+        help="which of the varied parameters matter: Sobol indices or Morris screening; .txt, .csv, .json, .png",
     )
     verb.add_argument("scene", metavar="SCENE", help="scene file (TOML) with [ensemble.vary]")
     verb.add_argument("--of", metavar="Q", action="append", help='quantity of interest: "position[2]" (the default), '

@@ -119,7 +119,7 @@ def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:
     """
     if chosen.error is None:
         if chosen.of is not None:
-            raise SceneError([f"--of {chosen.of}: says what --error is of, which is missing; add --error 1e-3"])
+            raise SceneError([f"--of {chosen.of}: has no effect without --error; add --error 1e-3"])
         return None
     if not (isinstance(scene.run.keep, str) and scene.run.keep == "all") or scene.run.until is not None:
         raise SceneError(

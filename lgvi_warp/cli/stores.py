@@ -25,9 +25,9 @@ def merge(chosen: argparse.Namespace) -> int:
     folder = put_together(chosen.dirs, chosen.out, chosen.overwrite)
     if not folder.complete:
         blocks = len(folder.unfinished())
-        missing_text = f"{blocks} of {len(folder.runs)} blocks are in none of the folders; lgvi-warp resume {folder.path} runs them"
-        kept_text = f"the members that it keeps are missing; lgvi-warp resume {folder.path} runs them, or says why not"
-        told([f"{folder.path}: {missing_text if blocks else kept_text}"])
+        missing = f"{blocks} of {len(folder.runs)} blocks are in none of the folders; lgvi-warp resume {folder.path} runs them"
+        kept = f"the members that it keeps are missing; lgvi-warp resume {folder.path} runs them, or says why not"
+        told([f"{folder.path}: {missing if blocks else kept}"])
     elif not chosen.quiet:
         print(f"file        {folder.path} ({size_of(folder.path) / 1e6:.1f} MB), complete")
     return 0 if folder.complete else 1

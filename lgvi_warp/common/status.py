@@ -56,10 +56,11 @@ _TEXT = {
     "shorten the step, or use psi_s or psi_x, which treat drag implicitly",
     Status.STEP_TOO_SMALL: "the steps that the tolerance asks for became too small, or too many (100,000 within one h); "
     "loosen rtol or atol (float32 reaches about 1e-6), or look for forces that jump or are stiff",
-    Status.ENERGY_GREW: "energy came from nowhere, more than 100 times what there was to exchange, though no force of the "
-    "scene creates any: the method is unstable at this step; shorten it (result.warnings tells what is too fast)",
-    Status.BACKWARD_DRAG: "drag became too strong for the stages of the composition that go backward: their drag number, "
-    "(back) (l + q|v|) / I, passed 0.5, and at 1 drag has no past; use the method that is composed, or shorten the step",
+    Status.ENERGY_GREW: "the total energy grew to more than 100 times the energy available, although no force of the scene "
+    "supplies any: the method is unstable at this step; shorten it (result.warnings tells what is too fast)",
+    Status.BACKWARD_DRAG: "this composition takes some stages with a negative step, and the drag is too strong to be "
+    "integrated backward: their drag number, (back) (l + q|v|) / I, passed 0.5; use the method that is composed, or shorten "
+    "the step",
     Status.SURFACE: "stopped by an event: rose to the surface",
     Status.FLOOR: "stopped by an event: sank to the sea floor",
     Status.BOX: "stopped by an event: left the box",
@@ -139,8 +140,8 @@ _WARNING_TEXT = {
     "limit of stability; shorten the step",
     Warnings.RESTORING_UNSTABLE: "the restoring moment's oscillation is too fast for this method and step: h sqrt(B|r|/J) "
     "passed the measured limit of stability; shorten the step",
-    Warnings.ENERGY: "energy came from nowhere, more than half of what there was to exchange, though no force of the scene "
-    "creates any; shorten the step",
+    Warnings.ENERGY: "the total energy grew by more than half of the energy available, although no force of the scene "
+    "supplies any; shorten the step",
 }
 
 _WARNING_VALUE = {

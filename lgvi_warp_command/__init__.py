@@ -9,7 +9,7 @@ def entry() -> None:
     """Run the command as the console script does: install signal handlers, then import the rest."""
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
-        # What is ignored, as by nohup, stays ignored.
+        # An ignored signal, as under nohup, stays ignored.
         if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(number, _end)
     from lgvi_warp.cli import entry as command

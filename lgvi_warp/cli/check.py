@@ -47,7 +47,7 @@ def _settings(ensemble: Any) -> tuple[str, tuple[str, ...]]:
     if missing:
         return members, (f"{' and '.join(missing)}: not given, so the method was not looked at; a run wants it",)
     method = run.method_of(run.method)
-    if method.iterations == "auto":  # is found by a run
+    if method.iterations == "auto":  # found only by a run
         method = replace(method, iterations=None)
     plan = make_plan(ensemble, method)
     return f"{members}, {method.name}, step {plan.grid.h:g} s, {plan.grid.steps:,} steps", plan.grid.messages

@@ -67,7 +67,7 @@ def code_of(error: BaseException, chosen: argparse.Namespace, signals: Signals) 
     Raises:
         BaseException: The error itself, where it is neither the user's fault nor the system's.
     """
-    # What libraries make of an interrupt while they are imported may be any exception.
+    # A library may turn an interrupt during its import into any exception.
     if isinstance(error, KeyboardInterrupt) or signals.number is not None:
         text, code = f"{signals.text}; {error if isinstance(error, Ended) else left(chosen)}", signals.exit_code
     elif isinstance(error, SceneError):
@@ -110,14 +110,14 @@ def entry() -> None:
     every file is closed already.
     """
     gc.disable()
-    for descriptor in range(3):  # one that is closed would become that of a file
+    for descriptor in range(3):  # a closed one would be given to the next file opened
         try:
             os.fstat(descriptor)
         except OSError:
             os.open(os.devnull, os.O_RDWR)
     try:
         code = main()
-    except SystemExit as end:  # of the parser
+    except SystemExit as end:  # raised by the parser
         code = end.code if isinstance(end.code, int) else 0
     if warp_setup := sys.modules.get("lgvi_warp.common.warp_setup"):
         warp_setup.end()

@@ -24,7 +24,11 @@ class Progress:
         self._lock, self._shown = threading.Lock(), False
 
     def __call__(self, fraction: float) -> None:
-        """Take note of the fraction of the work that is done."""
+        """Show the fraction done, at most once per interval.
+
+        Args:
+            fraction: Part of the work that is done, 0 to 1.
+        """
         now = time.perf_counter() - self._start
         with self._lock:
             if now - self._last < self._interval:

@@ -67,7 +67,7 @@ def complete(result: Any) -> bool:
     return Folder(result.store).complete
 
 
-# Plots and drift are of so many numbers at most, of the first members: a store may be larger than the memory.
+# Most numbers in pictures and drift, which then cover the first members: a store may be larger than the memory.
 MOST_DRAWN = 30_000_000
 
 
@@ -122,7 +122,7 @@ def write(result: Any, drawn: Any, out: Path) -> Written:
 def _in_turn(out: Path) -> Iterator[None]:
     """Let runs that end together in one folder write one after another, so that all files are of one of them."""
     with contextlib.ExitStack() as stack:
-        with contextlib.suppress(OSError):  # a folder that takes no file: each file says so
+        with contextlib.suppress(OSError):  # a folder that cannot be written: each file reports it
             stack.enter_context(write_lock(out / "result", wait=True))
         yield
 
@@ -173,7 +173,7 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
     return "\n".join(lines)
 
 
-# What may be conserved: its name in words and its unit.
+# Quantities that may be conserved -> name in words, unit.
 INVARIANTS = {
     "energy": ("energy", "J"),
     "horizontal_momentum": ("horizontal momentum", "N s"),

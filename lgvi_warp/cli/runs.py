@@ -14,7 +14,7 @@ from lgvi_warp.cli.settings import block_range, folder, overrides, store_setting
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.common.errors import Interrupted, MembersFailed, SceneError
 
-# The file of a result in memory, and that of a part of one where such a file is there.
+# File of a result in memory, and of an interrupted one where that file exists already.
 RESULT, PART = "result.npz", "result_part.npz"
 
 
@@ -58,7 +58,7 @@ def run(chosen: argparse.Namespace) -> int:
         faults = report(result, out, chosen.quiet, begun) + failures
     except KeyboardInterrupt as error:
         if str(out / RESULT) in str(error):
-            raise  # it is written
+            raise  # already saved
         raise Ended(rescued(result, out)) from error
     if suggested:
         faults += check_error(scene, result, suggested, chosen.quiet)
@@ -77,7 +77,7 @@ def rescued(result: Any, out: Path) -> str:
     """
     if result.store is not None:
         return f"the run is finished: its pictures are made by lgvi-warp resume {result.store.parent}"
-    # The result of another run that is there stays.
+    # Keep an existing result of another run.
     path = next(path for path in (out / RESULT, out / PART) if path.name == PART or not path.exists())
     n, total = result.members, result.provenance["ensemble"]["members"]
     members = (
@@ -177,7 +177,7 @@ def _import_in_background() -> threading.Thread:
             try:
                 importlib.import_module(name)
             except ImportError:
-                return  # whoever needs it says so, and how to get it
+                return  # the view that needs it reports it, with the remedy
 
     thread = threading.Thread(target=load, name="imports", daemon=True)
     thread.start()

@@ -10,7 +10,7 @@ from typing import Any
 
 from lgvi_warp.common.errors import SceneError
 
-# The store in a run's folder.
+# Name of the store in a run's folder.
 RUN = "run.zarr"
 # Command-line option -> key of the scene file that it replaces.
 OPTIONS = {
@@ -100,7 +100,7 @@ def out_of(chosen: argparse.Namespace, suffix: str = "") -> Path:
         The folder, which is not made.
     """
     name = Path(chosen.scene).stem
-    # A file called "...toml" would mean the folder above.
+    # A file called "...toml" would give "..", the parent folder.
     return chosen.out or Path("runs") / f"{name if name.strip('.') else 'scene'}{suffix}"
 
 

@@ -13,7 +13,7 @@ from types import FrameType
 from typing import Any, TextIO
 
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
-# What the system says of a terminal or a pipe that nobody reads any more.
+# Errors of a terminal or a pipe that nobody reads any more.
 GONE = {errno.EPIPE, errno.EIO, errno.ESHUTDOWN}
 
 
@@ -38,11 +38,11 @@ class Signals:
     def __init__(self, left: Callable[[], str]):
         self._left = left
         self._before: dict[int, Any] = {}
-        # The first signal heard; None without.
+        # Number of the first signal heard; None without one.
         self.number: int | None = None
-        # Whether a line has said so.
+        # Whether the end has been reported.
         self.said = False
-        # Of the signals that come, the one that ends the process at once.
+        # Count of the signal that ends the process at once.
         self._last = 2
 
     def __enter__(self) -> Signals:

@@ -52,7 +52,7 @@ def export(chosen: argparse.Namespace) -> int:
     return 0
 
 
-# Lines on damage.
+# Most lines on damage.
 MOST_SAID = 20
 
 

@@ -115,7 +115,7 @@ def stability(chosen: argparse.Namespace) -> int:
         )
     changes = overrides(chosen)
     scene = Scene.load(chosen.scene, changes)
-    # Of the random directions: all that the scene's ensemble has to say here.
+    # Seed of the random directions, the only setting of the scene's ensemble that is used here.
     seed = scene.ensemble_settings.seed if scene.ensemble_settings else 0
     out = folder(chosen, "_stability")
     from lgvi_warp.studies.stability.map import GRIDS, report_text, stability_map

@@ -12,7 +12,7 @@ from typing import Any
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw
 
-# A signal that comes just before the main thread begins to wait is heard so much later [s].
+# Longest delay of a signal that arrives just before the main thread begins to wait [s].
 PERIOD = 0.2
 
 
@@ -111,7 +111,7 @@ def side_by_side(writers: Mapping[Path, Callable[[Path], Path]]) -> dict[Path, F
         pool.shutdown()
     except KeyboardInterrupt:
         pool.shutdown(cancel_futures=True)
-        while len(begun) > len(ended):  # the pool does not know of a thread that it was just starting
+        while len(begun) > len(ended):  # the pool does not wait for a thread that it was just starting
             time.sleep(0.01)
         raise (Ended(f"written: {', '.join(map(str, finished))}") if finished else KeyboardInterrupt()) from None
     return jobs

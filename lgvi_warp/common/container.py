@@ -55,9 +55,9 @@ def _folders(root: Path, own: Path, controller: str) -> Iterator[Path]:
             continue
         top = _top(root, names, controller)
         group = Path(path.strip().strip("/"))
-        if ".." in group.parts:  # a group outside of the container's own namespace
+        if ".." in group.parts:  # outside the container's own namespace
             group = Path()
-        yield from (folder for part in (group, *group.parents) if (folder := top / part).is_dir())
+        yield from (folder for parent in (group, *group.parents) if (folder := top / parent).is_dir())
 
 
 def _top(root: Path, names: str, controller: str) -> Path:

@@ -13,11 +13,11 @@ import numpy as np
 
 from lgvi_warp.common.real_numbers import NotReal, holds_words, real_numbers
 
-# So many faults are said one by one, the rest are counted: a file may have a million of them.
+# Most faults in one message; the rest are only counted, since a file may have a million of them.
 MOST_FAULTS = 20
-# Characters of one fault: its head, and its end, which has the remedy.
+# Characters kept of a long fault: its beginning, and its end, which has the remedy.
 HEAD, END = 1500, 500
-# Characters of a value, and of a name, in a message.
+# Most characters of a value, and of a name, in a message.
 LONGEST_VALUE, LONGEST_NAME = 80, 200
 
 
@@ -101,7 +101,7 @@ class MissingExtra(ImportError):  # noqa: N818
         self.library, self.extra = library, extra
 
 
-# So many of the names that are known are said.
+# Most known names in one message.
 MOST_KNOWN = 60
 
 
@@ -383,7 +383,7 @@ class Faults:
             The matrix, float64, shape (size, size), exactly symmetric; None after a fault.
         """
         if holds_words(value):
-            self.finite(key, value, (size,), unit)  # says so
+            self.finite(key, value, (size,), unit)  # notes the fault
             return None
         if ragged(value):
             array = np.zeros(0)
@@ -403,7 +403,7 @@ class Faults:
         if np.abs(matrix - matrix.T).max() > 1e-9 * np.abs(matrix).max():
             self.add(key, value, "is not symmetric", "give a symmetric matrix")
             return None
-        # What is symmetric keeps its bits, subnormal and largest numbers too.
+        # Symmetric entries keep their bits, also where halving would underflow or the sum overflow.
         return np.where(matrix == matrix.T, matrix, 0.5 * matrix + 0.5 * matrix.T)
 
     def __bool__(self) -> bool:

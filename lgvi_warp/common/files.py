@@ -18,9 +18,9 @@ import numpy as np
 from lgvi_warp.common import safe_files, scratch
 from lgvi_warp.common.scratch import UNFINISHED
 
-# A file at least so large goes to the disk as soon as it is written: the disk has work while others are made.
+# Files of at least this size are synced as soon as they are written, so that the disk works while others are made [bytes].
 EARLY_BYTES = 200_000
-# Syncs side by side, and large files that may wait for theirs: enough for any disk, few enough for the system's memory.
+# Most concurrent syncs, and most large files waiting for one: enough for any disk, few enough for the memory.
 SYNCS, MOST_WAITING = 16, 32
 
 
@@ -37,7 +37,7 @@ def checksum(data: Any, before: int = 0) -> int:
     import google_crc32c
 
     view = memoryview(data)
-    # The extension takes an array, and no memoryview.
+    # The extension takes an array, but no memoryview.
     return int(google_crc32c.extend(before, np.frombuffer(view, np.uint8))) if view.nbytes else before
 
 
@@ -125,7 +125,7 @@ class Files:
 
     def __init__(self, root: Path):
         self._root = root
-        # Where each lies, what it will be called, and its sync if that has begun.
+        # Temporary path, later path, and the sync if it has begun.
         self._waiting: list[tuple[Path, Path, Future[None] | None]] = []
         self.sums: dict[str, list[int]] = {}
 
@@ -207,7 +207,7 @@ def finish_together(several: Sequence[Files]) -> list[OSError | None]:
     Returns:
         For each set, None or the error for which it is not in its place.
     """
-    # Syncs that run side by side share the file system's commits.
+    # Concurrent syncs share the file system's commits.
     for files in several:
         files.sync()
     errors: list[OSError | None] = []
@@ -359,7 +359,7 @@ def put_folder(beside: Path, target: Path) -> None:
     if not target.exists():
         beside.replace(target)
     elif not _exchanged(beside, target):
-        # Two steps where the system has no exchange: a crash between them is mended by `restored`.
+        # Two steps where the system cannot exchange folders: `restored` mends a crash between them.
         old = scratch.beside(target, scratch.OLD)
         target.replace(old)
         beside.replace(target)
@@ -417,7 +417,7 @@ def locked(path: Path, wait: bool = False) -> Iterator[bool]:
         try:
             yield True
         finally:
-            # A child that was forked meanwhile holds the same lock: to close it here alone would not release it.
+            # A child forked meanwhile holds the same lock: closing it here would not release it.
             with contextlib.suppress(OSError):
                 fcntl.flock(descriptor, fcntl.LOCK_UN)
     finally:

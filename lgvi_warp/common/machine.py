@@ -13,7 +13,7 @@ import numpy as np
 
 from lgvi_warp.common import container
 
-# What a run's dtype may be -> the type of the kernel's numbers. Compensated: a state of sums of two numbers.
+# A run's dtype -> type of the kernel's numbers. Compensated: each number of the state is a sum of two.
 DTYPES = {"float64": "float64", "float32": "float32", "float32_compensated": "float32"}
 
 REGISTER_BYTES = {"avx512": 64, "avx2": 32, "other": 16}

@@ -5,9 +5,9 @@ from __future__ import annotations
 import unicodedata
 from collections.abc import Iterable
 
-# A folder is called "name.field": with the longest field it stays well below the 255 bytes of file systems.
+# A folder is called "name.field"; with the longest field it stays well below the 255 bytes that file systems allow.
 MOST_NAME_BYTES = 100
-# What Windows takes for devices, in folders' names too, whatever follows a point.
+# Names that Windows reserves for devices, for folders too, whatever follows a point.
 DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(10))}
 BESIDE = " _-."
 RULE = "give letters, digits, _, - and points"

@@ -21,7 +21,7 @@ import numpy as np
 from lgvi_warp.common import safe_files
 
 KINDS = "biufU"
-# A list of files in an .npz, and how many there are: a result has some tens, with statistics some hundreds.
+# Most bytes of an .npz's list of files, and most arrays: a result has some tens, with statistics some hundreds.
 MOST_LIST, MOST_ARRAYS = 4_000_000, 20_000
 
 
@@ -158,6 +158,6 @@ def _arrays(archive: zipfile.ZipFile, file: _Careful, size: int) -> dict[str, np
     for member in members:
         with archive.open(member) as stream:
             arrays[member.filename.removesuffix(".npy")] = read(stream, member.file_size)
-            if stream.read(1):  # to the end, where the checksum is compared
+            if stream.read(1):  # zipfile compares the checksum at the end
                 raise ValueError(f"{member.filename} is longer than its array")
     return arrays

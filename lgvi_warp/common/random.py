@@ -7,11 +7,9 @@ import hashlib
 
 import numpy as np
 
-# Standard deviations beyond which the tail of a normal is known by its logarithm.
+# Standard deviations beyond which a normal's tail is computed from its logarithm.
 FAR = -20.0
-
-
-# Between two members that are asked for, it costs less to draw so many others than to start again.
+# Largest gap between two members over which drawing the members between costs less than a new start of the generator.
 NEAR = 64
 
 

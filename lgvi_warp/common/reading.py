@@ -8,8 +8,8 @@ from pathlib import Path
 
 from lgvi_warp.common.errors import SceneError
 
-# Bytes of the largest file of each kind. A scene, and coefficients in YAML or XML, are written by hand or by a script: the
-# parsers read a megabyte or two a second (TOML), and a tenth of that (YAML). A table may hold millions of numbers.
+# Largest size of each kind of file [bytes]. Scenes and coefficients (YAML, XML) are written by hand or by a script; parsers
+# read one or two megabytes a second of TOML, and a tenth of that of YAML. A table may hold millions of numbers.
 MOST_BYTES = {"scene file": 1 << 20, "YAML file": 128 << 10, "CSV file": 512 << 20}
 MOST_OTHERS = 16 << 20
 PATHS = {"scene file": "give the path of a TOML file", "CSV file": "give the path of a CSV file"}
@@ -52,7 +52,7 @@ def file_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
     """
     remedy, most = PATHS.get(kind, OTHER_PATHS), MOST_BYTES.get(kind, MOST_OTHERS)
     try:
-        # Looked at before it is opened: to open a device may do something. Nothing here waits for a pipe's other end.
+        # Checked before it is opened, since opening a device may have effects. Nothing here waits for a pipe's other end.
         _refuse(os.stat(path), kind)
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
         with os.fdopen(descriptor, "rb") as file:

@@ -108,7 +108,7 @@ def column_names(value: Any) -> list[Any] | None:
     return None
 
 
-# NumPy's arrays have no more dimensions than that.
+# Most dimensions of NumPy's arrays.
 DEEPEST = 64
 
 

@@ -16,7 +16,7 @@ from typing import Any, BinaryIO
 
 from lgvi_warp.common.errors import SceneError
 
-# A JSON file of a store is a few kilobytes; one with millions of indices has some tens of megabytes.
+# Most bytes of a JSON file: a store's has a few kilobytes, with millions of indices some tens of megabytes.
 MOST_JSON = 64_000_000
 BY_DESCRIPTOR = os.open in os.supports_dir_fd and os.rename in os.supports_dir_fd and hasattr(os, "O_NOFOLLOW")
 _PLAIN = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
@@ -116,7 +116,7 @@ def opened(root: Path, key: str) -> Iterator[BinaryIO]:
     path = root / key
     with folder(root, path.parent) as inside:
         where: Any = path if inside is None else path.name
-        # A device is not even opened: that alone may do something.
+        # A device is not even opened, since that may have effects.
         _check_file(os.stat(where, dir_fd=inside, follow_symlinks=False).st_mode, path)
         try:
             descriptor = os.open(where, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | _PLAIN, dir_fd=inside)
@@ -233,7 +233,7 @@ def rename(root: Path, path: Path, target: Path) -> None:
             os.replace(path.name, target.name, src_dir_fd=inside, dst_dir_fd=inside)
 
 
-# Folders within folders: a run has two of them, one with kept members four.
+# Most nested folders: a run has two levels, one with kept members four.
 MOST_DEEP = 8
 
 

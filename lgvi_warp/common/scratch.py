@@ -11,7 +11,7 @@ import socket
 import stat
 from pathlib import Path
 
-# A file that is being written, a folder that will take the place of another, and the one that it took the place of.
+# Endings of an unfinished file, of a new folder, and of the folder that it replaced.
 UNFINISHED, NEW, OLD = ".part", ".new", ".old"
 # HOST-NAMESPACE-PID-TOKEN; versions before 0.2 wrote HOST-PID.
 MARK = re.compile(r"(?P<host>[^/]+?)-(?:(?P<space>\d+)-)?(?P<pid>\d+)(?:-[0-9a-f]{8})?")
@@ -58,7 +58,7 @@ def is_alive(pid: int) -> bool:
         os.kill(pid, 0)
     except ProcessLookupError:
         return False
-    except (OSError, OverflowError):  # it is another user's
+    except (OSError, OverflowError):  # another user's process
         return True
     return True
 

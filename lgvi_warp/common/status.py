@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-# What solve and [run] may ask for (see solve).
+# Values of `checks` and `on_failure` in solve and in a scene's [run].
 CHECKS = ("none", "safe", "all")
 ON_FAILURE = ("freeze", "raise", "substep")
 
@@ -244,5 +244,5 @@ def stop_time(result: Any) -> np.ndarray:
     return np.where(np.asarray(result.status) != Status.OK, np.asarray(result.failure_time), np.inf)
 
 
-# A sample at a member's last time counts as its own, whatever the two were rounded to.
+# Relative tolerance by which a sample at a member's last time still counts as the member's own, despite round-off.
 ROUNDING = 1e-12

@@ -8,17 +8,17 @@ from typing import Any
 
 from lgvi_warp.common.errors import Faults, SceneError
 
-# Tables and lists within one another: a scene has six.
+# Most levels of nested tables and lists: a scene has six.
 DEEPEST = 24
-# Points of one key: tomllib's time grows with their square.
+# Most points in one key: tomllib's time grows with their square.
 MOST_DOTS = 8
 _PART = r"""(?:[\w\-]{1,200}|"(?:[^"\\\n]|\\.){0,200}"|'[^'\n]{0,200}')"""
 DOTTED = re.compile(rf"""(?<![\w\-"'\\]){_PART}(?:[ \t]{{0,200}}\.[ \t]{{0,200}}{_PART}){{{MOST_DOTS}}}""")
-# Tables: a term is one.
+# Most tables: each term is one.
 MOST_TABLES = 5000
 TABLE = re.compile(r"^[ \t]*\[[^,\n]*\][ \t]*(?:#.*)?$", re.MULTILINE)
 LONGEST_KEY, LONGEST_TEXT = 200, 4096
-# TOML's whole numbers.
+# Range of TOML's whole numbers.
 LEAST, MOST = -(2**63), 2**63 - 1
 
 
@@ -45,7 +45,7 @@ def parsed(text: str, name: str) -> dict[str, Any]:
         raise SceneError([f"{name} is not TOML: {error}; mend that line"]) from error
     except RecursionError:
         raise SceneError([_deep(name)]) from None
-    except ValueError:  # Python reads no whole number of some thousand digits
+    except ValueError:  # Python refuses whole numbers of several thousand digits
         raise SceneError(
             [f"{name}: has a whole number of thousands of digits; write it with a point: 1.0e20"]
         ) from None

@@ -23,7 +23,7 @@ def _native_stderr_closed() -> Iterator[None]:
         sys.stderr.flush()
     try:
         stderr_copy = os.dup(2)
-    except OSError:  # it is closed already
+    except OSError:  # already closed
         yield
         return
     null_device = os.open(os.devnull, os.O_WRONLY)
@@ -46,8 +46,8 @@ def _has_cuda_driver() -> bool:
     return False
 
 
-# Warp is started, builds and launches kernels for one thread at a time. A fork waits for it, so that a child finds Warp at
-# rest.
+# Held while Warp starts, builds or launches kernels: one thread at a time. A fork waits for it, so that Warp is idle in the
+# child.
 build_lock = threading.RLock()
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(
@@ -64,7 +64,7 @@ def start() -> None:
     Raises:
         OSError: The folder of Warp's kernel cache cannot be made; the message names it and WARP_CACHE_PATH.
     """
-    # Two threads that close and open stderr together would leave it closed.
+    # Two threads that redirect stderr at once would leave it closed.
     with build_lock:
         _start()
 
@@ -80,7 +80,7 @@ def _start() -> None:
     except OSError as error:
         cache, wp.config.kernel_cache_dir = wp.config.kernel_cache_dir, chosen
         if error.errno is None or cache is None:
-            raise  # one of Warp's libraries
+            raise  # an error of Warp's own libraries
         raise unusable(cache, error) from error
 
 

@@ -19,7 +19,7 @@ from typing import Any
 from lgvi_warp.common import scratch
 from lgvi_warp.common.errors import SceneError
 
-# What a file system without locks says.
+# Errors of file systems without locks.
 WITHOUT_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL}
 KEYS = {"pid", "host", "since"}
 # Descriptors of locks that this process holds.
@@ -84,7 +84,7 @@ def _taken(path: Path, target: Path, wait: bool) -> int:
                 raise SceneError(
                     [f"{target}: another run is writing into it{_told(descriptor)}; wait for it, or end it"]
                 )
-            # Who held it before may have removed the file that was opened here.
+            # The previous holder may have removed the file that was opened here.
             if _is_still(path, descriptor):
                 _sign(descriptor)
                 return descriptor

@@ -9,14 +9,14 @@ from typing import Any
 
 from lgvi_warp.common.errors import Faults, SceneError
 
-# Values after every alias is written out: coefficients of a vehicle are some hundreds.
+# Most values with every alias written out: a vehicle has some hundreds of coefficients.
 MOST_VALUES = 20_000
-# YAML 1.1 reads these as octal, and in base 60; YAML 1.2 as 10 and as a text.
+# YAML 1.1 reads these as octal and in base 60; YAML 1.2 as decimal and as a text.
 OCTAL = re.compile(r"[-+]?0[0-9_]+")
 SIXTIES = re.compile(r"[-+]?[0-9][0-9_]*(:[0-5]?[0-9])+(\.[0-9_]*)?")
-# What YAML 1.2 reads as a number, and 1.1 as a text: without a point, or without a sign after the e.
+# YAML 1.2 reads these as numbers, 1.1 as texts: without a point, or without a sign after the e.
 EXPONENT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)[eE][-+]?[0-9]+")
-# Brackets within brackets.
+# Most levels of nested brackets.
 DEEPEST = 50
 DEEP = "YAML: is nested too deep; write mass: ..., added_mass: ..."
 PLAIN = {f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "int", "float", "str", "seq", "map")}
@@ -55,7 +55,7 @@ def parsed(text: str) -> Any:
         raise SceneError([DEEP]) from None
     except yaml.YAMLError as error:
         raise SceneError([f"YAML: {' '.join(str(error).split())}; mend that line"]) from None
-    except Exception as error:  # PyYAML lets through whatever int(), float() and dates raise
+    except Exception as error:  # PyYAML passes on what int(), float() and dates raise
         raise SceneError([f"YAML: has a value that is none ({type(error).__name__}: {error}); mend it"]) from None
 
 

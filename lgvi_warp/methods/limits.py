@@ -19,10 +19,10 @@ from lgvi_warp.methods.method import Method
 if TYPE_CHECKING:
     pass
 
-# Largest h |Omega| of methods that turn about the axes, before their turns are inaccurate.
+# Largest h |Omega| at which methods that turn about the axes are still accurate.
 TURNS = 1.0
 
-# Method, or composition -> largest stable h w. Gauss collocation has none: what its iteration does not bear has a status.
+# Method or composition -> largest stable h w. Gauss collocation has no entry: a status reports where its iteration fails.
 MUNK: dict[str, float] = {
     "phi": 1.41, "phi_adjoint": 1.41, "psi": 1.52, "psi_s": 2.14, "psi_1": 2.00, "psi_x": 2.19, "psi_x8": 2.19,
     "psi_w": 2.14, "rk4": 2.44, "rk5": 2.22, "rk8": 2.65, "cg3": 1.69, "rkmk4": 2.44, "rkn4_6": 4.76,
@@ -67,7 +67,7 @@ def oscillation_limit(method: Method, table: Mapping[str, float]) -> float:
         stage. Infinite where a status reports the failure instead.
     """
     if method.gauss or method.adaptive:
-        # What the iteration of the stages, or the choice of the step, does not bear has a status.
+        # A status reports where the iteration of the stages, or the step control, fails.
         return np.inf
     match = re.fullmatch(r"(\w+)\((\w+)\)", method.name)
     if match is None:

@@ -23,21 +23,21 @@ PROGRAMS: dict[str, Program] = {
     "psi": (("Ab", 0.5), ("D", 0.5), ("K", 0.5), ("Ap", 1.0), ("K", 0.5), ("D", 0.5), ("Ab", 0.5)),
     "psi_s": (("T", 0.5), ("D", 0.5), ("K", 1.0), ("D", 0.5), ("T", 0.5)),
     "psi_1": (("K", 0.5), ("T", 0.5), ("D", 1.0), ("T", 0.5), ("K", 0.5)),
-    # Turns about the axes instead of D, which solves no equation; R2 twice as often for slender bodies (psi_x8).
+    # Turns about the axes instead of D: no equation to solve. psi_x8 turns about axis 2 twice as often, for slender bodies.
     "psi_x": (("T", 0.5), ("R1", 0.5), ("R2", 0.5), ("R3", 0.5), ("K", 1.0), ("R3", 0.5), ("R2", 0.5), ("R1", 0.5),
               ("T", 0.5)),
     "psi_x8": (("T", 0.5), ("R1", 0.5), ("R2", 0.25), ("R3", 0.5), ("R2", 0.25), ("K", 1.0), ("R2", 0.25), ("R3", 0.5),
                ("R2", 0.25), ("R1", 0.5), ("T", 0.5)),
-    # The coupled Moser-Veselov rotation W: as D, for M and J coupled.
+    # The coupled Moser-Veselov rotation W replaces D where M and J are coupled.
     "psi_w": (("T", 0.5), ("W", 0.5), ("K", 1.0), ("W", 0.5), ("T", 0.5)),
 }  # fmt: skip
-# With nonconservative forces the paper's own maps, whole: equations (15), (16).
+# With nonconservative forces the paper's maps act undivided: equations (15), (16).
 FORCED: dict[str, Program] = {
     "phi": (("Phi", 1.0),),
     "phi_adjoint": (("Phi*", 1.0),),
     "psi": (("Phi", 0.5), ("Phi*", 0.5)),
 }
-# Explicit methods, which know no sub-maps. KINDS: those that keep R on the group (see lgvi_kernels.explicit).
+# Explicit methods have no sub-maps. KINDS: those that keep R on the group (see lgvi_kernels.explicit).
 EXPLICIT: dict[str, Tableau] = {"rk4": RK4, "rk5": DOPRI5, "rk8": DOP853, "cg3": CG3, "rkmk4": RK4}
 KINDS = {"cg3": "group", "rkmk4": "munthe_kaas"}
 ORDERS = {"phi": 1, "phi_adjoint": 1, "psi": 2, "psi_s": 2, "psi_1": 2, "psi_x": 2, "psi_x8": 2, "psi_w": 2} | {
@@ -66,10 +66,10 @@ TWO_PART: dict[str, tuple[int, str, tuple[float, ...]]] = {
 }  # fmt: skip
 PARTS: dict[str, Program] = {"A": (("A", 1.0), ("B", 1.0)), "B": (("B", 1.0), ("A", 1.0))}
 
-# Gauss collocation, which solves for all of the state at once: name -> stages; the order is twice as many.
+# Gauss collocation, which solves for the whole state at once: name -> number of stages, half the order.
 GAUSS = {"gauss4": 2, "gauss6": 3, "gauss8": 4, "gauss10": 5, "gauss12": 6}
 
-# One sub-map of the letter may be divided in two, or two joined: each is the flow of something.
+# Sub-maps that are exact flows: one may be divided in two, or two joined.
 FLOWS = ("T", "K", "Ab", "Ap")
 
 SOLVERS = ("quartic", "cayley", "newton", "moser_veselov")
@@ -334,7 +334,7 @@ class Method:
         """
         c, g = lead or 0.0, self.stages
         if self.two_part:
-            # From `first` in turn, and back to it: its last number has no other after it.
+            # The parts alternate, beginning and ending with `first`: no number of the other follows its last one.
             first, second = g[0::2], g[1::2]
             if lead is None:
                 return (*g, 0.0), (0.0,) * (len(first) + 1)

@@ -13,9 +13,9 @@ from lgvi_warp.common.errors import Faults
 
 FIELDS = ("position", "attitude", "velocity", "angular_velocity")
 
-# A step more than this many times shorter than the one asked for is refused, not silently taken.
+# A grid whose step would be more than this many times shorter than the one asked for is refused.
 MOST_SHORTENING = 20
-# Samples that a run keeps at most: of one member they are 1.4 GB.
+# Most samples of a run: 1.4 GB for one member.
 MOST_SAMPLES = 10_000_000
 
 
@@ -136,6 +136,6 @@ def time_grid(h: float, t1: float, save: SaveAt) -> TimeGrid:
     if step != meant:
         messages = (f"step shortened from {h} s to {float(step):.9g} s, so that it divides every sample time",)
     steps = np.union1d(np.arange(regular + 1) * int(every / step), [int(t / step) for t in sample_times])
-    # Whole numbers divided: the nearest number to each time, however many there are.
+    # A quotient of whole numbers is the float nearest to each time; a sum of steps would not be.
     times = [k * step.numerator / step.denominator for k in steps.tolist()]
     return TimeGrid(float(step), steps.astype(np.int64), np.array(times), messages)

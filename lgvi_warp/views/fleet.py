@@ -33,7 +33,7 @@ class Look(NamedTuple):
         return red, green, blue
 
 
-# Colours after Okabe & Ito, apart for every kind of colour vision; all failures have one, and each its marker.
+# Colours after Okabe & Ito, distinct for every kind of colour vision. All failures share one, with a marker each.
 LOOKS = {
     Status.OK: Look("#3C82DC", ""),
     Status.SURFACE: Look("#009E73", "^"),

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from lgvi_warp.studies.stability.map import StabilityMap
     from lgvi_warp.studies.tradeoff import Tradeoff
 
-# Quantile pairs of the fan, outermost first, and how dark each band is.
+# Bands of the fan, outermost first: lower quantile, upper quantile, opacity.
 BANDS = ((0.0, 1.0, 0.15), (0.05, 0.95, 0.25), (0.25, 0.75, 0.4))
 PATHS = 12
 COLOR = "tab:blue"
@@ -139,7 +139,7 @@ def _counted_text(result: Result, counted: np.ndarray) -> str:
     return f"under way: {first:,} at {result.time[0]:g} s,\n{last:,} at {result.time[-1]:g} s"
 
 
-# Marks of ended members with one outcome, at most.
+# Most marks of ended members with the same outcome.
 MARKS = 1000
 
 
@@ -161,7 +161,7 @@ def _mark(code: Status) -> dict[str, Any]:
     return {"color": look.color, "marker": look.marker} | edge
 
 
-# What of a run's statistics is drawn: so many panels, and lines in a panel, at most.
+# Most panels of statistics, and most lines in a panel.
 PANELS, LINES = 12, 12
 
 
@@ -384,7 +384,7 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None 
     return save_figure(figure, path, 100)
 
 
-# Colours of stability_map's classes, apart for every kind of colour vision and in grey; what must not be is hatched too.
+# Colours of stability_map's classes, distinct for every kind of colour vision and in grey; silent failures are hatched.
 CELLS = ("#0072B2", "#9BD1F0", "#F0E442", "#8C8C8C", "#D55E00")
 # Line styles of the analytic limits.
 STYLES = {"rotation": "-", "munk": "--", "restoring": "-.", "drag": ":"}

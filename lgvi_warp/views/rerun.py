@@ -77,7 +77,7 @@ def log_rerun(result: Result, path: str | os.PathLike[str]) -> Path:
             recording.flush()
             recording.disconnect()
     except RuntimeError as error:
-        # rerun's word for a writer that could not begin, or not go on; it says why on stderr.
+        # rerun raises it for a writer that could not start or continue, and prints the reason on stderr.
         text = f"the recording could not be written ({error}); is the disk full, or the folder read-only?"
         raise OSError(text) from error
     return target
@@ -109,7 +109,7 @@ def _world(
     recording.log("world/trails", lines, static=True, strict=True)
 
 
-# A body that is not to be seen is so small, beside one that is: an entity without any pose would show one at the origin.
+# Scale of a hidden body: an entity without any pose would show a body at the origin.
 UNSEEN = 1e-6
 
 
@@ -128,7 +128,7 @@ def _poses(
         columns = rr.InstancePoses3D.columns(
             translations=position[frames][at],
             quaternions=quaternion[frames][at],
-            # At every time or at none: what is not sent anew holds on.
+            # Send scales at every time or never: one that is not sent again stays in force.
             scales=np.repeat(scales[:, None], 3, axis=1) if empty.any() else None,
         ).partition(at.sum(axis=1))
         recording.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=time[frames])], columns, strict=True)
@@ -205,7 +205,7 @@ def _blueprint(time: np.ndarray, position: np.ndarray, energy: Curve) -> Any:
 
     flat = position.reshape(-1, 3)
     centre, extent = (flat.max(axis=0) + flat.min(axis=0)) / 2.0, _extent(position)
-    # From the side of the way the fleet goes, and a little above: z points down.
+    # View across the fleet's way, from a little above: z points down.
     way = np.mean(position[-1] - position[0], axis=0)[:2]
     east, north = way / np.linalg.norm(way) if np.any(way) else (0.0, 1.0)
     eye = centre + np.linalg.norm(extent) * np.array([0.8 * north, -0.8 * east, -0.2])

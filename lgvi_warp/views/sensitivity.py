@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from lgvi_warp.studies.sensitivity import Indices
 
 COLORS = ("tab:blue", "tab:orange", "tab:green")
-# Panels beyond these are left out: a picture of more cannot be read.
+# Most panels: a picture of more cannot be read.
 MOST = 12
 
 

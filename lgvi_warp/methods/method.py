@@ -195,9 +195,9 @@ class Method:
             that needs more later gives its member the status NOT_CONVERGED.
         tolerance: Relative residual of equation (24) above which a solve has not converged, between 0 and 1. Default:
             1e-14 in float64 and 1e-6 in float32; 1e-12 and 1e-5 for a fixed number of iterations.
-        alpha: Weight of the old configuration in the averages of equation (15), 0 to 1; default 0.5. It acts on
-            nonconservative forces and torques in phi, phi_adjoint and psi only.
-        beta: The same in equation (16).
+        alpha: Weight of the old configuration in the average of nonconservative forces, equation (15), 0 to 1; default 0.5.
+            It acts in phi, phi_adjoint and psi only.
+        beta: The same for nonconservative torques, equation (16).
         rtol: Relative tolerance of the step control of rk5 and rk8; default None, a fixed step. The error estimated for each
             step stays below atol + rtol |y|, in the mean square over y = (b, R, p, pi), momenta divided by the largest J. The
             worst vehicle of a packet decides. The run's step is then the longest one, and the grid of samples, events and

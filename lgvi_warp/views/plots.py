@@ -222,7 +222,7 @@ def drawable(result: Result) -> list[Estimate]:
 
 
 def _levels_panel(axes: Any, one: Estimate) -> None:
-    """Draw pairs of quantiles as bands about the median, with a colour for each component."""
+    """Draw pairs of quantiles as bands about the middle one, with a colour for each component."""
     levels = one.coordinates["level"]
     for c in range(min(one.value.shape[2], LINES)):
         color, values = COLORS[c % len(COLORS)], one.value[:, :, c]

@@ -93,7 +93,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-# Loaded when first used: Warp takes a second to import, and a scene can be read and checked without it.
+# Imported on first use: Warp takes a second to import, and a scene can be read and checked without it.
 _LAZY = {
     "solve": "lgvi_warp.runs.solve",
     "Store": "lgvi_warp.runs.store.settings",
@@ -229,7 +229,7 @@ __all__ = [
 ]
 
 
-# Modules by a name of their own.
+# Public names of modules.
 _MODULES = {
     "uq": "lgvi_warp.studies.sensitivity",
     "notation": "lgvi_warp.physics.notation",

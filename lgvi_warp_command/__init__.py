@@ -1,4 +1,4 @@
-"""The command lgvi-warp, from its first moment: signals end it in a line also while its libraries are imported."""
+"""Start the command lgvi-warp: a signal ends it with one line even while its libraries are imported."""
 
 import os
 import signal
@@ -6,10 +6,10 @@ from types import FrameType
 
 
 def entry() -> None:
-    """The console script."""
+    """Run the command as the console script does: install signal handlers, then import the rest."""
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
-        # What is ignored, as by nohup, stays ignored.
+        # An ignored signal, as under nohup, stays ignored.
         if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(number, _end)
     from lgvi_warp.cli import entry as command
@@ -18,6 +18,6 @@ def entry() -> None:
 
 
 def _end(number: int, frame: FrameType | None) -> None:
-    """Nothing was begun: there is nothing to lose."""
+    """End at once: nothing has begun, so nothing is lost."""
     os.write(2, b"lgvi-warp: interrupted; nothing was written\n")
     os._exit(128 + number)

@@ -1,4 +1,4 @@
-"""The command lgvi-warp."""
+"""The command lgvi-warp: its arguments, verbs, reports and signals."""
 
 from lgvi_warp.cli.arguments import parser
 from lgvi_warp.cli.command import entry, main

@@ -1,4 +1,4 @@
-"""`python -m lgvi_warp.cli` is the command."""
+"""Run the command as `python -m lgvi_warp.cli`."""
 
 from lgvi_warp.cli import entry
 

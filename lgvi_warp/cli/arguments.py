@@ -1,4 +1,4 @@
-"""The arguments of the command, verb by verb."""
+"""The command's arguments, verb by verb."""
 
 from __future__ import annotations
 
@@ -28,7 +28,11 @@ go to stdout, progress and faults to stderr.
 
 
 def parser() -> argparse.ArgumentParser:
-    """The command's arguments."""
+    """Make the parser of the command's arguments.
+
+    Returns:
+        A parser with one subparser for each verb.
+    """
     top = argparse.ArgumentParser(
         prog="lgvi-warp",
         description="Simulate many underwater vehicles at once with a Lie group variational integrator.",
@@ -76,9 +80,11 @@ def parser() -> argparse.ArgumentParser:
         metavar="A:B",
         help="with --store zarr: run only these blocks, to be merged later (as many of them as there are)",
     )
-    there = run.add_mutually_exclusive_group()
-    there.add_argument("--overwrite", action="store_true", help="replace a run.zarr that is there")
-    there.add_argument("--resume", action="store_true", help="go on with a run.zarr that is there, if it is this run")
+    existing = run.add_mutually_exclusive_group()
+    existing.add_argument("--overwrite", action="store_true", help="replace a run.zarr that is there")
+    existing.add_argument(
+        "--resume", action="store_true", help="go on with a run.zarr that is there, if it is this run"
+    )
     _add_check(verbs)
     _add_plan(verbs)
     _add_store_verbs(verbs)
@@ -109,10 +115,10 @@ def parser() -> argparse.ArgumentParser:
 
 
 def _add_sensitivity(verbs: Any) -> None:
-    """lgvi-warp sensitivity and its arguments."""
+    """Add the verb sensitivity with its arguments."""
     verb = verbs.add_parser(
         "sensitivity",
-        help="what of that which varies matters: Sobol indices or Morris screening; .txt, .csv, .json, .png",
+        help="which of the varied parameters matter: Sobol indices or Morris screening; .txt, .csv, .json, .png",
     )
     verb.add_argument("scene", metavar="SCENE", help="scene file (TOML) with [ensemble.vary]")
     verb.add_argument("--of", metavar="Q", action="append", help='quantity of interest: "position[2]" (the default), '
@@ -136,7 +142,7 @@ def _add_sensitivity(verbs: Any) -> None:
 
 
 def _add_stability(verbs: Any) -> None:
-    """The arguments of lgvi-warp stability."""
+    """Add the verb stability with its arguments."""
     verb = verbs.add_parser(
         "stability",
         help="where methods are accurate, bounded, flagged or fail, over two parameters: .json, .csv and .png",
@@ -157,20 +163,20 @@ def _add_stability(verbs: Any) -> None:
 
 
 def _add_keep(verb: argparse.ArgumentParser) -> None:
-    """Whose samples are kept."""
+    """Add the argument that says whose samples are kept."""
     kinds = "all (default), none, failed, or indices 3,17"
     verb.add_argument("--keep", help=f"samples of members to keep: {kinds} (statistics are those of the scene)")
 
 
 def _add_executor(verb: argparse.ArgumentParser) -> None:
-    """Where blocks run."""
+    """Add the arguments that say where blocks run."""
     verb.add_argument("--threads", metavar="N", type=int, help="threads, processes or workers (default: all cores)")
     verb.add_argument("--executor", default="threads", help="threads (default), processes or dask")
     verb.add_argument("--scheduler", metavar="ADDRESS", help="of Dask; without one, a cluster on this machine")
 
 
 def _add_check(verbs: Any) -> None:
-    """The verb check."""
+    """Add the verb check with its arguments."""
     verb = verbs.add_parser(
         "check", help="whether a scene can run, and what is odd about it and most likely a unit; nothing runs"
     )
@@ -186,7 +192,7 @@ def _add_check(verbs: Any) -> None:
 
 
 def _add_plan(verbs: Any) -> None:
-    """The verb plan."""
+    """Add the verb plan with its arguments."""
     plan = verbs.add_parser(
         "plan", help="time, memory and disk that a run would take, from a small one on this machine"
     )
@@ -201,7 +207,7 @@ def _add_plan(verbs: Any) -> None:
 
 
 def _add_store_verbs(verbs: Any) -> None:
-    """The verbs that work on a store."""
+    """Add the verbs resume, merge and export with their arguments."""
     resume = verbs.add_parser("resume", help="go on with a run that was stopped, and mend what is damaged of it")
     resume.add_argument("dir", metavar="DIR", type=Path, help="a store, or a folder with one")
     _add_executor(resume)
@@ -221,7 +227,7 @@ def _add_store_verbs(verbs: Any) -> None:
 
 
 def _add_scene(verb: argparse.ArgumentParser, folder: str, ensemble: bool = True) -> None:
-    """The arguments of a verb that runs a scene."""
+    """Add the arguments that all verbs have that run a scene."""
     verb.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
     verb.add_argument(
         "--out", metavar="DIR", type=Path, help=f"folder for the files, replaced if they exist (default: {folder})"

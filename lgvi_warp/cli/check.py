@@ -1,4 +1,4 @@
-"""The verb check."""
+"""The verb check: whether a scene can run, and what is odd about it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,17 @@ from lgvi_warp.cli.settings import overrides
 
 
 def check(chosen: argparse.Namespace) -> int:
-    """lgvi-warp check: 0 for a scene that can run, whatever is odd about it. Raises SceneError for one that cannot."""
+    """Run the verb check: print what is odd about a scene, without running it.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 0 for a scene that can run, however odd.
+
+    Raises:
+        SceneError: The scene cannot run.
+    """
     from lgvi_warp.scene import plausibility
     from lgvi_warp.scene.ensemble import Ensemble
     from lgvi_warp.scene.scene import Scene
@@ -28,7 +38,7 @@ def check(chosen: argparse.Namespace) -> int:
 
 
 def _settings(ensemble: Any) -> tuple[str, tuple[str, ...]]:
-    """The run in a few words, and what is to be said of its settings. Raises SceneError for what a run would refuse."""
+    """The run in a few words, and remarks on its settings. Raises SceneError for what a run would refuse."""
     from lgvi_warp.runs.settle import make_plan
 
     run = ensemble.scene.run
@@ -37,7 +47,7 @@ def _settings(ensemble: Any) -> tuple[str, tuple[str, ...]]:
     if missing:
         return members, (f"{' and '.join(missing)}: not given, so the method was not looked at; a run wants it",)
     method = run.method_of(run.method)
-    if method.iterations == "auto":  # is found by a run
+    if method.iterations == "auto":  # found only by a run
         method = replace(method, iterations=None)
     plan = make_plan(ensemble, method)
     return f"{members}, {method.name}, step {plan.grid.h:g} s, {plan.grid.steps:,} steps", plan.grid.messages

@@ -1,4 +1,4 @@
-"""The command itself: a verb is run, and what it raises becomes a line and an exit code."""
+"""Run one verb, and turn what it raises into a line on stderr and an exit code."""
 
 from __future__ import annotations
 
@@ -34,7 +34,14 @@ VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command. Returns its exit code, see arguments.EPILOG."""
+    """Run the command.
+
+    Args:
+        arguments: Its arguments; default None, those of the process.
+
+    Returns:
+        The exit code, as arguments.EPILOG lists it.
+    """
     with Streams():
         chosen = parser().parse_args(arguments)
         with Signals(lambda: left(chosen)) as signals:
@@ -47,8 +54,20 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def code_of(error: BaseException, chosen: argparse.Namespace, signals: Signals) -> int:
-    """Say on stderr what ended a verb. Returns the exit code; raises what is no fault of the user's or of the system's."""
-    # What libraries make of an interrupt while they are imported may be any exception.
+    """Print on stderr why a verb ended.
+
+    Args:
+        error: What the verb raised.
+        chosen: The command's parsed arguments.
+        signals: The signals heard.
+
+    Returns:
+        The exit code.
+
+    Raises:
+        BaseException: The error itself, where it is neither the user's fault nor the system's.
+    """
+    # A library may turn an interrupt during its import into any exception.
     if isinstance(error, KeyboardInterrupt) or signals.number is not None:
         text, code = f"{signals.text}; {error if isinstance(error, Ended) else left(chosen)}", signals.exit_code
     elif isinstance(error, SceneError):
@@ -66,32 +85,39 @@ def code_of(error: BaseException, chosen: argparse.Namespace, signals: Signals) 
 
 
 def left(chosen: argparse.Namespace) -> str:
-    """What an interrupted verb leaves."""
+    """Say what an interrupted verb leaves.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        One sentence, with the way to go on where there is one.
+    """
     if chosen.verb in ("info", "check", "plan", "bench"):
         return "nothing was to be written"
-    there = chosen.dir if chosen.verb == "resume" else None
+    store = chosen.dir if chosen.verb == "resume" else None
     if chosen.verb == "run" and chosen.store == "zarr" and (out_of(chosen) / RUN).exists():
-        there = out_of(chosen)
-    if there is None:
+        store = out_of(chosen)
+    if store is None:
         return "nothing was written"
-    return f"finished blocks are kept: go on with lgvi-warp resume {there}"
+    return f"finished blocks are kept: go on with lgvi-warp resume {store}"
 
 
 def entry() -> None:
-    """The console script: `main`, for a process that ends here.
+    """Run the command as the console script does, and end the process.
 
-    Half a second is saved: no search for reference cycles among the modules' objects while they load, and none of the
-    libraries' taking-down at the end, when every file is closed already.
+    Half a second is saved: garbage collection is off while modules load, and the libraries' cleanup at exit is skipped, when
+    every file is closed already.
     """
     gc.disable()
-    for descriptor in range(3):  # one that is closed would become that of a file
+    for descriptor in range(3):  # a closed one would be given to the next file opened
         try:
             os.fstat(descriptor)
         except OSError:
             os.open(os.devnull, os.O_RDWR)
     try:
         code = main()
-    except SystemExit as end:  # of the parser
+    except SystemExit as end:  # raised by the parser
         code = end.code if isinstance(end.code, int) else 0
     if warp_setup := sys.modules.get("lgvi_warp.common.warp_setup"):
         warp_setup.end()

@@ -1,4 +1,4 @@
-"""The verbs info, of this machine, and bench."""
+"""The verbs info, without a folder about this machine, and bench."""
 
 from __future__ import annotations
 
@@ -9,7 +9,14 @@ from lgvi_warp.engine.peak import fma_peak
 
 
 def info(chosen: argparse.Namespace) -> int:
-    """lgvi-warp info."""
+    """Run the verb info: describe a stored run, or this machine.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 1 for a run that is not complete, otherwise 0.
+    """
     if chosen.dir is not None:
         return info_of_run(chosen.dir)
     from lgvi_warp.common import machine
@@ -28,7 +35,7 @@ def info(chosen: argparse.Namespace) -> int:
 
 
 def _of_quota() -> str:
-    """What a container's quota leaves of the cores, where it does."""
+    """Remark on a container's quota of CPU time, where it is smaller than the number of cores."""
     from lgvi_warp.common import container, machine
 
     quota, cores = container.cpu_quota(), machine.affinity()
@@ -38,7 +45,7 @@ def _of_quota() -> str:
 
 
 def _of_limit(memory: int) -> str:
-    """What a container's limit leaves of the memory, where it does."""
+    """Remark on a container's limit of memory, where it is smaller than the machine's memory."""
     from lgvi_warp.common import machine
 
     physical = machine.physical_memory()
@@ -48,7 +55,14 @@ def _of_limit(memory: int) -> str:
 
 
 def bench(chosen: argparse.Namespace) -> int:
-    """lgvi-warp bench."""
+    """Run the verb bench: measure the kernel's speed on this machine.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 0.
+    """
     from lgvi_warp.studies.speed import measure
 
     for line in measure(chosen.members, chosen.steps):

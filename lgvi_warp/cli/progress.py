@@ -1,4 +1,4 @@
-"""How far a command is, on stderr."""
+"""Show on stderr how far a command is."""
 
 from __future__ import annotations
 
@@ -11,7 +11,11 @@ from typing import TextIO
 
 
 class Progress:
-    """Fraction done and time left, on a terminal in place, elsewhere a line now and then."""
+    """Shows the fraction done and the time left: in place on a terminal, elsewhere a line every ten seconds.
+
+    Args:
+        stream: Where to write.
+    """
 
     def __init__(self, stream: TextIO):
         self._stream, self._start, self._last = stream, time.perf_counter(), 0.0
@@ -20,19 +24,23 @@ class Progress:
         self._lock, self._shown = threading.Lock(), False
 
     def __call__(self, fraction: float) -> None:
-        """Take note of the fraction of the work that is done."""
+        """Show the fraction done, at most once per interval.
+
+        Args:
+            fraction: Part of the work that is done, 0 to 1.
+        """
         now = time.perf_counter() - self._start
         with self._lock:
             if now - self._last < self._interval:
                 return
             self._last, self._shown = now, True
-            left = f", {now * (1.0 / fraction - 1.0):.0f} s left" if fraction > 0.0 else ""
-            text = f"{fraction:6.1%}{left}"
+            time_left = f", {now * (1.0 / fraction - 1.0):.0f} s left" if fraction > 0.0 else ""
+            text = f"{fraction:6.1%}{time_left}"
             self._stream.write(f"\r{text}   " if self._terminal else f"{text}\n")
             self._stream.flush()
 
     def close(self) -> None:
-        """Leave the terminal's line clean."""
+        """Clear the line on the terminal."""
         if self._terminal and self._shown:
             self._stream.write("\r" + " " * 40 + "\r")
             self._stream.flush()
@@ -40,7 +48,14 @@ class Progress:
 
 @contextlib.contextmanager
 def shown(quiet: bool) -> Iterator[Progress | None]:
-    """Progress on stderr, whose line is clean afterwards, whatever happens; None where nothing is to be said."""
+    """Show progress on stderr inside the `with` block, and clear its line afterwards.
+
+    Args:
+        quiet: Whether to show nothing.
+
+    Yields:
+        The progress to call with fractions; None if quiet.
+    """
     progress = None if quiet else Progress(sys.stderr)
     try:
         yield progress
@@ -50,5 +65,14 @@ def shown(quiet: bool) -> Iterator[Progress | None]:
 
 
 def part_of(progress: Progress | None, i: int, n: int) -> Callable[[float], None] | None:
-    """Progress of the whole from that of its part i of n."""
+    """Turn the progress of one part into that of the whole.
+
+    Args:
+        progress: Progress of the whole; None for none.
+        i: Index of the part.
+        n: Number of parts, all equally long.
+
+    Returns:
+        A function of the part's fraction; None without a progress.
+    """
     return progress and (lambda part: progress((i + part) / n))

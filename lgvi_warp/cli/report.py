@@ -1,4 +1,4 @@
-"""What a finished run leaves: its files, and a summary."""
+"""Files and summary of a finished run."""
 
 from __future__ import annotations
 
@@ -15,7 +15,17 @@ from lgvi_warp.common.write_lock import write_lock
 
 
 def report(result: Any, out: Path, quiet: bool, begun: float) -> list[str]:
-    """Write the files of a finished run, print its summary, and return what failed."""
+    """Write the files of a finished run and print its summary.
+
+    Args:
+        result: The run's result.
+        out: Folder of the files.
+        quiet: Whether to print nothing.
+        begun: When the verb began [s], by time.perf_counter.
+
+    Returns:
+        One text for each file that could not be written.
+    """
     if result.store is not None and not complete(result):
         if not quiet:
             print(f"members     {result.members:,} of a run in parts, in {result.store}")
@@ -30,25 +40,47 @@ def report(result: Any, out: Path, quiet: bool, begun: float) -> list[str]:
 
 
 def told(faults: list[str]) -> list[str]:
-    """The faults, said on stderr."""
+    """Print faults on stderr.
+
+    Args:
+        faults: One text per fault.
+
+    Returns:
+        The same faults.
+    """
     for fault in faults:
         print(f"lgvi-warp: {fault}", file=sys.stderr)
     return faults
 
 
 def complete(result: Any) -> bool:
-    """Whether a store holds the whole run."""
+    """Tell whether a store holds the whole run.
+
+    Args:
+        result: The result of a stored run.
+
+    Returns:
+        False for a run of some blocks only.
+    """
     from lgvi_warp.runs.store.folder import Folder
 
     return Folder(result.store).complete
 
 
-# Plots and drift are of so many numbers at most, of the first members: a store may be larger than the memory.
+# Most numbers in pictures and drift, which then cover the first members: a store may be larger than the memory.
 MOST_DRAWN = 30_000_000
 
 
 def shown_members(result: Any) -> Any:
-    """The result, or of a large one in a store its first members, in memory; without samples, those kept, or None."""
+    """Select the members that pictures and drift are made of.
+
+    Args:
+        result: The run's result.
+
+    Returns:
+        The result itself; the first members of a large one in a store, in memory; without samples, the kept members, or
+        None where there are none.
+    """
     if not result.samples:
         return result.kept and shown_members(result.kept)
     if result.store is None:
@@ -60,15 +92,15 @@ def shown_members(result: Any) -> Any:
 
 
 def write(result: Any, drawn: Any, out: Path) -> Written:
-    """Write result.npz, fleet.png, fleet.rrd and statistics.png side by side: what there is of them.
+    """Write result.npz, fleet.png, fleet.rrd and statistics.png side by side, as far as the run has them.
 
     Args:
-        result: Of the run; one in a store is written already.
-        drawn: The members of the pictures, None without.
-        out: The folder.
+        result: The run's result; a stored one is written already.
+        drawn: The members of the pictures, from `shown_members`; None for no pictures.
+        out: Folder of the files.
 
     Returns:
-        What was written.
+        What was written, and what failed.
     """
     from lgvi_warp.views.plots import drawable, plot, plot_statistics
     from lgvi_warp.views.rerun import log_rerun
@@ -88,15 +120,25 @@ def write(result: Any, drawn: Any, out: Path) -> Written:
 
 @contextlib.contextmanager
 def _in_turn(out: Path) -> Iterator[None]:
-    """Runs that end together in one folder write their files one after another: what is left are those of one of them."""
+    """Let runs that end together in one folder write one after another, so that all files are of one of them."""
     with contextlib.ExitStack() as stack:
-        with contextlib.suppress(OSError):  # a folder that takes no file: each file says so
+        with contextlib.suppress(OSError):  # a folder that cannot be written: each file reports it
             stack.enter_context(write_lock(out / "result", wait=True))
         yield
 
 
 def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
-    """The run in a few lines."""
+    """Summarise a run in a few lines.
+
+    Args:
+        result: The run's result.
+        drawn: The members that the drift is taken of, from `shown_members`.
+        files: The files that were written.
+        seconds: Time that the verb took [s].
+
+    Returns:
+        The lines as one text.
+    """
     from lgvi_warp.common.status import Status
     from lgvi_warp.runs.outcomes import outcome_text, outcomes
     from lgvi_warp.statistics.table import table
@@ -131,7 +173,7 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
     return "\n".join(lines)
 
 
-# What may be conserved: its name in words and its unit.
+# Quantities that may be conserved -> name in words, unit.
 INVARIANTS = {
     "energy": ("energy", "J"),
     "horizontal_momentum": ("horizontal momentum", "N s"),
@@ -140,7 +182,7 @@ INVARIANTS = {
 
 
 def _energy_lines(result: Any, drawn: Any) -> list[str]:
-    """How far what the scene conserves drifts, or how much energy changed where forces do work; none if all failed."""
+    """Line on the drift of conserved quantities, or on the change of energy where forces do work."""
     import math
 
     from lgvi_warp.physics import energy as invariants
@@ -157,7 +199,7 @@ def _energy_lines(result: Any, drawn: Any) -> list[str]:
 
 
 def _warning_lines(result: Any) -> list[str]:
-    """Members by warning, and of each warning what it says and who had it first as the most serious one."""
+    """Lines on warnings: members by warning, then the text of each and the member that had it first."""
     from lgvi_warp.common.status import Warnings
 
     counts = result.warnings.counts()
@@ -165,18 +207,18 @@ def _warning_lines(result: Any) -> list[str]:
         return []
     lines = ["warnings    " + ", ".join(f"{name} {number:,}" for name, number in counts.items())]
     worst = result.warnings.worst()
-    for one in Warnings:
-        members = (worst == one).nonzero()[0]
+    for warning in Warnings:
+        members = (worst == warning).nonzero()[0]
         if len(members):
             first = int(members[result.warning_time[members].argmin()])
-            value = f"{one.value_name} = {result.warning_value[first]:.4g}"
+            value = f"{warning.value_name} = {result.warning_value[first]:.4g}"
             when = f"first: member {first} at {result.warning_time[first]:g} s, {value}"
-            lines.append(f"  {str(one.name).lower()}: {one.text} ({when})")
+            lines.append(f"  {str(warning.name).lower()}: {warning.text} ({when})")
     return lines
 
 
 def _speed(result: Any, seconds: float) -> list[str]:
-    """The summary's line on speed; none for a run that went on, of which not all was made now."""
+    """Line on speed; none for a resumed run, only part of which was computed now."""
     if not result.run_seconds:
         return []
     rate = result.members * result.provenance["steps"] / result.run_seconds
@@ -187,5 +229,12 @@ def _speed(result: Any, seconds: float) -> list[str]:
 
 
 def size_of(path: Path) -> int:
-    """Bytes of a file, or of all in a folder."""
+    """Size of a file or of a folder's files.
+
+    Args:
+        path: The file or folder.
+
+    Returns:
+        Its size [bytes].
+    """
     return path.stat().st_size if path.is_file() else size_below(path)

@@ -14,12 +14,23 @@ from lgvi_warp.cli.settings import block_range, folder, overrides, store_setting
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.common.errors import Interrupted, MembersFailed, SceneError
 
-# The file of a result in memory, and that of a part of one where such a file is there.
+# File of a result in memory, and of an interrupted one where that file exists already.
 RESULT, PART = "result.npz", "result_part.npz"
 
 
 def run(chosen: argparse.Namespace) -> int:
-    """lgvi-warp run."""
+    """Run the verb run: simulate a scene's ensemble, write its files and print its summary.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 1 if a file, a check or every member failed, otherwise 0.
+
+    Raises:
+        SceneError: The scene or an argument is refused.
+        Ended: The run was interrupted; the text says what is saved.
+    """
     from lgvi_warp.scene.scene import Scene
 
     begun = time.perf_counter()
@@ -47,7 +58,7 @@ def run(chosen: argparse.Namespace) -> int:
         faults = report(result, out, chosen.quiet, begun) + failures
     except KeyboardInterrupt as error:
         if str(out / RESULT) in str(error):
-            raise  # it is written
+            raise  # already saved
         raise Ended(rescued(result, out)) from error
     if suggested:
         faults += check_error(scene, result, suggested, chosen.quiet)
@@ -55,34 +66,60 @@ def run(chosen: argparse.Namespace) -> int:
 
 
 def rescued(result: Any, out: Path) -> str:
-    """Save what an interrupted run in memory has, but for its pictures. Returns what is left, and how to go on."""
+    """Save the members that an interrupted run finished, without pictures.
+
+    Args:
+        result: What the run has so far.
+        out: Folder of the files.
+
+    Returns:
+        One sentence on what is saved, and how to go on.
+    """
     if result.store is not None:
         return f"the run is finished: its pictures are made by lgvi-warp resume {result.store.parent}"
-    # The result of another run that is there stays.
+    # Keep an existing result of another run.
     path = next(path for path in (out / RESULT, out / PART) if path.name == PART or not path.exists())
-    n, whole = result.members, result.provenance["ensemble"]["members"]
+    n, total = result.members, result.provenance["ensemble"]["members"]
     members = (
-        f"the first {n:,} of {whole:,} members are" if n < whole else f"the run is finished: its {n:,} members are"
+        f"the first {n:,} of {total:,} members are" if n < total else f"the run is finished: its {n:,} members are"
     )
     try:
         result.save(path)
     except OSError as error:
         return f"{members} lost: {path}: {error.strerror or error}"
-    return f"{members} saved in {path}" + ("; a run with --store zarr can go on where it stopped" if n < whole else "")
+    return f"{members} saved in {path}" + ("; a run with --store zarr can go on where it stopped" if n < total else "")
 
 
 def all_failed(result: Any) -> bool:
-    """Whether no member got to its end, or to the event that ended it."""
+    """Tell whether every member failed.
+
+    Args:
+        result: The run's result.
+
+    Returns:
+        True where none reached the end, or the event that stopped it.
+    """
     from lgvi_warp.common.status import failed
 
     return bool(failed(result.status).all())
 
 
 def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:
-    """What --error asks for, said; None without it. Raises SceneError."""
+    """Choose method, step and precision for --error, and print them.
+
+    Args:
+        scene: The scene.
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The suggestion; None without --error.
+
+    Raises:
+        SceneError: Other arguments contradict --error, or no setting keeps it.
+    """
     if chosen.error is None:
         if chosen.of is not None:
-            raise SceneError([f"--of {chosen.of}: says what --error is of, which is missing; add --error 1e-3"])
+            raise SceneError([f"--of {chosen.of}: has no effect without --error; add --error 1e-3"])
         return None
     if not (isinstance(scene.run.keep, str) and scene.run.keep == "all") or scene.run.until is not None:
         raise SceneError(
@@ -97,23 +134,33 @@ def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:
     methods = [chosen.method] if chosen.method else None
     of = chosen.of or "position"
     with shown(chosen.quiet) as progress:
-        found = suggest(scene, chosen.error, of, methods=methods, threads=chosen.threads, progress=progress)
+        suggested = suggest(scene, chosen.error, of, methods=methods, threads=chosen.threads, progress=progress)
     if not chosen.quiet:
-        print(found, flush=True)
-    return found
+        print(suggested, flush=True)
+    return suggested
 
 
 def check_error(scene: Any, result: Any, suggested: Any, quiet: bool) -> list[str]:
-    """Say what error the run has, by some members at half its step; a fault where it is above what was asked."""
+    """Print the error of a run, measured by some members at half its step.
+
+    Args:
+        scene: The scene.
+        result: The run's result.
+        suggested: The suggestion that it followed.
+        quiet: Whether to print nothing.
+
+    Returns:
+        One fault where the error is above the one asked for, otherwise nothing.
+    """
     from lgvi_warp.scene.ensemble import Ensemble
     from lgvi_warp.studies.suggest import verified
 
-    found, members = verified(Ensemble.from_scene(scene), result, suggested)
+    error, members = verified(Ensemble.from_scene(scene), result, suggested)
     text = (
-        f"error of {suggested.of} {found:.1e} {suggested.unit}, asked {suggested.error:g} ({members} members again at "
+        f"error of {suggested.of} {error:.1e} {suggested.unit}, asked {suggested.error:g} ({members} members again at "
     )
     text += "half the step, those with the largest errors among them)"
-    if not found <= suggested.error:
+    if not error <= suggested.error:
         return [f"{text}: missed; ask for a smaller one"]
     if not quiet:
         print(f"checked     {text}")
@@ -121,7 +168,7 @@ def check_error(scene: Any, result: Any, suggested: Any, quiet: bool) -> list[st
 
 
 def _import_in_background() -> threading.Thread:
-    """Load the plotting libraries while the kernels run, which leave the interpreter free."""
+    """Load the plotting libraries in a thread while kernels run, which release the interpreter."""
 
     def load() -> None:
         import importlib
@@ -130,7 +177,7 @@ def _import_in_background() -> threading.Thread:
             try:
                 importlib.import_module(name)
             except ImportError:
-                return  # whoever needs it says so, and how to get it
+                return  # the view that needs it reports it, with the remedy
 
     thread = threading.Thread(target=load, name="imports", daemon=True)
     thread.start()
@@ -138,7 +185,17 @@ def _import_in_background() -> threading.Thread:
 
 
 def resume(chosen: argparse.Namespace) -> int:
-    """lgvi-warp resume."""
+    """Run the verb resume: finish a stored run that was stopped, and mend what is damaged of it.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 1 if a file or every member failed, otherwise 0.
+
+    Raises:
+        SceneError: The store cannot be continued.
+    """
     from lgvi_warp.runs.store.resume import resume as go_on
 
     begun = time.perf_counter()
@@ -157,7 +214,17 @@ def resume(chosen: argparse.Namespace) -> int:
 
 
 def plan(chosen: argparse.Namespace) -> int:
-    """lgvi-warp plan."""
+    """Run the verb plan: predict time, memory and disk that a run would take.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 0.
+
+    Raises:
+        SceneError: The scene or an argument is refused.
+    """
     from lgvi_warp.runs.predict import predict
     from lgvi_warp.scene.scene import Scene
 

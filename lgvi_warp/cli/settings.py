@@ -1,4 +1,4 @@
-"""What the arguments ask of a scene and of a store."""
+"""What the arguments change of a scene, and which folder and store they name."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 from lgvi_warp.common.errors import SceneError
 
-# The store in a run's folder.
+# Name of the store in a run's folder.
 RUN = "run.zarr"
 # Command-line option -> key of the scene file that it replaces.
 OPTIONS = {
@@ -32,7 +32,17 @@ OPTIONS = {
 
 
 def overrides(chosen: argparse.Namespace) -> dict[str, Any]:
-    """What the command line replaces of the scene file. Raises SceneError for a --set without a value."""
+    """Collect the keys of the scene file that the command line replaces.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        Key, as "run.step" -> its value as TOML text.
+
+    Raises:
+        SceneError: A --set has no value.
+    """
     changes: dict[str, Any] = {}
     for name, key in OPTIONS.items():
         value = getattr(chosen, name, None)
@@ -47,7 +57,14 @@ def overrides(chosen: argparse.Namespace) -> dict[str, Any]:
 
 
 def whole(text: str) -> str:
-    """1e6 as 1000000: TOML knows no other whole numbers."""
+    """Write a whole number as TOML does: 1e6 becomes 1000000.
+
+    Args:
+        text: A number.
+
+    Returns:
+        Its digits; any other text unchanged.
+    """
     if text.strip("+-").isdigit():
         return text
     try:
@@ -58,7 +75,14 @@ def whole(text: str) -> str:
 
 
 def listed(text: str) -> str:
-    """Indices 3,17 as [3,17]."""
+    """Write indices as a TOML list: 3,17 becomes [3,17].
+
+    Args:
+        text: Indices with commas, or a word.
+
+    Returns:
+        The list; a word unchanged.
+    """
     return f"[{text}]" if text.replace(",", "").replace(" ", "").isdigit() else text
 
 
@@ -66,16 +90,33 @@ PLAIN = {"members": whole, "seed": whole, "keep": listed}
 
 
 def out_of(chosen: argparse.Namespace, suffix: str = "") -> Path:
-    """The folder for the files: --out, or one named after the scene."""
+    """Choose the folder for the files: --out, or one named after the scene.
+
+    Args:
+        chosen: The command's parsed arguments.
+        suffix: End of the default folder's name; default none.
+
+    Returns:
+        The folder, which is not made.
+    """
     name = Path(chosen.scene).stem
-    # A file called "...toml" would mean the folder above.
+    # A file called "...toml" would give "..", the parent folder.
     return chosen.out or Path("runs") / f"{name if name.strip('.') else 'scene'}{suffix}"
 
 
 def folder(chosen: argparse.Namespace, suffix: str = "") -> Path:
-    """The folder for the files, made if it is not there. Raises SceneError where it is a file, OSError.
+    """Make the folder for the files before the run, since results that cannot be written would be lost.
 
-    Before the run: what cannot be written afterwards is lost.
+    Args:
+        chosen: The command's parsed arguments.
+        suffix: End of the default folder's name; default none.
+
+    Returns:
+        The folder.
+
+    Raises:
+        SceneError: It is a file.
+        OSError: It cannot be made or written to.
     """
     out = out_of(chosen, suffix)
     try:
@@ -90,12 +131,22 @@ def folder(chosen: argparse.Namespace, suffix: str = "") -> Path:
 
 
 def store_settings(chosen: argparse.Namespace) -> Any:
-    """The store that the arguments ask for, None without one. Raises SceneError."""
+    """Read the store from the arguments.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        A `Store`; None for a run in memory.
+
+    Raises:
+        SceneError: An argument needs a store, and there is none.
+    """
     if chosen.store == "npz":
         names = ("store_dtype", "blocks", "overwrite", "resume")
-        given = [f"--{name.replace('_', '-')}" for name in names if getattr(chosen, name, None)]
-        if given:
-            raise SceneError([f"{' and '.join(given)}: is for runs in a store; add --store zarr, or leave it out"])
+        options = [f"--{name.replace('_', '-')}" for name in names if getattr(chosen, name, None)]
+        if options:
+            raise SceneError([f"{' and '.join(options)}: is for runs in a store; add --store zarr, or leave it out"])
         return None
     from lgvi_warp.runs.store.settings import Store
 
@@ -104,7 +155,17 @@ def store_settings(chosen: argparse.Namespace) -> Any:
 
 
 def block_range(chosen: argparse.Namespace) -> range | None:
-    """The blocks of --blocks A:B. Raises SceneError."""
+    """Read the blocks to run from --blocks A:B.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The blocks from A to B - 1; None for all.
+
+    Raises:
+        SceneError: The text is no range.
+    """
     if chosen.blocks is None:
         return None
     first, colon, stop = chosen.blocks.partition(":")

@@ -1,4 +1,4 @@
-"""What ends the command from outside: Ctrl-C, SIGTERM, SIGHUP, and a terminal that is no longer there."""
+"""What ends the command from outside: Ctrl-C, SIGTERM, SIGHUP, and a terminal that is gone."""
 
 from __future__ import annotations
 
@@ -13,32 +13,36 @@ from types import FrameType
 from typing import Any, TextIO
 
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
-# What the system says of a terminal or a pipe that nobody reads any more.
+# Errors of a terminal or a pipe that nobody reads any more.
 GONE = {errno.EPIPE, errno.EIO, errno.ESHUTDOWN}
 
 
 class Ended(KeyboardInterrupt):
-    """An interrupt whose text says what is left."""
+    """An interrupt whose text says what is saved."""
 
 
 class Signals:
-    """A context in which the first signal raises KeyboardInterrupt, and the second ends the process at once, in a line.
+    """A context in which the first signal raises KeyboardInterrupt, and the second ends the process at once.
 
-    The second is heard by a thread: the main one may be in a long call of native code. Signals that are ignored stay so;
-    what was done about the others is done again afterwards. Outside of the main thread it does nothing.
+    A thread listens for the second one, since the main thread may be in a long call of native code. Ignored signals stay
+    ignored; previous handlers are restored at the end. Outside the main thread the context does nothing.
 
     Args:
-        left: says what the process leaves when it ends at once.
+        left: Returns what the process leaves when it ends at once.
+
+    Attributes:
+        number: Number of the first signal heard; None without one.
+        said: Whether the end has been reported already.
     """
 
     def __init__(self, left: Callable[[], str]):
         self._left = left
         self._before: dict[int, Any] = {}
-        # The first signal heard; None without.
+        # Number of the first signal heard; None without one.
         self.number: int | None = None
-        # Whether a line has said so.
+        # Whether the end has been reported.
         self.said = False
-        # Of the signals that come, the one that ends the process at once.
+        # Count of the signal that ends the process at once.
         self._last = 2
 
     def __enter__(self) -> Signals:
@@ -67,24 +71,24 @@ class Signals:
 
     @property
     def exit_code(self) -> int:
-        """128 and the signal's number, as shells have it; that of Ctrl-C without one."""
+        """128 plus the signal's number, as shells have it; that of Ctrl-C without a signal."""
         return 128 + (self.number or signal.SIGINT)
 
     @property
     def text(self) -> str:
-        """What happened."""
+        """What happened, as "interrupted by SIGTERM"."""
         if self.number in (None, signal.SIGINT):
             return "interrupted"
         return f"interrupted by {signal.Signals(self.number).name}"
 
     def _hear(self, number: int, frame: FrameType | None) -> None:
-        """In the main thread, as soon as it is in Python's code."""
+        """Handle a signal in the main thread, as soon as that runs Python code."""
         if self.number is None:
             self.number = number
             raise KeyboardInterrupt
 
     def _listen(self, reader: int) -> None:
-        """In a thread: the numbers of signals, as they come."""
+        """Read the numbers of signals in a thread, as they arrive."""
         heard = 0
         with open(reader, "rb", buffering=0) as file:
             while data := file.read(1):
@@ -94,7 +98,7 @@ class Signals:
                     self._end()
 
     def _end(self) -> None:
-        """End the process in a line, without waiting for anything."""
+        """End the process after one line, without waiting."""
         try:
             if not self.said:
                 os.write(2, f"lgvi-warp: {self.text} twice, ended at once; {self._left()}\n".encode())
@@ -102,7 +106,7 @@ class Signals:
             os._exit(self.exit_code)
 
     def _again(self, lost: Any) -> None:
-        """An interrupt where no exception can be raised, as while an object is removed, comes again a moment later."""
+        """Send an interrupt again a moment later that fell where no exception can be raised, as in a finaliser."""
         if isinstance(lost.exc_value, KeyboardInterrupt) and self.number is not None:
             number, self.number = self.number, None
             self._last += 1
@@ -112,26 +116,44 @@ class Signals:
 
 
 class Lasting:
-    """A stream that is written to as long as somebody reads it: a run goes on without its terminal.
+    """A stream that ignores a reader's disappearance: a run goes on without its terminal.
 
     Args:
-        stream: what is written to; None, as Python has it for one that was closed before it began, is written to no more.
+        stream: The stream to write to; None for one that was closed before Python started.
     """
 
     def __init__(self, stream: TextIO | None):
         self._stream = stream
 
     def write(self, text: str) -> int:
-        """Write, if somebody reads. Raises OSError for all else, such as a full disk."""
+        """Write a text, unless the reader is gone.
+
+        Args:
+            text: The text.
+
+        Returns:
+            Its length.
+
+        Raises:
+            OSError: Any other error, such as a full disk.
+        """
         self._unless_gone(lambda stream: stream.write(text))
         return len(text)
 
     def flush(self) -> None:
-        """Flush likewise."""
+        """Flush the stream, unless the reader is gone.
+
+        Raises:
+            OSError: Any other error, such as a full disk.
+        """
         self._unless_gone(lambda stream: stream.flush())
 
     def isatty(self) -> bool:
-        """Whether it is a terminal."""
+        """Tell whether the stream is a terminal.
+
+        Returns:
+            False as well where the reader is gone.
+        """
         return self._stream is not None and self._stream.isatty()
 
     def _unless_gone(self, act: Callable[[TextIO], Any]) -> None:
@@ -149,7 +171,7 @@ class Lasting:
 
 
 class Streams:
-    """A context in which standard output and error are Lasting."""
+    """A context in which standard output and standard error are `Lasting`."""
 
     def __enter__(self) -> Streams:
         self._before = sys.stdout, sys.stderr

@@ -1,4 +1,4 @@
-"""The verbs merge, export, and info of a folder."""
+"""The verbs merge and export, and info about a folder."""
 
 from __future__ import annotations
 
@@ -9,24 +9,42 @@ from lgvi_warp.cli.report import size_of, told
 
 
 def merge(chosen: argparse.Namespace) -> int:
-    """lgvi-warp merge."""
+    """Run the verb merge: put runs of some blocks each together.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 0 if the whole run is there, otherwise 1.
+
+    Raises:
+        SceneError: The folders do not belong together, or a store is there already.
+    """
     from lgvi_warp.runs.store.merge import merge as put_together
 
     folder = put_together(chosen.dirs, chosen.out, chosen.overwrite)
     if not folder.complete:
-        left = len(folder.unfinished())
-        missing = (
-            f"{left} of {len(folder.runs)} blocks are in none of the folders; lgvi-warp resume {folder.path} runs them"
-        )
+        blocks = len(folder.unfinished())
+        missing = f"{blocks} of {len(folder.runs)} blocks are in none of the folders; lgvi-warp resume {folder.path} runs them"
         kept = f"the members that it keeps are missing; lgvi-warp resume {folder.path} runs them, or says why not"
-        told([f"{folder.path}: {missing if left else kept}"])
+        told([f"{folder.path}: {missing if blocks else kept}"])
     elif not chosen.quiet:
         print(f"file        {folder.path} ({size_of(folder.path) / 1e6:.1f} MB), complete")
     return 0 if folder.complete else 1
 
 
 def export(chosen: argparse.Namespace) -> int:
-    """lgvi-warp export."""
+    """Run the verb export: write a stored run as one NetCDF or Parquet file.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 0.
+
+    Raises:
+        SceneError: The store cannot be read, or the format is unknown.
+    """
     from lgvi_warp.runs.store.export import export as write_as
 
     path = write_as(chosen.dir, chosen.to, chosen.out)
@@ -34,29 +52,38 @@ def export(chosen: argparse.Namespace) -> int:
     return 0
 
 
-# Lines on damage.
+# Most lines on damage.
 MOST_SAID = 20
 
 
 def info_of_run(path: Path) -> int:
-    """What a store holds. Returns 0 if it is complete and whole, else 1."""
+    """Print what a store holds, and what is damaged of it.
+
+    Args:
+        path: The store, or a folder with one.
+
+    Returns:
+        The exit code: 0 if it is complete and undamaged, otherwise 1.
+    """
     from lgvi_warp.runs.store.state import state
 
-    found = state(path)
-    own = found["provenance"]
-    print(f"run         {found['path']} ({found['bytes'] / 1e6:.1f} MB), lgvi-warp {own['versions']['lgvi-warp']}")
-    print(f"members     {found['members']:,}, {own['method']['name']}, {own['dtype']}, step {own['step']:g} s, "
-          f"{own['steps']:,} steps")  # fmt: skip
-    fields = ", ".join(found["fields"])
-    print(f"samples     {found['samples']} times" + (f" of {fields}" if fields else ", not of all members"))
-    if found["keepers"]:
-        print(f"parts       {', '.join(found['keepers'])} of each block")
-    if found["kept"]:
-        print(f"kept        {found['kept']:,} members' samples, run again")
-    print(f"blocks      {found['finished']} of {found['blocks']} finished; "
-          + ("complete" if found["complete"] else f"not complete: lgvi-warp resume {path}"))  # fmt: skip
-    for text in found["damage"][:MOST_SAID]:
+    contents = state(path)
+    provenance = contents["provenance"]
+    print(
+        f"run         {contents['path']} ({contents['bytes'] / 1e6:.1f} MB), lgvi-warp {provenance['versions']['lgvi-warp']}"
+    )
+    print(f"members     {contents['members']:,}, {provenance['method']['name']}, {provenance['dtype']}, "
+          f"step {provenance['step']:g} s, {provenance['steps']:,} steps")  # fmt: skip
+    fields = ", ".join(contents["fields"])
+    print(f"samples     {contents['samples']} times" + (f" of {fields}" if fields else ", not of all members"))
+    if contents["keepers"]:
+        print(f"parts       {', '.join(contents['keepers'])} of each block")
+    if contents["kept"]:
+        print(f"kept        {contents['kept']:,} members' samples, run again")
+    print(f"blocks      {contents['finished']} of {contents['blocks']} finished; "
+          + ("complete" if contents["complete"] else f"not complete: lgvi-warp resume {path}"))  # fmt: skip
+    for text in contents["damage"][:MOST_SAID]:
         print(f"damage      {text}")
-    if (more := len(found["damage"]) - MOST_SAID) > 0:
+    if (more := len(contents["damage"]) - MOST_SAID) > 0:
         print(f"damage      and {more:,} more files")
-    return 0 if found["complete"] else 1
+    return 0 if contents["complete"] else 1

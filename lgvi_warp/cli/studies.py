@@ -14,7 +14,16 @@ from lgvi_warp.common.errors import SceneError
 
 
 def finish(written: Written, report: str, quiet: bool) -> int:
-    """Print a study's report, its files and its notes, and say what failed. Returns the exit code."""
+    """Print a study's report, its files and its notes, and say what failed.
+
+    Args:
+        written: The study's files.
+        report: The report's text.
+        quiet: Whether to print failures only.
+
+    Returns:
+        The exit code: 1 if a file failed, otherwise 0.
+    """
     if not quiet:
         files = (f"file        {path}" for path in written.files)
         print("\n".join([report, "", *written.note_lines(), *files]))
@@ -23,7 +32,17 @@ def finish(written: Written, report: str, quiet: bool) -> int:
 
 
 def tradeoff(chosen: argparse.Namespace) -> int:
-    """lgvi-warp tradeoff."""
+    """Run the verb tradeoff: measure speed against accuracy of methods, steps and precisions.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 1 if a file failed, otherwise 0.
+
+    Raises:
+        SceneError: The scene or an argument is refused.
+    """
     from lgvi_warp.scene.scene import Scene
 
     scene = Scene.load(chosen.scene, overrides(chosen))
@@ -34,39 +53,60 @@ def tradeoff(chosen: argparse.Namespace) -> int:
     from lgvi_warp.views.plots import plot_tradeoff
 
     with shown(chosen.quiet) as progress:
-        found = measure(scene, of=chosen.of, methods=methods, seconds=chosen.seconds, progress=progress)
-    written = Written(found.save(out))
-    written.draw(plot_tradeoff, found, out / "tradeoff.png")
-    return finish(written, report_text(found), chosen.quiet)
+        measurements = measure(scene, of=chosen.of, methods=methods, seconds=chosen.seconds, progress=progress)
+    written = Written(measurements.save(out))
+    written.draw(plot_tradeoff, measurements, out / "tradeoff.png")
+    return finish(written, report_text(measurements), chosen.quiet)
 
 
 def sensitivity(chosen: argparse.Namespace) -> int:
-    """lgvi-warp sensitivity."""
+    """Run the verb sensitivity: find which of the varied parameters matter.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 1 if members, a file or a library failed, otherwise 0.
+
+    Raises:
+        SceneError: The scene or an argument is refused.
+    """
     from lgvi_warp.scene.scene import Scene
     from lgvi_warp.studies import sensitivity as uq
     from lgvi_warp.views.sensitivity import plot_sensitivity
 
     scene = Scene.load(chosen.scene, overrides(chosen))
     out = folder(chosen, "_sensitivity")
-    of, asked = chosen.of or ["position[2]"], {} if chosen.samples is None else {"samples": chosen.samples}
+    of, options = chosen.of or ["position[2]"], {} if chosen.samples is None else {"samples": chosen.samples}
     try:
         with shown(chosen.quiet) as progress:
             settings: dict[str, Any] = {"failed": chosen.failed, "threads": chosen.threads, "progress": progress}
             if chosen.analysis == "morris":
-                found: uq.Indices = uq.morris(scene, of, **asked, **settings)
+                indices: uq.Indices = uq.morris(scene, of, **options, **settings)
             else:
                 first = chosen.first_order
-                asked = {"samples": 256} | asked
-                found = uq.sobol(scene, of, second_order=not first, **asked, **settings)
+                options = {"samples": 256} | options
+                indices = uq.sobol(scene, of, second_order=not first, **options, **settings)
     except (uq.FailedMembers, ImportError) as error:
         return len(told([str(error)]))
-    written = Written(found.save(out))
-    written.draw(plot_sensitivity, found, out / "sensitivity.png")
-    return finish(written, str(found), chosen.quiet)
+    written = Written(indices.save(out))
+    written.draw(plot_sensitivity, indices, out / "sensitivity.png")
+    return finish(written, str(indices), chosen.quiet)
 
 
 def stability(chosen: argparse.Namespace) -> int:
-    """lgvi-warp stability."""
+    """Run the verb stability: map where methods are accurate, bounded, flagged or fail.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 1 if a file failed, otherwise 0.
+
+    Raises:
+        SceneError: The scene or an argument is refused.
+        Ended: The study was interrupted after a map was finished.
+    """
     from lgvi_warp.scene.scene import Scene
 
     if chosen.grid is not None and (chosen.x is not None or chosen.y is not None):
@@ -75,7 +115,7 @@ def stability(chosen: argparse.Namespace) -> int:
         )
     changes = overrides(chosen)
     scene = Scene.load(chosen.scene, changes)
-    # Of the random directions: all that the scene's ensemble has to say here.
+    # Seed of the random directions, the only setting of the scene's ensemble that is used here.
     seed = scene.ensemble_settings.seed if scene.ensemble_settings else 0
     out = folder(chosen, "_stability")
     from lgvi_warp.studies.stability.map import GRIDS, report_text, stability_map
@@ -91,7 +131,7 @@ def stability(chosen: argparse.Namespace) -> int:
     with shown(chosen.quiet) as progress:
         for i, (name, (x, y)) in enumerate(maps.items()):
             try:
-                found = stability_map(
+                regions = stability_map(
                     scene, x, y, methods, points=chosen.points, t1=t1, error=chosen.error, of=chosen.of, seed=seed,
                     progress=part_of(progress, i, len(maps)),
                 )  # fmt: skip
@@ -99,7 +139,7 @@ def stability(chosen: argparse.Namespace) -> int:
                 if not written.files:
                     raise
                 raise Ended(f"{i} of {len(maps)} maps are finished, in {out}") from error
-            written.files += found.save(out, name)
-            texts.append(report_text(found))
-            written.draw(plot_stability, found, out / f"{name}.png")
+            written.files += regions.save(out, name)
+            texts.append(report_text(regions))
+            written.draw(plot_stability, regions, out / f"{name}.png")
     return finish(written, "\n\n".join(texts), chosen.quiet)

@@ -1,4 +1,4 @@
-"""Files that a verb writes at its end: side by side, whole where it is interrupted, and what is said of them."""
+"""Write the files at a verb's end side by side, whole even at an interrupt, and collect what failed."""
 
 from __future__ import annotations
 
@@ -12,13 +12,20 @@ from typing import Any
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw
 
-# A signal that comes just before the main thread begins to wait is heard so much later [s].
+# Longest delay of a signal that arrives just before the main thread begins to wait [s].
 PERIOD = 0.2
 
 
 @dataclass
 class Written:
-    """Files that were written; what failed; pictures without anything to draw; those that a library is missing for."""
+    """Outcome of writing several files.
+
+    Args:
+        files: Files that were written.
+        faults: One text for each file that failed.
+        empty: One text for each picture without anything to draw.
+        missing: Name of each file that needs a missing library -> the error.
+    """
 
     files: list[Path] = field(default_factory=list)
     faults: list[str] = field(default_factory=list)
@@ -26,7 +33,12 @@ class Written:
     missing: dict[str, MissingExtra] = field(default_factory=dict)
 
     def take(self, path: Path, write: Callable[[], Path]) -> None:
-        """Write a file, or note why it is not there."""
+        """Write a file, or note why it was not written.
+
+        Args:
+            path: The file.
+            write: Writes it and returns its path.
+        """
         try:
             self.files.append(write())
         except MissingExtra as error:
@@ -37,11 +49,21 @@ class Written:
             self.faults.append(f"{path} was not written: {error}")
 
     def draw(self, plot: Callable[[Any, Path], Path], found: Any, path: Path) -> None:
-        """Draw what was found."""
+        """Draw a study's picture, or note why it was not drawn.
+
+        Args:
+            plot: Draws the study into a file.
+            found: What the study found.
+            path: The file.
+        """
         self.take(path, lambda: plot(found, path))
 
     def note_lines(self) -> list[str]:
-        """A line on the libraries that are not installed, if there are any."""
+        """Say which libraries are missing for pictures.
+
+        Returns:
+            One line, or none where nothing is missing.
+        """
         if not self.missing:
             return []
         files, errors = ", ".join(self.missing), self.missing.values()
@@ -56,13 +78,13 @@ def side_by_side(writers: Mapping[Path, Callable[[Path], Path]]) -> dict[Path, F
     """Write files, each in a thread of its own.
 
     Args:
-        writers: Path -> what writes it.
+        writers: Path -> function that writes it.
 
     Returns:
         Path -> its future, which is done.
 
     Raises:
-        KeyboardInterrupt: At an interrupt, when what was being written is whole, with a text that names it. A second
+        KeyboardInterrupt: An interrupt came; the files begun are finished first, and the text names them. A second
             interrupt does not wait.
     """
     if not writers:
@@ -71,12 +93,12 @@ def side_by_side(writers: Mapping[Path, Callable[[Path], Path]]) -> dict[Path, F
     jobs: dict[Path, Future[Path]] = {}
     begun: list[Path] = []
     ended: list[Path] = []
-    whole: list[Path] = []
+    finished: list[Path] = []
 
     def make(path: Path) -> Path:
         begun.append(path)
         try:
-            whole.append(writers[path](path))
+            finished.append(writers[path](path))
         finally:
             ended.append(path)
         return path
@@ -89,7 +111,7 @@ def side_by_side(writers: Mapping[Path, Callable[[Path], Path]]) -> dict[Path, F
         pool.shutdown()
     except KeyboardInterrupt:
         pool.shutdown(cancel_futures=True)
-        while len(begun) > len(ended):  # the pool does not know of a thread that it was just starting
+        while len(begun) > len(ended):  # the pool does not wait for a thread that it was just starting
             time.sleep(0.01)
-        raise (Ended(f"written: {', '.join(map(str, whole))}") if whole else KeyboardInterrupt()) from None
+        raise (Ended(f"written: {', '.join(map(str, finished))}") if finished else KeyboardInterrupt()) from None
     return jobs

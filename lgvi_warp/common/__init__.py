@@ -1,1 +1,1 @@
-"""To be said in one sentence."""
+"""What knows no vehicle: faults, statuses, durable files, files of unknown origin, random numbers and the machine."""

@@ -1,7 +1,8 @@
-"""What a container or a batch system leaves of the machine: limits of Linux control groups, of version 2 and 1.
+"""Limits that a container or a batch system sets for a process: Linux control groups, versions 2 and 1.
 
-A process's groups are named in /proc/self/cgroup, and their limits lie in files below /sys/fs/cgroup. Every group above
-limits as well. In a container the names may be those of the host, whose folders are not there: then what is there counts.
+A process's groups are named in /proc/self/cgroup, and their limits are in files below /sys/fs/cgroup. The limits of every
+parent group apply too. In a container the names may be those of the host, whose folders are missing: then the folders that
+exist count.
 Source: Linux kernel, Documentation/admin-guide/cgroup-v2.rst and cgroup-v1/memory.rst, scheduler/sched-bwc.rst.
 """
 
@@ -14,14 +15,14 @@ ROOT, OWN = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
 
 
 def cpu_quota(root: Path = ROOT, own: Path = OWN) -> float | None:
-    """CPUs' worth of time that this process may use.
+    """CPU time that this process may use.
 
     Args:
-        root: where control groups are mounted.
-        own: the file that names this process's groups.
+        root: Folder where control groups are mounted; default /sys/fs/cgroup.
+        own: File that names this process's groups; default /proc/self/cgroup.
 
     Returns:
-        The least quota of its groups [CPUs], 1.5 for 150 ms in each 100 ms; None without one.
+        The smallest quota of its groups [CPUs], as 1.5 for 150 ms in each 100 ms; None without a quota.
     """
     quotas = [_v2_quota(folder) for folder in _folders(root, own, "")]
     quotas += [_v1_quota(folder) for folder in _folders(root, own, "cpu")]
@@ -29,14 +30,15 @@ def cpu_quota(root: Path = ROOT, own: Path = OWN) -> float | None:
 
 
 def memory_limit(root: Path = ROOT, own: Path = OWN) -> int | None:
-    """Memory that this process and its groups' others may use together.
+    """Memory that this process may use together with the others in its groups.
 
     Args:
-        root: where control groups are mounted.
-        own: the file that names this process's groups.
+        root: Folder where control groups are mounted; default /sys/fs/cgroup.
+        own: File that names this process's groups; default /proc/self/cgroup.
 
     Returns:
-        The least limit of its groups [bytes]; None without one. Version 1 says none by a number that no machine has.
+        The smallest limit of its groups [bytes]; None without one. Version 1 expresses "none" by a number that no machine
+        has.
     """
     limits = [_number(folder / "memory.max") for folder in _folders(root, own, "")]
     for folder in _folders(root, own, "memory"):
@@ -45,7 +47,7 @@ def memory_limit(root: Path = ROOT, own: Path = OWN) -> int | None:
 
 
 def _folders(root: Path, own: Path, controller: str) -> Iterator[Path]:
-    """Those of this process's group and of all above it that are there; controller: of version 1, "" for version 2."""
+    """Existing folders of this process's group and of its parents; controller: of version 1, "" for version 2."""
     for line in _text(own).splitlines():
         _, _, rest = line.partition(":")
         names, _, path = rest.partition(":")
@@ -53,13 +55,13 @@ def _folders(root: Path, own: Path, controller: str) -> Iterator[Path]:
             continue
         top = _top(root, names, controller)
         group = Path(path.strip().strip("/"))
-        if ".." in group.parts:  # a group outside of the container's own namespace
+        if ".." in group.parts:  # outside the container's own namespace
             group = Path()
-        yield from (folder for one in (group, *group.parents) if (folder := top / one).is_dir())
+        yield from (folder for parent in (group, *group.parents) if (folder := top / parent).is_dir())
 
 
 def _top(root: Path, names: str, controller: str) -> Path:
-    """Where a hierarchy is mounted: by its controller or by all of them, cpu,cpuacct; version 2 beside 1 in unified."""
+    """Folder where a hierarchy is mounted: named by its controller or by all of them; "unified" for version 2 beside 1."""
     if controller:
         return next((root / name for name in (controller, names) if (root / name).is_dir()), root / controller)
     return root / "unified" if (root / "unified").is_dir() else root
@@ -75,12 +77,12 @@ def _v1_quota(folder: Path) -> float | None:
 
 
 def _ratio(quota: str, period: str) -> float | None:
-    """Of two numbers above 0; None for "max", -1 and what is no number."""
+    """Quotient of two positive whole numbers; None for "max", -1 and any other text."""
     try:
-        given, each = int(quota), int(period)
+        time, interval = int(quota), int(period)
     except ValueError:
         return None
-    return given / each if given > 0 and each > 0 else None
+    return time / interval if time > 0 and interval > 0 else None
 
 
 def _number(path: Path) -> int | None:
@@ -91,7 +93,7 @@ def _number(path: Path) -> int | None:
 
 
 def _hierarchical(path: Path) -> int | None:
-    """The limit that version 1 finds among all groups above, those of the host too."""
+    """The limit that version 1 computes from all parent groups, those of the host included."""
     for line in _text(path).splitlines():
         name, _, value = line.partition(" ")
         if name == "hierarchical_memory_limit" and value.isdigit():

@@ -1,4 +1,4 @@
-"""Faults of a scene: all of them in one message, each with its key, its value and the remedy."""
+"""Faults of a scene, collected into one message: each with its key, its value and the remedy."""
 
 from __future__ import annotations
 
@@ -13,43 +13,57 @@ import numpy as np
 
 from lgvi_warp.common.real_numbers import NotReal, holds_words, real_numbers
 
-# So many faults are said one by one, the rest are counted: a file may have a million of them.
+# Most faults in one message; the rest are only counted, since a file may have a million of them.
 MOST_FAULTS = 20
-# Characters of one fault: its head, and its end, which has the remedy.
+# Characters kept of a long fault: its beginning, and its end, which has the remedy.
 HEAD, END = 1500, 500
-# Characters of a value, and of a name, in a message.
+# Most characters of a value, and of a name, in a message.
 LONGEST_VALUE, LONGEST_NAME = 80, 200
 
 
 class SceneError(ValueError):
-    """A scene, an ensemble or a setting that is refused.
+    """A scene, an ensemble or a setting is refused; the message lists every fault and its remedy.
 
     Args:
-        faults: One text per fault. Of more than 20 the first 20 are kept.
-        more: How many there are besides.
+        faults: One text per fault. Of more than 20, the first 20 are kept.
+        more: How many faults there are besides; default 0.
 
-    `faults` holds the texts, each on one line; `more` how many there are that it does not hold.
+    Attributes:
+        faults: The texts, each on one line.
+        more: Number of faults without a text.
     """
 
     def __init__(self, faults: Iterable[str], more: int = 0):
-        every = list(faults)
-        self.faults = tuple(one_line(fault) for fault in every[:MOST_FAULTS])
-        self.more = more + len(every) - len(self.faults)
+        texts = list(faults)
+        self.faults = tuple(one_line(fault) for fault in texts[:MOST_FAULTS])
+        self.more = more + len(texts) - len(self.faults)
         count = len(self.faults) + self.more
         lines = [f"{count:,} faults:"] * (count != 1) + list(self.faults)
         super().__init__("\n  ".join(lines + [f"and {self.more:,} more"] * (self.more > 0)))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Made again from its faults, in the process that asked."""
+        """Pickle the faults, so that another process can raise the same error."""
         return SceneError, (self.faults, self.more)
 
     def prefixed(self, prefix: str) -> SceneError:
-        """The same faults, each with a word before it that says where."""
+        """Return the same faults with a prefix that says where they are.
+
+        Args:
+            prefix: Text to put before each fault.
+
+        Returns:
+            A new error; this one is not changed.
+        """
         return SceneError((prefix + fault for fault in self.faults), self.more)
 
 
 class MembersFailed(RuntimeError):  # noqa: N818
-    """Members failed in a run with on_failure="raise". `result` holds all that the run came to: nothing is lost."""
+    """Members failed in a run with on_failure="raise"; nothing of the run is lost.
+
+    Args:
+        text: The message.
+        result: The whole `Result` of the run, kept as an attribute.
+    """
 
     def __init__(self, text: str, result: Any):
         super().__init__(text)
@@ -57,7 +71,12 @@ class MembersFailed(RuntimeError):  # noqa: N818
 
 
 class Interrupted(KeyboardInterrupt):
-    """A run in memory was interrupted. `result` holds the members that were finished: nothing of them is lost."""
+    """A run in memory was interrupted; its finished members are not lost.
+
+    Args:
+        text: The message.
+        result: The `Result` of the members that were finished, kept as an attribute.
+    """
 
     def __init__(self, text: str, result: Any):
         super().__init__(text)
@@ -65,16 +84,16 @@ class Interrupted(KeyboardInterrupt):
 
 
 class NothingToDraw(ValueError):  # noqa: N818
-    """A picture that would be empty: the message says why."""
+    """A picture would be empty; the message says why."""
 
 
 class MissingExtra(ImportError):  # noqa: N818
-    """A library that is not installed, of one of the package's extras.
+    """A library of one of the package's extras is not installed.
 
     Args:
-        what: What needs it, as "plots".
-        library: Its name as pip knows it.
-        extra: The extra of lgvi-warp that brings it.
+        what: What needs the library, as "plots".
+        library: Name of the library for pip.
+        extra: The extra of lgvi-warp that installs it.
     """
 
     def __init__(self, what: str, library: str, extra: str):
@@ -82,12 +101,20 @@ class MissingExtra(ImportError):  # noqa: N818
         self.library, self.extra = library, extra
 
 
-# So many of the names that are known are said.
+# Most known names in one message.
 MOST_KNOWN = 60
 
 
 def closest(word: Any, known: Iterable[str]) -> str:
-    """ "did you mean ..." or the list of what is known."""
+    """Suggest the known name nearest to a word.
+
+    Args:
+        word: What the user wrote.
+        known: The names that are allowed.
+
+    Returns:
+        'did you mean "name"?', or the list of the known names where none is near.
+    """
     names = [str(name) for name in known]
     text = word[:LONGEST_VALUE] if isinstance(word, str) else shown(word)
     near = [name for name in names if name.endswith(f".{text}")]
@@ -97,7 +124,7 @@ def closest(word: Any, known: Iterable[str]) -> str:
 
 
 class _Brief(reprlib.Repr):
-    """repr() of a value of any size, as long as a message shows of it: neither memory nor time grow with the value."""
+    """repr() of a value of any size, no longer than a message shows: memory and time do not grow with the value."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -106,18 +133,18 @@ class _Brief(reprlib.Repr):
         self.maxstring = self.maxother = 4 * LONGEST_VALUE
 
     def repr_dict(self, x: dict[Any, Any], level: int) -> str:
-        """In the order of the user, which reprlib sorts."""
+        """Show a dict in the user's order; reprlib would sort it."""
         if level <= 0:
             return "{...}"
         items = [f"{self.repr1(k, level - 1)}: {self.repr1(x[k], level - 1)}" for k, _ in zip(x, range(self.maxdict))]  # noqa: B905
         return "{" + ", ".join(items + ["..."] * (len(x) > self.maxdict)) + "}"
 
     def repr_str(self, x: str, level: int) -> str:
-        """From its beginning."""
+        """Show the beginning of a text."""
         return repr(x[: self.maxstring])
 
     def repr_int(self, x: int, level: int) -> str:
-        """Python writes no whole number of more than some thousand digits."""
+        """Show a whole number, or its length: Python refuses to write one of several thousand digits."""
         return (
             repr(x) if x.bit_length() < 1000 else f"<a whole number of about {round(x.bit_length() * 0.30103)} digits>"
         )
@@ -127,7 +154,14 @@ _brief = _Brief()
 
 
 def shown(value: Any) -> str:
-    """A value on one line, cut where it is long."""
+    """Show a value on one line of a message.
+
+    Args:
+        value: Any value, an array too.
+
+    Returns:
+        Its repr, cut after 80 characters.
+    """
     if isinstance(value, np.ndarray):
         value = value[tuple(slice(LONGEST_VALUE) for _ in value.shape)].tolist()
     elif isinstance(value, np.generic):
@@ -137,19 +171,42 @@ def shown(value: Any) -> str:
 
 
 def cut(name: Any) -> str:
-    """A name in a message, which a file may have written without end."""
+    """Shorten a name for a message: a file may hold one of any length.
+
+    Args:
+        name: A name; of what is no text, its repr is taken.
+
+    Returns:
+        The name, cut after 200 characters.
+    """
     text = name if isinstance(name, str) else shown(name)
     return text if len(text) <= LONGEST_NAME else f"{text[:LONGEST_NAME]}..."
 
 
 def one_line(fault: str) -> str:
-    """A fault on one line of bearable length: what a file says may hold line ends, or codes that a terminal obeys."""
+    """Put a fault on one printable line of limited length.
+
+    A file may hold line ends, or control codes that a terminal would obey.
+
+    Args:
+        fault: The text of a fault.
+
+    Returns:
+        The text without control characters; of a long one, its beginning and its end.
+    """
     text = fault if len(fault) <= HEAD + END else f"{fault[:HEAD]} ... {fault[-END:]}"
-    return text if text.isprintable() else "".join(one if one.isprintable() else ascii(one)[1:-1] for one in text)
+    return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 def ragged(value: Any) -> bool:
-    """Whether lists within lists differ in length, so that NumPy makes no array of them."""
+    """Tell whether nested lists differ in length, so that NumPy makes no array of them.
+
+    Args:
+        value: Lists within lists, or anything else.
+
+    Returns:
+        True where NumPy refuses the value.
+    """
     try:
         np.asarray(value)
     except ValueError:
@@ -158,19 +215,23 @@ def ragged(value: Any) -> bool:
 
 
 class Faults:
-    """Collects faults, so that a user sees all of them at once."""
+    """Collects faults, so that a user sees all of them at once.
+
+    Args:
+        prefix: Text before each fault; default none.
+    """
 
     def __init__(self, prefix: str = ""):
         self._prefix, self._found, self._more = prefix, list[str](), 0
 
     def add(self, key: str, value: Any, what: str, remedy: str | Callable[[], str]) -> None:
-        """Note a fault: key = value: what is wrong; how to mend it.
+        """Note one fault, as "key = value: what is wrong; the remedy".
 
         Args:
-            key: What is wrong.
+            key: Name of the setting at fault.
             value: Its value.
             what: What is wrong with it.
-            remedy: How to mend it; a function where that takes time, called only for a fault that is said.
+            remedy: How to mend it. Give a function where the text takes time: it is called only if the fault is shown.
         """
         if len(self._found) >= MOST_FAULTS:
             self._more += 1
@@ -180,7 +241,7 @@ class Faults:
 
     @contextlib.contextmanager
     def including(self) -> Iterator[None]:
-        """Take over the faults that are raised inside, and go on."""
+        """Note the faults of a SceneError raised inside the `with` block, and go on after it."""
         try:
             yield
         except SceneError as error:
@@ -189,12 +250,25 @@ class Faults:
             self._more += error.more + len(error.faults[room:])
 
     def raise_if_any(self) -> None:
-        """Raise SceneError with the faults noted."""
+        """Raise all noted faults at once.
+
+        Raises:
+            SceneError: At least one fault was noted.
+        """
         if self._found:
             raise SceneError(self._found, self._more)
 
     def choice(self, key: str, value: Any, known: Iterable[Any]) -> bool:
-        """The value must be one of those known."""
+        """Check that a value is one of those allowed; note a fault otherwise.
+
+        Args:
+            key: Name of the setting.
+            value: Its value.
+            known: The values that are allowed; the type must agree too.
+
+        Returns:
+            Whether the value is allowed.
+        """
         known = list(known)
         good = any(value == k and type(value) is type(k) for k in known)
         if not good:
@@ -202,7 +276,13 @@ class Faults:
         return good
 
     def keys(self, key: str, given: Iterable[str], known: Iterable[str]) -> None:
-        """Every given key must be one of those known; a mapping's values are shown."""
+        """Check that every key is one of those allowed; note a fault for each other one.
+
+        Args:
+            key: Name of the table; "" for the top of a scene.
+            given: The keys of the user. Of a mapping, the fault shows the value too.
+            known: The keys that are allowed.
+        """
         known = list(known)
         for name in given:
             if name not in known:
@@ -211,7 +291,16 @@ class Faults:
                 self.add(f"{key}.{name}" if key else name, value, "is an unknown key", remedy)
 
     def real(self, key: str, value: Any, remedy: str = "give numbers") -> np.ndarray | None:
-        """A new float64 array of the same numbers, which may be NaN; None after noting a fault."""
+        """Read real numbers; note a fault where the value holds anything else.
+
+        Args:
+            key: Name of the setting.
+            value: What the user gave.
+            remedy: How to mend it, where the fault itself suggests nothing; default "give numbers".
+
+        Returns:
+            A new float64 array of the value's shape, which may hold NaN; None after a fault.
+        """
         try:
             return real_numbers(value)
         except NotReal as error:
@@ -219,7 +308,17 @@ class Faults:
             return None
 
     def finite(self, key: str, value: Any, shape: tuple[int, ...] | None = None, unit: str = "") -> np.ndarray | None:
-        """A finite float64 array, of this shape if one is given; None after noting a fault."""
+        """Read finite numbers; note a fault where one is not finite or the shape differs.
+
+        Args:
+            key: Name of the setting.
+            value: What the user gave.
+            shape: The shape asked for, () for one number; default None, any shape.
+            unit: Unit named in the remedy; default none.
+
+        Returns:
+            A read-only float64 array; None after a fault.
+        """
         wanted = "a number" if shape == () else f"numbers of shape {shape}" if shape else "numbers"
         remedy = f"give {wanted}" + (f" [{unit}]" if unit else "")
         array = self.real(key, value, remedy)
@@ -235,7 +334,17 @@ class Faults:
         return None
 
     def number(self, key: str, value: Any, unit: str = "", least: float = -np.inf) -> float | None:
-        """A finite number not below `least`; None after noting a fault."""
+        """Read one finite number; note a fault where it is too small.
+
+        Args:
+            key: Name of the setting.
+            value: What the user gave.
+            unit: Unit named in the remedy; default none.
+            least: The smallest value allowed; default no bound.
+
+        Returns:
+            The number; None after a fault.
+        """
         array = self.finite(key, value, (), unit)
         if array is None:
             return None
@@ -245,7 +354,16 @@ class Faults:
         return float(array)
 
     def positive(self, key: str, value: Any, unit: str = "s") -> float | None:
-        """A finite number above 0; None after noting a fault."""
+        """Read one finite number above 0; note a fault where it is not.
+
+        Args:
+            key: Name of the setting.
+            value: What the user gave.
+            unit: Unit named in the remedy; default "s".
+
+        Returns:
+            The number; None after a fault.
+        """
         array = self.finite(key, value, (), unit)
         if array is not None and array <= 0.0:
             self.add(key, value, "is not positive", f"give a number above 0 [{unit}]")
@@ -253,9 +371,19 @@ class Faults:
         return None if array is None else float(array)
 
     def symmetric(self, key: str, value: Any, unit: str, size: int = 3) -> np.ndarray | None:
-        """A symmetric matrix, or the diagonal of one; None after noting a fault."""
+        """Read a symmetric matrix, or the diagonal of a diagonal one.
+
+        Args:
+            key: Name of the setting.
+            value: `size` numbers, or a matrix symmetric to 1e-9 of its largest entry.
+            unit: Unit named in the remedy.
+            size: Rows of the matrix; default 3.
+
+        Returns:
+            The matrix, float64, shape (size, size), exactly symmetric; None after a fault.
+        """
         if holds_words(value):
-            self.finite(key, value, (size,), unit)  # says so
+            self.finite(key, value, (size,), unit)  # notes the fault
             return None
         if ragged(value):
             array = np.zeros(0)
@@ -266,8 +394,8 @@ class Faults:
             return None if diagonal is None else np.diag(diagonal)
         if array.shape != (size, size):
             wanted = f"{size} numbers or a symmetric {size}x{size} matrix [{unit}]"
-            what = f"has shape {array.shape}" if array.size else "is no matrix"
-            self.add(key, value, what, f"give {wanted}")
+            problem = f"has shape {array.shape}" if array.size else "is no matrix"
+            self.add(key, value, problem, f"give {wanted}")
             return None
         matrix = self.finite(key, value, (size, size), unit)
         if matrix is None:
@@ -275,9 +403,9 @@ class Faults:
         if np.abs(matrix - matrix.T).max() > 1e-9 * np.abs(matrix).max():
             self.add(key, value, "is not symmetric", "give a symmetric matrix")
             return None
-        # What is symmetric keeps its bits, subnormal and largest numbers too.
+        # Symmetric entries keep their bits, also where halving would underflow or the sum overflow.
         return np.where(matrix == matrix.T, matrix, 0.5 * matrix + 0.5 * matrix.T)
 
     def __bool__(self) -> bool:
-        """Whether a fault was noted."""
+        """Tell whether a fault was noted."""
         return bool(self._found)

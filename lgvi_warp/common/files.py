@@ -18,18 +18,26 @@ import numpy as np
 from lgvi_warp.common import safe_files, scratch
 from lgvi_warp.common.scratch import UNFINISHED
 
-# A file at least so large goes to the disk as soon as it is written: the disk has work while others are made.
+# Files of at least this size are synced as soon as they are written, so that the disk works while others are made [bytes].
 EARLY_BYTES = 200_000
-# Syncs side by side, and large files that may wait for theirs: enough for any disk, few enough for the system's memory.
+# Most concurrent syncs, and most large files waiting for one: enough for any disk, few enough for the memory.
 SYNCS, MOST_WAITING = 16, 32
 
 
 def checksum(data: Any, before: int = 0) -> int:
-    """CRC-32C of bytes or a contiguous array, as zarr's crc32c codec has it, after data that had the checksum `before`."""
+    """CRC-32C checksum, as zarr's crc32c codec computes it.
+
+    Args:
+        data: Bytes, or a contiguous array.
+        before: Checksum of the data that precede it; default 0, none.
+
+    Returns:
+        The checksum of all data so far, 32 bits.
+    """
     import google_crc32c
 
     view = memoryview(data)
-    # The extension takes an array, and no memoryview.
+    # The extension takes an array, but no memoryview.
     return int(google_crc32c.extend(before, np.frombuffer(view, np.uint8))) if view.nbytes else before
 
 
@@ -43,7 +51,7 @@ _room = threading.BoundedSemaphore(MOST_WAITING)
 
 
 def _renew() -> None:
-    """In a child after a fork, where none of the threads lives on."""
+    """Start afresh in a child after a fork, where none of the threads exists."""
     global _room
     _syncs.cache_clear()
     _room = threading.BoundedSemaphore(MOST_WAITING)
@@ -54,7 +62,15 @@ if hasattr(os, "register_at_fork"):
 
 
 def sync_file(beside: Path, target: Path) -> None:
-    """Wait until a file is on the disk: where it lies, and what it will be called."""
+    """Wait until a file's content is on the disk.
+
+    Args:
+        beside: The file as it is named now.
+        target: Its later name, which an OSError reports.
+
+    Raises:
+        OSError: The file cannot be synced.
+    """
     descriptor = os.open(beside, os.O_RDONLY)
     try:
         with named(target):
@@ -64,7 +80,7 @@ def sync_file(beside: Path, target: Path) -> None:
 
 
 def _begun(descriptor: int, target: Path) -> Future[None]:
-    """The sync of an open file, begun; waits where too many are on their way."""
+    """Start to sync an open file; wait first where too many are waiting."""
     _room.acquire()
     return _syncs().submit(_sync_early, os.dup(descriptor), target)
 
@@ -79,7 +95,14 @@ def _sync_early(descriptor: int, target: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Wait until the names in a folder are on the disk; a system that cannot sync folders is left alone."""
+    """Wait until the names in a folder are on the disk; do nothing where the system cannot sync folders.
+
+    Args:
+        folder: The folder.
+
+    Raises:
+        OSError: The folder cannot be synced.
+    """
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         with contextlib.suppress(PermissionError):
@@ -89,21 +112,36 @@ def sync_folder(folder: Path) -> None:
 
 
 class Files:
-    """Files that come into being together: `write` each, then `finish` all.
+    """Files that appear together: `write` each, then `finish` all.
 
-    Until then they lie beside their places under another name, so that what was there stays whole.
+    Until then they lie beside their places under temporary names, so that existing files stay whole.
+
+    Args:
+        root: Folder below which all of them lie.
+
+    Attributes:
+        sums: Key of each file written -> [bytes, CRC-32C].
     """
 
     def __init__(self, root: Path):
         self._root = root
-        # Where each lies, what it will be called, and its sync if that has begun.
+        # Temporary path, later path, and the sync if it has begun.
         self._waiting: list[tuple[Path, Path, Future[None] | None]] = []
         self.sums: dict[str, list[int]] = {}
 
     def write(self, key: str, data: Any, *, checked: bool = False) -> None:
-        """Write a file below the root, and note its size and checksum; checked: with the data's own checksum at its end.
+        """Write one file, and note its size and checksum.
 
-        Waits where many large files have not reached the disk yet. Raises SceneError where a link stands in its way.
+        Waits while many large files have not reached the disk.
+
+        Args:
+            key: Path of the file below the root.
+            data: Bytes, or a contiguous array.
+            checked: Whether to append the data's own checksum, 4 bytes; default False.
+
+        Raises:
+            SceneError: A link stands in its way.
+            OSError: The file cannot be written.
         """
         target = self._root / key
         beside = scratch.beside(target)
@@ -119,14 +157,21 @@ class Files:
         self.sums[key] = [len(view) + len(tail), checksum(tail, crc)]
 
     def sync(self) -> None:
-        """Begin to sync what is not on its way yet."""
+        """Start to sync the files whose sync has not begun."""
         self._waiting = [
             (beside, target, sync or _syncs().submit(sync_file, beside, target))
             for beside, target, sync in self._waiting
         ]
 
     def place(self) -> set[Path]:
-        """Wait for the syncs and put the files in their places. Returns their folders, which are not synced."""
+        """Wait for the syncs, then rename the files to their places.
+
+        Returns:
+            Their folders, which are not synced yet.
+
+        Raises:
+            OSError: A sync or a renaming failed.
+        """
         for _, _, sync in self._waiting:
             assert sync is not None
             sync.result()
@@ -137,40 +182,59 @@ class Files:
         return folders
 
     def finish(self) -> None:
-        """Sync the files, put them in their places, and sync their folders."""
+        """Sync the files, put them in their places, and sync their folders.
+
+        Raises:
+            OSError: One of these steps failed.
+        """
         (error,) = finish_together([self])
         if error is not None:
             raise error
 
     def drop(self) -> None:
-        """Take back what is not finished."""
+        """Remove the files that are not finished."""
         for beside, _, _ in self._waiting:
             beside.unlink(missing_ok=True)
         self._waiting.clear()
 
 
 def finish_together(several: Sequence[Files]) -> list[OSError | None]:
-    """Finish all of them, each folder synced once. Returns what went wrong with each, which is not in its place then."""
-    # Syncs that run side by side share the file system's commits.
-    for one in several:
-        one.sync()
+    """Finish several sets of files; each folder is synced once.
+
+    Args:
+        several: The sets.
+
+    Returns:
+        For each set, None or the error for which it is not in its place.
+    """
+    # Concurrent syncs share the file system's commits.
+    for files in several:
+        files.sync()
     errors: list[OSError | None] = []
     folders = set[Path]()
-    for one in several:
+    for files in several:
         try:
-            folders |= one.place()
+            folders |= files.place()
             errors.append(None)
         except OSError as error:
             errors.append(error)
     try:
         list(_syncs().map(sync_folder, sorted(folders)))
     except OSError as error:
-        return [found or error for found in errors]
+        return [earlier or error for earlier in errors]
     return errors
 
 
 def write_all(file: Any, view: memoryview) -> None:
-    """Write every byte: the system may take fewer at a time, and says so only by their number."""
+    """Write every byte, however few the system takes at a time.
+
+    Args:
+        file: An unbuffered file, open for writing.
+        view: The bytes.
+
+    Raises:
+        OSError: The disk is full, or another error of the system.
+    """
     while len(view):
         written = file.write(view)
         if not written:
@@ -180,7 +244,14 @@ def write_all(file: Any, view: memoryview) -> None:
 
 @contextlib.contextmanager
 def named(path: Path) -> Iterator[None]:
-    """An OSError from inside names this file."""
+    """Give an OSError raised inside the `with` block the name of this file.
+
+    Args:
+        path: The file.
+
+    Raises:
+        OSError: That error.
+    """
     try:
         yield
     except OSError as error:
@@ -189,7 +260,16 @@ def named(path: Path) -> Iterator[None]:
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """One file, durable."""
+    """Write one file durably: it is there whole or not at all.
+
+    Args:
+        path: The file.
+        data: Its bytes.
+
+    Raises:
+        SceneError: A link stands in its way.
+        OSError: The file cannot be written.
+    """
     files = Files(path.parent)
     try:
         files.write(path.name, data)
@@ -200,7 +280,21 @@ def write_whole(path: Path, data: bytes) -> None:
 
 
 def fault(root: Path, key: str, size: int, crc: int) -> str | None:
-    """What is wrong with a file: "is missing", "is torn" or "has changed"; None if nothing is."""
+    """Compare a file with the size and checksum noted for it.
+
+    Args:
+        root: Folder below which it lies.
+        key: Its path from there.
+        size: Its size [bytes].
+        crc: CRC-32C checksum of its bytes.
+
+    Returns:
+        "is missing", "is torn" or "has changed"; None for a file in order.
+
+    Raises:
+        SceneError: It is a link, a pipe or a device.
+        OSError: It cannot be read.
+    """
     try:
         with safe_files.opened(root, key) as file:
             if os.fstat(file.fileno()).st_size != size:
@@ -211,7 +305,11 @@ def fault(root: Path, key: str, size: int, crc: int) -> str | None:
 
 
 def remove_unfinished(folders: Iterable[Path]) -> None:
-    """Remove what writers that were killed left behind, of folders that one writer at a time may change."""
+    """Remove unfinished files of writers that were killed.
+
+    Args:
+        folders: Folders that only one writer at a time may change.
+    """
     for folder in folders:
         for path in folder.glob(f"*{UNFINISHED}"):
             if scratch.is_unfinished(path.name) and not path.is_dir():
@@ -220,9 +318,19 @@ def remove_unfinished(folders: Iterable[Path]) -> None:
 
 @contextlib.contextmanager
 def placed(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """The name to write a file under: at the end it is made durable and put in its place; after an error it is removed.
+    """Write a file under a temporary name, and put it in its place at the end of the `with` block.
 
-    What lay there before stays whole until then. Files of other writers of it that were killed are removed.
+    An existing file stays whole until then; after an error the new one is removed. Unfinished files of killed writers of the
+    same file are removed too.
+
+    Args:
+        path: The file.
+
+    Yields:
+        The temporary path to write to.
+
+    Raises:
+        OSError: The file cannot be made durable or put in its place.
     """
     target = Path(path)
     scratch.sweep(target)
@@ -238,12 +346,20 @@ def placed(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def put_folder(beside: Path, target: Path) -> None:
-    """Put a folder in the place of another, which is removed, or of none. A crash leaves one of the two there, whole."""
+    """Replace a folder by another; a crash leaves one of the two, whole.
+
+    Args:
+        beside: The new folder, in the same parent folder.
+        target: Its place; an existing folder there is removed.
+
+    Raises:
+        OSError: The folder cannot be put there.
+    """
     old = beside
     if not target.exists():
         beside.replace(target)
     elif not _exchanged(beside, target):
-        # Two steps where the system has no exchange: a crash between them is mended by `restored`.
+        # Two steps where the system cannot exchange folders: `restored` mends a crash between them.
         old = scratch.beside(target, scratch.OLD)
         target.replace(old)
         beside.replace(target)
@@ -252,7 +368,7 @@ def put_folder(beside: Path, target: Path) -> None:
 
 
 def _exchanged(one: Path, other: Path) -> bool:
-    """Exchange two folders in one step; False where the system cannot."""
+    """Exchange two folders in one step; return False where the system cannot."""
     try:
         rename = ctypes.CDLL(None, use_errno=True).renameat2
     except (OSError, AttributeError, TypeError):
@@ -262,7 +378,11 @@ def _exchanged(one: Path, other: Path) -> bool:
 
 
 def restored(target: Path) -> None:
-    """Put a folder back that a writer was killed while it replaced it, and nothing has its place."""
+    """Put back a folder whose writer was killed while it replaced it.
+
+    Args:
+        target: Place of the folder; nothing happens where something is there.
+    """
     old = [path for path in scratch.left_behind(target) if path.suffix == scratch.OLD and not path.is_symlink()]
     if len(old) == 1 and not target.exists():
         old[0].replace(target)
@@ -271,7 +391,15 @@ def restored(target: Path) -> None:
 
 @contextlib.contextmanager
 def locked(path: Path, wait: bool = False) -> Iterator[bool]:
-    """Hold a folder or file for this process alone; False if another has it. True where a system knows no locks."""
+    """Hold a folder or file for this process alone.
+
+    Args:
+        path: The folder or file.
+        wait: Whether to wait until it is free; default False.
+
+    Yields:
+        Whether it is held; True as well where the system has no locks.
+    """
     try:
         import fcntl
     except ImportError:
@@ -289,7 +417,7 @@ def locked(path: Path, wait: bool = False) -> Iterator[bool]:
         try:
             yield True
         finally:
-            # A child that was forked meanwhile holds the same lock: to close it here alone would not release it.
+            # A child forked meanwhile holds the same lock: closing it here would not release it.
             with contextlib.suppress(OSError):
                 fcntl.flock(descriptor, fcntl.LOCK_UN)
     finally:

@@ -1,4 +1,4 @@
-"""Columns by name out of what a user has: a mapping, a data frame, a structured array, an xarray Dataset."""
+"""Read columns by name from a mapping, a data frame, a structured array or an xarray Dataset."""
 
 from __future__ import annotations
 
@@ -12,18 +12,28 @@ from lgvi_warp.common.real_numbers import column_names
 
 
 def is_labelled(value: Any) -> bool:
-    """Whether its columns have labels, which say what is what whatever their order."""
+    """Tell whether a value has named columns, whose order then does not matter.
+
+    Args:
+        value: Anything a user gave for a table.
+
+    Returns:
+        True for a mapping, a data frame, a structured array, or a labelled xarray object.
+    """
     return _labels(value) is not None
 
 
 def columns_by_name(faults: Faults, key: str, value: Any) -> dict[str, Any]:
-    """Label -> column of a labelled value, in its order; nothing after noting a fault.
+    """Read the columns of a labelled value.
 
     Args:
-        faults: takes what is wrong: labels that are no texts, or that are there twice.
-        key: what a fault calls the value.
-        value: a mapping, a data frame (pandas, polars, pyarrow, or another with `columns` and table[name]), a structured
+        faults: Receives what is wrong: labels that are no texts, or that occur twice.
+        key: Name of the value in a fault.
+        value: A mapping, a data frame (pandas, polars, pyarrow, or another with `columns` and table[name]), a structured
             array, an xarray Dataset, or a DataArray with labels along its second dimension.
+
+    Returns:
+        Label -> column, in the value's order; empty after a fault.
     """
     labels = _labels(value)
     if labels is None or not labels:
@@ -31,8 +41,10 @@ def columns_by_name(faults: Faults, key: str, value: Any) -> dict[str, Any]:
         return {}
     odd = [label for label in labels if not isinstance(label, str)]
     if odd:
-        what = f"has no names of columns: they are called {', '.join(map(repr, odd[:6]))}{', ...' * (len(odd) > 6)}"
-        faults.add(key, "...", what, "name the columns: table.columns = [...], or give .to_numpy() in the right order")
+        problem = f"has no names of columns: they are called {', '.join(map(repr, odd[:6]))}{', ...' * (len(odd) > 6)}"
+        faults.add(
+            key, "...", problem, "name the columns: table.columns = [...], or give .to_numpy() in the right order"
+        )
         return {}
     doubled = sorted({label for label in labels if labels.count(label) > 1})
     if doubled:
@@ -42,7 +54,17 @@ def columns_by_name(faults: Faults, key: str, value: Any) -> dict[str, Any]:
 
 
 def match(faults: Faults, key: str, given: Sequence[str], wanted: Sequence[str]) -> bool:
-    """Whether labels are those that are wanted, in any order; notes each that is missing, and each that is none of them."""
+    """Compare labels with those that are wanted, in any order; note a fault for each missing or unknown one.
+
+    Args:
+        faults: Receives the faults.
+        key: Name of the value in a fault.
+        given: Labels of the value.
+        wanted: Labels it must have.
+
+    Returns:
+        Whether they agree.
+    """
     missing = [name for name in wanted if name not in given]
     for label in given:
         if label not in wanted:
@@ -62,7 +84,7 @@ def _labels(value: Any) -> list[Any] | None:
 
 
 def _labelled_dimension(value: Any) -> str | None:
-    """The second dimension of an xarray DataArray whose coordinate is texts."""
+    """Name of an xarray DataArray's second dimension, where its coordinate holds texts."""
     dims = getattr(value, "dims", ())
     if not hasattr(value, "coords") or not isinstance(dims, tuple) or len(dims) != 2 or dims[1] not in value.coords:
         return None
@@ -81,14 +103,14 @@ def _read(value: Any, labels: Sequence[str]) -> dict[str, Any]:
 
 
 def _members_first(columns: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The variables of a Dataset with the dimension that all of them share in front."""
+    """Variables of a Dataset, with the dimension that all of them share first."""
     dims = [column.dims for column in columns.values()]
-    shared = [dim for dim in dims[0] if all(dim in other for other in dims)]
+    shared = [dim for dim in dims[0] if all(dim in dims_of_column for dims_of_column in dims)]
     if len(shared) != 1:
         return columns
     return {label: column.transpose(shared[0], ...) for label, column in columns.items()}
 
 
 def _plain(column: Any) -> Any:
-    """A frame's column as an array; what is none as it is."""
+    """A frame's column as an array; anything else unchanged."""
     return np.asarray(column) if hasattr(column, "__array__") or hasattr(column, "__array_interface__") else column

@@ -1,30 +1,30 @@
-"""Names that a scene gives to its terms and events: each becomes part of a folder's name in a store, on any file system."""
+"""Names that a scene gives to terms and events: each becomes part of a folder's name in a store, on any file system."""
 
 from __future__ import annotations
 
 import unicodedata
 from collections.abc import Iterable
 
-# A folder is called "name.field": with the longest field it stays well below the 255 bytes of file systems.
+# A folder is called "name.field"; with the longest field it stays well below the 255 bytes that file systems allow.
 MOST_NAME_BYTES = 100
-# What Windows takes for devices, in folders' names too, whatever follows a point.
+# Names that Windows reserves for devices, for folders too, whatever follows a point.
 DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(10))}
 BESIDE = " _-."
 RULE = "give letters, digits, _, - and points"
 
 
 def wrong_with(name: str) -> tuple[str, str] | None:
-    """What is wrong with a name, and the remedy.
+    """Check a name of a term or an event.
 
     Args:
-        name: Of a term or an event.
+        name: The name.
 
     Returns:
-        (what is wrong, the remedy), None for a good name.
+        (what is wrong, the remedy); None for a good name.
     """
     if not name:
         return "is empty", RULE
-    bad = next((one for one in name if not (one.isalnum() or one in BESIDE)), None)
+    bad = next((character for character in name if not (character.isalnum() or character in BESIDE)), None)
     if bad is not None:
         return f"has {shown_character(bad)}, which no folder's name may have everywhere", RULE
     if len(name.encode()) > MOST_NAME_BYTES:
@@ -39,35 +39,42 @@ def wrong_with(name: str) -> tuple[str, str] | None:
 
 
 def shown_character(one: str) -> str:
-    """A character in a message."""
+    """Write a character so that a message can show it.
+
+    Args:
+        one: One character.
+
+    Returns:
+        "a space", "a point", or its repr.
+    """
     return {" ": "a space", ".": "a point"}.get(one, ascii(one) if not one.isprintable() else repr(one))
 
 
 def folded(name: str) -> str:
-    """A name as file systems compare it that know no capitals, or that write accents in two ways.
+    """Normalise a name as file systems do that ignore case, or that write accents in two ways.
 
     Args:
-        name: Of a term or an event.
+        name: Name of a term or an event.
 
     Returns:
-        The same text for names that such a file system takes for one.
+        The same text for names that such a file system cannot tell apart.
     """
     return unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", name).casefold())
 
 
 def alike(names: Iterable[str]) -> list[tuple[str, str]]:
-    """Names that are different texts, and one name on some file system.
+    """Find different names that some file system cannot tell apart.
 
     Args:
-        names: Of terms and events.
+        names: Names of terms and events.
 
     Returns:
-        Pairs (first, other), in the order of the names.
+        Pairs (earlier name, later name), in the order of the names.
     """
     first: dict[str, str] = {}
     pairs: list[tuple[str, str]] = []
     for name in names:
-        other = first.setdefault(folded(name), name)
-        if other != name and (other, name) not in pairs:
-            pairs.append((other, name))
+        earlier = first.setdefault(folded(name), name)
+        if earlier != name and (earlier, name) not in pairs:
+            pairs.append((earlier, name))
     return pairs

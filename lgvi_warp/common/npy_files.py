@@ -1,7 +1,7 @@
-"""Arrays in the form of .npy, one after another in a file or each in an .npz, that may be somebody else's.
+"""Read arrays in .npy form, one after another in a file or in an .npz archive, of a file of unknown origin.
 
-NumPy's own reader makes room for what a header promises before it looks whether the file has it; here the file's size says
-how much there can be. Only numbers, truth values and texts are read: nothing is unpickled.
+NumPy's own reader allocates what a header promises before it checks that the file holds it; here the file's size bounds
+every array. Only numbers, truth values and texts are read: nothing is unpickled.
 """
 
 from __future__ import annotations
@@ -21,17 +21,30 @@ import numpy as np
 from lgvi_warp.common import safe_files
 
 KINDS = "biufU"
-# A list of files in an .npz, and how many there are: a result has some tens, with statistics some hundreds.
+# Most bytes of an .npz's list of files, and most arrays: a result has some tens, with statistics some hundreds.
 MOST_LIST, MOST_ARRAYS = 4_000_000, 20_000
 
 
 @contextlib.contextmanager
 def opened(root: Path, key: str) -> Iterator[Iterator[np.ndarray]]:
-    """The arrays of a file below the root, in turn. Raises ValueError, SceneError, OSError."""
+    """Open a file of several arrays below a root folder.
+
+    Args:
+        root: The root folder.
+        key: Path of the file from there.
+
+    Yields:
+        The arrays, one after another.
+
+    Raises:
+        ValueError: The file holds something else.
+        SceneError: It is a link, a pipe or a device.
+        OSError: It cannot be read.
+    """
     with safe_files.opened(root, key) as raw:
-        left = os.fstat(raw.fileno()).st_size
+        size = os.fstat(raw.fileno()).st_size
         with io.BufferedReader(raw) as file:  # type: ignore[type-var]
-            yield _in_turn(file, left)
+            yield _in_turn(file, size)
 
 
 def _in_turn(file: BinaryIO, size: int) -> Iterator[np.ndarray]:
@@ -40,7 +53,18 @@ def _in_turn(file: BinaryIO, size: int) -> Iterator[np.ndarray]:
 
 
 def read(file: Any, left: int) -> np.ndarray:
-    """One array of a stream that has so many bytes left. Raises ValueError where it is none, or longer than that."""
+    """Read one array from a stream.
+
+    Args:
+        file: A buffered binary stream.
+        left: Bytes that the stream still has.
+
+    Returns:
+        The array.
+
+    Raises:
+        ValueError: The stream holds no array, or a longer one than it has bytes for.
+    """
     shape, fortran, dtype = _described(file)
     count = math.prod(shape)
     if dtype.kind not in KINDS or dtype.itemsize == 0 or count * dtype.itemsize > left:
@@ -65,7 +89,17 @@ def _described(file: Any) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
 
 
 def text(arrays: Iterator[np.ndarray]) -> str:
-    """The next of several arrays, which is one text. Raises ValueError."""
+    """Take the next array, which must be one text.
+
+    Args:
+        arrays: Arrays of a file, one after another.
+
+    Returns:
+        The text.
+
+    Raises:
+        ValueError: The next array is no text, or there is none.
+    """
     array = next(arrays, np.zeros(0))
     if array.dtype.kind != "U" or array.shape:
         raise ValueError("does not begin with a text")
@@ -73,7 +107,7 @@ def text(arrays: Iterator[np.ndarray]) -> str:
 
 
 class _Careful(io.BufferedReader):
-    """A file of which only so many bytes are read at once: a list of files in an .npz may be as long as that file."""
+    """A file that limits the bytes of one read: a damaged .npz may promise an endless list of files."""
 
     most = MOST_LIST
 
@@ -86,17 +120,25 @@ class _Careful(io.BufferedReader):
 
 
 def of_npz(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
-    """All arrays of an .npz file, by name: stored as they are, each once, no more than the file has room for.
+    """Read all arrays of an .npz file, each once, and no more than the file has room for.
 
-    Raises ValueError where it is no such file, or damaged, OSError.
+    Args:
+        path: The file; its arrays are stored without compression.
+
+    Returns:
+        Name -> array.
+
+    Raises:
+        ValueError: It is no such file, or is damaged.
+        OSError: It cannot be read.
     """
     with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb", buffering=0) as raw:
-        found = os.fstat(raw.fileno())
-        if not stat.S_ISREG(found.st_mode):
-            raise ValueError(safe_files.kind(found.st_mode))
+        stats = os.fstat(raw.fileno())
+        if not stat.S_ISREG(stats.st_mode):
+            raise ValueError(safe_files.kind(stats.st_mode))
         try:
             with _Careful(raw) as file, zipfile.ZipFile(file) as archive:
-                return _arrays(archive, file, found.st_size)
+                return _arrays(archive, file, stats.st_size)
         except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, OverflowError) as error:
             raise ValueError(f"is torn or no .npz file ({error})") from None
 
@@ -105,15 +147,17 @@ def _arrays(archive: zipfile.ZipFile, file: _Careful, size: int) -> dict[str, np
     members = archive.infolist()
     if len(members) > MOST_ARRAYS:
         raise ValueError(f"has {len(members):,} arrays")
-    if any(one.compress_type != zipfile.ZIP_STORED for one in members):
+    if any(member.compress_type != zipfile.ZIP_STORED for member in members):
         raise ValueError("is compressed, which no result is")
-    if sum(one.file_size for one in members) > size or any(one.file_size != one.compress_size for one in members):
+    if sum(member.file_size for member in members) > size or any(
+        member.file_size != member.compress_size for member in members
+    ):
         raise ValueError("promises more bytes than it has")
     file.most = max(size, MOST_LIST)
     arrays = {}
-    for one in members:
-        with archive.open(one) as stream:
-            arrays[one.filename.removesuffix(".npy")] = read(stream, one.file_size)
-            if stream.read(1):  # to the end, where the checksum is compared
-                raise ValueError(f"{one.filename} is longer than its array")
+    for member in members:
+        with archive.open(member) as stream:
+            arrays[member.filename.removesuffix(".npy")] = read(stream, member.file_size)
+            if stream.read(1):  # zipfile compares the checksum at the end
+                raise ValueError(f"{member.filename} is longer than its array")
     return arrays

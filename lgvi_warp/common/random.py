@@ -1,4 +1,4 @@
-"""To be said in one sentence."""
+"""Random numbers by counter: each member's depend on the seed, its index and a name only."""
 
 from __future__ import annotations
 
@@ -7,17 +7,23 @@ import hashlib
 
 import numpy as np
 
-# Standard deviations beyond which the tail of a normal is known by its logarithm.
+# Standard deviations beyond which a normal's tail is computed from its logarithm.
 FAR = -20.0
-
-
-# Between two members that are asked for, it costs less to draw so many others than to start again.
+# Largest gap between two members over which drawing the members between costs less than a new start of the generator.
 NEAR = 64
 
 
 @functools.lru_cache(maxsize=1024)
 def seed_words(seed: int, name: str) -> tuple[int, ...]:
-    """Entropy that depends on the seed and the name, for numpy.random.SeedSequence."""
+    """Entropy for numpy.random.SeedSequence that depends on a seed and a name.
+
+    Args:
+        seed: A whole number >= 0.
+        name: Name of what is drawn.
+
+    Returns:
+        The seed, and eight words of 32 bits from the name's SHA-256.
+    """
     return (int(seed), *(int(word) for word in np.frombuffer(hashlib.sha256(name.encode()).digest(), dtype="<u4")))
 
 
@@ -27,9 +33,19 @@ def _philox_key(seed: int, name: str) -> np.ndarray:
 
 
 def uniforms(seed: int, name: str, first: int, count: int, components: int) -> np.ndarray:
-    """Uniform numbers in (0, 1), (count, components), of the members from `first` on.
+    """Uniform random numbers of neighbouring members.
 
     They depend on the seed, the member's index and the name only: Philox counters, a fixed number for each member.
+
+    Args:
+        seed: A whole number >= 0.
+        name: Name of what is drawn.
+        first: Index of the first member.
+        count: Number of members.
+        components: Numbers for each member.
+
+    Returns:
+        Numbers in (0, 1), float64, shape (count, components).
     """
     counters = -(-components // 4)
     generator = np.random.Philox(key=_philox_key(int(seed), name))
@@ -39,12 +55,22 @@ def uniforms(seed: int, name: str, first: int, count: int, components: int) -> n
 
 
 def uniforms_of(seed: int, name: str, members: np.ndarray, components: int) -> np.ndarray:
-    """The same of any members (n,), in any order: (n, components). Neighbours are drawn together."""
+    """Uniform random numbers of any members; neighbours are drawn together.
+
+    Args:
+        seed: A whole number >= 0.
+        name: Name of what is drawn.
+        members: Indices in any order, shape (n,).
+        components: Numbers for each member.
+
+    Returns:
+        Numbers in (0, 1), float64, shape (n, components), the same as `uniforms` gives for these members.
+    """
     first, count = int(members[0]), len(members)
     if count == 1 or np.all(np.diff(members) == 1):
         return uniforms(seed, name, first, count, components)
     ascending, place = np.unique(members, return_inverse=True)
     ends = np.flatnonzero(np.diff(ascending) > NEAR) + 1
     runs = np.split(ascending, ends)
-    drawn = [uniforms(seed, name, int(run[0]), int(run[-1] - run[0]) + 1, components)[run - run[0]] for run in runs]
-    return np.concatenate(drawn)[place.reshape(-1)]
+    blocks = [uniforms(seed, name, int(run[0]), int(run[-1] - run[0]) + 1, components)[run - run[0]] for run in runs]
+    return np.concatenate(blocks)[place.reshape(-1)]

@@ -1,4 +1,4 @@
-"""What is read of a file that somebody gives: regular files alone, of a bounded size, so that reading ends."""
+"""Read a file that a user names: regular files only, of bounded size, so that reading ends."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 
 from lgvi_warp.common.errors import SceneError
 
-# Bytes of the largest file of each kind. A scene, and coefficients in YAML or XML, are written by hand or by a script: the
-# parsers read a megabyte or two a second (TOML), and a tenth of that (YAML). A table may hold millions of numbers.
+# Largest size of each kind of file [bytes]. Scenes and coefficients (YAML, XML) are written by hand or by a script; parsers
+# read one or two megabytes a second of TOML, and a tenth of that of YAML. A table may hold millions of numbers.
 MOST_BYTES = {"scene file": 1 << 20, "YAML file": 128 << 10, "CSV file": 512 << 20}
 MOST_OTHERS = 16 << 20
 PATHS = {"scene file": "give the path of a TOML file", "CSV file": "give the path of a CSV file"}
@@ -25,7 +25,7 @@ KINDS = (
 
 
 class UnreadableError(ValueError):
-    """A file that is not read.
+    """A file is not read.
 
     Args:
         what: What is wrong with it.
@@ -38,21 +38,21 @@ class UnreadableError(ValueError):
 
 
 def file_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
-    """All bytes of a regular file.
+    """Read all bytes of a regular file.
 
     Args:
         path: The file.
-        kind: What it is, such as "scene file": more bytes than such a file has are refused before one is read.
+        kind: What it is, such as "scene file"; a file larger than such files may be is refused before it is read.
 
     Returns:
         The bytes.
 
     Raises:
-        UnreadableError: It is no regular file, is too large, or the system does not give it.
+        UnreadableError: It is no regular file, is too large, or the system refuses it.
     """
     remedy, most = PATHS.get(kind, OTHER_PATHS), MOST_BYTES.get(kind, MOST_OTHERS)
     try:
-        # Looked at before it is opened: to open a device may do something. Nothing here waits for a pipe's other end.
+        # Checked before it is opened, since opening a device may have effects. Nothing here waits for a pipe's other end.
         _refuse(os.stat(path), kind)
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
         with os.fdopen(descriptor, "rb") as file:
@@ -68,18 +68,18 @@ def file_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
 
 
 def _refuse(found: os.stat_result, kind: str) -> None:
-    """Raise UnreadableError for what is no regular file, or is too large."""
-    for is_kind, what in KINDS:
+    """Raise UnreadableError for a file that is not regular, or too large."""
+    for is_kind, problem in KINDS:
         if is_kind(found.st_mode):
-            raise UnreadableError(what, PATHS.get(kind, OTHER_PATHS))
+            raise UnreadableError(problem, PATHS.get(kind, OTHER_PATHS))
     most = MOST_BYTES.get(kind, MOST_OTHERS)
     if found.st_size > most:
-        what = f"has {found.st_size / 1e6:,.1f} MB, more than the {most / 1e6:,.1f} MB that a {kind} may have"
-        raise UnreadableError(what, _smaller(kind))
+        problem = f"has {found.st_size / 1e6:,.1f} MB, more than the {most / 1e6:,.1f} MB that a {kind} may have"
+        raise UnreadableError(problem, _smaller(kind))
 
 
 def _smaller(kind: str) -> str:
-    """How to do with a smaller file."""
+    """The remedy for a file that is too large."""
     if kind == "CSV file":
         return "leave out columns or members, or give the numbers as arrays: lw.Table({name: array})"
     if kind == "scene file":
@@ -88,7 +88,7 @@ def _smaller(kind: str) -> str:
 
 
 def text_of(content: bytes) -> str:
-    """The text of bytes in UTF-8, without the mark that some editors put before it.
+    """Decode bytes in UTF-8, without a byte order mark.
 
     Args:
         content: The bytes of a file.
@@ -104,12 +104,12 @@ def text_of(content: bytes) -> str:
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        what = f"is no text in UTF-8: byte 0x{content[error.start]:02x} at {error.start:,}"
-        raise UnreadableError(what, "save it in UTF-8") from None
+        problem = f"is no text in UTF-8: byte 0x{content[error.start]:02x} at {error.start:,}"
+        raise UnreadableError(problem, "save it in UTF-8") from None
 
 
 def file_text(path: str | os.PathLike[str], kind: str) -> str:
-    """The text of a file.
+    """Read a text file in UTF-8.
 
     Args:
         path: The file.
@@ -119,7 +119,7 @@ def file_text(path: str | os.PathLike[str], kind: str) -> str:
         The text.
 
     Raises:
-        SceneError: It is not read, with the reason and the remedy.
+        SceneError: It cannot be read; the message has the reason and the remedy.
     """
     try:
         content = file_bytes(path, kind)
@@ -132,5 +132,5 @@ def file_text(path: str | os.PathLike[str], kind: str) -> str:
 
 
 def _name(path: str | os.PathLike[str]) -> str:
-    """A path in a message; of what is none, its repr."""
+    """A path as a message shows it; the repr of anything else."""
     return str(path) if isinstance(path, str | Path) else repr(path)

@@ -1,4 +1,4 @@
-"""What a user gives for numbers, as an array of them: what is masked, labelled, or no real number is refused."""
+"""Read a user's numbers as an array; refuse what is masked, labelled or not real."""
 
 from __future__ import annotations
 
@@ -10,7 +10,12 @@ import numpy as np
 
 
 class NotReal(ValueError):  # noqa: N818
-    """A value that is no array of real numbers. what: is wrong with it; remedy: None for "give numbers"."""
+    """A value is no array of real numbers.
+
+    Args:
+        what: What is wrong with it.
+        remedy: How to mend it; default None, "give numbers".
+    """
 
     def __init__(self, what: str, remedy: str | None = None):
         super().__init__(what)
@@ -18,22 +23,25 @@ class NotReal(ValueError):  # noqa: N818
 
 
 def real_numbers(value: Any) -> np.ndarray:
-    """A new float64 array of the same numbers, which may be NaN or infinite.
+    """Read real numbers into a new array; they may be NaN or infinite.
 
     Args:
-        value: a number, lists of numbers, an array, or what NumPy makes an array of.
+        value: A number, lists of numbers, an array, or anything NumPy makes an array of.
+
+    Returns:
+        float64, of the value's shape.
 
     Raises:
-        NotReal: for texts, truth values, complex numbers and dates, alone or among numbers; for lists of different
-            lengths; where a mask hides a number; and for a table whose columns have names, which would be lost.
+        NotReal: The value holds texts, truth values, complex numbers or dates, lists of different lengths, a masked
+            number, or a table whose column names would be lost.
     """
-    for part in _parts(value):
-        _check(part)
+    for leaf in _parts(value):
+        _check(leaf)
     if isinstance(value, np.ma.MaskedArray):
         value = value.data
     try:
         array = np.array(value)
-        if array.dtype.kind == "O" and all(isinstance(one, Real) and not _is_word(one) for one in array.flat):
+        if array.dtype.kind == "O" and all(isinstance(item, Real) and not _is_word(item) for item in array.flat):
             return array.astype(np.float64)
         if array.dtype.kind in "iuf":
             return array.astype(np.float64)
@@ -43,10 +51,16 @@ def real_numbers(value: Any) -> np.ndarray:
 
 
 def real_results(values: Any) -> np.ndarray:
-    """What a user's function gave, as an array of numbers: NaN where it is masked; truth values stay as they are.
+    """Read the numbers that a user's function returned; masked ones become NaN.
+
+    Args:
+        values: What the function returned.
+
+    Returns:
+        An array of numbers or of truth values.
 
     Raises:
-        NotReal: for complex numbers, texts, and what is no array.
+        NotReal: The values are complex, texts, or no array.
     """
     if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
         if values.dtype.kind not in "biuf":
@@ -62,15 +76,28 @@ def real_results(values: Any) -> np.ndarray:
 
 
 def holds_words(value: Any) -> bool:
-    """Whether a truth value or a text hides among numbers.
+    """Tell whether a truth value or a text hides among numbers.
 
-    [true, 1.0] would pass for [1.0, 1.0], and of one long text among many numbers NumPy makes as many long texts.
+    [true, 1.0] would pass for [1.0, 1.0], and NumPy turns one long text among many numbers into as many long texts.
+
+    Args:
+        value: A value, or lists of values.
+
+    Returns:
+        True where one is a truth value or a text.
     """
-    return any(_is_word(part) for part in _parts(value))
+    return any(_is_word(leaf) for leaf in _parts(value))
 
 
 def column_names(value: Any) -> list[Any] | None:
-    """Names of the columns of a table such as pandas.DataFrame or polars.DataFrame; None where it has none."""
+    """Column names of a table such as pandas.DataFrame or polars.DataFrame.
+
+    Args:
+        value: Any value.
+
+    Returns:
+        The names; None for a value without them.
+    """
     for name in ("column_names", "columns"):  # pyarrow's `columns` are the columns themselves
         names = getattr(value, name, None)
         if names is not None and not callable(names) and not isinstance(names, str):
@@ -81,30 +108,30 @@ def column_names(value: Any) -> list[Any] | None:
     return None
 
 
-# NumPy's arrays have no more dimensions than that.
+# Most dimensions of NumPy's arrays.
 DEEPEST = 64
 
 
 def _parts(value: Any, depth: int = 0) -> Iterator[Any]:
-    """What lists within lists hold, a word for those that are too deep; the value itself where it is no list."""
+    """Items of nested lists, a text for those nested too deep; the value itself if it is no list."""
     if depth > DEEPEST:
         yield "too deep"
     elif isinstance(value, list | tuple):
-        for part in value:
-            yield from _parts(part, depth + 1)
+        for item in value:
+            yield from _parts(item, depth + 1)
     else:
         yield value
 
 
 def _is_word(part: Any) -> bool:
-    """Whether it is a truth value, an array of them, or a text."""
+    """Tell whether a value is a truth value, an array of them, or a text."""
     if isinstance(part, bool | np.bool_ | str | bytes):
         return True
     return isinstance(part, np.ndarray) and part.dtype.kind == "b"
 
 
 def _check(part: Any) -> None:
-    """Refuse what NumPy would take without a word."""
+    """Refuse what NumPy would convert silently."""
     if _is_word(part):
         raise NotReal("is not numeric")
     if isinstance(part, np.ma.MaskedArray) and np.ma.is_masked(part):
@@ -112,8 +139,8 @@ def _check(part: Any) -> None:
     names = column_names(part)
     if names is not None and names != list(range(len(names))):
         listed = ", ".join(map(str, names[:6])) + ", ..." * (len(names) > 6)
-        what = f"is a table with names of columns ({listed}), which are not read here"
-        raise NotReal(what, "give its numbers alone, in the order that is wanted: table[[...]].to_numpy()")
+        problem = f"is a table with names of columns ({listed}), which are not read here"
+        raise NotReal(problem, "give its numbers alone, in the order that is wanted: table[[...]].to_numpy()")
 
 
 def _masked(part: np.ma.MaskedArray) -> tuple[str, str]:
@@ -124,5 +151,5 @@ def _masked(part: np.ma.MaskedArray) -> tuple[str, str]:
     if mask.ndim == 0:
         return "is masked: it has no number", "give a number for it, or leave it out"
     first = ", ".join(str(int(i)) for i in np.argwhere(mask)[0])
-    what = f"has a mask that hides {int(mask.sum())} of {mask.size} numbers (the first: [{first}])"
-    return what, "leave out what is masked, or give numbers for it: .filled(...)"
+    problem = f"has a mask that hides {int(mask.sum())} of {mask.size} numbers (the first: [{first}])"
+    return problem, "leave out what is masked, or give numbers for it: .filled(...)"

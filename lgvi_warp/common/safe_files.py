@@ -1,6 +1,6 @@
-"""Files below a folder that may be somebody else's: no link is followed, and only plain files are opened.
+"""Files below a folder of unknown origin: no link is followed, and only plain files are opened.
 
-Each folder on the way is opened in the one above it, so that a link that is put there meanwhile is not followed either.
+Each folder on the way is opened relative to its parent, so that a link placed there meanwhile is not followed either.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, BinaryIO
 
 from lgvi_warp.common.errors import SceneError
 
-# A JSON file of a store is a few kilobytes; one with millions of indices has some tens of megabytes.
+# Most bytes of a JSON file: a store's has a few kilobytes, with millions of indices some tens of megabytes.
 MOST_JSON = 64_000_000
 BY_DESCRIPTOR = os.open in os.supports_dir_fd and os.rename in os.supports_dir_fd and hasattr(os, "O_NOFOLLOW")
 _PLAIN = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
@@ -24,21 +24,45 @@ _FOLDER = getattr(os, "O_DIRECTORY", 0) | os.O_RDONLY | _PLAIN
 
 
 def refused(path: Path, what: str) -> SceneError:
-    """A file that a store never holds."""
+    """Make the error for a file that a store never holds.
+
+    Args:
+        path: The file.
+        what: What is wrong with it, as `kind` says.
+
+    Returns:
+        The error, with its remedy.
+    """
     remedy = "take it away, and what it leads to is left alone" if what == "is a link" else "take it away"
     return SceneError([f"{path}: {what}, where a store has plain files and folders only; {remedy}"])
 
 
 def kind(mode: int) -> str:
-    """What a file is that is not a plain one."""
+    """Say what a file is that is not a plain one.
+
+    Args:
+        mode: Its mode, as os.stat gives it.
+
+    Returns:
+        "is a link", "is a folder" or "is a device, pipe or socket".
+    """
     return "is a link" if stat.S_ISLNK(mode) else "is a folder" if stat.S_ISDIR(mode) else "is a device, pipe or socket"
 
 
 @contextlib.contextmanager
 def folder(root: Path, inner: Path) -> Iterator[int | None]:
-    """A descriptor of a folder below the root, which itself may be a link; None where a system has none for folders.
+    """Open a folder below a root, without following links; the root itself may be one.
 
-    Raises SceneError where a link is on the way, OSError.
+    Args:
+        root: The root folder.
+        inner: The folder below it.
+
+    Yields:
+        A descriptor; None on a system without descriptors of folders.
+
+    Raises:
+        SceneError: A link is on the way.
+        OSError: A folder cannot be opened.
     """
     steps = inner.relative_to(root).parts
     if not BY_DESCRIPTOR:
@@ -56,7 +80,7 @@ def folder(root: Path, inner: Path) -> Iterator[int | None]:
 
 
 def _entered(descriptor: int, step: str, path: Path) -> int:
-    """A folder within an open one, which is closed. Raises SceneError for a link."""
+    """Open a folder within an open one, and close the outer one. Raises SceneError for a link."""
     try:
         inner = os.open(step, _FOLDER, dir_fd=descriptor)
     except OSError as error:
@@ -75,11 +99,24 @@ def _check_folder(mode: int, path: Path) -> None:
 
 @contextlib.contextmanager
 def opened(root: Path, key: str) -> Iterator[BinaryIO]:
-    """A plain file below the root, for reading. Raises SceneError for links, pipes and devices, FileNotFoundError, OSError."""
+    """Open a plain file below a root for reading.
+
+    Args:
+        root: The root folder.
+        key: Path of the file from there.
+
+    Yields:
+        The unbuffered file.
+
+    Raises:
+        SceneError: It is a link, a pipe or a device.
+        FileNotFoundError: It is missing.
+        OSError: It cannot be opened.
+    """
     path = root / key
     with folder(root, path.parent) as inside:
         where: Any = path if inside is None else path.name
-        # A device is not even opened: that alone may do something.
+        # A device is not even opened, since that may have effects.
         _check_file(os.stat(where, dir_fd=inside, follow_symlinks=False).st_mode, path)
         try:
             descriptor = os.open(where, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | _PLAIN, dir_fd=inside)
@@ -97,7 +134,20 @@ def _check_file(mode: int, path: Path) -> None:
 
 
 def read(root: Path, key: str, most: int) -> bytes:
-    """A plain file below the root, of so many bytes at most. Raises SceneError, FileNotFoundError, OSError."""
+    """Read a plain file below a root.
+
+    Args:
+        root: The root folder.
+        key: Path of the file from there.
+        most: Largest size allowed [bytes].
+
+    Returns:
+        Its bytes.
+
+    Raises:
+        SceneError: It is no plain file, or too large.
+        OSError: It is missing or cannot be read.
+    """
     with opened(root, key) as file:
         size = os.fstat(file.fileno()).st_size
         if size > most:
@@ -106,12 +156,35 @@ def read(root: Path, key: str, most: int) -> bytes:
 
 
 def read_json(root: Path, key: str) -> Any:
-    """A JSON file below the root. Raises ValueError where it is none, SceneError, OSError."""
+    """Read a JSON file below a root.
+
+    Args:
+        root: The root folder.
+        key: Path of the file from there.
+
+    Returns:
+        Its content.
+
+    Raises:
+        ValueError: It is not JSON.
+        SceneError: It is no plain file, or too large.
+        OSError: It is missing or cannot be read.
+    """
     return parsed(read(root, key, MOST_JSON))
 
 
 def parsed(text: str | bytes) -> Any:
-    """JSON as Python's objects. Raises ValueError where it is none, or nested too deep."""
+    """Parse JSON into Python's objects.
+
+    Args:
+        text: The JSON text.
+
+    Returns:
+        Its content.
+
+    Raises:
+        ValueError: It is not JSON, or is nested too deep.
+    """
     try:
         return json.loads(text)
     except RecursionError:
@@ -120,7 +193,19 @@ def parsed(text: str | bytes) -> Any:
 
 @contextlib.contextmanager
 def created(root: Path, path: Path) -> Iterator[BinaryIO]:
-    """A new file below the root, for writing. Raises SceneError where a folder on the way is a link, OSError."""
+    """Create a new file below a root for writing.
+
+    Args:
+        root: The root folder.
+        path: The file, which must not exist.
+
+    Yields:
+        The unbuffered file.
+
+    Raises:
+        SceneError: A folder on the way is a link.
+        OSError: It cannot be created.
+    """
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _PLAIN
     with folder(root, path.parent) as inside:
         where = path if inside is None else path.name
@@ -130,7 +215,17 @@ def created(root: Path, path: Path) -> Iterator[BinaryIO]:
 
 
 def rename(root: Path, path: Path, target: Path) -> None:
-    """Rename a file within its folder below the root; a link that has the target's name is replaced, not followed."""
+    """Rename a file within its folder below a root; an existing link of that name is replaced, not followed.
+
+    Args:
+        root: The root folder.
+        path: The file.
+        target: Its new path, in the same folder.
+
+    Raises:
+        SceneError: A folder on the way is a link.
+        OSError: It cannot be renamed.
+    """
     with folder(root, path.parent) as inside:
         if inside is None:
             path.replace(target)
@@ -138,16 +233,28 @@ def rename(root: Path, path: Path, target: Path) -> None:
             os.replace(path.name, target.name, src_dir_fd=inside, dst_dir_fd=inside)
 
 
-# Folders within folders: a run has two of them, one with kept members four.
+# Most nested folders: a run has two levels, one with kept members four.
 MOST_DEEP = 8
 
 
 def entries(root: Path, below: str = "") -> Iterator[tuple[str, os.DirEntry[str]]]:
-    """All that lies below the root, with its name from there; links are not followed. SceneError if too deep."""
+    """List everything below a root, in order of names; links are not followed.
+
+    Args:
+        root: The root folder.
+        below: Folder to begin with, ending in "/"; default the root.
+
+    Yields:
+        (path from the root, directory entry).
+
+    Raises:
+        SceneError: Folders are nested too deep.
+        OSError: A folder cannot be read.
+    """
     if below.count("/") > MOST_DEEP:
         raise SceneError([f"{root / below}: is deeper than the folders of a run are; take it away"])
-    with os.scandir(root / below) as found:
-        for entry in sorted(found, key=lambda one: one.name):
+    with os.scandir(root / below) as listing:
+        for entry in sorted(listing, key=lambda item: item.name):
             name = f"{below}{entry.name}"
             yield name, entry
             if entry.is_dir(follow_symlinks=False):
@@ -155,7 +262,19 @@ def entries(root: Path, below: str = "") -> Iterator[tuple[str, os.DirEntry[str]
 
 
 def names(root: Path, key: str) -> set[str]:
-    """Names in a folder below the root, none of one that is not there. Raises SceneError where it is a link."""
+    """List the names in a folder below a root.
+
+    Args:
+        root: The root folder.
+        key: Path of the folder from there.
+
+    Returns:
+        The names; empty where the folder is missing.
+
+    Raises:
+        SceneError: A link is on the way.
+        OSError: It cannot be read.
+    """
     try:
         with folder(root, root / key) as inside:
             return set(os.listdir(root / key if inside is None else inside))
@@ -164,13 +283,27 @@ def names(root: Path, key: str) -> set[str]:
 
 
 def size_below(root: Path) -> int:
-    """Bytes of all plain files below a folder."""
-    plain = (one for _, one in entries(root) if one.is_file(follow_symlinks=False))
-    return sum(one.stat(follow_symlinks=False).st_size for one in plain)
+    """Add up the plain files below a folder.
+
+    Args:
+        root: The folder.
+
+    Returns:
+        Their size [bytes].
+    """
+    plain = (entry for _, entry in entries(root) if entry.is_file(follow_symlinks=False))
+    return sum(entry.stat(follow_symlinks=False).st_size for entry in plain)
 
 
 def refuse_links(root: Path) -> None:
-    """Raise SceneError where a link, device or pipe lies below the root."""
+    """Refuse a folder that holds anything but plain files and folders.
+
+    Args:
+        root: The folder.
+
+    Raises:
+        SceneError: A link, device or pipe lies below it.
+    """
     for name, entry in entries(root):
         if not entry.is_dir(follow_symlinks=False):
             _check_file(entry.stat(follow_symlinks=False).st_mode, root / name)

@@ -1,4 +1,4 @@
-"""Names of files and folders on their way to their places: they tell which process writes them, and no two are the same."""
+"""Temporary names of files and folders that are being written: each names its process, and no two are the same."""
 
 from __future__ import annotations
 
@@ -11,14 +11,18 @@ import socket
 import stat
 from pathlib import Path
 
-# A file that is being written, a folder that will take the place of another, and the one that it took the place of.
+# Endings of an unfinished file, of a new folder, and of the folder that it replaced.
 UNFINISHED, NEW, OLD = ".part", ".new", ".old"
 # HOST-NAMESPACE-PID-TOKEN; versions before 0.2 wrote HOST-PID.
 MARK = re.compile(r"(?P<host>[^/]+?)-(?:(?P<space>\d+)-)?(?P<pid>\d+)(?:-[0-9a-f]{8})?")
 
 
 def host() -> str:
-    """The machine's name and the number of the process namespace: within both a process is known by its number."""
+    """Identify the machine and the process namespace, within which a process number is unique.
+
+    Returns:
+        "HOST-NAMESPACE"; namespace 0 where the system has none.
+    """
     try:
         space = os.stat("/proc/self/ns/pid").st_ino
     except OSError:
@@ -27,25 +31,48 @@ def host() -> str:
 
 
 def beside(target: Path, ending: str = UNFINISHED) -> Path:
-    """A name for what will take the place of `target`, in the same folder, that no other writer has."""
+    """Make a temporary name, in the same folder, that no other writer has.
+
+    Args:
+        target: The later path.
+        ending: UNFINISHED (default), NEW or OLD.
+
+    Returns:
+        The temporary path.
+    """
     return target.with_name(f"{target.name}.{host()}-{os.getpid()}-{secrets.token_hex(4)}{ending}")
 
 
 def is_alive(pid: int) -> bool:
-    """Whether a process of this machine runs; yes where the system does not tell."""
+    """Tell whether a process of this machine runs.
+
+    Args:
+        pid: Its number.
+
+    Returns:
+        True where it runs, or where the system does not tell.
+    """
     if os.name != "posix":
         return True
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
         return False
-    except (OSError, OverflowError):  # it is another user's
+    except (OSError, OverflowError):  # another user's process
         return True
     return True
 
 
 def of_target(name: str, target: str) -> re.Match[str] | None:
-    """What a name says of its writer, if it is one that `beside` gives for a target."""
+    """Read the writer from a temporary name.
+
+    Args:
+        name: Name of a file or folder.
+        target: Name that it was made for.
+
+    Returns:
+        A match with "host", "space" and "pid"; None for any other name.
+    """
     head, ending = f"{target}.", os.path.splitext(name)[1]
     if not name.startswith(head) or ending not in (UNFINISHED, NEW, OLD):
         return None
@@ -53,7 +80,14 @@ def of_target(name: str, target: str) -> re.Match[str] | None:
 
 
 def is_unfinished(name: str) -> bool:
-    """Whether a name is one that `beside` gives for an unfinished file."""
+    """Tell whether a name is that of an unfinished file.
+
+    Args:
+        name: Name of a file.
+
+    Returns:
+        True for a name that `beside` gives with its default ending.
+    """
     head, ending = os.path.splitext(name)
     return ending == UNFINISHED and any(MARK.fullmatch(head[dot + 1 :]) for dot in _dots(head))
 
@@ -63,21 +97,32 @@ def _dots(text: str) -> list[int]:
 
 
 def left_behind(target: Path) -> list[Path]:
-    """What writers of a target left that run no more: of this machine, by the numbers of their processes."""
+    """Find what dead writers of this machine left of a target.
+
+    Args:
+        target: Path of the file or folder that they wrote.
+
+    Returns:
+        Paths of their files and folders.
+    """
     try:
         names = os.listdir(target.parent)
     except OSError:
         return []
-    found = []
+    paths = []
     for name in names:
         mark = of_target(name, target.name)
         if mark and f"{mark['host']}-{mark['space']}" == host() and not is_alive(int(mark["pid"])):
-            found.append(target.with_name(name))
-    return found
+            paths.append(target.with_name(name))
+    return paths
 
 
 def sweep(target: Path) -> None:
-    """Remove unfinished files of writers of this target that run no more; folders are left to who knows what is in them."""
+    """Remove unfinished files that dead writers left of a target; folders stay, since their use is unknown here.
+
+    Args:
+        target: Path of the file that they wrote.
+    """
     for path in left_behind(target):
         with contextlib.suppress(OSError):
             if path.suffix == UNFINISHED and stat.S_ISREG(path.lstat().st_mode):
@@ -85,6 +130,10 @@ def sweep(target: Path) -> None:
 
 
 def remove_folder(path: Path) -> None:
-    """Remove a folder and all that is in it; one that is not there is no error. A link is not followed."""
+    """Remove a folder with all its content; a missing one is no error, and a link is not followed.
+
+    Args:
+        path: The folder.
+    """
     with contextlib.suppress(FileNotFoundError):
         shutil.rmtree(path)

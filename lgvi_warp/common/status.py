@@ -1,4 +1,4 @@
-"""What became of each member, and what to do about it."""
+"""Outcome and warnings of each member of a run, each with its remedy."""
 
 from __future__ import annotations
 
@@ -7,13 +7,16 @@ from typing import Any
 
 import numpy as np
 
-# What solve and [run] may ask for (see solve).
+# Values of `checks` and `on_failure` in solve and in a scene's [run].
 CHECKS = ("none", "safe", "all")
 ON_FAILURE = ("freeze", "raise", "substep")
 
 
 class Status(IntEnum):
-    """Outcome of one member. A member that failed stays at its last good state; no other member notices."""
+    """Outcome of one member: OK, the reason of its failure, or the event that stopped it.
+
+    A member that failed stays at its last good state; no other member is affected. Codes from 16 on are events.
+    """
 
     OK = 0
     STEP_TOO_LARGE = 1
@@ -31,12 +34,12 @@ class Status(IntEnum):
 
     @property
     def stopped(self) -> bool:
-        """Whether an event of the scene stopped the member: an outcome, no failure."""
+        """Whether an event of the scene stopped the member, which is no failure."""
         return self >= Status.SURFACE
 
     @property
     def text(self) -> str:
-        """What happened and the remedy, in a sentence."""
+        """What happened and the remedy, in one sentence."""
         return _TEXT[self]
 
 
@@ -53,10 +56,11 @@ _TEXT = {
     "shorten the step, or use psi_s or psi_x, which treat drag implicitly",
     Status.STEP_TOO_SMALL: "the steps that the tolerance asks for became too small, or too many (100,000 within one h); "
     "loosen rtol or atol (float32 reaches about 1e-6), or look for forces that jump or are stiff",
-    Status.ENERGY_GREW: "energy came from nowhere, more than 100 times what there was to exchange, though no force of the "
-    "scene creates any: the method is unstable at this step; shorten it (result.warnings tells what is too fast)",
-    Status.BACKWARD_DRAG: "drag became too strong for the stages of the composition that go backward: their drag number, "
-    "(back) (l + q|v|) / I, passed 0.5, and at 1 drag has no past; use the method that is composed, or shorten the step",
+    Status.ENERGY_GREW: "the total energy grew to more than 100 times the energy available, although no force of the scene "
+    "supplies any: the method is unstable at this step; shorten it (result.warnings tells what is too fast)",
+    Status.BACKWARD_DRAG: "this composition takes some stages with a negative step, and the drag is too strong to be "
+    "integrated backward: their drag number, (back) (l + q|v|) / I, passed 0.5; use the method that is composed, or shorten "
+    "the step",
     Status.SURFACE: "stopped by an event: rose to the surface",
     Status.FLOOR: "stopped by an event: sank to the sea floor",
     Status.BOX: "stopped by an event: left the box",
@@ -67,28 +71,32 @@ _TEXT = {
 
 
 class StatusArray(np.ndarray):
-    """Status of each member, shape (n,), uint8: compares with `Status` members; `counts()` sums up."""
+    """Status codes of all members, uint8, shape (n,); compares with members of `Status`."""
 
     @property
     def failed(self) -> np.ndarray:
-        """(n,), which members failed: neither got to the end nor were stopped by an event."""
+        """Mask (n,) of the members that neither reached the end nor were stopped by an event."""
         return failed(self)
 
     @property
     def stopped(self) -> np.ndarray:
-        """(n,), which members an event of the scene stopped: an outcome, no failure."""
+        """Mask (n,) of the members that an event of the scene stopped."""
         return stopped(self)
 
     def counts(self) -> dict[str, int]:
-        """Members by status name, those that occur, the most serious last."""
+        """Count members by outcome.
+
+        Returns:
+            Name of the status in lower case -> number of members, in the order of the codes; only those that occur.
+        """
         values, numbers = np.unique(np.asarray(self), return_counts=True)
         return {Status(v).name.lower(): int(n) for v, n in zip(values, numbers, strict=True)}
 
 
 class Warnings(IntFlag):
-    """What a member's numbers or its motion say against the step, the precision or the numbers themselves.
+    """Signs that the step, the precision or a member's numbers do not suit its motion, as bits.
 
-    A warning stops nothing. Of two, the higher is the more serious.
+    A warning stops nothing. Of two warnings, the higher bit is the more serious.
     """
 
     INERTIA = 1
@@ -104,12 +112,12 @@ class Warnings(IntFlag):
 
     @property
     def text(self) -> str:
-        """What was seen and the remedy, in a sentence. Of several warnings, of each."""
-        return "; ".join(_WARNING_TEXT[one] for one in Warnings if one in self)
+        """What was seen and the remedy, in one sentence for each warning set."""
+        return "; ".join(_WARNING_TEXT[warning] for warning in Warnings if warning in self)
 
     @property
     def value_name(self) -> str:
-        """What `result.warning_value` is where this warning is a member's most serious one."""
+        """Formula of the number in `result.warning_value`, for the most serious warning set."""
         return _WARNING_VALUE[Warnings(1 << (int(self).bit_length() - 1))] if self else ""
 
 
@@ -132,8 +140,8 @@ _WARNING_TEXT = {
     "limit of stability; shorten the step",
     Warnings.RESTORING_UNSTABLE: "the restoring moment's oscillation is too fast for this method and step: h sqrt(B|r|/J) "
     "passed the measured limit of stability; shorten the step",
-    Warnings.ENERGY: "energy came from nowhere, more than half of what there was to exchange, though no force of the scene "
-    "creates any; shorten the step",
+    Warnings.ENERGY: "the total energy grew by more than half of the energy available, although no force of the scene "
+    "supplies any; shorten the step",
 }
 
 _WARNING_VALUE = {
@@ -151,59 +159,75 @@ _WARNING_VALUE = {
 
 
 def stopped(status: Any) -> np.ndarray:
-    """Which members an event of the scene stopped: an outcome, no failure.
+    """Mask of the members that an event of the scene stopped, which is no failure.
 
     Args:
-        status: (n,), codes of `Status`.
+        status: Codes of `Status`, shape (n,).
 
     Returns:
-        (n,), bool.
+        bool, shape (n,).
     """
     return np.isin(np.asarray(status), [code for code in Status if code.stopped])
 
 
 def failed(status: Any) -> np.ndarray:
-    """Which members failed: neither got to the end nor were stopped by an event.
+    """Mask of the members that neither reached the end nor were stopped by an event.
 
     Args:
-        status: (n,), codes of `Status`.
+        status: Codes of `Status`, shape (n,).
 
     Returns:
-        (n,), bool.
+        bool, shape (n,).
     """
     return np.asarray((np.asarray(status) != Status.OK) & ~stopped(status))
 
 
 class WarningArray(np.ndarray):
-    """Warnings of each member, shape (n,), uint16: bits of `Warnings`; `counts()` sums up."""
+    """Warnings of all members as bits of `Warnings`, uint16, shape (n,)."""
 
     def counts(self) -> dict[str, int]:
-        """Members by warning, those that occur, the most serious last; a member counts for each that it has."""
+        """Count members by warning.
+
+        Returns:
+            Name of the warning in lower case -> number of members, the most serious last; only those that occur. A member
+            counts once for each of its warnings.
+        """
         bits = np.asarray(self)
-        numbers = {one.name.lower(): int(np.count_nonzero(bits & one)) for one in Warnings if one.name}
+        numbers = {warning.name.lower(): int(np.count_nonzero(bits & warning)) for warning in Warnings if warning.name}
         return {name: n for name, n in numbers.items() if n}
 
     def has(self, warning: Warnings) -> np.ndarray:
-        """(n,), which members have it, or any of several."""
+        """Mask of the members with a warning.
+
+        Args:
+            warning: One warning, or several joined by |: a member with any of them counts.
+
+        Returns:
+            bool, shape (n,).
+        """
         return (np.asarray(self) & int(warning)) != 0
 
     def worst(self) -> np.ndarray:
-        """(n,), each member's most serious warning, 0 where it has none."""
+        """Find the most serious warning of each member.
+
+        Returns:
+            One bit of `Warnings` each, uint16, shape (n,); 0 for a member without a warning.
+        """
         bits = np.asarray(self, dtype=np.uint16)
-        found = np.zeros_like(bits)
-        for one in Warnings:
-            found = np.where(bits & one, np.uint16(one), found)
-        return found
+        highest = np.zeros_like(bits)
+        for warning in Warnings:
+            highest = np.where(bits & warning, np.uint16(warning), highest)
+        return highest
 
 
 def under_way(result: Any) -> np.ndarray:
-    """Which members were under way at each sample: not stopped by an event, and not failed.
+    """Mask of the members under way at each sample: neither stopped by an event nor failed.
 
     Args:
-        result: Of a run, with k samples of n members.
+        result: A `Result` of n members with k samples.
 
     Returns:
-        (k, n), bool.
+        bool, shape (k, n).
     """
     return np.asarray(result.time[:, None] <= stop_time(result) * (1.0 + ROUNDING))
 
@@ -212,13 +236,13 @@ def stop_time(result: Any) -> np.ndarray:
     """When each member stopped: the time of its event, or of its last good state where it failed.
 
     Args:
-        result: Of a run.
+        result: A `Result` of n members.
 
     Returns:
-        (n,) [s]; infinite where the member went to the end of the run.
+        Times [s], shape (n,); infinite for a member that ran to the end.
     """
     return np.where(np.asarray(result.status) != Status.OK, np.asarray(result.failure_time), np.inf)
 
 
-# A sample at a member's last time counts as its own, whatever the two were rounded to.
+# Relative tolerance by which a sample at a member's last time still counts as the member's own, despite round-off.
 ROUNDING = 1e-12

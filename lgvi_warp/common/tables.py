@@ -1,4 +1,4 @@
-"""Tables for other programs."""
+"""Write records as tables for other programs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,18 @@ from lgvi_warp.common import files as durable
 
 
 def write_csv(rows: Sequence[Mapping[str, Any]], path: str | os.PathLike[str]) -> Path:
-    """Write records to a CSV file, a column for every key that some record has. Returns its path. Raises OSError."""
+    """Write records to a CSV file; it is there whole or not at all.
+
+    Args:
+        rows: Records, with one column for every key that some record has.
+        path: The file.
+
+    Returns:
+        Its path.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
     target = Path(path)
     names = list(dict.fromkeys(key for row in rows for key in row))
     with durable.placed(target) as beside, beside.open("x", newline="", encoding="utf-8") as file:

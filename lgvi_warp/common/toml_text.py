@@ -1,4 +1,4 @@
-"""TOML from anybody: what is deep, endless or larger than any scene is refused, in a bounded time."""
+"""Read TOML of unknown origin: texts nested deeper or larger than any scene are refused, in bounded time."""
 
 from __future__ import annotations
 
@@ -8,32 +8,32 @@ from typing import Any
 
 from lgvi_warp.common.errors import Faults, SceneError
 
-# Tables and lists within one another: a scene has six.
+# Most levels of nested tables and lists: a scene has six.
 DEEPEST = 24
-# Points of one key: tomllib's time grows with their square.
+# Most points in one key: tomllib's time grows with their square.
 MOST_DOTS = 8
 _PART = r"""(?:[\w\-]{1,200}|"(?:[^"\\\n]|\\.){0,200}"|'[^'\n]{0,200}')"""
 DOTTED = re.compile(rf"""(?<![\w\-"'\\]){_PART}(?:[ \t]{{0,200}}\.[ \t]{{0,200}}{_PART}){{{MOST_DOTS}}}""")
-# Tables: a term is one.
+# Most tables: each term is one.
 MOST_TABLES = 5000
 TABLE = re.compile(r"^[ \t]*\[[^,\n]*\][ \t]*(?:#.*)?$", re.MULTILINE)
 LONGEST_KEY, LONGEST_TEXT = 200, 4096
-# TOML's whole numbers.
+# Range of TOML's whole numbers.
 LEAST, MOST = -(2**63), 2**63 - 1
 
 
 def parsed(text: str, name: str) -> dict[str, Any]:
-    """The tables of a TOML text.
+    """Parse a TOML text.
 
     Args:
-        text: In TOML.
-        name: What it is called in a message.
+        text: The TOML text.
+        name: Its name in a message.
 
     Returns:
         Tables by name.
 
     Raises:
-        SceneError: It is not TOML, is nested deeper than any scene, or holds a number or a text that TOML cannot hold.
+        SceneError: It is not TOML, is nested deeper than any scene, or holds a number or text that is too large.
     """
     if DOTTED.search(text):
         raise SceneError([f"{name}: has a key of more than {MOST_DOTS} parts; write section.key"])
@@ -45,7 +45,7 @@ def parsed(text: str, name: str) -> dict[str, Any]:
         raise SceneError([f"{name} is not TOML: {error}; mend that line"]) from error
     except RecursionError:
         raise SceneError([_deep(name)]) from None
-    except ValueError:  # Python reads no whole number of some thousand digits
+    except ValueError:  # Python refuses whole numbers of several thousand digits
         raise SceneError(
             [f"{name}: has a whole number of thousands of digits; write it with a point: 1.0e20"]
         ) from None
@@ -58,7 +58,7 @@ def _deep(name: str) -> str:
 
 
 def _check(content: dict[str, Any], name: str) -> None:
-    """Refuse what no scene has, layer by layer: nothing here calls itself, however deep the content is."""
+    """Refuse what no scene holds, layer by layer: no recursion, however deep the content is."""
     faults = Faults()
     layer: list[tuple[str, Any]] = [("", content)]
     for _ in range(DEEPEST):
@@ -80,7 +80,7 @@ def _check(content: dict[str, Any], name: str) -> None:
 
 
 def _note(faults: Faults, at: str, value: Any, following: list[tuple[str, Any]]) -> None:
-    """Note what is wrong with a value; a table or list waits for the next layer."""
+    """Note what is wrong with a value; a table or list is kept for the next layer."""
     if isinstance(value, dict | list):
         following.append((at, value))
     elif isinstance(value, str) and len(value) > LONGEST_TEXT:

@@ -1,4 +1,4 @@
-"""Start Warp without a word on stdout or stderr."""
+"""Start Warp without output on stdout or stderr."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ import warp._src.context as context
 
 @contextlib.contextmanager
 def _native_stderr_closed() -> Iterator[None]:
-    """Send what native code writes to file descriptor 2 nowhere."""
+    """Discard what native code writes to file descriptor 2."""
     if sys.stderr is not None:
         sys.stderr.flush()
     try:
-        kept = os.dup(2)
-    except OSError:  # it is closed already
+        stderr_copy = os.dup(2)
+    except OSError:  # already closed
         yield
         return
-    nowhere = os.open(os.devnull, os.O_WRONLY)
+    null_device = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(nowhere, 2)
+        os.dup2(null_device, 2)
         yield
     finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nowhere)
+        os.dup2(stderr_copy, 2)
+        os.close(stderr_copy)
+        os.close(null_device)
 
 
 def _has_cuda_driver() -> bool:
@@ -46,8 +46,8 @@ def _has_cuda_driver() -> bool:
     return False
 
 
-# Warp is started, builds and launches kernels for one thread at a time. A fork waits for it, so that a child finds Warp at
-# rest.
+# Held while Warp starts, builds or launches kernels: one thread at a time. A fork waits for it, so that Warp is idle in the
+# child.
 build_lock = threading.RLock()
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(
@@ -56,14 +56,15 @@ if hasattr(os, "register_at_fork"):
 
 
 def start() -> None:
-    """Initialise Warp once, quietly: no banner unless the user asked for one, no remark that there is no GPU driver.
+    """Initialise Warp once, without its banner and its remark that there is no GPU driver.
 
-    Warp's native code writes that remark to the file descriptor itself, whatever its log level, so it is caught there.
+    A banner that the user asked for is shown. Native code writes the remark to the file descriptor itself, whatever Warp's
+    log level, so it is caught there.
 
     Raises:
-        OSError: where the folder of Warp's kernel cache cannot be made; it names the folder and WARP_CACHE_PATH.
+        OSError: The folder of Warp's kernel cache cannot be made; the message names it and WARP_CACHE_PATH.
     """
-    # Two threads that close and open stderr together would leave it closed.
+    # Two threads that redirect stderr at once would leave it closed.
     with build_lock:
         _start()
 
@@ -79,40 +80,44 @@ def _start() -> None:
     except OSError as error:
         cache, wp.config.kernel_cache_dir = wp.config.kernel_cache_dir, chosen
         if error.errno is None or cache is None:
-            raise  # one of Warp's libraries
+            raise  # an error of Warp's own libraries
         raise unusable(cache, error) from error
 
 
 def unusable(cache: str | os.PathLike[str], error: OSError) -> OSError:
-    """What went wrong with the kernel cache, and the remedy.
+    """Explain an error of the kernel cache, with its remedy.
 
     Args:
-        cache: its folder.
-        error: what the system said.
+        cache: Folder of the cache.
+        error: The system's error.
 
     Returns:
         An error of the same number that names the folder and WARP_CACHE_PATH.
     """
     full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-    what = "has no room for a new kernel" if full else "cannot be written"
+    problem = "has no room for a new kernel" if full else "cannot be written"
     remedy = f"{'make room, or ' if full else ''}set WARP_CACHE_PATH to another folder"
-    return OSError(error.errno, f"the kernel cache {what} ({error.strerror}); {remedy}", os.fspath(cache))
+    return OSError(error.errno, f"the kernel cache {problem} ({error.strerror}); {remedy}", os.fspath(cache))
 
 
 def header_folders() -> dict[int, Any]:
-    """Temporary folders of Clang's precompiled headers, by thread; empty where Warp keeps them otherwise."""
+    """Temporary folders of Clang's precompiled headers.
+
+    Returns:
+        Thread -> folder; empty where Warp keeps them elsewhere.
+    """
     return getattr(context.runtime, "_pch_dirs", {})
 
 
 def end() -> None:
-    """Remove the temporary folders, in a process that ends without Python's own cleaning up."""
+    """Remove the temporary folders, in a process that skips Python's own cleanup."""
     for folder in header_folders().values():
         folder.cleanup()
     header_folders().clear()
 
 
 def _forget() -> None:
-    """In a child after a fork: the temporary folders are the parent's, to read, to write and to remove."""
+    """Forget the temporary folders in a child after a fork: they belong to the parent."""
     for folder in header_folders().values():
         folder._finalizer.detach()
     header_folders().clear()

@@ -1,7 +1,7 @@
-"""A lock beside a file or folder: one writer at a time, from before it looks at what is there to its end.
+"""A lock beside a file or folder: one writer at a time, from its first look at the target to its end.
 
-The lock is the system's own on an open file (flock), which ends with the process however that ends; the file names its
-holder for who is refused. Libraries of locks keep the file or name nobody.
+The lock is the system's own on an open file (flock), which ends with the process in any case; the file names its holder
+for a writer that is refused. Lock libraries keep the file, or do not name the holder.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import Any
 from lgvi_warp.common import scratch
 from lgvi_warp.common.errors import SceneError
 
-# What a file system without locks says.
+# Errors of file systems without locks.
 WITHOUT_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL}
 KEYS = {"pid", "host", "since"}
 # Descriptors of locks that this process holds.
@@ -27,7 +27,7 @@ _held: set[int] = set()
 
 
 def _let_go() -> None:
-    """In a process that was forked: its copies of the descriptors must not outlive the holder's."""
+    """Close inherited descriptors in a child after a fork: they must not outlive the holder's."""
     for descriptor in _held:
         with contextlib.suppress(OSError):
             os.close(descriptor)
@@ -39,17 +39,29 @@ if hasattr(os, "register_at_fork"):
 
 
 def lock_file(target: Path) -> Path:
-    """Where the lock of a file or folder lies: one for all the ways that lead to it."""
+    """Path of the lock of a file or folder, the same for all paths that lead to it.
+
+    Args:
+        target: The file or folder.
+
+    Returns:
+        Path of the lock's file, beside the target.
+    """
     place = Path(os.path.realpath(target))
     return place.with_name(f".{place.name}.lock")
 
 
 @contextlib.contextmanager
 def write_lock(target: Path, wait: bool = False) -> Iterator[None]:
-    """Keep other writers out of a file or folder that may not be there yet; its parent folder is made.
+    """Keep other writers out of a file or folder inside the `with` block; its parent folder is made.
 
-    wait: until another writer has ended. Raises SceneError naming the writer that holds it, or where the lock's place is
-    taken by another file, OSError where none can be made.
+    Args:
+        target: The file or folder, which may not exist yet.
+        wait: Whether to wait until another writer has ended; default False.
+
+    Raises:
+        SceneError: Another writer holds it, which the message names, or another file has the lock's name.
+        OSError: The lock cannot be made.
     """
     path = lock_file(target)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -64,7 +76,7 @@ def write_lock(target: Path, wait: bool = False) -> Iterator[None]:
 
 
 def _taken(path: Path, target: Path, wait: bool) -> int:
-    """A descriptor of the lock's file, locked. Raises SceneError."""
+    """Open and lock the lock's file; return its descriptor. Raises SceneError."""
     while True:
         descriptor = _opened(path)
         try:
@@ -72,7 +84,7 @@ def _taken(path: Path, target: Path, wait: bool) -> int:
                 raise SceneError(
                     [f"{target}: another run is writing into it{_told(descriptor)}; wait for it, or end it"]
                 )
-            # Who held it before may have removed the file that was opened here.
+            # The previous holder may have removed the file that was opened here.
             if _is_still(path, descriptor):
                 _sign(descriptor)
                 return descriptor
@@ -83,7 +95,7 @@ def _taken(path: Path, target: Path, wait: bool) -> int:
 
 
 def _opened(path: Path) -> int:
-    """The lock's file, made if it is not there. Raises SceneError where another file has its name."""
+    """Open the lock's file, created if missing. Raises SceneError where another file has its name."""
     try:
         flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
         descriptor = os.open(path, flags | getattr(os, "O_CLOEXEC", 0), 0o666)
@@ -102,7 +114,7 @@ def _no_lock(path: Path) -> SceneError:
 
 
 def _locked(descriptor: int, wait: bool) -> bool:
-    """Lock an open file; False where another has it. Without locks, whether the process that it names runs no more."""
+    """Lock an open file; False where another process has it. Without locks: whether the process it names has ended."""
     try:
         import fcntl
 
@@ -120,7 +132,7 @@ def _locked(descriptor: int, wait: bool) -> bool:
 
 
 def _is_still(path: Path, descriptor: int) -> bool:
-    """Whether the path leads to the open file."""
+    """Tell whether the path still leads to the open file."""
     try:
         return os.path.samestat(os.lstat(path), os.fstat(descriptor))
     except FileNotFoundError:
@@ -128,7 +140,7 @@ def _is_still(path: Path, descriptor: int) -> bool:
 
 
 def _holder(descriptor: int) -> dict[str, Any] | None:
-    """What the file says of who holds it, nothing if that has only begun; None if it is no lock's file."""
+    """Content of the lock's file, empty if it was just created; None if it is no lock's file."""
     os.lseek(descriptor, 0, os.SEEK_SET)
     text = os.read(descriptor, 1000)
     try:
@@ -139,7 +151,7 @@ def _holder(descriptor: int) -> dict[str, Any] | None:
 
 
 def _told(descriptor: int) -> str:
-    """Who holds it, in words."""
+    """Name the holder in words."""
     for _ in range(10):
         holder = _holder(descriptor)
         if holder:
@@ -149,7 +161,7 @@ def _told(descriptor: int) -> str:
 
 
 def _sign(descriptor: int) -> None:
-    """Say who holds it. On a full disk the lock holds all the same."""
+    """Write the holder into the file. On a full disk the lock holds without it."""
     holder = {"pid": os.getpid(), "host": scratch.host(), "since": time.strftime("%Y-%m-%d %H:%M:%S")}
     with contextlib.suppress(OSError):
         os.ftruncate(descriptor, 0)
@@ -158,7 +170,7 @@ def _sign(descriptor: int) -> None:
 
 
 def _release(path: Path, descriptor: int) -> None:
-    """Remove the file while it is locked, so that nobody else's is, and let go."""
+    """Remove the file while it is locked, so that nobody else's is removed, then unlock it."""
     with contextlib.suppress(OSError):
         if _is_still(path, descriptor):
             path.unlink()

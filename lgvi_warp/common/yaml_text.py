@@ -1,4 +1,4 @@
-"""YAML from anybody: no objects, no bombs of aliases, and no number that two versions of YAML read differently."""
+"""Read YAML of unknown origin: no objects, no bombs of aliases, and no number that two versions of YAML read differently."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from typing import Any
 
 from lgvi_warp.common.errors import Faults, SceneError
 
-# Values after every alias is written out: coefficients of a vehicle are some hundreds.
+# Most values with every alias written out: a vehicle has some hundreds of coefficients.
 MOST_VALUES = 20_000
-# YAML 1.1 reads these as octal, and in base 60; YAML 1.2 as 10 and as a text.
+# YAML 1.1 reads these as octal and in base 60; YAML 1.2 as decimal and as a text.
 OCTAL = re.compile(r"[-+]?0[0-9_]+")
 SIXTIES = re.compile(r"[-+]?[0-9][0-9_]*(:[0-5]?[0-9])+(\.[0-9_]*)?")
-# What YAML 1.2 reads as a number, and 1.1 as a text: without a point, or without a sign after the e.
+# YAML 1.2 reads these as numbers, 1.1 as texts: without a point, or without a sign after the e.
 EXPONENT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)[eE][-+]?[0-9]+")
-# Brackets within brackets.
+# Most levels of nested brackets.
 DEEPEST = 50
 DEEP = "YAML: is nested too deep; write mass: ..., added_mass: ..."
 PLAIN = {f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "int", "float", "str", "seq", "map")}
 
 
 def parsed(text: str) -> Any:
-    """What a YAML text says, in plain tables, lists, texts and numbers.
+    """Parse a YAML text into plain tables, lists, texts and numbers.
 
     Args:
-        text: In YAML 1.1, or in 1.2 where the two agree.
+        text: YAML 1.1, or 1.2 where the two agree.
 
     Returns:
         Its only document.
@@ -55,12 +55,12 @@ def parsed(text: str) -> Any:
         raise SceneError([DEEP]) from None
     except yaml.YAMLError as error:
         raise SceneError([f"YAML: {' '.join(str(error).split())}; mend that line"]) from None
-    except Exception as error:  # PyYAML lets through whatever int(), float() and dates raise
+    except Exception as error:  # PyYAML passes on what int(), float() and dates raise
         raise SceneError([f"YAML: has a value that is none ({type(error).__name__}: {error}); mend it"]) from None
 
 
 def _depth(text: str) -> int:
-    """How deep brackets are open in a text, those within its words as well: PyYAML's time grows with it."""
+    """Largest depth of open brackets in a text, those in words included: PyYAML's time grows with it."""
     depth = deepest = 0
     for bracket in re.finditer(r"[\[\]{}]", text):
         depth += 1 if bracket[0] in "[{" else -1
@@ -70,30 +70,30 @@ def _depth(text: str) -> int:
 
 @functools.cache
 def _loader(yaml: Any) -> Any:
-    """PyYAML's safe loader, in Python: the one in C calls itself as deep as a text is, and crashes."""
+    """PyYAML's safe loader in Python: the one in C recurses as deep as the text is nested, and crashes."""
 
     class Loader(yaml.SafeLoader):
-        """With numbers such as 1e3, which YAML 1.2 has."""
+        """PyYAML's safe loader that also reads numbers such as 1e3, as YAML 1.2 does."""
 
     Loader.add_implicit_resolver("tag:yaml.org,2002:float", EXPONENT, list("-+.0123456789"))
     return Loader
 
 
 def _look(yaml: Any, faults: Faults, root: Any) -> None:
-    """Note what is refused of a tree of nodes, before anything is made of it."""
+    """Note everything refused in a tree of nodes, before any object is constructed from it."""
     sizes: dict[int, int] = {}
     _size(yaml, root, sizes, set())
     if sizes[id(root)] > MOST_VALUES:
-        what = f"are {sizes[id(root)]:,} with every alias (*name) written out"
-        faults.add("values", "...", what, f"give at most {MOST_VALUES:,}")
+        problem = f"are {sizes[id(root)]:,} with every alias (*name) written out"
+        faults.add("values", "...", problem, f"give at most {MOST_VALUES:,}")
         return
-    seen: set[int] = set()
+    visited: set[int] = set()
     waiting = [root]
     while waiting:
         node = waiting.pop()
-        if id(node) in seen:
+        if id(node) in visited:
             continue
-        seen.add(id(node))
+        visited.add(id(node))
         if isinstance(node, yaml.MappingNode):
             _check_keys(yaml, faults, node)
             waiting += [child for pair in reversed(node.value) for child in reversed(pair)]
@@ -106,7 +106,7 @@ def _look(yaml: Any, faults: Faults, root: Any) -> None:
 
 
 def _size(yaml: Any, node: Any, sizes: dict[int, int], above: set[int]) -> int:
-    """How many values a node has, aliases written out. Raises SceneError where one holds itself."""
+    """Number of values of a node, aliases written out. Raises SceneError where a node contains itself."""
     if id(node) in above:
         raise SceneError([f"YAML: {_line(node)}: holds itself by an alias; write it out"])
     if id(node) not in sizes:
@@ -148,7 +148,7 @@ def _check_scalar(faults: Faults, node: Any) -> None:
 
 
 def _is_merge(node: Any) -> bool:
-    """Whether it is the key of a merge, <<."""
+    """Tell whether a node is the key of a merge, <<."""
     return bool(node.tag == "tag:yaml.org,2002:merge")
 
 

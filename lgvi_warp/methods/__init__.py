@@ -1,1 +1,1 @@
-"""To be said in one sentence."""
+"""How time advances, as data: programs of sub-maps, tableaux, the time grid and stable steps."""

@@ -1,4 +1,4 @@
-"""How far a method may be driven: limits of stability by method, and what a member's numbers and start say about its step.
+"""How large a step each method bears: limits of stability measured by method, or computed.
 
 Limits are in h times the angular frequency of an oscillation, found by `python benchmarks/warning_limits.py`: the fastest
 one whose amplitude stays bounded, for the Munk moment with M = (1, 100, 100) and 0.3 rad, and for the restoring moment of a
@@ -19,10 +19,10 @@ from lgvi_warp.methods.method import Method
 if TYPE_CHECKING:
     pass
 
-# Largest h |Omega| of methods that turn about the axes, before their turns are inaccurate.
+# Largest h |Omega| at which methods that turn about the axes are still accurate.
 TURNS = 1.0
 
-# Method, or composition -> largest stable h w. Gauss collocation has none: what its iteration does not bear has a status.
+# Method or composition -> largest stable h w. Gauss collocation has no entry: a status reports where its iteration fails.
 MUNK: dict[str, float] = {
     "phi": 1.41, "phi_adjoint": 1.41, "psi": 1.52, "psi_s": 2.14, "psi_1": 2.00, "psi_x": 2.19, "psi_x8": 2.19,
     "psi_w": 2.14, "rk4": 2.44, "rk5": 2.22, "rk8": 2.65, "cg3": 1.69, "rkmk4": 2.44, "rkn4_6": 4.76,
@@ -44,14 +44,30 @@ RESTORING: dict[str, float] = {
 
 
 def longest_stage(method: Method) -> float:
-    """The longest stage, forward or backward, in steps."""
+    """Length of a method's longest stage, forward or backward.
+
+    Args:
+        method: The method.
+
+    Returns:
+        The length in steps.
+    """
     return max(abs(length) for length in method.lengths(None)[0])
 
 
 def oscillation_limit(method: Method, table: Mapping[str, float]) -> float:
-    """The largest stable h w of a method by MUNK or RESTORING; of one that was not measured, by its longest stage."""
+    """Largest stable h w of a method for an oscillation of angular frequency w.
+
+    Args:
+        method: The method.
+        table: Measured limits by name, MUNK or RESTORING.
+
+    Returns:
+        The limit [rad]: measured, or for a composition that was not measured, that of its base divided by the longest
+        stage. Infinite where a status reports the failure instead.
+    """
     if method.gauss or method.adaptive:
-        # What the iteration of the stages, or the choice of the step, does not bear has a status.
+        # A status reports where the iteration of the stages, or the step control, fails.
         return np.inf
     match = re.fullmatch(r"(\w+)\((\w+)\)", method.name)
     if match is None:
@@ -61,7 +77,14 @@ def oscillation_limit(method: Method, table: Mapping[str, float]) -> float:
 
 @functools.cache
 def imaginary_limit(name: str) -> float:
-    """The largest y with |R(iy)| <= 1 of an explicit method, R its stability function: h |Omega| of a steady spin."""
+    """Largest y with |R(iy)| <= 1, R the stability function of an explicit method: h |Omega| of a steady spin.
+
+    Args:
+        name: Name of an explicit method.
+
+    Returns:
+        The limit [rad].
+    """
     tableau = Method(name).tableau
     assert tableau is not None
     n = len(tableau.b)
@@ -72,7 +95,14 @@ def imaginary_limit(name: str) -> float:
 
 
 def rotation_limit(method: Method) -> float:
-    """The largest h |Omega| of a method that has no status for it; infinity for those that have one."""
+    """Largest h |Omega| of a method that has no status for it.
+
+    Args:
+        method: The method.
+
+    Returns:
+        The limit [rad]; infinite for a method whose status reports a step that is too large.
+    """
     if method.adaptive:
         return np.inf
     if method.turns:

@@ -23,21 +23,21 @@ PROGRAMS: dict[str, Program] = {
     "psi": (("Ab", 0.5), ("D", 0.5), ("K", 0.5), ("Ap", 1.0), ("K", 0.5), ("D", 0.5), ("Ab", 0.5)),
     "psi_s": (("T", 0.5), ("D", 0.5), ("K", 1.0), ("D", 0.5), ("T", 0.5)),
     "psi_1": (("K", 0.5), ("T", 0.5), ("D", 1.0), ("T", 0.5), ("K", 0.5)),
-    # Turns about the axes instead of D, which solves no equation; R2 twice as often for slender bodies (psi_x8).
+    # Turns about the axes instead of D: no equation to solve. psi_x8 turns about axis 2 twice as often, for slender bodies.
     "psi_x": (("T", 0.5), ("R1", 0.5), ("R2", 0.5), ("R3", 0.5), ("K", 1.0), ("R3", 0.5), ("R2", 0.5), ("R1", 0.5),
               ("T", 0.5)),
     "psi_x8": (("T", 0.5), ("R1", 0.5), ("R2", 0.25), ("R3", 0.5), ("R2", 0.25), ("K", 1.0), ("R2", 0.25), ("R3", 0.5),
                ("R2", 0.25), ("R1", 0.5), ("T", 0.5)),
-    # The coupled Moser-Veselov rotation W: as D, for M and J coupled.
+    # The coupled Moser-Veselov rotation W replaces D where M and J are coupled.
     "psi_w": (("T", 0.5), ("W", 0.5), ("K", 1.0), ("W", 0.5), ("T", 0.5)),
 }  # fmt: skip
-# With nonconservative forces the paper's own maps, whole: equations (15), (16).
+# With nonconservative forces the paper's maps act undivided: equations (15), (16).
 FORCED: dict[str, Program] = {
     "phi": (("Phi", 1.0),),
     "phi_adjoint": (("Phi*", 1.0),),
     "psi": (("Phi", 0.5), ("Phi*", 0.5)),
 }
-# Explicit methods, which know no sub-maps. KINDS: those that keep R on the group (see lgvi_kernels.explicit).
+# Explicit methods have no sub-maps. KINDS: those that keep R on the group (see lgvi_kernels.explicit).
 EXPLICIT: dict[str, Tableau] = {"rk4": RK4, "rk5": DOPRI5, "rk8": DOP853, "cg3": CG3, "rkmk4": RK4}
 KINDS = {"cg3": "group", "rkmk4": "munthe_kaas"}
 ORDERS = {"phi": 1, "phi_adjoint": 1, "psi": 2, "psi_s": 2, "psi_1": 2, "psi_x": 2, "psi_x8": 2, "psi_w": 2} | {
@@ -66,10 +66,10 @@ TWO_PART: dict[str, tuple[int, str, tuple[float, ...]]] = {
 }  # fmt: skip
 PARTS: dict[str, Program] = {"A": (("A", 1.0), ("B", 1.0)), "B": (("B", 1.0), ("A", 1.0))}
 
-# Gauss collocation, which solves for all of the state at once: name -> stages; the order is twice as many.
+# Gauss collocation, which solves for the whole state at once: name -> number of stages, half the order.
 GAUSS = {"gauss4": 2, "gauss6": 3, "gauss8": 4, "gauss10": 5, "gauss12": 6}
 
-# One sub-map of the letter may be divided in two, or two joined: each is the flow of something.
+# Sub-maps that are exact flows: one may be divided in two, or two joined.
 FLOWS = ("T", "K", "Ab", "Ap")
 
 SOLVERS = ("quartic", "cayley", "newton", "moser_veselov")
@@ -175,27 +175,37 @@ HALVES: dict[str, tuple[int, tuple[float, ...]]] = {
 
 @dataclass(frozen=True)
 class Method:
-    """A method by name, and how equation (24) is solved inside it.
+    """An integration method by name, and how it solves its implicit equations.
 
-    name: "phi", "phi_adjoint", "psi" (the paper's), "psi_s" (default), "psi_1", or a composition of a symmetric one:
-    "tj4(psi_s)", "su4(psi_s)", "kl6(psi_1)", "kl8(psi_s)", ...; "bm4(psi_x)", "bm6(psi_x)" of its two halves;
-    "rkn4_6", "rkn6_11", "rkn6_14" of two parts, for weight and restoring moment; "gauss4" to "gauss12", Gauss collocation
-    with a fixed-point iteration to the tolerance, or of so many iterations, for forces of position and time.
-    solver: "quartic" (default), "cayley", "newton" (the paper's, on the exponential map) or "moser_veselov" (explicit).
-    iterations: Newton steps of every solve, a whole number >= 0; None iterates each vehicle to the tolerance; "auto" finds
-    out, before the run, how many serve every member's start at twice the step, and makes so many (a solve that needed
-    more later on gives its member the status NOT_CONVERGED).
-    alpha, beta: weight of the old configuration in the averages of equations (15) and (16), 0 to 1, for nonconservative
-    forces and torques in phi, phi_adjoint and psi (their conservative forces, and the other methods, have no such choice).
-    The name may also be of an explicit method: "rk4", "rk5" (Dormand & Prince), "rk8" (DOP853's), with R as two rows, or
-    on the rotation group "cg3" (Crouch & Grossman) and "rkmk4" (Munthe-Kaas).
-    rtol, atol: with both, rk5 and rk8 choose their steps: the error estimated for each step stays below
-    atol + rtol |y| (in the mean square over y = (b, R, p, pi), momenta divided by the largest J). The worst vehicle of a
-    packet decides for it. h then is the longest step: where samples, events and statuses may be.
-    tolerance: relative residual of equation (24) above which a solve is not converged (default 1e-14 in float64 and
-    1e-6 in float32 when iterating to it; 1e-12 and 1e-5 for a fixed number of iterations).
+    Args:
+        name: One of
 
-    Raises SceneError (a ValueError) naming every fault.
+            * "phi", "phi_adjoint", "psi": the maps of Nordkvist & Sanyal 2010;
+            * "psi_s" (default), "psi_1", "psi_x", "psi_x8", "psi_w": symmetric splittings of order 2;
+            * a composition of a symmetric method: "tj4(psi_s)", "su4(psi_s)", "kl6(psi_1)", "kl8(psi_s)" and so on, or
+              "bm4(psi_x)", "bm6(psi_x)" of its two halves;
+            * "rkn4_6", "rkn6_11", "rkn6_14": two parts, for weight and restoring moment;
+            * "gauss4" to "gauss12": Gauss collocation by fixed-point iteration, for forces of position and time;
+            * explicit methods: "rk4", "rk5" (Dormand & Prince), "rk8" (DOP853's) with R as two rows; "cg3" (Crouch &
+              Grossman) and "rkmk4" (Munthe-Kaas) on the rotation group.
+        solver: Solver of equation (24): "quartic" (default), "cayley", "newton" (the paper's, on the exponential map) or
+            "moser_veselov" (explicit).
+        iterations: Newton steps, or fixed-point iterations, of every solve, 0 to 100. None (default) iterates each vehicle
+            to the tolerance. "auto" finds out before the run how many serve every member's start at twice the step; a solve
+            that needs more later gives its member the status NOT_CONVERGED.
+        tolerance: Relative residual of equation (24) above which a solve has not converged, between 0 and 1. Default:
+            1e-14 in float64 and 1e-6 in float32; 1e-12 and 1e-5 for a fixed number of iterations.
+        alpha: Weight of the old configuration in the average of nonconservative forces, equation (15), 0 to 1; default 0.5.
+            It acts in phi, phi_adjoint and psi only.
+        beta: The same for nonconservative torques, equation (16).
+        rtol: Relative tolerance of the step control of rk5 and rk8; default None, a fixed step. The error estimated for each
+            step stays below atol + rtol |y|, in the mean square over y = (b, R, p, pi), momenta divided by the largest J. The
+            worst vehicle of a packet decides. The run's step is then the longest one, and the grid of samples, events and
+            statuses.
+        atol: Absolute tolerance of the step control; give both or none.
+
+    Raises:
+        SceneError: A setting is wrong; the message names every fault.
     """
 
     name: str = "psi_s"
@@ -236,14 +246,14 @@ class Method:
         faults.raise_if_any()
 
     def _check_steps(self, faults: Faults) -> None:
-        """Both tolerances or none, and only for a method that estimates its error."""
-        given = {name: value for name in ("rtol", "atol") if (value := getattr(self, name)) is not None}
-        for name, value in given.items():
+        """Note a fault unless both tolerances or none are set, and for a method that estimates no error."""
+        tolerances = {name: value for name in ("rtol", "atol") if (value := getattr(self, name)) is not None}
+        for name, value in tolerances.items():
             if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < 1.0:
                 faults.add(name, value, "is not between 0 and 1", "give a tolerance such as 1e-9")
-        if len(given) == 1:
-            faults.add(*given.popitem(), "has no counterpart", "give both rtol and atol, or none for a fixed step")
-        elif given and self.name in ORDERS and not (self.tableau and self.tableau.errors):
+        if len(tolerances) == 1:
+            faults.add(*tolerances.popitem(), "has no counterpart", "give both rtol and atol, or none for a fixed step")
+        elif tolerances and self.name in ORDERS and not (self.tableau and self.tableau.errors):
             able = " or ".join(name for name, tableau in EXPLICIT.items() if tableau.errors)
             faults.add("rtol, atol", self.name, "estimates no error", f"use {able}, or leave them out")
 
@@ -253,24 +263,24 @@ class Method:
 
     @property
     def base(self) -> str:
-        """The method that is composed, or that this is."""
+        """Name of the method that is composed; without a composition, of this one."""
         return self._split()[0]
 
     @property
     def program(self) -> Program:
-        """The sub-maps of one stage, the first applied first."""
+        """The sub-maps of one stage as (letter, coefficient), in the order in which they are applied."""
         if self.gauss:
             return (("G", 1.0),)
         return PARTS[TWO_PART[self.base][1]] if self.two_part else PROGRAMS.get(self.base, ())
 
     @property
     def two_part(self) -> bool:
-        """Whether it splits into the parts A and B."""
+        """Whether the method splits into the parts A and B."""
         return self.base in TWO_PART
 
     @property
     def gauss(self) -> int:
-        """Stages of Gauss collocation; 0 for other methods."""
+        """Number of stages of Gauss collocation; 0 for other methods."""
         return GAUSS.get(self.base, 0)
 
     @property
@@ -280,24 +290,24 @@ class Method:
 
     @property
     def tableau(self) -> Tableau | None:
-        """The numbers of an explicit method."""
+        """Coefficients of an explicit method; None for other methods."""
         return EXPLICIT.get(self.name)
 
     @property
     def adaptive(self) -> bool:
-        """Whether each packet chooses its steps."""
+        """Whether each packet chooses its own steps."""
         return self.rtol is not None
 
     @property
     def turns(self) -> bool:
-        """Whether it turns about the axes one after the other, instead of solving equation (24)."""
+        """Whether it turns about the axes one after another, instead of solving equation (24)."""
         return any(letter[0] == "R" for letter, _ in self.program)
 
     @property
     def stages(self) -> tuple[float, ...]:
-        """The stage coefficients g_i: one step is the program with g_1 h, then with g_2 h, ...
+        """The stage coefficients g_i: one step is the program over g_1 h, then over g_2 h, and so on.
 
-        Of two halves, or of two parts, these are the numbers of both in turn.
+        For two halves, or two parts, the coefficients of both alternate.
         """
         composition = self._split()[1]
         if self.two_part:
@@ -310,14 +320,21 @@ class Method:
         return COMPOSITIONS[composition][1]
 
     def lengths(self, lead: float | None) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """What the stages are given, and the lead after each of them and, at the end, before the first; in steps.
+        """Lengths of the stages and of the lead, in steps.
 
-        lead: the coefficient of the lead, or None without one. Halves and parts have two lengths a stage; where one of
-        two parts leads, the stages have the other's. Psi_h is its halves over h/2: a half over a is told as 2 a.
+        The lead is a flow that opens and closes the program (see `merged`). Halves and parts have two lengths per stage;
+        where one of two parts leads, the stages have the lengths of the other. Psi_h is its halves over h/2: a half over
+        a is given as 2 a.
+
+        Args:
+            lead: Coefficient of the lead; None without one.
+
+        Returns:
+            (lengths of the stages; lengths of the lead after each stage and, as the last number, before the first stage).
         """
         c, g = lead or 0.0, self.stages
         if self.two_part:
-            # From `first` in turn, and back to it: its last number has no other after it.
+            # The parts alternate, beginning and ending with `first`: no number of the other follows its last one.
             first, second = g[0::2], g[1::2]
             if lead is None:
                 return (*g, 0.0), (0.0,) * (len(first) + 1)
@@ -332,7 +349,7 @@ class Method:
 
     @property
     def order(self) -> int:
-        """Order of convergence."""
+        """Order of convergence in the step."""
         base, composition = self._split()
         if self.two_part:
             return TWO_PART[base][0]
@@ -341,17 +358,38 @@ class Method:
         return ORDERS[base] if composition is None else (COMPOSITIONS | HALVES)[composition][0]
 
     def force_tolerance(self, dtype: str) -> float:
-        """Relative change of the momenta below which the iteration for the forces of Phi* has settled."""
+        """Tolerance of the iteration for the forces of Phi*.
+
+        Args:
+            dtype: "float64", or one of the float32 types.
+
+        Returns:
+            Relative change of the momenta below which the iteration has settled.
+        """
         return 1e-14 if dtype == "float64" else 1e-6
 
     def tolerances(self, dtype: str) -> tuple[float, float]:
-        """The two tolerances that a kernel gets: of (24) and of the forces of Phi*, or rtol and atol of the steps."""
+        """The two tolerances that the kernel receives.
+
+        Args:
+            dtype: "float64", or one of the float32 types.
+
+        Returns:
+            (rtol, atol) with step control; otherwise (tolerance of equation (24), tolerance of the forces of Phi*).
+        """
         if self.rtol is not None and self.atol is not None:
             return self.rtol, self.atol
         return self.residual_tolerance(dtype), self.force_tolerance(dtype)
 
     def residual_tolerance(self, dtype: str) -> float:
-        """The tolerance in force for this dtype."""
+        """Relative residual above which a solve of equation (24) has not converged.
+
+        Args:
+            dtype: "float64", or one of the float32 types.
+
+        Returns:
+            `tolerance` if set, else the default for this dtype and for the kind of iteration.
+        """
         if self.tolerance is not None:
             return self.tolerance
         if self.iterations is None:
@@ -360,7 +398,14 @@ class Method:
 
 
 def merged(program: Program) -> tuple[tuple[str, float] | None, Program]:
-    """(lead, maps): a flow that both opens and closes the program joins that of the next step; lead is its half."""
+    """Join a flow that both opens and closes the program with that of the next step.
+
+    Args:
+        program: Sub-maps of one stage.
+
+    Returns:
+        (lead, maps): the lead is the half of that flow, None where there is none; maps is the rest of the program.
+    """
     first, last = program[0], program[-1]
     if len(program) > 1 and first == last and first[0] in FLOWS:
         return first, program[1:-1]
@@ -368,7 +413,16 @@ def merged(program: Program) -> tuple[tuple[str, float] | None, Program]:
 
 
 def palindrome_of_parts(printed: tuple[float, ...]) -> tuple[float, ...]:
-    """All numbers of two parts in turn, from the printed ones: those of each part sum to one, which gives the last two."""
+    """Complete the printed coefficients of a splitting into two parts.
+
+    The numbers of each part sum to one, which gives the last two.
+
+    Args:
+        printed: First half of the palindrome, the parts in turn, without the last number of each part.
+
+    Returns:
+        All coefficients, the parts in turn.
+    """
     c, n = list(printed), len(printed)
     c.append(0.5 - sum(c[n % 2 :: 2]))
     c.append(1.0 - 2.0 * sum(c[(n + 1) % 2 :: 2]))
@@ -376,12 +430,26 @@ def palindrome_of_parts(printed: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def divisible(program: Program) -> bool:
-    """Whether a symmetric program is a map and its adjoint: its middle, if it has one, is a flow."""
+    """Tell whether a symmetric program is the product of a map and its adjoint.
+
+    Args:
+        program: Sub-maps of one stage, symmetric.
+
+    Returns:
+        True where its middle sub-map, if it has one, is a flow and can be divided.
+    """
     return len(program) % 2 == 0 or program[len(program) // 2][0] in FLOWS
 
 
 def divided(program: Program) -> Program:
-    """With two halves of the middle in its place, where it is symmetric but no flow."""
+    """Replace the middle sub-map by two halves of it.
+
+    Args:
+        program: Sub-maps of one stage, symmetric.
+
+    Returns:
+        The program with two halves of its middle; unchanged where it has no middle.
+    """
     n = len(program) // 2
     if len(program) % 2 == 0:
         return program
@@ -390,28 +458,52 @@ def divided(program: Program) -> Program:
 
 
 def with_hops(program: Program) -> Program:
-    """With the hops between the origins of the axes, where inertia is coupled: each turn is about its own."""
+    """Insert the translations between the three axes' origins.
+
+    They are needed when inertia is coupled, since each turn is then made about its own origin.
+
+    Args:
+        program: Sub-maps of one stage, with turns R1 to R3.
+
+    Returns:
+        The program with "hij" wherever the origin changes from axis i to axis j.
+    """
     hopped: list[tuple[str, float]] = []
-    here = 1
+    current_axis = 1
     for letter, coefficient in program:
         if letter[0] == "R":
-            there = int(letter[1])
-            while here != there:
-                step = 1 if there > here else -1
-                hopped.append((f"h{here}{here + step}", 1.0))
-                here += step
+            axis = int(letter[1])
+            while current_axis != axis:
+                step = 1 if axis > current_axis else -1
+                hopped.append((f"h{current_axis}{current_axis + step}", 1.0))
+                current_axis += step
         hopped.append((letter, coefficient))
     return tuple(hopped)
 
 
 def middle_axis(program: Program) -> int:
-    """The axis (1 to 3) at whose origin a program of turns kicks: that of the turn before K."""
+    """Axis at whose origin a program of turns applies its kick.
+
+    Args:
+        program: Sub-maps of one stage, with turns R1 to R3 before K.
+
+    Returns:
+        1, 2 or 3: the axis of the turn before K.
+    """
     letters = [letter for letter, _ in program]
     return int(letters[letters.index("K") - 1][1])
 
 
 def simplified(program: Program, isotropic: bool) -> Program:
-    """Without the Munk moment when M = m I: it is zero, and computing it would be pure round-off torque."""
+    """Remove the Munk moment where M = m I: it is zero, and computing it would only add round-off.
+
+    Args:
+        program: Sub-maps of one stage.
+        isotropic: Whether M is a multiple of the identity.
+
+    Returns:
+        The program with Ab instead of T and without Ap if isotropic; otherwise unchanged.
+    """
     if not isotropic:
         return program
     return tuple(("Ab" if letter == "T" else letter, c) for letter, c in program if letter != "Ap")

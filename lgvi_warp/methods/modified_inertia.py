@@ -12,7 +12,14 @@ import numpy as np
 
 
 def fields(J: np.ndarray) -> dict[str, Any]:
-    """The kernel's inverse_J, shrink and shift for moments J (n, 3)."""
+    """The numbers of the modified inertia that the kernel needs.
+
+    Args:
+        J: Principal moments of inertia [kg m^2], shape (n, 3).
+
+    Returns:
+        "inverse_J" (n, 3), and the series "shrink" and "shift" as {"c1": (n,), ...}.
+    """
     shrink, shift = series(J)
     return {
         "inverse_J": 1.0 / J,
@@ -22,7 +29,14 @@ def fields(J: np.ndarray) -> dict[str, Any]:
 
 
 def series(J: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Coefficients (n,) of s and of d: of N, H; N^2, N H, H^2; N^3, N^2 H, N H^2, H^3."""
+    """Coefficients of the polynomials s and d, by Hairer & Vilmart (2006).
+
+    Args:
+        J: Principal moments of inertia [kg m^2], shape (n, 3).
+
+    Returns:
+        (coefficients of s, of d), nine arrays (n,) each, of N, H; N^2, N H, H^2; N^3, N^2 H, N H^2, H^3.
+    """
     e = J.prod(axis=1)
 
     def total(n: int, m: int = 0) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""When to keep a sample, and the uniform grid of steps that meets every such time."""
+"""When to keep a sample, and the uniform grid of steps that meets every sample time."""
 
 from __future__ import annotations
 
@@ -13,18 +13,24 @@ from lgvi_warp.common.errors import Faults
 
 FIELDS = ("position", "attitude", "velocity", "angular_velocity")
 
-# A step more than this many times shorter than the one asked for is refused, not silently taken.
+# A grid whose step would be more than this many times shorter than the one asked for is refused.
 MOST_SHORTENING = 20
-# Samples that a run keeps at most: of one member they are 1.4 GB.
+# Most samples of a run: 1.4 GB for one member.
 MOST_SAMPLES = 10_000_000
 
 
 @dataclass(frozen=True)
 class SaveAt:
-    """Which samples to keep: every so many seconds, or at given times [s]; t = 0 and the end are always kept.
+    """Which samples a run keeps; t = 0 and the end are always kept.
 
-    fields: any of "position", "attitude", "velocity", "angular_velocity" (all by default); what is left out is not
-    written and takes no memory. Raises SceneError naming every fault.
+    Args:
+        every: Interval of samples [s]; default None, the end only.
+        at: Rising times of samples [s], >= 0; default None. Give `every` or `at`, not both.
+        fields: Any of "position", "attitude", "velocity", "angular_velocity"; default all four. A field that is left out
+            takes no memory.
+
+    Raises:
+        SceneError: A setting is wrong; the message names every fault.
     """
 
     every: float | None = None
@@ -48,7 +54,14 @@ class SaveAt:
 
 @dataclass(frozen=True)
 class TimeGrid:
-    """Uniform steps of h [s]; samples after `sample_steps` steps, at `times` [s], both starting with 0."""
+    """Uniform steps from 0 to the end of a run, and those after which a sample is kept.
+
+    Args:
+        h: Length of a step [s].
+        sample_steps: Numbers of steps before each sample, int64, shape (k,); the first is 0.
+        times: Times of the samples [s], shape (k,); the first is 0.
+        messages: What the user should know, such as that the step was shortened.
+    """
 
     h: float
     sample_steps: np.ndarray
@@ -57,7 +70,7 @@ class TimeGrid:
 
     @property
     def steps(self) -> int:
-        """Steps from start to end."""
+        """Number of steps from the start to the end."""
         return int(self.sample_steps[-1])
 
 
@@ -68,10 +81,21 @@ def _exact(x: float) -> Fraction:
 
 
 def time_grid(h: float, t1: float, save: SaveAt) -> TimeGrid:
-    """The steps and samples for a step of h [s] until t1 [s]. The step is shortened until it divides every sample time.
+    """Choose the steps and samples of a run.
 
-    Raises SceneError if h or t1 is not positive, a sample lies beyond t1, or the step would have to shrink more than
-    MOST_SHORTENING times.
+    The step is shortened until it divides every sample time and the end.
+
+    Args:
+        h: The step asked for [s].
+        t1: End of the run [s].
+        save: Which samples to keep.
+
+    Returns:
+        The grid of steps, with a message where the step was shortened.
+
+    Raises:
+        SceneError: h or t1 is not positive, a sample lies beyond t1, there are too many samples or steps, or the step
+            would shrink more than MOST_SHORTENING times.
     """
     faults = Faults()
     faults.positive("step", h)
@@ -88,9 +112,9 @@ def time_grid(h: float, t1: float, save: SaveAt) -> TimeGrid:
     end, meant = _exact(t1), _exact(h)
     every = end if save.every is None else _exact(save.every)
     regular = int(end / every)
-    rest = sorted({_exact(t) for t in save.at or ()} | {Fraction(0), end})
+    sample_times = sorted({_exact(t) for t in save.at or ()} | {Fraction(0), end})
     spacing = every
-    for t in rest:
+    for t in sample_times:
         spacing = Fraction(
             math.gcd(spacing.numerator * t.denominator, t.numerator * spacing.denominator),
             spacing.denominator * t.denominator,
@@ -111,7 +135,7 @@ def time_grid(h: float, t1: float, save: SaveAt) -> TimeGrid:
     messages: tuple[str, ...] = ()
     if step != meant:
         messages = (f"step shortened from {h} s to {float(step):.9g} s, so that it divides every sample time",)
-    steps = np.union1d(np.arange(regular + 1) * int(every / step), [int(t / step) for t in rest])
-    # Whole numbers divided: the nearest number to each time, however many there are.
+    steps = np.union1d(np.arange(regular + 1) * int(every / step), [int(t / step) for t in sample_times])
+    # A quotient of whole numbers is the float nearest to each time; a sum of steps would not be.
     times = [k * step.numerator / step.denominator for k in steps.tolist()]
     return TimeGrid(float(step), steps.astype(np.int64), np.array(times), messages)

@@ -10,9 +10,15 @@ Row = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Tableau:
-    """order; a, the row i with its i numbers; b, c (stages,); errors: rows e (stages,), or one longer with f(y) at the end.
+    """Coefficients of an explicit Runge-Kutta method with s stages.
 
-    estimate: the power of h in the error estimate, from which the next step follows.
+    Args:
+        order: Order of convergence.
+        a: Stage matrix; row i holds its i numbers.
+        b: Weights, shape (s,).
+        c: Nodes, shape (s,).
+        errors: Rows e of error estimates, shape (s,), or (s + 1,) with the slope at the new state last; default none.
+        estimate: Power of h in the error estimate, from which the next step follows; default 0.
     """
 
     order: int

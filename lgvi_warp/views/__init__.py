@@ -1,1 +1,1 @@
-"""Pictures and recordings: they read a Result and nothing else, and import their libraries when called."""
+"""Pictures and recordings of results and studies."""

@@ -1,4 +1,4 @@
-"""What the picture and the recording of a fleet share: the look of each outcome, the title, and curves of those under way."""
+"""What the picture and the recording of a fleet share: looks of outcomes, the title, and curves of members under way."""
 
 from __future__ import annotations
 
@@ -16,19 +16,24 @@ if TYPE_CHECKING:
 
 
 class Look(NamedTuple):
-    """How members with an outcome are drawn: colour as #RRGGBB, and Matplotlib's marker where they ended."""
+    """How members with one outcome are drawn.
+
+    Args:
+        color: Colour as #RRGGBB.
+        marker: Matplotlib's marker where such members ended.
+    """
 
     color: str
     marker: str
 
     @property
     def rgb(self) -> tuple[int, int, int]:
-        """The colour, from 0 to 255 each."""
+        """The colour as (red, green, blue), 0 to 255 each."""
         red, green, blue = bytes.fromhex(self.color[1:])
         return red, green, blue
 
 
-# Colours after Okabe & Ito, apart for every kind of colour vision; all failures have one, and each its marker.
+# Colours after Okabe & Ito, distinct for every kind of colour vision. All failures share one, with a marker each.
 LOOKS = {
     Status.OK: Look("#3C82DC", ""),
     Status.SURFACE: Look("#009E73", "^"),
@@ -42,7 +47,13 @@ LOOKS |= {code: Look("#D55E00", marker) for code, marker in zip(FAILURES, "xX*P1
 
 
 class Curve(NamedTuple):
-    """One number of all members against time: name, label of its axis with the unit, and values (k, n)."""
+    """One number of all members against time.
+
+    Args:
+        name: Title of the curve.
+        label: Label of its axis, with the unit.
+        values: The numbers, shape (k, n).
+    """
 
     name: str
     label: str
@@ -50,7 +61,14 @@ class Curve(NamedTuple):
 
 
 def energy_curve(result: Result) -> Curve:
-    """The error of energy where the scene's laws conserve it; where one gives or takes some, energy itself [J]."""
+    """Energy against time, as its error where the scene's laws conserve it.
+
+    Args:
+        result: A result with position, attitude, velocity and angular velocity.
+
+    Returns:
+        E(t) - E(0), or E(t) where a force does work [J], shape (k, n).
+    """
     if "energy" in invariants.conserved(result):
         return Curve("Energy error", "E(t) - E(0) [J]", result.energy - result.energy[:1])
     return Curve("Energy", "E(t) [J]", result.energy)
@@ -60,12 +78,12 @@ def quantiles(values: np.ndarray, counted: np.ndarray, levels: list[float]) -> n
     """Quantiles over the members that count at each time.
 
     Args:
-        values: (k, n).
-        counted: (k, n), which members count; a value that is not finite never does.
+        values: Numbers of the members, shape (k, n).
+        counted: Mask (k, n) of the members that count; a value that is not finite never does.
         levels: m numbers from 0 to 1.
 
     Returns:
-        (m, k); NaN at times when no member counts.
+        Quantiles, shape (m, k); NaN at times when no member counts.
     """
     counted = counted & np.isfinite(values)
     values = values.astype(np.float64)
@@ -77,12 +95,27 @@ def quantiles(values: np.ndarray, counted: np.ndarray, levels: list[float]) -> n
 
 
 def evenly(members: np.ndarray, most: int) -> np.ndarray:
-    """At most so many of the members, spread evenly over their indices."""
+    """Choose members spread evenly over their indices.
+
+    Args:
+        members: Indices, shape (n,).
+        most: The most to choose.
+
+    Returns:
+        Indices, shape (min(most, n),), in the same order.
+    """
     return members[np.unique(np.linspace(0, len(members) - 1, min(most, len(members))).astype(int))]
 
 
 def title(result: Result) -> str:
-    """Members, method and step, and how many have each outcome where not all ran to the end."""
+    """Title of a picture: members, method and step, and the outcomes where not all ran to the end.
+
+    Args:
+        result: A result.
+
+    Returns:
+        One line of text.
+    """
     method, step = result.provenance["method"]["name"], result.provenance["step"]
     text = f"{result.members:,} members, {method}, step {step:g} s"
     counts = result.status.counts()
@@ -92,12 +125,18 @@ def title(result: Result) -> str:
 
 
 def identity(result: Result) -> str:
-    """A name of 16 hexadecimal digits that the same run always has, and no other: a hash of provenance and samples.
+    """Identifier of a run: a hash of its provenance and samples.
 
-    The provenance alone is not enough: parts of a run share it.
+    The provenance alone is not enough, since parts of a run share it.
+
+    Args:
+        result: A result.
+
+    Returns:
+        16 hexadecimal digits, the same for the same run.
     """
-    found = hashlib.sha256(json.dumps(result.provenance, sort_keys=True).encode())
+    digest = hashlib.sha256(json.dumps(result.provenance, sort_keys=True).encode())
     for array in (result.time, np.asarray(result.status), stop_time(result), result.position[0], result.position[-1]):
-        found.update(f"{array.shape} {array.dtype.str}\n".encode())
-        found.update(np.ascontiguousarray(array).data)
-    return found.hexdigest()[:16]
+        digest.update(f"{array.shape} {array.dtype.str}\n".encode())
+        digest.update(np.ascontiguousarray(array).data)
+    return digest.hexdigest()[:16]

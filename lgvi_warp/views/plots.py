@@ -1,4 +1,4 @@
-"""A picture of a fleet: depth as a fan of quantiles, energy, and a few paths."""
+"""Pictures of runs, statistics, trade-offs and stability maps, drawn with Matplotlib."""
 
 from __future__ import annotations
 
@@ -21,14 +21,26 @@ if TYPE_CHECKING:
     from lgvi_warp.studies.stability.map import StabilityMap
     from lgvi_warp.studies.tradeoff import Tradeoff
 
-# Quantile pairs of the fan, outermost first, and how dark each band is.
+# Bands of the fan, outermost first: lower quantile, upper quantile, opacity.
 BANDS = ((0.0, 1.0, 0.15), (0.05, 0.95, 0.25), (0.25, 0.75, 0.4))
 PATHS = 12
 COLOR = "tab:blue"
 
 
 def save_figure(figure: Any, path: str | os.PathLike[str], dpi: int) -> Path:
-    """Write a picture, whole or not at all; its ending chooses the format. Returns its path. Raises OSError."""
+    """Write a picture; the file is there whole or not at all.
+
+    Args:
+        figure: A Matplotlib figure.
+        path: The file; its ending chooses the format.
+        dpi: Dots per inch.
+
+    Returns:
+        The path.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
     target = Path(path)
     with durable.placed(target) as beside:
         figure.savefig(beside, dpi=dpi, format=target.suffix.removeprefix(".") or "png")
@@ -36,20 +48,20 @@ def save_figure(figure: Any, path: str | os.PathLike[str], dpi: int) -> Path:
 
 
 def plot(result: Result, path: str | os.PathLike[str]) -> Path:
-    """Draw the fleet into a picture file: depth, energy and a few paths; the file's ending chooses the format.
+    """Draw the fleet into a picture file: depth, energy and a few paths.
 
-    The fans are of the members under way at each time. Where events stopped the others, and where members failed, is
-    marked in the colour of the outcome. Energy is drawn as its error where the scene's laws conserve it.
+    The fans are of the members under way at each time. Members that an event stopped, or that failed, are marked where they
+    ended, in the colour of the outcome. Energy is drawn as its error where the scene's laws conserve it.
 
     Args:
-        result: With position, attitude, velocity and angular velocity.
-        path: Of the file.
+        result: A result with position, attitude, velocity and angular velocity.
+        path: The file; its ending chooses the format.
 
     Returns:
         The path.
 
     Raises:
-        ImportError: Without matplotlib (extra: viz).
+        ImportError: Matplotlib is not installed (extra: viz).
         NothingToDraw: Every member failed before the second sample, or none has a finite position.
         OSError: The file cannot be written.
     """
@@ -87,7 +99,14 @@ def _refuse_nothing(result: Result, counted: np.ndarray) -> None:
 
 
 def figure_class() -> Any:
-    """Matplotlib's Figure. Raises ImportError with the remedy."""
+    """Load Matplotlib's Figure.
+
+    Returns:
+        The class.
+
+    Raises:
+        ImportError: Matplotlib is not installed; the message has the remedy.
+    """
     try:
         from matplotlib.figure import Figure
     except ModuleNotFoundError as error:
@@ -96,7 +115,14 @@ def figure_class() -> Any:
 
 
 def fan(axes: Any, time: np.ndarray, values: np.ndarray, counted: np.ndarray) -> None:
-    """Quantile bands and the median of values (k, n) against time (k,), of the members that count (k, n) at each time."""
+    """Draw quantile bands and the median of many members against time.
+
+    Args:
+        axes: Matplotlib axes.
+        time: Times [s], shape (k,).
+        values: A number of each member, shape (k, n).
+        counted: Mask (k, n) of the members that count at each time.
+    """
     levels = sorted({q for low, high, _ in BANDS for q in (low, high)} | {0.5})
     curves = dict(zip(levels, quantiles(values, counted, levels), strict=True))
     for low, high, alpha in BANDS:
@@ -106,19 +132,19 @@ def fan(axes: Any, time: np.ndarray, values: np.ndarray, counted: np.ndarray) ->
 
 
 def _counted_text(result: Result, counted: np.ndarray) -> str:
-    """How many members the fan is of: at its beginning, and at its end."""
+    """Number of members in the fan, at its beginning and at its end."""
     if counted.all():
         return f"{result.members:,} members"
     first, last = (int(counted[i].sum()) for i in (0, -1))
     return f"under way: {first:,} at {result.time[0]:g} s,\n{last:,} at {result.time[-1]:g} s"
 
 
-# Marks of ended members with one outcome, at most.
+# Most marks of ended members with the same outcome.
 MARKS = 1000
 
 
 def _ends(axes: Any, result: Result) -> None:
-    """Where and when members ended that did not run to the end: their depths against the times, by outcome."""
+    """Mark by outcome where and when members ended before the end of the run: depth against time."""
     when, depth = stop_time(result), result.position[-1, :, 2]
     for code in outcomes(result):
         members = np.flatnonzero(np.asarray(result.status) == code)
@@ -135,15 +161,27 @@ def _mark(code: Status) -> dict[str, Any]:
     return {"color": look.color, "marker": look.marker} | edge
 
 
-# What of a run's statistics is drawn: so many panels, and lines in a panel, at most.
+# Most panels of statistics, and most lines in a panel.
 PANELS, LINES = 12, 12
 
 
 def plot_statistics(result: Result, path: str | os.PathLike[str]) -> Path:
-    """Draw a run's statistics against time, a panel each: quantiles as a fan, others with their intervals.
+    """Draw a run's statistics against time, one panel each.
 
-    Statistics of paths, which have one time, and covariances are left to the table. Returns the path. Raises ImportError
-    without matplotlib (extra: viz), ValueError when there is nothing to draw.
+    Quantiles are drawn as a fan, other statistics with their intervals. Statistics of paths, which have one time, and
+    covariances are left to the table.
+
+    Args:
+        result: A result with statistics; the first 12 that can be drawn are.
+        path: The file; its ending chooses the format.
+
+    Returns:
+        The path.
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        ValueError: There is no statistic against time.
+        OSError: The file cannot be written.
     """
     figure_of = figure_class()
     drawn = drawable(result)[:PANELS]
@@ -152,14 +190,14 @@ def plot_statistics(result: Result, path: str | os.PathLike[str]) -> Path:
     columns = min(3, len(drawn))
     rows = -(-len(drawn) // columns)
     figure = figure_of(figsize=(5.0 * columns, 3.8 * rows), layout="constrained")
-    for axes, one in zip(figure.subplots(rows, columns, squeeze=False).flat, drawn, strict=False):
-        _PANEL[one.settings["type"]](axes, one)
-        histogram = one.settings["type"] == "histogram"
-        axes.set(title=one.name, xlabel="time [s]", ylabel="" if histogram else f"[{one.unit}]")
+    for axes, estimate in zip(figure.subplots(rows, columns, squeeze=False).flat, drawn, strict=False):
+        _PANEL[estimate.settings["type"]](axes, estimate)
+        histogram = estimate.settings["type"] == "histogram"
+        axes.set(title=estimate.name, xlabel="time [s]", ylabel="" if histogram else f"[{estimate.unit}]")
         axes.grid(True, alpha=0.3)
-        if "depth" in one.name or "position[2]" in one.name:
-            axes.set_ylabel("[m], down" if one.unit == "m" else f"[{one.unit}]")
-            if one.unit == "m":
+        if "depth" in estimate.name or "position[2]" in estimate.name:
+            axes.set_ylabel("[m], down" if estimate.unit == "m" else f"[{estimate.unit}]")
+            if estimate.unit == "m":
                 axes.invert_yaxis()
     for axes in list(figure.axes)[len(drawn) :]:
         axes.set_axis_off()
@@ -168,12 +206,23 @@ def plot_statistics(result: Result, path: str | os.PathLike[str]) -> Path:
 
 
 def drawable(result: Result) -> list[Estimate]:
-    """The statistics that `plot_statistics` draws."""
-    return [one for one in result.statistics.values() if len(one.time) > 1 and one.settings["type"] in _PANEL]
+    """Select the statistics that `plot_statistics` draws.
+
+    Args:
+        result: A result.
+
+    Returns:
+        Its estimates against time, in the order of the result.
+    """
+    return [
+        estimate
+        for estimate in result.statistics.values()
+        if len(estimate.time) > 1 and estimate.settings["type"] in _PANEL
+    ]
 
 
 def _levels_panel(axes: Any, one: Estimate) -> None:
-    """Pairs of quantiles as bands about the middle one; for several components lines."""
+    """Draw pairs of quantiles as bands about the middle one, with a colour for each component."""
     levels = one.coordinates["level"]
     for c in range(min(one.value.shape[2], LINES)):
         color, values = COLORS[c % len(COLORS)], one.value[:, :, c]
@@ -188,7 +237,7 @@ def _levels_panel(axes: Any, one: Estimate) -> None:
 
 
 def _lines_panel(axes: Any, one: Estimate) -> None:
-    """A line for each component, its interval about it."""
+    """Draw a line for each component, with its interval."""
     shape = (len(one.time), -1)
     value, lower, upper = (array.reshape(shape) for array in (one.value, one.lower, one.upper))
     names = one.coordinates["component"] if one.coordinates["component"].size else np.array([one.name])
@@ -200,7 +249,7 @@ def _lines_panel(axes: Any, one: Estimate) -> None:
 
 
 def _extremes_panel(axes: Any, one: Estimate) -> None:
-    """From the smallest to the largest."""
+    """Draw a band from the smallest to the largest value."""
     for c in range(min(one.value.shape[1], LINES)):
         label = one.coordinates["component"][c]
         axes.fill_between(one.time, one["minimum"][:, c], one["maximum"][:, c], alpha=0.3, linewidth=0, label=label)
@@ -208,7 +257,7 @@ def _extremes_panel(axes: Any, one: Estimate) -> None:
 
 
 def _histogram_panel(axes: Any, one: Estimate) -> None:
-    """Fractions of the first component, bins against time."""
+    """Draw the fractions of the first component, bins against time."""
     drawn = axes.pcolormesh(one.time, one.coordinates["bin"], one.value[:, 0].T, shading="nearest")
     axes.figure.colorbar(drawn, ax=axes, label="fraction of members")
 
@@ -226,7 +275,7 @@ _PANEL = {
 
 
 def _paths(axes: Any, result: Result) -> None:
-    """Paths of a few members from the side: horizontal distance from the start against depth, and where they ended."""
+    """Draw a few members' paths from the side: depth against horizontal distance from the start."""
     finite = np.flatnonzero(np.isfinite(result.position[0]).all(axis=-1))
     chosen = evenly(finite, PATHS)
     start = result.position[0, finite, :2].mean(axis=0)
@@ -251,22 +300,34 @@ MARKERS = "os^vDPX*<>dphH"
 
 
 def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None = None) -> Path:
-    """Draw error against cost, a line for each method and precision, the front thick, and the biases of statistics.
+    """Draw error against cost, with a line for each method and precision, and the biases of statistics.
 
-    of: "position" and so on, by default what the trade-off was asked for. Returns the path. Raises ImportError without
-    matplotlib, ValueError when there is nothing to draw.
+    The settings that are cheapest for their error are joined by a thick line.
+
+    Args:
+        found: Measurements of `tradeoff`.
+        path: The file; its ending chooses the format.
+        of: Quantity of the errors, "position" and so on; default that of the trade-off.
+
+    Returns:
+        The path.
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        ValueError: No setting was measured.
+        OSError: The file cannot be written.
     """
     figure_of = figure_class()
     of = of or found.of
     if not found.measurements:
         raise ValueError("no setting was measured: there is nothing to draw")
     figure = figure_of(figsize=(20.5, 7.5))
-    left, right = figure.subplots(1, 2)
+    cost_axes, bias_axes = figure.subplots(1, 2)
     figure.subplots_adjust(left=0.055, right=0.83, bottom=0.09, top=0.88, wspace=0.2)
     shown = found.shown(of)
     groups: dict[tuple[str, str], list[Any]] = {}
-    for one in found.measurements:
-        groups.setdefault((one.setting.name, one.setting.dtype), []).append(one)
+    for point in found.measurements:
+        groups.setdefault((point.setting.name, point.setting.dtype), []).append(point)
     names = list(dict.fromkeys(name for name, _ in groups))
     for (name, dtype), members in groups.items():
         i = names.index(name)
@@ -278,35 +339,43 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None 
             "linewidth": 1.0,
         }
         style |= {"linestyle": "--", "markerfacecolor": "white"} if single else {}
-        line = sorted((one for one in members if one in shown), key=lambda one: one.setting.h)
-        costs = [one.us_per_vehicle_second for one in line]
-        left.plot([one.error(of) for one in line], costs, label=f"{name}, {dtype}" if single else name, **style)
-        biased = sorted((one for one in members if one.biases), key=lambda one: one.setting.h)
+        line = sorted((point for point in members if point in shown), key=lambda point: point.setting.h)
+        costs = [point.us_per_vehicle_second for point in line]
+        cost_axes.plot(
+            [point.error(of) for point in line], costs, label=f"{name}, {dtype}" if single else name, **style
+        )
+        biased = sorted((point for point in members if point.biases), key=lambda point: point.setting.h)
         key = f"{of}_mean" if of != "energy" else "energy_mean"
-        right.plot([one.setting.h for one in biased], [one.biases.get(key, np.nan) for one in biased], **style)
+        bias_axes.plot(
+            [point.setting.h for point in biased], [point.biases.get(key, np.nan) for point in biased], **style
+        )
     front = found.front(of)
-    left.plot([one.error(of) for one in front], [one.us_per_vehicle_second for one in front], color="black", linewidth=5,
-              alpha=0.2, solid_capstyle="round", label="cheapest for each error", zorder=0)  # fmt: skip
-    left.set(xlabel=f"largest error of {of} [{found.units[of]}], up to {found.until:g} s",
-             ylabel="microseconds of one core per vehicle and simulated second", title="Cost of accuracy")  # fmt: skip
-    right.set(xlabel="step [s]", ylabel=f"bias / standard error of {found.members} members",
-              title=f"Bias of the mean of {of} up to {found.t1:g} s")  # fmt: skip
-    for axes, drawn, why in (
-        (left, bool(shown), "no error of members: noise acts, or the reference is not good enough"),
-        (right, any(one.biases for one in found.measurements), "no statistics: there is one member"),
+    cost_axes.plot([point.error(of) for point in front], [point.us_per_vehicle_second for point in front], color="black",
+                   linewidth=5, alpha=0.2, solid_capstyle="round", label="cheapest for each error", zorder=0)  # fmt: skip
+    cost_axes.set(xlabel=f"largest error of {of} [{found.units[of]}], up to {found.until:g} s",
+                  ylabel="microseconds of one core per vehicle and simulated second", title="Cost of accuracy")  # fmt: skip
+    bias_axes.set(xlabel="step [s]", ylabel=f"bias / standard error of {found.members} members",
+                  title=f"Bias of the mean of {of} up to {found.t1:g} s")  # fmt: skip
+    for axes, drawn, reason in (
+        (cost_axes, bool(shown), "no error of members: noise acts, or the reference is not good enough"),
+        (bias_axes, any(point.biases for point in found.measurements), "no statistics: there is one member"),
     ):
         if drawn:
             axes.set(xscale="log", yscale="log")
         else:
-            axes.text(0.5, 0.5, why, ha="center", transform=axes.transAxes)
+            axes.text(0.5, 0.5, reason, ha="center", transform=axes.transAxes)
     if shown:
-        left.invert_xaxis()
-    right.axhline(1.4, color="black", linewidth=0.8, linestyle=":")
-    right.text(0.01, 1.6, "chance", fontsize="small", transform=right.get_yaxis_transform())
-    for axes in (left, right):
+        cost_axes.invert_xaxis()
+    bias_axes.axhline(1.4, color="black", linewidth=0.8, linestyle=":")
+    bias_axes.text(0.01, 1.6, "chance", fontsize="small", transform=bias_axes.get_yaxis_transform())
+    for axes in (cost_axes, bias_axes):
         axes.grid(True, alpha=0.3)
     figure.legend(
-        *left.get_legend_handles_labels(), loc="center left", bbox_to_anchor=(0.838, 0.5), fontsize="x-small", ncols=2
+        *cost_axes.get_legend_handles_labels(),
+        loc="center left",
+        bbox_to_anchor=(0.838, 0.5),
+        fontsize="x-small",
+        ncols=2,
     )
     title = (
         f"{found.members} members, 0 to {found.t1:g} s; reference {found.reference}; better is to the right and down"
@@ -315,16 +384,25 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None 
     return save_figure(figure, path, 100)
 
 
-# Colours of stability_map's classes, apart for every kind of colour vision and in grey; what must not be is hatched too.
+# Colours of stability_map's classes, distinct for every kind of colour vision and in grey; silent failures are hatched.
 CELLS = ("#0072B2", "#9BD1F0", "#F0E442", "#8C8C8C", "#D55E00")
 # Line styles of the analytic limits.
 STYLES = {"rotation": "-", "munk": "--", "restoring": "-.", "drag": ":"}
 
 
 def plot_stability(found: StabilityMap, path: str | os.PathLike[str]) -> Path:
-    """Draw a stability map, a panel for each method, with the analytic limits that lie in it. Returns the path.
+    """Draw a stability map, a panel for each method, with the analytic limits that lie in it.
 
-    Raises ImportError without matplotlib.
+    Args:
+        found: A map of `stability_map`.
+        path: The file; its ending chooses the format.
+
+    Returns:
+        The path.
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        OSError: The file cannot be written.
     """
     figure_of = figure_class()
     n = len(found.methods)
@@ -356,7 +434,7 @@ def plot_stability(found: StabilityMap, path: str | os.PathLike[str]) -> Path:
 
 
 def _edges(line: Line) -> np.ndarray:
-    """Between the values of an axis, and beyond its ends (k + 1,)."""
+    """Edges (k + 1,) of the cells about an axis's k values, halfway between neighbours."""
     values = np.log(line.values) if line.log else line.values
     half = 0.5 * np.diff(values) if len(values) > 1 else np.array([0.5])
     edges = np.concatenate([[values[0] - half[0]], values[:-1] + half[: len(values) - 1], [values[-1] + half[-1]]])
@@ -364,7 +442,7 @@ def _edges(line: Line) -> np.ndarray:
 
 
 def _cells(axes: Any, found: StabilityMap, method: str) -> None:
-    """The classes as colours."""
+    """Draw the classes as colours."""
     from matplotlib.colors import ListedColormap
 
     classes = found.classes[method]
@@ -378,7 +456,7 @@ def _cells(axes: Any, found: StabilityMap, method: str) -> None:
 
 
 def _limits(axes: Any, found: StabilityMap, method: str) -> set[str]:
-    """Where h reaches each analytic limit: black on white, to be seen on every colour. Returns those that lie in the map."""
+    """Draw where h reaches each analytic limit, black on white to be seen on every colour; return the limits drawn."""
     drawn: set[str] = set()
     if min(len(found.x.values), len(found.y.values)) < 2:
         return drawn
@@ -393,7 +471,7 @@ def _limits(axes: Any, found: StabilityMap, method: str) -> set[str]:
 
 
 def _legend(figure: Any, drawn: set[str]) -> None:
-    """Classes and limits, below the panels."""
+    """Draw the legend of classes and limits below the panels."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

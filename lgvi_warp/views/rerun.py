@@ -1,4 +1,4 @@
-"""A recording of a fleet for the rerun viewer: bodies that move, a few paths, depth, energy and outcomes as curves."""
+"""A recording of a fleet for the rerun viewer: moving bodies, a few paths, and curves of depth, energy and outcomes."""
 
 from __future__ import annotations
 
@@ -34,21 +34,21 @@ CURVES = (
 
 
 def log_rerun(result: Result, path: str | os.PathLike[str]) -> Path:
-    """Write the fleet as an .rrd recording: the file is there whole or not at all.
+    """Write the fleet as an .rrd recording; the file is there whole or not at all.
 
     At most MOST_BODIES members are shown, spread evenly. A member that an event stopped, or that failed, stays where it
-    ended, in the colour of its outcome from then on. Curves are of the members under way at each time. The recording and
-    the application have ids of their own, which the same run always has: the viewer keeps recordings and layouts apart.
+    ended, in the colour of its outcome. Curves are of the members under way at each time. The same run always gives the
+    recording and the application the same ids: the viewer keeps recordings and layouts apart by them.
 
     Args:
-        result: With position, attitude, velocity and angular velocity.
-        path: Of the file.
+        result: A result with position, attitude, velocity and angular velocity.
+        path: The file.
 
     Returns:
         The path.
 
     Raises:
-        ImportError: Without rerun-sdk (extra: viz).
+        ImportError: rerun-sdk is not installed (extra: viz).
         NothingToDraw: No member has a finite start.
         OSError: The file cannot be written.
     """
@@ -77,14 +77,14 @@ def log_rerun(result: Result, path: str | os.PathLike[str]) -> Path:
             recording.flush()
             recording.disconnect()
     except RuntimeError as error:
-        # rerun's word for a writer that could not begin, or not go on; it says why on stderr.
+        # rerun raises it for a writer that could not start or continue, and prints the reason on stderr.
         text = f"the recording could not be written ({error}); is the disk full, or the folder read-only?"
         raise OSError(text) from error
     return target
 
 
 def _text(result: Result) -> str:
-    """What became of the members, and everything that the run follows from."""
+    """Outcomes of the members and the run's provenance, in Markdown."""
     lines = [title(result), "", *(f"- {outcome_text(result, code)}" for code in outcomes(result)), ""]
     return "\n".join([*lines, "```json", json.dumps(result.provenance, indent=2), "```"])
 
@@ -92,7 +92,7 @@ def _text(result: Result) -> str:
 def _world(
     recording: Any, rr: Any, result: Result, shown: np.ndarray, position: np.ndarray, counted: np.ndarray
 ) -> None:
-    """Bodies and trails. x north, y east, z down. counted: which of those shown are under way, at each time."""
+    """Log bodies and trails; x north, y east, z down. counted: which of the bodies shown are under way at each time."""
     recording.log("world", rr.ViewCoordinates.FRD, static=True, strict=True)
     quaternion = notation.quaternion_from_matrix(result.attitude[:, shown])[..., [1, 2, 3, 0]].astype(np.float32)
     size = max(_extent(position)) * 0.02
@@ -109,7 +109,7 @@ def _world(
     recording.log("world/trails", lines, static=True, strict=True)
 
 
-# A body that is not to be seen is so small, beside one that is: an entity without any pose would show one at the origin.
+# Scale of a hidden body: an entity without any pose would show a body at the origin.
 UNSEEN = 1e-6
 
 
@@ -117,7 +117,7 @@ def _poses(
     recording: Any, rr: Any, entity: str, time: np.ndarray, position: np.ndarray, quaternion: np.ndarray,
     visible: np.ndarray,
 ) -> None:  # fmt: skip
-    """Send the poses (k, m) of the bodies that are visible at each time (k, m), some frames at once."""
+    """Send the poses (k, m) of the bodies that are visible at each time (k, m), in chunks of frames."""
     empty = ~visible.any(axis=1)
     posed = visible.copy()
     posed[empty, 0] = True
@@ -128,20 +128,20 @@ def _poses(
         columns = rr.InstancePoses3D.columns(
             translations=position[frames][at],
             quaternions=quaternion[frames][at],
-            # At every time or at none: what is not sent anew holds on.
+            # Send scales at every time or never: one that is not sent again stays in force.
             scales=np.repeat(scales[:, None], 3, axis=1) if empty.any() else None,
         ).partition(at.sum(axis=1))
         recording.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=time[frames])], columns, strict=True)
 
 
 def _extent(position: np.ndarray) -> np.ndarray:
-    """Size of the box around all positions, at least 1 m along each axis."""
+    """Size [m] of the box around all positions, at least 1 m along each axis."""
     flat = position.reshape(-1, 3)
     return np.maximum(flat.max(axis=0) - flat.min(axis=0), 1.0)
 
 
 def _body(rr: Any, size: float, color: tuple[int, int, int]) -> Any:
-    """A spindle along the body's x axis, with a bright nose and a fin on its upper side: attitude can be read off it."""
+    """A spindle along the body's x axis, with a bright nose and a fin on its upper side, which show its attitude."""
     s = 0.18 * size
     points = [(size, 0, 0), (0, s, 0), (0, 0, s), (0, -s, 0), (0, 0, -s), (-size, 0, 0), (-size, 0, -2.5 * s)]
     faces = [
@@ -161,19 +161,26 @@ def _body(rr: Any, size: float, color: tuple[int, int, int]) -> Any:
 
 
 def entity_of(curve: Curve) -> str:
-    """Where a curve lies in the recording: "energy_error" and so on."""
+    """Name of a curve's entity in the recording.
+
+    Args:
+        curve: The curve.
+
+    Returns:
+        The name in lower case without spaces, as "energy_error".
+    """
     return curve.name.lower().replace(" ", "_")
 
 
 def _fan(recording: Any, rr: Any, time: np.ndarray, name: str, values: np.ndarray, counted: np.ndarray) -> None:
-    """Smallest, median and largest of the members that count at each time."""
+    """Log the smallest, the median and the largest value of the members that count at each time."""
     rows = quantiles(values, counted, [quantile for _, quantile, _ in CURVES])
     for (curve, _, color), row in zip(CURVES, rows, strict=True):
         _series(recording, rr, f"{name}/{curve}", time, row, curve, color)
 
 
 def _members(recording: Any, rr: Any, result: Result, counted: np.ndarray) -> None:
-    """How many members are under way at each time, and how many ended, by outcome."""
+    """Log how many members are under way at each time, and how many ended, by outcome."""
     status = np.asarray(result.status)
     numbers = {"under way": (Status.OK, counted.sum(axis=1))}
     for code in outcomes(result):
@@ -186,19 +193,19 @@ def _members(recording: Any, rr: Any, result: Result, counted: np.ndarray) -> No
 def _series(
     recording: Any, rr: Any, entity: str, time: np.ndarray, values: np.ndarray, name: str, color: tuple[int, int, int]
 ) -> None:
-    """One curve; where its values are not finite it is broken."""
+    """Log one curve, broken where its values are not finite."""
     recording.log(entity, rr.SeriesLines(names=name, colors=color, widths=2.0), static=True, strict=True)
     columns = rr.Scalars.columns(scalars=values.astype(np.float64))
     recording.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=time)], columns, strict=True)
 
 
 def _blueprint(time: np.ndarray, position: np.ndarray, energy: Curve) -> Any:
-    """What is seen first: the fleet from the side and above on the left, the curves and the run's facts on the right."""
+    """First layout of the viewer: the fleet on the left, the curves and the run's facts on the right."""
     import rerun.blueprint as rrb
 
     flat = position.reshape(-1, 3)
     centre, extent = (flat.max(axis=0) + flat.min(axis=0)) / 2.0, _extent(position)
-    # From the side of the way the fleet goes, and a little above: z points down.
+    # View across the fleet's way, from a little above: z points down.
     way = np.mean(position[-1] - position[0], axis=0)[:2]
     east, north = way / np.linalg.norm(way) if np.any(way) else (0.0, 1.0)
     eye = centre + np.linalg.norm(extent) * np.array([0.8 * north, -0.8 * east, -0.2])
@@ -207,16 +214,18 @@ def _blueprint(time: np.ndarray, position: np.ndarray, energy: Curve) -> Any:
         name="Fleet (north, east, down)",
         eye_controls=rrb.EyeControls3D(position=eye, look_target=centre, eye_up=(0.0, 0.0, -1.0)),
     )
-    whole = rrb.TimeAxis(
+    full_time = rrb.TimeAxis(
         view_range=rrb.TimeRange(
             start=rrb.TimeRangeBoundary.absolute(seconds=float(time[0])),
             end=rrb.TimeRangeBoundary.absolute(seconds=float(time[-1])),
         )
     )
     side = rrb.Vertical(
-        rrb.TimeSeriesView(origin="depth", name="Depth [m] of the members under way", axis_x=whole),
-        rrb.TimeSeriesView(origin=entity_of(energy), name=f"{energy.name} [J] of the members under way", axis_x=whole),
-        rrb.TimeSeriesView(origin="members", name="Members by outcome", axis_x=whole),
+        rrb.TimeSeriesView(origin="depth", name="Depth [m] of the members under way", axis_x=full_time),
+        rrb.TimeSeriesView(
+            origin=entity_of(energy), name=f"{energy.name} [J] of the members under way", axis_x=full_time
+        ),
+        rrb.TimeSeriesView(origin="members", name="Members by outcome", axis_x=full_time),
         rrb.TextDocumentView(origin="run", name="Run"),
     )
     return rrb.Blueprint(

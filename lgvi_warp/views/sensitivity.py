@@ -1,4 +1,4 @@
-"""A picture of a sensitivity analysis: bars with their intervals, a panel for each quantity."""
+"""A picture of a sensitivity analysis: bars with confidence intervals, one panel for each quantity."""
 
 from __future__ import annotations
 
@@ -14,14 +14,24 @@ if TYPE_CHECKING:
     from lgvi_warp.studies.sensitivity import Indices
 
 COLORS = ("tab:blue", "tab:orange", "tab:green")
-# Panels beyond these are left out: a picture of more cannot be read.
+# Most panels: a picture of more cannot be read.
 MOST = 12
 
 
 def plot_sensitivity(found: Indices, path: str | os.PathLike[str]) -> Path:
-    """Draw the indices of each factor as bars, with their confidence intervals. Returns the path.
+    """Draw the indices of each factor as bars with their confidence intervals.
 
-    Raises ImportError without matplotlib (extra: viz), ValueError when there is nothing to draw.
+    Args:
+        found: Indices of `lw.uq.sobol` or `lw.uq.morris`; the first 12 quantities that vary are drawn.
+        path: The file; its ending chooses the format.
+
+    Returns:
+        The path.
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        ValueError: No quantity varies.
+        OSError: The file cannot be written.
     """
     figure_of = figure_class()
     shown = [q for q in range(len(found.quantities)) if np.isfinite(getattr(found, found.columns[0])[q]).any()][:MOST]
@@ -40,15 +50,15 @@ def plot_sensitivity(found: Indices, path: str | os.PathLike[str]) -> Path:
     panels[0].invert_yaxis()
     panels[0].legend(loc="best", fontsize="small")
     failed = f", {found.failed} failed" if found.failed else ""
-    left = len(found.quantities) - len(shown)
-    more = f"; {left} quantities not shown" if left else ""
+    hidden = len(found.quantities) - len(shown)
+    more = f"; {hidden} quantities not shown" if hidden else ""
     figure.suptitle(f"{found.name}, {found.samples} samples, {found.members} members{failed}; "
                     f"{found.confidence:.0%} intervals{more}", fontsize="medium")  # fmt: skip
     return save_figure(figure, path, 100)
 
 
 def _bars(axes: Any, found: Indices, q: int) -> None:
-    """Bars of one quantity, the columns of a factor side by side."""
+    """Draw the bars of one quantity, the columns of a factor side by side."""
     places = np.arange(len(found.factors))
     width = 0.8 / len(found.columns)
     for i, column in enumerate(found.columns):

@@ -10,14 +10,10 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from lgvi_warp.methods.method import Method
-
-if TYPE_CHECKING:
-    pass
 
 # Largest h |Omega| at which methods that turn about the axes are still accurate.
 TURNS = 1.0

@@ -111,3 +111,6 @@ def _in_turn(
                 work.plan.compile()
                 fresh = in_order(left, stack.enter_context(contextlib.closing(executor.run(work, left, advanced))))
             yield next(fresh)
+        # An executor raises an interrupt after the blocks that ended all the same: it is to be heard after the last one too.
+        for _ in fresh or ():
+            pass

@@ -138,8 +138,9 @@ def test_a_run_in_a_store_goes_on(name, executor, tmp_path):
 def test_other_verbs_end_in_a_line(verb, tmp_path):
     scene = [] if verb == "bench" else [PAPER]
     out = [] if verb in ("bench", "plan") else ["--out", str(tmp_path)]
-    more = ["--members", "100000000"] if verb == "bench" else ["--duration", "100"]
-    with begun([verb, *scene, *more, *out], shown="") as process:
+    # Enough work that none has ended before it is told to.
+    more = {"bench": ["--members", "100000000"], "plan": ["--members", "3000000", "--duration", "100000"]}
+    with begun([verb, *scene, *more.get(verb, ["--duration", "2000"]), *out], shown="") as process:
         time.sleep(4.0)
         process.terminate()
         code, _, lines = ended(process)

@@ -189,8 +189,8 @@ def test_the_order_holds_up_to_the_event(method, order, steps):
         r = lw.solve(one(FALLING, **FALL), method, h=2.0 / n, t1=2.0)
         assert abs(r.position[-1, 0, 2] - 6.5) < 1e-13
         errors.append(max(difference(last(r), last(true)), abs(r.end_time[0] - true.end_time[0])))
-    # Fitted to three steps that differ little: a half above or below; never an order less.
-    assert slope([2.0 / n for n in steps], errors) == pytest.approx(order, abs=0.55)
+    # At least the order: at these steps some methods still gain on it (rkn6_11, rk8), and none may fall a third of one behind.
+    assert slope([2.0 / n for n in steps], errors) > order - 0.35
 
 
 def test_an_adaptive_method_arrives_within_its_tolerance():

@@ -35,8 +35,10 @@ def test_operators_are_imported(path):
 
 
 def whole_numbers(node):
-    """Index arithmetic, and a number with a sign: never lanes."""
+    """Index arithmetic, a number with a sign, and numbers made by `real(...)`: never lanes."""
     text = ast.unparse(node)
+    if text.startswith("real("):
+        return True
     return (
         any(isinstance(sub, ast.Constant) and isinstance(sub.value, int) for sub in ast.walk(node))
         or text[1:].replace(".", "").isdigit()

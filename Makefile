@@ -1,12 +1,16 @@
 # Everything from a fresh clone: `make run`, `make test`. Needs Python 3.11 or later, with venv.
+# `make quick` and `make quick ROOM=statistics`: the tests of all rooms, or of one, that load no kernel.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: run test test-long lint bench bench-peers clean
+.PHONY: run quick test test-long coverage lint bench bench-peers clean
 
 run: $(VENV)/.run
 	$(BIN)/lgvi-warp run examples/paper.toml --out runs/paper
+
+quick: $(VENV)/.dev
+	$(BIN)/python -m pytest -n auto --dist worksteal -m "not slow and not kernel" tests/unit/$(ROOM)
 
 test: lint
 	$(BIN)/python -m pytest -n auto --dist worksteal -m "not slow"

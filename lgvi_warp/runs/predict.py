@@ -135,6 +135,9 @@ def predict(
     from lgvi_warp.runs.settle import make_plan
     from lgvi_warp.runs.store.solve import settled
 
+    faults = Faults()
+    check_threads(faults, threads)
+    faults.raise_if_any()
     ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
     statistics, keep, until = (settings.pop(name, None) for name in ("statistics", "keep", "until"))
     scene = ensemble.scene
@@ -142,9 +145,6 @@ def predict(
     fields = (settings.get("save") or SaveAt()).fields
     plan = make_plan(ensemble, **settings, fields=observed.fields)
     compile_seconds = plan.compile()
-    faults = Faults()
-    check_threads(faults, threads)
-    faults.raise_if_any()
     count = threads or machine.thread_count()
     set_up, step = costs(plan, count, observed)
     asked_store = store if isinstance(store, Store) or store is None else Store(store)

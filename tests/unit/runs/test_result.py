@@ -11,6 +11,8 @@ from lgvi_warp.physics import energy as invariants
 from lgvi_warp.reference import energy
 from tests.support.tools import TURN, body_of, one, random_states, scene_of, to_state
 
+pytestmark = pytest.mark.kernel
+
 
 @pytest.fixture(scope="module")
 def result():

@@ -242,6 +242,7 @@ def test_of_very_many_samples_the_last_are_looked_at(monkeypatch):
     assert len(plausibility.on_the_way(scene(), samples(velocity=v[:2])).messages(1)) == 1
 
 
+@pytest.mark.kernel
 def test_a_result_says_what_is_odd():
     fleet = lw.Ensemble(
         lw.Scene(lw.Vehicle(10.0, [1.0, 2.0, 2.5], buoyancy=200.0), start=lw.Start([0.0, 0.0, 1.0])),

@@ -18,6 +18,12 @@ test: lint
 test-long: $(VENV)/.dev
 	$(BIN)/python -m pytest -n auto --dist worksteal
 
+# TESTS="not slow and not kernel": of quick tests alone; TESTS= : of all. Device code, and processes that tests start, do not count.
+TESTS ?= not slow
+coverage: $(VENV)/.dev
+	$(BIN)/python -m pytest -n auto --dist worksteal -m "$(TESTS)" --cov lgvi_warp --cov-report=
+	$(BIN)/python -m tests.house.coverage_by_room
+
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .

@@ -4,18 +4,29 @@ import ast as _ast
 
 __version__ = "0.1.0"
 
-# {public name: (module, its name there)}, as the stub tells editors. A name is imported when it is used first: NumPy, SciPy
+# The stub lists the public names, for editors and for this file. A name is imported when it is used first: NumPy, SciPy
 # and Warp take longer to import than a script that only asks for help or a version may take.
+_STUB = _ast.parse(__loader__.get_data(f"{__path__[0]}/__init__.pyi")).body
+
+# {public name: (module, its name there)}
 _PLACES = {
     _alias.asname or _alias.name: (_line.module, _alias.name)
-    for _line in _ast.parse(__loader__.get_data(f"{__path__[0]}/__init__.pyi")).body
+    for _line in _STUB
     if isinstance(_line, _ast.ImportFrom)
     for _alias in _line.names
 }
+# {old public name: the name that replaces it}
+_RENAMED = {_line.targets[0].id: _line.value.id for _line in _STUB if isinstance(_line, _ast.Assign)}
+
 __all__ = sorted(_PLACES)
 
 
 def __getattr__(name: str) -> object:
+    if name in _RENAMED:
+        import warnings
+
+        warnings.warn(f"lw.{name} is now lw.{_RENAMED[name]}; write that", DeprecationWarning, stacklevel=2)
+        return globals().get(_RENAMED[name]) or __getattr__(_RENAMED[name])
     if name not in _PLACES:
         raise AttributeError(f"module 'lgvi_warp' has no attribute {name!r}")
     module, name_there = _PLACES[name]

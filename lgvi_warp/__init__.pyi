@@ -22,8 +22,8 @@ from lgvi_warp.physics.terms import DragMatrix as DragMatrix
 from lgvi_warp.physics.terms import Fins as Fins
 from lgvi_warp.physics.terms import GaussMarkovCurrent as GaussMarkovCurrent
 from lgvi_warp.physics.terms import Packed as Packed
+from lgvi_warp.physics.terms import PackingContext as PackingContext
 from lgvi_warp.physics.terms import Restoring as Restoring
-from lgvi_warp.physics.terms import Setting as Setting
 from lgvi_warp.physics.terms import Stratification as Stratification
 from lgvi_warp.physics.terms import Term as Term
 from lgvi_warp.physics.terms import Tether as Tether
@@ -33,8 +33,8 @@ from lgvi_warp.physics.terms import Weight as Weight
 from lgvi_warp.physics.terms import Wrench as Wrench
 from lgvi_warp.physics.terms import WrenchNoise as WrenchNoise
 from lgvi_warp.physics.terms import WrenchSchedule as WrenchSchedule
-from lgvi_warp.physics.terms import quantity as quantity
-from lgvi_warp.physics.terms import register as register
+from lgvi_warp.physics.terms import number as number
+from lgvi_warp.physics.terms import register_term as register_term
 from lgvi_warp.physics.terms.events import Box as Box
 from lgvi_warp.physics.terms.events import Event as Event
 from lgvi_warp.physics.terms.events import Floor as Floor
@@ -52,12 +52,12 @@ from lgvi_warp.runs.store.settings import Store as Store
 from lgvi_warp.sampling.designs import Grid as Grid
 from lgvi_warp.sampling.designs import Halton as Halton
 from lgvi_warp.sampling.designs import LatinHypercube as LatinHypercube
-from lgvi_warp.sampling.designs import Levels as Levels
 from lgvi_warp.sampling.designs import Morris as Morris
 from lgvi_warp.sampling.designs import Random as Random
 from lgvi_warp.sampling.designs import Saltelli as Saltelli
 from lgvi_warp.sampling.designs import Sobol as Sobol
 from lgvi_warp.sampling.designs import Table as Table
+from lgvi_warp.sampling.designs import UnitCubePoints as UnitCubePoints
 from lgvi_warp.sampling.distributions.basic import Choice as Choice
 from lgvi_warp.sampling.distributions.basic import LogNormal as LogNormal
 from lgvi_warp.sampling.distributions.basic import Normal as Normal
@@ -68,15 +68,15 @@ from lgvi_warp.sampling.distributions.joint import PhysicalInertia as PhysicalIn
 from lgvi_warp.sampling.distributions.joint import PositiveDefinite as PositiveDefinite
 from lgvi_warp.sampling.distributions.joint import RotationNormal as RotationNormal
 from lgvi_warp.sampling.distributions.joint import UniformRotation as UniformRotation
-from lgvi_warp.sampling.distributions.named import Frozen as Frozen
+from lgvi_warp.sampling.distributions.named import ScipyDistribution as ScipyDistribution
 from lgvi_warp.scene.ensemble import Ensemble as Ensemble
 from lgvi_warp.scene.scene import Scene as Scene
 from lgvi_warp.scene.start import Environment as Environment
 from lgvi_warp.scene.start import Start as Start
-from lgvi_warp.scene.vehicles.fossen import from_fossen as from_fossen
+from lgvi_warp.scene.vehicles.fossen import vehicle_tables_from_fossen as vehicle_tables_from_fossen
 from lgvi_warp.scene.vehicles.fossen import vehicles as vehicles
-from lgvi_warp.scene.vehicles.sdf import from_sdf as from_sdf
-from lgvi_warp.scene.vehicles.yaml import from_yaml as from_yaml
+from lgvi_warp.scene.vehicles.sdf import vehicle_tables_from_sdf as vehicle_tables_from_sdf
+from lgvi_warp.scene.vehicles.yaml import vehicle_tables_from_yaml as vehicle_tables_from_yaml
 from lgvi_warp.statistics import CircularMean as CircularMean
 from lgvi_warp.statistics import Covariance as Covariance
 from lgvi_warp.statistics import EndTime as EndTime
@@ -109,3 +109,13 @@ from lgvi_warp.views.rerun import log_rerun as log_rerun
 from lgvi_warp.views.sensitivity import plot_sensitivity as plot_sensitivity
 
 __version__: str
+
+# Old public names.
+Frozen = ScipyDistribution
+Levels = UnitCubePoints
+Setting = PackingContext
+from_fossen = vehicle_tables_from_fossen
+from_sdf = vehicle_tables_from_sdf
+from_yaml = vehicle_tables_from_yaml
+quantity = number
+register = register_term

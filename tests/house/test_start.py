@@ -1,12 +1,14 @@
 """The package loads late: an import of it brings nothing else in, and a scene needs neither SciPy nor Warp."""
 
 import json
+import re
 import subprocess
 import sys
 
 import pytest
 
 import lgvi_warp as lw
+from tests.conftest import ROOT
 
 HEAVY = {
     "scipy",
@@ -55,6 +57,12 @@ def test_every_public_name_is_found():
     assert {"Scene", "solve", "uq", "vehicles", "__version__"} <= set(dir(lw))
     assert all(getattr(lw, name) is not None for name in dir(lw))
     assert lw.uq.__name__ == "lgvi_warp.studies.sensitivity"
+
+
+def test_the_version_is_the_same_everywhere():
+    for path in ("pyproject.toml", "CITATION.cff"):
+        text = (ROOT / path).read_text()
+        assert re.search(r'^version(?: =|:) "?([\d.]+)"?$', text, re.MULTILINE)[1] == lw.__version__, path
 
 
 def test_an_unknown_name_is_refused():

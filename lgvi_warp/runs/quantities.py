@@ -12,7 +12,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.real_numbers import NotReal, real_results
-from lgvi_warp.methods.saveat import FIELDS
+from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.result import Result
 from lgvi_warp.statistics.functional import Functional, functional
 from lgvi_warp.statistics.quantity import Quantity

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import SceneError
+from lgvi_warp.physics.fields import FIELDS, TABLE
 from lgvi_warp.runs.quantities import samples_of
 from lgvi_warp.runs.result import Result
 from lgvi_warp.statistics.functional import Functional, functional
 
 # Quantities that results are always compared in, and their units. Attitudes differ by the angle between them.
-QUANTITIES = {"position": "m", "attitude": "rad", "velocity": "m/s", "angular_velocity": "rad/s", "energy": "J"}
+QUANTITIES = {name: TABLE[name].unit for name in (*FIELDS, "energy")} | {"attitude": "rad"}
 
 
 @dataclass(frozen=True)

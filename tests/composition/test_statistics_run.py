@@ -14,7 +14,7 @@ from lgvi_warp import cli
 from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.engine.keepers import observation
 from lgvi_warp.engine.keepers.statistics import Gathered
-from lgvi_warp.methods.saveat import FIELDS
+from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene import scene as scenes
 from lgvi_warp.scene.scene import from_dict

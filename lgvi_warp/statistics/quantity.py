@@ -142,11 +142,12 @@ KNOWN: dict[str, Quantity] = {
 }
 
 
-def named(key: str, text: str) -> Quantity:
+def named(key: str, of: str, text: str) -> Quantity:
     """Return the quantity of a name, or one component of it.
 
     Args:
         key: the key that messages name.
+        of: what was asked for, which messages show.
         text: a name such as "position", or a component such as "position[2]".
 
     Raises:
@@ -155,14 +156,15 @@ def named(key: str, text: str) -> Quantity:
     match = re.fullmatch(r"(\w+)(\[[\d, ]+\])?", text.strip())
     base = KNOWN.get(match[1]) if match else None
     if base is None:
-        raise SceneError([f"{key} = {shown(text)}: is not known; {closest(text, KNOWN)}"])
+        raise SceneError([f"{key} = {shown(of)}: is not known; {closest(text, KNOWN)}"])
     assert match is not None
     if match[2] is None:
         return base
     label = f"{base.name}[{', '.join(match[2][1:-1].replace(' ', '').split(','))}]"
     if label not in base.labels:
-        remark = "has one component" if base.size == 1 else f"has the components {', '.join(base.labels)}"
-        raise SceneError([f"{key} = {shown(text)}: {base.name} {remark}; give one of them"])
+        one = f"has one component; give {base.name!r}"
+        remark = one if base.size == 1 else f"has the components {', '.join(base.labels)}; give one of them"
+        raise SceneError([f"{key} = {shown(of)}: {base.name} {remark}"])
     return component(base, base.labels.index(label))
 
 

@@ -95,7 +95,7 @@ def compared_in(of: Any) -> Compared:
         raise SceneError([f"of = {of!r}: is several quantities; errors are of one of them: give its name"])
     parsed = functional("of", of)
     if parsed.over_path:
-        remedy = f"give {parsed.quantity.name!r}, whose largest error over the path is reported"
+        remedy = f"give {parsed.inner.name!r}, whose largest error over the path is reported"
         raise SceneError(
             [f"of = {parsed.label!r}: looks over the path, and errors are of a quantity at each time; {remedy}"]
         )

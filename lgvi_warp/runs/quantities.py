@@ -27,8 +27,7 @@ class OfResult:
     """A quantity of interest of a result: a `Functional`, or a function of a Result.
 
     "position[2]" is the value at the end; max(...), min(...), mean(...) and range(...) are over the path, as its
-    samples were kept;
-    norm(...) is the length of a vector.
+    samples were kept; norm(...) is the length of a vector.
 
     Attributes:
         label: Its name.

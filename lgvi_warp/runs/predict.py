@@ -18,7 +18,7 @@ import numpy as np
 from lgvi_warp.common import files as durable
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.engine.block import SHAPES, Block, blocks
+from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.engine.executors import check_threads
 from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.keepers.memory import Samples
@@ -27,6 +27,7 @@ from lgvi_warp.engine.keepers.protocol import Keeper
 from lgvi_warp.engine.plan import SEGMENT_SAMPLE_BYTES, Plan
 from lgvi_warp.engine.work import Work
 from lgvi_warp.methods.saveat import SaveAt, TimeGrid
+from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.runs import member_fields
 from lgvi_warp.runs.sizes import Sizes, sizes
 from lgvi_warp.runs.store.create import create
@@ -221,7 +222,7 @@ def _result_bytes(plan: Plan, fields: Sequence[str] | None = None) -> int:
     """Size of a result in memory, and about that of its file [bytes]; fields: of its samples, by default all of the plan."""
     k, n = len(plan.grid.times), plan.ensemble.members
     real = np.dtype(machine.DTYPES[plan.dtype]).itemsize
-    rows = {name: int(np.prod(SHAPES[name])) * real for name in (plan.fields if fields is None else fields)}
+    rows = {name: int(np.prod(TABLE[name].shape)) * real for name in (plan.fields if fields is None else fields)}
     if plan.spec.compensated and "position" in rows:
         rows["position"] = 24
     first = plan.ensemble.parameters(0, 1)

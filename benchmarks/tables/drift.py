@@ -1,48 +1,19 @@
-"""Energy and momentum over a million steps of every method, beside its cost: writes docs/long_runs.md.
-
-python benchmarks/drift_table.py
-"""
+"""Energy and momentum over a million steps of every method, beside its cost: a vehicle on a tether."""
 
 import sys
-from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
 import lgvi_warp as lw
-from lgvi_warp.common import machine, warp_setup
+from benchmarks.pages import line, markdown, stamp
 from lgvi_warp.physics import notation, terms
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.studies import speed
 
-TARGET = Path(__file__).resolve().parent.parent / "docs" / "long_runs.md"
 STEP, STEPS, MEMBERS, SAMPLES = 0.05, 1_000_000, 64, 1000
 M, J = np.array([188.8, 193.8, 198.8]), np.array([5.46, 5.29, 5.72])
 METHODS = ("psi_s", "psi_1", "psi_x", "psi_x8", "psi", "phi", "su4(psi_s)", "su4(psi_x)", "kl6(psi_x)", "kl8(psi_x)",
            "ss6_13(psi_x)", "su8_15(psi_x)", "bm4(psi_x)", "bm6(psi_x)", "cg3", "rkmk4", "rk4", "rk5", "rk8")  # fmt: skip
-
-TEXT = """# A million steps
-
-The paper's vehicle on a tether of {stiffness} N/m to the origin, weightless: the energy and the angular momentum about
-the anchor are constants of its motion. {members} members with random starts, {steps:,} steps of {step} s.
-
-* **energy error**: largest |E - E0| of all members and samples, over the energy E0 they start with.
-* **slope**: the rate at which the energy error grows in the second half of the run, mean over members by least squares,
-  times the length of the run; and how many of its standard errors that is (from the spread over members). Below 3 it is
-  none. The first half is left out: a symplectic method keeps an energy that differs a little from E, and how much
-  depends on where in their motion the members are; from their start they take thousands of seconds to spread, and the
-  mean of E moves by a few per cent of its swing meanwhile, and then no more.
-* **momentum error**: largest |L - L0| / |L0| of all members at the end.
-* **cost**: nanoseconds per vehicle and step on one core, all methods in turn, {members} members.
-
-Machine: {cpu}, {simd}. Written by `python benchmarks/drift_table.py`; do not edit.
-
-{tables}
-
-A method of Runge-Kutta type loses or gains energy at a steady rate that its order and step decide; a symplectic one
-swings about its start value. What remains of drift in float32 is round-off.
-"""
 
 
 def scene():
@@ -67,12 +38,12 @@ def momentum(result):
 
 
 def row(method, dtype, members):
-    """The line of one method: everything but its cost."""
+    """The cells of one method: everything but its cost."""
     save = lw.SaveAt(every=STEP * STEPS / SAMPLES)
     result = lw.solve(members, method, h=STEP, t1=STEP * STEPS, save=save, dtype=dtype)
     well = np.asarray(result.status) == 0
     if not well.any():
-        return f"{', '.join(result.status.counts())} | | | "
+        return [", ".join(result.status.counts()), "", "", ""]
     E, L = result.energy[:, well].astype(float), momentum(result)[:, well].astype(float)
     error = E / E[0] - 1.0
     half = SAMPLES // 2
@@ -81,11 +52,11 @@ def row(method, dtype, members):
     mean, spread = slopes.mean(), slopes.std(ddof=1) / np.sqrt(len(slopes))
     turned = np.linalg.norm(L[-1] - L[0], axis=-1) / np.linalg.norm(L[0], axis=-1)
     lost = "" if well.all() else f" ({(~well).sum()} failed)"
-    return f"{np.abs(error).max():.1e}{lost} | {mean:+.1e} | {abs(mean) / spread:.1f} | {turned.max():.1e}"
+    return [f"{np.abs(error).max():.1e}{lost}", f"{mean:+.1e}", f"{abs(mean) / spread:.1f}", f"{turned.max():.1e}"]
 
 
 def table(dtype, members):
-    """The lines of one precision."""
+    """The table of one precision."""
     known = []
     for method in METHODS:
         try:
@@ -93,22 +64,14 @@ def table(dtype, members):
         except lw.SceneError as error:
             print(error, file=sys.stderr)
     seconds = speed.interleaved([speed.stepper(plan) for _, plan in known], 7)
-    lines = [f"## {dtype}", "", "| method | energy error | slope x time | standard errors | momentum error | cost [ns] |",
-             "| --- | ---: | ---: | ---: | ---: | ---: |"]  # fmt: skip
+    rows = []
     for (method, _), one in zip(known, seconds, strict=True):
-        lines.append(f"| `{method}` | {row(method, dtype, members)} | {1e9 * one / (100 * MEMBERS):.1f} |")
-        print(lines[-1], flush=True)
-    return "\n".join(lines)
+        rows.append([f"`{method}`", *row(method, dtype, members), f"{1e9 * one / (100 * MEMBERS):.1f}"])
+        print(line(rows[-1]), file=sys.stderr, flush=True)
+    head = ["method", "energy error", "slope x time", "standard errors", "momentum error", "cost [ns]"]
+    return f"## {dtype}\n\n{markdown(head, rows, 'lrrrrr')}"
 
 
 def main():
-    warp_setup.start()
-    members, described = fleet(), machine.describe()
-    tables = "\n\n".join(table(dtype, members) for dtype in ("float64", "float32"))
-    stiffness = float(scene().terms[0].stiffness)
-    TARGET.write_text(TEXT.format(members=MEMBERS, steps=STEPS, step=STEP, stiffness=stiffness, tables=tables,
-                                  cpu=described["cpu"], simd=described["simd"]))  # fmt: skip
-
-
-if __name__ == "__main__":
-    main()
+    members = fleet()
+    return "\n\n".join([stamp("drift"), *(table(dtype, members) for dtype in ("float64", "float32"))])

@@ -1,24 +1,17 @@
-"""Samplings side by side: the error of a mean, the time to check all members and to draw a block, and memory.
-
-python benchmarks/sampling_table.py [--quick]      writes docs/sampling_cost.md
-"""
+"""Samplings side by side: the error of a mean, the time to check all members and to draw a block, and memory."""
 
 from __future__ import annotations
 
 import argparse
-import re
-import subprocess
-import sys
 import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import lgvi_warp as lw
-from lgvi_warp.common import machine
+from benchmarks import own_process
+from benchmarks.pages import ROOT, markdown, stamp
 
-ROOT = Path(__file__).parent.parent
 SAMPLINGS: dict[str, Any] = {
     "random": "random",
     "latin_hypercube (group of 256)": {"latin_hypercube": {"group": 256}},
@@ -35,6 +28,11 @@ MEMBERS = (256, 1024, 4096)
 T1 = 10.0
 BLOCK = 4096
 TRIALS = 3
+
+TEXT = """Mean depth after {t1:g} s; root mean square error over {seeds} seeds [m], from the mean of 8 Sobol sequences of
+32,768 members. Then the time to make an ensemble of {members:,} members (all are drawn and checked), to draw its
+last blocks of {block}, and the memory that both took beyond that of a small ensemble, in a process of its own, one
+thread; the least of {trials} processes."""
 
 
 def scene() -> lw.Scene:
@@ -57,26 +55,11 @@ def errors(sampling: Any, exact: float, seeds: int) -> list[float]:
     return found
 
 
-def costs(sampling: Any, members: int) -> tuple[float, float, float]:
-    """Seconds to make and check an ensemble, milliseconds to draw a block (least of 5), MB at the most; in a process."""
-    code = f"from benchmarks import sampling_table as t; t.measure({sampling!r}, {members})"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
-    made, drawn, memory = (float(word) for word in done.stdout.split())
-    return made, drawn, memory
-
-
-def most_memory() -> float:
-    """Of this process so far [MB]. (What getrusage says begins with the parent's.)"""
-    found = re.search(r"VmHWM:\s+(\d+) kB", Path("/proc/self/status").read_text())
-    assert found is not None
-    return int(found[1]) / 1e3
-
-
-def measure(sampling: Any, members: int) -> None:
-    """Print them."""
+def measure(sampling: Any, members: int) -> tuple[float, float, float]:
+    """Seconds to make and check an ensemble, milliseconds to draw a block (least of 5), MB at the most; in this process."""
     scenery = scene()
     lw.Ensemble(scenery, BLOCK, 1, VARY, sampling).select(0, BLOCK)
-    before = most_memory()
+    before = own_process.peak_memory()
     begun = time.perf_counter()
     fleet = lw.Ensemble(scenery, members, 1, VARY, sampling)
     made = time.perf_counter() - begun
@@ -85,44 +68,32 @@ def measure(sampling: Any, members: int) -> None:
         begun = time.perf_counter()
         fleet.select(members - (i + 1) * BLOCK, members - i * BLOCK)
         times.append(time.perf_counter() - begun)
-    print(made, 1e3 * min(times), most_memory() - before)
+    return made, 1e3 * min(times), (own_process.peak_memory() - before) / 1e6
 
 
-def page(seeds: int, members: int) -> str:
-    """The page."""
+def table(seeds: int, members: int) -> str:
+    """The text of the page."""
     exact = float(np.mean([mean_depth(lw.Ensemble(scene(), 2**15, seed, VARY, "sobol")) for seed in range(100, 108)]))
-    lines = [
-        "# What samplings cost, and what they gain", "",
-        "The paper's vehicle with mass, second moments of mass, center of buoyancy and angular velocity varied: 10 columns.",
-        f"Mean depth after {T1:g} s; root mean square error over {seeds} seeds [m], from the mean of 8 Sobol sequences of",
-        f"32,768 members. Then the time to make an ensemble of {members:,} members (all are drawn and checked), to draw its",
-        f"last blocks of {BLOCK}, and the memory that both took beyond that of a small ensemble, in a process of its own, one",
-        f"thread; the least of {TRIALS} processes.", "",
-        f"Machine: {machine.describe()['cpu']}. Written by `python benchmarks/sampling_table.py`; do not edit.", "",
-        "| sampling | " + " | ".join(f"error, {n}" for n in MEMBERS) + " | make and check [s] | block [ms] | memory [MB] |",
-        "| --- |" + " ---: |" * (len(MEMBERS) + 3),
-    ]  # fmt: skip
     # One after the other, three times: what else the machine does meets all alike.
-    trials = [{name: costs(one, members // 256 * 256) for name, one in SAMPLINGS.items()} for _ in range(TRIALS)]
-    least = {name: np.min([trial[name] for trial in trials], axis=0) for name in SAMPLINGS}
-    for name, sampling in SAMPLINGS.items():
-        found, (made, drawn, memory) = errors(sampling, exact, seeds), least[name]
-        cells = [*(f"{one:.1e}" for one in found), f"{made:.2f}", f"{drawn:.1f}", f"{memory:.0f}"]
-        lines.append(f"| `{name.split()[0]}`{name.removeprefix(name.split()[0])} | " + " | ".join(cells) + " |")
-    return "\n".join(lines) + "\n"
+    trials = [
+        [own_process.call(measure, one, members // 256 * 256) for one in SAMPLINGS.values()] for _ in range(TRIALS)
+    ]
+    rows = []
+    for (name, sampling), (made, drawn, memory) in zip(SAMPLINGS.items(), np.min(trials, axis=0), strict=True):
+        kind, _, group = name.partition(" ")
+        found = [f"{one:.1e}" for one in errors(sampling, exact, seeds)]
+        rows.append([f"`{kind}` {group}".strip(), *found, f"{made:.2f}", f"{drawn:.1f}", f"{memory:.0f}"])
+    head = ["sampling", *(f"error, {n}" for n in MEMBERS), "make and check [s]", "block [ms]", "memory [MB]"]
+    about = TEXT.format(t1=T1, seeds=seeds, members=members, block=BLOCK, trials=TRIALS)
+    return "\n\n".join([about, stamp("sampling"), markdown(head, rows, "l" + 6 * "r")])
 
 
-def main() -> None:
-    """Write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
+def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quick", action="store_true", help="few seeds and members, printed and not written")
-    quick = parser.parse_args().quick
-    text = page(2 if quick else 24, 40_960 if quick else 1_000_000)
-    if quick:
-        print(text)
-    else:
-        (ROOT / "docs" / "sampling_cost.md").write_text(text)
 
 
-if __name__ == "__main__":
-    main()
+def main(quick: bool) -> str | None:
+    if not quick:
+        return table(24, 1_000_000)
+    print(table(2, 40_960))
+    return None

@@ -134,7 +134,7 @@ def general_body():
             rows.append([f"`{method}`", f"{h:g}", *(few(x, 2) for x in e[i]), order])
     caption = (
         "**Errors of the general body** at t = 5 s, Euclidean norms, against the state in quad precision that "
-        "`benchmarks/coupled_problems.py` has. Order: of R, from the two steps."
+        "`benchmarks/coupled_problems.py` holds. Order: of R, from the two steps."
     )
     return table(caption, ["method", "h [s]", "b [m]", "R", "nu [m/s]", "Om [rad/s]", "order"], rows)
 

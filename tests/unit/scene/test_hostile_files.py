@@ -1,0 +1,464 @@
+"""Scenes, tables and coefficients from a stranger: refused in a few lines, in bounded time and memory; nothing is written.
+
+Each row of a table below is a file, or an argument, that somebody may meet. docs/what_files_can_do.md says what holds.
+"""
+
+import io
+import os
+import resource
+import socket
+import subprocess
+import sys
+import time
+import zipfile
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp import vehicle_tables_from_sdf as from_sdf
+from lgvi_warp import vehicle_tables_from_yaml as from_yaml
+from lgvi_warp.cli import main
+from lgvi_warp.cli.settings import out_of
+from lgvi_warp.common import errors, reading
+from lgvi_warp.scene.scene import from_dict
+from tests.conftest import ROOT
+
+BODY = "[vehicle]\nmass = 30.0\ninertia = [0.2, 3.0, 3.0]\nbuoyancy = 290.0\n"
+TABLED = BODY + "[ensemble.sampling.table]\nfile = 'table.csv'\n"
+# Of this process's own time, however busy the machine is [s], and of its memory [kB].
+MOST_SECONDS, MOST_KB = 2.0, 300_000
+
+
+def refused(call, *arguments, words=(), **named):
+    """The faults of a call that is refused: few, short, printable, and soon."""
+    begun, before = time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(lw.SceneError) as caught:
+        call(*arguments, **named)
+    assert time.process_time() - begun < MOST_SECONDS
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < MOST_KB
+    lines = str(caught.value).splitlines()
+    assert len(lines) <= errors.MOST_FAULTS + 2 and max(map(len, lines)) <= errors.HEAD + errors.END + 20
+    assert all(line.isprintable() for line in lines)
+    assert all(word in str(caught.value) for word in words), str(caught.value)[:2000]
+    return caught.value
+
+
+def tree(folder):
+    """All that lies in a folder."""
+    return sorted(str(path) for path in folder.rglob("*"))
+
+
+def terms(count, kind="drag"):
+    return BODY + f'[[terms]]\ntype = "{kind}"\n' * count
+
+
+# Scenes: what the file holds, and words of the refusal.
+SCENES = {
+    "empty": (b"", ("vehicle", "is missing")),
+    "spaces": (b" \n\t\n", ("vehicle", "is missing")),
+    "text": (b"dear reader", ("is not TOML", "line 1")),
+    "random bytes": (bytes(range(256)) * 9, ("UTF-8",)),
+    "invalid UTF-8": (b"a = '\xc3\x28'", ("byte 0xc3 at 5", "save it in UTF-8")),
+    "UTF-16 with its mark": (BODY.encode("utf-16"), ("UTF-16", "save it in UTF-8")),
+    "UTF-16, large end first": (b"\xfe\xff" + BODY.encode("utf-16-be"), ("UTF-16",)),
+    "UTF-32": (BODY.encode("utf-32"), ("UTF-16",)),
+    "a zero byte": (BODY.encode() + b"a = \0\n", ("is not TOML",)),
+    "old Macintosh lines": (BODY.replace("\n", "\r").encode(), ("is not TOML",)),
+    "a pickle": (b"\x80\x04\x95\x15\x00\x00\x00\x00\x00\x00\x00\x8c\x05posix\x94", ("UTF-8",)),
+    "NumPy's": (b"\x93NUMPY\x01\x00", ("UTF-8",)),
+    "JSON": (b'{"vehicle": {"mass": 1}}', ("is not TOML",)),
+    "lists in lists": ("a = " + "[" * 10_000 + "]" * 10_000, ("nested",)),
+    "open lists": ("a = " + "[" * 100_000, ("nested",)),
+    "tables in tables": ("a = " + "{a=" * 10_000 + "1" + "}" * 10_000, ("nested",)),
+    "lists, less deep": (BODY + "[start]\nposition = " + "[" * 30 + "]" * 30, ("nested more than 24 deep",)),
+    "a key of a million points": ("a." * 500_000 + "a = 1", ("more than 8 parts",)),
+    "quoted keys with points": ("'x y' . " * 100_000 + "a = 1", ("more than 8 parts",)),
+    "a header of a million points": ("[" + "a." * 500_000 + "a]", ("more than 8 parts",)),
+    "tables without end": ("".join(f"[a{i}.b.c.d]\n" for i in range(60_000)), ("60,000 tables",)),
+    "terms without end": (terms(1500), ("terms: are 1,500", "at most 1,000")),
+    "events without end": ("events = [" + '{type="floor"},' * 40_000 + "]\n" + BODY, ("events: are 40,000",)),
+    "unknown terms": (terms(900, "drug"), ("900 faults", "and 880 more", "did you mean 'drag'?")),
+    "unknown keys": (BODY + "".join(f"key{i} = 1\n" for i in range(30_000)), ("30,000 faults", "and 29,980 more")),
+    "unknown names that vary": (
+        BODY + "[ensemble.vary]\n" + "".join(f'"a{i}.b" = {{normal={{std=1.0}}}}\n' for i in range(6000)),
+        ("and 5,980 more",),
+    ),
+    "unknown laws": (BODY + "[ensemble.vary]\n" + "".join(f"a{i} = {{ norml = 1 }}\n" for i in range(6000)), ("more",)),
+    "a whole number of 5,000 digits": (BODY.replace("30.0", "9" * 5000), ("thousands of digits", "1.0e20")),
+    "a whole number of 30 digits": (BODY.replace("30.0", "9" * 30), ("vehicle.mass", "64 bits")),
+    "a hexadecimal of 100,000 digits": (BODY.replace("30.0", "0x" + "f" * 100_000), ("vehicle.mass", "120412 digits")),
+    "a large seed": (BODY + "[ensemble]\nseed = 99999999999999999999\n", ("ensemble.seed", "64 bits")),
+    "1e999": (BODY.replace("30.0", "1e999"), ("vehicle.mass = inf", "not finite")),
+    "inf": (BODY.replace("290.0", "inf"), ("vehicle.buoyancy = inf", "not finite")),
+    "nan": (BODY.replace("0.2,", "nan,"), ("vehicle.inertia", "not finite")),
+    "a date": (BODY.replace("30.0", "2001-01-01"), ("vehicle.mass", "not numeric")),
+    "a date that there is not": (BODY.replace("30.0", "2001-99-99"), ("is not TOML",)),
+    "a truth value": (BODY.replace("30.0", "true"), ("vehicle.mass = True", "not numeric")),
+    "a truth value among numbers": (BODY.replace("0.2,", "true,"), ("vehicle.inertia", "not numeric")),
+    "a text for a number": (BODY.replace("30.0", "'30.0'"), ("vehicle.mass = '30.0'", "not numeric")),
+    "a long text": (BODY.replace("30.0", "'" + "x" * 900_000 + "'"), ("vehicle.mass", "900,000 characters")),
+    "a long name": (BODY + "'" + "x" * 900_000 + "' = 1", ("900,000 characters",)),
+    "a text among 200,000 numbers": (
+        BODY + "[start]\nposition = ['" + "x" * 4000 + "', " + "1," * 200_000 + "]",
+        ("start.position", "not numeric"),
+    ),
+    "200,000 numbers": (BODY + "[start]\nposition = [" + "1," * 200_000 + "]", ("start.position", "(200000,)")),
+    "doubled keys": (BODY + "mass = 31.0\n", ("is not TOML", "line 5")),
+    "doubled tables": (BODY + BODY, ("is not TOML",)),
+    "codes for the terminal": (BODY + '"\\u001b]0;gone\\u0007\\n2 faults" = 1\n', (r"\x1b]0;gone\x07\n2 faults",)),
+    "a section that is a number": ("vehicle = 3\n", ("vehicle = 3", "is not a table")),
+    "a vehicle of another folder": ("[vehicle]\nname = '../../secret'\n", ("../../secret", "is not known")),
+    "members without end": (BODY + "[ensemble]\nmembers = 9000000000000000000\n", ("members", "2147483648")),
+    "a grid without end": (
+        BODY + "[ensemble.vary]\n'start.position' = {normal={std=1.0}}\n"
+        "[ensemble.sampling.grid]\n'start.position' = 1000000000\n",
+        ("more members than",),
+    ),
+    "a hypercube without end": (
+        BODY + "[ensemble]\nmembers = 2147483648\nsampling = {latin_hypercube = {group = 2147483648}}\n",
+        ("group", "1048576"),
+    ),
+    "a law of scipy's that is none": (
+        BODY + "[ensemble.vary]\n'vehicle.mass' = {scipy = {name = '__import__'}}\n",
+        ("__import__", "is no distribution"),
+    ),
+    "a law of the user's": (
+        BODY + "[ensemble.vary]\n'vehicle.mass' = {own = {law = 'eval'}}\n",
+        ("a file does not hold",),
+    ),
+    "a table that is a device": (TABLED.replace("table.csv", "/dev/zero"), ("is a device",)),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_scene_is_refused(name, tmp_path):
+    content, words = SCENES[name]
+    path = tmp_path / "scene.toml"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    refused(lw.Scene.load, path, words=words)
+    assert tree(tmp_path) == [str(path)]
+
+
+def test_a_scene_with_windows_lines_and_a_mark_before_it_is_read(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + BODY.replace("\n", "\r\n").encode())
+    assert lw.Scene.load(path).vehicle.mass == 30.0
+
+
+# Tables of members.
+WIDE = ",".join(f"column {i}" for i in range(16_000))
+BOXES = io.BytesIO()
+np.savez(BOXES, a=np.zeros(3))
+OBJECTS = io.BytesIO()
+np.save(OBJECTS, np.array([{}], dtype=object), allow_pickle=True)
+ZIPPED = io.BytesIO()
+with zipfile.ZipFile(ZIPPED, "w") as archive:
+    archive.writestr("../../escaped.csv", "vehicle.mass\n30\n")
+
+TABLES = {
+    "empty": (b"", ("is empty",)),
+    "comments alone": (b"# a\n" * 1000, ("is empty",)),
+    "16,000 unknown columns": ((WIDE + "\n" + "1," * 15_999 + "1\n").encode(), ("16,000 faults", "and 15,980 more")),
+    "16,000 columns of one name": (b"vehicle.mass," * 15_999 + b"vehicle.mass\n", ("names a column twice",)),
+    "numbers without names": (b"1,2\n3,4\n", ("numbers where the names should be",)),
+    "names without numbers": (b"vehicle.mass\n", ("no members",)),
+    "a line of two million characters": (b"a" * 2_000_000, ("line of more than 1.0 million",)),
+    "a name of 200,000 characters": (b"a" * 200_000 + b"\n1\n", ("field larger than field limit",)),
+    "a name of 100,000 commas": (b'"' + b"," * 100_000 + b'"\n1\n', ("does not name",)),
+    "an open quote": (b'"vehicle.mass\n' + b"1\n" * 200_000, ("field larger",)),
+    "a million lines that are wrong": (b"vehicle.mass\n" + b"x\n" * 500_000, ("9992 more such faults or more",)),
+    "lines of different length": (b"vehicle.mass,vehicle.buoyancy\n30\n", ("2 names and 1 cells",)),
+    "nan": (b"vehicle.mass\nnan\n", ("not finite", "line 2")),
+    "1e999": (b"vehicle.mass\n1e999\n", ("not finite", "line 2")),
+    "a date": (b"vehicle.mass\n2001-01-01\n", ("no number",)),
+    "a zero byte": (b"vehicle.mass\n3\x000\n", ("no number",)),
+    "UTF-16": ("vehicle.mass\n30\n".encode("utf-16"), ("UTF-8",)),
+    "invalid UTF-8": (b"vehicle.mass\n\xc3\x28\n", ("UTF-8",)),
+    "NumPy's array of objects": (OBJECTS.getvalue(), ("a file of NumPy",)),
+    "NumPy's archive": (BOXES.getvalue(), ("an archive",)),
+    "an archive that means another folder": (ZIPPED.getvalue(), ("an archive",)),
+    "a compressed file": (b"\x1f\x8b\x08\x00", ("an archive",)),
+    "codes for the terminal": (b"\x1b[2J\n1\n", (r"\x1b[2J",)),
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_table_is_refused(name, tmp_path):
+    content, words = TABLES[name]
+    (tmp_path / "table.csv").write_bytes(content)
+    (tmp_path / "scene.toml").write_text(TABLED)
+    before = tree(tmp_path)
+    refused(lw.Scene.load, tmp_path / "scene.toml", words=words)
+    assert tree(tmp_path) == before
+
+
+# Coefficients in YAML.
+GOOD = "mass: 30\ninertia: [1, 2, 2]\n"
+BOMB = "a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
+    f"{one}: &{one} [{', '.join(['*' + before] * 9)}]\n" for before, one in zip("abcdefgh", "bcdefghi", strict=True)
+)
+MERGES = "a: &a {x: 1}\n" + "".join(
+    f"{one}: &{one} {{<<: [{', '.join(['*' + before] * 9)}]}}\n"
+    for before, one in zip("abcdefgh", "bcdefghi", strict=True)
+)
+YAML = {
+    "octal": (GOOD.replace("30", "010"), ("line 1 = '010'", "octal", "write 10")),
+    "base 60": (GOOD.replace("30", "1:30"), ("line 1 = '1:30'", "base 60")),
+    "base 60 with a point": (GOOD.replace("30", "1:30.5"), ("base 60",)),
+    "octal in a list": (GOOD.replace("[1,", "[-010,"), ("line 2 = '-010'",)),
+    "doubled keys": (GOOD + "mass: 31\n", ("line 3 = 'mass'", "is there already, in line 1")),
+    "doubled keys within": ("hull:\n  mass: 1\n  mass: 2\n", ("line 3", "line 2")),
+    "a bomb of aliases": (BOMB, ("every alias", "at most 20,000")),
+    "a bomb of merges": (MERGES, ("every alias",)),
+    "a list that holds itself": ("a: &a [*a]\n", ("holds itself",)),
+    "lists in lists": (GOOD + "a: " + "[" * 10_000 + "]" * 10_000, ("nested too deep",)),
+    "maps in maps": (GOOD + "a: " + "{a: " * 10_000 + "}" * 10_000, ("nested too deep",)),
+    "code": ("mass: !!python/object/apply:os.system ['touch escaped']\n", ("is a type that is not read",)),
+    "a module": ("mass: !!python/name:os.system\n", ("is a type that is not read",)),
+    "bytes": ("mass: !!binary aGVsbG8=\n", ("is a type that is not read",)),
+    "a date": (GOOD.replace("30", "2001-01-01"), ("is a type that is not read",)),
+    "a date that there is not": (GOOD.replace("30", "2001-99-99"), ("is a type that is not read",)),
+    "a number that is none": ("mass: !!int ''\n", ("has a value that is none",)),
+    "5,000 digits": (GOOD.replace("30", "9" * 5000), ("has a value that is none",)),
+    "infinite": (GOOD.replace("30", ".inf"), ("mass = inf", "not finite")),
+    "yes": (GOOD.replace("30", "yes"), ("mass = True", "not numeric")),
+    "two documents": (GOOD + "---\n" + GOOD, ("another document",)),
+    "a key that is a list": ("[1, 2]: 3\n", ("is a key that is no text",)),
+    "a zero byte": (GOOD + "a: \0\n", ("not allowed",)),
+    "unknown keys": (GOOD + "".join(f"k{i}: 1\n" for i in range(2000)), ("2,000 faults", "and 1,980 more")),
+    "a long text": (GOOD + "a: '" + "x" * 200_000 + "'\n", ("131,072",)),
+    "a million dashes": (GOOD + "a:\n" + "- " * 60_000, ("YAML",)),
+}
+
+
+@pytest.mark.parametrize("name", YAML)
+def test_yaml_is_refused(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text, words = YAML[name]
+    refused(from_yaml, text, words=words)
+    assert tree(tmp_path) == []
+
+
+def test_yaml_that_two_versions_read_alike_is_read():
+    plain = from_yaml(GOOD + "buoyancy: 290.0\n")
+    other = from_yaml("mass: 3e1\ninertia: &j [1.0, 2, 2]\nbuoyancy: 2_90.0\nspare: {cog: [0, 0, 0]}\n")
+    assert plain == other
+    quoted = "mass: 30\ninertia: [1, 2, 2]\n'010': 3\n"
+    refused(from_yaml, quoted, words=("010 = 3", "unknown key"))
+
+
+# Files that are none. What opens them waits, or never ends.
+
+
+def doors(tmp_path):
+    """Every way to give the path of a file."""
+    (tmp_path / "scene.toml").write_text(TABLED)
+    return {
+        "scene": lw.Scene.load,
+        "table": lambda path: lw.Table(str(path)),
+        "YAML": from_yaml,
+        "SDF": from_sdf,
+    }
+
+
+def made(kind, tmp_path):
+    """The path of what is no file."""
+    path = tmp_path / "odd"
+    if kind == "folder":
+        path.mkdir()
+    elif kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "socket":
+        with socket.socket(socket.AF_UNIX) as server:
+            server.bind(os.path.relpath(path))
+    elif kind == "link to a device":
+        path.symlink_to("/dev/zero")
+    elif kind == "link to itself":
+        path.symlink_to(path)
+    elif kind == "huge":
+        with path.open("wb") as file:
+            file.truncate(20_000_000_000)
+    elif kind == "terminal":
+        return "/dev/tty"
+    elif kind == "device":
+        return "/dev/zero"
+    elif kind == "name with a zero byte":
+        return "odd\0name"
+    elif kind == "long name":
+        return "x" * 100_000
+    elif kind == "no name":
+        return ""
+    return path
+
+
+KINDS = {
+    "folder": "is a folder", "pipe": "is a named pipe", "socket": "is a socket", "device": "is a device",
+    "terminal": "is a device", "link to a device": "is a device", "link to itself": "symbolic links", "huge": "20,000.0 MB",
+    "name with a zero byte": "null", "long name": "File name too long", "no name": "No such file", "missing": "No such file",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("door", ["scene", "table", "YAML", "SDF"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_no_file_is_refused(kind, door, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    load, path = doors(tmp_path)[door], made(kind, tmp_path)
+    before = tree(tmp_path)
+    error = refused(load, path, words=(KINDS[kind],))
+    assert "give" in str(error) or "leave out" in str(error)
+    assert tree(tmp_path) == before
+
+
+def test_a_file_that_grows_while_it_is_read_ends(tmp_path, monkeypatch):
+    path = tmp_path / "scene.toml"
+    path.write_bytes(b"#" * 1000)
+    monkeypatch.setitem(reading.MOST_BYTES, "scene file", 500)
+    monkeypatch.setattr(reading, "_refuse", lambda found, kind: None)
+    refused(lw.Scene.load, path, words=("never ends",))
+
+
+# Arguments of the command: exit code 2 and a line.
+PAPER = str(ROOT / "examples" / "paper.toml")
+ARGUMENTS = [
+    (["run", PAPER, "--members", "nan"], "ensemble.members = nan"),
+    (["run", PAPER, "--members", "-1"], "ensemble.members = -1"),
+    (["run", PAPER, "--members", "1e300"], "ensemble.members"),
+    (["run", PAPER, "--members", "1e999"], "ensemble.members = inf"),
+    (["run", PAPER, "--members", ""], "ensemble.members = ''"),
+    (["run", PAPER, "--members", "2.5"], "ensemble.members"),
+    (["run", PAPER, "--members", "true"], "ensemble.members = True"),
+    (["run", PAPER, "--seed", "-1"], "ensemble.seed = -1"),
+    (["run", PAPER, "--seed", "99999999999999999999999999"], "ensemble.seed = 99999999999999999999999999: is beyond"),
+    (["run", PAPER, "--step", "nan"], "run.step = nan"),
+    (["run", PAPER, "--step", "-1"], "run.step = -1"),
+    (["run", PAPER, "--step", "0"], "run.step = 0"),
+    (["run", PAPER, "--step", ""], "run.step = ''"),
+    (["check", PAPER, "--step", "1e-300"], "step = 1e-300: needs"),
+    (["check", PAPER, "--duration", "1e300"], "save.every = 1.0: asks for more"),
+    (["run", PAPER, "--duration", "inf"], "run.duration = inf"),
+    (["run", PAPER, "--tolerance", "nan"], "run.tolerance = nan"),
+    (["run", PAPER, "--iterations", "1e9"], "run.iterations"),
+    (["run", PAPER, "--iterations", "-1"], "run.iterations = -1"),
+    (["run", PAPER, "--keep", "99999999999999999999"], "run.keep"),
+    (["run", PAPER, "--keep", "-1"], "run.keep"),
+    (["run", PAPER, "--threads", "-1", "--members", "8"], "threads = -1"),
+    (["run", PAPER, "--threads", "1000000000", "--members", "8"], "threads = 1000000000: is more than 100,000"),
+    (["predict", PAPER, "--threads", "0"], "threads = 0"),
+    (["run", PAPER, "--error", "nan", "--members", "8"], "error = nan"),
+    (["run", PAPER, "--error", "inf", "--members", "8"], "error = inf"),
+    (["run", PAPER, "--error", "-1", "--members", "8"], "error = -1"),
+    (["tradeoff", PAPER, "--seconds", "nan"], "seconds = nan"),
+    (["tradeoff", PAPER, "--seconds", "inf"], "seconds = inf"),
+    (["tradeoff", PAPER, "--seconds", "-1"], "seconds = -1"),
+    (["tradeoff", PAPER, "--seconds", "0"], "seconds = 0"),
+    (["stability", PAPER, "--points", "0"], "points = (0, 0)"),
+    (["stability", PAPER, "--points", "1000000"], "points = (1000000, 1000000): make"),
+    (["stability", PAPER, "--error", "nan"], "error = nan"),
+    (["sensitivity", PAPER, "--samples", "0"], "samples = 0"),
+    (["sensitivity", PAPER, "--samples", "-4"], "samples = -4"),
+    (["bench", "--members", "0"], "ensemble.members = 0"),
+    (["run", PAPER, "--set", "vehicle.mass=120\n[start]"], "vehicle.mass = '120\\n[start]': is not one value"),
+    (["run", PAPER, "--set", "vehicle.mass=120\nvehicle.buoyancy=3"], "is not one value"),
+    (["run", PAPER, "--set", "run.method=psi_s\npsi"], "is not one value"),
+    (["run", PAPER, "--set", "vehicle.mass=" + "9" * 5000], "vehicle.mass"),
+    (["run", PAPER, "--set", "vehicle.mass=" + "[" * 5000 + "]" * 5000], "nested"),
+    (["run", PAPER, "--set", "=3"], "is not a dotted key"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "words"), ARGUMENTS, ids=[" ".join(one)[-30:] for one, _ in ARGUMENTS])
+def test_an_argument_is_refused(arguments, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    begun = time.process_time()
+    assert main(arguments) == 2
+    assert time.process_time() - begun < 2.0 * MOST_SECONDS  # libraries are loaded
+    text = capsys.readouterr().err
+    assert words in text and "Traceback" not in text and len(text.splitlines()) <= 3
+
+
+def test_a_list_over_many_lines_is_one_value(tmp_path):
+    scene = lw.Scene.load(PAPER, {"start.position": "[1.0,\n 2.0,\n 3.0]\n", "vehicle.mass": "120 # kg"})
+    assert scene.start.position.tolist() == [1.0, 2.0, 3.0] and scene.vehicle.mass == 120
+
+
+def test_a_scene_whose_name_means_another_folder_writes_below_runs():
+    class Chosen:
+        out, scene = None, "...toml"
+
+    assert str(out_of(Chosen())) == "runs/scene" and str(out_of(Chosen(), "_x")) == "runs/scene_x"
+
+
+# The command as a process: exit code, a line, no traceback.
+PROCESSES = {
+    "device": (["run", "/dev/zero"], "is a device"),
+    "pipe": (["check", "pipe"], "is a named pipe"),
+    "deep": (["run", "deep.toml"], "nested"),
+    "seconds": (["tradeoff", PAPER, "--seconds", "nan"], "seconds = nan"),
+}
+
+
+@pytest.mark.parametrize("name", PROCESSES)
+def test_the_command_refuses_in_a_line(name, tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "deep.toml").write_text("a = " + "[" * 100_000)
+    arguments, words = PROCESSES[name]
+    command = [sys.executable, "-m", "lgvi_warp.cli", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=60)
+    assert done.returncode == 2 and words in done.stderr and done.stdout == ""
+    assert len(done.stderr.splitlines()) == 1 and "Traceback" not in done.stderr
+
+
+# Faults are counted.
+
+
+def test_so_many_faults_are_said_and_the_rest_is_counted():
+    faults = errors.Faults()
+    asked = []
+    for i in range(63):
+        faults.add(f"key{i}", i, "is odd", lambda i=i: asked.append(i) or "mend it")
+    error = refused(faults.raise_if_any)
+    lines = str(error).splitlines()
+    assert lines[0] == "63 faults:" and lines[1] == "  key0 = 0: is odd; mend it" and lines[-1] == "  and 43 more"
+    assert len(lines) == 22 and len(error.faults) == 20 and error.more == 43
+    assert asked == list(range(20))  # what is not said costs nothing
+
+
+def test_faults_within_faults_are_counted_once():
+    inner = lw.SceneError(f"fault {i}" for i in range(50))
+    assert (len(inner.faults), inner.more) == (20, 30)
+    outer = errors.Faults()
+    outer.add("first", 1, "is odd", "mend it")
+    for _ in range(2):
+        with outer.including():
+            raise inner.prefixed("here: ")
+    error = refused(outer.raise_if_any)
+    assert (len(error.faults), error.more) == (20, 81) and error.faults[1] == "here: fault 0"
+    again = error.__reduce__()
+    assert str(again[0](*again[1])) == str(error)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        ("x" * 10**6, "'" + "x" * 76 + "..."),
+        (list(range(10**6)), "[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21..."),
+        ({"b": 1, "a": (2.5, None)}, "{'b': 1, 'a': (2.5, None)}"),
+        (np.arange(6.0).reshape(2, 3), "[[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]"),
+        (np.float64(2.5), "2.5"),
+        (10**5000, "<a whole number of about 5000 digits>"),
+        (-(10**25), "-10000000000000000000000000"),
+    ],
+    ids=["text", "list", "table", "array", "number", "5,000 digits", "25 digits"],
+)
+def test_a_value_of_any_size_is_shown_on_a_line(value, text):
+    assert errors.shown(value) == text
+
+
+def test_lists_without_end_are_not_numeric():
+    deep = []
+    for _ in range(100_000):
+        deep = [deep]
+    for value in (deep, [10**400, 1.0], ["1", 2.0, 3.0], [1 + 2j], [None]):
+        refused(from_dict, {"vehicle": {"mass": 1.0, "inertia": [1, 1, 1]}, "start": {"position": value}},
+                words=("start.position", "not numeric"))  # fmt: skip

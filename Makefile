@@ -31,13 +31,13 @@ lint: $(VENV)/.dev
 	$(BIN)/lint-imports
 
 bench: $(VENV)/.dev
-	$(BIN)/python benchmarks/run.py
+	$(BIN)/python -m benchmarks run
 
 # Other systems on the same problem; their packages go into an environment of their own.
 bench-peers: .venv-peers/.done
-	.venv-peers/bin/python benchmarks/peers/run.py --out runs/peers_1
-	.venv-peers/bin/python benchmarks/peers/run.py --threads $$(nproc) --out runs/peers_all
-	.venv-peers/bin/python benchmarks/peers/page.py runs/peers_1/peers.jsonl runs/peers_all/peers.jsonl --write
+	.venv-peers/bin/python -m benchmarks peers --out runs/peers_1
+	.venv-peers/bin/python -m benchmarks peers --threads $$(nproc) --out runs/peers_all
+	.venv-peers/bin/python -m benchmarks table peers runs/peers_1/peers.jsonl runs/peers_all/peers.jsonl --write
 
 .venv-peers/.done: benchmarks/peers/requirements.txt pyproject.toml
 	$(PYTHON) -m venv .venv-peers

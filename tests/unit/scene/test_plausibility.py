@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from benchmarks import scenes as benchmarks
+from benchmarks import problems
 from lgvi_warp.cli import main
 from lgvi_warp.scene import ensemble as ensembles
 from lgvi_warp.scene import plausibility
@@ -268,7 +268,7 @@ def test_no_example_is_odd(path):
 
 
 def test_no_scene_of_the_benchmarks_is_odd():
-    for name, one in {**benchmarks.each_term(), **benchmarks.coupled(), "all": benchmarks.all_terms()}.items():
+    for name, one in {**problems.each_term(), **problems.coupled(), "all": problems.all_terms()}.items():
         assert said(one) == (), name
 
 

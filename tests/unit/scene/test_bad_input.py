@@ -480,7 +480,7 @@ def test_packed_that_returns_something_else(given):
 @pytest.mark.kernel
 def test_packed_left_out():
     report = lw.check_law(Pull(k=1.0))
-    assert not report.ok and "NotImplementedError" in str(report) and "write packed(self, own, setting)" in str(report)
+    assert not report.ok and "NotImplementedError" in str(report) and "write packed(self, numbers, context)" in str(report)
 
 
 @pytest.mark.kernel

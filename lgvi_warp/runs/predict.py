@@ -29,13 +29,13 @@ from lgvi_warp.engine.work import Work
 from lgvi_warp.methods.saveat import SaveAt, TimeGrid
 from lgvi_warp.runs import member_fields
 from lgvi_warp.runs.sizes import Sizes, sizes
+from lgvi_warp.runs.store.block_files import BlockFiles, marker
 from lgvi_warp.runs.store.create import create
 from lgvi_warp.runs.store.folder import Folder
 from lgvi_warp.runs.store.kept import group_of
 from lgvi_warp.runs.store.layout import columns, size
 from lgvi_warp.runs.store.recipe import of_store
 from lgvi_warp.runs.store.settings import Store
-from lgvi_warp.runs.store.sink import Sink, marker
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 
@@ -261,7 +261,7 @@ class Sized:
         assert self.store is not None
         block, k = blocks(self.plan.ensemble.members)[0], len(self.plan.grid.times)
         keys = {key: column.bytes for column in columns(self.plan, self.store) for key in column.keys(block, k)}
-        keys |= {Sink.parts_key(block): self.statistics.file} if self.statistics.file else {}
+        keys |= {BlockFiles.parts_key(block): self.statistics.file} if self.statistics.file else {}
         return {key: [count, 2**32 - 1] for key, count in keys.items()}
 
     @property

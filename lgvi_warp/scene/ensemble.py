@@ -197,12 +197,15 @@ class Ensemble:
         columns = self.sampling.own_values()
         self._turn_by_matrix(faults, columns)
         known = {**self._base, **({} if self._explicit else self._start)}
-        laws = {**self.sampling.laws(), **self.vary}
-        for key in self.sampling.laws().keys() & self.vary.keys():
+        distributions = {**self.sampling.distributions(), **self.vary}
+        for key in self.sampling.distributions().keys() & self.vary.keys():
             faults.add(
                 f'"{key}"', self.vary[key], f"varies what the {self.sampling.kind} gives values", "drop one of them"
             )
-        described = [variations.variation(faults, key, law, known) for key, law in sorted(laws.items())]
+        described = [
+            variations.variation(faults, key, distribution, known)
+            for key, distribution in sorted(distributions.items())
+        ]
         named = [(variation.key, variation.targets) for variation in described if variation]
         self._columns: list[tuple[Target, np.ndarray]] = []
         tables = Faults("ensemble.sampling.table.")
@@ -233,7 +236,7 @@ class Ensemble:
 
     def _turn_by_matrix(self, faults: Faults, columns: Mapping[str, Any]) -> None:
         """Write the scene's attitude as a matrix, whatever form it has, if the attitude itself varies."""
-        keys = [*self.vary, *self.sampling.laws(), *columns]
+        keys = [*self.vary, *self.sampling.distributions(), *columns]
         names = {target.name for key in keys for target in variations.targets(key)}
         if variations.ATTITUDE not in names or self._explicit:
             return
@@ -608,11 +611,11 @@ def check_names(vary: Mapping[str, Any], parameters: Sequence[str]) -> None:
     """
     faults = Faults("ensemble.vary.")
     known = [*parameters, *(f"start.{name}" for name in SHAPES)]
-    for key, law in vary.items():
+    for key, distribution in vary.items():
         for target in variations.targets(key):
             if target.name not in known:
                 remedy = functools.partial(closest, target.name, known)
-                faults.add(f'"{key}"', law, "does not name what a scene has", remedy)
+                faults.add(f'"{key}"', distribution, "does not name what a scene has", remedy)
     faults.raise_if_any()
 
 

@@ -14,8 +14,8 @@ from lgvi_warp.runs import member_fields
 from lgvi_warp.runs import predict as prediction
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.runs.sizes import sizes
+from lgvi_warp.runs.store.block_files import BlockFiles
 from lgvi_warp.runs.store.folder import Folder
-from lgvi_warp.runs.store.sink import Sink
 from tests.conftest import ROOT
 from tests.stores import SETTINGS, STATISTICS, fleet, tree
 
@@ -124,7 +124,7 @@ def gathered_of(folder, statistics):
     """Bytes of the parts that a run has joined at its end."""
     keeper = Gathered(folder.group()["time"][:], folder.members, statistics)
     for block in folder.runs:
-        keeper.merge(block, *Sink(folder.path, ()).parts(block, [keeper]))
+        keeper.merge(block, *BlockFiles(folder.path, ()).parts(block, [keeper]))
     return sum(array.nbytes for tree in keeper._trees for part in tree.parts() for array in part.values())
 
 

@@ -202,7 +202,7 @@ class Bank(Packets):
     def __init__(self, bench: Bench, context: PackingContext, views: Views):
         # What Packets asks of a Plan and of Members to pack laws.
         plan: Any = SimpleNamespace(
-            model=SimpleNamespace(laws=((bench.term, bench.module),)),
+            kernel_choice=SimpleNamespace(laws=((bench.term, bench.module),)),
             spec=SimpleNamespace(width=bench.width, drag=(), gauss=()),
             dtypes=(None, bench.Params, None),
             dtype="float64",

@@ -127,11 +127,11 @@ def ordered(low: np.ndarray, high: np.ndarray) -> bool:
         return False
 
 
-def varies_nothing(law: Distribution, bases: Sequence[np.ndarray]) -> str | None:
+def varies_nothing(distribution: Distribution, bases: Sequence[np.ndarray]) -> str | None:
     """Find a distribution that is relative to the scene's value where that is 0, so that nothing would vary.
 
     Args:
-        law: The distribution.
+        distribution: The distribution.
         bases: The scene's value of each quantity that it draws.
 
     Returns:
@@ -139,10 +139,11 @@ def varies_nothing(law: Distribution, bases: Sequence[np.ndarray]) -> str | None
     """
     if any(np.any(base) for base in bases):
         return None
-    relative = getattr(law, "relative", None)
+    relative = getattr(distribution, "relative", None)
     if relative is not None and np.any(relative):
         return "relative"
-    return "sigma" if isinstance(law, LogNormal) and law.median is None and np.any(law.sigma) else None
+    has_sigma = isinstance(distribution, LogNormal) and distribution.median is None and np.any(distribution.sigma)
+    return "sigma" if has_sigma else None
 
 
 def _width(std: Spread | None, relative: Spread | None, base: np.ndarray) -> np.ndarray:

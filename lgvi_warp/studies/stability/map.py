@@ -23,7 +23,7 @@ from lgvi_warp.runs.provenance import provenance
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.compared import QUANTITIES, compared_in
 from lgvi_warp.studies.speed import void
-from lgvi_warp.studies.stability.grid import Grid, Line
+from lgvi_warp.studies.stability.grid import Line, StabilityGrid
 from lgvi_warp.studies.stability.limits import LIMITS
 from lgvi_warp.studies.stability.runs import (
     LEAST_DRIVEN,
@@ -384,7 +384,7 @@ def stability_map(
     grid = None
     with faults.including():
         both = (points, points) if isinstance(points, int) else tuple(points)
-        grid = Grid(scene, x, y, both, directions, seed, h)
+        grid = StabilityGrid(scene, x, y, both, directions, seed, h)
     faults.raise_if_any()
     assert grid is not None and compared is not None
     refused = refusals(grid, names, dtype)
@@ -439,12 +439,12 @@ def stability_map(
     return result
 
 
-def _worst(grid: Grid, values: np.ndarray) -> np.ndarray:
+def _worst(grid: StabilityGrid, values: np.ndarray) -> np.ndarray:
     """Take the largest value over the starts of each cell (ny, nx)."""
     return np.max(values.reshape(grid.shape), axis=2)
 
 
-def _worst_status(grid: Grid, status: np.ndarray) -> np.ndarray:
+def _worst_status(grid: StabilityGrid, status: np.ndarray) -> np.ndarray:
     """Take the worst status over the starts of each cell (ny, nx).
 
     Refusals by the program come first, then failures, events and OK.
@@ -473,7 +473,7 @@ def cells_of(one: Found, verified: np.ndarray, error: float, energy_bound: float
     return np.where(unbounded, np.where(flagged, Cell.FAILED, Cell.SILENT), np.where(flagged, Cell.FLAGGED, quiet))
 
 
-def _ratios(grid: Grid, methods: Sequence[str]) -> dict[str, dict[str, np.ndarray]]:
+def _ratios(grid: StabilityGrid, methods: Sequence[str]) -> dict[str, dict[str, np.ndarray]]:
     """Compute the step over each analytic limit, of the fastest start of each cell.
 
     Returns method -> limit -> (ny, nx) [1]. Limits that a method does not have, or whose motion is absent, are left out.
@@ -487,7 +487,9 @@ def _ratios(grid: Grid, methods: Sequence[str]) -> dict[str, dict[str, np.ndarra
     return ratios
 
 
-def _provenance(grid: Grid, methods: Sequence[str], dtype: str, seed: int, energy_bound: float) -> dict[str, Any]:
+def _provenance(
+    grid: StabilityGrid, methods: Sequence[str], dtype: str, seed: int, energy_bound: float
+) -> dict[str, Any]:
     """Describe the scene, the settings, the versions and the machine of a map."""
     content = provenance(plan_of(grid, np.arange(1), methods[0], SHORTEST, "float64"))
     content = {name: content[name] for name in ("scene", "versions", "machine", "checks")}

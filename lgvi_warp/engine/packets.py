@@ -82,7 +82,7 @@ class Packets:
         context = PackingContext(
             members.parameters, self.frame, members.indices, members.seed, plan.grid.h, plan.kernel_choice.aligned
         )
-        params, table, memory = self._laws(context)
+        params, table, memory = self.packed_laws(context)
         self.inertia = _structs(self._inertia(), Inertia)
         self.params = _structs(params, Params)
         self.events = _structs(self._events(context), Events)
@@ -207,8 +207,15 @@ class Packets:
         else:
             target[...] = self._lanes(value[:, None])[:, 0]
 
-    def _laws(self, context: PackingContext) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Params, table and memory of the laws: each term's numbers, one after the other."""
+    def packed_laws(self, context: PackingContext) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Pack each term's numbers, one after the other.
+
+        Args:
+            context: What the terms may look at.
+
+        Returns:
+            (params, table, memory) of the laws, as the kernel takes them.
+        """
         packed: list[Packed] = []
         for i, (term, module) in enumerate(self.plan.kernel_choice.laws):
             parameters = Ensemble.own(term, context.parameters)

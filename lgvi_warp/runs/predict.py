@@ -217,8 +217,16 @@ def _seconds(plan: Plan, steps: int, chosen: list[Block], threads: int, observed
     return time.perf_counter() - start
 
 
-def _result_bytes(plan: Plan, fields: Sequence[str] | None = None) -> int:
-    """Size of a result in memory, and about that of its file [bytes]; fields: of its samples, by default all of the plan."""
+def result_bytes(plan: Plan, fields: Sequence[str] | None = None) -> int:
+    """Size of a result in memory, and about that of its file.
+
+    Args:
+        plan: The run.
+        fields: Fields of the samples that the result holds; default None, all of the plan.
+
+    Returns:
+        The size [bytes].
+    """
     k, n = len(plan.grid.times), plan.ensemble.members
     real = np.dtype(machine.DTYPES[plan.dtype]).itemsize
     rows = {name: int(np.prod(SHAPES[name])) * real for name in (plan.fields if fields is None else fields)}
@@ -252,7 +260,7 @@ class Sized:
     def disk(self) -> int:
         """Size of the files without a store's metadata [bytes]; for a run in memory about that of its result's file."""
         if self.store is None:
-            return _result_bytes(self.plan, self.fields) + self.statistics.estimates
+            return result_bytes(self.plan, self.fields) + self.statistics.estimates
         each = self.statistics.file + len(marker(self._sums()))
         return size(self.plan, self.store) + each * len(blocks(self.plan.ensemble.members))
 
@@ -269,7 +277,7 @@ class Sized:
         """Memory held at the end of the run [bytes]: its result, or what stays in memory beside a store."""
         held = self.statistics.joined + self.statistics.estimates
         if self.store is None:
-            return held + _result_bytes(self.plan, self.fields)
+            return held + result_bytes(self.plan, self.fields)
         each = sum(np.dtype(member_field.dtype).itemsize for member_field in member_fields.present(self.plan))
         return held + each * self.plan.ensemble.members
 

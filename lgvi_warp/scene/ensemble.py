@@ -90,9 +90,10 @@ class Ensemble:
         """
         ensemble = cls.__new__(cls)
         # The ensemble of a scene file was checked when the file was read.
-        ensemble._setup(scene, settings, {}, checked=vars(scene).get("_checked") is settings)
-        if scene.ensemble_settings is settings:
-            object.__setattr__(scene, "_checked", settings)
+        from_file = scene.ensemble_settings is settings
+        ensemble._setup(scene, settings, {}, checked=from_file and scene.ensemble_is_checked)
+        if from_file:
+            scene.note_checked_ensemble()
         if settings.indices is None:
             return ensemble
         most = int(np.max(settings.indices))
@@ -184,8 +185,8 @@ class Ensemble:
         # Positions of these members in the whole ensemble, and the indices that key their noise; None: all, in order.
         self._places: np.ndarray | None = None
         self._indices: np.ndarray | None = None
-        self._variations = self._described()
-        self.space: Space = variations.space(self.seed, self._variations)
+        self.variations = self._described()
+        self.space: Space = variations.space(self.seed, self.variations)
         self._whole = self._counted(settings)
         self.members = self._whole
         if not checked:
@@ -286,7 +287,7 @@ class Ensemble:
 
     def _check_physical(self) -> None:
         """Refuse unphysical members: all are checked, so few at a time that memory stays small."""
-        targets = [target for v in self._variations for target in v.targets] + [target for target, _ in self._columns]
+        targets = [target for v in self.variations for target in v.targets] + [target for target, _ in self._columns]
         varied = {name for name in (*(target.name for target in targets), *self._explicit) if name in self._base}
         findings: dict[str, _Unphysical] = {}
         for block_findings in over_members(functools.partial(self._look_at, varied), self.members if varied else 0):
@@ -297,7 +298,7 @@ class Ensemble:
                     findings[key].count += finding.count
         faults = Faults()
         for key, finding in findings.items():
-            drawn = any(name in {t.name for v in self._variations for t in v.targets} for name in key.split(" + "))
+            drawn = any(name in {t.name for v in self.variations for t in v.targets} for name in key.split(" + "))
             remedy = "use a smaller spread, TruncatedNormal or LogNormal" if drawn else "give finite, physical values"
             problem = f"is unphysical ({finding.count} of {finding.of if finding.shared else self.members} members)"
             faults.add(f"{key} of member {finding.first}", finding.value, problem, remedy)
@@ -347,7 +348,7 @@ class Ensemble:
             values |= {name: column[rows] for name, column in self._explicit.items() if start or name in self._base}
         wanted = [
             variation
-            for variation in self._variations
+            for variation in self.variations
             if start or any(target.name in self._base for target in variation.targets)
         ]
         if not (wanted or self._columns):
@@ -410,14 +411,14 @@ class Ensemble:
         Returns:
             Names in the order of `scene.parameters()`; those of the start are not among them.
         """
-        drawn = {target.name for variation in self._variations for target in variation.targets}
+        drawn = {target.name for variation in self.variations for target in variation.targets}
         varied = drawn | {target.name for target, _ in self._columns} | self._explicit.keys()
         return [name for name in self._base if name in varied]
 
     @property
     def starts_vary(self) -> bool:
         """Whether the initial state differs from member to member."""
-        names = {target.name for variation in self._variations for target in variation.targets}
+        names = {target.name for variation in self.variations for target in variation.targets}
         return not {*names, *(target.name for target, _ in self._columns), *self._explicit} <= self._base.keys()
 
     def subset(self, indices: Sequence[int] | np.ndarray) -> Ensemble:

@@ -51,6 +51,7 @@ class Scene:
     run: RunSettings = field(default_factory=RunSettings)
     ensemble_settings: EnsembleSettings | None = None
     events: Sequence[Any] = ()
+    ensemble_is_checked: bool = field(default=False, init=False, repr=False)
 
     def __post_init__(self) -> None:
         faults = Faults()
@@ -81,6 +82,10 @@ class Scene:
         for first, second in alike(keys):
             problem = f"is the same folder as {first!r} on file systems that do not tell capitals apart"
             faults.add("terms and events", second, problem, f'give each a name of its own: name = "{second}_2"')
+
+    def note_checked_ensemble(self) -> None:
+        """Remember that the ensemble of `ensemble_settings` is sound: it need not be checked again."""
+        object.__setattr__(self, "ensemble_is_checked", True)
 
     def parameters(self) -> dict[str, np.ndarray]:
         """Return every number that may vary from member to member, with the value that this scene has.

@@ -127,10 +127,10 @@ class Sample:
         self.whole, self.t1, self.samples = ensemble, float(t1), samples
         self.ensemble = ensemble if ensemble.members <= members else ensemble.subset(range(members))
         self.members = self.ensemble.members
-        end = saveat._exact(self.t1)
+        end = saveat.exact(self.t1)
         every = settings.save_every
-        divides = every is not None and every <= self.t1 and (end / saveat._exact(every)).denominator == 1
-        self.spacing = saveat._exact(every) if divides and every is not None else end / samples
+        divides = every is not None and every <= self.t1 and (end / saveat.exact(every)).denominator == 1
+        self.spacing = saveat.exact(every) if divides and every is not None else end / samples
         count = int(end / self.spacing)
         self.index = np.unique(np.linspace(0, count, min(count, samples) + 1).round().astype(np.int64))
         self.times = np.array([float(int(i) * self.spacing) for i in self.index])

@@ -40,9 +40,9 @@ def test_the_memory_of_a_result_is_counted():
     result = lw.solve(fleet(), **SETTINGS)
     arrays = [*result.samples.values(), result.parameters["vehicle.mass"]]
     arrays += [getattr(result, one.name) for one in member_fields.present(plan)]
-    assert prediction._result_bytes(plan) == sum(x.nbytes for x in arrays)
+    assert prediction.result_bytes(plan) == sum(x.nbytes for x in arrays)
     small, large = (prediction.memory([prediction.Sized(make_plan(fleet(n), **SETTINGS))], 1) for n in (1000, 5000))
-    assert large - small == 4 * prediction._result_bytes(make_plan(fleet(1000), **SETTINGS))
+    assert large - small == 4 * prediction.result_bytes(make_plan(fleet(1000), **SETTINGS))
 
 
 def test_a_store_needs_no_memory_for_samples():
@@ -125,7 +125,7 @@ def gathered_of(folder, statistics):
     keeper = Gathered(folder.group()["time"][:], folder.members, statistics)
     for block in folder.runs:
         keeper.merge(block, *BlockFiles(folder.path, ()).parts(block, [keeper]))
-    return sum(array.nbytes for tree in keeper._trees for part in tree.parts() for array in part.values())
+    return sum(array.nbytes for tree in keeper.trees for part in tree.parts() for array in part.values())
 
 
 def test_members_that_are_kept_take_their_share_of_the_time(monkeypatch):

@@ -142,7 +142,7 @@ def test_growth_of_energy_is_over_what_the_start_can_hold(scene):
 def test_the_worst_status_is_of_a_failure_before_an_event(scene):
     grid = StabilityGrid(scene, "h", "angular_velocity", (2, 2), 3, 0, None)
     status = np.array([0, 16, 3, 0, 0, 16, 255, 16, 1, 0, 0, 0])
-    assert stability._worst_status(grid, status).tolist() == [[3, 16], [255, 0]]
+    assert stability.worst_status(grid, status).tolist() == [[3, 16], [255, 0]]
 
 
 def test_the_same_for_any_number_of_threads(scene):

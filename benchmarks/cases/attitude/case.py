@@ -7,7 +7,7 @@ import numpy as np
 import warp as wp
 
 from lgvi_kernels.flags import CPU_FLAGS
-from lgvi_kernels.lanes import _native, add, cross, div, dot, lane, lane3, mul, neg, ones, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes import add, cross, div, dot, lane, lane3, mul, native_code, neg, ones, sub, vec3  # noqa: F401
 from lgvi_kernels.rotation import quartic_rotation, quartic_series, rotation_struct, transpose_apply
 from lgvi_warp.physics import notation
 from lgvi_warp.studies import speed
@@ -16,7 +16,7 @@ WIDTH, REAL = 8, wp.float64
 Lane, Lane3, Rotation = lane(WIDTH, REAL), lane3(WIDTH, REAL), rotation_struct(WIDTH, REAL)
 
 
-@wp.func_native(_native(WIDTH, REAL, "A", "__builtin_elementwise_sqrt(A)"))
+@wp.func_native(native_code(WIDTH, REAL, "A", "__builtin_elementwise_sqrt(A)"))
 def root(a: Lane) -> Lane: ...
 
 

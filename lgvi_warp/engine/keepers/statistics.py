@@ -38,7 +38,7 @@ class Gathered:
     def __init__(self, time: np.ndarray, members: int, statistics: Sequence[Statistic], replicates: int = 1):
         self._statistics, self.time, self._replicates = tuple(statistics), time, replicates
         self._size = blocks(members)[0].count
-        self._trees = [Tree(statistic.join) for statistic in self._statistics]
+        self.trees = [Tree(statistic.join) for statistic in self._statistics]
 
     def open(self, plan: Plan, block: Block, members: Members) -> _BlockStatistics:
         """The keeper of a block's statistics.
@@ -63,7 +63,7 @@ class Gathered:
         """
         # Squares of a failing member may overflow: the statistic reports it, so no warning from NumPy.
         with np.errstate(invalid="ignore", over="ignore"):
-            for tree, statistic_part in zip(self._trees, part, strict=True):
+            for tree, statistic_part in zip(self.trees, part, strict=True):
                 tree.add(block.first // self._size, statistic_part)
 
     def estimates(self, chosen: Statistic | None = None) -> list[Estimate]:
@@ -76,7 +76,7 @@ class Gathered:
             The estimates, in the order of the statistics.
         """
         estimates: list[Estimate] = []
-        for statistic, tree in zip(self._statistics, self._trees, strict=True):
+        for statistic, tree in zip(self._statistics, self.trees, strict=True):
             if chosen is None or statistic is chosen:
                 with np.errstate(invalid="ignore", over="ignore"):
                     estimates += self.said(statistic, tree.parts())

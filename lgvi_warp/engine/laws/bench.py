@@ -210,7 +210,7 @@ class Bank(Packets):
         members: Any = SimpleNamespace(count=bench.count, parameters=context.parameters, indices=context.members)
         self.plan, self.members, self.frame, self.bench = plan, members, context.frame, bench
         self.count = bench.count // bench.width
-        params, table, memory = self._laws(context)
+        params, table, memory = self.packed_laws(context)
         Lane = bench.examine.Lane
         self.params = wp.array(params, dtype=bench.examine.Params, device="cpu")
         self.table, self.memory = (wp.array(x, dtype=Lane, shape=x.shape[:2], device="cpu") for x in (table, memory))

@@ -56,7 +56,7 @@ class ScipyDistribution(Distribution):
         elif not is_frozen(self.distribution):
             faults.add("distribution", self.distribution, "is no frozen distribution of scipy.stats",
                        "give one with its numbers, such as scipy.stats.gamma(2.0, scale=3.0)")  # fmt: skip
-        elif not all([faults.finite(name, value) is not None for name, value in self._given_numbers().items()]):
+        elif not all([faults.finite(name, value) is not None for name, value in self.numbers_by_name().items()]):
             pass
         elif not np.all(np.isfinite(self.distribution.ppf(0.5))):
             faults.add(
@@ -75,14 +75,14 @@ class ScipyDistribution(Distribution):
         """The distribution's name in scipy.stats."""
         return str(getattr(self.distribution.dist, "name", None) or type(self.distribution.dist).__name__)
 
-    def _given_numbers(self) -> dict[str, Any]:
+    def numbers_by_name(self) -> dict[str, Any]:
         """The parameters by their names in scipy.stats, as they were given."""
         known = [*_shapes(self.distribution.dist), "loc", "scale"]
         return dict(zip(known, self.distribution.args, strict=False)) | dict(self.distribution.kwds)
 
     def _numbers(self) -> dict[str, Any]:
         """The parameters as lists; loc = 0 for a distribution that was frozen with none, so that a file holds a number."""
-        parameters = self._given_numbers() or {"loc": 0.0}
+        parameters = self.numbers_by_name() or {"loc": 0.0}
         return {name: np.asarray(value).tolist() for name, value in parameters.items()}
 
     def numbers(self) -> list[Any]:

@@ -115,9 +115,11 @@ class ScalarModel:
     def _single_distributions(one: Any) -> list[tuple[Any, np.ndarray, dict[str, np.ndarray]]]:
         """List (distribution, the scene's value, the distribution's numbers) of each entry of a variation."""
         (base,) = one.bases
-        numbers = {name: np.broadcast_to(value, base.shape).reshape(-1) for name, value in one.distribution._given().items()
-                   if np.ndim(value) <= base.ndim and one.distribution.kind != "choice"}  # fmt: skip
-        return [(one.distribution, value, {name: column[i] for name, column in numbers.items()})
+        distribution = one.distribution
+        numbers = {name: np.broadcast_to(value, base.shape).reshape(-1)
+                   for name, value in distribution.numbers_by_name().items()
+                   if np.ndim(value) <= base.ndim and distribution.kind != "choice"}  # fmt: skip
+        return [(distribution, value, {name: column[i] for name, column in numbers.items()})
                 for i, value in enumerate(np.reshape(base, -1))]  # fmt: skip
 
     @property
@@ -231,7 +233,7 @@ class _Column:
         label = self.fleet.space.factors[self.column][0]
         (wanted,) = variations.targets(label)
         split = self.fleet.space.split(cube)
-        for variation in self.fleet._variations:
+        for variation in self.fleet.variations:
             for target, values in variation.values(split[variation.key]):
                 if target == wanted:
                     return values.reshape(np.shape(u))

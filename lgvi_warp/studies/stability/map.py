@@ -419,7 +419,7 @@ def stability_map(
         classes=classes,
         errors={name: _worst(grid, outcome.error) for name, outcome in outcomes.items()},
         energies={name: _worst(grid, outcome.growth / energy_bound) for name, outcome in outcomes.items()},
-        statuses={name: _worst_status(grid, outcome.status) for name, outcome in outcomes.items()},
+        statuses={name: worst_status(grid, outcome.status) for name, outcome in outcomes.items()},
         ratios=_ratios(grid, list(outcomes)),
         of=compared.name,
         unit=compared.unit,
@@ -444,10 +444,17 @@ def _worst(grid: StabilityGrid, values: np.ndarray) -> np.ndarray:
     return np.max(values.reshape(grid.shape), axis=2)
 
 
-def _worst_status(grid: StabilityGrid, status: np.ndarray) -> np.ndarray:
+def worst_status(grid: StabilityGrid, status: np.ndarray) -> np.ndarray:
     """Take the worst status over the starts of each cell (ny, nx).
 
     Refusals by the program come first, then failures, events and OK.
+
+    Args:
+        grid: The map's grid.
+        status: Status of each start (members,).
+
+    Returns:
+        Status of each cell (ny, nx).
     """
     rank = np.where(stopped(status), status - 500, np.where(status == Status.OK, -1000, status)).reshape(grid.shape)
     chosen = np.argmax(rank, axis=2)[:, :, None]

@@ -122,7 +122,6 @@ class PathMaximum(OfPath):
     of_samples: ClassVar[bool] = True
 
     def step(self, state: np.ndarray, before: np.ndarray, x: np.ndarray, dt: float, share: float) -> np.ndarray:
-        """Keep the larger of state and sample."""
         return np.maximum(state, x)
 
 
@@ -139,7 +138,6 @@ class PathMinimum(OfPath):
     of_samples: ClassVar[bool] = True
 
     def step(self, state: np.ndarray, before: np.ndarray, x: np.ndarray, dt: float, share: float) -> np.ndarray:
-        """Keep the smaller of state and sample."""
         return np.minimum(state, x)
 
 
@@ -159,7 +157,6 @@ class PathRange(OfPath):
         return np.stack([x, x])
 
     def step(self, state: np.ndarray, before: np.ndarray, x: np.ndarray, dt: float, share: float) -> np.ndarray:
-        """Keep the smaller and the larger value."""
         return np.stack([np.minimum(state[0], x), np.maximum(state[1], x)])
 
     def finish(self, state: np.ndarray) -> np.ndarray:
@@ -182,7 +179,7 @@ class PathMean(OfPath):
     type: ClassVar[str] = "path_mean"
 
     def step(self, state: np.ndarray, before: np.ndarray, x: np.ndarray, dt: float, share: float) -> np.ndarray:
-        """Move the average so far towards the average since the sample before."""
+        # Move the average so far towards the average since the sample before.
         return np.asarray(state + share * (0.5 * (before + x) - state))
 
 
@@ -204,7 +201,7 @@ class PathRms(PathMean):
         return np.asarray(x * x)
 
     def step(self, state: np.ndarray, before: np.ndarray, x: np.ndarray, dt: float, share: float) -> np.ndarray:
-        """Average the squares over time as `PathMean` does."""
+        # Average the squares over time as `PathMean` does.
         return super().step(state, before * before, x * x, dt, share)
 
     def finish(self, state: np.ndarray) -> np.ndarray:
@@ -248,7 +245,7 @@ class PathTime(OfPath, Condition):
         return np.zeros(x.shape)
 
     def step(self, state: np.ndarray, before: np.ndarray, x: np.ndarray, dt: float, share: float) -> np.ndarray:
-        """Add the part of dt for which the condition holds."""
+        # Add the part of dt for which the condition holds.
         above, below = self.limits(x.shape[-2])
         if above is None and below is None:
             fraction = 0.5 * ((before != 0.0) + 1.0 * (x != 0.0))

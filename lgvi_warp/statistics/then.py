@@ -98,7 +98,6 @@ class Then(Statistic):
         return part
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """Join the parts of each statistic."""
         both: Part = {}
         for i, statistic in enumerate(self.then):
             both |= {f"{i}/{key}": a for key, a in statistic.join(own(left, i), own(right, i), place).items()}
@@ -112,7 +111,6 @@ class Then(Statistic):
         return estimates
 
     def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
-        """Return the part of one replicate, for each statistic."""
         replicate_part: Part = {}
         for i, statistic in enumerate(self.then):
             replicate_part |= {
@@ -121,7 +119,7 @@ class Then(Statistic):
         return replicate_part
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
-        """Return the estimates of each statistic from its replicates, at the end."""
+        # The estimates of each statistic from its replicates, at the end.
         estimates: list[Estimate] = []
         for i, statistic in enumerate(self.then_of(time)):
             estimates += statistic.estimates_of_replicates([own(part, i) for part in parts], time[-1:], replicates)

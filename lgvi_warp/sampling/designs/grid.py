@@ -66,7 +66,7 @@ class Grid(Sampling):
         return math.prod(self._radices(space)[1])
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
-        """In addition, adds a fault for a number of levels without a distribution in `vary`."""
+        # Also a fault for a number of levels without a distribution in `vary`.
         for name in self.axes:
             if name not in space.keys:
                 fault = "is a number of levels of what has no distribution"

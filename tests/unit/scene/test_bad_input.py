@@ -1,0 +1,554 @@
+"""What a newcomer may get wrong: every message names the key, the value and the remedy, and all faults come at once."""
+
+import functools
+import importlib.util
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+import warp as wp
+
+import lgvi_warp as lw
+from lgvi_kernels.lanes.arithmetic import add, lane, mul  # noqa: F401
+from lgvi_kernels.lanes.state import struct
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.scene import scene as scenes
+from lgvi_warp.scene.scene import from_dict
+
+NAN = float("nan")
+BODY = {"mass": 10.0, "inertia": [1.0, 2.0, 2.5]}
+CREATES = np.diag([1.0, -1.0, 1.0, 1.0, 1.0, 1.0]).tolist()
+LOPSIDED = (np.eye(6) + 3.0 * np.eye(6, k=1)).tolist()
+DIAGONAL = np.diag([10.0, 10.0, 10.0, 1.0, 2.0, 2.5])
+POINT, AHEAD = [[0.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]]
+THRUSTER = {"type": "thrusters", "position": POINT, "direction": AHEAD, "coefficient": [1.0]}
+FIN = {"type": "fins", "position": POINT, "chord": AHEAD, "normal": [[0.0, 0.0, 1.0]], "area": 1.0, "lift_slope": 3.0,
+       "drag": 0.1}  # fmt: skip
+PROFILE = {"type": "current_profile", "depths": [0.0, 9.0], "velocities": [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]}
+SCHEDULE = {"type": "wrench_schedule", "times": [0.0, 1.0], "force": [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]}
+TIDE = {"type": "current_harmonics", "amplitudes": AHEAD, "periods": [10.0]}
+WAVES = {"type": "waves", "amplitudes": [1.0], "periods": [5.0], "headings_deg": [0.0]}
+WANDERING = {"type": "gauss_markov_current", "standard_deviation": [0.1, 0.1, 0.1], "time_constant": 10.0}
+TETHER = {"type": "tether", "anchor": [0.0, 0.0, 0.0], "stiffness": 5.0}
+HULL = {"type": "cross_flow", "stations": [-1.0, 1.0], "diameters": [0.1, 0.1], "drag_coefficient": 1.0}
+
+
+def refused(make, *arguments, **named):
+    """The faults with which a call is refused."""
+    with pytest.raises(lw.SceneError) as caught:
+        make(*arguments, **named)
+    return caught.value.faults
+
+
+def from_table(table, section="terms"):
+    return from_dict({"vehicle": BODY, section: [table]})
+
+
+# Tables of terms, what is changed in them -> words of the message.
+TERMS = [
+    # drag that creates energy, coefficients of the wrong sign
+    ({"type": "drag_matrix", "linear": CREATES}, "drag_matrix.linear = [[1.0, 0.0", "creates energy", "minus Fossen's"),
+    (
+        {"type": "drag_matrix", "linear": LOPSIDED},
+        "drag_matrix.linear = [[1.0, 3.0",
+        "at the velocity",
+        "positive on the",
+    ),
+    ({"type": "drag_matrix", "quadratic": CREATES}, "drag_matrix.quadratic", "creates energy", "minus Fossen's"),
+    ({"type": "drag_matrix", "linear": [1.0] * 6}, "drag_matrix.linear", "shape (6,)", "give numbers of shape (6, 6)"),
+    ({"type": "drag", "linear": [-4, 0, 0, 0, 0, 0]}, "drag.linear = [-4, 0", "out of bounds", "from 0 [N s/m, N m s]"),
+    ({"type": "drag", "quadratic": [NAN] * 6}, "drag.quadratic = [nan", "not finite", "(6,)"),
+    (TETHER | {"stiffness": -5.0}, "tether.stiffness = -5.0", "out of bounds", "from 0 [N/m]"),
+    (TETHER | {"rest_length": float("inf")}, "tether.rest_length = inf", "not finite", "[m]"),
+    (TETHER | {"anchor": [0.0, 0.0]}, "tether.anchor = [0.0, 0.0]", "shape (2,)", "(3,) [m]"),
+    (
+        {key: value for key, value in THRUSTER.items() if key != "coefficient"},
+        "thrusters.coefficient = None",
+        "is missing",
+        "or a polynomial [N]",
+    ),
+    (THRUSTER | {"polynomial": [[1.0]]}, "thrusters.polynomial = [[1.0]]", "has shape (1, 1)", "give p numbers"),
+    (THRUSTER | {"coefficient": [-1.0]}, "thrusters.coefficient = [-1.0]", "out of bounds", "from 0"),
+    (THRUSTER | {"time_constant": -0.1}, "thrusters.time_constant", "out of bounds", "from 0 [s]"),
+    (HULL | {"diameters": [0.1, -0.1]}, "cross_flow.diameters = [0.1, -0.1]", "out of bounds", "from 0 [m]"),
+    (FIN | {"lift_slope": -3.0}, "fins.lift_slope", "out of bounds", "from 0 [1/rad]"),
+    (WAVES | {"amplitudes": [-1.0]}, "waves.amplitudes = [-1.0]", "out of bounds", "from 0 [m]"),
+    (WAVES | {"periods": [0.0]}, "waves.periods = [0.0]", "not positive", "above 0 [s]"),
+    (TIDE | {"periods": [-2.0]}, "current_harmonics.periods = [-2.0]", "not positive", "above 0 [s]"),
+    (WANDERING | {"time_constant": 0.0}, "gauss_markov_current.time_constant = 0.0", "not positive", "above 0 [s]"),
+    ({"type": "wrench_noise", "force": [-1, 0, 0]}, "wrench_noise.force = [-1", "out of bounds", "from 0 [N s^1/2]"),
+    # tables: not sorted, empty, of different lengths
+    (PROFILE | {"depths": [9.0, 0.0]}, "current_profile.depths = [9.0, 0.0]", "not rising", "sort the table"),
+    (SCHEDULE | {"times": [1.0, 1.0]}, "wrench_schedule.times = [1.0, 1.0]", "not rising", "drop repetitions"),
+    (HULL | {"stations": [1.0, -1.0]}, "cross_flow.stations = [1.0, -1.0]", "not rising", "sort the table"),
+    (HULL | {"stations": [1.0], "diameters": [1.0]}, "cross_flow.stations = [1.0]", "one station", "give two or more"),
+    (
+        THRUSTER | {"times": [2.0, 1.0], "command_schedule": [[0.0], [1.0]]},
+        "thrusters.times = [2.0, 1.0]",
+        "not rising",
+    ),
+    (PROFILE | {"depths": []}, "current_profile.depths = []", "shape (0,)", "give k numbers [m]"),
+    (PROFILE | {"velocities": AHEAD}, "current_profile.velocities", "shape (1, 3)", "give 2 x 3 numbers [m/s]"),
+    (PROFILE | {"velocities": [[1.0], [2.0, 3.0]]}, "current_profile.velocities", "not numeric", "give numbers [m/s]"),
+    (TIDE | {"phases": [0.0, 1.0]}, "current_harmonics.phases = [0.0, 1.0]", "shape (2,)", "give 1 numbers [rad]"),
+    (SCHEDULE | {"interpolation": "cubic"}, "wrench_schedule.interpolation = 'cubic'", "known: linear, steps"),
+    (WANDERING | {"start": "warm"}, "gauss_markov_current.start = 'warm'", "known: zero, stationary"),
+    # directions and commands
+    (THRUSTER | {"direction": POINT}, "thrusters.direction[0] = [0.0, 0.0, 0.0]", "zero length", "such as [1, 0, 0]"),
+    (THRUSTER | {"command_schedule": 3.0, "times": [0.0]}, "thrusters.command_schedule = 3.0", "give 1 x 1 numbers"),
+    (THRUSTER | {"command_schedule": [[1.0, 2.0], [3.0]]}, "thrusters.command_schedule", "not numeric", "give numbers"),
+    (
+        THRUSTER | {"command": [[1.0], [2.0, 3.0]]},
+        "thrusters.command = [[1.0], [2.0, 3.0]]",
+        "not numeric",
+        "give numbers",
+    ),
+    (THRUSTER | {"limit": [[1.0, 2.0], [3.0]]}, "thrusters.limit = [[1.0, 2.0], [3.0]]", "not numeric", "give numbers"),
+    (
+        THRUSTER | {"command": [1.0], "times": [0.0], "command_schedule": [[2.0]]},
+        "thrusters.command",
+        "keep one of them",
+    ),
+    (FIN | {"chord": POINT}, "fins.chord[0] = [0.0, 0.0, 0.0]", "zero length", "trailing to leading edge"),
+    (FIN | {"normal": AHEAD}, "fins.normal[0] = [1.0, 0.0, 0.0]", "along the chord", "across the fin's plane"),
+    # names and types
+    ({"type": "dragg"}, "terms[0].type = 'dragg'", "not known", "did you mean 'drag'?"),
+    ({"type": ["drag"]}, "terms[0].type = ['drag']", "not known", "did you mean 'drag'?"),
+    ({"linear": [1.0] * 6}, "terms[0].type = ''", "known: drag"),
+    ({"type": "weight"}, "terms[0].type = 'weight'", "follows from the vehicle"),
+    ({"type": "drag", "quad": 1.0}, "terms[0].quad = 1.0", "unknown key", "did you mean 'quadratic'?"),
+    ({"type": "tether"}, "terms[0].anchor", "is missing", "give it [m]"),
+    ({"type": "drag", "name": 3}, "name = 3", "not a text", "give a name"),
+    ({"type": "drag", "name": "vehicle"}, "terms = 'vehicle'", "section of the scene", 'name = "vehicle_term"'),
+    (3, "terms[0] = 3", "is no term", "write a table with type"),
+]
+
+
+@pytest.mark.parametrize(("table", "words"), [(row[0], row[1:]) for row in TERMS])
+def test_a_term_of_a_scene_file(table, words):
+    (fault,) = (one for one in refused(from_table, table) if words[0] in one)
+    assert all(word in fault for word in words), fault
+
+
+def from_python(table):
+    """The same with keyword arguments; Python itself refuses what it does not know."""
+    return lw.terms.TYPES[table["type"]](**{key: value for key, value in table.items() if key != "type"})
+
+
+@pytest.mark.parametrize(("table", "words"), [(row[0], row[1:]) for row in TERMS if not row[1].startswith("terms")])
+def test_the_same_from_python(table, words):
+    (fault,) = (one for one in refused(from_python, table) if words[0] in one)
+    assert all(word in fault for word in words), fault
+
+
+EVENTS = [
+    (
+        {"type": "box", "lower": [0, 0, 9], "upper": [1, 1, 1]},
+        "box.upper = [1.0, 1.0, 1.0]",
+        "not above lower",
+        "upper >",
+    ),
+    ({"type": "time", "at": -1.0}, "time.at = -1.0", "out of bounds", "from 0 [s]"),
+    ({"type": "floor", "depth": NAN}, "floor.depth = nan", "not finite", "[m]"),
+    ({"type": "floor"}, "events[0].depth", "is missing", "give it [m]"),
+    ({"type": "flor"}, "events[0].type = 'flor'", "not known", "did you mean 'floor'?"),
+    ({"type": "surface", "deep": 1.0}, "events[0].deep = 1.0", "unknown key", "did you mean 'depth'?"),
+]
+
+
+@pytest.mark.parametrize(("table", "words"), [(row[0], row[1:]) for row in EVENTS])
+def test_an_event(table, words):
+    (fault,) = refused(from_table, table, "events")
+    assert all(word in fault for word in words), fault
+
+
+LISTS = [
+    ([lw.Drag(), lw.Drag()], "terms = 'drag'", "name of 2 terms", 'name = "drag_2"'),
+    ([lw.Drag(name="current"), lw.Current(velocity=[1, 0, 0])], "terms = 'current'", "name of 2 terms", "current_2"),
+    ([lw.Current(velocity=[1, 0, 0], name="environment")], "terms = 'environment'", "environment_term"),
+    ([lw.Surface()], "terms[0] = 'surface'", "is an event", "events=[...]"),
+    ([lw.Weight()], "terms[0] = 'weight'", "acts already", "leave it out"),
+    ([lw.Drag], "terms[0] = <class", "is no term", "lw.Drag(quadratic=...)"),
+    (lw.Drag(), "terms = Drag", "is no list", "terms=[lw.Drag(...)]"),
+]
+
+
+@pytest.mark.parametrize(("terms", "words"), [(row[0], row[1:]) for row in LISTS])
+def test_a_list_of_terms(terms, words):
+    (fault,) = refused(lw.Scene, lw.Vehicle(**BODY), terms=terms)
+    assert all(word in fault for word in words), fault
+
+
+def full(rigid=DIAGONAL, **more):
+    return {"rigid_body_mass_matrix": rigid} | more
+
+
+VEHICLES = [
+    ({}, "vehicle.mass = None", "is missing", "[kg]"),
+    (BODY | {"mass": -1}, "vehicle.mass = -1", "not positive", "above 0 [kg]"),
+    (BODY | {"inertia": [1.0, NAN, 2.0]}, "vehicle.inertia = [1.0, nan, 2.0]", "not finite", "[kg m2]"),
+    (
+        BODY | {"added_mass": [-11.0, 0.0, 0.0]},
+        "vehicle.added_mass = [-11.0",
+        "not positive definite",
+        "minus Fossen's",
+    ),
+    (BODY | {"weight": 98.0}, "vehicle.weight = 98.0", "6x6 form", "give rigid_body_mass_matrix"),
+    (full(DIAGONAL + np.eye(6, k=1)), "vehicle.rigid_body_mass_matrix", "not symmetric", "give a symmetric matrix"),
+    (full(-DIAGONAL), "vehicle.rigid_body_mass_matrix", "not positive definite", "[[m I, -m hat(r_g)]"),
+    (full(np.diag([1.0, 2, 3, 1, 1, 1])), "vehicle.rigid_body_mass_matrix", "no m I in its first block", "[[m I"),
+    (full(np.eye(3)), "vehicle.rigid_body_mass_matrix", "shape (3, 3)", "symmetric 6x6 matrix"),
+    (full(added_mass_matrix=-2.0 * DIAGONAL), "vehicle.added_mass_matrix", "not positive definite", "X_udot"),
+    (
+        {"added_mass_matrix": DIAGONAL},
+        "vehicle.rigid_body_mass_matrix = None",
+        "is missing",
+        "beside added_mass_matrix",
+    ),
+    (full(mass=10.0), "vehicle.mass = 10.0", "says again", "keep one of the two forms"),
+    (full(weight=NAN), "vehicle.weight = nan", "not finite", "[N]"),
+    (full(center_of_gravity=[1.0]), "vehicle.center_of_gravity = [1.0]", "shape (1,)", "(3,) [m]"),
+]
+
+
+@pytest.mark.parametrize(("values", "words"), [(row[0], row[1:]) for row in VEHICLES])
+def test_a_vehicle(values, words):
+    fault = next(one for one in refused(lw.Vehicle, **values) if words[0] in one)
+    assert all(word in fault for word in words), fault
+
+
+FOSSEN = [
+    ({"X_udot": 5.0}, "X_udot = 5.0", "is positive", "write -5"),
+    ({"X_u|u|": 5.0}, "X_u|u| = 5.0", "is positive", "write -5"),
+    ({"Y_rdot": -1.0, "N_vdot": -2.0}, "Y_rdot = -1.0", "differs from its partner N_vdot", "mend one or leave it out"),
+    ({"X_u": -1.0, "Xu": -2.0}, "Xu = -2.0", "given twice", "leave one out"),
+    ({"Y_uv": -1.0}, "Y_uv = -1.0", "product of two velocities", "ignore="),
+    ({"X_qq": -1.0}, "X_qq = -1.0", "no drag", "X_|q|q"),
+    ({"Q_u": -1.0}, "Q_u = -1.0", "not a coefficient's name", "known: X_udot"),
+    ({3: -1.0}, "3 = -1.0", "not a coefficient's name", "known: X_udot"),
+    ({"X_u": NAN}, "X_u = nan", "not finite", "give a number"),
+    ([1.0], "coefficients = [1.0]", "not a map", "X_udot"),
+    ({"X_qdot": -1e3}, "total mass matrix", "not positive definite", "check mass"),
+]
+
+
+@pytest.mark.parametrize(("given", "words"), [(row[0], row[1:]) for row in FOSSEN])
+def test_fossens_coefficients(given, words):
+    (fault,) = refused(lw.vehicle_tables_from_fossen, given, **BODY)
+    assert all(word in fault for word in words), fault
+
+
+def test_fossens_drag_that_creates_energy():
+    made = lw.vehicle_tables_from_fossen({"X_u": -1.0, "X_v": -100.0, "Y_v": -1.0}, **BODY)
+    (fault,) = refused(from_dict, made)
+    assert "drag_matrix.linear" in fault and "creates energy" in fault and "minus Fossen's" in fault
+
+
+LINK = ("<sdf><model name='m'><link name='b'><inertial><mass>10</mass><inertia><ixx>1</ixx><iyy>2</iyy><izz>2.5</izz>"
+        "</inertia></inertial></link><plugin name='hydrodynamics'><xU>-1</xU></plugin></model></sdf>")  # fmt: skip
+SDF = [
+    ("<sdf/>", {}, "SDF link", "has none", "with a <link>"),
+    ("<sdf><link name='b'/></sdf>", {}, "'b'", "no <inertial>", "add mass, pose and inertia"),
+    ("<sdf><", {}, "not XML", "mend that line"),
+    ("missing.sdf", {}, "missing.sdf", "No such file", "give the path of a file, or its text"),
+    (None, {}, "SDF file None", "give the path of a file, or its text"),
+    (LINK.replace("<mass>10</mass>", ""), {}, "<mass>", "is missing", "[kg]"),
+    (LINK.replace(">10<", ">ten<"), {}, "<mass> = 'ten'", "does not hold 1 finite numbers"),
+    (LINK.replace("<xU>-1</xU>", "<xU>-1</xU><yV>1</yV>"), {}, "plugin's linear drag", "both signs", "Fossen's signs"),
+    (LINK.replace("xU", "xUabsV"), {}, "<xUabsV> = -1.0", "product of velocities", "leave it out"),
+    (LINK, {"link": "c"}, "SDF link = 'c'", "not in the file", "known: b"),
+    (LINK, {"volume": -1.0}, "volume = -1.0", "not positive", "[m3]"),
+    (LINK, {"volume": 0.01, "gravity": "g"}, "gravity = 'g'", "not numeric", "[m/s2]"),
+]
+
+
+@pytest.mark.parametrize(("text", "more", "words"), [(row[0], row[1], row[2:]) for row in SDF])
+def test_sdf(text, more, words):
+    fault = next(one for one in refused(lw.vehicle_tables_from_sdf, text, **more) if words[0] in one)
+    assert all(word in fault for word in words), fault
+
+
+YAML = [
+    ("inertia: [1, 2, 2.5]\n", "mass = ''", "is missing", "add mass to the file, or pass mass="),
+    ("mass: 10\ninertia:\n", "inertia = ''", "is missing", "pass inertia="),
+    ("mass: ten\ninertia: [1, 2, 2.5]\n", "mass = 'ten'", "not numeric", "[kg]"),
+    ("mass: 10\ninertia: [1, 2, 2.5]\nvolume: 0.1\n", "density = 'not given'", "[kg/m3 (with volume)]"),
+    ("mass: 10\ninertia: [1, 2, 2.5]\ncolour: red\n", "colour = 'red'", "unknown key", "ignore="),
+    ("mass: 10\ninertia: [1, 2, 2.5]\nadded_mass: [1, 2]\n", "added_mass = [1, 2]", "shape (2,)", "6x6 matrix"),
+    ("mass: 10\ninertia: [1, 2, 2.5]\ncoefficients: [1]\n", "coefficients = [1]", "not a map", "X_udot"),
+    ("- 1\n- 2\n", "is not a map", "write mass: ..."),
+    ("mass: [1\n", "YAML", "mend that line"),
+]
+
+
+@pytest.mark.parametrize(("text", "words"), [(row[0], row[1:]) for row in YAML])
+def test_yaml(text, words):
+    pytest.importorskip("yaml")
+    (fault,) = refused(lw.vehicle_tables_from_yaml, text)
+    assert all(word in fault for word in words), fault
+
+
+def test_all_faults_of_a_scene_file_at_once():
+    text = """
+    [vehicle]
+    mass = -10
+    inertia = [1, 2, 2.5]
+    [run]
+    method = "psi_q"
+    dtype = "float64"
+    [[terms]]
+    type = "drag"
+    linear = [-1, 0, 0, 0, 0, 0]
+    [[terms]]
+    type = "spring"
+    [[events]]
+    type = "box"
+    lower = [1, 1, 1]
+    upper = [0, 0, 0]
+    """
+    found = refused(scenes.loads, text)
+    keys = ("vehicle.mass = -10", "run.method = 'psi_q'", "drag.linear", "terms[1].type = 'spring'", "box.upper")
+    assert len(found) == len(keys)
+    assert all(any(one.startswith(key) for one in found) for key in keys)
+
+
+@pytest.mark.parametrize("path", ["missing.toml", None])
+def test_a_scene_file_that_is_not_there(path):
+    (fault,) = refused(lw.Scene.load, path)
+    assert str(path) in fault and "give the path of a TOML file" in fault
+
+
+FAR = lw.Normal(std=100.0)
+VARIED = [
+    (PROFILE, "current_profile.depths", FAR),
+    (SCHEDULE, "wrench_schedule.times", FAR),
+    (THRUSTER | {"times": [0.0, 1.0], "command_schedule": [[0.0], [1.0]]}, "thrusters.times", FAR),
+    (HULL, "cross_flow.stations", FAR),
+    (THRUSTER, "thrusters.coefficient", FAR),
+    ({"type": "drag_matrix", "linear": np.eye(6).tolist()}, "drag_matrix.linear", FAR),
+    (WAVES, "waves.periods", FAR),
+]
+
+
+@pytest.mark.parametrize(("table", "name", "law"), VARIED)
+def test_members_that_would_be_unphysical(table, name, law):
+    (fault,) = refused(lw.Ensemble, from_table(table), 50, 0, {name: law})
+    assert name in fault and "unphysical" in fault and "of 50 members" in fault and "smaller spread" in fault
+
+
+NAMES = [
+    ({"type": "drag"}, "drag.quadrtic", "did you mean 'drag.quadratic'?"),
+    ({"type": "drag", "name": "hull"}, "drag.quadratic", "did you mean 'hull.quadratic'?"),
+]
+
+
+@pytest.mark.parametrize(("table", "name", "remedy"), NAMES)
+def test_what_cannot_vary(table, name, remedy):
+    (fault,) = refused(lw.Ensemble, from_table(table), 5, 0, {name: lw.Normal(std=1.0)})
+    assert f'ensemble.vary."{name}"' in fault and "does not name what the scene has" in fault and remedy in fault
+
+
+SCHEDULED = THRUSTER | {"times": [0.0, 1.0], "command_schedule": [[0.0], [1.0]]}
+STEERED = FIN | {"type": "control_fins", "command": 0.1}
+IDLE = [
+    (SCHEDULED, "thrusters.command", "vary thrusters.command_schedule"),
+    (THRUSTER, "thrusters.command_schedule", "vary thrusters.command"),
+    (THRUSTER, "thrusters.polynomial", "give thrusters.polynomial in the scene"),
+    (THRUSTER, "thrusters.time_constant", "give thrusters.time_constant above 0 [s] in the scene"),
+    (STEERED, "control_fins.times", "vary control_fins.command"),
+    (STEERED, "control_fins.rate_limit", "give control_fins.rate_limit below 1e+06 rad/s in the scene"),
+]
+
+
+@pytest.mark.parametrize(("table", "name", "remedy"), IDLE)
+def test_numbers_that_would_do_nothing(table, name, remedy):
+    (fault,) = refused(lw.Ensemble, from_table(table), 5, 0, {name: lw.Uniform(0.1, 0.2)})
+    assert name in fault and "does not act: the scene has" in fault and remedy in fault
+
+
+NOISE = {"type": "wrench_noise", "force": [1.0, 1.0, 1.0]}
+MATRIX = {"type": "drag_matrix", "linear": np.eye(6).tolist()}
+SETTINGS = [
+    (MATRIX, {"method": "kl6(psi_s)"}, "method = 'kl6(psi_s)'", "a damping matrix does not", "use psi_s"),
+    (MATRIX, {"method": "tj4(psi_x)"}, "method = 'tj4(psi_x)'", "keeps its order only for maps that undo", "use psi_x"),
+    (TIDE, {"method": "su4(psi_s)"}, "method = 'su4(psi_s)'", "water that varies does not", "use psi_s"),
+    (NOISE, {"method": "psi"}, "method = 'psi'", "noise more than once a step", "use psi_s"),
+    (
+        {"type": "drag", "linear": [0.0, 0.0, 3e5, 0.0, 0.0, 0.0]},
+        {"method": "kl6(psi_s)"},
+        "goes backward by",
+        "drag number up to",
+        "use psi_s, or a step",
+    ),
+    (MATRIX, {"method": "psi_q"}, "method = 'psi_q'", "not known", "did you mean 'psi_"),
+    (MATRIX, {"method": "kl6(phi)"}, "method = 'kl6(phi)'", "not symmetric", "compose psi_s"),
+    (MATRIX, {"dtype": "float16"}, "dtype = 'float16'", "did you mean 'float64'?"),
+    (MATRIX, {"h": NAN}, "h = nan", "not finite", "[s]"),
+    (MATRIX, {"t1": -1.0}, "t1 = -1.0", "not positive", "above 0 [s]"),
+    (MATRIX, {"h": "a"}, "h = 'a'", "not numeric", "[s]"),
+    (MATRIX, {"t1": [1.0]}, "t1 = [1.0]", "shape", "[s]"),
+    (MATRIX, {"save": 0.1}, "save = 0.1", "is no SaveAt", "lw.SaveAt("),
+]
+
+
+@pytest.mark.parametrize(("table", "settings", "words"), [(row[0], row[1], row[2:]) for row in SETTINGS])
+def test_a_method_that_cannot_do_it(table, settings, words):
+    (fault,) = refused(make_plan, lw.Ensemble(from_table(table)), **({"h": 0.01, "t1": 0.1} | settings))
+    assert all(word in fault for word in words), fault
+
+
+# A user's law.
+
+
+@functools.cache
+def pull_params(width, real):
+    return struct("Pull", k=lane(width, real))
+
+
+@wp.func
+def pull_law(w: Any, view: Any, p: Any):
+    w.force = w.force + p.k * view.down
+    return w
+
+
+@wp.func
+def pull_short(w: Any, view: Any):
+    return w
+
+
+@wp.func
+def pull_silent(w: Any, view: Any, p: Any):
+    w.force = w.force + p.k * view.down
+
+
+def pull_plain(w, view, p):
+    return w
+
+
+def device(**functions):
+    return type("Device", (), {"params": staticmethod(pull_params)} | functions)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Pull(lw.Term):
+    type: ClassVar[str] = "pull"
+    device: ClassVar[Any] = device(law=pull_law)
+
+    k: Any = lw.number((), "N")
+
+
+class Packs(Pull):
+    what: ClassVar[Any] = None
+
+    def packed(self, numbers, context):
+        return self.what
+
+
+LAWS = [
+    (device(law=pull_short), "pull.law = '(w, view)'", "takes 2 arguments", "write law(w, view, p)"),
+    (device(law=pull_plain), "pull.law", "not a Warp function", "@wp.func"),
+    (device(law=pull_law, params=None), "pull.device", "has no params(width, real)", "add_a_law.md"),
+    (device(), "pull.device", "has none of law, damping, flow, evolve", "add_a_law.md"),
+    ("pull", "pull.device = 'pull'", "not known", "give a module"),
+]
+
+
+@pytest.mark.parametrize(("made", "words"), [(row[0], row[1:]) for row in LAWS])
+def test_a_users_law(made, words):
+    term = type("Bad", (Pull,), {"device": made, "__annotations__": {}})(k=1.0)
+    fleet = lw.Ensemble(lw.Scene(lw.Vehicle(**BODY), terms=[term]))
+    for check in (lambda: lw.check_law(term), lambda: make_plan(fleet, h=0.01, t1=0.1)):
+        (fault,) = refused(check)
+        assert all(word in fault for word in words), fault
+
+
+def test_a_law_that_returns_nothing():
+    term = type("Bad", (Packs,), {"device": device(law=pull_silent), "__annotations__": {}})(k=1.0)
+    (fault,) = refused(lw.check_law, term)
+    assert "pull.device" in fault and "does not compile" in fault and "return what the role adds to" in fault
+
+
+@pytest.mark.parametrize("given", [None, {"k": np.ones(1)}], ids=["nothing", "a dict"])
+def test_packed_that_returns_something_else(given):
+    report = lw.check_law(type("Bad", (Packs,), {"what": given, "__annotations__": {}})(k=1.0))
+    assert not report.ok and "packed() returns" in str(report) and "lw.Packed({name: numbers})" in str(report)
+
+
+def test_packed_left_out():
+    report = lw.check_law(Pull(k=1.0))
+    assert (
+        not report.ok and "NotImplementedError" in str(report) and "write packed(self, numbers, context)" in str(report)
+    )
+
+
+def test_numbers_of_the_wrong_shape():
+    wrong = type("Bad", (Packs,), {"what": lw.Packed({"k": np.ones((1, 3))}), "__annotations__": {}})
+    report = lw.check_law(wrong(k=1.0))
+    assert not report.ok and "packed() fails" in str(report) and "give arrays (1,), (1, 3)" in str(report)
+
+
+def test_what_is_no_fleet():
+    for make in (lw.solve, lw.Ensemble):
+        (fault,) = refused(make, lw.Vehicle(1.0, 1.0 * np.ones(3), np.ones(3), 0.0))
+        assert "give lw.Scene(" in fault
+    (fault,) = refused(lw.Ensemble, from_table(MATRIX), 5, 0, [1])
+    assert "vary = [1]" in fault and "lw.Normal" in fault
+
+
+def test_two_events_of_one_name():
+    events = [lw.Floor(depth=1.0), lw.Floor(depth=2.0)]
+    (fault,) = refused(lw.Scene, from_table(MATRIX).vehicle, events=events)
+    assert "events = 'floor'" in fault and 'name = "floor_2"' in fault
+    second = lw.Floor(depth=2.0, name="lower")
+    assert len(lw.Scene(from_table(MATRIX).vehicle, events=[events[0], second]).events) == 2
+
+
+def test_a_quadratic_matrix_of_members_that_creates_energy():
+    scene = from_table({"type": "drag_matrix", "quadratic": np.eye(6).tolist()})
+    (fault,) = refused(lw.Ensemble, scene, 2000, 0, {"drag_matrix.quadratic": lw.Normal(std=1.0)})
+    assert "drag_matrix.quadratic of member" in fault and "unphysical" in fault
+    lw.Ensemble(scene, 2000, 0, {"drag_matrix.quadratic": lw.Uniform(relative=0.3)})
+
+
+def test_a_broken_law_in_solve():
+    broken = device(law=pull_silent)
+    Broken = type("Broken", (Pull,), {"device": broken})
+    with pytest.raises(lw.SceneError, match=r"(?s)law pull: .*does not compile.*lw.check_law"):
+        lw.solve(lw.Scene(from_table(MATRIX).vehicle, terms=[Broken(k=1.0)]), h=0.01, t1=0.1)
+    wavy = type("Wavy", (Pull,), {"device": device(law=pull_law, FLOW="wavy")})
+    (fault,) = refused(lw.solve, lw.Scene(from_table(MATRIX).vehicle, terms=[wavy(k=1.0)]), h=0.01, t1=0.1)
+    assert "pull.FLOW = 'wavy'" in fault and "varying" in fault
+
+
+NOTEBOOK_CELL = """
+import functools
+from typing import Any
+import warp as wp
+from lgvi_kernels.lanes.arithmetic import add, lane, mul
+from lgvi_kernels.lanes.state import struct
+
+@functools.cache
+def params(width, real):
+    return struct("Lift", k=lane(width, real))
+
+@wp.func
+def law(w: Any, view: Any, p: Any):
+    w.force = w.force + p.k * view.down
+    return w
+"""
+
+
+def test_a_law_defined_twice_as_in_a_notebook(tmp_path):
+    results = []
+    for i in range(2):
+        path = tmp_path / f"cell_{i}.py"
+        path.write_text(NOTEBOOK_CELL)
+        spec = importlib.util.spec_from_file_location("cell", path)
+        cell = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(cell)
+        Lift = type(
+            "Lift", (Pull,), {"device": cell, "packed": lambda self, numbers, context: lw.Packed(dict(numbers))}
+        )
+        results.append(lw.solve(lw.Scene(from_table(MATRIX).vehicle, terms=[Lift(k=1.0)]), h=0.01, t1=0.1).position)
+    assert np.array_equal(*results)

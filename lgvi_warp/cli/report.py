@@ -35,11 +35,11 @@ def report(result: Any, out: Path, quiet: bool, begun: float) -> list[str]:
     written = write(result, drawn, out)
     if not quiet:
         print("\n".join([*written.note_lines(), summary(result, drawn, written.files, time.perf_counter() - begun)]))
-    told(written.empty)
+    print_faults(written.empty)
     return written.faults
 
 
-def told(faults: list[str]) -> list[str]:
+def print_faults(faults: list[str]) -> list[str]:
     """Print faults on stderr.
 
     Args:

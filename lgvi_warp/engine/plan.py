@@ -152,7 +152,7 @@ class Plan:
         lanes = np.unique(indices // width)[:, None] * width + np.arange(width)
         return lanes[lanes < self.ensemble.members]
 
-    def part(self, indices: Sequence[int], fields: Sequence[str]) -> Plan:
+    def subplan(self, indices: Sequence[int], fields: Sequence[str]) -> Plan:
         """The plan for some of the members, with all choices made for the whole ensemble.
 
         The members' bits are therefore those of the whole run, unless steps are adaptive (see `with_neighbours`).
@@ -250,7 +250,7 @@ class Plan:
         """Pickle the settings alone: a kernel cannot be pickled, and the other process finds it in Warp's cache."""
         if self._whole:
             # Made anew from these members alone, the plan might choose another kernel.
-            return Plan.part, self._whole
+            return Plan.subplan, self._whole
         settings = (
             self.ensemble,
             self.method,

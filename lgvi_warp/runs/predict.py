@@ -335,10 +335,10 @@ def again(plan: Plan, observed: Observation, store: Store | None, fields: Sequen
         return []
     wanted = observed.again(np.zeros(plan.ensemble.members, np.uint8))
     if store is None:
-        return [Sized(plan.part(plan.with_neighbours(wanted).tolist(), fields))]
+        return [Sized(plan.subplan(plan.with_neighbours(wanted).tolist(), fields))]
     group = group_of(store, plan, wanted)
     stored_fields = tuple(name for name in fields if store.fields is None or name in store.fields)
-    return [Sized(plan.part(group.members.tolist(), stored_fields), group)]
+    return [Sized(plan.subplan(group.members.tolist(), stored_fields), group)]
 
 
 def writing(runs: Sequence[Sized], folder: Path, threads: int) -> tuple[float, int]:

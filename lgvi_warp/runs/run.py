@@ -128,7 +128,7 @@ def again(
     if not len(indices):
         return indices, None
     chosen = plan.with_neighbours(indices)
-    result = run_plan(plan.part([int(i) for i in chosen], fields), threads)
+    result = run_plan(plan.subplan([int(i) for i in chosen], fields), threads)
     return indices, result if len(chosen) == len(indices) else result.part(np.searchsorted(chosen, indices))
 
 

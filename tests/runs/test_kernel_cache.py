@@ -200,7 +200,7 @@ def test_a_temporary_folder_without_room_is_not_needed(cache, monkeypatch, capfd
     monkeypatch.setattr(warp_setup, "header_folders", lambda: folders)
     before = dict(folders)
     folders.clear()
-    monkeypatch.setattr(kernel_cache, "_temporary_room", lambda: False)
+    monkeypatch.setattr(kernel_cache, "temporary_room", lambda: False)
     made = []
     load_module = wp.load_module
     monkeypatch.setattr(wp, "load_module", lambda *given, **named: made.append(
@@ -239,7 +239,7 @@ def test_what_killed_processes_left_is_swept(cache):
 def test_threads_compile_once(cache, monkeypatch):
     compiled = []
     compile_it = kernel_cache.compile_module
-    monkeypatch.setattr(kernel_cache, "_compile", lambda *given: (compiled.append(given), compile_it(*given)))
+    monkeypatch.setattr(kernel_cache, "compile_module", lambda *given: (compiled.append(given), compile_it(*given)))
     threads = [threading.Thread(target=kernel_cache.load, args=(MODULE,)) for _ in range(4)]
     for thread in threads:
         thread.start()

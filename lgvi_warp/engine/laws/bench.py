@@ -98,7 +98,7 @@ class Views:
             self.time,
         )
 
-    def told(self, i: int) -> str:
+    def description(self, i: int) -> str:
         """One view in words, for a message.
 
         Args:

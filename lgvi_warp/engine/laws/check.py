@@ -128,7 +128,7 @@ def _judged(name: str, difference: np.ndarray, allowed: np.ndarray | float, view
         )
     i, j = np.unravel_index(ratio.argmax(), ratio.shape)
     good = bool(np.all(worst <= limit) and np.isfinite(limit).all())
-    text = "" if good else f"{views.told(int(i))}; {remedy}"
+    text = "" if good else f"{views.description(int(i))}; {remedy}"
     return Check(name, float(worst[i, j]), float(limit[i, j]), good, text)
 
 

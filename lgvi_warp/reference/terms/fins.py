@@ -29,9 +29,9 @@ class Fins(Law):
     def damping(self, view: View) -> Array:
         """D (6, 6), the sum over the fins."""
         angles = self.deflection(view)
-        return np.asarray(sum((self.one(i, angle, view) for i, angle in enumerate(angles)), np.zeros((6, 6))))
+        return np.asarray(sum((self.fin_damping(i, angle, view) for i, angle in enumerate(angles)), np.zeros((6, 6))))
 
-    def one(self, i: int, angle: float, view: View) -> Array:
+    def fin_damping(self, i: int, angle: float, view: View) -> Array:
         """D (6, 6) of a fin: -l (uc n - un c) - d (uc c + un n), l = kl uc un / V, d = kd V + kn un^2 / V.
 
         Args:

@@ -116,7 +116,7 @@ class KeptRun:
                 scratch.remove_folder(beside)
         if not len(wanted):
             return 0
-        plan = run.plan.part(group.members.tolist(), self.fields)
+        plan = run.plan.subplan(group.members.tolist(), self.fields)
         content = {key: value for key, value in run.provenance.items() if key != "observed"}
         again = StoredRun(plan, group, content | {"kernel": plan.kernel_hash}, run.messages)
         return again.run(executor, progress and _after(progress, members, len(group.members))).ran

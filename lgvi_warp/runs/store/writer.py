@@ -26,7 +26,7 @@ class Room(list[dict[str, np.ndarray]]):
         return Room, ()
 
     @staticmethod
-    def made(columns: tuple[StoreArray, ...]) -> dict[str, np.ndarray]:
+    def empty_chunks(columns: tuple[StoreArray, ...]) -> dict[str, np.ndarray]:
         """Allocate a chunk for each array that has times.
 
         Args:
@@ -61,7 +61,7 @@ class BlockWriter:
         try:
             self._chunks = room.pop()
         except IndexError:
-            self._chunks = room.made(columns)
+            self._chunks = room.empty_chunks(columns)
         if block.count < columns[0].length:
             for column in columns:
                 if column.times:

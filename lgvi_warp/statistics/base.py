@@ -55,7 +55,7 @@ class Gatherer:
         raise TypeError(f"{type(self).__name__} is abstract")
 
 
-class Rows(Gatherer):
+class RowGatherer(Gatherer):
     """Gathers one row of each array for each sample time, as the samples come."""
 
     def __init__(self, statistic: Statistic):
@@ -243,7 +243,7 @@ class Statistic:
             time: (k,) [s], all sample times of the run.
             count: number of members of the block.
         """
-        return Rows(self)
+        return RowGatherer(self)
 
     def rows(self, values: Values) -> Part:
         """Return the part of a block at some sample times: arrays with one row for each time.

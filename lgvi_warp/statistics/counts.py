@@ -24,7 +24,6 @@ class Counted(Statistic):
     """A statistic whose part is whole numbers: these add up to the same in any order."""
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """Add the counts of both sets of members."""
         return {key: left[key] + right[key] for key in left}
 
     def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
@@ -367,7 +366,7 @@ class FirstPassage(Condition, Counted):
         return estimate(self, text, dims | along(times, "level"), arrays, time, levels, "1", labels=())
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
-        """Return probabilities with intervals from the spread of the replicates' curves."""
+        # Probabilities with intervals from the spread of the replicates' curves.
         each = self.each_replicate(parts, replicates)
         overall = self.whole(together(each))
         curve = Curve.of(overall)

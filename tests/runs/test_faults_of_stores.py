@@ -387,7 +387,7 @@ def test_folders_are_exchanged_in_one_step(tmp_path):
     for name in "ab":
         (tmp_path / name).mkdir()
         (tmp_path / name / name).touch()
-    if not durable._exchanged(tmp_path / "a", tmp_path / "b"):
+    if not durable.exchanged(tmp_path / "a", tmp_path / "b"):
         pytest.skip("this system cannot")
     assert os.listdir(tmp_path / "a") == ["b"] and os.listdir(tmp_path / "b") == ["a"]
 

@@ -98,7 +98,7 @@ class Views:
             self.time,
         )
 
-    def told(self, i: int) -> str:
+    def description(self, i: int) -> str:
         """One view in words, for a message.
 
         Args:
@@ -202,7 +202,7 @@ class Bank(Packets):
     def __init__(self, bench: Bench, context: PackingContext, views: Views):
         # What Packets asks of a Plan and of Members to pack laws.
         plan: Any = SimpleNamespace(
-            model=SimpleNamespace(laws=((bench.term, bench.module),)),
+            kernel_choice=SimpleNamespace(laws=((bench.term, bench.module),)),
             spec=SimpleNamespace(width=bench.width, drag=(), gauss=()),
             dtypes=(None, bench.Params, None),
             dtype="float64",
@@ -210,7 +210,7 @@ class Bank(Packets):
         members: Any = SimpleNamespace(count=bench.count, parameters=context.parameters, indices=context.members)
         self.plan, self.members, self.frame, self.bench = plan, members, context.frame, bench
         self.count = bench.count // bench.width
-        params, table, memory = self._laws(context)
+        params, table, memory = self.packed_laws(context)
         Lane = bench.examine.Lane
         self.params = wp.array(params, dtype=bench.examine.Params, device="cpu")
         self.table, self.memory = (wp.array(x, dtype=Lane, shape=x.shape[:2], device="cpu") for x in (table, memory))

@@ -77,7 +77,7 @@ class UnitCubePoints(Sampling):
         return len(self.points)
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
-        """In addition, adds a fault where the columns are not those of the cube."""
+        # Also a fault where the columns are not those of the cube.
         if self.points.shape[1] != space.dimensions:
             remedy = f"give {space.dimensions}, of {', '.join(space.keys) or 'nothing'}"
             faults.add("sampling.levels.points", "...", f"has {self.points.shape[1]} columns", remedy)

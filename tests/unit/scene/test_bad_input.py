@@ -441,7 +441,7 @@ class Pull(lw.Term):
 class Packs(Pull):
     what: ClassVar[Any] = None
 
-    def packed(self, own, setting):
+    def packed(self, numbers, context):
         return self.what
 
 
@@ -480,7 +480,9 @@ def test_packed_that_returns_something_else(given):
 @pytest.mark.kernel
 def test_packed_left_out():
     report = lw.check_law(Pull(k=1.0))
-    assert not report.ok and "NotImplementedError" in str(report) and "write packed(self, numbers, context)" in str(report)
+    assert (
+        not report.ok and "NotImplementedError" in str(report) and "write packed(self, numbers, context)" in str(report)
+    )
 
 
 @pytest.mark.kernel
@@ -551,6 +553,8 @@ def test_a_law_defined_twice_as_in_a_notebook(tmp_path):
         spec = importlib.util.spec_from_file_location("cell", path)
         cell = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(cell)
-        Lift = type("Lift", (Pull,), {"device": cell, "packed": lambda self, own, setting: lw.Packed(dict(own))})
+        Lift = type(
+            "Lift", (Pull,), {"device": cell, "packed": lambda self, numbers, context: lw.Packed(dict(numbers))}
+        )
         results.append(lw.solve(lw.Scene(from_table(MATRIX).vehicle, terms=[Lift(k=1.0)]), h=0.01, t1=0.1).position)
     assert np.array_equal(*results)

@@ -22,12 +22,12 @@ from lgvi_warp.scene.oddities import Oddities
 
 
 @dataclass(frozen=True)
-class Model:
+class KernelChoice:
     """What the kernel of a run must contain.
 
     Attributes:
         method: the integration method.
-        aligned: whether the kernel's axes are the user's but for order and sense (see `Setting`).
+        aligned: whether the kernel's axes are the user's but for order and sense (see `PackingContext`).
         moved: whether the state's origin differs from the user's.
         laws: terms with the modules of their device code; drag by its exact flow comes first.
         events: events with the modules of their device code.
@@ -66,14 +66,14 @@ class Model:
     odd: Oddities
 
 
-def make_model(
+def choose_kernel(
     ensemble: Ensemble,
     method: Method,
     h: float,
     laws: Mapping[str, Any],
     stops: Mapping[str, Any],
     checked: bool = True,
-) -> Model:
+) -> KernelChoice:
     """Choose what the kernel of a run must contain.
 
     Args:
@@ -142,7 +142,7 @@ def make_model(
              "turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
              "modified": method.two_part, "dense": dense, "water": flow in ("uniform", "varying"),
              "origin": bool(elsewhere and (facts.moved or facts.forces_moved))}  # fmt: skip
-    return Model(
+    return KernelChoice(
         method=method,
         aligned=not facts.turned,
         moved=facts.moved,

@@ -1,4 +1,4 @@
-"""`Sink`: the keeper that writes blocks into a store and knows their files, and the format of markers and parts."""
+"""`BlockFiles`: the keeper that writes blocks into a store and knows their files, and the format of markers and parts."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.keepers.protocol import Keeper, PartKeeper
 from lgvi_warp.runs.store.commits import Commits
-from lgvi_warp.runs.store.layout import Column
+from lgvi_warp.runs.store.layout import StoreArray
 from lgvi_warp.runs.store.layout_check import is_sum, understood
 from lgvi_warp.runs.store.writer import BlockWriter, Room
 
@@ -41,7 +41,7 @@ def name_of(block: Block) -> str:
 
 
 @dataclass(frozen=True)
-class Sink:
+class BlockFiles:
     """Keeper that writes blocks into a store, from threads, processes or other machines that see its folder.
 
     Attributes:
@@ -52,7 +52,7 @@ class Sink:
     """
 
     root: Path
-    columns: tuple[Column, ...]
+    columns: tuple[StoreArray, ...]
     room: Room = field(default_factory=Room, compare=False)
     commits: Commits = field(default_factory=Commits, compare=False)
 
@@ -304,19 +304,19 @@ def read_marker(root: Path, key: str) -> dict[str, list[int]] | None:
 
 
 def check(
-    sink: Sink, runs: Sequence[Block], samples: int, keepers: Sequence[Any] = ()
+    block_files: BlockFiles, runs: Sequence[Block], samples: int, keepers: Sequence[Any] = ()
 ) -> Iterator[tuple[Block, list[str]]]:
     """Compare the files of blocks with their markers, reading every file.
 
     Args:
-        sink: The store's blocks.
+        block_files: The store's blocks.
         runs: The blocks to check.
         samples: Number of sample times.
         keepers: The keepers that leave parts.
 
     Yields:
-        Tuples (block, its faults), in order; see Sink.faults.
+        Tuples (block, its faults), in order; see BlockFiles.faults.
     """
     with ThreadPoolExecutor(machine.thread_count()) as pool:
-        faults = pool.map(lambda block: sink.faults(block, samples, keepers), runs)
+        faults = pool.map(lambda block: block_files.faults(block, samples, keepers), runs)
         yield from zip(runs, faults, strict=True)

@@ -50,7 +50,7 @@ from lgvi_warp.runs.store import folder as store
 from tests.support.stores import SETTINGS, fleet
 path, place, count, exchange = sys.argv[1], sys.argv[2], int(sys.argv[3]), sys.argv[4] == "yes"
 if not exchange:
-    durable._exchanged = lambda one, other: False
+    durable.exchanged = lambda one, other: False
 owner, name = {"rename": (durable.Path, "replace"), "sync": (durable, "sync_folder"), "remove": (scratch, "remove_folder"),
                "write": (safe_files, "rename")}[place]
 call, left = getattr(owner, name), [count]

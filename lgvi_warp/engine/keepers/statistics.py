@@ -118,7 +118,7 @@ class Gathered:
 
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs to gather blocks, without what was gathered here."""
-        return {name: value for name, value in vars(self).items() if name != "_trees"}
+        return {name: value for name, value in vars(self).items() if name != "trees"}
 
     @staticmethod
     def to_arrays(part: Sequence[Part]) -> tuple[dict[str, np.ndarray], Any]:

@@ -1,4 +1,4 @@
-"""Measure the methods for coupled inertia and write the tables of docs/coupled_inertia.md.
+"""Measure the methods for coupled inertia and write the tables of docs/explain/coupled_inertia.md.
 
 python benchmarks/coupled_table.py
 
@@ -20,7 +20,7 @@ from lgvi_warp.reference import coupled, rotation
 from tests.tools import difference, random_states, slope
 from tests.verification import test_coupled_reference as case
 
-TARGET = Path(__file__).resolve().parent.parent / "docs" / "coupled_inertia.md"
+TARGET = Path(__file__).resolve().parent.parent / "docs" / "explain" / "coupled_inertia.md"
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 
 TWIN = {"psi_x": "x6", "psi_x8": "x8", "psi_w": "psi_w"}

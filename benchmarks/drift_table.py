@@ -1,4 +1,4 @@
-"""Energy and momentum over a million steps of every method, beside its cost: writes docs/long_runs.md.
+"""Energy and momentum over a million steps of every method, beside its cost: writes docs/explain/long_runs.md.
 
 python benchmarks/drift_table.py
 """
@@ -16,7 +16,7 @@ from lgvi_warp.physics import notation, terms
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.studies import speed
 
-TARGET = Path(__file__).resolve().parent.parent / "docs" / "long_runs.md"
+TARGET = Path(__file__).resolve().parent.parent / "docs" / "explain" / "long_runs.md"
 STEP, STEPS, MEMBERS, SAMPLES = 0.05, 1_000_000, 64, 1000
 M, J = np.array([188.8, 193.8, 198.8]), np.array([5.46, 5.29, 5.72])
 METHODS = ("psi_s", "psi_1", "psi_x", "psi_x8", "psi", "phi", "su4(psi_s)", "su4(psi_x)", "kl6(psi_x)", "kl8(psi_x)",
@@ -36,7 +36,7 @@ the anchor are constants of its motion. {members} members with random starts, {s
 * **momentum error**: largest |L - L0| / |L0| of all members at the end.
 * **cost**: nanoseconds per vehicle and step on one core, all methods in turn, {members} members.
 
-Machine: {cpu}, {simd}. Written by `python benchmarks/drift_table.py`; do not edit.
+Machine: {cpu}, {simd}. Written by `python -m benchmarks table drift`; do not edit.
 
 {tables}
 

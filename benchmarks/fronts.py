@@ -1,4 +1,4 @@
-"""Measure the fronts of accuracy against time of four scenes and write docs/accuracy_and_speed.md, with a picture of each.
+"""Measure the fronts of accuracy against time of four scenes and write docs/guide/accuracy_and_speed.md, with a picture of each.
 
 python benchmarks/fronts.py
 """
@@ -14,7 +14,7 @@ import lgvi_warp as lw
 from lgvi_warp.common import machine, warp_setup
 
 ROOT = Path(__file__).resolve().parent.parent
-TARGET = ROOT / "docs" / "accuracy_and_speed.md"
+TARGET = ROOT / "docs" / "guide" / "accuracy_and_speed.md"
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 DECADES = range(-1, -13, -1)
 SPREAD = {"start.angular_velocity": lw.Normal(relative=0.1)}
@@ -63,7 +63,7 @@ def section(name, make):
     """The text of one scene."""
     fleet, t1 = make()
     found = lw.tradeoff(fleet, t1=t1, seconds=90.0)
-    picture = ROOT / "docs" / f"accuracy_{name}.png"
+    picture = ROOT / "docs" / "guide" / f"accuracy_{name}.png"
     lw.plot_tradeoff(found, picture)
     lines = [f"## {make.__doc__.strip()}", "", f"![errors and cost]({picture.name})", ""]
     lines += [f"Reference: {found.reference}. {' '.join(f'{text}.' for text in found.messages)}", ""]
@@ -83,7 +83,7 @@ def main():
     chosen = sys.argv[1:] or list(SCENES)
     described, versions = machine.describe(), machine.versions()
     where = f"One core of {described['cpu']}, {described['simd']}; Warp {versions['warp-lang']}."
-    head = f"{where} Written by `python benchmarks/fronts.py`."
+    head = f"{where} Written by `python -m benchmarks table fronts`."
     text = "\n\n".join([head, *(section(name, SCENES[name]) for name in chosen)])
     page = TARGET.read_text()
     before, rest = page.split(BEGIN)

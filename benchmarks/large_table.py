@@ -1,6 +1,6 @@
 """From 1,000 to 10 million members: time, memory and disk of runs in memory and in a store, beside what was predicted.
 
-python benchmarks/large_table.py                1,000 to 1,000,000 members; writes docs/large_ensembles.md
+python benchmarks/large_table.py                1,000 to 1,000,000 members; writes docs/guide/large_ensembles.md
 python benchmarks/large_table.py --most 10000000    10 million too: 16 GB of disk in the folder --dir (default: runs)
 """
 
@@ -19,7 +19,7 @@ from benchmarks.scenes import peak_memory
 from lgvi_warp.common import machine
 from lgvi_warp.studies import speed
 
-TARGET = Path(__file__).resolve().parent.parent / "docs" / "large_ensembles.md"
+TARGET = Path(__file__).resolve().parent.parent / "docs" / "guide" / "large_ensembles.md"
 SETTINGS = {"method": "psi_s", "h": 0.01, "t1": 10.0, "save": lw.SaveAt(every=1.0)}
 SIZES = (1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 
@@ -32,7 +32,7 @@ velocities, {threads} threads; the whole of `lw.solve` in a process of its own, 
 process's largest resident memory: {floor} MB of it are Python and Warp, {more} MB with zarr and xarray. *Predicted* is
 what `lw.predict` said before the run, over what was measured.
 
-Machine: {cpu}, {simd}, {threads} threads. Written by `python benchmarks/large_table.py --most {most}`; do not edit.
+Machine: {cpu}, {simd}, {threads} threads. Written by `python -m benchmarks table large --most {most}`; do not edit.
 
 | members | kept | time | peak | disk | predicted: time, memory |
 |---:|---|---:|---:|---:|---|

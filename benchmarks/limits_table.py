@@ -1,4 +1,4 @@
-"""Measure the largest stable step of every method, on motions of one rate; write the table of docs/where_it_breaks.md.
+"""Measure the largest stable step of every method, on motions of one rate; write the table of docs/guide/when_it_breaks.md.
 
 python benchmarks/limits_table.py            # JSON lines, then the table, which also goes into the page
 
@@ -20,7 +20,7 @@ import lgvi_warp as lw
 from lgvi_warp.physics import notation
 from lgvi_warp.studies.stability.limits import LIMITS
 
-TARGET = Path(__file__).resolve().parent.parent / "docs" / "where_it_breaks.md"
+TARGET = Path(__file__).resolve().parent.parent / "docs" / "guide" / "when_it_breaks.md"
 BEGIN, END = "<!-- limits: begin -->", "<!-- limits: end -->"
 
 METHODS = (

@@ -1,4 +1,4 @@
-"""Measure every method in every precision at every width and write docs/methods.md: some 500 kernels, half an hour.
+"""Measure every method in every precision at every width and write docs/reference/method_costs.md: some 500 kernels, half an hour.
 
 python benchmarks/method_table.py [file of JSON lines: those of `python benchmarks/run.py methods`, in place of measuring]
 """
@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from benchmarks.cases.methods import case
 from lgvi_warp.common import machine, warp_setup
 
-TARGET = Path(__file__).resolve().parent.parent / "docs" / "methods.md"
+TARGET = Path(__file__).resolve().parent.parent / "docs" / "reference" / "method_costs.md"
 SOUND = 1.5
 
 TEXT = """# Methods, precisions and widths
@@ -23,7 +23,7 @@ worst use of the core's rate of fused multiply-adds at that width, and how many 
 a method's operations are the same at every width, so above {sound} something was not vectorised as it should be. `load`
 is the longest that a kernel of the row took to compile, or to load from Warp's cache [s].
 
-{cpu}, {simd}. Written by `python benchmarks/method_table.py`; do not edit.
+{cpu}, {simd}. Written by `python -m benchmarks table method`; do not edit.
 
 | method | float64 [ns] | worst | float32 [ns] | worst | ratio | float32_compensated [ns] | worst | load [s] |
 | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |

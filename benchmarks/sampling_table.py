@@ -1,6 +1,6 @@
 """Samplings side by side: the error of a mean, the time to check all members and to draw a block, and memory.
 
-python benchmarks/sampling_table.py [--quick]      writes docs/sampling_cost.md
+python benchmarks/sampling_table.py [--quick]      writes docs/reference/sampling_costs.md
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def page(seeds: int, members: int) -> str:
         f"32,768 members. Then the time to make an ensemble of {members:,} members (all are drawn and checked), to draw its",
         f"last blocks of {BLOCK}, and the memory that both took beyond that of a small ensemble, in a process of its own, one",
         f"thread; the least of {TRIALS} processes.", "",
-        f"Machine: {machine.describe()['cpu']}. Written by `python benchmarks/sampling_table.py`; do not edit.", "",
+        f"Machine: {machine.describe()['cpu']}. Written by `python -m benchmarks table sampling`; do not edit.", "",
         "| sampling | " + " | ".join(f"error, {n}" for n in MEMBERS) + " | make and check [s] | block [ms] | memory [MB] |",
         "| --- |" + " ---: |" * (len(MEMBERS) + 3),
     ]  # fmt: skip
@@ -121,7 +121,7 @@ def main() -> None:
     if quick:
         print(text)
     else:
-        (ROOT / "docs" / "sampling_cost.md").write_text(text)
+        (ROOT / "docs" / "reference" / "sampling_costs.md").write_text(text)
 
 
 if __name__ == "__main__":

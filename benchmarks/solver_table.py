@@ -1,4 +1,4 @@
-"""Measure the solvers of equation (24) and write the table of docs/solvers.md.
+"""Measure the solvers of equation (24) and write the table of docs/explain/solvers.md.
 
 python benchmarks/solver_table.py
 """
@@ -11,7 +11,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from benchmarks.cases.solvers import case
 from lgvi_warp.common import machine, warp_setup
 
-TARGET = Path(__file__).resolve().parent.parent / "docs" / "solvers.md"
+TARGET = Path(__file__).resolve().parent.parent / "docs" / "explain" / "solvers.md"
 
 TEXT = """# Solving equation (24)
 
@@ -32,7 +32,7 @@ number before the run.
 Columns: nanoseconds per solve and turn of the state (NumPy: per solve), the relative residual where the length of
 J^-1 a is 0.003, 0.1 and 0.9, the largest entry of F^T F - I at 0.1, and the range: the largest length up to which the
 residual stays below the tolerance (1: all of where a solution is sure). One core of {cpu}, {simd}. Written by
-`python benchmarks/solver_table.py`; do not edit.
+`python -m benchmarks table solver`; do not edit.
 
 {tables}
 

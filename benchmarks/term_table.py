@@ -1,4 +1,4 @@
-"""Measure what each term costs and write the table of docs/terms/COST.md.
+"""Measure what each term costs and write the table of docs/reference/term_costs.md.
 
 python benchmarks/term_table.py
 """
@@ -11,7 +11,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from benchmarks.cases.terms import case
 from lgvi_warp.common import machine, warp_setup
 
-TARGET = Path(__file__).resolve().parent.parent / "docs" / "terms" / "COST.md"
+TARGET = Path(__file__).resolve().parent.parent / "docs" / "reference" / "term_costs.md"
 
 TEXT = """# What each term costs
 
@@ -22,7 +22,7 @@ registers where the processor has enough), h = {step} s, checks on. The numbers 
 `benchmarks/scenes.py`: of waves 8 components, of cross-flow 10 stations, of thrusters and fins 4, of control fins 2,
 of tables 4 knots.
 
-Machine: {cpu}, {simd}; Warp {warp}, NumPy {numpy}. Written by `python benchmarks/term_table.py`; do not edit.
+Machine: {cpu}, {simd}; Warp {warp}, NumPy {numpy}. Written by `python -m benchmarks table term`; do not edit.
 
 | term | float64 ns | more than none | float32 ns | more than none |
 | --- | ---: | ---: | ---: | ---: |

@@ -1,4 +1,4 @@
-"""The table of docs/accuracy_and_speed.md on other systems, from the lines of one or more runs of run.py.
+"""The table of docs/guide/accuracy_and_speed.md on other systems, from the lines of one or more runs of run.py.
 
 python benchmarks/peers/page.py runs/peers_1/peers.jsonl runs/peers_all/peers.jsonl [--write]
 
@@ -19,7 +19,7 @@ sys.path.insert(0, str(ROOT))
 
 from benchmarks.peers.plot import DECADES, HOME, TITLES, front  # noqa: E402
 
-TARGET = ROOT / "docs" / "accuracy_and_speed.md"
+TARGET = ROOT / "docs" / "guide" / "accuracy_and_speed.md"
 BEGIN, END = "<!-- peers: begin -->", "<!-- peers: end -->"
 NAMES = {
     "numba_simd": "numba, written by hand over SIMD lanes",

@@ -236,9 +236,9 @@ def device_module(term: Term, device: Any, known: Mapping[str, Any], *roles: str
     if module is None:
         faults.add(f"{term.key}.device", device, "is not known", "give a module, or the name of a built-in one")
     elif not callable(getattr(module, "params", None)):
-        faults.add(f"{term.key}.device", module, "has no params(width, real)", "see docs/add_a_law.md")
+        faults.add(f"{term.key}.device", module, "has no params(width, real)", "see docs/develop/add_a_force.md")
     elif not any(hasattr(module, role) for role in roles):
-        faults.add(f"{term.key}.device", module, f"has none of {', '.join(roles)}", "see docs/add_a_law.md")
+        faults.add(f"{term.key}.device", module, f"has none of {', '.join(roles)}", "see docs/develop/add_a_force.md")
     else:
         for role in roles:
             _check_signature(faults, term, module, role)

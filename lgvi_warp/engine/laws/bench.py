@@ -251,7 +251,7 @@ def _built(term: Term, module: Any, width: int) -> Any:
         raise SceneError([f"{term.key}.device = {module!r}: cannot be a key of the kernels made; {remedy}"]) from None
     remedy = (
         "return what the role adds to (w, D, f, state); name fields as the View and params() do; import the operators of "
-        "lanes that are used; no `if` on a lane, no plain number times a lane: docs/add_a_law.md"
+        "lanes that are used; no `if` on a lane, no plain number times a lane: docs/develop/add_a_force.md"
     )
     try:
         examine = make_examine(module, width, wp.float64)

@@ -8,10 +8,10 @@ import numpy as np
 import warp as wp
 
 import lgvi_warp as lw
-from lgvi_kernels.lane_math import exponential
-from lgvi_kernels.lanes import add, cross, div, dot, lane, lane3, mul, neg, ones, sub, vec3  # noqa: F401
-from lgvi_kernels.state import struct
-from lgvi_kernels.view import add_outer, add_rows, to_body, to_inertial
+from lgvi_kernels.lanes.arithmetic import add, cross, div, dot, lane, lane3, mul, neg, ones, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes.functions import exponential
+from lgvi_kernels.lanes.state import struct
+from lgvi_kernels.lanes.view import add_outer, add_rows, to_body, to_inertial
 
 # 1. A law with a potential: U = -energy exp(-|d|^2 / (2 reach^2)), d from the dock to the vehicle's nose.
 
@@ -35,7 +35,7 @@ def dock_law(w: Any, view: Any, p: Any):
 
 
 class DockOnDevice:
-    """What a module of lgvi_kernels.terms would hold."""
+    """What a module of lgvi_kernels.laws would hold."""
 
     POTENTIAL = True
     params = staticmethod(dock_params)

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from lgvi_kernels.collocation import SLOPE_FIELDS
-from lgvi_kernels.events import FIRST
-from lgvi_kernels.lanes import int_lane
-from lgvi_kernels.monitor import ENERGY_FIELDS
-from lgvi_kernels.rows import PACE_FIELDS, STATE_FIELDS
-from lgvi_kernels.terms import LAWS
+from lgvi_kernels.advance.events import FIRST
+from lgvi_kernels.advance.monitor import ENERGY_FIELDS
+from lgvi_kernels.advance.rows import PACE_FIELDS, STATE_FIELDS
+from lgvi_kernels.lanes.arithmetic import int_lane
+from lgvi_kernels.laws import LAWS
+from lgvi_kernels.maps.collocation import SLOPE_FIELDS
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine.outcome import Outcome

@@ -23,7 +23,7 @@ def fma_peak(dtype: str = "float64", width: int | None = None, rounds: int = 5, 
     """
     import warp as wp
 
-    from lgvi_kernels.peak import CHAINS, make_peak
+    from lgvi_kernels.lanes.peak import CHAINS, make_peak
     from lgvi_warp.common import warp_setup
     from lgvi_warp.engine import kernel_cache
 

@@ -14,12 +14,12 @@ import numpy as np
 import warp as wp
 
 from lgvi_kernels.advance.kernel import Advance, make_advance
+from lgvi_kernels.advance.rows import SAMPLE_FIELDS
 from lgvi_kernels.advance.spec import CHUNK, Spec
-from lgvi_kernels.explicit import Explicit
-from lgvi_kernels.lanes import WIDTHS
-from lgvi_kernels.rows import SAMPLE_FIELDS
+from lgvi_kernels.lanes.arithmetic import WIDTHS
+from lgvi_kernels.laws import LAWS
+from lgvi_kernels.maps.explicit import Explicit
 from lgvi_kernels.stops import STOPS
-from lgvi_kernels.terms import LAWS
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.machine import DTYPES, default_width
 from lgvi_warp.common.status import CHECKS, ON_FAILURE

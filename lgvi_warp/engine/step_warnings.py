@@ -72,7 +72,7 @@ def watched(plan: Watched) -> tuple[str, ...]:
         plan: the plan of the run.
 
     Returns:
-        Names of rows of lgvi_kernels.monitor, the least serious first.
+        Names of rows of lgvi_kernels.advance.monitor, the least serious first.
     """
     method, model = plan.method, plan.model
     rows = ["precision"] * (plan.dtype == "float32") + ["orthogonality"]

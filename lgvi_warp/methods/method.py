@@ -37,7 +37,7 @@ FORCED: dict[str, Program] = {
     "phi_adjoint": (("Phi*", 1.0),),
     "psi": (("Phi", 0.5), ("Phi*", 0.5)),
 }
-# Explicit methods have no sub-maps. KINDS: those that keep R on the group (see lgvi_kernels.explicit).
+# Explicit methods have no sub-maps. KINDS: those that keep R on the group (see lgvi_kernels.maps.explicit).
 EXPLICIT: dict[str, Tableau] = {"rk4": RK4, "rk5": DOPRI5, "rk8": DOP853, "cg3": CG3, "rkmk4": RK4}
 KINDS = {"cg3": "group", "rkmk4": "munthe_kaas"}
 ORDERS = {"phi": 1, "phi_adjoint": 1, "psi": 2, "psi_s": 2, "psi_1": 2, "psi_x": 2, "psi_x8": 2, "psi_w": 2} | {

@@ -9,8 +9,8 @@ import pytest
 import warp as wp
 
 import lgvi_warp as lw
-from lgvi_kernels.lanes import lane, sub  # noqa: F401
-from lgvi_kernels.state import struct
+from lgvi_kernels.lanes.arithmetic import lane, sub  # noqa: F401
+from lgvi_kernels.lanes.state import struct
 from lgvi_warp.methods.method import PROGRAMS
 from lgvi_warp.physics.inertia import moved
 from lgvi_warp.physics.terms import events

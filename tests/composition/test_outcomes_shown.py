@@ -230,7 +230,7 @@ def test_energy_error_only_where_energy_is_conserved(mixed, monkeypatch, name):
 
 @pytest.mark.parametrize("name", laws.CASES)
 def test_terms_say_of_energy_what_their_device_code_does(name):
-    from lgvi_kernels.terms import LAWS
+    from lgvi_kernels.laws import LAWS
 
     for term in laws.CASES[name].terms:
         module = LAWS[term.device]

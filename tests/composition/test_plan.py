@@ -8,7 +8,7 @@ import warp as wp
 
 import lgvi_warp as lw
 from lgvi_kernels.advance.kernel import make_advance
-from lgvi_kernels.terms import restoring, weight
+from lgvi_kernels.laws import restoring, weight
 from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.packets import pack
 from lgvi_warp.engine.plan import SEGMENT_SAMPLE_BYTES

@@ -141,7 +141,8 @@ def test_every_status_says_what_to_do():
 
 
 def test_codes_are_those_of_the_kernel():
-    from lgvi_kernels import packet, solve
+    from lgvi_kernels.lanes import packet
+    from lgvi_kernels.maps import solve
 
     kernel = (solve.STEP_TOO_LARGE, packet.STEP_TOO_LARGE, solve.NOT_CONVERGED, packet.NON_FINITE)
     assert kernel == (Status.STEP_TOO_LARGE, Status.STEP_TOO_LARGE, Status.NOT_CONVERGED, Status.NON_FINITE)

@@ -337,7 +337,7 @@ def test_every_warning_says_what_to_do():
 
 
 def test_bits_and_codes_are_those_of_the_kernel():
-    from lgvi_kernels import monitor
+    from lgvi_kernels.advance import monitor
 
     names = {"precision": "PRECISION_LOSS", "drag": "DRAG_STIFF"}
     for row, bit in monitor.BITS.items():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_kernels.dissipation import GAMMA
+from lgvi_kernels.maps.dissipation import GAMMA
 from lgvi_warp.common.status import Status
 from lgvi_warp.physics import energy as invariants
 from tests.extremes import extended

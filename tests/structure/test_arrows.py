@@ -65,7 +65,7 @@ def test_the_reader_finds_both_packages():
         "lgvi_warp.reference.rotation",
         "lgvi_kernels.advance.kernel",
     } <= MODULES.keys()
-    assert all(part(package) for package in ("lgvi_warp.reference", "lgvi_warp.views", "lgvi_kernels.terms"))
+    assert all(part(package) for package in ("lgvi_warp.reference", "lgvi_warp.views", "lgvi_kernels.laws"))
 
 
 @pytest.mark.parametrize(

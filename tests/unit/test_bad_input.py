@@ -10,8 +10,8 @@ import pytest
 import warp as wp
 
 import lgvi_warp as lw
-from lgvi_kernels.lanes import add, lane, mul  # noqa: F401
-from lgvi_kernels.state import struct
+from lgvi_kernels.lanes.arithmetic import add, lane, mul  # noqa: F401
+from lgvi_kernels.lanes.state import struct
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene import scene as scenes
 from lgvi_warp.scene.scene import from_dict
@@ -523,8 +523,8 @@ NOTEBOOK_CELL = """
 import functools
 from typing import Any
 import warp as wp
-from lgvi_kernels.lanes import add, lane, mul
-from lgvi_kernels.state import struct
+from lgvi_kernels.lanes.arithmetic import add, lane, mul
+from lgvi_kernels.lanes.state import struct
 
 @functools.cache
 def params(width, real):

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 import warp as wp
 
-from lgvi_kernels import lane_math as lm
-from lgvi_kernels.flags import CPU_FLAGS
-from lgvi_kernels.lanes import REALS, WIDTHS, lane
+from lgvi_kernels.lanes.arithmetic import REALS, WIDTHS, lane
+from lgvi_kernels.lanes import functions as lm
+from lgvi_kernels.lanes.flags import CPU_FLAGS
 
 NAMES = ("root", "exponential", "sine", "cosine", "logarithm", "decay", "greatest", "clamp")
 FORMATS = {"float64": (wp.float64, np.float64), "float32": (wp.float32, np.float32)}

@@ -10,10 +10,10 @@ import pytest
 import warp as wp
 
 import lgvi_warp as lw
-from lgvi_kernels.lanes import add, cross, div, dot, lane, mul, ones, sub, vec3  # noqa: F401
-from lgvi_kernels.state import struct
-from lgvi_kernels.terms import restoring, tether
-from lgvi_kernels.view import to_body
+from lgvi_kernels.lanes.arithmetic import add, cross, div, dot, lane, mul, ones, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes.state import struct
+from lgvi_kernels.lanes.view import to_body
+from lgvi_kernels.laws import restoring, tether
 from tests.laws import CASES
 
 BUILT_IN = [(f"{name} {i}", term) for name, case in CASES.items() for i, term in enumerate(case.terms)]
@@ -346,7 +346,7 @@ def test_what_is_no_term():
 
 
 def test_a_second_check_builds_no_kernel():
-    from lgvi_kernels.examine import make_examine
+    from lgvi_kernels.advance.examine import make_examine
 
     lw.check_law(CASES["tether"].terms[0])
     before = make_examine.cache_info().misses

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import warp as wp
 
-from lgvi_kernels import lane_math as lm
-from lgvi_kernels.flags import CPU_FLAGS
-from lgvi_kernels.lanes import WIDTHS, int_lane, lane
+from lgvi_kernels.lanes.arithmetic import WIDTHS, int_lane, lane
+from lgvi_kernels.lanes import functions as lm
+from lgvi_kernels.lanes.flags import CPU_FLAGS
 from lgvi_warp.reference import random
 
 N = 250_000

@@ -6,9 +6,23 @@ Also the drift from orthogonality after all steps, neither renormalised.
 import numpy as np
 import warp as wp
 
-from lgvi_kernels.flags import CPU_FLAGS
-from lgvi_kernels.lanes import _native, add, cross, div, dot, lane, lane3, mul, neg, ones, sub, vec3  # noqa: F401
-from lgvi_kernels.rotation import quartic_rotation, quartic_series, rotation_struct, transpose_apply
+from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
+    _native,
+    add,
+    cross,
+    div,
+    dot,
+    lane,
+    lane3,
+    mul,
+    neg,
+    ones,
+    sub,
+    vec3,
+)
+from lgvi_kernels.lanes.flags import CPU_FLAGS
+from lgvi_kernels.lanes.rotations import rotation_struct, transpose_apply
+from lgvi_kernels.maps.rotation import quartic_rotation, quartic_series
 from lgvi_warp.physics import notation
 from lgvi_warp.studies import speed
 

@@ -1,6 +1,6 @@
 """ns per vehicle and step of every method, dtype and width on one core, beside the core's peak."""
 
-from lgvi_kernels.lanes import WIDTHS
+from lgvi_kernels.lanes.arithmetic import WIDTHS
 from lgvi_warp.engine.peak import fma_peak
 from lgvi_warp.methods.method import PROGRAMS
 from lgvi_warp.runs.settle import make_plan

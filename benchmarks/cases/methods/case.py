@@ -5,7 +5,7 @@ alone, at that width (fma_peak). `off` is time times that rate, over the same at
 width is used as well as the default is, and 10 where vectorisation fell off a cliff.
 """
 
-from lgvi_kernels.lanes import WIDTHS
+from lgvi_kernels.lanes.arithmetic import WIDTHS
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.engine.peak import fma_peak
 from lgvi_warp.methods.method import Method

@@ -5,17 +5,17 @@ from typing import Any, NamedTuple
 
 import warp as wp
 
+from lgvi_kernels.advance.events import FIRST
 from lgvi_kernels.advance.retry import make_retry
+from lgvi_kernels.advance.rows import make_rows, make_sample
 from lgvi_kernels.advance.spec import CHUNK, Types, make_types
 from lgvi_kernels.advance.stepping import make_stepping
 from lgvi_kernels.advance.watching import make_watching
-from lgvi_kernels.compose import superpose
-from lgvi_kernels.events import FIRST
-from lgvi_kernels.flags import CPU_FLAGS
-from lgvi_kernels.lanes import add, any_positive, div, mul, neg, ones, positive, sub  # noqa: F401
-from lgvi_kernels.packet import failures, renormalise, turned_too_far
-from lgvi_kernels.rows import make_rows, make_sample
-from lgvi_kernels.sums import at_rest, choose
+from lgvi_kernels.lanes.arithmetic import add, any_positive, div, mul, neg, ones, positive, sub  # noqa: F401
+from lgvi_kernels.lanes.flags import CPU_FLAGS
+from lgvi_kernels.lanes.packet import failures, renormalise, turned_too_far
+from lgvi_kernels.lanes.sums import at_rest, choose
+from lgvi_kernels.maps.compose import superpose
 
 # Where every step is a sample, steps between two looks at the energy: it is then found out so many late.
 SINGLE_LOOKS = 8

@@ -5,13 +5,13 @@ from typing import Any, NamedTuple
 
 import warp as wp
 
+from lgvi_kernels.advance.events import FIRST, make_arrival
+from lgvi_kernels.advance.rows import make_rows
 from lgvi_kernels.advance.spec import make_types
 from lgvi_kernels.advance.stepping import make_stepping
-from lgvi_kernels.events import FIRST, make_arrival
-from lgvi_kernels.lanes import add, any_positive, mul, neg, ones, positive, sub  # noqa: F401
-from lgvi_kernels.packet import failures, turned_too_far
-from lgvi_kernels.rows import make_rows
-from lgvi_kernels.sums import at_rest, choose, settled
+from lgvi_kernels.lanes.arithmetic import add, any_positive, mul, neg, ones, positive, sub  # noqa: F401
+from lgvi_kernels.lanes.packet import failures, turned_too_far
+from lgvi_kernels.lanes.sums import at_rest, choose, settled
 
 # A step without a solution is divided into at most so many.
 MOST_PARTS = 1024

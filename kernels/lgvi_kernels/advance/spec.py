@@ -5,12 +5,12 @@ from typing import Any, NamedTuple
 
 import warp as wp
 
-from lgvi_kernels import monitor as monitors
-from lgvi_kernels.compose import params_of
-from lgvi_kernels.lanes import int_lane, lane
-from lgvi_kernels.rows import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS
-from lgvi_kernels.state import alarm_struct, inertia_struct, state_struct, struct, view_struct
-from lgvi_kernels.terms import drag
+from lgvi_kernels.advance import monitor as monitors
+from lgvi_kernels.advance.rows import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS
+from lgvi_kernels.lanes.arithmetic import int_lane, lane
+from lgvi_kernels.lanes.state import alarm_struct, inertia_struct, state_struct, struct, view_struct
+from lgvi_kernels.laws import drag
+from lgvi_kernels.maps.compose import params_of
 
 # Steps between two looks at the alarms. A chunk with an alarm is repeated one step at a time by the same code.
 CHUNK = 128

@@ -5,13 +5,13 @@ from typing import Any, NamedTuple
 
 import warp as wp
 
+from lgvi_kernels.advance.events import Watch, make_watch
+from lgvi_kernels.advance.method import Step, make_method
+from lgvi_kernels.advance.monitor import make_backward, make_drag_rate
 from lgvi_kernels.advance.spec import make_types
-from lgvi_kernels.events import Watch, make_watch
-from lgvi_kernels.lanes import add, mul  # noqa: F401
-from lgvi_kernels.method import Step, make_method
-from lgvi_kernels.monitor import make_backward, make_drag_rate
-from lgvi_kernels.sums import settled
-from lgvi_kernels.terms import drag_directions
+from lgvi_kernels.lanes.arithmetic import add, mul  # noqa: F401
+from lgvi_kernels.lanes.sums import settled
+from lgvi_kernels.laws import drag_directions
 
 
 class Stepping(NamedTuple):

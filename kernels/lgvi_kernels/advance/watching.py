@@ -9,13 +9,13 @@ from typing import Any, NamedTuple
 
 import warp as wp
 
-from lgvi_kernels import monitor as monitors
+from lgvi_kernels.advance import monitor as monitors
 from lgvi_kernels.advance.spec import make_types
 from lgvi_kernels.advance.stepping import make_stepping
-from lgvi_kernels.compose import superpose
-from lgvi_kernels.lanes import add, any_positive, div, mul, neg, ones, positive, sub  # noqa: F401
-from lgvi_kernels.state import damping_struct
-from lgvi_kernels.terms import drag_directions
+from lgvi_kernels.lanes.arithmetic import add, any_positive, div, mul, neg, ones, positive, sub  # noqa: F401
+from lgvi_kernels.lanes.state import damping_struct
+from lgvi_kernels.laws import drag_directions
+from lgvi_kernels.maps.compose import superpose
 
 
 class Watching(NamedTuple):

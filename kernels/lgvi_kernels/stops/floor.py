@@ -5,8 +5,8 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes import lane, sub  # noqa: F401
-from lgvi_kernels.state import struct
+from lgvi_kernels.lanes.arithmetic import lane, sub  # noqa: F401
+from lgvi_kernels.lanes.state import struct
 
 
 @functools.cache

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from lgvi_kernels.examine import COLUMNS, OUT_FIELDS, make_examine
+from lgvi_kernels.advance.examine import COLUMNS, OUT_FIELDS, make_examine
 from lgvi_warp.common import warp_setup
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.machine import default_width

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lgvi_kernels.laws import LAWS
 from lgvi_kernels.stops import STOPS
-from lgvi_kernels.terms import LAWS
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.machine import default_width
 from lgvi_warp.engine import model

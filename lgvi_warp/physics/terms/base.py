@@ -87,7 +87,7 @@ class Term:
 
     Fields declared by `quantity` are arrays after construction.
 
-    Class attributes: `type` is the name in a scene file; `device` is the module of lgvi_kernels.terms by name, or any object
+    Class attributes: `type` is the name in a scene file; `device` is the module of lgvi_kernels.laws by name, or any object
     with the same functions; `timed` says whether the law depends on time; `dissipative`, whether its damping never creates
     energy. docs/develop/add_a_force.md shows how to write one.
 
@@ -205,7 +205,7 @@ class Term:
             aligned: As of `Setting`: whether the kernel's axes and origin are the user's.
 
         Returns:
-            The name of a module of lgvi_kernels.terms, or an object with the same functions.
+            The name of a module of lgvi_kernels.laws, or an object with the same functions.
         """
         return self.device
 

@@ -96,7 +96,7 @@ def _degenerate(chord: np.ndarray, normal: np.ndarray) -> Any:
 def fin_rows(own: Numbers, setting: Setting) -> np.ndarray:
     """Device rows of fins: the twists c and n along chord and normal, rho A/2 times the three coefficients, and S and W.
 
-    S = c c^T + n n^T and W = n c^T - c n^T, block by block (lgvi_kernels/terms/fins.py).
+    S = c c^T + n n^T and W = n c^T - c n^T, block by block (lgvi_kernels/laws/fins.py).
 
     Args:
         own: The term's numbers by field, each of shape (members, fins, ...).

@@ -1,0 +1,103 @@
+"""One law alone, at given views: what lgvi_warp.law_check compares with finite differences."""
+
+import functools
+from typing import Any, NamedTuple
+
+import warp as wp
+
+from lgvi_kernels.lanes.arithmetic import add, lane, mul, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes.packet import put
+from lgvi_kernels.lanes.state import damping_struct, flow_struct, view_struct, wrench_struct
+from lgvi_kernels.maps.compose import params_of, plays, superpose
+
+# Numbers of a view in `views[packet, field]`: R row by row, b, nu, Om.
+VIEW_FIELDS = 18
+
+# What comes out -> (first column, numbers); a role that the law does not have leaves zeros.
+COLUMNS = {"law": (0, 6), "damping": (6, 36), "flow": (42, 15), "distance": (57, 1), "energy": (58, 1)}
+OUT_FIELDS = 59
+
+
+class Examine(NamedTuple):
+    """A kernel and the types of its arguments."""
+
+    kernel: Any
+    Lane: Any
+    Params: Any
+
+
+@functools.cache
+def make_examine(module, width, real):
+    """Build (without compiling) the kernel that evaluates this module's functions."""
+    Lane, View, Params = lane(width, real), view_struct(width, real), params_of((module,), width, real)
+    Wrench, Damping, Flow = (make(width, real) for make in (wrench_struct, damping_struct, flow_struct))
+    law, damping, flow, evolve = (superpose((module,), role) for role in ("law", "damping", "flow", "evolve"))
+    distance, energy = plays(module, "distance"), superpose((module,), "energy")
+
+    @wp.func
+    def put_rows(out: wp.array2d(dtype=Lane), i: int, first: int, m: Any):
+        """Write the blocks of rows of a 6x6 matrix, 6 numbers apart."""
+        put(out, i, first, m.row0)
+        put(out, i, first + 6, m.row1)
+        put(out, i, first + 12, m.row2)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def examine(
+        # the law's numbers
+        params: wp.array(dtype=Params),
+        table: wp.array2d(dtype=Lane),
+        # the views: in space, in time, length and number of the kick; second: -1 evaluates, 0 and 1 call evolve instead
+        views: wp.array2d(dtype=Lane),
+        times: wp.array(dtype=real),
+        h: real,
+        step: int,
+        second: int,
+        # in and out
+        memory: wp.array2d(dtype=Lane),
+        # out
+        out: wp.array2d(dtype=Lane),
+    ):
+        i = wp.tid()
+        p = params[i % params.shape[0]]
+        view = View()
+        view.north = vec3(views[i, 0], views[i, 1], views[i, 2])
+        view.east = vec3(views[i, 3], views[i, 4], views[i, 5])
+        view.down = vec3(views[i, 6], views[i, 7], views[i, 8])
+        view.b = vec3(views[i, 9], views[i, 10], views[i, 11])
+        view.nu = vec3(views[i, 12], views[i, 13], views[i, 14])
+        view.Om = vec3(views[i, 15], views[i, 16], views[i, 17])
+        view.t = times[i]
+        view.h = h
+        view.step = step
+        view.table = table
+        view.memory = memory
+        view.packet = i
+        view.entry = i % table.shape[0]
+        if second >= 0:
+            if wp.static(evolve is not None):
+                view.second = second
+                view = evolve(view, view, p)
+        else:
+            if wp.static(law is not None):
+                w = law(Wrench(), view, p)
+                put(out, i, 0, w.force)
+                put(out, i, 3, w.torque)
+            if wp.static(damping is not None):
+                D = damping(Damping(), view, p)
+                put_rows(out, i, 6, D.force_velocity)
+                put_rows(out, i, 9, D.force_rate)
+                put_rows(out, i, 24, D.torque_velocity)
+                put_rows(out, i, 27, D.torque_rate)
+            if wp.static(flow is not None):
+                f = flow(Flow(), view, p)
+                put(out, i, 42, f.velocity)
+                put(out, i, 45, f.rate)
+                put(out, i, 48, f.by_north)
+                put(out, i, 51, f.by_east)
+                put(out, i, 54, f.by_depth)
+            if wp.static(distance is not None):
+                out[i, 57] = distance(view, p.own)
+            if wp.static(energy is not None):
+                out[i, 58] = energy(view.b.x - view.b.x, view, p)
+
+    return Examine(examine, Lane, Params)

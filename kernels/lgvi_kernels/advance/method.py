@@ -1,0 +1,212 @@
+"""A method's step from its sub-maps, for what the scene has: which laws act where, and how velocities follow."""
+
+from typing import Any, NamedTuple
+
+import warp as wp
+
+from lgvi_kernels.lanes.arithmetic import add, div, mul, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes.matrix3 import apply, factor_struct, transpose_times
+from lgvi_kernels.lanes.rotations import rotation_struct
+from lgvi_kernels.lanes.state import damping_struct, flow_struct, matrix3_struct, view_struct, wrench_struct
+from lgvi_kernels.lanes.view import to_body
+from lgvi_kernels.laws import drag, drag_directions
+from lgvi_kernels.maps import turns
+from lgvi_kernels.maps.collocation import make_G
+from lgvi_kernels.maps.compose import superpose
+from lgvi_kernels.maps.coupled import make_W
+from lgvi_kernels.maps.dissipation import make_V
+from lgvi_kernels.maps.explicit import in_body, make_explicit
+from lgvi_kernels.maps.forces import make_forces
+from lgvi_kernels.maps.paper import make_phi
+from lgvi_kernels.maps.solve import make_solve
+from lgvi_kernels.maps.submaps import (
+    Ap,
+    anisotropic_velocity,
+    fold,
+    fold_pair,
+    isotropic_velocity,
+    look,
+    make_Ab,
+    make_D,
+    make_K,
+    make_T,
+    rotate,
+)
+from lgvi_kernels.maps.two_part import make_A, make_B
+from lgvi_kernels.maps.water import make_shear
+
+
+class Step(NamedTuple):
+    """Functions of a method: one stage without its lead, the lead, the velocities of a state, E's set-up, the current.
+
+    velocities_of_forces: those at the origin of the forces.
+    momentum: p of a state that holds R p in its place, or None.
+    """
+
+    step: Any
+    lead: Any
+    velocities: Any
+    prepare: Any
+    water_velocity: Any
+    velocities_of_forces: Any
+    momentum: Any = None
+
+
+@wp.func
+def direct_velocity(inertia: Any, p: Any):
+    """The same for diagonal M by one product, for methods that ask many times: the compiler keeps the sums."""
+    A = inertia.anisotropy
+    mean = inertia.mean
+    return vec3((mean + A.x) * p.x, (mean + A.y) * p.y, (mean + A.z) * p.z)
+
+
+@wp.func
+def divided(inertia: Any, pi: Any):
+    """J^-1 pi."""
+    return pi / inertia.J
+
+
+@wp.func
+def multiplied(inertia: Any, pi: Any):
+    """The same without a division, for methods that ask many times a step."""
+    return inertia.inverse_J * pi
+
+
+def make_velocities(velocity, turning, coupled):
+    """(inertia, p, pi) -> (nu, Om) at the origin of the state, and the same at that of the forces.
+
+    velocity: M^-1 p; turning: J^-1 of a vector.
+    """
+    if not coupled:
+
+        @wp.func
+        def velocities(inertia: Any, p: Any, pi: Any):
+            """nu = M^-1 p, Om = J^-1 pi."""
+            return velocity(inertia, p), turning(inertia, pi)
+
+        return velocities, velocities
+
+    @wp.func
+    def velocities_of_state(inertia: Any, p: Any, pi: Any):
+        """Om = Js^-1 (pi - E^T p), nu = M^-1 p - E Om."""
+        Om = turning(inertia, pi - transpose_times(inertia.E, p))
+        return velocity(inertia, p) - apply(inertia.E, Om), Om
+
+    @wp.func
+    def velocities_of_forces(inertia: Any, p: Any, pi: Any):
+        """The same where the forces act."""
+        Om = turning(inertia, pi - transpose_times(inertia.E_forces, p))
+        return velocity(inertia, p) - apply(inertia.E_forces, Om), Om
+
+    return velocities_of_state, velocities_of_forces
+
+
+def make_damping(laws, shear):
+    """D of the damping laws, and of water that varies in space. None if there is neither."""
+    damping = superpose(laws, "damping")
+    if damping is None and shear is None:
+        return None
+
+    @wp.func
+    def total(D: Any, view: Any, water: Any, c: Any):
+        if wp.static(damping is not None):
+            D = damping(D, view, c.params)
+        if wp.static(shear is not None):
+            D = shear(D, view, c.inertia, water)
+        return D
+
+    return total
+
+
+def make_method(spec):
+    """The functions of a method for this Spec."""
+    width, real = spec.width, spec.real
+    structs = (make(width, real) for make in (view_struct, wrench_struct, flow_struct, damping_struct))
+    View, Wrench, Flow, Damping = structs
+    coupled, shifted = "coupled" in spec.parts, "origin" in spec.parts
+    velocity = isotropic_velocity if spec.mass == "isotropic" else anisotropic_velocity
+    if spec.explicit and spec.mass == "diagonal":
+        velocity = direct_velocity
+    turning = multiplied if spec.explicit else divided
+    velocities, velocities_of_forces = make_velocities(velocity, turning, coupled)
+    laws = spec.laws
+    law, flow, evolve = (superpose(laws, role) for role in ("law", "flow", "evolve"))
+    varies = spec.flow in ("uniform", "varying")
+    shear = make_shear(matrix3_struct(width, real), coupled, shifted) if spec.flow == "varying" else None
+    damping = make_damping(laws, shear)
+    prepare, exact = None, None
+    if spec.drag and spec.explicit is None:
+        by_axes = laws[0] is drag
+        prepare, exact = (
+            drag.make_E(spec.drag, spec.compensated)
+            if by_axes
+            else drag_directions.make_E(spec.drag, velocities_of_forces)
+        )
+
+    @wp.func
+    def E(x: Any, c: Any, h: Any):
+        """Drag by its exact flow; its constants are at hand for the whole step, and made for any other."""
+        if h == c.drag.h:
+            x = exact(x, c.drag, c)
+        else:
+            x = exact(x, prepare(c.drag, c.params.own, h), c)
+        return x
+
+    @wp.func
+    def water_velocity(x: Any, c: Any, h: Any):
+        """R^T u where the vehicle is."""
+        view = look(View(), x, c, h)
+        if wp.static(shifted):
+            view.b = view.b + rotate(x, c.inertia.user_origin)
+        return to_body(view, flow(Flow(), view, c.params).velocity)
+
+    if spec.explicit is not None:
+        acting = (View, Wrench, Flow, Damping, law, damping, flow, varies, shifted)
+        step = make_explicit(spec, make_forces(*acting)[0], velocities)
+        momentum = in_body if spec.inertial else None
+        return Step(step, step, velocities, prepare, water_velocity, velocities_of_forces, momentum)
+    V = None
+    if damping is not None and spec.averages is None:
+        V = make_V(damping, velocities_of_forces, Damping, factor_struct(width, real), coupled)
+    solve, solve_within = make_solve(real, spec.solver, spec.iterations, spec.adaptive, spec.checked)
+    used = {letter for letter, _ in spec.maps} | ({spec.lead[0]} if spec.lead else set())
+    letters = {
+        "Ab": make_Ab(velocity, spec.timed),
+        "Ap": Ap,
+        "T": make_T(spec.timed, spec.compensated),
+        "D": make_D(rotation_struct(width, real), solve, spec.compensated),
+    }
+    if "K" in used:
+        letters["K"] = make_K(View, Wrench, Flow, law, evolve, flow, varies, shifted, E if spec.drag else None, V)
+    if "W" in used:
+        letters["W"] = make_W(rotation_struct(width, real), rotate, spec.iterations, spec.adaptive, spec.checked)
+    if "modified" in spec.parts:
+        drift = letters["Ab"] if spec.mass == "isotropic" else letters["T"]
+        letters["A"] = make_A(rotation_struct(width, real), solve_within, View, Wrench, law)
+        letters["B"] = make_B(drift, View, Wrench, law)
+    if spec.gauss:
+        functions = (View, Wrench, law, velocities)
+        letters["G"] = make_G(spec.gauss, *functions, spec.iterations, spec.adaptive, spec.checked, spec.timed)
+    U12, U13, U23, *pitched = spec.coupling
+    for letter in used:
+        if letter[0] == "h":
+            letters[letter] = turns.make_hop(int(letter[1]) - 1, int(letter[2]) - 1, U12, U13, U23, spec.compensated)
+    if spec.averages is not None:
+        force, potential = superpose(laws, "force"), superpose(laws, "potential")
+        _, forces, current = make_forces(View, Wrench, Flow, Damping, force, damping, flow, varies, shifted)
+        maps = (letters["Ab"], None if spec.mass == "isotropic" else Ap, letters["D"])
+        functions = (View, Wrench, potential, forces, current, evolve, velocities)
+        letters["Phi"], letters["Phi*"] = make_phi(maps, functions, *spec.averages)
+    maps = []
+    for i, (letter, coefficient) in enumerate(spec.maps):
+        if letter[0] == "R":
+            axes = [int(other[1]) - 1 for other, _ in (*spec.maps[i:], *spec.maps[:i]) if other[0] == "R"]
+            following = next((axis for axis in axes if axis != axes[0]), axes[0])
+            watched = spec.checked and not any(other[0] == "R" for other, _ in spec.maps[i + 1 :])
+            turn = turns.make_turn(axes[0], pitched[axes[0]], following, spec.compensated, watched)
+            maps.append((turn, coefficient))
+        else:
+            maps.append((letters[letter], coefficient))
+    step = fold_pair(tuple(maps)) if spec.paired else fold(tuple(maps))
+    lead = letters[spec.lead[0]] if spec.lead else step
+    return Step(step, lead, velocities, prepare, water_velocity, velocities_of_forces)

@@ -1,0 +1,1 @@
+"""Numbers, vectors, matrices and states of a packet of vehicles, side by side in SIMD lanes."""

@@ -1,0 +1,226 @@
+"""Lane arithmetic: one Warp thread advances a packet of W vehicles, side by side in SIMD lanes.
+
+A `Lane` is wp.vec(W): one number of W vehicles. A `Lane3` is a struct of three lanes: one 3-vector of W vehicles.
+A module that imports the operators `add`, `sub`, `neg`, `mul`, `div` from here gets `+ - * /` between them lane by lane
+(Warp looks an operator's name up among the module's functions first), so formulas read as they would for one vehicle.
+
+Each operator is one expression of Clang's vector types: every width and every size of kernel becomes SIMD instructions,
+whether or not an automatic vectoriser would have found them. With one lane (CUDA) the same expressions are plain numbers.
+"""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+WIDTHS = (1, 2, 4, 8, 16, 32)
+REALS = (wp.float32, wp.float64)
+
+
+@functools.cache
+def lane(width, real):
+    """Type of one number of `width` vehicles."""
+    return wp.types.vector(width, real)
+
+
+@functools.cache
+def int_lane(width):
+    """Type of one int32 of `width` vehicles."""
+    return wp.types.vector(width, wp.int32)
+
+
+@functools.cache
+def lane3(width, real):
+    """Type of one 3-vector of `width` vehicles."""
+    Lane = lane(width, real)
+
+    @wp.struct
+    class Lane3:
+        x: Lane
+        y: Lane
+        z: Lane
+
+    return Lane3
+
+
+@functools.cache
+def symmetric3(width, real):
+    """Type of one symmetric 3x3 matrix of `width` vehicles: diagonal 11, 22, 33 and off-diagonal 23, 31, 12."""
+    Lane3 = lane3(width, real)
+
+    @wp.struct
+    class Symmetric3:
+        diagonal: Lane3
+        off_diagonal: Lane3
+
+    return Symmetric3
+
+
+def _head(width, real, arguments):
+    """C++ that declares the vector type V and copies the lanes a, b, c into vectors A, B, C."""
+    name = "wp::float32" if real == wp.float32 else "wp::float64"
+    size = width * (4 if real == wp.float32 else 8)
+    vector = "S V" if width == 1 else f"S V __attribute__((vector_size({size})))"
+    loads = "".join(f" V {v}; memcpy(&{v}, &{v.lower()}, sizeof(V));" for v in arguments)
+    return f"typedef {name} S; typedef {vector};{loads}"
+
+
+def _native(width, real, arguments, expression):
+    """C++ of a function of the lanes a, b, c: the expression is written in their vectors A, B, C (and a number s)."""
+    result = f"V R = {expression}; wp::vec_t<{width}, S> r; memcpy(&r, &R, sizeof(V)); return r;"
+    return f"{_head(width, real, arguments)} {result}"
+
+
+def _native_any_positive(width, real):
+    """C++ of: some lane of `a` is positive. The maximum would not do: it may drop a lane beside one that is NaN."""
+    if width == 1:
+        return "return a[0] > 0;"
+    return f"{_head(width, real, 'A')} return __builtin_reduce_or(A > (S)0) != 0;"
+
+
+def _native_element(width, real, statement):
+    """C++ that reads or writes a lane r at its place in a two-dimensional array."""
+    kind = f"wp::vec_t<{width}, wp::{real.__name__}>"
+    place = f"{kind}* place = ({kind}*)rows.data + ((wp::int64)(entry * rows.shape[1] + row) + offset);"
+    return f"{kind} r; {place} {statement}"
+
+
+def _vec3_maker(width, real):
+    """The constructor of a Lane3, bound to its type: an overload's body would look the type up too late."""
+    Lane, Lane3 = lane(width, real), lane3(width, real)
+
+    @wp.func
+    def make(x: Lane, y: Lane, z: Lane):
+        return Lane3(x, y, z)
+
+    return make
+
+
+# Definitions of one name at module level become overloads of one Warp function; inside a factory they would not.
+for _real in REALS:
+    for _width in WIDTHS:
+        _R, _L, _L3, _S3 = _real, lane(_width, _real), lane3(_width, _real), symmetric3(_width, _real)
+        _make = _vec3_maker(_width, _real)
+        _native_here = functools.partial(_native, _width, _real)
+
+        @wp.func_native(_native_here("AB", "A + B"))
+        def add(a: _L, b: _L) -> _L: ...
+
+        @wp.func_native(_native_here("AB", "A - B"))
+        def sub(a: _L, b: _L) -> _L: ...
+
+        @wp.func_native(_native_here("A", "-A"))
+        def neg(a: _L) -> _L: ...
+
+        @wp.func_native(_native_here("AB", "A * B"))
+        def mul(a: _L, b: _L) -> _L: ...
+
+        @wp.func_native(_native_here("A", "s * A"))
+        def mul(s: _R, a: _L) -> _L: ...
+
+        @wp.func_native(_native_here("AB", "A / B"))
+        def div(a: _L, b: _L) -> _L: ...
+
+        @wp.func_native(_native_here("A", "A < (S)0 ? -A : A"))
+        def absolute(a: _L) -> _L: ...
+
+        @wp.func_native(_native_here("AB", "A < B ? A : B"))
+        def least(a: _L, b: _L) -> _L: ...
+
+        @wp.func_native(_native_here("AB", "A < B ? B : A"))
+        def largest(a: _L, b: _L) -> _L: ...
+
+        @wp.func_native(_native_here("", "V() + (S)1"))
+        def ones(like: _L) -> _L:
+            """1 in every lane."""
+            ...
+
+        @wp.func_native(_native_here("ABC", "A > (S)0 ? B : C"))
+        def positive(a: _L, b: _L, c: _L) -> _L:
+            """`b` in the lanes where a > 0, `c` in the others (and where a is not a number)."""
+            ...
+
+        @wp.func_native(_native_any_positive(_width, _real))
+        def any_positive(a: _L) -> bool:
+            """Whether some lane is positive."""
+            ...
+
+        @wp.func_native(_native_element(_width, _real, "memcpy(&r, place, sizeof(r)); return r;"))
+        def element(rows: wp.array2d(dtype=_L), entry: int, row: int, offset: int) -> _L:
+            """rows[entry, row + offset] of an array without gaps: one address serves all (constant) offsets."""
+            ...
+
+        @wp.func_native(_native_element(_width, _real, "memcpy(place, &value, sizeof(r));"))
+        def set_element(rows: wp.array2d(dtype=_L), entry: int, row: int, offset: int, value: _L):
+            """rows[entry, row + offset] = value."""
+            ...
+
+        @wp.func
+        def vec3(x: _L, y: _L, z: _L):
+            return wp.static(_make)(x, y, z)
+
+        @wp.func
+        def add(a: _L3, b: _L3):
+            return vec3(a.x + b.x, a.y + b.y, a.z + b.z)
+
+        @wp.func
+        def sub(a: _L3, b: _L3):
+            return vec3(a.x - b.x, a.y - b.y, a.z - b.z)
+
+        @wp.func
+        def mul(a: _L3, b: _L3):
+            return vec3(a.x * b.x, a.y * b.y, a.z * b.z)
+
+        @wp.func
+        def mul(a: _L, b: _L3):
+            return vec3(a * b.x, a * b.y, a * b.z)
+
+        @wp.func
+        def mul(s: _R, b: _L3):
+            return vec3(s * b.x, s * b.y, s * b.z)
+
+        @wp.func
+        def mul(a: _S3, b: _L3):
+            d = a.diagonal
+            o = a.off_diagonal
+            return vec3(
+                d.x * b.x + o.z * b.y + o.y * b.z, o.z * b.x + d.y * b.y + o.x * b.z, o.y * b.x + o.x * b.y + d.z * b.z
+            )
+
+        @wp.func
+        def div(a: _L3, b: _L3):
+            return vec3(a.x / b.x, a.y / b.y, a.z / b.z)
+
+        @wp.func
+        def positive(a: _L, b: _L3, c: _L3):
+            return vec3(positive(a, b.x, c.x), positive(a, b.y, c.y), positive(a, b.z, c.z))
+
+
+@wp.func
+def dot(a: Any, b: Any):
+    """a.b, lane by lane."""
+    return a.x * b.x + a.y * b.y + a.z * b.z
+
+
+@wp.func
+def cross(a: Any, b: Any):
+    """a x b, lane by lane."""
+    return vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
+
+
+@wp.func
+def component_x(v: Any):
+    """v.x."""
+    return v.x
+
+
+@wp.func
+def component_y(v: Any):
+    """v.y."""
+    return v.y
+
+
+@wp.func
+def component_z(v: Any):
+    """v.z."""
+    return v.z

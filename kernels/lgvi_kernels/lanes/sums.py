@@ -1,0 +1,181 @@
+"""What is added to a state, by the type of the state: plainly, or with compensation, where each number is a sum of two.
+
+Compensated (W. Kahan 1965), v + v_low: a change is added to what v had no digits for, v takes of it what it can hold, and
+v_low keeps the rest, exactly. The round-off of a step is then that of its changes, which are small, not that of the state.
+b alone is settled once a step: drifts add to b_low until then. A kernel without compensation has no trace of all this.
+"""
+
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lanes.arithmetic import REALS, WIDTHS, add, lane, lane3, mul, ones, positive, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes.packet import choose_vectors, vectors_at_rest
+from lgvi_kernels.lanes.rotations import transpose_apply
+from lgvi_kernels.lanes.state import state_struct
+
+
+@wp.func
+def carried(v: Any, low: Any, d: Any):
+    """v + low + d as (v, low): exact but for the sum low + d where |low + d| < |v|, else to the round-off of d."""
+    y = low + d
+    t = v + y
+    return t, y - (t - v)
+
+
+@wp.func
+def carried_turn(v: Any, low: Any, F: Any):
+    """F^T v with compensation: (v, low)."""
+    return carried(v, low, v.x * F.row0 + v.y * F.row1 + v.z * F.row2)
+
+
+@wp.func
+def with_turned(
+    x: Any,
+    p: Any,
+    p_low: Any,
+    pi: Any,
+    pi_low: Any,
+    R0: Any,
+    R0_low: Any,
+    R1: Any,
+    R1_low: Any,
+    R2: Any,
+    R2_low: Any,
+):
+    """The state with these p, pi and R."""
+    x.p = p
+    x.p_low = p_low
+    x.pi = pi
+    x.pi_low = pi_low
+    x.R0 = R0
+    x.R0_low = R0_low
+    x.R1 = R1
+    x.R1_low = R1_low
+    x.R2 = R2
+    x.R2_low = R2_low
+    return x
+
+
+for _width in WIDTHS:
+    for _real in REALS:
+        _State, _L, _L3 = state_struct(_width, _real), lane(_width, _real), lane3(_width, _real)
+
+        @wp.func
+        def place(x: _State):
+            """b, as laws see it."""
+            return x.b
+
+        @wp.func
+        def moved(x: _State, d: _L3):
+            """b <- b + d."""
+            x.b = x.b + d
+            return x
+
+        @wp.func
+        def moved_from(x: _State, start: _State, d: _L3):
+            """b <- b of `start` + d."""
+            x.b = start.b + d
+            return x
+
+        @wp.func
+        def pushed(x: _State, d: _L3):
+            """p <- p + d."""
+            x.p = x.p + d
+            return x
+
+        @wp.func
+        def twisted(x: _State, d: _L3):
+            """pi <- pi + d."""
+            x.pi = x.pi + d
+            return x
+
+        @wp.func
+        def turned(x: _State, F: Any):
+            """p <- F^T p, pi <- F^T pi, R <- R F."""
+            x.p = transpose_apply(F, x.p)
+            x.pi = transpose_apply(F, x.pi)
+            x.R0 = transpose_apply(F, x.R0)
+            x.R1 = transpose_apply(F, x.R1)
+            x.R2 = transpose_apply(F, x.R2)
+            return x
+
+        @wp.func
+        def choose(test: _L, yes: _State, no: _State):
+            """`yes` in the lanes where test > 0: all of the state but the alarm."""
+            return choose_vectors(test, yes, no)
+
+        @wp.func
+        def at_rest(x: _State):
+            """The same vehicles at rest at the origin."""
+            return vectors_at_rest(x)
+
+    _State, _L, _L3 = state_struct(_width, wp.float32, True), lane(_width, wp.float32), lane3(_width, wp.float32)
+
+    @wp.func
+    def place(x: _State):
+        return x.b + x.b_low
+
+    @wp.func
+    def moved(x: _State, d: _L3):
+        x.b_low = x.b_low + d
+        return x
+
+    @wp.func
+    def moved_from(x: _State, start: _State, d: _L3):
+        x.b_low = start.b_low + d
+        return x
+
+    @wp.func
+    def settled(x: _State):
+        """b takes of b_low what it can hold."""
+        b = x.b + x.b_low
+        x.b_low = x.b_low - (b - x.b)
+        x.b = b
+        return x
+
+    @wp.func
+    def pushed(x: _State, d: _L3):
+        p, low = carried(x.p, x.p_low, d)
+        x.p = p
+        x.p_low = low
+        return x
+
+    @wp.func
+    def twisted(x: _State, d: _L3):
+        pi, low = carried(x.pi, x.pi_low, d)
+        x.pi = pi
+        x.pi_low = low
+        return x
+
+    @wp.func
+    def turned(x: _State, F: Any):
+        p, p_low = carried_turn(x.p, x.p_low, F)
+        pi, pi_low = carried_turn(x.pi, x.pi_low, F)
+        R0, R0_low = carried_turn(x.R0, x.R0_low, F)
+        R1, R1_low = carried_turn(x.R1, x.R1_low, F)
+        R2, R2_low = carried_turn(x.R2, x.R2_low, F)
+        return with_turned(x, p, p_low, pi, pi_low, R0, R0_low, R1, R1_low, R2, R2_low)
+
+    @wp.func
+    def choose(test: _L, yes: _State, no: _State):
+        no = choose_vectors(test, yes, no)
+        no.R0_low = positive(test, yes.R0_low, no.R0_low)
+        no.R1_low = positive(test, yes.R1_low, no.R1_low)
+        no.R2_low = positive(test, yes.R2_low, no.R2_low)
+        no.b_low = positive(test, yes.b_low, no.b_low)
+        no.p_low = positive(test, yes.p_low, no.p_low)
+        no.pi_low = positive(test, yes.pi_low, no.pi_low)
+        return no
+
+    @wp.func
+    def at_rest(x: _State):
+        x = vectors_at_rest(x)
+        none = x.b
+        x.R0_low = none
+        x.R1_low = none
+        x.R2_low = none
+        x.b_low = none
+        x.p_low = none
+        x.pi_low = none
+        return x

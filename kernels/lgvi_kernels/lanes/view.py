@@ -1,0 +1,121 @@
+"""What laws do with a View: turn vectors, read rows of their table, find velocities at a point, sum damping."""
+
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lanes.arithmetic import add, cross, dot, element, mul, neg, ones, set_element, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes.functions import clamp
+
+
+@wp.func
+def to_body(view: Any, v: Any):
+    """R^T v: a vector of inertial axes in body axes."""
+    return v.x * view.north + v.y * view.east + v.z * view.down
+
+
+@wp.func
+def to_inertial(view: Any, v: Any):
+    """R v: a vector of body axes in inertial axes."""
+    return vec3(dot(view.north, v), dot(view.east, v), dot(view.down, v))
+
+
+@wp.func
+def velocity_at(view: Any, r: Any):
+    """nu + Om x r: the velocity of the body's point r through the water, body axes [m/s]."""
+    return view.nu + cross(view.Om, r)
+
+
+@wp.func
+def row1(view: Any, row: int):
+    """One number of the law's table."""
+    return element(view.table, view.entry, row, 0)
+
+
+@wp.func
+def row3(view: Any, row: int):
+    """Three rows of the law's table as a vector."""
+    t = view.table
+    i = view.entry
+    return vec3(element(t, i, row, 0), element(t, i, row, 1), element(t, i, row, 2))
+
+
+@wp.func
+def remembered(view: Any, row: int):
+    """One number that the law remembers."""
+    return element(view.memory, view.packet, row, 0)
+
+
+@wp.func
+def remember(view: Any, row: int, value: Any):
+    """Keep a number for later, in this step or a following one."""
+    set_element(view.memory, view.packet, row, 0, value)
+
+
+@wp.func
+def ramp(view: Any, row: int, x: Any):
+    """How far x is from one knot to the next, 0 to 1, from the two rows that hold the knot and 1 / the distance."""
+    one = ones(x)
+    t = view.table
+    i = view.entry
+    return clamp((x - element(t, i, row, 0)) * element(t, i, row, 1), one - one, one)
+
+
+@wp.func
+def table1(view: Any, first: int, count: int, x: Any):
+    """A table's value at x: row `first` holds the first value, then 3 rows a knot: knot, 1 / distance, difference."""
+    value = row1(view, first)
+    for i in range(count):
+        at = first + 1 + 3 * i
+        value = value + ramp(view, at, x) * element(view.table, view.entry, at, 2)
+    return value
+
+
+@wp.func
+def table3(view: Any, first: int, count: int, x: Any):
+    """The same for vectors: 3 rows for the first value, then 5 rows a knot: knot, 1 / distance, 3 differences."""
+    value = row3(view, first)
+    for i in range(count):
+        at = first + 3 + 5 * i
+        change = vec3(
+            element(view.table, view.entry, at, 2),
+            element(view.table, view.entry, at, 3),
+            element(view.table, view.entry, at, 4),
+        )
+        value = value + ramp(view, at, x) * change
+    return value
+
+
+@wp.func
+def command(view: Any, first: int, count: int, limit: Any, t: Any):
+    """A command from its table (see table1) at the time t, kept within a limit."""
+    return clamp(table1(view, first, count, t * ones(limit)), -limit, limit)
+
+
+@wp.func
+def middle_of_half(view: Any):
+    """The time in the middle of this half of a kick, for laws that remember."""
+    quarter = view.h.dtype(0.25) * view.h
+    t = view.t - quarter
+    if view.second > 0:
+        t = view.t + quarter
+    return t
+
+
+@wp.func
+def add_outer(D: Any, force: Any, torque: Any, velocity: Any, rate: Any):
+    """D + (force; torque) (velocity; rate)^T: what acts along one wrench in proportion to one velocity."""
+    D.force_velocity = add_rows(D.force_velocity, force, velocity)
+    D.force_rate = add_rows(D.force_rate, force, rate)
+    D.torque_velocity = add_rows(D.torque_velocity, torque, velocity)
+    D.torque_rate = add_rows(D.torque_rate, torque, rate)
+    return D
+
+
+@wp.func
+def add_rows(m: Any, a: Any, b: Any):
+    """m + a b^T."""
+    m.row0 = m.row0 + a.x * b
+    m.row1 = m.row1 + a.y * b
+    m.row2 = m.row2 + a.z * b
+    return m

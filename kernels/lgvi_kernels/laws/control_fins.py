@@ -1,0 +1,72 @@
+"""Control fins: fins that turn about their span to a command, within a limit and no faster than a rate."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lanes.arithmetic import add, mul, neg, ones, sub  # noqa: F401
+from lgvi_kernels.lanes.functions import clamp, cosine, sine
+from lgvi_kernels.lanes.state import struct
+from lgvi_kernels.lanes.view import command, middle_of_half, remember, remembered, row1
+from lgvi_kernels.laws import fins
+from lgvi_kernels.laws.fins import add_fins, note_lift_and_drag, speed_along
+
+# Rows of one fin: those of fins.ROWS, limit, and limit of the rate.
+LIMIT = fins.ROWS
+RATE = fins.ROWS + 1
+ROWS = fins.ROWS + 2
+
+
+@functools.cache
+def params(width, real):
+    """Params: count of fins and of knots of their commands; first row of the table and of the memory.
+
+    Rows: for each fin ROWS numbers, then for each its table of commands over time (see view.table1).
+    Memory: one row a fin, its deflection; none unless `limited`. Work: two rows a fin.
+    """
+    places = {"first": wp.int32, "memory": wp.int32, "work": wp.int32}
+    return struct("ControlFins", **places, count=wp.int32, knots=wp.int32, limited=wp.int32)
+
+
+@wp.func
+def commanded(view: Any, p: Any, i: int, t: Any):
+    """The command of fin i at time t, within its limit."""
+    first = p.first + wp.static(ROWS) * p.count + i * (1 + 3 * p.knots)
+    return command(view, first, p.knots, row1(view, p.first + wp.static(ROWS) * i + wp.static(LIMIT)), t)
+
+
+@wp.func
+def evolve(state: Any, view: Any, p: Any):
+    """|deflection'| <= rate: towards the command over half a kick, the command that of the middle of that half."""
+    if p.limited > 0:
+        t = middle_of_half(view)
+        half = view.h.dtype(0.5) * view.h
+        for i in range(p.count):
+            angle = remembered(view, p.memory + i)
+            change = commanded(view, p, i, t) - angle
+            most = half * row1(view, p.first + wp.static(ROWS) * i + wp.static(RATE))
+            remember(view, p.memory + i, angle + clamp(change, -most, most))
+    return state
+
+
+@wp.func
+def damping(D: Any, view: Any, p: Any):
+    """D = sum over fins, each seen from its turned axes c' = cos c + sin n, n' = cos n - sin c.
+
+    S and W are those of the axes that are not turned: lift and drag are across and along the flow, so of a fin's angle
+    they feel l and d alone.
+    """
+    for i in range(p.count):
+        at = p.first + wp.static(ROWS) * i
+        angle = ones(view.b.x) - ones(view.b.x)
+        if p.limited > 0:
+            angle = remembered(view, p.memory + i)
+        else:
+            angle = commanded(view, p, i, view.t)
+        c = cosine(angle)
+        s = sine(angle)
+        along = speed_along(view, at)
+        across = speed_along(view, at + 6)
+        note_lift_and_drag(view, at, c * along + s * across, c * across - s * along, p.work + 2 * i)
+    return add_fins(D, view, p.first, wp.static(ROWS), p.count, p.work)

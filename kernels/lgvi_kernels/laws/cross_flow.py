@@ -1,0 +1,53 @@
+"""Cross-flow drag of a slender hull: -c_i |w| w at each strip, w the flow across the hull's axis."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lanes.arithmetic import add, dot, lane3, mul, neg, ones, sub  # noqa: F401
+from lgvi_kernels.lanes.functions import root
+from lgvi_kernels.lanes.state import struct
+from lgvi_kernels.lanes.view import add_outer, add_rows, row1
+
+
+@functools.cache
+def params(width, real):
+    """Params: a, b, the unit vectors across the axis, axis x a = b; their arms r0 x a, r0 x b, r0 the station 0.
+
+    Rows: for each of `count` strips its station [m] and rho / 2 times drag coefficient, breadth and length.
+    """
+    Lane3 = lane3(width, real)
+    return struct("CrossFlow", a=Lane3, b=Lane3, a_arm=Lane3, b_arm=Lane3, first=wp.int32, count=wp.int32)
+
+
+@wp.func
+def add_across(D: Any, force: Any, arm: Any, by_station: Any, S0: Any, S1: Any, S2: Any):
+    """D + S0 t0 t0^T + S1 (t0 t1^T + t1 t0^T) + S2 t1 t1^T, t0 = (force, arm), t1 = (0, by_station)."""
+    D = add_outer(D, force, arm, S0 * force, S0 * arm + S1 * by_station)
+    D.torque_velocity = add_rows(D.torque_velocity, by_station, S1 * force)
+    D.torque_rate = add_rows(D.torque_rate, by_station, S1 * arm + S2 * by_station)
+    return D
+
+
+@wp.func
+def damping(D: Any, view: Any, p: Any):
+    """D = sum over strips at x of s t t^T for both directions: s = c |w|, t = t0 + x t1 measuring the flow there."""
+    along_a = dot(p.a, view.nu) + dot(p.a_arm, view.Om)
+    along_b = dot(p.b, view.nu) + dot(p.b_arm, view.Om)
+    # axis x a = b and axis x b = -a.
+    a_by_station = dot(p.b, view.Om)
+    b_by_station = -dot(p.a, view.Om)
+    S0 = ones(along_a) - ones(along_a)
+    S1 = S0
+    S2 = S0
+    for i in range(p.count):
+        x = row1(view, p.first + 2 * i)
+        v_a = along_a + x * a_by_station
+        v_b = along_b + x * b_by_station
+        s = row1(view, p.first + 2 * i + 1) * root(v_a * v_a + v_b * v_b)
+        S0 = S0 + s
+        S1 = S1 + s * x
+        S2 = S2 + (s * x) * x
+    D = add_across(D, p.a, p.a_arm, p.b, S0, S1, S2)
+    return add_across(D, p.b, p.b_arm, p.a, S0, -S1, S2)

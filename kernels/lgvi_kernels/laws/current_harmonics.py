@@ -1,0 +1,35 @@
+"""A uniform current that is a sum of harmonics in time, such as tides: u(t) = sum_j a_j cos(omega_j t + phase_j)."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lanes.arithmetic import add, mul, neg  # noqa: F401
+from lgvi_kernels.lanes.functions import cosine, sine
+from lgvi_kernels.lanes.state import struct
+from lgvi_kernels.lanes.view import row1, row3
+
+FLOW = "uniform"
+
+# Rows of one harmonic: amplitude (3) [m/s, inertial], omega [rad/s], phase [rad].
+ROWS = 5
+
+
+@functools.cache
+def params(width, real):
+    """Params: first row of its table, ROWS for each harmonic, and count of harmonics."""
+    return struct("CurrentHarmonics", first=wp.int32, count=wp.int32)
+
+
+@wp.func
+def flow(f: Any, view: Any, p: Any):
+    """u and du/dt = -sum_j omega_j a_j sin(omega_j t + phase_j)."""
+    for j in range(p.count):
+        at = p.first + wp.static(ROWS) * j
+        amplitude = row3(view, at)
+        omega = row1(view, at + 3)
+        angle = view.t * omega + row1(view, at + 4)
+        f.velocity = f.velocity + cosine(angle) * amplitude
+        f.rate = f.rate + -(omega * sine(angle)) * amplitude
+    return f

@@ -1,0 +1,36 @@
+"""A current that varies with depth: u(b3) by linear interpolation of a table, constant above and below it."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lanes.arithmetic import add, div, mul, ones, positive, sub  # noqa: F401
+from lgvi_kernels.lanes.state import struct
+from lgvi_kernels.lanes.view import ramp, row1, row3
+
+FLOW = "varying"
+
+
+@functools.cache
+def params(width, real):
+    """Params: first row of its table and count of knots after the first; rows as for view.table3."""
+    return struct("CurrentProfile", first=wp.int32, count=wp.int32)
+
+
+@wp.func
+def flow(f: Any, view: Any, p: Any):
+    """u and du/db3, which within a segment is its slope."""
+    depth = view.b.z
+    one = ones(depth)
+    zero = one - one
+    u = row3(view, p.first)
+    for i in range(p.count):
+        at = p.first + 3 + 5 * i
+        part = ramp(view, at, depth)
+        change = row3(view, at + 2)
+        u = u + part * change
+        inside = positive(part, positive(one - part, row1(view, at + 1), zero), zero)
+        f.by_depth = f.by_depth + inside * change
+    f.velocity = f.velocity + u
+    return f

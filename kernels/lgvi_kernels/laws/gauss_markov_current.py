@@ -1,0 +1,65 @@
+"""A uniform current that wanders: a first-order Gauss-Markov (Ornstein-Uhlenbeck) process, u' = -u / tau + noise."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lanes.arithmetic import add, div, int_lane, lane, lane3, mul, ones, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes.functions import normals3
+from lgvi_kernels.lanes.state import struct
+from lgvi_kernels.lanes.view import remember, remembered
+
+FLOW = "uniform"
+NOISE = True
+
+
+@functools.cache
+def params(width, real):
+    """Params: decay, e^(-h / tau), and spread, the standard deviation of one step's noise [m/s, inertial], of a step h.
+
+    member, seed0, seed1, channel: what the noise is keyed by, besides the step.
+    memory: the first of its rows: u while the kick lasts (3), u at its end (3), du/dt (3).
+    """
+    Lane, Lane3 = lane(width, real), lane3(width, real)
+    key = {"member": int_lane(width), "seed0": wp.int32, "seed1": wp.int32, "channel": wp.int32}
+    return struct("GaussMarkovCurrent", decay=Lane, spread=Lane3, memory=wp.int32, **key)
+
+
+@wp.func
+def recall(view: Any, row: int):
+    """Three rows of what it remembers."""
+    return vec3(remembered(view, row), remembered(view, row + 1), remembered(view, row + 2))
+
+
+@wp.func
+def keep(view: Any, row: int, v: Any):
+    """Write three rows of what it remembers."""
+    remember(view, row, v.x)
+    remember(view, row + 1, v.y)
+    remember(view, row + 2, v.z)
+
+
+@wp.func
+def evolve(state: Any, view: Any, p: Any):
+    """u <- e^(-h/tau) u + spread xi, exact over a kick of h (Gillespie 1996): during the kick, the mean of old and new."""
+    at = p.memory
+    if view.second > 0:
+        keep(view, at, recall(view, at + 3))
+    else:
+        one = ones(p.decay)
+        old = recall(view, at + 3)
+        noise = normals3(p.decay, p.member, view.step, p.channel, p.seed0, p.seed1)
+        new = p.decay * old + p.spread * noise
+        keep(view, at, view.h.dtype(0.5) * (old + new))
+        keep(view, at + 3, new)
+        keep(view, at + 6, (one / (view.h * one)) * (new - old))
+    return state
+
+
+@wp.func
+def flow(f: Any, view: Any, p: Any):
+    """u and du/dt as remembered: over a kick du/dt h is what u changes by."""
+    f.velocity = f.velocity + recall(view, p.memory)
+    f.rate = f.rate + recall(view, p.memory + 6)
+    return f

@@ -1,0 +1,36 @@
+"""Lift of a hull: force_i = -u sum_j matrix_ij nu_j, u the speed ahead."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lanes.arithmetic import add, dot, mul  # noqa: F401
+from lgvi_kernels.lanes.state import struct
+from lgvi_kernels.lanes.view import row3
+
+
+@functools.cache
+def params(width, real):
+    """Params: first row of its table. Rows: the twist that measures the speed ahead (6), the matrix (36)."""
+    return struct("Lift", first=wp.int32)
+
+
+@wp.func
+def add_three(m: Any, view: Any, row: int, u: Any):
+    """m + u times a 3x3 matrix of the table, whose rows are 6 apart."""
+    m.row0 = m.row0 + u * row3(view, row)
+    m.row1 = m.row1 + u * row3(view, row + 6)
+    m.row2 = m.row2 + u * row3(view, row + 12)
+    return m
+
+
+@wp.func
+def damping(D: Any, view: Any, p: Any):
+    """D = u times the matrix: one multiplication an element, however many of its columns are zero."""
+    u = dot(row3(view, p.first), view.nu) + dot(row3(view, p.first + 3), view.Om)
+    D.force_velocity = add_three(D.force_velocity, view, p.first + 6, u)
+    D.force_rate = add_three(D.force_rate, view, p.first + 9, u)
+    D.torque_velocity = add_three(D.torque_velocity, view, p.first + 24, u)
+    D.torque_rate = add_three(D.torque_rate, view, p.first + 27, u)
+    return D

@@ -1,0 +1,49 @@
+"""Restoring moment: mU = -B r x R^T e3, from the potential U = B r.R^T e3 (section IV of Nordkvist & Sanyal 2010)."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lanes.arithmetic import add, cross, dot, lane3, sub  # noqa: F401
+from lgvi_kernels.lanes.functions import root
+
+POTENTIAL = True
+SEPARABLE = True
+
+
+@functools.cache
+def params(width, real):
+    """Params: moment [N m], buoyancy times its lever less weight times its own, from the origin of the forces."""
+    Lane3 = lane3(width, real)
+
+    @wp.struct
+    class Restoring:
+        moment: Lane3
+
+    return Restoring
+
+
+@wp.func
+def law(w: Any, view: Any, p: Any):
+    """mU(b, R) = -B r x R^T e3."""
+    w.torque = w.torque - cross(p.moment, view.down)
+    return w
+
+
+@wp.func
+def energy(u: Any, view: Any, p: Any):
+    """U = B r.R^T e3."""
+    return u + dot(p.moment, view.down)
+
+
+@wp.func
+def steady_force(w: Any, view: Any, p: Any):
+    """A moment only."""
+    return w
+
+
+@wp.func
+def supply(s: Any, view: Any, p: Any):
+    """U and B |r|: down to where the vehicle hangs."""
+    return energy(s, view, p) + root(dot(p.moment, p.moment))

@@ -1,0 +1,65 @@
+"""Thrusters: quadratic thrust curve with dead band and saturation, after a first-order lag."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lanes.arithmetic import absolute, add, div, mul, neg, ones, positive, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes.functions import exponential, greatest
+from lgvi_kernels.lanes.state import struct
+from lgvi_kernels.lanes.view import command, middle_of_half, remember, remembered, row1, row3
+
+# Rows of one thruster: force and torque per newton (6), coefficient forward and backward, dead band, limit, 1 / lag.
+ROWS = 11
+
+
+@functools.cache
+def params(width, real):
+    """Params: count of thrusters and of knots of their commands; first row of the table and of the memory.
+
+    Rows: for each thruster ROWS numbers, then for each its table of commands over time (see view.table1).
+    Memory: one row a thruster, its lagged command.
+    """
+    return struct("Thrusters", first=wp.int32, memory=wp.int32, count=wp.int32, knots=wp.int32, lagged=wp.int32)
+
+
+@wp.func
+def commanded(view: Any, p: Any, i: int, t: Any):
+    """The command of thruster i at time t, within its limit."""
+    first = p.first + wp.static(ROWS) * p.count + i * (1 + 3 * p.knots)
+    return command(view, first, p.knots, row1(view, p.first + wp.static(ROWS) * i + 9), t)
+
+
+@wp.func
+def evolve(state: Any, view: Any, p: Any):
+    """n' = (command - n) / time constant, exactly over half a kick, the command held at the middle of that half."""
+    if p.lagged > 0:
+        t = middle_of_half(view)
+        half = view.h.dtype(0.5) * view.h
+        for i in range(p.count):
+            n = remembered(view, p.memory + i)
+            u = commanded(view, p, i, t)
+            rate = row1(view, p.first + wp.static(ROWS) * i + 10)
+            remember(view, p.memory + i, u + exponential(-half * rate) * (n - u))
+    return state
+
+
+@wp.func
+def law(w: Any, view: Any, p: Any):
+    """Thrust = c+ max(n - band, 0)^2 - c- max(-n - band, 0)^2 along each thruster."""
+    zero = ones(view.b.x) - ones(view.b.x)
+    for i in range(p.count):
+        at = p.first + wp.static(ROWS) * i
+        n = zero
+        if p.lagged > 0:
+            n = remembered(view, p.memory + i)
+        else:
+            n = commanded(view, p, i, view.t)
+        band = row1(view, at + 8)
+        ahead = greatest(n - band, zero)
+        astern = greatest(-n - band, zero)
+        thrust = row1(view, at + 6) * (ahead * ahead) - row1(view, at + 7) * (astern * astern)
+        w.force = w.force + thrust * row3(view, at)
+        w.torque = w.torque + thrust * row3(view, at + 3)
+    return w

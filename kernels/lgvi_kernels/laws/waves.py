@@ -1,0 +1,55 @@
+"""Linear waves in deep water, a sum of components (Faltinsen 1990, table 2.1; Newman 1977, 6.2)."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lanes.arithmetic import add, mul, neg, ones, positive, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes.functions import cosine, exponential, greatest, sine
+from lgvi_kernels.lanes.state import struct
+from lgvi_kernels.lanes.view import row1, row3
+
+FLOW = "varying"
+
+# Rows of one component: wavenumber north, east and in all [1/m], omega [rad/s], phase [rad],
+# speed of the water at the surface, a omega, north, east and in all [m/s].
+ROWS = 8
+
+
+@functools.cache
+def params(width, real):
+    """Params: first row of its table, ROWS for each component, and count of components."""
+    return struct("Waves", first=wp.int32, count=wp.int32)
+
+
+@wp.func
+def flow(f: Any, view: Any, p: Any):
+    """u = a omega e^(-k depth) (cos theta along the heading, -sin theta down), theta = k.x - omega t + phase; its slopes.
+
+    Above the still surface the decay is held at 1, and there is no slope by depth.
+    """
+    depth = view.b.z
+    zero = ones(depth) - ones(depth)
+    below = greatest(depth, zero)
+    inside = positive(depth, ones(depth), zero)
+    for j in range(p.count):
+        at = p.first + wp.static(ROWS) * j
+        north = row1(view, at)
+        east = row1(view, at + 1)
+        k = row1(view, at + 2)
+        omega = row1(view, at + 3)
+        speed = row3(view, at + 5)
+        theta = north * view.b.x + east * view.b.y + (row1(view, at + 4) - view.t * omega)
+        decayed = exponential(-(k * below))
+        c = decayed * cosine(theta)
+        s = decayed * sine(theta)
+        u = vec3(c * speed.x, c * speed.y, -(s * speed.z))
+        # -du/dtheta
+        slope = vec3(s * speed.x, s * speed.y, c * speed.z)
+        f.velocity = f.velocity + u
+        f.rate = f.rate + omega * slope
+        f.by_north = f.by_north - north * slope
+        f.by_east = f.by_east - east * slope
+        f.by_depth = f.by_depth - (inside * k) * u
+    return f

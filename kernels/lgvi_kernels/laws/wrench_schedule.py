@@ -1,0 +1,25 @@
+"""A wrench in body axes that follows a table over time."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lanes.arithmetic import add, lane, mul, ones  # noqa: F401
+from lgvi_kernels.lanes.state import struct
+from lgvi_kernels.lanes.view import table3
+
+
+@functools.cache
+def params(width, real):
+    """Params: first row of its tables, of force and then of torque (see view.table3), and count of knots after the first."""
+    return struct("WrenchSchedule", first=wp.int32, count=wp.int32)
+
+
+@wp.func
+def law(w: Any, view: Any, p: Any):
+    """phi(t), tau(t)."""
+    t = view.t * ones(view.b.x)
+    w.force = w.force + table3(view, p.first, p.count, t)
+    w.torque = w.torque + table3(view, p.first + 3 + 5 * p.count, p.count, t)
+    return w

@@ -1,0 +1,1 @@
+"""What a method is made of: the maps that advance a packet, and the equations that they solve."""

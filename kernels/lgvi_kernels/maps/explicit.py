@@ -1,0 +1,393 @@
+"""Explicit Runge-Kutta methods on (b, R, p, pi), and on the rotation group: fixed steps, or steps chosen for a tolerance.
+
+k_i = f(t + c_i h, y_i), where y_i comes from y by h a_i1 k_1, h a_i2 k_2, ... and the new state by h b_1 k_1, h b_2 k_2, ...
+A move adds: two rows of R are six numbers like the others, which leave the group at the order of the method, and the third
+is their cross product. Or it turns: R <- R exp(h a Om), one after the other (Crouch & Grossman 1993). Zero coefficients make
+no code; the stages are unrolled.
+"""
+
+import functools
+from typing import Any, NamedTuple
+
+import warp as wp
+
+from lgvi_kernels.lanes.arithmetic import add, cross, div, dot, lane3, mul, ones, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes.functions import root, sine
+from lgvi_kernels.lanes.rotations import rodrigues, rotation_struct, transpose_apply
+from lgvi_kernels.lanes.state import struct, view_struct, wrench_struct
+from lgvi_kernels.laws.drag import make_resistance
+from lgvi_kernels.maps.compose import superpose
+from lgvi_kernels.maps.step_control import make_adaptive, make_errors
+from lgvi_kernels.maps.submaps import rotate
+
+# Added under a root that is divided by: the least that keeps 0/0 away.
+TINY = {wp.float64: 1e-300, wp.float32: 1e-36}
+
+
+class Explicit(NamedTuple):
+    """What decides the code of an explicit method: a tableau, whose row i of `a` has i numbers, and how it is used.
+
+    kind: "vector" (R as two of its rows), "inertial" (the same, and forces never change in inertial axes, so that R p is
+    known for all times: it is kept in place of p), "group" (R turns by exponentials) or "munthe_kaas" (order 4 with its
+    commutators).
+    errors: rows of error estimates, (stages,) or one longer with f of the new state at its end, which go as h to the power
+    `estimate`. adaptive: each packet chooses its steps.
+    """
+
+    kind: str
+    a: tuple
+    b: tuple
+    c: tuple
+    errors: tuple = ()
+    estimate: int = 0
+    adaptive: bool = False
+
+
+@functools.cache
+def rates_struct(width, real, kind):
+    """b', pi', p' unless it is known, and the first and last row of R' = R hat(Om); on the group, Om instead of them."""
+    Lane3 = lane3(width, real)
+    turning = {"R0": Lane3, "R2": Lane3} if kind in ("vector", "inertial") else {"Om": Lane3}
+    pushing = {} if kind == "inertial" else {"p": Lane3}
+    return struct("Rates", b=Lane3, **turning, **pushing, pi=Lane3)
+
+
+@functools.cache
+def slopes_struct(Rates, count):
+    """k_1 to k_count, as k0, k1, ..."""
+    return struct("Slopes", **{f"k{i}": Rates for i in range(count)})
+
+
+def make_rates(Rates, Wrench, everything, velocities, kind, mass, coupled, drifts, scaled, drag):
+    """The right-hand side, eq. (1) and (3) of Nordkvist & Sanyal 2010 with all laws of a scene.
+
+    scaled: momenta are divided by max J; drag: the function that adds drag along the axes, where it is not among
+    `everything`, or None.
+    """
+
+    isotropic, munk = mass == "isotropic", make_munk(mass == "diagonal")
+    group, inertial = kind not in ("vector", "inertial"), kind == "inertial"
+
+    @wp.func
+    def turning(w: Any, x: Any, c: Any, nu: Any, Om: Any):
+        """p x Om and pi x Om + p x nu: what the momenta in body axes change by without any force."""
+        w.force = w.force + cross(x.p, Om)
+        w.torque = w.torque + cross(x.pi, Om)
+        if wp.static(coupled):
+            w.torque = w.torque + cross(x.p, nu)
+        elif wp.static(not isotropic):
+            # Of the mean of M^-1 it is zero.
+            w.torque = munk(w.torque, x.p, c.inertia.anisotropy)
+        return w
+
+    @wp.func
+    def rates(x: Any, c: Any, h: Any):
+        """b' = R nu + u, R' = R hat(Om), p' = p x Om + f, pi' = pi x Om + p x nu + m."""
+        k = Rates()
+        if wp.static(inertial):
+            x.p = in_body(x)
+        nu, Om = velocities(c.inertia, x.p, x.pi)
+        w = Wrench()
+        if wp.static(not scaled):
+            # Laws add to what is there: fewer operations than a sum of their own.
+            w = turning(w, x, c, nu, Om)
+        w, u = everything(w, x, c, h, nu, Om)
+        if wp.static(scaled):
+            w.force = c.inertia.inverse_scale * w.force
+            w.torque = c.inertia.inverse_scale * w.torque
+            w = turning(w, x, c, nu, Om)
+        k.b = rotate(x, nu)
+        if wp.static(drifts):
+            k.b = k.b + u
+        if wp.static(group):
+            k.Om = Om
+        else:
+            k.R0 = cross(x.R0, Om)
+            k.R2 = cross(x.R2, Om)
+        if wp.static(not inertial):
+            k.p = w.force
+        k.pi = w.torque
+        if wp.static(drag is not None):
+            k = drag(k, x, c.params.own)
+        return k
+
+    return rates
+
+
+@wp.func
+def in_body(x: Any):
+    """R^T P, with P in place of p."""
+    return x.p.x * x.R0 + x.p.y * x.R1 + x.p.z * x.R2
+
+
+def make_munk(diagonal):
+    """pi' + p x A p, where A is M^-1 less its mean."""
+
+    @wp.func
+    def munk(turned: Any, p: Any, A: Any):
+        if wp.static(diagonal):
+            # The differences stay the same for all steps, and the compiler keeps them.
+            turned.x = turned.x + (A.z - A.y) * (p.y * p.z)
+            turned.y = turned.y + (A.x - A.z) * (p.z * p.x)
+            turned.z = turned.z + (A.y - A.x) * (p.x * p.y)
+        else:
+            turned = turned + cross(p, A * p)
+        return turned
+
+    return munk
+
+
+@wp.func
+def along(x: Any, k: Any, s: Any):
+    """x + s k; the middle row of R is left behind (see `completed`)."""
+    x.b = x.b + s * k.b
+    x.R0 = x.R0 + s * k.R0
+    x.R2 = x.R2 + s * k.R2
+    x.p = x.p + s * k.p
+    x.pi = x.pi + s * k.pi
+    return x
+
+
+@wp.func
+def along_known(x: Any, k: Any, s: Any):
+    """The same where P is known for all times."""
+    x.b = x.b + s * k.b
+    x.R0 = x.R0 + s * k.R0
+    x.R2 = x.R2 + s * k.R2
+    x.pi = x.pi + s * k.pi
+    return x
+
+
+@wp.func
+def completed(x: Any):
+    """The middle row of R from the others."""
+    x.R1 = cross(x.R2, x.R0)
+    return x
+
+
+def make_turned(Rotation, real):
+    """R exp(hat(v)) of a rotation vector v."""
+
+    @wp.func
+    def turned(x: Any, v: Any):
+        """Rodrigues' formula: exp = I + sin n / n hat(v) + 1/2 (sin(n/2) / (n/2))^2 hat(v)^2, n = |v|."""
+        square = dot(v, v)
+        half = real(0.5)
+        # n of v = 0 is not 0 but so small that the quotients of sines are 1.
+        n = root(square + real(wp.static(TINY[real])) * ones(square))
+        sinc_half = sine(half * n) / (half * n)
+        F = rodrigues(Rotation(), v, sine(n) / n, half * sinc_half * sinc_half)
+        x.R0 = transpose_apply(F, x.R0)
+        x.R1 = transpose_apply(F, x.R1)
+        x.R2 = transpose_apply(F, x.R2)
+        return x
+
+    return turned
+
+
+def make_act(turned):
+    """How the group moves a state."""
+
+    @wp.func
+    def act(x: Any, k: Any, s: Any):
+        """R exp(s hat(Om)), and (b, p, pi) + s k."""
+        x.b = x.b + s * k.b
+        x.p = x.p + s * k.p
+        x.pi = x.pi + s * k.pi
+        return turned(x, s * k.Om)
+
+    return act
+
+
+# The two functions that follow are written out for so many stages: a loop or a recursion over them would copy all the
+# slopes for each, which the compiler removes again, in three times as long.
+MOST_STAGES = 13
+
+
+def make_moves(move, weights, complete):
+    """One function (y, slopes, h): the moves by h w_1 k_1, then h w_2 k_2, ... of all weights that are not zero.
+
+    complete: what completes a state that was moved, or None.
+    """
+    w = weights + (0.0,) * (MOST_STAGES - len(weights))
+
+    @wp.func
+    def moves(y: Any, k: Any, h: Any):
+        if wp.static(w[0] != 0.0):
+            y = move(y, k.k0, h.dtype(wp.static(w[0])) * h)
+        if wp.static(w[1] != 0.0):
+            y = move(y, k.k1, h.dtype(wp.static(w[1])) * h)
+        if wp.static(w[2] != 0.0):
+            y = move(y, k.k2, h.dtype(wp.static(w[2])) * h)
+        if wp.static(w[3] != 0.0):
+            y = move(y, k.k3, h.dtype(wp.static(w[3])) * h)
+        if wp.static(w[4] != 0.0):
+            y = move(y, k.k4, h.dtype(wp.static(w[4])) * h)
+        if wp.static(w[5] != 0.0):
+            y = move(y, k.k5, h.dtype(wp.static(w[5])) * h)
+        if wp.static(w[6] != 0.0):
+            y = move(y, k.k6, h.dtype(wp.static(w[6])) * h)
+        if wp.static(w[7] != 0.0):
+            y = move(y, k.k7, h.dtype(wp.static(w[7])) * h)
+        if wp.static(w[8] != 0.0):
+            y = move(y, k.k8, h.dtype(wp.static(w[8])) * h)
+        if wp.static(w[9] != 0.0):
+            y = move(y, k.k9, h.dtype(wp.static(w[9])) * h)
+        if wp.static(w[10] != 0.0):
+            y = move(y, k.k10, h.dtype(wp.static(w[10])) * h)
+        if wp.static(w[11] != 0.0):
+            y = move(y, k.k11, h.dtype(wp.static(w[11])) * h)
+        if wp.static(w[12] != 0.0):
+            y = move(y, k.k12, h.dtype(wp.static(w[12])) * h)
+        if wp.static(complete is not None):
+            y = complete(y)
+        return y
+
+    return moves
+
+
+def make_push(Wrench, View, laws):
+    """(x, constants, h): P <- P + h F, where F never changes in inertial axes."""
+    force = superpose(laws, "steady_force")
+
+    @wp.func
+    def pushed(x: Any, c: Any, h: Any):
+        if wp.static(force is not None):
+            x.p = x.p + h * force(Wrench(), View(), c.params).force
+        return x
+
+    return pushed
+
+
+def make_stage(moves, push, node, timed):
+    """The state of one stage. push: what changes P, where it is known, or None."""
+
+    @wp.func
+    def at_node(x: Any, k: Any, c: Any, h: Any):
+        y = moves(x, k, h)
+        if wp.static(push is not None):
+            y = push(y, c, h.dtype(wp.static(node)) * h)
+        if wp.static(timed):
+            y.time = x.time + wp.float64(wp.static(node)) * wp.float64(h)
+        return y
+
+    return at_node
+
+
+def make_stages(Rates, rates, move, complete, push, a, c, timed):
+    """One function (x, constants, h) -> the slopes of all rows of `a`."""
+    count = len(a)
+    Slopes = slopes_struct(Rates, count)
+    ys = [make_stage(make_moves(move, row, complete), push, node, timed) for row, node in zip(a, c)]
+    _, at_1, at_2, at_3, at_4, at_5, at_6, at_7, at_8, at_9, at_10, at_11, at_12 = ys + [None] * (MOST_STAGES - count)
+
+    @wp.func
+    def stages(x: Any, constants: Any, h: Any):
+        k = Slopes()
+        k.k0 = rates(x, constants, h)
+        if wp.static(count > 1):
+            k.k1 = rates(at_1(x, k, constants, h), constants, h)
+        if wp.static(count > 2):
+            k.k2 = rates(at_2(x, k, constants, h), constants, h)
+        if wp.static(count > 3):
+            k.k3 = rates(at_3(x, k, constants, h), constants, h)
+        if wp.static(count > 4):
+            k.k4 = rates(at_4(x, k, constants, h), constants, h)
+        if wp.static(count > 5):
+            k.k5 = rates(at_5(x, k, constants, h), constants, h)
+        if wp.static(count > 6):
+            k.k6 = rates(at_6(x, k, constants, h), constants, h)
+        if wp.static(count > 7):
+            k.k7 = rates(at_7(x, k, constants, h), constants, h)
+        if wp.static(count > 8):
+            k.k8 = rates(at_8(x, k, constants, h), constants, h)
+        if wp.static(count > 9):
+            k.k9 = rates(at_9(x, k, constants, h), constants, h)
+        if wp.static(count > 10):
+            k.k10 = rates(at_10(x, k, constants, h), constants, h)
+        if wp.static(count > 11):
+            k.k11 = rates(at_11(x, k, constants, h), constants, h)
+        if wp.static(count > 12):
+            k.k12 = rates(at_12(x, k, constants, h), constants, h)
+        return k
+
+    return stages
+
+
+def make_fixed(stages, finish, push, timed):
+    """One step of the length that is asked for. push: as of make_stage."""
+
+    @wp.func
+    def step(x: Any, c: Any, h: Any):
+        """y + h sum_i b_i k_i."""
+        x = finish(x, stages(x, c, h), h)
+        if wp.static(push is not None):
+            x = push(x, c, h)
+        if wp.static(timed):
+            x.time = x.time + wp.float64(h)
+        return x
+
+    return step
+
+
+def make_munthe_kaas(rates, act, turned, timed):
+    """Munthe-Kaas & Owren (1999): order 4 with two commutators."""
+
+    @wp.func
+    def later(y: Any, x: Any, h: Any):
+        if wp.static(timed):
+            y.time = x.time + wp.float64(h)
+        return y
+
+    @wp.func
+    def moved(x: Any, k: Any, s: Any, bracket: Any):
+        """(b, p, pi) + s k, R exp(s hat(Om) + hat(bracket))."""
+        x.b = x.b + s * k.b
+        x.p = x.p + s * k.p
+        x.pi = x.pi + s * k.pi
+        return turned(x, s * k.Om + bracket)
+
+    @wp.func
+    def step(x: Any, c: Any, h: Any):
+        """Hairer, Lubich & Wanner, IV.8, in body axes, so that the signs of the commutators are opposite."""
+        half = h.dtype(0.5) * h
+        k1 = rates(x, c, h)
+        k2 = rates(later(act(x, k1, half), x, half), c, h)
+        k3 = rates(later(moved(x, k2, half, (h.dtype(0.125) * h * h) * cross(k1.Om, k2.Om)), x, half), c, h)
+        k4 = rates(later(act(x, k3, h), x, h), c, h)
+        two = h.dtype(2.0)
+        k = k1
+        k.b = k1.b + two * (k2.b + k3.b) + k4.b
+        k.p = k1.p + two * (k2.p + k3.p) + k4.p
+        k.pi = k1.pi + two * (k2.pi + k3.pi) + k4.pi
+        k.Om = k1.Om + two * (k2.Om + k3.Om) + k4.Om
+        sixth = h / h.dtype(6.0)
+        y = moved(x, k, sixth, (half * sixth) * cross(k1.Om, k4.Om))
+        return later(y, x, h)
+
+    return step
+
+
+def make_explicit(spec, everything, velocities):
+    """The step of an explicit method for this Spec, with all the laws in `everything`."""
+    method, width, real, timed = spec.explicit, spec.width, spec.real, spec.timed
+    Wrench = wrench_struct(width, real)
+    Rates = rates_struct(width, real, method.kind)
+    turned = make_turned(rotation_struct(width, real), real)
+    moves = {"vector": (along, completed), "inertial": (along_known, completed)}
+    move, complete = moves.get(method.kind, (make_act(turned), None))
+    push = make_push(Wrench, view_struct(width, real), spec.laws) if method.kind == "inertial" else None
+    shape = (spec.mass, "coupled" in spec.parts, spec.flow != "none", spec.scaled)
+    drag = make_resistance(spec.drag) if spec.drag else None
+    rates = make_rates(Rates, Wrench, everything, velocities, method.kind, *shape, drag)
+    if method.kind == "munthe_kaas":
+        return make_munthe_kaas(rates, move, turned, timed)
+    a, c = method.a, method.c
+    if method.adaptive and len(method.errors[0]) > len(a):
+        a, c = (*a, method.b), (*c, 1.0)
+    stages = make_stages(Rates, rates, move, complete, push, a, c, timed)
+    finish = make_moves(move, method.b + (0.0,) * (len(a) - len(method.b)), complete)
+    if not method.adaptive:
+        return make_fixed(stages, finish, push, timed)
+    errors = make_errors(Rates, [make_moves(along, row, None) for row in method.errors])
+    return make_adaptive(stages, finish, errors, method.estimate, width, real, timed)

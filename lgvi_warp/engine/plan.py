@@ -241,7 +241,9 @@ class Plan:
                 raise
             problem = f"one of them does not compile ({type(error).__name__}: {error})"
             raise SceneError(
-                [f"law {', '.join(user_laws)}: {problem}; lw.check_law(term) says where, docs/develop/add_a_force.md how"]
+                [
+                    f"law {', '.join(user_laws)}: {problem}; lw.check_law(term) says where, docs/develop/add_a_force.md how"
+                ]
             ) from error
 
     def __reduce__(self) -> tuple[Any, ...]:

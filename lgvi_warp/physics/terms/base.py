@@ -222,7 +222,9 @@ class Term:
         Raises:
             NotImplementedError: Where the term does not define it.
         """
-        raise NotImplementedError(f"{type(self).__name__} must define packed(own, setting): see docs/develop/add_a_force.md")
+        raise NotImplementedError(
+            f"{type(self).__name__} must define packed(own, setting): see docs/develop/add_a_force.md"
+        )
 
     def water(self, own: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray | None:
         """Velocity of the water that this term moves; by default it moves none.

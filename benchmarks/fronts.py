@@ -1,4 +1,4 @@
-"""Measure the fronts of accuracy against time of four scenes and write docs/guide/accuracy_and_speed.md, with a picture of each.
+"""Measure accuracy against time of four scenes; write docs/guide/accuracy_and_speed.md, with a picture of each.
 
 python benchmarks/fronts.py
 """

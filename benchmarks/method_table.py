@@ -1,4 +1,4 @@
-"""Measure every method in every precision at every width and write docs/reference/method_costs.md: some 500 kernels, half an hour.
+"""Every method in every precision at every width, written to docs/reference/method_costs.md: 500 kernels, half an hour.
 
 python benchmarks/method_table.py [file of JSON lines: those of `python benchmarks/run.py methods`, in place of measuring]
 """

@@ -105,7 +105,7 @@ def test_a_point_that_is_not_moved():
 class NoPotential(lw.Tether):
     """Says it has a potential, and has none."""
 
-    def potential(self, own, position, attitude, setting):
+    def potential(self, own, position, attitude, parameters):
         return 0.0
 
 
@@ -167,7 +167,7 @@ class Stirred(lw.Term):
     type: ClassVar[str] = "stirred"
     device: ClassVar[Any] = StirredDevice
 
-    strength: Any = lw.quantity((), "1/s")
+    strength: Any = lw.number((), "1/s")
 
     def packed(self, own, setting):
         return lw.Packed(dict(own))

@@ -99,7 +99,7 @@ class Unturned(lw.Tether):
 def test_a_point_that_is_not_moved():
     report = lw.check_law(Unturned(anchor=(1.0, 2.0, 3.0), stiffness=5.0, attachment=(0.5, 0.0, 0.0)))
     assert names_of_failed(report) == ["law: any axes"]
-    assert "setting.frame" in str(report)
+    assert "context.frame" in str(report)
 
 
 class NoPotential(lw.Tether):

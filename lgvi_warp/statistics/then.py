@@ -45,7 +45,9 @@ class Then(Statistic):
             elif statistic.of is not None:
                 faults.add(f"then[{i}].of", statistic.of, "is given already", f"leave it out: it is of the {self.type}")
             elif statistic.at is not None:
-                faults.add(f"then[{i}].at", statistic.at, f"says when, and a {self.type} has no time", "leave it out")
+                faults.add(
+                    f"then[{i}].at", statistic.at, f"names an outcome, and a {self.type} has no time", "leave it out"
+                )
         object.__setattr__(self, "then", tuple(statistics))
         if self.of is not None and not faults:
             with faults.including():  # report a missing limit now, not during the run

@@ -96,7 +96,7 @@ DRAG = lw.terms.Drag(quadratic=[20.0, 80.0, 80.0, 3.0, 5.0, 5.0])
 MATRIX = lw.terms.DragMatrix(linear=np.eye(6))
 WRENCH = lw.terms.Wrench(force=[1.0, 0.0, 0.0], torque=[0.0, 0.0, 0.0])
 REFUSED = [
-    ("rkn6_14", TETHER, "wants potentials of position plus such of attitude, which tether is not"),
+    ("rkn6_14", TETHER, "needs potentials of position plus those of attitude; tether has none such"),
     ("rkn6_11", DRAG, "which drag is not"),
     ("rkn4_6", WRENCH, "which wrench is not"),
     ("bm4(psi_x)", MATRIX, "keeps its order only for maps that undo themselves"),

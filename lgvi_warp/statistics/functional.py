@@ -91,7 +91,7 @@ class Functional:
         """
         if self.over_path:
             remedy = f"ask for {self.quantity.name}, or for lw.PathMaximum({self.quantity.name!r}) and the like"
-            raise SceneError([f"{self.label}: is of the whole path and has no value at each time; {remedy}"])
+            raise SceneError([f"{self.label}: looks over the path, and has no number at each time; {remedy}"])
         if not self.functions and self.entry is None:
             return self.quantity
         return replace(self.quantity, name=self.label, labels=self.labels, function=self)
@@ -122,7 +122,7 @@ def functional(key: str, of: Any) -> Functional:
         if name not in FUNCTIONS:
             faults.add(key, of, f"has a function {name!r} that is not known", closest(name, FUNCTIONS))
     if sum(name in OVER_TIME for name in names) > 1:
-        faults.add(key, of, "is of the whole path twice", f"keep one of {', '.join(OVER_TIME)}")
+        faults.add(key, of, "looks over the path twice", f"keep one of {', '.join(OVER_TIME)}")
     faults.raise_if_any()
     if not re.fullmatch(r"\w+(\[[\d,]+\])?", inner):
         form = 'write "position[2]", "depth", "norm(velocity)" or "max(depth)"'

@@ -96,6 +96,6 @@ def compared_in(of: Any) -> Compared:
     if parsed.over_path:
         remedy = f"give {parsed.quantity.name!r}, whose largest error over the path is reported"
         raise SceneError(
-            [f"of = {parsed.label!r}: is of the whole path, and errors are of a quantity at each time; {remedy}"]
+            [f"of = {parsed.label!r}: looks over the path, and errors are of a quantity at each time; {remedy}"]
         )
     return Compared(parsed.label, parsed.unit or "1", parsed)

@@ -484,7 +484,7 @@ def test_the_page_names_tests_that_there_are():
         .partition("\n## ")[0]
     )
     source = "".join(
-        (ROOT / "tests" / "composition" / f"test_{name}_stores.py").read_text() for name in ("hostile", "faults_of")
+        (ROOT / "tests" / "runs" / f"test_{name}_stores.py").read_text() for name in ("hostile", "faults_of")
     )
     tests = re.findall(r"`(test_\w+)`", text)
     named = re.findall(r'"([^"]+)"', " ".join(re.findall(r"\(`stores`:([^)]*)\)", text.replace("\n", " "))))

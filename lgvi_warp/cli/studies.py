@@ -111,7 +111,7 @@ def stability(chosen: argparse.Namespace) -> int:
 
     if chosen.grid is not None and (chosen.x is not None or chosen.y is not None):
         raise SceneError(
-            [f"--grid {chosen.grid}: says the axes that --x and --y say; leave out --grid, or both of them"]
+            [f"--grid {chosen.grid}: names the same axes as --x and --y; leave out --grid, or both of them"]
         )
     changes = overrides(chosen)
     scene = Scene.load(chosen.scene, changes)

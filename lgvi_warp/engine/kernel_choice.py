@@ -236,9 +236,9 @@ def device_module(term: Term, device: Any, known: Mapping[str, Any], *roles: str
     if module is None:
         faults.add(f"{term.key}.device", device, "is not known", "give a module, or the name of a built-in one")
     elif not callable(getattr(module, "params", None)):
-        faults.add(f"{term.key}.device", module, "has no params(width, real)", "see docs/add_a_law.md")
+        faults.add(f"{term.key}.device", module, "has no params(width, real)", "see docs/develop/add_a_force.md")
     elif not any(hasattr(module, role) for role in roles):
-        faults.add(f"{term.key}.device", module, f"has none of {', '.join(roles)}", "see docs/add_a_law.md")
+        faults.add(f"{term.key}.device", module, f"has none of {', '.join(roles)}", "see docs/develop/add_a_force.md")
     else:
         for role in roles:
             _check_signature(faults, term, module, role)
@@ -298,16 +298,16 @@ def _check(
     if facts.left > UNCOUPLED:
         k = f"coupling norm up to {facts.left:.3g} at the best origin"
         remedy = "use psi_x, psi_x8 or psi_w, which take any 6x6 inertia"
-        faults.add("method", method.name, f"cannot couple velocities and rates ({k})", remedy)
+        faults.add("method", method.name, f"cannot advance an inertia that couples velocities and rates ({k})", remedy)
     composed = len(method.stages) > 1
     noisy = any(getattr(module, "NOISE", False) for _, module in acting)
     if composed and not method.two_part and (dense or flow in ("uniform", "varying") or memory or noisy):
         cause = "a damping matrix" if dense else "water that varies" if flow != "none" else "a term that remembers"
-        faults.add("method", method.name, f"keeps its order only for maps that undo themselves, which {cause} does not",
+        faults.add("method", method.name, f"keeps its order only if a step of -h undoes one of h, and {cause} prevents that",
                    f"use {method.base}")  # fmt: skip
     for term, module in acting:
         if method.two_part and not getattr(module, "SEPARABLE", False):
-            faults.add("method", method.name, f"wants potentials of position plus such of attitude, which {term.key} is not",
+            faults.add("method", method.name, f"needs potentials of position plus those of attitude; {term.key} has none such",
                        "use ss6_13(psi_x), or bm6(psi_x)")  # fmt: skip
         if method.gauss and ("law" not in (roles := [role for role in ROLES if hasattr(module, role)]) or len(roles) > 1
                              or isinstance(term, Drag) or getattr(module, "NOISE", False)):  # fmt: skip
@@ -321,6 +321,6 @@ def _check(
     if noisy and not composed and not method.tableau and kicks != 1:
         faults.add("method", method.name, "would draw noise more than once a step", "use psi_s, psi_x or psi_w")
     if flow in ("uniform", "varying") and facts.weightless and facts.buoyant:
-        faults.add("environment.gravity", 0.0, "leaves the displaced mass unknown, which water that accelerates pushes",
+        faults.add("environment.gravity", 0.0, "leaves the displaced mass unknown, on which accelerating water pushes",
                    "give gravity, or buoyancy = 0")  # fmt: skip
     faults.raise_if_any()

@@ -87,12 +87,12 @@ class Plan:
         if self.width is not None:
             faults.choice("width", self.width, WIDTHS)
         if self.checks == "none" and self.ensemble.scene.events:
-            faults.add("checks", self.checks, "leaves events unseen", 'use checks="safe", or drop the events')
+            faults.add("checks", self.checks, "does not see events", 'use checks="safe", or drop the events')
         if self.dtype == "float32_compensated" and (self.method.tableau or self.method.gauss or self.method.two_part):
-            problem = f"sums up what a method of sub-maps changes, which {self.method.name} is not"
+            problem = f"compensates sums of a method of sub-maps, which {self.method.name} is not"
             faults.add("dtype", self.dtype, problem, "use float64, or psi_s, psi_x and their compositions")
         if self.checks == "none" and self.on_failure in ON_FAILURE[1:]:
-            problem = f"leaves failures unseen, which on_failure={self.on_failure!r} waits for"
+            problem = f"does not see failures, which on_failure={self.on_failure!r} waits for"
             faults.add("checks", self.checks, problem, 'use checks="safe", or on_failure="freeze"')
         faults.raise_if_any()
         checked = self.checks != "none"
@@ -243,7 +243,9 @@ class Plan:
                 raise
             problem = f"one of them does not compile ({type(error).__name__}: {error})"
             raise SceneError(
-                [f"law {', '.join(user_laws)}: {problem}; lw.check_law(term) says where, docs/add_a_law.md how"]
+                [
+                    f"law {', '.join(user_laws)}: {problem}; lw.check_law(term) says where, docs/develop/add_a_force.md how"
+                ]
             ) from error
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -1,4 +1,4 @@
-"""The step for a full 6x6 inertia, of one vehicle, in the symbols of docs/coupled_inertia.md.
+"""The step for a full 6x6 inertia, of one vehicle, in the symbols of docs/explain/coupled_inertia.md.
 
 I6 = [[M, C], [C^T, J]] at the user's origin O in the user's axes; E = M^-1 C, Js = J - C^T M^-1 C, and
 H = p.M^-1 p / 2 + (pi - E^T p).Js^-1 (pi - E^T p) / 2 + U. The turns want Js diagonal, ascending, and E upper

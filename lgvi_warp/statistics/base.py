@@ -129,7 +129,9 @@ class Statistic:
         if self.at is not None and (not isinstance(self.at, str) or not self.at):
             faults.add("at", self.at, "is no outcome", 'give "floor", the name of an event, or "stopped"')
         elif self.at is not None and not self.of_numbers:
-            faults.add("at", self.at, "is one moment, and this is of all times", "leave it out, or ask for a mean")
+            faults.add(
+                "at", self.at, "is one moment, and this statistic is of all times", "leave it out, or ask for a mean"
+            )
         if self.of is not None:
             with faults.including():
                 object.__setattr__(self, "_quantity", self.meant())

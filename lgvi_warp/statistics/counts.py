@@ -76,7 +76,7 @@ class Histogram(Counted):
             faults.add("edges", self.edges, "and bins are both given", "keep one of them")
             return
         if (self.edges is None) == (self.bins is None or self.limits is None):
-            faults.add("edges", self.edges, "or bins and limits are wanted, one of them", "give edges=(0, 10, 20)")
+            faults.add("edges", self.edges, "is missing, and so is bins or limits", "give edges=(0, 10, 20)")
             return
         run = isinstance(self.limits, str) and self.limits == "run"
         if run and self.of is not None:
@@ -148,7 +148,7 @@ class Condition(Statistic):
     below: Any = None
 
     def check(self, faults: Faults) -> None:
-        """Note limits that are no numbers, are missing, or leave nothing between them."""
+        """Note limits that are no numbers, are missing, or have nothing between them."""
         super().check(faults)
         quantity = getattr(self, "_quantity", None)
         fits, limits = (1,) if quantity is None else (1, quantity.size), list[np.ndarray]()
@@ -161,7 +161,7 @@ class Condition(Statistic):
                     limits.append(limit)
         if len(limits) == 2 and not np.all(limits[0] < limits[1]):
             both = self.above, self.below
-            faults.add("above and below", both, "leave nothing between them", "give above < below, or one of them")
+            faults.add("above and below", both, "have nothing between them", "give above < below, or one of them")
         if quantity is not None and self.above is None and self.below is None and quantity.needs_limit:
             unit = f" [{quantity.unit}]" if quantity.unit else ""
             remedy = f"give above=... or below=...{unit}, or a function that says true or false"

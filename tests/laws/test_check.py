@@ -325,7 +325,7 @@ def plain_law(w, view, p):
     [
         (type("Short", (), {"params": staticmethod(stirred_params), "law": short_law}), "write law(w, view, p)"),
         (type("Plain", (), {"params": staticmethod(stirred_params), "law": plain_law}), "decorate it with @wp.func"),
-        (type("Bare", (), {"law": hasty_law}), "add_a_law.md"),
+        (type("Bare", (), {"law": hasty_law}), "add_a_force.md"),
         (type("Roleless", (), {"params": staticmethod(stirred_params)}), "has none of law, damping"),
         (type("Unknown", (), {"params": staticmethod(stirred_params), "law": unknown_law}), "does not compile"),
         (SimpleNamespace(params=stirred_params, law=hasty_law), "give a module, or a class"),

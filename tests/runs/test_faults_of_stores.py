@@ -476,12 +476,15 @@ def test_a_full_disk_does_not_undo_what_is_overwritten(whole, tmp_path, monkeypa
 
 
 def test_the_page_names_tests_that_there_are():
-    """Each test and each store or result that docs/what_files_can_do.md names for its sentences."""
+    """Each test and each store or result that docs/guide/what_files_can_do.md names for its sentences."""
     text = (
-        (ROOT / "docs" / "what_files_can_do.md").read_text().partition("## Stores and results")[2].partition("\n## ")[0]
+        (ROOT / "docs" / "guide" / "what_files_can_do.md")
+        .read_text()
+        .partition("## Stores and results")[2]
+        .partition("\n## ")[0]
     )
     source = "".join(
-        (ROOT / "tests" / "composition" / f"test_{name}_stores.py").read_text() for name in ("hostile", "faults_of")
+        (ROOT / "tests" / "runs" / f"test_{name}_stores.py").read_text() for name in ("hostile", "faults_of")
     )
     tests = re.findall(r"`(test_\w+)`", text)
     named = re.findall(r'"([^"]+)"', " ".join(re.findall(r"\(`stores`:([^)]*)\)", text.replace("\n", " "))))

@@ -248,10 +248,12 @@ def _built(term: Term, module: Any, width: int) -> Any:
         hash(module)
     except TypeError:
         remedy = "give a module, or a class that holds the functions"
-        raise SceneError([f"{term.key}.device = {module!r}: cannot be a key of the kernels made; {remedy}"]) from None
+        raise SceneError(
+            [f"{term.key}.device = {module!r}: is not hashable, as the key of a compiled kernel must be; {remedy}"]
+        ) from None
     remedy = (
         "return what the role adds to (w, D, f, state); name fields as the View and params() do; import the operators of "
-        "lanes that are used; no `if` on a lane, no plain number times a lane: docs/add_a_law.md"
+        "lanes that are used; no `if` on a lane, no plain number times a lane: docs/develop/add_a_force.md"
     )
     try:
         examine = make_examine(module, width, wp.float64)

@@ -105,7 +105,9 @@ class Morris(Sampling):
     def check(self, faults: Faults, space: Space, members: int) -> None:
         # Also a fault where fewer than two factors vary.
         if len(space.factors) < 2:
-            faults.add("sampling", self.kind, f"has {len(space.factors)} factors to tell apart", "vary two or more")
+            faults.add(
+                "sampling", self.kind, f"needs two or more factors, and has {len(space.factors)}", "vary two or more"
+            )
             return
         super().check(faults, space, members)
 

@@ -197,7 +197,12 @@ VEHICLES = [
     (BODY | {"weight": 98.0}, "vehicle.weight = 98.0", "6x6 form", "give rigid_body_mass_matrix"),
     (full(DIAGONAL + np.eye(6, k=1)), "vehicle.rigid_body_mass_matrix", "not symmetric", "give a symmetric matrix"),
     (full(-DIAGONAL), "vehicle.rigid_body_mass_matrix", "not positive definite", "[[m I, -m hat(r_g)]"),
-    (full(np.diag([1.0, 2, 3, 1, 1, 1])), "vehicle.rigid_body_mass_matrix", "no m I in its first block", "[[m I"),
+    (
+        full(np.diag([1.0, 2, 3, 1, 1, 1])),
+        "vehicle.rigid_body_mass_matrix",
+        "not have m I as its upper left block",
+        "[[m I",
+    ),
     (full(np.eye(3)), "vehicle.rigid_body_mass_matrix", "shape (3, 3)", "symmetric 6x6 matrix"),
     (full(added_mass_matrix=-2.0 * DIAGONAL), "vehicle.added_mass_matrix", "not positive definite", "X_udot"),
     (
@@ -206,7 +211,7 @@ VEHICLES = [
         "is missing",
         "beside added_mass_matrix",
     ),
-    (full(mass=10.0), "vehicle.mass = 10.0", "says again", "keep one of the two forms"),
+    (full(mass=10.0), "vehicle.mass = 10.0", "repeats what", "keep one of the two forms"),
     (full(weight=NAN), "vehicle.weight = nan", "not finite", "[N]"),
     (full(center_of_gravity=[1.0]), "vehicle.center_of_gravity = [1.0]", "shape (1,)", "(3,) [m]"),
 ]
@@ -370,9 +375,15 @@ def test_numbers_that_would_do_nothing(table, name, remedy):
 NOISE = {"type": "wrench_noise", "force": [1.0, 1.0, 1.0]}
 MATRIX = {"type": "drag_matrix", "linear": np.eye(6).tolist()}
 SETTINGS = [
-    (MATRIX, {"method": "kl6(psi_s)"}, "method = 'kl6(psi_s)'", "a damping matrix does not", "use psi_s"),
-    (MATRIX, {"method": "tj4(psi_x)"}, "method = 'tj4(psi_x)'", "keeps its order only for maps that undo", "use psi_x"),
-    (TIDE, {"method": "su4(psi_s)"}, "method = 'su4(psi_s)'", "water that varies does not", "use psi_s"),
+    (MATRIX, {"method": "kl6(psi_s)"}, "method = 'kl6(psi_s)'", "a damping matrix prevents that", "use psi_s"),
+    (
+        MATRIX,
+        {"method": "tj4(psi_x)"},
+        "method = 'tj4(psi_x)'",
+        "keeps its order only if a step of -h undoes",
+        "use psi_x",
+    ),
+    (TIDE, {"method": "su4(psi_s)"}, "method = 'su4(psi_s)'", "water that varies prevents that", "use psi_s"),
     (NOISE, {"method": "psi"}, "method = 'psi'", "noise more than once a step", "use psi_s"),
     (
         {"type": "drag", "linear": [0.0, 0.0, 3e5, 0.0, 0.0, 0.0]},
@@ -448,8 +459,8 @@ class Packs(Pull):
 LAWS = [
     (device(law=pull_short), "pull.law = '(w, view)'", "takes 2 arguments", "write law(w, view, p)"),
     (device(law=pull_plain), "pull.law", "not a Warp function", "@wp.func"),
-    (device(law=pull_law, params=None), "pull.device", "has no params(width, real)", "add_a_law.md"),
-    (device(), "pull.device", "has none of law, damping, flow, evolve", "add_a_law.md"),
+    (device(law=pull_law, params=None), "pull.device", "has no params(width, real)", "add_a_force.md"),
+    (device(), "pull.device", "has none of law, damping, flow, evolve", "add_a_force.md"),
     ("pull", "pull.device = 'pull'", "not known", "give a module"),
 ]
 

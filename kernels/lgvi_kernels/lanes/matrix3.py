@@ -96,7 +96,7 @@ def inverse(m: Any):
 
 @wp.func
 def factorise(f: Any, a: Any, b: Any, c: Any, d: Any):
-    """Block elimination of [[a, b], [c, d]]. The blocks need no pivots: inertia plus damping is positive."""
+    """Block elimination of [[a, b], [c, d]], without pivots: inertia plus damping is positive, so its blocks are regular."""
     f.inverse = inverse(a)
     f.upper = product(f.inverse, b)
     f.lower = c

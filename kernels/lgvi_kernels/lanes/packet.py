@@ -29,7 +29,7 @@ def renormalise(x: Any, h: Any):
 
 @wp.func
 def choose_vectors(test: Any, yes: Any, no: Any):
-    """`yes` in the lanes where test > 0: all of the state but the alarm and low parts."""
+    """The vectors of `yes` in the lanes where test > 0; all else, alarm and low parts too, is that of `no`."""
     no.R0 = positive(test, yes.R0, no.R0)
     no.R1 = positive(test, yes.R1, no.R1)
     no.R2 = positive(test, yes.R2, no.R2)
@@ -55,6 +55,7 @@ def vectors_at_rest(x: Any):
 @wp.func
 def probe(x: Any):
     """Zero in the lanes that are finite, not a number in the others."""
+    # One sum shows whether any term is infinite or NaN; of both, the difference s - s is NaN.
     s = x.R0 + x.R1 + x.R2 + x.b + x.p + x.pi
     s = s - s
     return s.x + s.y + s.z
@@ -78,6 +79,7 @@ def failures(x: Any, frozen: Any):
     """The failure code of each lane that is not frozen yet, 0 where it is well."""
     one = ones(frozen)
     zero = one - one
+    # 1 where all is finite; where it is NaN, positive() takes its last argument.
     well = one - probe(x)
     code = positive(x.alarm.code, x.alarm.code, positive(well, zero, one.dtype(wp.static(float(NON_FINITE))) * one))
     return positive(frozen, zero, code)

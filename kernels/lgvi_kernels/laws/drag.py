@@ -30,7 +30,7 @@ def flow_struct(width, real):
 
 @wp.func
 def decay3(x: Any):
-    """(1 - e^-x)/x on three axes."""
+    """(1 - e^-x)/x on each of three axes."""
     return vec3(decay(x.x), decay(x.y), decay(x.z))
 
 
@@ -43,13 +43,13 @@ def remaining(x: Any, s: Any):
 
 @wp.func
 def remaining3(x: Any, s: Any):
-    """The same on three axes."""
+    """The same on each of three axes."""
     return vec3(remaining(x.x, s.x), remaining(x.y, s.y), remaining(x.z, s.z))
 
 
 @wp.func
 def size3(v: Any):
-    """|v| on three axes."""
+    """The sizes of three components."""
     return vec3(absolute(v.x), absolute(v.y), absolute(v.z))
 
 
@@ -78,14 +78,14 @@ def make_taken(linear, quadratic):
 
     @wp.func
     def taken(v: Any, gain: Any, loss: Any):
-        less = v.x.dtype(-1.0)
+        minus_one = v.x.dtype(-1.0)
         if wp.static(quadratic):
             one = vec3(ones(v.x), ones(v.x), ones(v.x))
             g = gain * size3(v)
             if wp.static(linear):
-                return less * (((g + loss) / (one + g)) * v)
-            return less * ((g / (one + g)) * v)
-        return less * (loss * v)
+                return minus_one * (((g + loss) / (one + g)) * v)
+            return minus_one * ((g / (one + g)) * v)
+        return minus_one * (loss * v)
 
     return taken
 
@@ -100,7 +100,7 @@ def make_E(parts, by_changes):
 
     @wp.func
     def prepare(e: Any, p: Any, h: Any):
-        """The constants of E for steps of h."""
+        """The constants of E for steps of h, made before the loop over steps: there it has no exponential."""
         e.h = h
         if wp.static(linear_force):
             x = h * p.linear_force

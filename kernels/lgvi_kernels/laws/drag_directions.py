@@ -18,7 +18,7 @@ from lgvi_kernels.law import absolute, add, cross, div, lane3, mul, ones, struct
 from lgvi_kernels.laws.drag import PARTS
 from lgvi_kernels.laws.drag import make_E as make_exact
 
-COLUMNS = tuple(f"{what}_{axis}" for axis in "uvwpqr" for what in ("velocity", "rate"))
+COLUMNS = tuple(f"{kind}_{axis}" for axis in "uvwpqr" for kind in ("velocity", "rate"))
 
 
 @functools.cache
@@ -40,12 +40,12 @@ def make_axis(component, linear, quadratic):
     @wp.func
     def changed(w: Any, decay: Any, gain: Any):
         one = ones(w)
-        s = w
+        slowed = w
         if wp.static(quadratic):
-            s = s / (one + component(gain) * absolute(w))
+            slowed = slowed / (one + component(gain) * absolute(w))
         if wp.static(linear):
-            s = component(decay) * s
-        return s - w
+            slowed = component(decay) * slowed
+        return slowed - w
 
     return changed
 
@@ -77,6 +77,8 @@ def make_E(parts, velocities):
         nu_forces, Om_forces = velocities(c.inertia, x.p, x.pi)
         Om = apply(p.turn, Om_forces)
         nu = apply(p.turn, nu_forces) - cross(Om, p.origin)
+        # du to dr sum up each axis's changes: velocities follow at once, momenta once at the end.
+        # Written out, since each axis has fields of its own, which no loop can index.
         zero = ones(Om.x) - ones(Om.x)
         du = zero
         dv = zero

@@ -41,7 +41,7 @@ def params(width, real):
 
 @wp.func
 def speed_along(view: Any, row: int):
-    """The velocity that the twist in these rows measures."""
+    """The velocity that the twist in six rows measures."""
     return dot(row3(view, row), view.nu) + dot(row3(view, row + 3), view.Om)
 
 
@@ -50,6 +50,7 @@ def note_lift_and_drag(view: Any, at: int, along: Any, across: Any, noted: int):
     """Note l and d of a fin whose wrench is -l (along n - across c) - d (along c + across n), for add_fins.
 
     l = kl along across / V, d = kd V + kn across^2 / V; along and across are the flow along its chord c and normal n.
+    They are noted in rows of work, since add_fins goes through all fins once for each block.
     """
     speed = root(along * along + across * across)
     over = across / greatest(speed, view.h.dtype(wp.static(STILL)) * ones(speed))
@@ -108,6 +109,7 @@ def add_fins(D: Any, view: Any, first: int, stride: int, count: int, noted: int)
     D.force_rate.row0 = D.force_rate.row0 + (s0 + w0)
     D.force_rate.row1 = D.force_rate.row1 + (s1 + w1)
     D.force_rate.row2 = D.force_rate.row2 + (s2 + w2)
+    # The block torque by velocity is (S - W)^T of force by rate: S is symmetric, W antisymmetric.
     s0 = s0 - w0
     s1 = s1 - w1
     s2 = s2 - w2

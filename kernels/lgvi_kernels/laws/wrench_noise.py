@@ -15,10 +15,10 @@ def params(width, real):
     """Params: for each of the user's axes, the noise's force [N s^1/2], that force's torque about the origin of the forces
     and the noise's torque [N m s^1/2], in the kernel's axes.
 
-    member, seed0, seed1, channel: what the noise is keyed by, besides the step; the torques have channel + 1.
+    member, seed0, seed1, channel: with the step, the key of the random numbers; the torques' key has channel + 1.
     """
     Lane3 = lane3(width, real)
-    columns = {f"{what}{axis}": Lane3 for what in ("force", "moment", "torque") for axis in "xyz"}
+    columns = {f"{kind}{axis}": Lane3 for kind in ("force", "moment", "torque") for axis in "xyz"}
     key = {"member": int_lane(width), "seed0": wp.int32, "seed1": wp.int32, "channel": wp.int32}
     return struct("WrenchNoise", **columns, **key)
 

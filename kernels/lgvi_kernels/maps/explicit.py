@@ -76,7 +76,7 @@ def make_rates(Rates, Wrench, everything, velocities, kind, mass, coupled, drift
         if wp.static(coupled):
             w.torque = w.torque + cross(x.p, nu)
         elif wp.static(not isotropic):
-            # Of the mean of M^-1 it is zero.
+            # p x M^-1 p without the mean of M^-1, of which it is zero.
             w.torque = munk(w.torque, x.p, c.inertia.anisotropy)
         return w
 
@@ -89,7 +89,7 @@ def make_rates(Rates, Wrench, everything, velocities, kind, mass, coupled, drift
         nu, Om = velocities(c.inertia, x.p, x.pi)
         w = Wrench()
         if wp.static(not scaled):
-            # Laws add to what is there: fewer operations than a sum of their own.
+            # Laws add to w: begun with these terms, it saves the addition of two wrenches.
             w = turning(w, x, c, nu, Om)
         w, u = everything(w, x, c, h, nu, Om)
         if wp.static(scaled):
@@ -126,7 +126,7 @@ def make_munk(diagonal):
     @wp.func
     def munk(turned: Any, p: Any, A: Any):
         if wp.static(diagonal):
-            # The differences stay the same for all steps, and the compiler keeps them.
+            # The differences of A are the same in all steps: the compiler forms them before the loop.
             turned.x = turned.x + (A.z - A.y) * (p.y * p.z)
             turned.y = turned.y + (A.x - A.z) * (p.z * p.x)
             turned.z = turned.z + (A.y - A.x) * (p.x * p.y)
@@ -150,7 +150,7 @@ def along(x: Any, k: Any, s: Any):
 
 @wp.func
 def along_known(x: Any, k: Any, s: Any):
-    """The same where P is known for all times."""
+    """The same without p, where P is known for all times."""
     x.b = x.b + s * k.b
     x.R0 = x.R0 + s * k.R0
     x.R2 = x.R2 + s * k.R2
@@ -253,6 +253,7 @@ def make_push(Wrench, View, laws):
     @wp.func
     def pushed(x: Any, c: Any, h: Any):
         if wp.static(force is not None):
+            # An empty view: such a force looks at nothing.
             x.p = x.p + h * force(Wrench(), View(), c.params).force
         return x
 
@@ -315,7 +316,7 @@ def make_stages(Rates, rates, move, complete, push, a, c, timed):
 
 
 def make_fixed(stages, finish, push, timed):
-    """One step of the length that is asked for. push: as of make_stage."""
+    """One step of length h. push: as in make_stage."""
 
     @wp.func
     def step(x: Any, c: Any, h: Any):
@@ -383,6 +384,7 @@ def make_explicit(spec, everything, velocities):
     if method.kind == "munthe_kaas":
         return make_munthe_kaas(rates, move, turned, timed)
     a, c = method.a, method.c
+    # An estimate of one number more asks for the slope at the end of the step, whose row of `a` is b.
     if method.adaptive and len(method.errors[0]) > len(a):
         a, c = (*a, method.b), (*c, 1.0)
     stages = make_stages(Rates, rates, move, complete, push, a, c, timed)

@@ -54,6 +54,7 @@ def make_shear(Matrix3, coupled, shifted):
     @wp.func
     def shear(D: Any, view: Any, inertia: Any, water: Any):
         """D + I6 (R^T G R, 0): force M R^T G R nu and, where M and J are coupled, torque C^T R^T G R nu."""
+        # M and C are divided by max J, D is not.
         scale = ones(inertia.mean) / inertia.inverse_scale
         X = gradient_in_body(Matrix3(), view, water)
         MX = product(symmetric(Matrix3(), inertia.M), X)

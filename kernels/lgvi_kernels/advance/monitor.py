@@ -1,7 +1,7 @@
-"""What is looked at now and then, beside the alarms of each step: rows of warnings, energy that must not grow, strong drag.
+"""Checks beside the alarms of each step: rows of warnings, energy that must not grow, strong drag.
 
-A look sees the state at the end of a step, once in so many steps: its code lies outside the loop over the steps. What a
-kernel is not asked for is not in it. Values are squares, as those of alarms are; the host takes the root.
+A look sees the state at the end of a step, once in so many steps: its code lies outside the loop over the steps, whose
+registers it would take. A kernel has only the checks that it is asked for. Values are squares, as those of alarms are.
 """
 
 import functools
@@ -49,7 +49,7 @@ MOST_ENERGY = 100.0
 # Drag number of the stages that go backward beyond which the member has failed: at 1 drag alone has no past.
 MOST_BACKWARD_DRAG = 0.5
 
-# T and U at the start, and what both could give from there.
+# T and U at the start, and the energy that both could give from there.
 ENERGY_FIELDS = 3
 EPSILON = {wp.float64: 2.0**-52, wp.float32: 2.0**-23}
 # Round-off of energies that cancel, in units of EPSILON: what a float32 attitude loses between two renormalisations.
@@ -58,7 +58,7 @@ ROUND_OFF = 1e4
 
 @functools.cache
 def limits_struct(width, real, rows):
-    """What rows compare with. munk: (h w)^2 per |p|^2; step: h [s]; the rest are the limits, squared."""
+    """The numbers that rows compare with. munk: (h w)^2 per |p|^2; step: h [s]; the rest are the limits, squared."""
     fields = {f"{row}_limit": real for row in rows}
     if "munk_coarse" in rows:
         fields["munk"] = lane(width, real)
@@ -76,7 +76,7 @@ def seen_struct(width, real):
 
 @functools.cache
 def monitor_struct(width, real, rows, energy, backward, substep, still):
-    """The kernel's argument: limits, one entry or one a packet, and what looks leave behind, by packet.
+    """The kernel's argument: limits, one entry or one a packet, and the results of looks, by packet.
 
     warned: bits; warned_step and warned_size: steps made at the first crossing of the most serious row, and its square.
     energy: rows of ENERGY_FIELDS. backward: the part of h that stages go back at once. substeps: steps that were divided.
@@ -101,7 +101,7 @@ def monitor_struct(width, real, rows, energy, backward, substep, still):
 
 @wp.func
 def size3(v: Any):
-    """|v| on three axes."""
+    """The sizes of three components."""
     return vec3(absolute(v.x), absolute(v.y), absolute(v.z))
 
 
@@ -143,7 +143,7 @@ def make_drag_rate(by_directions, parts, velocities, factor):
 
 
 def make_matrix_rate(View, Damping, damping, velocities):
-    """The same of damping matrices, by their diagonals: at twice the velocities they hold l + 2 q|v|."""
+    """The same for damping matrices, by their diagonals: D of twice the velocities has l + 2 q|v| there."""
 
     @wp.func
     def matrix_rate(x: Any, c: Any):
@@ -162,7 +162,7 @@ def make_matrix_rate(View, Damping, damping, velocities):
 
 
 def make_sum(one, other):
-    """Of drag along axes and of matrices beside it."""
+    """The sum of two rates: of drag along axes, and of damping matrices beside it."""
 
     @wp.func
     def rate(x: Any, c: Any):
@@ -172,7 +172,10 @@ def make_sum(one, other):
 
 
 def make_backward(drag_rate):
-    """The check of each step where stages go backward: what drag alone would have no past for is no solution."""
+    """The alarm of each step whose method has stages that go backward.
+
+    Backward in time drag makes a vehicle faster, and where the drag number is 1 or more, infinitely fast within the stage.
+    """
 
     @wp.func
     def backward(x: Any, c: Any, length: Any):
@@ -188,7 +191,9 @@ def make_backward(drag_rate):
 
 
 def make_energy(laws, real, View, velocities, shifted):
-    """(energies, supplies, growth) of states, divided by max J: T and U; what they can give; what was created over that.
+    """Functions (energies, supplies, growth) of states: T and U; what they can give; the energy created, over that.
+
+    Energies are divided by max J, as momenta are.
 
     shifted: the forces have another origin than the state.
     """
@@ -217,7 +222,7 @@ def make_energy(laws, real, View, velocities, shifted):
 
     @wp.func
     def growth(x: Any, c: Any, t: Any, T0: Any, U0: Any, S0: Any):
-        """(E - E0) / (what there was to exchange), with the round-off of U under the fraction.
+        """(E - E0) / (what there was to exchange): rounding errors of U are added below, so that they raise no alarm.
 
         A steady force F gives in the time t no more than (F t)^2 / (2 M), whatever else acts; 3 `mean` is above all 1 / M.
         """

@@ -27,9 +27,9 @@ EPSILON = {wp.float64: 2.0**-52, wp.float32: 2.0**-23}
 class Watch(NamedTuple):
     """Functions of a scene's events.
 
-    alarm: (x, c, h) -> x with the alarm of the lanes that have reached an event; spacing: (good, x, c, h) -> what the
-    position between two states is known to, about each axis; nearest: (x, c, h, spacing) -> (distance with twice the margin,
-    margin, status) of the event that is nearest in each lane.
+    alarm: (x, c, h) -> x with the alarm of the lanes that have reached an event; spacing: (good, x, c, h) -> the round-off of
+    a position between two states, along each axis; nearest: (x, c, h, spacing) -> (distance plus two margins, margin,
+    status) of the event that is nearest in each lane.
     """
 
     alarm: Any
@@ -68,7 +68,7 @@ def make_watch(events, View, shifted, real):
 
     @wp.func
     def spacing(good: Any, x: Any, c: Any, h: Any):
-        """A position is known to the spacing of its numbers along the step."""
+        """The round-off of a position on the step: the spacing of its numbers."""
         return real(wp.static(EPSILON[real])) * (sizes(good, c, h) + sizes(x, c, h))
 
     @wp.func
@@ -196,7 +196,7 @@ def make_arrival(watch, part_step, choose, water_velocity, real, width, most_par
                         if failed and parts < wp.static(most_parts):
                             parts = 2 * parts
                         elif failed or not distance[j] == distance[j]:
-                            # Ends the search: what was found before stays.
+                            # Ends the search with the last part that reached the event.
                             evaluations = int(wp.static(MOST_EVALUATIONS))
                         elif distance[j] > margin[j]:
                             low = trial

@@ -21,7 +21,7 @@ from lgvi_kernels.lanes.packet import failures, renormalise, turned_too_far
 from lgvi_kernels.lanes.sums import at_rest, choose
 from lgvi_kernels.maps.compose import superpose
 
-# Where every step is a sample, steps between two looks at the energy: a failure is then found up to so many steps late.
+# Where every step is a sample, steps between two looks at the energy: this is how late a failure may be seen.
 SINGLE_LOOKS = 8
 
 
@@ -83,7 +83,7 @@ def make_advance(spec):
         status: wp.array(dtype=Ints),
         failed_step: wp.array(dtype=Ints),
         failed_size: wp.array(dtype=Lane),
-        # what is looked at now and then
+        # limits and results of looks
         monitor: Monitor,
         # out
         out: wp.array2d(dtype=Lane),
@@ -116,6 +116,7 @@ def make_advance(spec):
         any_frozen = bool(False)
         if wp.static(checked):
             for j in range(wp.static(width)):
+                # Positive in the lanes that an earlier launch froze.
                 frozen[j] = real(status[i][j])
             any_frozen = any_positive(frozen)
         # kept: the last good state of frozen lanes, which rest at the origin meanwhile and raise no further alarm.

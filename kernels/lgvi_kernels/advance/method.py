@@ -1,4 +1,4 @@
-"""A method's step from its sub-maps, for what the scene has: which laws act where, and how velocities follow."""
+"""A method's step, made of its sub-maps and the scene's laws: which law acts in which map, and how velocities follow."""
 
 from typing import Any, NamedTuple
 

@@ -44,7 +44,7 @@ BITS = {
     "energy": 9,
 }
 
-# Energy created, over what there was to be exchanged, beyond which the member has failed.
+# Energy created, over the energy that could be exchanged, beyond which the member has failed.
 MOST_ENERGY = 100.0
 # Drag number of the stages that go backward beyond which the member has failed: at 1 drag alone has no past.
 MOST_BACKWARD_DRAG = 0.5
@@ -52,7 +52,7 @@ MOST_BACKWARD_DRAG = 0.5
 # T and U at the start, and the energy that both could give from there.
 ENERGY_FIELDS = 3
 EPSILON = {wp.float64: 2.0**-52, wp.float32: 2.0**-23}
-# Round-off of energies that cancel, in units of EPSILON: what a float32 attitude loses between two renormalisations.
+# Round-off of energies that cancel, in units of EPSILON: as large as that of a float32 attitude between two renormalisations.
 ROUND_OFF = 1e4
 
 
@@ -222,7 +222,7 @@ def make_energy(laws, real, View, velocities, shifted):
 
     @wp.func
     def growth(x: Any, c: Any, t: Any, T0: Any, U0: Any, S0: Any):
-        """(E - E0) / (what there was to exchange): rounding errors of U are added below, so that they raise no alarm.
+        """(E - E0) over the energy that could be exchanged. The round-off of U is added to it, and so raises no alarm.
 
         A steady force F gives in the time t no more than (F t)^2 / (2 M), whatever else acts; 3 `mean` is above all 1 / M.
         """
@@ -257,6 +257,7 @@ def make_look(rows, width, real, velocities, drag_rate):
         nu, Om = velocities(c.inertia, x.p, x.pi)
         if wp.static("precision" in rows):
             step = limits.step * limits.step
+            # At rest, where moved is 0, no digit of a motion is lost.
             moved = step * dot(nu, nu)
             lost = real(wp.static(EPSILON[real] ** 2)) * dot(x.b, x.b)
             excess = positive(moved, lost - limits.precision_limit * moved, zero - one)

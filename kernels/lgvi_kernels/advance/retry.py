@@ -1,4 +1,7 @@
-"""Steps that are made again: in equal parts where a step has no solution, and in part where an event stops a member."""
+"""Steps that are made again: in equal parts, where a step has no solution; up to an event, where it stops a member.
+
+Both are rare, so their functions are not inlined: the loop over steps keeps its registers.
+"""
 
 import functools
 from typing import Any, NamedTuple
@@ -41,7 +44,7 @@ def make_retry(spec):
                  lead_h: wp.array(dtype=real), opening: real, among: Lane):  # fmt: skip
         """Make `parts` equal parts of step k, each `part` of its length.
 
-        Before and after, the state has the lead of a whole step: it is undone, and the lead of a part made, and back.
+        The state comes and goes with the lead of a whole step: here that lead is undone, and the lead of a part made.
         among: the lanes that count; a packet that chooses its steps asks for the tolerance in them alone.
         """
         stages = lead_h.shape[0] - 1

@@ -30,7 +30,7 @@ class Spec(NamedTuple):
     fields: the sampled quantities.
     events: modules of events.
     drag: the parts of drag along the axes (by its exact flow, or as rates) that some member has, or none.
-    parts: what the inertia holds besides (see inertia_struct).
+    parts: optional fields of the inertia (see inertia_struct).
     coupling: which of U12, U13, U23 and of the three pitches some member has.
     flow: "none", "steady" (uniform, the same for ever), "uniform" or "varying".
     timed: whether a law looks at the time.
@@ -90,7 +90,7 @@ class Spec(NamedTuple):
 
     @property
     def turned(self) -> bool:
-        """Whether turns about the body's axes are made, whose angle has a limit."""
+        """Whether the method turns about the body's axes: the angle of these turns has a limit."""
         return any(letter[0] == "R" for letter, _ in self.maps)
 
     @property
@@ -133,9 +133,9 @@ class Spec(NamedTuple):
 
 
 class Types(NamedTuple):
-    """The types of a kernel: lanes, what a packet carries (see state), and its arguments.
+    """The types of a kernel: lanes, the structs of lanes/state.py, and the kernel's arguments.
 
-    Constants: what is the same in all steps of a packet. DragFlow: the constants of drag by its exact flow.
+    Constants: all that is the same in every step of a packet. DragFlow: the constants of drag by its exact flow.
     """
 
     Lane: Any

@@ -40,6 +40,7 @@ def make_stepping(spec):
     composed, paired, compensated = spec.composed, spec.paired, spec.compensated
     backward, watched = spec.backward, spec.watched
     watch = make_watch(spec.events, types.View, "origin" in spec.parts, real) if watched else None
+    # step stands in for functions that this Spec does not ask for; it is not called in their place.
     to_event = watch.alarm if watched else step
     drag_back = step
     if backward:

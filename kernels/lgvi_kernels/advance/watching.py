@@ -45,7 +45,7 @@ def make_watching(spec):
 
     @wp.func
     def created(y: State, c: Constants, monitor: Monitor, t: real):
-        """Energy created since the start, over what there was to exchange (see monitor.make_energy)."""
+        """Energy created since the start, over the energy that could be exchanged (see monitor.make_energy)."""
         e = monitor.energy
         return growth(y, c, t, e[c.packet, 0], e[c.packet, 1], e[c.packet, 2])
 

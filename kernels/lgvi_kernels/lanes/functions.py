@@ -125,7 +125,7 @@ def _powers(real, x, limits):
     """C++ that declares N, R, Q with x = N ln 2 + R and Q = (e^R - 1) / R, |R| <= ln 2 / 2, x kept within limits."""
     f = FORMATS[real]
     low, high = (f"(V() + (S){limit!r})" for limit in f[limits])
-    # Not a number is neither below nor above, so it stays what it is.
+    # NaN is neither below nor above a limit, so it stays NaN.
     kept = f"V X = {x}; X = X < {low} ? {low} : X; X = X > {high} ? {high} : X;"
     Q = _series("R", [1.0 / _factorial(k + 1) for k in range(f["exponential"])])
     return f"{kept} {_rounded(real, 'X', 1.0 / LN2)} V R = {_less('X', 'T', f['ln2'])}; V Q = {Q};"
@@ -191,7 +191,7 @@ def _logarithm(real, excess="M - (S)1"):
 
 
 def _positive_logarithm(real):
-    # Every comparison with what is not a number fails.
+    # Every comparison with NaN fails: R / R, which is 0 / 0, marks a <= 0 and NaN alike.
     return f"{_split(real, 'A')} {_logarithm(real)} V R = V(); R = A > (S)0 ? L : R / R;"
 
 

@@ -1,4 +1,4 @@
-"""What is done to a whole packet between steps: renormalise, choose between two states lane by lane, find failures."""
+"""Functions of a whole packet between steps: renormalise, choose between two states lane by lane, find failures."""
 
 from typing import Any
 
@@ -55,7 +55,7 @@ def vectors_at_rest(x: Any):
 @wp.func
 def probe(x: Any):
     """Zero in the lanes that are finite, not a number in the others."""
-    # One sum shows whether any term is infinite or NaN; of both, the difference s - s is NaN.
+    # The sum is infinite or NaN where any of its terms is; s - s is then NaN.
     s = x.R0 + x.R1 + x.R2 + x.b + x.p + x.pi
     s = s - s
     return s.x + s.y + s.z

@@ -67,7 +67,7 @@ for _width in WIDTHS:
 
         @wp.func
         def place(x: _State):
-            """The position that laws see: b and what waits in b_low."""
+            """The position that laws see: b, or b + b_low."""
             return x.b
 
         @wp.func

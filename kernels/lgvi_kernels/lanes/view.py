@@ -74,7 +74,7 @@ def table1(view: Any, first: int, count: int, x: Any):
 
 @wp.func
 def table3(view: Any, first: int, count: int, x: Any):
-    """The same for vectors: 3 rows for the first value, then 5 rows a knot: knot, 1 / distance, 3 differences."""
+    """table1 for vectors: 3 rows for the first value, then 5 rows a knot: knot, 1 / distance, 3 differences."""
     value = row3(view, first)
     for i in range(count):
         at = first + 3 + 5 * i

@@ -1,7 +1,7 @@
 """Drag per axis, -(l + q|v|) v, by its exact flow E: v -> v e^-x / (1 + (h q|v|/I) (1 - e^-x)/x), x = h l / I.
 
 E is the solution of I v' = -(l + q|v|) v on one axis, exact at any h, and exact altogether where the axes of drag are
-principal axes of M and J. (Where they are not, the same drag acts as a damping matrix: terms/drag_matrix.py.)
+principal axes of M and J. (Where they are not, drag_directions.py takes its place.)
 """
 
 import functools

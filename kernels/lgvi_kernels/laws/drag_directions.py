@@ -25,7 +25,7 @@ COLUMNS = tuple(f"{kind}_{axis}" for axis in "uvwpqr" for kind in ("velocity", "
 def params(width, real):
     """Params: as drag, with L l [1/s] and L q; turn and origin, from the kernel's frame to the user's; mass, 1 / L by max J.
 
-    velocity_u ... rate_r: what a unit change of the velocity along each axis does to all velocities.
+    velocity_u ... rate_r: the changes of nu and Om that go with a unit change of the velocity along one axis.
     """
     Lane3 = lane3(width, real)
     fields = {part: Lane3 for part in PARTS} | {name: Lane3 for name in COLUMNS}

@@ -25,7 +25,7 @@ from lgvi_kernels.law import (  # noqa: F401
 # Rows of one fin: the twists that measure the speed along its chord c and normal n (6 and 6, each also the wrench of a unit
 # force), then rho A / 2 times lift slope, drag coefficient and added drag coefficient; and as MATRICES say.
 ROWS = 51
-# Where in a fin's rows S = c c^T + n n^T (what drag multiplies) and W = n c^T - c n^T (what lift does) begin, by blocks:
+# Where in a fin's rows S = c c^T + n n^T (drag is d S) and W = n c^T - c n^T (lift is l W) begin, by blocks:
 # force by velocity, S's diagonal and 23, 31, 12 and W's 23, 31, 12; force by rate, S's and W's three rows; torque by rate,
 # as force by velocity. Torque by velocity follows, for S is symmetric and W antisymmetric.
 MATRICES = (15, 24, 42)

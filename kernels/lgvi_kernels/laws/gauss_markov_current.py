@@ -73,7 +73,7 @@ def evolve(state: Any, view: Any, p: Any):
 
 @wp.func
 def flow(f: Any, view: Any, p: Any):
-    """u and du/dt as remembered: over a kick du/dt h is what u changes by."""
+    """u and du/dt from the memory; du/dt h is the change of u over a kick."""
     f.velocity = f.velocity + recall(view, p.memory)
     f.rate = f.rate + recall(view, p.memory + 6)
     return f

@@ -25,7 +25,7 @@ TINY = {wp.float64: 1e-300, wp.float32: 1e-36}
 
 
 class Explicit(NamedTuple):
-    """What decides the code of an explicit method: a tableau, whose row i of `a` has i numbers, and how it is used.
+    """All that decides the code of an explicit method: a tableau, whose row i of `a` has i numbers, and how it is used.
 
     kind: "vector" (R as two of its rows), "inertial" (the same, and forces never change in inertial axes, so that R p is
     known for all times: it is kept in place of p), "group" (R turns by exponentials) or "munthe_kaas" (order 4 with its
@@ -70,7 +70,7 @@ def make_rates(Rates, Wrench, everything, velocities, kind, mass, coupled, drift
 
     @wp.func
     def turning(w: Any, x: Any, c: Any, nu: Any, Om: Any):
-        """p x Om and pi x Om + p x nu: what the momenta in body axes change by without any force."""
+        """p x Om and pi x Om + p x nu: the rates of the momenta in body axes without any force."""
         w.force = w.force + cross(x.p, Om)
         w.torque = w.torque + cross(x.pi, Om)
         if wp.static(coupled):
@@ -199,7 +199,7 @@ def make_act(turned):
     return act
 
 
-# The two functions that follow are written out for so many stages: a loop or a recursion over them would copy all the
+# The two functions that follow are written out for MOST_STAGES stages: a loop or a recursion over them would copy all the
 # slopes for each, which the compiler removes again, in three times as long.
 MOST_STAGES = 13
 
@@ -207,7 +207,7 @@ MOST_STAGES = 13
 def make_moves(move, weights, complete):
     """One function (y, slopes, h): the moves by h w_1 k_1, then h w_2 k_2, ... of all weights that are not zero.
 
-    complete: what completes a state that was moved, or None.
+    complete: the function that completes a moved state, or None (see `completed`).
     """
     w = weights + (0.0,) * (MOST_STAGES - len(weights))
 
@@ -261,7 +261,7 @@ def make_push(Wrench, View, laws):
 
 
 def make_stage(moves, push, node, timed):
-    """The state of one stage. push: what changes P, where it is known, or None."""
+    """The state of one stage. push: the function that changes P where it is known (see make_push), or None."""
 
     @wp.func
     def at_node(x: Any, k: Any, c: Any, h: Any):

@@ -1,4 +1,4 @@
-"""All laws of a scene at one state, for given velocities: what acts on the vehicle and how fast the water is."""
+"""All laws of a scene at one state and its velocities: the force and torque on the vehicle, and the water's velocity."""
 
 from typing import Any
 

@@ -81,7 +81,7 @@ def make_solve(real, solver, iterations, adaptive, checked):
 
     @wp.func
     def raise_alarm(alarm: Any, far: Any, e: Any, r2: Any, unit: Any):
-        """Note the first failure of each lane, and the square of what crossed its limit."""
+        """Note the first failure of each lane, and the square of the value that crossed its limit."""
         zero = ones(e) - ones(e)
         unconverged = unit.dtype(wp.static(float(NOT_CONVERGED))) * ones(e)
         too_large = unit.dtype(wp.static(float(STEP_TOO_LARGE))) * ones(e)

@@ -1,4 +1,4 @@
-"""Steps that each packet chooses for a tolerance: error norm, step control, and what has failed."""
+"""Steps that each packet chooses for a tolerance: error norm, step control, and the status of lanes that fail."""
 
 from typing import Any
 

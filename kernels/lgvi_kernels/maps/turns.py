@@ -2,7 +2,7 @@
 
 In axes where Js is diagonal, 1/2 (pi - E^T p).Js^-1 (pi - E^T p) with E moved to upper triangular form U by the choice of
 an origin for each axis. Without coupling U = 0: three plain turns. No equation is solved; the map exists for every step,
-but where half the angle of a turn reaches 1 rad it has no digit of the motion: a member there is marked.
+but where half the angle of a turn reaches 1 rad it has no digit of the motion: such a member gets a status.
 """
 
 from typing import Any
@@ -166,8 +166,8 @@ def make_turn(axis, pitched, following, compensated, watched=False):
     about all axes (see packet.turned_too_far). Turns keep |pi|, so Y is not below half the angle of the turn about the axis of
     the largest J, nor, as J3 <= 2 J2 for a rigid body, below a half of that about the middle one.
 
-    A step is one chain of turns, each waiting for the momentum about its axis from the one before: what decides its time
-    is how soon that component is there, so all that need not wait is written apart from what must.
+    A step is one chain of turns: each waits until the turn before has computed the momentum about its axis. How soon that
+    component is ready decides the time of a step, so all that need not wait for it is written apart.
     """
     component, _ = AXES[axis]
     turn = make_turn_of_state(axis, following, compensated)

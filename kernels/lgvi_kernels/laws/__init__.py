@@ -1,4 +1,4 @@
-"""The laws that a scene may name, one file each: `params(width, real)`, the struct of its numbers, and some of the functions
+"""The laws that a scene may name, one file each: `params(width, real)`, the struct of its numbers, and some functions.
 
 law(w, view, p): force [N] and torque [N m] that depend on position, attitude and time;
 damping(D, view, p): the matrix D of a force and torque -D (nu; Om); D may depend on velocities as well;

@@ -12,9 +12,9 @@ NOISE = True
 
 @functools.cache
 def params(width, real):
-    """Params: for each of the user's axes, the noise's force [N s^1/2], that force's torque about the origin of the forces
-    and the noise's torque [N m s^1/2], in the kernel's axes.
+    """Params: for each of the user's axes, the noise's force and torques, in the kernel's axes.
 
+    forcex to forcez [N s^1/2]; momentx to momentz: their torque about the origin of the forces; torquex to torquez [N m s^1/2];
     member, seed0, seed1, channel: with the step, the key of the random numbers; the torques' key has channel + 1.
     """
     Lane3 = lane3(width, real)

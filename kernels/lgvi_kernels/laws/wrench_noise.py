@@ -14,7 +14,7 @@ NOISE = True
 def params(width, real):
     """Params: for each of the user's axes, the noise's force and torques, in the kernel's axes.
 
-    forcex to forcez [N s^1/2]; momentx to momentz: their torque about the origin of the forces; torquex to torquez [N m s^1/2];
+    forcex to forcez [N s^1/2]; momentx to momentz: its torque about the origin of the forces; torquex to torquez [N m s^1/2];
     member, seed0, seed1, channel: with the step, the key of the random numbers; the torques' key has channel + 1.
     """
     Lane3 = lane3(width, real)

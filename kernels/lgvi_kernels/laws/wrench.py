@@ -16,7 +16,7 @@ def params(width, real):
 
 @wp.func
 def law(w: Any, view: Any, p: Any):
-    """phi = force, tau = torque."""
+    """phi = force, tau = torque, whatever the state is."""
     w.force = w.force + p.force
     w.torque = w.torque + p.torque
     return w

@@ -22,7 +22,10 @@ def plays(law, role):
 
 @functools.cache
 def params_of(laws, width, real):
-    """The parameters of several laws, nested as `own` and `rest`."""
+    """The parameters of several laws, nested: `own`, those of the first law, and `rest`, the same struct of the others.
+
+    The functions of superpose nest alike: each hands `rest` on and reads `own`, without a name for each law.
+    """
     if not laws:
         return struct("NoParams", unused=wp.uint8)
     return struct("Params", own=laws[0].params(width, real), rest=params_of(laws[1:], width, real))
@@ -30,7 +33,10 @@ def params_of(laws, width, real):
 
 @functools.cache
 def superpose(laws, role):
-    """Fold the functions of this role into one, (sum, view, params) -> sum. None if no law has it."""
+    """Fold the functions of this role into one, (sum, view, params) -> sum. None if no law has it.
+
+    The last law is added first; this order is part of the bits of a result.
+    """
     if not any(plays(law, role) for law in laws):
         return None
     function, rest = plays(laws[0], role), superpose(laws[1:], role)

@@ -1,4 +1,4 @@
-"""The events a scene may name, one file each: `params(width, real)` and `distance(view, p)`, positive while all is well."""
+"""The events that a scene may name, one file each: `params(width, real)` and `distance(view, p)`, positive until the event."""
 
 from lgvi_kernels.stops import box, floor, surface, time
 

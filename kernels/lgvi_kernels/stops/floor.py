@@ -16,5 +16,5 @@ def params(width, real):
 
 @wp.func
 def distance(view: Any, p: Any):
-    """Metres to go."""
+    """Height above the floor [m]."""
     return p.depth - view.b.z

@@ -16,5 +16,5 @@ def params(width, real):
 
 @wp.func
 def distance(view: Any, p: Any):
-    """Metres to go."""
+    """Distance below the depth at which the member stops [m]."""
     return view.b.z - p.depth

@@ -1,4 +1,4 @@
-"""A member's time is over."""
+"""A member reaches the time at which it stops."""
 
 import functools
 from typing import Any
@@ -16,5 +16,5 @@ def params(width, real):
 
 @wp.func
 def distance(view: Any, p: Any):
-    """Seconds to go."""
+    """Time left [s]."""
     return p.at - view.t * ones(p.at)

@@ -2,7 +2,7 @@
 
 python benchmarks/coupled_table.py
 
-Bodies, starts and truth are those of tests/verification/test_coupled_reference.py. One step, its structure and the general
+Bodies, starts and truth are those of tests/methods/test_coupled_reference.py. One step, its structure and the general
 body are measured on the NumPy twin; long runs and fleets on the kernel.
 """
 
@@ -17,8 +17,8 @@ from scipy.optimize import root
 import lgvi_warp as lw
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.reference import coupled, rotation
-from tests.tools import difference, random_states, slope
-from tests.verification import test_coupled_reference as case
+from tests.methods import test_coupled_reference as case
+from tests.support.tools import difference, random_states, slope
 
 TARGET = Path(__file__).resolve().parent.parent / "docs" / "coupled_inertia.md"
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
@@ -144,7 +144,7 @@ def general_body():
             rows.append([f"`{method}`", f"{h:g}", *(few(x, 2) for x in e[i]), order])
     caption = (
         "**Errors of the general body** at t = 5 s, Euclidean norms, against the state in quad precision that "
-        "`tests/verification/test_coupled_reference.py` prints. Order: of R, from the two steps."
+        "`tests/methods/test_coupled_reference.py` prints. Order: of R, from the two steps."
     )
     return table(caption, ["method", "h [s]", "b [m]", "R", "nu [m/s]", "Om [rad/s]", "order"], rows)
 

@@ -1,5 +1,6 @@
 """Fixtures: the paper's example, as numbers, as a scene and as the reference's body."""
 
+import fnmatch
 import json
 from pathlib import Path
 
@@ -12,20 +13,20 @@ from lgvi_warp.reference.terms.restoring import Restoring
 from lgvi_warp.reference.terms.weight import Weight
 
 ROOT = Path(__file__).parent.parent
-SLOW = [line for line in (ROOT / "tests" / "slow.txt").read_text().splitlines() if line and not line.startswith("#")]
 
 
-COLLECTED = pytest.StashKey[list[str]]()
+def matches(case, mark):
+    """Whether the id of a test's case is like one of a mark's patterns, such as "psi_x-*"."""
+    return any(fnmatch.fnmatchcase(case, pattern) for pattern in mark.args)
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(config, items):
-    """Mark as slow what slow.txt names."""
-    config.stash[COLLECTED] = [item.nodeid for item in items]
-    left = tuple(line for line in SLOW if not line.startswith("!"))
-    here = tuple(line[1:] for line in SLOW if line.startswith("!"))
+def pytest_collection_modifyitems(items):
+    """Mark as slow the cases that `slow_for` names, and all but those that `slow_but` names."""
     for item in items:
-        if item.nodeid.startswith(left) and not item.nodeid.startswith(here):
+        case = item.callspec.id if hasattr(item, "callspec") else ""
+        slow_for, slow_but = item.get_closest_marker("slow_for"), item.get_closest_marker("slow_but")
+        if (slow_for and matches(case, slow_for)) or (slow_but and not matches(case, slow_but)):
             item.add_marker(pytest.mark.slow)
 
 

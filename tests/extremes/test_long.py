@@ -9,7 +9,7 @@ from lgvi_warp.common.status import Status
 from lgvi_warp.physics import energy as invariants
 from tests.extremes import extended
 from tests.extremes.cases import DTYPES, UNIT, Case, Group, ensemble, oblique, twin
-from tests.tools import random_states
+from tests.support.tools import random_states
 
 SLOW = pytest.mark.slow
 KAPPAS = tuple(10.0**k for k in range(-6, 7))
@@ -21,6 +21,7 @@ def rising(values, unit):
     return float((np.diff(values, axis=0) / (unit * values[:-1] + 1e-300)).max())
 
 
+@pytest.mark.slow_for("psi_x*")
 @pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("method", ["psi_s", "psi_x"])
 def test_energy_never_grows_by_exact_drag(method, dtype):
@@ -46,6 +47,7 @@ def matrices(n):
     return A @ np.swapaxes(A, 1, 2) + B - np.swapaxes(B, 1, 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dtype", ["float64", pytest.param("float32", marks=SLOW)])
 def test_energy_never_grows_by_a_drag_matrix(dtype):
     h, n = 0.1, 4
@@ -111,6 +113,7 @@ def fall(case, h, steps):
     return float(w), float(b)
 
 
+@pytest.mark.slow_for("float64*")
 @pytest.mark.parametrize("dtype", ["float64", "float32", pytest.param("float32_compensated", marks=SLOW)])
 def test_falling_and_rising_for_a_day(dtype):
     h, steps = 1.0, 100_000

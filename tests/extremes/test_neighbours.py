@@ -6,7 +6,7 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
 from tests.extremes import cases
-from tests.tools import random_states, scene_of
+from tests.support.tools import random_states, scene_of
 
 SLOW = pytest.mark.slow
 FIELDS = ("position", "attitude", "velocity", "angular_velocity")

@@ -33,7 +33,7 @@ from lgvi_warp.runs.store.run import Stored
 from lgvi_warp.runs.store.settings import Store
 from lgvi_warp.runs.store.sink import Sink
 from lgvi_warp.studies import speed
-from tests.toy_keeper import DepthSum
+from tests.support.toy_keeper import DepthSum
 
 
 def in_turn(calls, rounds):

@@ -1,0 +1,122 @@
+"""The graph of imports, read from the source: `python -m tests.house.graph` prints rooms, circles and lazy imports.
+
+An import is read as "top" (made when its module is), "lazy" (inside a function) or "typing" (under `if TYPE_CHECKING:`).
+"""
+
+import ast
+import graphlib
+from collections import Counter
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[2]
+SOURCE_ROOTS = {"lgvi_warp": ROOT, "lgvi_kernels": ROOT / "kernels"}
+FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
+# The lowest first; those of one floor side by side.
+ROOMS = (
+    ("common",), ("physics", "methods"), ("sampling",), ("statistics",), ("scene",), ("engine",), ("runs",), ("studies",),
+    ("views",), ("cli",),
+)  # fmt: skip
+
+
+class Import(NamedTuple):
+    """One imported name: `lgvi_warp.common.machine` for `from lgvi_warp.common import machine`; kind: top, lazy or typing."""
+
+    name: str
+    kind: str
+
+
+def is_type_checking(node):
+    """Whether the node is `if TYPE_CHECKING:`, which never runs."""
+    return isinstance(node, ast.If) and ast.unparse(node.test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING")
+
+
+def names(node, package):
+    """Absolute names that an import statement asks for."""
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    base = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+    return [".".join([*base, *filter(None, [node.module]), alias.name]) for alias in node.names]
+
+
+def imports(node, package="", kind="top"):
+    """Every Import below a node."""
+    if isinstance(node, (ast.Import, ast.ImportFrom)):
+        return [Import(name, kind) for name in names(node, package)]
+    if is_type_checking(node):
+        typing = [found for child in node.body for found in imports(child, package, "typing")]
+        return typing + [found for child in node.orelse for found in imports(child, package, kind)]
+    below = "lazy" if isinstance(node, FUNCTIONS) and kind == "top" else kind
+    return [found for child in ast.iter_child_nodes(node) for found in imports(child, package, below)]
+
+
+def read_modules():
+    """{module name: its imports} of both packages."""
+    modules = {}
+    for package, root in SOURCE_ROOTS.items():
+        for path in sorted((root / package).rglob("*.py")):
+            parts = path.relative_to(root).with_suffix("").parts
+            own = parts[:-1] if parts[-1] == "__init__" else parts
+            modules[".".join(own)] = imports(ast.parse(path.read_text()), ".".join(parts[:-1]))
+    return modules
+
+
+MODULES = read_modules()
+
+
+def module_of(name):
+    """The module that an imported name is, or lies in; None for a foreign one."""
+    while name and name not in MODULES:
+        name = name.rpartition(".")[0]
+    return name or None
+
+
+def graph(*kinds):
+    """{module: the modules that it imports} by imports of these kinds. The face of the package names everything: left out."""
+    return {
+        module: {module_of(found.name) for found in all_of_it if found.kind in kinds} - {None, module, "lgvi_warp"}
+        for module, all_of_it in MODULES.items()
+        if module != "lgvi_warp"
+    }
+
+
+def circle(*kinds):
+    """A circle of modules by imports of these kinds; None if there is none."""
+    try:
+        tuple(graphlib.TopologicalSorter(graph(*kinds)).static_order())
+    except graphlib.CycleError as error:
+        return error.args[1]
+    return None
+
+
+def room(module):
+    """The number of a module's floor; None outside of the rooms."""
+    name = module.split(".")[1] if module.startswith("lgvi_warp.") else None
+    return next((floor for floor, rooms in enumerate(ROOMS) if name in rooms), None)
+
+
+def arrows_up():
+    """(module, imported module) that look up, all kinds counted."""
+    arrows = ((one, other) for one, others in graph("top", "lazy", "typing").items() for other in others)
+    return [arrow for arrow in arrows if None not in map(room, arrow) and room(arrow[0]) < room(arrow[1])]
+
+
+def report():
+    """Lines on the rooms and their imports."""
+    modules = Counter(module.split(".")[1] for module in MODULES if room(module) is not None)
+    for floor, rooms in enumerate(ROOMS):
+        yield f"floor {floor}: " + ", ".join(f"{name} ({modules[name]} modules)" for name in rooms)
+    yield f"circle of modules, all imports counted: {circle('top', 'lazy', 'typing') or 'none'}"
+    yield f"arrows up: {arrows_up() or 'none'}"
+    late = Counter(
+        found.name.split(".")[0] if module_of(found.name) is None else module_of(found.name)
+        for all_of_it in MODULES.values()
+        for found in all_of_it
+        if found.kind == "lazy"
+    )
+    yield f"imports inside functions: {sum(late.values())}"
+    yield from (f"  {count:3d}  {name}" for name, count in late.most_common())
+
+
+if __name__ == "__main__":
+    print(*report(), sep="\n")

@@ -1,0 +1,134 @@
+"""The arrows between modules point one way (architecture, Layout), read from the source: lazy imports count as well."""
+
+import ast
+import sys
+
+import pytest
+
+from tests.house.graph import MODULES, arrows_up, circle, imports, module_of
+
+# What pyproject.toml declares, by import name; the optional ones take long to import, or may be absent.
+OPTIONAL = {"SALib", "matplotlib", "rerun", "xarray", "zarr", "google_crc32c", "distributed", "netCDF4", "pyarrow"}
+DEPENDENCIES = {"numpy", "scipy", "warp"} | OPTIONAL
+
+
+def within(name, package):
+    """Whether a name is the package or lies in it."""
+    return name == package or name.startswith(f"{package}.")
+
+
+def part(package):
+    """The modules of one package."""
+    return {module: found for module, found in MODULES.items() if within(module, package)}
+
+
+def strangers(package, allowed):
+    """(module, name) for every import in a package from outside the allowed ones."""
+    return [
+        (module, found.name)
+        for module, all_of_it in part(package).items()
+        for found in all_of_it
+        if found.kind != "typing" and not any(within(found.name, one) for one in allowed)
+    ]
+
+
+def importers(package, lazy=True):
+    """Modules outside a package that import something of it; lazy=False leaves imports inside functions out."""
+    return {
+        module
+        for module, all_of_it in MODULES.items()
+        for found in all_of_it
+        if within(found.name, package) and not within(module, package)
+        if found.kind == "top" or (lazy and found.kind == "lazy")
+    }
+
+
+def loaded_by(module):
+    """Modules of ours that importing this one names at once, without those named inside functions."""
+    return {module_of(found.name) for found in MODULES[module] if found.kind == "top"} - {None, module}
+
+
+def closure(module):
+    """A module and all of ours that importing it brings in, parent packages included."""
+    seen, waiting = set(), {module}
+    while waiting:
+        one = waiting.pop()
+        seen.add(one)
+        waiting |= (loaded_by(one) | ({one.rpartition(".")[0]} & MODULES.keys())) - seen
+    return seen
+
+
+def test_the_reader_finds_both_packages():
+    assert {
+        "lgvi_warp",
+        "lgvi_warp.engine.plan",
+        "lgvi_warp.reference.rotation",
+        "lgvi_kernels.advance.kernel",
+    } <= MODULES.keys()
+    assert all(part(package) for package in ("lgvi_warp.reference", "lgvi_warp.views", "lgvi_kernels.laws"))
+
+
+@pytest.mark.parametrize(
+    ("source", "expected"),
+    [
+        ("import rerun as rr", [("rerun", "top")]),
+        ("def f():\n    import rerun", [("rerun", "lazy")]),
+        ("class A:\n    import rerun", [("rerun", "top")]),
+        ("try:\n    from rerun import Mesh3D\nexcept ImportError:\n    pass", [("rerun.Mesh3D", "top")]),
+        ("if TYPE_CHECKING:\n    import rerun\nelse:\n    import xarray", [("rerun", "typing"), ("xarray", "top")]),
+        ("from lgvi_warp import views", [("lgvi_warp.views", "top")]),
+        ("from . import plots", [("lgvi_warp.views.plots", "top")]),
+        ("from ..runs.result import Result", [("lgvi_warp.runs.result.Result", "top")]),
+    ],
+)
+def test_the_reader_sees_an_import(source, expected):
+    assert imports(ast.parse(source), "lgvi_warp.views") == expected
+
+
+def test_device_code_imports_warp_only():
+    assert strangers("lgvi_kernels", {"lgvi_kernels", "warp", "functools", "typing"}) == []
+
+
+def test_the_reference_imports_numpy_only():
+    assert strangers("lgvi_warp.reference", {"lgvi_warp.reference", "numpy"} | sys.stdlib_module_names) == []
+
+
+def test_the_product_imports_what_it_declares():
+    assert strangers("lgvi_warp", {"lgvi_warp", "lgvi_kernels"} | DEPENDENCIES | sys.stdlib_module_names) == []
+
+
+def test_only_five_files_of_the_engine_know_the_kernels():
+    those = {
+        "lgvi_warp.engine.plan",
+        "lgvi_warp.engine.packets",
+        "lgvi_warp.engine.peak",
+        "lgvi_warp.engine.laws.bench",
+        "lgvi_warp.engine.laws.check",
+    }
+    assert importers("lgvi_kernels") == those
+
+
+def test_nothing_of_the_product_uses_the_reference():
+    assert importers("lgvi_warp.reference") == set()
+
+
+def test_only_the_command_line_asks_for_sinks_and_late():
+    assert importers("lgvi_warp.views", lazy=False) == set()
+    assert all(within(module, "lgvi_warp.cli") for module in importers("lgvi_warp.views"))
+
+
+@pytest.mark.parametrize("name", sorted(OPTIONAL | {"pandas"}))
+def test_optional_packages_are_imported_late(name):
+    assert importers(name, lazy=False) == set()
+
+
+@pytest.mark.parametrize("module", ["lgvi_warp", "lgvi_warp.cli", "lgvi_warp.scene.file", "lgvi_warp.scene.ensemble"])
+def test_a_scene_is_read_without_warp(module):
+    assert {"lgvi_warp.scene.scene", "lgvi_warp.physics.vehicle"} <= closure(module)
+    assert closure(module) & (importers("warp", lazy=False) | part("lgvi_kernels").keys()) == set()
+
+
+def test_no_circle_and_no_arrow_up():
+    # Imports inside functions and for typing counted; import-linter asserts the same of rooms (`make lint`).
+    assert circle("top", "lazy", "typing") is None
+    assert arrows_up() == []

@@ -1,0 +1,45 @@
+"""Formulas in kernel modules use the lanes' operators: a builtin would be silently slower, and looks the same."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+KERNELS = Path(__file__).parents[2] / "kernels" / "lgvi_kernels"
+OPERATORS = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div", ast.USub: "neg"}
+FORMULAS = sorted({*KERNELS.rglob("*.py")} - {KERNELS / "lanes" / "arithmetic.py"})
+
+
+def device_functions(tree):
+    """Functions that Warp compiles."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef) and any("wp." in ast.unparse(d) for d in node.decorator_list):
+            yield node
+
+
+@pytest.mark.parametrize("path", FORMULAS, ids=lambda path: path.stem)
+def test_operators_are_imported(path):
+    tree = ast.parse(path.read_text())
+    imported = {
+        alias.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and node.module == "lgvi_kernels.lanes.arithmetic"
+        for alias in node.names
+    }
+    used = set()
+    for function in device_functions(tree):
+        for node in ast.walk(function):
+            if isinstance(node, (ast.BinOp, ast.UnaryOp)) and type(node.op) in OPERATORS and not whole_numbers(node):
+                used.add(OPERATORS[type(node.op)])
+    assert used <= imported, f"{path.name}: import {sorted(used - imported)} from lgvi_kernels.lanes.arithmetic"
+
+
+def whole_numbers(node):
+    """Index arithmetic, a number with a sign, and numbers made by `real(...)`: never lanes."""
+    text = ast.unparse(node)
+    if text.startswith("real("):
+        return True
+    return (
+        any(isinstance(sub, ast.Constant) and isinstance(sub.value, int) for sub in ast.walk(node))
+        or text[1:].replace(".", "").isdigit()
+    )

@@ -1,0 +1,24 @@
+"""What a case of a law is: its term beside its twin."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Case(NamedTuple):
+    """The terms of a scene and the same laws of the twin. smooth: whether an order of convergence can be seen."""
+
+    terms: tuple
+    laws: tuple
+    smooth: bool = True
+
+
+def matrix(seed, size=1.0):
+    """A symmetric positive definite matrix (6, 6) that couples everything."""
+    A = np.random.default_rng(seed).normal(size=(6, 6))
+    return size * (A @ A.T / 6.0 + np.eye(6))
+
+
+def case(host, twin, **numbers):
+    """A Case of one term whose fields have the same names on both sides."""
+    return Case((host(**numbers),), (twin(**{key: np.asarray(value) for key, value in numbers.items()}),))

@@ -1,0 +1,100 @@
+"""Each term of a scene beside its twin: what the parity, order and bits tests of tests/laws/test_parity.py run over."""
+
+import numpy as np
+
+from lgvi_warp.physics import terms
+from lgvi_warp.reference.terms.current import Current, CurrentProfile
+from lgvi_warp.reference.terms.drag import Drag, DragMatrix
+from lgvi_warp.reference.terms.tether import Tether
+from lgvi_warp.reference.terms.thrusters import Thrusters
+from lgvi_warp.reference.terms.wrench import Wrench, WrenchSchedule
+from tests.laws import cases_lift, cases_water
+from tests.laws.case import Case, case, matrix
+
+LINEAR, QUADRATIC = (3.0, 4.0, 5.0, 0.3, 0.4, 0.5), (10.0, 30.0, 40.0, 1.0, 2.0, 3.0)
+TABLE = dict(
+    times=(0.0, 0.3, 0.7, 1.5),
+    force=((0.0, 0.0, 0.0), (5.0, -2.0, 1.0), (-3.0, 4.0, 2.0), (1.0, 1.0, 1.0)),
+    torque=((0.0, 0.1, 0.0), (0.2, -0.2, 0.1), (-0.3, 0.1, 0.2), (0.0, 0.0, 0.1)),
+)
+TWIN_TABLE = {key: np.array(value) for key, value in TABLE.items()}
+THRUSTERS = dict(
+    position=((-0.5, 0.2, 0.0), (-0.5, -0.2, 0.0), (0.1, 0.0, 0.3)),
+    direction=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.6, 0.8)),
+    dead_band=(0.1, 0.1, 0.05),
+    limit=(0.9, 0.8, 1.0),
+    time_constant=(0.2, 0.1, 0.3),
+)
+COMMANDS = dict(times=(0.0, 0.5, 1.5), command_schedule=((0.3, 0.8, -0.7), (0.7, -0.9, 0.9), (0.5, 0.5, -1.5)))
+
+CASES = {
+    "linear drag": case(terms.Drag, Drag, linear=LINEAR, quadratic=(0.0,) * 6),
+    "quadratic drag": case(terms.Drag, Drag, linear=(0.0,) * 6, quadratic=QUADRATIC),
+    "drag": case(terms.Drag, Drag, linear=LINEAR, quadratic=QUADRATIC),
+    "drag matrix": case(terms.DragMatrix, DragMatrix, linear=matrix(1, 3.0), quadratic=0.1 * matrix(2) + np.diag(QUADRATIC)),
+    "current": case(terms.Current, Current, velocity=(0.3, -0.2, 0.1)),
+    "current profile": case(
+        terms.CurrentProfile,
+        CurrentProfile,
+        depths=(-100.0, 100.0),
+        velocities=((-30.0, 20.0, -10.0), (30.0, -20.0, 10.0)),
+    ),
+    "tether": case(
+        terms.Tether, Tether, anchor=(1.0, 2.0, 3.0), stiffness=5.0, attachment=(0.5, -0.1, 0.2), rest_length=2.0
+    ),
+    "slack tether": case(
+        terms.Tether, Tether, anchor=(0.0, 0.0, 10.0), stiffness=5.0, attachment=(0.1, 0.0, 0.0), rest_length=50.0
+    ),
+    "wrench": case(terms.Wrench, Wrench, force=(1.0, -2.0, 0.5), torque=(0.1, 0.2, -0.3)),
+    "wrench schedule": Case((terms.WrenchSchedule(**TABLE),), (WrenchSchedule(**TWIN_TABLE),), False),
+    "wrench in steps": Case(
+        (terms.WrenchSchedule(**TABLE, interpolation="steps"),),
+        (WrenchSchedule(**TWIN_TABLE, steps=True),),
+        False,
+    ),
+    "thrusters": Case(
+        (terms.Thrusters(**THRUSTERS, **COMMANDS, coefficient=(20.0, 20.0, 10.0), coefficient_astern=(15.0, 15.0, 8.0)),),
+        (
+            Thrusters(
+                **{k: np.array(v) for k, v in THRUSTERS.items()},
+                forward=np.array((20.0, 20.0, 10.0)),
+                backward=np.array((15.0, 15.0, 8.0)),
+                times=np.array(COMMANDS["times"]),
+                command=np.array(COMMANDS["command_schedule"]),
+            ),
+        ),
+        False,
+    ),
+    "thrusters with polynomials": Case(
+        (
+            terms.Thrusters(
+                **THRUSTERS, **COMMANDS, coefficient=(2.0, 3.0, 1.0), coefficient_astern=(1.5, 2.5, 0.5),
+                polynomial=(3.0, 0.5, 8.0, -2.0, 1.0), polynomial_astern=(2.0, 7.0, -1.5),
+            ),
+        ),
+        (
+            Thrusters(
+                **{k: np.array(v) for k, v in THRUSTERS.items()},
+                forward=np.array((2.0, 3.0, 1.0)),
+                backward=np.array((1.5, 2.5, 0.5)),
+                times=np.array(COMMANDS["times"]),
+                command=np.array(COMMANDS["command_schedule"]),
+                polynomial=(3.0, 0.5, 8.0, -2.0, 1.0),
+                polynomial_astern=(2.0, 7.0, -1.5),
+            ),
+        ),
+        False,
+    ),
+}  # fmt: skip
+
+CASES |= cases_water.CASES | cases_lift.CASES
+
+# One of each type.
+_ALL = (
+    "drag matrix", "current", "current profile", "current harmonics", "waves", "Gauss-Markov current", "tether", "wrench",
+    "wrench schedule", "wrench noise", "thrusters", "fins", "control fins with rates", "cross-flow", "body lift",
+    "stratification",
+)  # fmt: skip
+CASES["all together"] = Case(
+    sum((CASES[name].terms for name in _ALL), ()), sum((CASES[name].laws for name in _ALL), ()), False
+)

@@ -1,0 +1,58 @@
+"""Fins, cross-flow drag and body lift beside their twins. Import tests.laws.cases, which includes them, not this."""
+
+import numpy as np
+
+from lgvi_warp.physics import terms
+from lgvi_warp.reference.terms.control_fins import ControlFins
+from lgvi_warp.reference.terms.cross_flow import CrossFlow
+from lgvi_warp.reference.terms.fins import Fins
+from lgvi_warp.reference.terms.lift import BodyLift
+from tests.laws.case import Case
+
+DENSITY = 1025.0
+
+
+def arrays(numbers):
+    return {key: np.array(value) for key, value in numbers.items()}
+
+
+FINS = dict(
+    position=((-0.6, 0.1, 0.0), (-0.6, 0.0, 0.1), (0.2, -0.2, 0.05)),
+    chord=((1.0, 0.0, 0.0), (2.0, 0.1, 0.0), (0.9, 0.0, -0.3)),
+    normal=((0.0, 0.0, -1.0), (0.2, 1.0, 0.1), (0.0, 0.5, -0.8)),
+    area=(0.02, 0.03, 0.01),
+    lift_slope=(3.0, 2.0, 4.0),
+    drag=(0.02, 0.0, 0.05),
+    drag_normal=(1.2, 0.5, 0.0),
+)
+# Commands beyond the limit, and faster than the rates where these are limited.
+STEER = dict(limit=(0.35, 0.2, 0.5), times=(0.0, 0.4, 0.9, 1.5))
+COMMANDS = ((0.1, 0.3, -0.2), (-0.3, 0.1, 0.6), (0.5, -0.3, 0.1), (0.0, 0.0, 0.0))
+RATES = (0.4, 0.2, 1.0)
+HULL = dict(
+    stations=(-0.7, -0.5, 0.0, 0.5, 0.8),
+    diameters=(0.02, 0.15, 0.2, 0.2, 0.0),
+    drag_coefficient=(1.0, 1.1, 1.2, 1.1, 0.9),
+)
+LIFT = np.random.default_rng(5).normal(size=(6, 6)) * np.array([4.0, 4.0, 4.0, 0.5, 0.5, 0.5])
+
+
+def steered(rates):
+    """Control fins with a schedule; rates: (3,) [rad/s], or None."""
+    host = {} if rates is None else {"rate_limit": rates}
+    twin = ControlFins(
+        **arrays(FINS | STEER),
+        density=DENSITY,
+        rate_limit=np.full(3, np.inf) if rates is None else np.array(rates),
+        command=np.array(COMMANDS),
+    )
+    return Case((terms.ControlFins(**FINS, **STEER, **host, command_schedule=COMMANDS),), (twin,), False)
+
+
+CASES = {
+    "fins": Case((terms.Fins(**FINS),), (Fins(**arrays(FINS), density=DENSITY),)),
+    "control fins": steered(None),
+    "control fins with rates": steered(RATES),
+    "cross-flow": Case((terms.CrossFlow(**HULL),), (CrossFlow(**arrays(HULL), density=DENSITY),)),
+    "body lift": Case((terms.BodyLift(matrix=LIFT),), (BodyLift(LIFT),)),
+}

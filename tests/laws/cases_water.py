@@ -1,0 +1,57 @@
+"""Cases of waves, currents that change, noise and stratification. Import tests.laws.cases, which includes them, not this."""
+
+import numpy as np
+
+from lgvi_warp.physics import terms
+from lgvi_warp.physics.terms.wrench_noise import channel
+from lgvi_warp.reference.terms.current_harmonics import CurrentHarmonics
+from lgvi_warp.reference.terms.gauss_markov_current import GaussMarkovCurrent
+from lgvi_warp.reference.terms.stratification import Stratification
+from lgvi_warp.reference.terms.waves import Waves
+from lgvi_warp.reference.terms.wrench_noise import WrenchNoise
+from tests.laws.case import Case, case
+
+# The vehicle and gravity of tests/laws/test_parity.py.
+GRAVITY, BUOYANCY, CENTER_OF_BUOYANCY = 9.8, 21.5 * 9.8, np.array((0.01, 0.005, -0.02))
+
+HARMONICS = dict(
+    amplitudes=((0.3, -0.2, 0.0), (0.1, 0.2, -0.1), (-0.05, 0.1, 0.02)),
+    periods=(7.0, 3.1, 1.3),
+    phases=(0.3, -1.2, 2.0),
+)
+WAVES = dict(
+    amplitudes=(0.4, 0.3, 0.1), periods=(5.0, 3.5, 2.5), headings_deg=(20.0, -110.0, 200.0), phases=(0.5, -0.9, 2.5)
+)
+GAUSS_MARKOV = dict(standard_deviation=(0.3, 0.2, 0.05), time_constant=4.0)
+WRENCH_NOISE = dict(force=(1.0, 2.0, 0.5), torque=(0.1, 0.2, 0.3))
+STRATIFICATION = dict(gradient=0.05, reference_depth=6.0)
+
+
+def arrays(numbers):
+    """As the twins take them."""
+    return {key: np.asarray(value) for key, value in numbers.items()}
+
+
+def noisy(host, twin, numbers, name=""):
+    """A Case whose twin draws the same random numbers."""
+    term = host(**numbers, name=name)
+    return Case((term,), (twin(**arrays(numbers), channel=channel(term.key)),), False)
+
+
+CASES = {
+    "current harmonics": case(terms.CurrentHarmonics, CurrentHarmonics, **HARMONICS),
+    "waves": Case((terms.Waves(**WAVES),), (Waves(**arrays(WAVES), gravity=GRAVITY),)),
+    "Gauss-Markov current": noisy(terms.GaussMarkovCurrent, GaussMarkovCurrent, GAUSS_MARKOV),
+    "wrench noise": noisy(terms.WrenchNoise, WrenchNoise, WRENCH_NOISE),
+    "two wrench noises": Case(
+        *(
+            tuple(noisy(terms.WrenchNoise, WrenchNoise, WRENCH_NOISE, name)[side][0] for name in ("", "second"))
+            for side in (0, 1)
+        ),
+        False,
+    ),
+    "stratification": Case(
+        (terms.Stratification(**STRATIFICATION),),
+        (Stratification(**STRATIFICATION, buoyancy=BUOYANCY, center_of_buoyancy=CENTER_OF_BUOYANCY),),
+    ),
+}

@@ -1,0 +1,198 @@
+"""What a scene does not ask for leaves no code: asserted on the source that Warp generates; and varying compiles nothing."""
+
+import re
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp.physics import terms
+from lgvi_warp.runs.settle import make_plan
+from tests.laws.cases import CASES
+from tests.laws.test_parity import STATE, VEHICLE, scene_of
+from tests.support.tools import generated, one
+
+# What the generated source holds if a scene has this term, and only then.
+MARKS = {
+    "drag": r"make_E__locals__slowed", "drag matrix": r"add_three", "current": r"\bflow_0\(", "tether": r"rest_length",
+    "wrench": r"HeldWrench", "thrusters": r"commanded", "waves": r"Waves", "fins": r"Fins",
+}  # fmt: skip
+# Functions that some scenes need, and a bare one does not.
+NOT_THERE = (
+    "kicked",
+    "look",
+    "factorise",
+    "exponential",
+    "normals",
+    "passage",
+    "R_i",
+    "back_up",
+    "decay3",
+    "to_body",
+)
+BARE = lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 20.0 * 9.8)
+
+
+def source(scene, folder, method="psi_s", dtype="float64", **settings):
+    """The C++ that Warp generates for a scene."""
+    plan = make_plan(one(scene, **STATE), method, h=0.01, t1=0.1, dtype=dtype, **settings)
+    return generated(plan, folder)
+
+
+def laws_in(text):
+    """Functions of law modules that the source holds."""
+    return set(re.findall(r"^static \S+ (\w*(?:law|damping|flow|evolve)\w*)\(", text, re.MULTILINE))
+
+
+def test_a_bare_scene_has_no_law_at_all(tmp_path):
+    text = source(lw.Scene(BARE, lw.Environment(gravity=9.8)), tmp_path)
+    assert laws_in(text) == set()
+    for mark in NOT_THERE:
+        assert not re.search(rf"^static (?!.*adj_).*{mark}\w*\(", text, re.MULTILINE), mark
+
+
+@pytest.mark.slow_for("psi_x")
+@pytest.mark.parametrize("method", ["psi_s", "psi_x"])
+def test_compensation_is_there_only_if_asked_for(method, tmp_path):
+    scene = lw.Scene(VEHICLE, lw.Environment(gravity=9.8), terms=list(CASES["drag"].terms))
+    for dtype, there in (("float64", False), ("float32", False), ("float32_compensated", True)):
+        (tmp_path / dtype).mkdir()
+        text = source(scene, tmp_path / dtype, method, dtype)
+        for mark in ("_low", "carried", "settled", "CompensatedState"):
+            assert (mark in text) == there, (mark, dtype)
+
+
+# Functions of the kernel that a level of checks, or a fallback, brings with it.
+LEVELS = {
+    "solve_within": ("none", "safe", "all"), "raise_alarm": ("safe", "all"), "failures": ("safe", "all"),
+    "energy_alarm": ("safe", "all"), "growth": ("safe", "all"), "look_at": ("all",), "warn": ("all",), "noted": ("all",),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("checks", ["none", "safe", "all"])
+def test_a_level_of_checks_brings_its_code_and_no_other(checks, tmp_path):
+    text = source(lw.Scene(BARE, lw.Environment(gravity=9.8)), tmp_path, checks=checks)
+    for function, levels in LEVELS.items():
+        there = bool(re.search(rf"^static (?!.*adj_).*{function}_\d+\(", text, re.MULTILINE))
+        assert there == (checks in levels), function
+    for absent in ("retried", "in_parts", "drag_back", "backward"):
+        assert not re.search(rf"^static (?!.*adj_).*{absent}\w*\(", text, re.MULTILINE), absent
+    assert ("NoMonitor" in text) == (checks == "none") and ("warned_step" in text) == (checks == "all")
+
+
+def test_steps_are_divided_only_if_asked_for(tmp_path):
+    text = source(lw.Scene(BARE, lw.Environment(gravity=9.8)), tmp_path, on_failure="substep")
+    assert re.search(r"^static (?!.*adj_).*retried_\d+\(", text, re.MULTILINE) and "substeps" in text
+
+
+def test_energy_is_not_looked_at_where_forces_create_it(tmp_path):
+    wrench = list(CASES["wrench"].terms)
+    text = source(lw.Scene(BARE, lw.Environment(gravity=9.8), terms=wrench), tmp_path)
+    assert "energy_alarm" not in text and "NoMonitor" in text
+
+
+@pytest.mark.parametrize("name", MARKS)
+def test_a_term_adds_its_code_and_no_other(name, tmp_path):
+    text = source(lw.Scene(BARE, lw.Environment(gravity=9.8), terms=list(CASES[name].terms)), tmp_path)
+    for other, mark in MARKS.items():
+        assert bool(re.search(mark, text)) == (other == name), other
+
+
+def test_a_term_of_zeros_is_absent():
+    zeros = [terms.Drag(), terms.Current(velocity=(0.0, 0.0, 0.0)), terms.Wrench(), terms.DragMatrix()]
+    plain = make_plan(one(lw.Scene(VEHICLE), **STATE), h=0.01, t1=0.1)
+    asked = make_plan(one(lw.Scene(VEHICLE, terms=zeros), **STATE), h=0.01, t1=0.1)
+    assert asked.spec == plain.spec and asked.advance is plain.advance
+
+
+def test_a_polynomial_is_there_only_if_asked_for(tmp_path):
+    plain = CASES["thrusters"].terms[0]
+    numbers = {one.name: getattr(plain, one.name) for one in plain.quantities()}
+    scenes = {
+        name: lw.Scene(VEHICLE, terms=[terms.Thrusters(**numbers | {"polynomial": curve})])
+        for name, curve in (("none", None), ("square", (0.0, 1.0)), ("cubic", (0.0, 0.0, 1.0)))
+    }
+    plans = {name: make_plan(one(scene, **STATE), h=0.01, t1=0.1) for name, scene in scenes.items()}
+    assert plans["none"].spec == plans["square"].spec != plans["cubic"].spec
+    assert plans["none"].advance is plans["square"].advance
+    for name in ("none", "cubic"):
+        (tmp_path / name).mkdir()
+        assert ("polynomial_law" in source(scenes[name], tmp_path / name)) == (name == "cubic")
+    assert "polynomial" not in plain.to_dict()
+
+
+VARIED = {
+    "vehicle.mass": lw.Normal(relative=0.01),
+    "vehicle.inertia": lw.Normal(relative=0.01),
+    "drag_matrix.linear": lw.Normal(relative=0.01),
+    "drag_matrix.quadratic": lw.Normal(relative=0.01),
+    "current.velocity": lw.Normal(std=0.1),
+    "tether.anchor": lw.Normal(std=0.1),
+    "tether.stiffness": lw.LogNormal(sigma=0.1),
+    "wrench.force": lw.Normal(std=(0.1, 0.0, 0.0)),
+    "thrusters.coefficient": lw.Uniform(relative=0.1),
+    "thrusters.position": lw.Normal(std=0.01),
+    "environment.gravity": lw.Uniform(low=9.78, high=9.83),
+}
+
+
+def scene():
+    """Several terms at once."""
+    chosen = [CASES[name].terms[0] for name in ("drag matrix", "current", "tether", "wrench", "thrusters")]
+    return lw.Scene(VEHICLE, lw.Environment(gravity=9.8), terms=chosen, start=lw.Start(velocity=(1.0, 0.0, 0.0)))
+
+
+def test_any_parameter_varies_and_compiles_nothing():
+    shared = make_plan(lw.Ensemble(scene(), 20), h=0.01, t1=0.1)
+    for name, law in VARIED.items():
+        varied = make_plan(lw.Ensemble(scene(), 20, 1, {name: law}), h=0.01, t1=0.1)
+        assert varied.advance is shared.advance, name
+    everything = make_plan(lw.Ensemble(scene(), 20, 1, VARIED), h=0.01, t1=0.1)
+    assert everything.advance is shared.advance
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["psi_s", "psi_x"])
+def test_a_varied_member_is_as_if_alone_with_its_numbers(method):
+    fleet = lw.Ensemble(scene(), 20, 1, VARIED)
+    together = lw.solve(fleet, method, h=0.02, t1=0.4)
+    p = fleet.parameters(0, 20)
+    for member in (0, 7, 19):
+        alone = lw.solve(fleet.subset([member]), method, h=0.02, t1=0.4)
+        for name in ("position", "attitude", "velocity", "angular_velocity"):
+            assert getattr(alone, name)[:, 0].tobytes() == getattr(together, name)[:, member].tobytes()
+        # And as a scene that has these numbers, to round-off: diagonal matrices are told in another way.
+        own = {
+            term.key: type(term)(**{
+                f.name: p[f"{term.key}.{f.name}"][member % len(p[f"{term.key}.{f.name}"])] for f in term.quantities()
+            })
+            for term in scene().terms
+        }  # fmt: skip
+        vehicle = lw.Vehicle(
+            p["vehicle.mass"][member], p["vehicle.inertia"][member], VEHICLE.added_mass, VEHICLE.buoyancy,
+            VEHICLE.center_of_buoyancy,
+        )  # fmt: skip
+        by_hand = lw.Scene(
+            vehicle, lw.Environment(gravity=p["environment.gravity"][member]), list(own.values()), scene().start
+        )
+        expected = lw.solve(by_hand, method, h=0.02, t1=0.4).position[-1, 0]
+        np.testing.assert_allclose(together.position[-1, member], expected, atol=1e-12)
+
+
+def test_unphysical_members_are_counted():
+    with pytest.raises(lw.SceneError, match=r"tether.stiffness of member \d+.*unphysical \(\d+ of 50"):
+        lw.Ensemble(scene(), 50, 1, {"tether.stiffness": lw.Normal(relative=2.0)})
+    with pytest.raises(lw.SceneError, match=r"did you mean 'current\.velocity'"):
+        lw.Ensemble(scene(), 50, 1, {"current.velocty": lw.Normal(std=0.1)})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_the_same_bits_for_any_number_of_threads(dtype):
+    everything = scene_of(CASES["all together"])
+    fleet = lw.Ensemble(
+        everything, 700, 3, {"current.velocity": lw.Normal(std=0.1), "vehicle.mass": lw.Normal(relative=0.01)}
+    )
+    runs = [lw.solve(fleet, h=0.02, t1=0.5, dtype=dtype, threads=threads) for threads in (1, 2, 4)]
+    for name in ("position", "attitude", "velocity", "angular_velocity"):
+        assert len({getattr(run, name).tobytes() for run in runs}) == 1

@@ -1,0 +1,490 @@
+"""Two at once, killed at any moment, a full or unwritable disk: what is left is whole, and nobody else's file is touched."""
+
+import errno
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp import cli
+from lgvi_warp.cli import report
+from lgvi_warp.common import files as durable
+from lgvi_warp.common import safe_files, scratch, write_lock
+from lgvi_warp.runs.store import folder as store
+from tests.conftest import ROOT
+from tests.support import hostile
+from tests.support.stores import MEMBERS, SETTINGS, differing, fleet, tree
+
+# A process that has loaded all waits for the word to begin.
+TOGETHER = """
+import sys, time, os
+from pathlib import Path
+import lgvi_warp as lw
+from lgvi_warp.runs.store import folder as store
+from lgvi_warp.runs.store import open as stored
+from tests.support.stores import SETTINGS, fleet
+path, mode, here = Path(sys.argv[1]), sys.argv[2], Path(sys.argv[3])
+(here / f"ready{os.getpid()}").touch()
+while not (here / "go").exists():
+    time.sleep(0.001)
+try:
+    lw.solve(fleet(), **SETTINGS, store=lw.Store(path, existing=mode))
+except lw.SceneError as error:
+    sys.exit(str(error))
+"""
+# A process that dies, as by a kill, when it comes to a certain place the n-th time.
+DYING = """
+import sys, os
+import lgvi_warp as lw
+from lgvi_warp.common import files as durable
+from lgvi_warp.common import safe_files, scratch
+from lgvi_warp.runs.store import folder as store
+from tests.support.stores import SETTINGS, fleet
+path, place, count, exchange = sys.argv[1], sys.argv[2], int(sys.argv[3]), sys.argv[4] == "yes"
+if not exchange:
+    durable._exchanged = lambda one, other: False
+owner, name = {"rename": (durable.Path, "replace"), "sync": (durable, "sync_folder"), "remove": (scratch, "remove_folder"),
+               "write": (safe_files, "rename")}[place]
+call, left = getattr(owner, name), [count]
+def dying(*arguments):
+    left[0] -= 1
+    if left[0] < 0:
+        os._exit(9)
+    return call(*arguments)
+setattr(owner, name, dying)
+lw.solve(fleet(300), **SETTINGS, store=lw.Store(path, existing="overwrite"))
+"""
+SAVING = """
+import sys
+import lgvi_warp as lw
+first = lw.Result.load(sys.argv[1])
+for _ in range(int(sys.argv[3])):
+    first.save(sys.argv[2])
+"""
+
+
+def started(code, *arguments):
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])}
+    command = [sys.executable, "-c", code, *map(str, arguments)]
+    return subprocess.Popen(command, env=env, stderr=subprocess.PIPE, text=True)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A complete store, which no test changes."""
+    path = tmp_path_factory.mktemp("whole") / "run.zarr"
+    lw.solve(fleet(), **SETTINGS, store=path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """Two results, saved."""
+    folder = tmp_path_factory.mktemp("results")
+    return [lw.solve(fleet(n), **SETTINGS).save(folder / f"{n}.npz") for n in (20, 30)]
+
+
+@pytest.mark.slow_but("refuse-4")
+@pytest.mark.parametrize(("mode", "count"), [("refuse", 2), ("refuse", 4), ("resume", 4), ("overwrite", 4)])
+def test_runs_that_start_together(whole, tmp_path, mode, count):
+    """One of them runs; the others are refused, or find it done."""
+    path, here = tmp_path / "runs" / "run.zarr", tmp_path / "here"
+    here.mkdir()
+    processes = [started(TOGETHER, path, mode, here) for _ in range(count)]
+    while len(list(here.iterdir())) < count:
+        assert all(one.poll() is None for one in processes)
+        time.sleep(0.005)
+    (here / "go").touch()
+    said = [one.communicate(timeout=120)[1] for one in processes]
+    done = [one.returncode == 0 for one in processes]
+    assert sum(done) == 1 if mode == "refuse" else sum(done) >= 1
+    for good, text in zip(done, said, strict=True):
+        assert good or "another run is writing into it" in text or "holds a run already" in text
+        assert "Traceback" not in text
+    assert differing(whole, path) == [] and [one.name for one in path.parent.iterdir()] == ["run.zarr"]
+
+
+def test_threads_of_one_process_are_kept_apart_as_well(whole, tmp_path):
+    path, said = tmp_path / "run.zarr", []
+
+    def run():
+        try:
+            lw.solve(fleet(), **SETTINGS, store=path)
+        except lw.SceneError as error:
+            said.append(str(error))
+
+    threads = [threading.Thread(target=run) for _ in range(3)]
+    for one in threads:
+        one.start()
+    for one in threads:
+        one.join()
+    assert len(said) == 2 and differing(whole, path) == []
+
+
+@pytest.mark.slow
+def test_processes_of_one_run_write_side_by_side(whole, tmp_path):
+    """Workers are the run's own: they take no lock."""
+    lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", executor="processes", threads=2)
+    assert differing(whole, tmp_path / "run.zarr") == []
+    assert [one.name for one in tmp_path.iterdir()] == ["run.zarr"]
+
+
+def test_the_holder_is_named(tmp_path):
+    path = tmp_path / "run.zarr"
+    with store.held(path), pytest.raises(lw.SceneError) as refused, store.held(path):
+        pass
+    text = str(refused.value)
+    assert f"another run is writing into it (process {os.getpid()} on " in text and "since 20" in text
+    assert "wait for it, or end it" in text and list(tmp_path.iterdir()) == []
+
+
+def test_a_lock_ends_with_its_process(tmp_path):
+    code = """
+import sys, time
+from pathlib import Path
+from lgvi_warp.common.write_lock import write_lock
+with write_lock(Path(sys.argv[1])):
+    Path(sys.argv[2]).touch()
+    time.sleep(60)
+"""
+    path, sign = tmp_path / "run.zarr", tmp_path / "sign"
+    process = started(code, path, sign)
+    while not sign.exists():
+        assert process.poll() is None
+        time.sleep(0.005)
+    with pytest.raises(lw.SceneError, match=f"process {process.pid} on"), store.held(path):
+        pass
+    process.kill()
+    process.wait()
+    assert write_lock.lock_file(path).exists()
+    with store.held(path):
+        pass
+    assert not write_lock.lock_file(path).exists()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+@pytest.mark.filterwarnings("ignore:This process.*is multi-threaded")
+def test_a_fork_does_not_keep_the_lock(tmp_path):
+    path = tmp_path / "run.zarr"
+    read, send = os.pipe()
+    with store.held(path):
+        child = os.fork()
+        if child == 0:
+            os.close(send)
+            os.read(read, 1)  # until the parent has ended with it
+            os._exit(0)
+    with store.held(path):
+        pass
+    os.close(send)
+    os.waitpid(child, 0)
+    os.close(read)
+
+
+def test_a_file_of_the_users_is_not_taken_for_a_lock(tmp_path):
+    path = write_lock.lock_file(tmp_path / "run.zarr")
+    for make in (
+        lambda: path.write_text("mine"),
+        lambda: path.symlink_to(tmp_path / "other"),
+        path.mkdir,
+        lambda: os.mkfifo(path),
+    ):
+        make()
+        with pytest.raises(lw.SceneError, match=r"is no lock of lgvi-warp, but has its name; move it away"):
+            lw.solve(fleet(10), **SETTINGS, store=tmp_path / "run.zarr")
+        assert not (tmp_path / "run.zarr").exists() and not (tmp_path / "other").exists()
+        path.rmdir() if path.is_dir() else path.unlink()
+
+
+def test_without_locks_the_named_process_is_looked_for(tmp_path, monkeypatch):
+    import fcntl
+
+    def none(*_):
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", none)
+    path = write_lock.lock_file(tmp_path / "run.zarr")
+    with (
+        store.held(tmp_path / "run.zarr"),
+        pytest.raises(lw.SceneError, match="another run"),
+        store.held(tmp_path / "run.zarr"),
+    ):
+        pass
+    path.write_text(json.dumps({"pid": 2**22 + 5, "host": scratch.host(), "since": "then"}))
+    with store.held(tmp_path / "run.zarr"):
+        pass
+
+
+def test_two_who_save_into_one_file(results, tmp_path):
+    """Each of the two, again and again: what is read meanwhile and afterwards is whole."""
+    target = tmp_path / "result.npz"
+    shutil.copy(results[0], target)
+    processes = [started(SAVING, one, target, 60) for one in results]
+    while any(one.poll() is None for one in processes):
+        assert lw.Result.load(target).members in (20, 30)
+    assert [one.wait() for one in processes] == [0, 0]
+    assert lw.Result.load(target).members in (20, 30) and [one.name for one in tmp_path.iterdir()] == ["result.npz"]
+
+
+def test_two_threads_who_save_into_one_file(results, tmp_path):
+    loaded, target = [lw.Result.load(one) for one in results], tmp_path / "result.npz"
+    threads = [threading.Thread(target=lambda one=one: [one.save(target) for _ in range(20)]) for one in loaded]
+    for one in threads:
+        one.start()
+    for one in threads:
+        one.join()
+    assert lw.Result.load(target).members in (20, 30) and [one.name for one in tmp_path.iterdir()] == ["result.npz"]
+
+
+def test_killed_while_it_saves(results, tmp_path):
+    """The file that was there stays whole, and what the killed one left is removed by the next."""
+    target = tmp_path / "result.npz"
+    shutil.copy(results[0], target)
+    for i in range(3):
+        process = started(SAVING, results[1], target, 10**6)
+        while not list(tmp_path.glob("*.part")):
+            assert process.poll() is None
+        time.sleep(0.003 * i)
+        process.kill()
+        process.wait()
+        assert lw.Result.load(target).members in (20, 30)
+    (tmp_path / "result.npz.part").write_text("the user's")
+    (tmp_path / "result.npz.mine-1-notes.part").write_text("the user's")
+    lw.Result.load(results[0]).save(target)
+    names = ["result.npz", "result.npz.mine-1-notes.part", "result.npz.part"]
+    assert sorted(one.name for one in tmp_path.iterdir()) == names
+
+
+def test_a_file_of_another_machine_is_left_alone(results, tmp_path):
+    others = tmp_path / f"result.npz.elsewhere-4026531836-{2**22 + 5}-0123abcd.part"
+    dead = tmp_path / f"result.npz.{scratch.host()}-{2**22 + 5}-0123abcd.part"
+    alive = tmp_path / f"result.npz.{scratch.host()}-{os.getpid()}-0123abcd.part"
+    for one in (others, dead, alive):
+        one.write_text("half")
+    lw.Result.load(results[0]).save(tmp_path / "result.npz")
+    assert [one.exists() for one in (others, dead, alive)] == [True, False, True]
+
+
+def test_two_runs_that_end_together_leave_the_files_of_one(results, tmp_path, monkeypatch):
+    """Their files are written one after another."""
+    loaded, order = [lw.Result.load(one) for one in results], []
+    save = lw.Result.save
+
+    def slowly(self, path):
+        order.append(self.members)
+        time.sleep(0.05)
+        found = save(self, path)
+        order.append(self.members)
+        return found
+
+    monkeypatch.setattr(lw.Result, "save", slowly)
+    threads = [threading.Thread(target=report.write, args=(one, None, tmp_path)) for one in loaded]
+    for one in threads:
+        one.start()
+    for one in threads:
+        one.join()
+    assert order in ([20, 20, 30, 30], [30, 30, 20, 20]) and [one.name for one in tmp_path.iterdir()] == ["result.npz"]
+    assert lw.Result.load(tmp_path / "result.npz").members == order[-1]
+
+
+def test_a_saved_result_is_on_the_disk_before_it_has_its_name(results, tmp_path, monkeypatch):
+    order, fsync, replace = [], os.fsync, durable.Path.replace
+    monkeypatch.setattr(os, "fsync", lambda fd: (order.append(os.readlink(f"/proc/self/fd/{fd}")), fsync(fd)))
+    monkeypatch.setattr(durable.Path, "replace", lambda self, to: (order.append("name"), replace(self, to))[1])
+    lw.Result.load(results[0]).save(tmp_path / "result.npz")
+    assert order[0].endswith(".part") and order[1:] == ["name", str(tmp_path)]
+
+
+# What a folder called run.zarr may hold that no run wrote, and whether there is a run beside it.
+NOTES = {
+    "notes beside a run": ("notes.txt", True),
+    "notes within an array": ("position/notes.txt", True),
+    "a folder of notes": ("mine/notes.txt", True),
+    "notes among the blocks": ("blocks/notes.json", True),
+    "notes in the kept members' place": ("kept/notes.txt", True),
+    "notes alone": ("notes.txt", False),
+    "another zarr": ("temperature/c/0", False),
+}
+
+
+@pytest.mark.parametrize("name", NOTES)
+@pytest.mark.parametrize("verb", ["run", "merge"])
+def test_what_no_run_wrote_is_not_overwritten(whole, tmp_path, name, verb, capsys):
+    notes, with_run = NOTES[name]
+    path = tmp_path / "run.zarr"
+    if with_run:
+        shutil.copytree(whole, path)
+    (path / notes).parent.mkdir(parents=True, exist_ok=True)
+    (path / notes).write_text("mine")
+    before = tree(tmp_path)
+    arguments = {
+        "run": [str(ROOT / "examples" / "paper.toml"), "--store", "zarr", "--members", "5"],
+        "merge": [str(whole)],
+    }[verb]
+    assert cli.main([verb, *arguments, "--out", str(tmp_path), "--overwrite"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "not overwritten: move it away, or give another folder" in said
+    assert tree(tmp_path) == before
+
+
+def test_a_link_is_not_overwritten_but_what_it_leads_to(whole, tmp_path):
+    """A run on another disk; a link within a run is no run's."""
+    shutil.copytree(whole, tmp_path / "disk" / "run.zarr")
+    (tmp_path / "run.zarr").symlink_to(tmp_path / "disk" / "run.zarr")
+    lw.solve(fleet(), **SETTINGS, store=lw.Store(tmp_path / "run.zarr", existing="overwrite"))
+    assert (tmp_path / "run.zarr").is_symlink() and differing(whole, tmp_path / "disk" / "run.zarr") == []
+    shutil.rmtree(tmp_path / "disk" / "run.zarr" / "status")
+    (tmp_path / "notes").mkdir()
+    (tmp_path / "disk" / "run.zarr" / "status").symlink_to(tmp_path / "notes")
+    with pytest.raises(lw.SceneError, match="holds status, which no run wrote"):
+        lw.solve(fleet(), **SETTINGS, store=lw.Store(tmp_path / "run.zarr", existing="overwrite"))
+
+
+def test_a_damaged_run_may_be_overwritten(whole, tmp_path):
+    for name in ("zarr.json", "created.json"):
+        path = shutil.copytree(whole, tmp_path / name / "run.zarr")
+        (path / name).write_bytes(b"{")
+        lw.solve(fleet(), **SETTINGS, store=lw.Store(path, existing="overwrite"))
+        assert differing(whole, path) == []
+
+
+def test_an_empty_folder_is_taken(whole, tmp_path):
+    (tmp_path / "run.zarr").mkdir()
+    lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr")
+    assert differing(whole, tmp_path / "run.zarr") == []
+
+
+# Where an overwriting run dies: what it is doing, how often it has done that before, and whether folders can be exchanged.
+DEATHS = [("rename", 0, "no"), ("rename", 1, "no"), ("sync", 20, "yes"), ("remove", 0, "yes"), ("write", 3, "yes")]
+
+
+@pytest.mark.slow_but("rename-1-no", "sync*")
+@pytest.mark.parametrize(("place", "count", "exchange"), DEATHS)
+def test_killed_while_it_overwrites(whole, tmp_path, place, count, exchange):
+    """The old run is there, or the new one, which goes on; nothing is left of the other."""
+    path = shutil.copytree(whole, tmp_path / "run.zarr")
+    process = started(DYING, path, place, count, exchange)
+    assert "Traceback" not in process.communicate(timeout=120)[1] and process.returncode == 9
+    with store.held(path):  # whoever comes next mends it
+        assert path.exists()
+    folder = store.Folder(path)
+    assert folder.recipe["members"] in (300, MEMBERS)
+    if folder.recipe["members"] == MEMBERS:
+        assert differing(whole, path) == []
+    else:
+        assert lw.resume(path).members == 300
+    assert [one.name for one in tmp_path.iterdir()] == ["run.zarr"]
+
+
+def test_folders_are_exchanged_in_one_step(tmp_path):
+    for name in "ab":
+        (tmp_path / name).mkdir()
+        (tmp_path / name / name).touch()
+    if not durable._exchanged(tmp_path / "a", tmp_path / "b"):
+        pytest.skip("this system cannot")
+    assert os.listdir(tmp_path / "a") == ["b"] and os.listdir(tmp_path / "b") == ["a"]
+
+
+def test_nobody_elses_folder_beside_a_run_is_removed(whole, tmp_path):
+    """The names that earlier versions took for their own, and one of ours that holds notes."""
+    mark = f"{scratch.host()}-{2**22 + 5}-0123abcd"
+    for name in ("run.zarr.new", "run.zarr.old", f"run.zarr.{mark}.new"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "notes.txt").write_text("mine")
+    shutil.copytree(whole, tmp_path / f"run.zarr.{mark[:-1]}e.new")
+    before = {name for name in os.listdir(tmp_path) if not name.endswith("e.new")}
+    lw.solve(fleet(300), **SETTINGS, store=tmp_path / "run.zarr")
+    lw.solve(fleet(300), **SETTINGS, store=lw.Store(tmp_path / "run.zarr", existing="overwrite"))
+    assert set(os.listdir(tmp_path)) == before | {"run.zarr"}
+    assert (tmp_path / "run.zarr.old" / "notes.txt").read_text() == "mine"
+
+
+ROOM, WRITE = "make room, then `lgvi-warp resume", "choose a folder that can be written"
+# What the system says, of which file, and what a user reads.
+FAULTS = [
+    (errno.ENOSPC, "zarr.json", ROOM), (errno.ENOSPC, "created.json", ROOM), (errno.ENOSPC, "c.0.0.0", ROOM),
+    (errno.ENOSPC, "c.0.2.0", ROOM), (errno.ENOSPC, "000000256.json", ROOM), (errno.EDQUOT, "c.0.1.0", ROOM),
+    (errno.EFBIG, "c.0.1.0", ROOM), (errno.EACCES, "zarr.json", WRITE), (errno.EACCES, "000000000.json", WRITE),
+    (errno.EROFS, "created.json", WRITE), (errno.EPERM, "c.0.3.0", WRITE), (errno.EIO, "c.0.3.0", "Input/output error"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("number", "file", "said"), FAULTS)
+def test_a_disk_that_takes_no_more(whole, tmp_path, monkeypatch, number, file, said):
+    """A line says so, what was finished is kept, and the run goes on when there is room."""
+    path, created = tmp_path / "run.zarr", safe_files.created
+
+    def refused(root, beside):
+        if beside.name.startswith(f"{file}."):
+            raise OSError(number, os.strerror(number))
+        return created(root, beside)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(safe_files, "created", refused)
+        with pytest.raises(OSError, match=said) as told:
+            lw.solve(fleet(), **SETTINGS, store=path)
+    assert "\n" not in str(told.value) and file in str(told.value)
+    assert not list(tmp_path.rglob("*.part")) and {one.name for one in tmp_path.iterdir()} <= {"run.zarr"}
+    lw.solve(fleet(), **SETTINGS, store=lw.Store(path, existing="resume"))
+    assert differing(whole, path) == []
+
+
+@pytest.mark.parametrize(("number", "said"), [(errno.EACCES, WRITE), (errno.EROFS, WRITE), (errno.ENOSPC, ROOM)])
+def test_a_folder_that_takes_no_lock(tmp_path, monkeypatch, number, said):
+    def refused(path):
+        raise OSError(number, os.strerror(number), str(path))
+
+    monkeypatch.setattr(write_lock, "_opened", refused)
+    with pytest.raises(OSError, match=said):
+        lw.solve(fleet(10), **SETTINGS, store=tmp_path / "run.zarr")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_does_not_undo_a_saved_result(results, tmp_path, monkeypatch):
+    target = shutil.copy(results[0], tmp_path / "result.npz")
+
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(np, "savez", full)
+    with pytest.raises(OSError, match="No space left"):
+        lw.Result.load(results[1]).save(target)
+    assert lw.Result.load(target).members == 20 and [one.name for one in tmp_path.iterdir()] == ["result.npz"]
+
+
+def test_a_full_disk_does_not_undo_what_is_overwritten(whole, tmp_path, monkeypatch):
+    path, created = shutil.copytree(whole, tmp_path / "run.zarr"), safe_files.created
+
+    def full(root, beside):
+        if beside.name.startswith("created.json."):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return created(root, beside)
+
+    monkeypatch.setattr(safe_files, "created", full)
+    with pytest.raises(OSError, match="No space left"):
+        lw.solve(fleet(300), **SETTINGS, store=lw.Store(path, existing="overwrite"))
+    with pytest.raises(OSError, match="No space left"):
+        lw.merge([path], tmp_path, overwrite=True)
+    assert differing(whole, path) == [] and [one.name for one in tmp_path.iterdir()] == ["run.zarr"]
+
+
+def test_the_page_names_tests_that_there_are():
+    """Each test and each store or result that docs/what_files_can_do.md names for its sentences."""
+    text = (
+        (ROOT / "docs" / "what_files_can_do.md").read_text().partition("## Stores and results")[2].partition("\n## ")[0]
+    )
+    source = "".join(
+        (ROOT / "tests" / "composition" / f"test_{name}_stores.py").read_text() for name in ("hostile", "faults_of")
+    )
+    tests = re.findall(r"`(test_\w+)`", text)
+    named = re.findall(r'"([^"]+)"', " ".join(re.findall(r"\(`stores`:([^)]*)\)", text.replace("\n", " "))))
+    assert len(tests) > 10 and all(f"def {name}(" in source for name in tests)
+    rows = [*hostile.STORES, *hostile.RESULTS]
+    assert len(named) > 25 and all(any(row.startswith(name.removesuffix(" ...")) for row in rows) for name in named)

@@ -1,0 +1,22 @@
+"""Forty fixed runs keep the bits that are recorded of them: a change of structure changes no number."""
+
+import pytest
+
+from tests.support.fixed_scenes import RUNS, machine, recorded
+
+# Of each kind of run one; each takes a kernel or two of its own.
+QUICK = ("term all together", "method psi_s float32", "statistics, sobol", "events", "store with statistics")
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in RUNS]
+)
+def test_the_bits_are_those_recorded(name):
+    known = recorded()
+    if name not in known:
+        pytest.skip(f"nothing is recorded for {machine()}: python -m tests.support.fixed_scenes --write")
+    assert RUNS[name]() == known[name]
+
+
+def test_there_are_forty():
+    assert len(RUNS) >= 40

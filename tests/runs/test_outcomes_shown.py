@@ -1,0 +1,521 @@
+"""An outcome is not a failure: pictures, recordings, summaries and exit codes of members that events stopped."""
+
+import dataclasses
+import io
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+from rerun.chunk import RrdReader
+
+import lgvi_warp as lw
+from lgvi_warp import cli
+from lgvi_warp.cli import report
+from lgvi_warp.common import status
+from lgvi_warp.common.status import Status, StatusArray, failed, stopped
+from lgvi_warp.physics import energy as invariants
+from lgvi_warp.runs import outcomes
+from lgvi_warp.views import fleet as looks
+from lgvi_warp.views import plots
+from tests.laws import cases
+
+GRAVITY = 10.0
+# Neutrally buoyant with M = m I: each goes straight on at its speed, as in test_events, whose kernel this is.
+VEHICLE = lw.Vehicle(20.0, (1.0, 1.2, 1.4), (10.0, 10.0, 10.0), 20.0 * GRAVITY)
+FLOOR = 8.0
+SPEEDS = np.array([1.0, 0.5, 0.25, 0.1, 0.0, -0.4, -1.0])
+# From depth 5 in 20 s: three sink to the floor after 3, 6 and 12 s, two surface after 12.5 and 5 s, two go on.
+OUTCOMES = [Status.FLOOR] * 3 + [Status.OK] * 2 + [Status.SURFACE] * 2
+
+
+def divers(speeds):
+    """Members that start at depth 5 and sink at these speeds [m/s]."""
+    n = len(speeds)
+    scene = lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), events=[lw.Surface(), lw.Floor(depth=FLOOR)])
+    down = np.array([0.0, 0.0, 1.0])
+    level = np.broadcast_to(np.eye(3), (n, 3, 3))
+    return lw.Ensemble.from_states(scene, np.tile(5.0 * down, (n, 1)), level, np.outer(speeds, down), np.zeros((n, 3)))
+
+
+@pytest.fixture(scope="module")
+def mixed():
+    """Seven members of three outcomes."""
+    result = lw.solve(divers(SPEEDS), h=0.1, t1=20.0, save=lw.SaveAt(every=1.0))
+    assert list(result.status) == OUTCOMES
+    return result
+
+
+@pytest.fixture(scope="module")
+def sunk():
+    """Five members that all sink to the floor."""
+    result = lw.solve(divers(np.linspace(0.3, 1.0, 5)), h=0.1, t1=20.0, save=lw.SaveAt(every=1.0))
+    assert result.status.counts() == {"floor": 5}
+    return result
+
+
+def ending(result, codes, times):
+    """The same result, its members ended so at these times."""
+    status, value = np.array(codes, np.uint8).view(StatusArray), np.ones(len(codes))
+    return dataclasses.replace(result, status=status, failure_time=np.array(times), failure_value=value)
+
+
+def acted_on(result, term):
+    """The same samples, as if this term had acted as well."""
+    numbers = {f"{term.key}.{name}": value[None] for name, value in term.parameters().items()}
+    return dataclasses.replace(result, terms=(term,), parameters=dict(result.parameters) | numbers)
+
+
+def drawn(result, monkeypatch):
+    """The figure that `lw.plot` makes."""
+    figures = []
+    with monkeypatch.context() as patch:
+        patch.setattr(plots, "save_figure", lambda figure, *_: figures.append(figure))
+        lw.plot(result, "fleet.png")
+    return figures[0]
+
+
+def texts(axes):
+    """All texts of a panel's legend, its title in front."""
+    legend = axes.get_legend()
+    return [legend.get_title().get_text(), *(text.get_text() for text in legend.get_texts())]
+
+
+def marks(axes, code):
+    """Where members with an outcome are marked (m, 2)."""
+    color = tuple(part / 255.0 for part in looks.LOOKS[code].rgb)
+    found = [
+        one for one in axes.collections if one.get_offsets().size and np.allclose(one.get_facecolor()[0, :3], color)
+    ]
+    return np.concatenate([one.get_offsets() for one in found])
+
+
+def test_failed_and_stopped_are_told_apart():
+    codes = np.array([0, 1, 2, 16, 17, 20, 255], np.uint8)
+    assert failed(codes).tolist() == [False, True, True, False, False, False, True]
+    assert stopped(codes).tolist() == [False, False, False, True, True, True, False]
+    assert all(bool(stopped(code)) == code.stopped for code in Status)
+    of_result = codes.view(StatusArray)
+    assert (of_result.failed == failed(codes)).all() and (of_result.stopped == stopped(codes)).all()
+
+
+def test_members_are_under_way_until_they_end(mixed):
+    end = status.stop_time(mixed)
+    np.testing.assert_allclose(end, [3.0, 6.0, 12.0, np.inf, np.inf, 12.5, 5.0], rtol=1e-9)
+    np.testing.assert_array_equal(status.under_way(mixed).sum(axis=0), [4, 7, 13, 21, 21, 13, 6])
+
+
+def test_a_sample_at_the_last_good_step_counts():
+    # 0.1 * 3 is not 0.3 in floating point: a member that failed at its third step is under way at the sample of that time.
+    few = SimpleNamespace(
+        time=np.array([0.0, 0.3, 0.6]), status=np.array([1, 1]), failure_time=np.array([0.3 - 1e-16, 0.1])
+    )
+    assert status.under_way(few).tolist() == [[True, True], [True, False], [False, False]]
+
+
+def test_the_first_in_time_is_named(mixed):
+    assert outcomes.outcome_text(mixed, Status.FLOOR).startswith(
+        "floor, 3 of 7 members (first: member 0 at 3 s): stopped"
+    )
+    assert outcomes.outcome_text(mixed, Status.SURFACE).startswith("surface, 2 of 7 members (first: member 6 at 5 s): ")
+    assert outcomes.failure_text(mixed) == ""
+    two = ending(mixed, [1, 0, 1, 0, 17, 0, 0], [8.0, np.nan, 2.0, np.nan, 1.0, np.nan, np.nan])
+    said = outcomes.failure_text(two).splitlines()
+    assert len(said) == 1 and said[0].startswith(
+        "step_too_large, 2 of 7 members (first: member 2 at 2 s, value 1): the step"
+    )
+
+
+def test_a_run_that_all_sink_is_drawn(sunk, tmp_path):
+    picture = imread(lw.plot(sunk, tmp_path / "fleet.png"))
+    assert all(third.std() > 0.05 for third in np.array_split(picture[..., :3], 3, axis=1))
+
+
+def test_the_fan_is_of_those_under_way(mixed, monkeypatch):
+    figure = drawn(mixed, monkeypatch)
+    depth = figure.axes[0]
+    median = next(line for line in depth.lines if line.get_label() == "median").get_ydata()
+    path = 5.0 + np.outer(np.arange(21.0), SPEEDS)
+    end = [3.0, 6.0, 12.0, 99.0, 99.0, 12.5, 5.0]
+    expected = [np.median(row[np.array(end) + 1e-9 >= time]) for time, row in enumerate(path)]
+    np.testing.assert_allclose(median, expected, atol=1e-9)
+    assert texts(depth)[0] == "under way: 7 at 0 s,\n2 at 20 s"
+
+
+def test_the_fan_ends_where_all_have(sunk, monkeypatch):
+    depth = drawn(sunk, monkeypatch).axes[0]
+    median = next(line for line in depth.lines if line.get_label() == "median").get_ydata()
+    assert np.isfinite(median[:11]).all() and np.isnan(median[11:]).all()
+
+
+def test_ends_are_marked_and_counted_by_outcome(mixed, monkeypatch):
+    figure = drawn(mixed, monkeypatch)
+    depth, _, paths = figure.axes
+    assert figure.get_suptitle() == "7 members, psi_s, step 0.1 s: 2 ok, 2 surface, 3 floor"
+    assert {"floor (3)", "surface (2)"} <= set(texts(depth)) and {"ok", "floor", "surface"} <= set(texts(paths))
+    at = marks(depth, Status.FLOOR)
+    np.testing.assert_allclose(np.sort(at[:, 0]), [3.0, 6.0, 12.0], rtol=1e-9)
+    np.testing.assert_allclose(at[:, 1], FLOOR, atol=1e-6)
+    np.testing.assert_allclose(np.sort(marks(depth, Status.SURFACE)[:, 0]), [5.0, 12.5], rtol=1e-9)
+    np.testing.assert_allclose(marks(paths, Status.FLOOR)[:, 1], FLOOR, atol=1e-6)
+
+
+def test_failures_are_drawn_until_they_fail(mixed, monkeypatch):
+    some = ending(mixed, [1, 1, 1, 0, 0, 2, 17], [2.0, 2.0, 4.0, np.nan, np.nan, 6.0, 5.0])
+    figure = drawn(some, monkeypatch)
+    title = "7 members, psi_s, step 0.1 s: 2 ok, 3 step_too_large, 1 not_converged, 1 floor"
+    assert figure.get_suptitle() == title
+    assert {"step_too_large (3)", "not_converged (1)", "floor (1)"} <= set(texts(figure.axes[0]))
+    # A colour says failure, a marker says which.
+    assert len(marks(figure.axes[0], Status.STEP_TOO_LARGE)) == 4
+    # What an event stopped at once has its marks.
+    assert len(marks(drawn(ending(mixed, [17] * 7, [0.0] * 7), monkeypatch).axes[0], Status.FLOOR)) == 7
+    every = ending(mixed, [1] * 7, [3.0] * 7)
+    assert np.isfinite(drawn(every, monkeypatch).axes[0].lines[0].get_ydata()).sum() == 4
+
+
+def test_outcomes_look_different():
+    seen = [(look.color, look.marker) for look in looks.LOOKS.values()]
+    assert set(looks.LOOKS) == set(Status) and len(set(seen)) == len(seen)
+    assert len({look.color for code, look in looks.LOOKS.items() if code == Status.OK or code.stopped}) == 6
+
+
+def test_nothing_to_draw_says_why(mixed, tmp_path):
+    nowhere = {"position": np.full_like(mixed.position, np.nan)}
+    lost = ending(dataclasses.replace(mixed, samples=dict(mixed.samples) | nowhere), [3] * 7, [0.0] * 7)
+    for draw in (lw.plot, lw.log_rerun):
+        with pytest.raises(ValueError, match="nothing to draw"):
+            draw(lost, tmp_path / "fleet.png")
+
+
+def test_drift_is_of_the_times_under_way(mixed, sunk):
+    assert all(0.0 <= value < 1e-9 for value in invariants.drift(sunk).values())
+    # What a member is at after its end is no motion of its.
+    after = {name: values.copy() for name, values in mixed.samples.items()}
+    after["velocity"][4:, 0] *= 3.0
+    moved = dataclasses.replace(mixed, samples=after)
+    assert invariants.drift(moved)["energy"] == invariants.drift(mixed)["energy"] < 1e-9
+    assert invariants.drift(ending(moved, [0] * 7, [np.nan] * 7))["energy"] > 1.0
+    some = ending(mixed, [1, 17, 0, 0, 0, 0, 0], [1.0, 6.0] + [np.nan] * 5)
+    assert np.isfinite(list(invariants.drift(some).values())).all()
+    assert np.isnan(list(invariants.drift(ending(mixed, [1] * 7, [1.0] * 7)).values())).all()
+
+
+# What acts beside weight and buoyancy, and what is conserved then.
+ALL = {"energy", "horizontal_momentum", "vertical_angular_momentum"}
+ACTING = {
+    "still drag": (lw.Drag(linear=np.zeros(6), quadratic=np.zeros(6)), ALL),
+    "drag": (lw.Drag(linear=np.ones(6), quadratic=np.zeros(6)), set()),
+    "thrust": (lw.Wrench(force=[1.0, 0.0, 0.0]), set()),
+    "noise": (lw.WrenchNoise(force=[0.1, 0.0, 0.0]), set()),
+    "moving water": (lw.Current(velocity=[0.2, 0.0, 0.0]), set()),
+    "layers": (lw.Stratification(gradient=0.01), ALL),
+    "an anchor": (lw.Tether(anchor=[0.0, 0.0, 8.0], stiffness=2.0), {"energy"}),
+}
+
+
+@pytest.mark.parametrize("name", ACTING)
+def test_energy_error_only_where_energy_is_conserved(mixed, monkeypatch, name):
+    term, kept = ACTING[name]
+    result = acted_on(mixed, term)
+    assert invariants.conserved(result) == kept
+    assert invariants.at_work(result) == (() if "energy" in kept else (term.key,))
+    energy = drawn(result, monkeypatch).axes[1]
+    asked = ("Energy error", "E(t) - E(0) [J]") if "energy" in kept else ("Energy", "E(t) [J]")
+    assert (energy.get_title(), energy.get_ylabel()) == asked
+    first = next(line for line in energy.lines if line.get_label() == "median").get_ydata()[0]
+    assert first == pytest.approx(0.0 if "energy" in kept else np.median(result.energy[0]), abs=1e-12)
+
+
+@pytest.mark.parametrize("name", cases.CASES)
+def test_terms_say_of_energy_what_their_device_code_does(name):
+    from lgvi_kernels.laws import LAWS
+
+    for term in cases.CASES[name].terms:
+        module = LAWS[term.device]
+        follows = getattr(module, "POTENTIAL", False) and not hasattr(module, "damping") and not hasattr(module, "flow")
+        assert ("energy" in term.conserves) == follows
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class Own(lw.Term):
+    """A law of a user's own."""
+
+    type = "own"
+    device = SimpleNamespace(POTENTIAL=True)
+
+
+class Told(Own):
+    """One whose potential is known to the host."""
+
+    def potential(self, own, position, attitude, setting):
+        return position[..., 2]
+
+
+class Timed(Told):
+    """One whose potential varies in time."""
+
+    timed = True
+
+
+class Braking(Told):
+    """One that damps as well."""
+
+    device = SimpleNamespace(POTENTIAL=True, damping=None)
+
+
+def test_a_law_of_the_users_own_conserves_energy_by_its_potential():
+    assert [sorted(kind().conserves) for kind in (Own, Told, Timed, Braking)] == [[], ["energy"], [], []]
+
+
+def entry_of(path):
+    """The recording in a file."""
+    return RrdReader(path).recordings()[0]
+
+
+def rows(path, entity, ending):
+    """Time -> value of a component of an entity, frame by frame."""
+    found = {}
+    for chunk in RrdReader(path).stream().filter(content=entity):
+        batch = chunk.to_record_batch()
+        column = next((name for name in batch.schema.names if name.endswith(ending)), None)
+        if column and "sim_time" in batch.schema.names:
+            times = batch.column("sim_time").cast("int64").to_numpy() / 1e9
+            found |= dict(zip(times.tolist(), batch.column(column).to_pylist(), strict=True))
+    return found
+
+
+def test_every_run_has_ids_of_its_own(mixed, sunk, tmp_path):
+    again = lw.solve(divers(SPEEDS), h=0.1, t1=20.0, save=lw.SaveAt(every=1.0))
+    part = mixed.part(np.array([0, 1]))
+    other = mixed.part(np.array([2, 3]))
+    ids = []
+    for i, result in enumerate((mixed, again, sunk, part, other)):
+        entry = entry_of(lw.log_rerun(result, tmp_path / f"{i}.rrd"))
+        blueprint = RrdReader(tmp_path / f"{i}.rrd").blueprints()[0]
+        assert entry.recording_id in entry.application_id and blueprint.application_id == entry.application_id
+        ids.append((entry.application_id, entry.recording_id))
+    assert ids[0] == ids[1] and len(set(ids)) == 4
+    assert len({application for application, _ in ids}) == len({recording for _, recording in ids}) == 4
+
+
+def test_the_ids_are_those_of_the_saved_result(mixed, tmp_path):
+    saved = lw.Result.load(mixed.save(tmp_path / "result.npz"))
+    assert looks.identity(saved) == looks.identity(mixed)
+
+
+def test_a_recording_shows_each_member_by_its_outcome_from_then_on(mixed, tmp_path):
+    path = lw.log_rerun(mixed, tmp_path / "fleet.rrd")
+    seen = {name: rows(path, f"/world/{name}", "translations") for name in ("fleet", "floor", "surface")}
+    scales = {name: rows(path, f"/world/{name}", "scales") for name in seen}
+    visible = {
+        name: [
+            sum(scale[0] == 1.0 for scale in scales[name][t]) if scales[name] else len(seen[name][t])
+            for t in seen[name]
+        ]
+        for name in seen
+    }
+    under_way = status.under_way(mixed)
+    assert visible["fleet"] == under_way.sum(axis=1).tolist()
+    for name, code in (("floor", Status.FLOOR), ("surface", Status.SURFACE)):
+        assert visible[name] == (~under_way & (mixed.status == code)).sum(axis=1).tolist()
+    np.testing.assert_allclose(np.array(seen["floor"][20.0]), mixed.position[-1, :3], atol=1e-5)
+    assert all(np.isfinite(pose).all() for frames in seen.values() for pose in frames.values())
+
+
+def test_the_curves_of_a_recording_are_of_those_under_way(sunk, mixed, tmp_path):
+    path = lw.log_rerun(sunk, tmp_path / "sunk.rrd")
+    largest = rows(path, "/depth/largest", "scalars")
+    assert largest[2.0][0] == pytest.approx(7.0) and np.isnan(largest[15.0][0])
+    assert rows(path, "/members/floor", "scalars")[20.0] == [5.0] and rows(path, "/members/under_way", "scalars")[
+        0.0
+    ] == [5.0]
+    assert rows(path, "/energy_error/median", "scalars") and not rows(path, "/energy/median", "scalars")
+    driven = lw.log_rerun(acted_on(mixed, ACTING["thrust"][0]), tmp_path / "driven.rrd")
+    assert rows(driven, "/energy/median", "scalars") and not rows(driven, "/energy_error/median", "scalars")
+
+
+def test_a_recording_says_what_became_of_the_members(mixed, tmp_path):
+    path = lw.log_rerun(mixed, tmp_path / "fleet.rrd")
+    words = [
+        text
+        for chunk in RrdReader(path).stream().filter(content="/run")
+        for column in chunk.to_record_batch().columns
+        for text in column.to_pylist()
+    ]
+    said = str(words)
+    for line in ("2 ok, 2 surface, 3 floor", "floor, 3 of 7 members (first: member 0 at 3 s)", "ok, 2 of 7 members"):
+        assert line in said
+
+
+SCENE = """
+[vehicle]
+mass = 20.0
+inertia = [1.0, 1.2, 1.4]
+added_mass = [10.0, 10.0, 10.0]
+buoyancy = 200.0
+[environment]
+gravity = 10.0
+[start]
+position = [0.0, 0.0, 5.0]
+velocity = [0.0, 0.0, 1.0]
+[[events]]
+type = "surface"
+[[events]]
+type = "floor"
+depth = 8.0
+[ensemble]
+members = 4
+[ensemble.vary]
+"start.velocity" = { normal = { std = 0.05 } }
+[run]
+step = 0.1
+duration = 20.0
+save_every = 1.0
+"""
+
+
+@pytest.fixture
+def scene_file(tmp_path):
+    path = tmp_path / "sink.toml"
+    path.write_text(SCENE)
+    return path
+
+
+def run(scene_file, capsys, *options):
+    """Exit code, stdout and stderr of a run into the folder beside."""
+    code = cli.main(["run", str(scene_file), "--out", str(scene_file.parent / "out"), *options])
+    said = capsys.readouterr()
+    return code, said.out, said.err
+
+
+def test_a_run_that_all_sink_exits_with_0_and_has_its_pictures(scene_file, capsys):
+    code, said, errors = run(scene_file, capsys)
+    assert code == 0 and "nan" not in said and "not written" not in errors
+    files = sorted(path.name for path in (scene_file.parent / "out").iterdir())
+    assert files == ["fleet.png", "fleet.rrd", "result.npz"]
+    assert (
+        "status      floor 4" in said
+        and "drift       energy " in said
+        and "floor, 4 of 4 members (first: member" in said
+    )
+
+
+def test_members_that_are_kept_since_they_failed_are_drawn(mixed, tmp_path):
+    few = ending(mixed, [1] * 7, [2.0] * 7)
+    written = report.write(few, few, tmp_path)
+    assert (written.faults, written.empty) == ([], []) and len(written.files) == 3
+    # One that failed at once has no picture, which is no fault of the run.
+    at_once = ending(mixed, [1] * 7, [0.0] * 7)
+    written = report.write(mixed, at_once, tmp_path)
+    assert written.faults == [] and "fleet.png was not written: every member failed before" in written.empty[0]
+
+
+def test_the_summary_says_work_where_forces_do_some(mixed):
+    driven = acted_on(mixed, ACTING["thrust"][0])
+    (line,) = report._energy_lines(driven, driven)
+    assert (
+        line.startswith("work        energy changed by up to ") and "J, through wrench (largest of all members)" in line
+    )
+    tethered = acted_on(mixed, ACTING["an anchor"][0])
+    (line,) = report._energy_lines(tethered, tethered)
+    assert line.startswith("drift       energy ") and "momentum" not in line
+    lost = ending(mixed, [1] * 7, [2.0] * 7)
+    assert report._energy_lines(lost, lost) == []
+
+
+@pytest.mark.parametrize(
+    ("absent", "files", "words"),
+    [
+        (["matplotlib"], ["fleet.rrd", "result.npz"], "fleet.png: not made without matplotlib; "),
+        (["rerun"], ["fleet.png", "result.npz"], "fleet.rrd: not made without rerun-sdk; "),
+        (["matplotlib", "rerun"], ["result.npz"], "fleet.png, fleet.rrd: not made without matplotlib and rerun-sdk; "),
+    ],
+)
+def test_a_plain_installation_runs(scene_file, capsys, monkeypatch, absent, files, words):
+    for name in absent:
+        for module in [name, *(one for one in sys.modules if one.startswith(f"{name}."))]:
+            monkeypatch.setitem(sys.modules, module, None)
+    code, said, errors = run(scene_file, capsys)
+    assert code == 0 and "not written" not in errors
+    assert f"note        {words}to have pictures: pip install 'lgvi-warp[viz]'\n" in said
+    assert sorted(path.name for path in (scene_file.parent / "out").iterdir()) == files
+
+
+def test_a_library_that_is_broken_is_a_fault(mixed, tmp_path, monkeypatch):
+    def broken(result, path):
+        raise ImportError("libpng16.so: wrong version")
+
+    monkeypatch.setattr("lgvi_warp.views.plots.plot", broken)
+    assert "libpng16.so" in report.write(mixed, mixed, tmp_path).faults[0]
+
+
+def test_an_interrupt_while_drawing_leaves_whole_files(mixed, tmp_path, monkeypatch):
+    def interrupted(jobs, timeout):
+        next(iter(jobs)).result()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("lgvi_warp.cli.writing.wait", interrupted)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        report.write(mixed, mixed, tmp_path)
+    names = {path.name for path in tmp_path.iterdir()}
+    assert "result.npz" in names <= {"result.npz", "fleet.png", "fleet.rrd"}
+    said = str(caught.value)
+    assert said.startswith("written: ") and all(str(path) in said for path in tmp_path.iterdir())
+    assert lw.Result.load(tmp_path / "result.npz").status.counts() == mixed.status.counts()
+
+
+def test_the_command_says_in_a_line_what_an_interrupt_left(scene_file, monkeypatch, capsys):
+    from lgvi_warp.cli import runs
+    from lgvi_warp.cli.signals import Ended
+
+    out = scene_file.parent / "out"
+
+    def interrupted(*arguments):
+        raise Ended(f"written: {out / 'result.npz'}")
+
+    monkeypatch.setattr(runs, "report", interrupted)
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    assert cli.main(["run", str(scene_file), "--out", str(out), "--quiet"]) == 130
+    assert sys.stderr.getvalue() == f"lgvi-warp: interrupted; written: {out / 'result.npz'}\n"
+
+
+def test_keep_failed_keeps_no_outcome(mixed):
+    from lgvi_warp.engine.keepers.observation import Observation
+
+    codes = np.array([0, 1, 16, 17, 18, 19, 20, 5])
+    assert Observation(keep="failed").again(codes).tolist() == [1, 7]
+
+
+REMUS = """
+[vehicle]
+name = "remus_100"
+buoyancy = 280.0
+[start]
+position = [0.0, 0.0, 5.0]
+[[events]]
+type = "floor"
+depth = 20.0
+[ensemble]
+members = 8
+[ensemble.vary]
+"start.angular_velocity" = { normal = { std = 0.1 } }
+[run]
+method = "psi_x"
+step = 0.02
+duration = 120.0
+save_every = 1.0
+"""
+
+
+@pytest.mark.slow
+def test_remus_100_that_all_sink(tmp_path, capsys):
+    path = tmp_path / "sink.toml"
+    path.write_text(REMUS)
+    code, said, _ = run(path, capsys)
+    assert code == 0 and "status      floor 8" in said and "nan" not in said
+    assert "J, through drag_matrix, control_fins, wrench, body_lift (largest of all members)" in said
+    assert len(list((tmp_path / "out").iterdir())) == 3
+    result = lw.Result.load(tmp_path / "out" / "result.npz")
+    assert np.isfinite(list(invariants.drift(result).values())).all()

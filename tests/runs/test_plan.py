@@ -1,0 +1,219 @@
+"""Only what a scene has is compiled; a second solve builds nothing; memory follows the samples kept."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import warp as wp
+
+import lgvi_warp as lw
+from lgvi_kernels.advance.kernel import make_advance
+from lgvi_kernels.laws import restoring, weight
+from lgvi_warp.engine.block import blocks
+from lgvi_warp.engine.packets import pack
+from lgvi_warp.engine.plan import SEGMENT_SAMPLE_BYTES
+from lgvi_warp.engine.survey import shape_of_mass
+from lgvi_warp.methods.method import Method
+from lgvi_warp.runs.settle import make_plan
+from tests.support.tools import TURN, generated, one, scene_of
+
+
+def plan_of(scene, **named):
+    return make_plan(one(scene), h=0.01, t1=1.0, **named)
+
+
+def test_an_absent_term_is_no_code(tmp_path):
+    both = generated(plan_of(scene_of(net=1.0, moment=(0.0, 0.0, 1.0))), tmp_path / "both")
+    weight = generated(plan_of(scene_of(net=1.0)), tmp_path / "weight")
+    none = generated(plan_of(scene_of()), tmp_path / "none")
+    assert "Weight" in both and "Restoring" in both
+    assert "Weight" in weight and "Restoring" not in weight
+    assert "Weight" not in none and "Restoring" not in none
+
+
+def test_terms_are_those_of_the_scene():
+    assert plan_of(scene_of()).spec.laws == ()
+    assert plan_of(scene_of(net=1.0)).spec.laws == (weight,)
+    assert plan_of(scene_of(moment=(0.0, 0.0, 1.0))).spec.laws == (restoring,)
+    assert plan_of(scene_of(net=1.0, moment=(0.0, 0.0, 1.0))).spec.laws == (weight, restoring)
+
+
+def test_an_absent_term_is_no_parameter():
+    def names(struct):
+        return set(struct.numpy_dtype()["names"])
+
+    assert names(plan_of(scene_of()).advance.types.Params) == {"unused"}
+    params = plan_of(scene_of(net=1.0)).advance.types.Params
+    assert np.zeros(1, params.numpy_dtype())["own"].dtype.names == ("net",)
+
+
+def test_munk_moment_only_for_anisotropic_mass():
+    isotropic, diagonal = plan_of(scene_of((2.0, 2.0, 2.0), net=1.0)), plan_of(scene_of((1.0, 2.0, 3.0)))
+    assert (
+        isotropic.spec.mass == "isotropic"
+        and "anisotropy" not in isotropic.advance.types.Inertia.numpy_dtype()["names"]
+    )
+    assert {letter for letter, _ in (*isotropic.spec.maps, isotropic.spec.lead)} == {"Ab", "D", "K"}
+    assert diagonal.spec.mass == "diagonal" and diagonal.spec.lead == ("T", 0.5)
+    assert plan_of(scene_of(TURN @ np.diag((1.0, 2.0, 3.0)) @ TURN.T)).spec.mass == "full"
+
+
+def test_shape_of_mass():
+    assert shape_of_mass(np.eye(3)[None]) == "isotropic"
+    assert shape_of_mass(np.stack([np.eye(3), np.diag([1.0, 1.0, 2.0])])) == "diagonal"
+    assert shape_of_mass((np.eye(3) + 0.1)[None]) == "full"
+
+
+def test_a_second_solve_builds_no_kernel():
+    scene = scene_of(net=1.0)
+    lw.solve(one(scene), h=0.01, t1=0.1)
+    before = make_advance.cache_info().misses
+    lw.solve(one(scene_of((1.0, 2.0, 4.0), net=3.0), nu=[1.0, 0.0, 0.0]), h=0.02, t1=0.2)
+    assert make_advance.cache_info().misses == before
+
+
+@pytest.mark.parametrize("names", [("su4(psi_s)", "kl6(psi_s)", "su8_15(psi_s)"), ("bm4(psi_x)", "bm6(psi_x)")])
+def test_compositions_of_a_method_share_its_kernel(names):
+    """Their coefficients are numbers that the kernel gets, unless a law asks for the time within a step."""
+    plain, held = scene_of(net=1.0), lw.Wrench(force=[1.0, 0.0, 0.0])
+    schedule = lw.terms.WrenchSchedule(times=(0.0, 1.0), force=((0.0,) * 3, (1.0,) * 3), torque=((0.0,) * 3,) * 2)
+    for terms, kernels in (([], 1), ([held], 1), ([schedule], len(names))):
+        scene = lw.Scene(plain.vehicle, plain.environment, terms)
+        plans = [make_plan(one(scene), name, h=0.01, t1=1.0) for name in names]
+        assert len({plan.kernel_hash for plan in plans}) == kernels
+
+
+def test_varying_a_parameter_compiles_nothing_else(scene):
+    shared = make_plan(lw.Ensemble(scene, 16), h=0.01, t1=1.0)
+    varied = make_plan(lw.Ensemble(scene, 16, vary={"vehicle.mass": lw.Normal(relative=0.01)}), h=0.01, t1=1.0)
+    assert shared.spec == varied.spec and shared.advance is varied.advance
+
+
+def test_varied_parameters_act_on_their_member():
+    # A free fall in vacuum: v = net t / M, member by member.
+    scene = scene_of((2.0, 2.0, 2.0), net=1.0)
+    n = 11
+    buoyancy = scene.vehicle.buoyancy * np.linspace(0.5, 1.5, n)
+    states = [np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3))]
+    fleet = lw.Ensemble.from_states(scene, *states, {"vehicle.buoyancy": buoyancy})
+    result = lw.solve(fleet, h=0.01, t1=1.0)
+    net = scene.vehicle.mass * 9.8 - buoyancy
+    np.testing.assert_allclose(result.velocity[-1, :, 2], net / 2.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("n", [1, 255, 256, 257, 4096, 100_000, 1_000_000])
+def test_blocks_cover_the_members(n):
+    runs = blocks(n)
+    assert runs[0].first == 0 and runs[-1].stop == n
+    assert all(a.stop == b.first for a, b in zip(runs, runs[1:], strict=False))
+    assert all(run.count == runs[0].count for run in runs[:-1])
+
+
+def test_pack_fills_up_with_the_last_member():
+    rows = np.arange(10.0).reshape(5, 2)
+    packed = pack(rows, 4)
+    assert packed.shape == (2, 2, 4)
+    np.testing.assert_array_equal(packed[1, :, :], [[8.0] * 4, [9.0] * 4])
+
+
+def test_segments_are_contiguous_and_their_buffer_is_bounded(scene):
+    plan = make_plan(lw.Ensemble(scene, 4096), h=0.01, t1=1000.0, save=lw.SaveAt(every=0.01))
+    segments = list(plan.segments(4096))
+    samples = [plan.due(k0, k1) for k0, k1 in segments]
+    assert segments[0][0] == 0 and segments[-1][1] == plan.grid.steps and samples[-1][1] == len(plan.grid.times)
+    assert all(a[1] == b[0] for runs in (segments, samples) for a, b in zip(runs, runs[1:], strict=False))
+    assert max(s1 - s0 for s0, s1 in samples) * 4096 * 18 * 8 <= SEGMENT_SAMPLE_BYTES
+
+
+def test_segments_change_no_bit(scene, monkeypatch):
+    fleet = lw.Ensemble(scene, 16, vary={"start.angular_velocity": lw.Normal(std=0.1)})
+    whole = lw.solve(fleet, h=0.01, t1=2.0, save=lw.SaveAt(every=0.5))
+    monkeypatch.setattr("lgvi_warp.engine.plan.SEGMENT_VEHICLE_STEPS", 16 * 48)
+    monkeypatch.setattr("lgvi_warp.engine.plan.SEGMENT_SAMPLE_BYTES", 1)
+    pieces = lw.solve(fleet, h=0.01, t1=2.0, save=lw.SaveAt(every=0.5))
+    assert whole.position.tobytes() == pieces.position.tobytes()
+
+
+def test_fields_not_kept_take_no_memory(scene):
+    result = lw.solve(lw.Ensemble(scene, 4), h=0.01, t1=0.1, save=lw.SaveAt(fields=("velocity",)))
+    full = lw.solve(lw.Ensemble(scene, 4), h=0.01, t1=0.1)
+    assert list(result.samples) == ["velocity"]
+    np.testing.assert_array_equal(result.velocity, full.velocity)
+    with pytest.raises(AttributeError, match="SaveAt"):
+        _ = result.position
+
+
+def test_progress_reaches_one(scene):
+    seen = []
+    lw.solve(lw.Ensemble(scene, 300), h=0.01, t1=0.5, threads=1, progress=seen.append)
+    assert seen == sorted(seen) and seen[-1] == 1.0
+
+
+@pytest.mark.parametrize(("named", "text"), [
+    ({"dtype": "float16"}, "dtype"), ({"width": 3}, "width"), ({"checks": "some"}, "checks"), ({"method": "psy_s"}, "psi_s"),
+    ({"h": -0.1}, "h = -0.1"), ({"t1": 0.0}, "t1 = 0.0"), ({"threads": 0}, "threads"), ({"method": "kl6(phi)"}, "symmetric"),
+    ({"h": float("nan")}, "h = nan"), ({"save": lw.SaveAt(every=20.0)}, "save.every"),
+    ({"save": lw.SaveAt(at=[2.0])}, "beyond"),
+])  # fmt: skip
+def test_settings_are_refused(scene, named, text):
+    with pytest.raises(lw.SceneError, match=text):
+        lw.solve(lw.Ensemble(scene), **({"h": 0.01, "t1": 1.0} | named))
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_an_exception_on_the_way_stops_the_run(scene, threads):
+    seen = []
+
+    def interrupt(fraction):
+        seen.append(fraction)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        lw.solve(lw.Ensemble(scene, 5000), h=0.01, t1=0.1, threads=threads, progress=interrupt)
+    # Each thread meets it at most once and takes up no further block; 20 blocks are there.
+    assert len(seen) <= 2 * threads
+
+
+def test_solve_prints_nothing(scene, capfd):
+    lw.solve(lw.Ensemble(scene, 3), h=0.013, t1=0.1)
+    lw.solve(scene_of(), h=0.01, t1=0.1)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_method_is_data():
+    settings = {"solver": "quartic", "iterations": None, "tolerance": None, "alpha": 0.5, "beta": 0.5}
+    settings |= {"rtol": None, "atol": None}
+    assert dataclasses.asdict(Method()) == {"name": "psi_s"} | settings
+    assert Method("kl8(psi_1)").order == 8 and len(Method("kl8(psi_1)").stages) == 17
+    for name in ("tj4", "su4", "kl6", "kl8"):
+        stages = Method(f"{name}(psi_s)").stages
+        assert sum(stages) == pytest.approx(1.0, abs=1e-14) and stages == stages[::-1]
+
+
+def test_kernels_compile_for_cuda(tmp_path):
+    # sm_90, without a GPU: the same code, one vehicle a packet.
+    scene = scene_of(TURN @ np.diag((1.0, 2.0, 3.0)) @ TURN.T, net=1.0, moment=(0.0, 0.0, 1.0))
+    for dtype in ("float64", "float32"):
+        plan = plan_of(scene, width=1, dtype=dtype)
+        wp.compile_aot_module(plan.advance.kernel.module, arch=90, module_dir=str(tmp_path / dtype))
+        assert any(path.suffix == ".cubin" for path in (tmp_path / dtype).iterdir())
+
+
+@pytest.mark.slow_for("cayley*")
+@pytest.mark.parametrize(("solver", "h", "n"), [("quartic", 1e-4, 0), ("quartic", 0.01, 1), ("cayley", 0.1, 2)])
+def test_as_many_newton_steps_as_the_start_needs(scene, solver, h, n):
+    fleet = lw.Ensemble(scene, 20, 1, {"start.angular_velocity": lw.Normal(relative=0.1)})
+    chosen = lw.solve(fleet, lw.Method("psi_s", solver, "auto"), h=h, t1=10 * h, save=lw.SaveAt())
+    assert chosen.provenance["method"]["iterations"] == n and str(n) in chosen.messages[0]
+    assert chosen.status.counts() == {"ok": 20}
+    # Each of 20 solves leaves a residual below 1e-12 of a turn of h |Omega| / 2 < 0.02 rad.
+    exact = lw.solve(fleet, lw.Method("psi_s", solver), h=h, t1=10 * h, save=lw.SaveAt())
+    np.testing.assert_allclose(chosen.attitude, exact.attitude, rtol=0, atol=20 * 1e-12)
+
+
+def test_a_member_that_spins_up_is_told():
+    # At rest no Newton step is needed; 2 rad/s later, at h = 0.1 s, one would be.
+    resting = lw.Scene(lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 0.0), lw.Environment(gravity=0.0),
+                       [lw.Wrench(torque=(1.5, 3.0, 4.0))])  # fmt: skip
+    result = lw.solve(resting, lw.Method("psi_s", iterations="auto"), h=0.1, t1=5.0)
+    assert result.status.counts() == {"not_converged": 1} and 0.0 < result.failure_time[0] < 5.0

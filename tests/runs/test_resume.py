@@ -1,0 +1,137 @@
+"""Killed at any moment (SIGKILL), a run goes on and leaves the bytes of one that was never stopped."""
+
+import os
+import random
+import shutil
+import subprocess
+import sys
+import time
+
+import pytest
+
+import lgvi_warp as lw
+from tests.support.stores import differing, fleet
+
+# Blocks on one thread, chunks of about 50 samples: long enough to be hit in the middle of all that happens.
+CODE = """
+import sys
+import lgvi_warp as lw
+from tests.support.stores import fleet
+lw.solve(fleet(int(sys.argv[3])), "psi_s", h=0.01, t1=60.0, save=lw.SaveAt(every=0.5), threads=int(sys.argv[2]),
+         store=lw.Store(sys.argv[1], existing="resume", chunk_bytes=500_000))
+"""
+
+
+def start(path, threads=1, members=2048):
+    """The run in a process of its own, begun or gone on with; 256 members a block."""
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    return subprocess.Popen([sys.executable, "-c", CODE, str(path), str(threads), str(members)], env=env)
+
+
+def wait_for(path, process):
+    """Until the store is there."""
+    while not path.exists() and process.poll() is None:
+        time.sleep(0.002)
+
+
+def undisturbed(path, members):
+    """(a run that was not stopped, seconds before its store was there, seconds after)."""
+    lw.solve(fleet(64), "psi_s", h=0.01, t1=1.0)  # compiles the kernel, if nothing has
+    begun = time.perf_counter()
+    process = start(path, members=members)
+    wait_for(path, process)
+    there = time.perf_counter()
+    assert process.wait() == 0
+    return path, there - begun, time.perf_counter() - there
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory):
+    """Of 8 blocks."""
+    return undisturbed(tmp_path_factory.mktemp("short") / "run.zarr", 2048)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """Of 16 blocks."""
+    return undisturbed(tmp_path_factory.mktemp("whole") / "run.zarr", 4096)
+
+
+def killed(path, seconds):
+    """Start the run and kill it so many seconds after its start. Whether it was hit."""
+    process = start(path, members=4096)
+    try:
+        process.wait(seconds)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+        return True
+    return False
+
+
+def finished(path):
+    """Blocks that are marked."""
+    return len(list((path / "blocks").glob("*.json"))) if path.exists() else 0
+
+
+def goes_on(path, whole, members=4096):
+    """Finish a run by lw.resume, or start it again where it had not begun; compare all files."""
+    if path.exists():
+        lw.resume(path)
+    else:
+        assert start(path, members=members).wait() == 0
+    assert differing(whole, path) == []
+    assert sorted(one.name for one in path.parent.iterdir()) == ["run.zarr"]
+    shutil.rmtree(path)
+
+
+def killed_after(path, blocks, delay, members):
+    """Start the run and kill it a moment after so many blocks are marked. Whether it was hit before its end."""
+    process = start(path, members=members)
+    while finished(path) < blocks and process.poll() is None:
+        time.sleep(0.002)
+    time.sleep(delay)
+    process.kill()
+    return process.wait() != 0
+
+
+def test_three_kills(short, tmp_path):
+    path, dice = tmp_path / "run.zarr", random.Random(3)
+    for blocks in (1, 2, 4):
+        # Blocks are marked in groups: on a busy machine the last of them may be marked before the kill arrives.
+        for _ in range(5):
+            hit = killed_after(path, blocks, dice.uniform(0.0, 0.02), 2048)
+            if in_middle := hit and 0 < finished(path) < 8:
+                break
+            shutil.rmtree(path)
+        assert in_middle
+        goes_on(path, short[0])
+
+
+@pytest.mark.slow
+def test_twenty_kills_at_random_moments(whole, tmp_path):
+    """Ten from the start of the process to a little beyond its end, ten a moment after some block was marked.
+
+    The moments of the second ten do not depend on how busy the machine is: most of them hit the run in its middle.
+    """
+    path, before, after = whole
+    dice = random.Random(20)
+    found = []
+    for i in range(20):
+        if i < 10:
+            hit = killed(tmp_path / "run.zarr", dice.uniform(0.0, 1.05 * (before + after)))
+        else:
+            hit = killed_after(tmp_path / "run.zarr", dice.randrange(15), dice.uniform(0.0, 0.1), 4096)
+        found.append((hit, finished(tmp_path / "run.zarr")))
+        goes_on(tmp_path / "run.zarr", path)
+    assert sum(hit and 0 < count < 16 for hit, count in found) >= 5
+
+
+@pytest.mark.slow
+def test_killed_again_and_again(whole, tmp_path):
+    """Each attempt is killed after two more blocks or a few more; the run still ends, with the same bytes."""
+    here, kills = tmp_path / "run.zarr", 0
+    while killed_after(here, finished(here) + 2, 0.0, 4096):
+        kills += 1
+        assert kills < 10
+    assert kills >= 3 and differing(whole[0], here) == []

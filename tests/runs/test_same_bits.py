@@ -1,0 +1,82 @@
+"""Same inputs, same bits: any number of threads, any order of members, alone or among others, after a failure beside."""
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp.engine.block import blocks
+from tests.support.tools import random_states, scene_of
+
+FIELDS = ("position", "attitude", "velocity", "angular_velocity")
+
+
+@pytest.fixture(scope="module")
+def fleet():
+    """1,003 different members in several blocks, the last packet ragged; mass and inertia vary as well."""
+    scene = scene_of((10.0, 12.0, 15.0), (1.0, 2.0, 2.5), net=-0.3, moment=(0.0, 0.1, -0.5))
+    n = 1003
+    rng = np.random.default_rng(5)
+    parameters = {
+        "vehicle.mass": 5.0 + rng.random(n),
+        "vehicle.inertia": np.array([1.0, 2.0, 2.5]) + rng.random((n, 3)),
+    }
+    return lw.Ensemble.from_states(scene, *random_states(3, n), parameters)
+
+
+@pytest.fixture(scope="module", params=["float64", "float32"])
+def run(request):
+    def solve(ensemble, **named):
+        return lw.solve(ensemble, "psi_s", h=0.01, t1=0.75, save=lw.SaveAt(every=0.25), dtype=request.param, **named)
+
+    return solve
+
+
+def same(x, y, members=slice(None)):
+    """Whether two results hold the same bytes, x's members chosen by an index."""
+    return all(getattr(x, f)[:, members].tobytes() == getattr(y, f).tobytes() for f in FIELDS)
+
+
+def test_threads(fleet, run):
+    assert len(blocks(fleet.members)) > 3
+    reference = run(fleet, threads=1)
+    assert all(same(reference, run(fleet, threads=threads)) for threads in (2, 3, 4))
+
+
+def test_order_of_members(fleet, run):
+    order = np.random.default_rng(1).permutation(fleet.members)
+    assert same(run(fleet), run(fleet.subset(order)), order)
+
+
+def test_alone_or_among_others(fleet, run):
+    reference = run(fleet)
+    for member in (0, 513, 1002):
+        assert same(reference, run(fleet.subset([member])), [member])
+
+
+def test_samples_do_not_change_the_path(fleet):
+    dense = lw.solve(fleet, h=0.01, t1=0.75, save=lw.SaveAt(every=0.01))
+    sparse = lw.solve(fleet, h=0.01, t1=0.75)
+    assert dense.position[-1].tobytes() == sparse.position[-1].tobytes()
+
+
+def test_a_failure_beside_changes_nothing(fleet, run):
+    reference = run(fleet)
+    sick = run(_with_sick_members(fleet))
+    well = np.setdiff1d(np.arange(fleet.members), SICK)
+    assert (sick.status[SICK] != 0).all() and (sick.status[well] == 0).all()
+    assert all(getattr(reference, f)[:, well].tobytes() == getattr(sick, f)[:, well].tobytes() for f in FIELDS)
+
+
+SICK = np.array([2, 300, 301, 1002])
+
+
+def _with_sick_members(fleet):
+    """The fleet with four members that fail: not a number, too fast a spin, infinite, overflowing."""
+    members = fleet.select(0, fleet.members)
+    states = [np.array(getattr(members, name)) for name in FIELDS]
+    states[2][SICK[0]] = np.nan
+    states[3][SICK[1]] = 1e4
+    states[0][SICK[2]] = np.inf
+    states[2][SICK[3]] = 1e200
+    varied = {name: members.parameters[name] for name in ("vehicle.mass", "vehicle.inertia")}
+    return lw.Ensemble.from_states(fleet.scene, *states, varied)

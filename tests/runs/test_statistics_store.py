@@ -1,0 +1,288 @@
+"""Statistics in a store: the bits of a run in memory, of any executor, killed and gone on with."""
+
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp import cli
+from lgvi_warp.engine.keepers.observation import observation_of, observe
+from lgvi_warp.runs.provenance import messages, provenance
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.runs.store.create import create
+from lgvi_warp.runs.store.folder import Folder
+from lgvi_warp.runs.store.state import state
+from tests.conftest import ROOT
+from tests.support.stores import SETTINGS, STATISTICS, UNTIL, bits, differing, fleet, markers, tree
+
+
+@pytest.fixture(scope="module")
+def memory():
+    return lw.solve(fleet(), **SETTINGS, statistics=STATISTICS, keep="none")
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A complete store without samples."""
+    path = tmp_path_factory.mktemp("statistics") / "run.zarr"
+    lw.solve(fleet(), **SETTINGS, statistics=STATISTICS, keep="none", store=path)
+    return path
+
+
+def test_a_store_without_samples_has_statistics_and_arrays_of_members(whole, memory):
+    stored = lw.open_run(whole)
+    assert bits(stored) == bits(memory) and len(stored.samples) == 0
+    assert not (whole / "position").exists() and len(list((whole / "parts").glob("*.npy"))) == 4
+    np.testing.assert_array_equal(stored.parameters["vehicle.mass"], memory.parameters["vehicle.mass"])
+    for name in ("status", "failure_time", "warnings", "warning_time", "warning_value", "substeps"):
+        np.testing.assert_array_equal(getattr(stored, name), getattr(memory, name))
+    assert stored.provenance["observed"] == memory.provenance["observed"] and stored.messages == memory.messages
+    assert "mean_position" in stored.statistics.dataset and "position" not in stored.dataset
+
+
+@pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
+def test_it_is_exported_with_its_statistics(whole, memory, tmp_path):
+    import pyarrow.parquet as pq
+    import xarray
+
+    with xarray.open_dataset(lw.export(whole, "netcdf", tmp_path / "run.nc"), group="statistics") as found:
+        np.testing.assert_array_equal(found.mean_position.values, memory.statistics["mean position"].value)
+    table = pq.read_table(lw.export(whole, "parquet", tmp_path / "run.parquet"))
+    assert table.column_names == ["realization", "vehicle.mass", "status", "failure_time"] and table.num_rows == 1003
+
+
+def test_statistics_of_damaged_parts_are_refused(whole, tmp_path):
+    path = shutil.copytree(whole, tmp_path / "run.zarr")
+    part = path / "parts" / "000000256.npy"
+    data = bytearray(part.read_bytes())
+    data[len(data) // 2] ^= 1
+    part.write_bytes(data)
+    with pytest.raises(lw.SceneError, match=r"parts/000000256.* has changed; `lgvi-warp resume .*` mends it"):
+        lw.open_run(path)
+    (path / "blocks" / "000000256.json").unlink()
+    with pytest.raises(lw.SceneError, match=r"blocks/000000256.json is missing or damaged; `lgvi-warp resume"):
+        lw.open_run(path)
+
+
+@pytest.mark.parametrize("harm", ["flip", "tear", "remove"])
+def test_a_damaged_part_is_seen_and_its_block_alone_runs_again(harm, whole, memory, tmp_path):
+    path = shutil.copytree(whole, tmp_path / "run.zarr")
+    part = path / "parts/000000512.npy"
+    data = bytearray(part.read_bytes())
+    data[len(data) // 2] ^= 1
+    {"flip": lambda: part.write_bytes(data), "tear": lambda: part.write_bytes(data[:-7]), "remove": part.unlink}[harm]()
+    assert any("parts/000000512.npy" in text for text in state(path)["damage"])
+    before = markers(path)
+    assert bits(lw.resume(path)) == bits(memory) and differing(whole, path) == []
+    after = markers(path)
+    assert [name for name in after if after[name] != before[name]] == ["000000512.json"]
+
+
+def test_samples_and_statistics_together(memory, tmp_path):
+    save = lw.SaveAt(every=0.1, fields=("attitude",))
+    result = lw.solve(fleet(), **SETTINGS | {"save": save}, statistics=STATISTICS, store=tmp_path / "run.zarr")
+    assert list(result.samples) == ["attitude"] and bits(result) == bits(memory)
+
+
+def test_members_kept_are_run_again_and_after_a_resume(whole, tmp_path):
+    every = lw.solve(fleet(), **SETTINGS)
+    result = lw.solve(fleet(), **SETTINGS, keep=[3, 1002], store=tmp_path / "run.zarr")
+    (tmp_path / "run.zarr/blocks/000000256.json").unlink()
+    for one in (result, lw.resume(tmp_path)):
+        assert one.kept.position.tobytes() == every.position[:, [3, 1002]].tobytes()
+        assert len(one.samples) == 0 and list(one.kept_members) == [3, 1002]
+
+
+@pytest.mark.parametrize("executor", [pytest.param("processes", marks=pytest.mark.slow), "threads"])
+def test_executors_give_the_same_bits(executor, memory, whole, tmp_path):
+    settings = {**SETTINGS, "statistics": STATISTICS, "keep": "none", "executor": executor, "threads": 2}
+    assert bits(lw.solve(fleet(), **settings)) == bits(memory)
+    assert bits(lw.solve(fleet(), **settings, store=tmp_path / "run.zarr")) == bits(memory)
+    assert differing(whole, tmp_path / "run.zarr") == []
+
+
+@pytest.mark.slow
+def test_until_and_samples_in_processes(tmp_path):
+    settings = {**SETTINGS, "statistics": STATISTICS, "until": UNTIL}
+    one, two = (lw.solve(fleet(), **settings, executor=name, threads=2) for name in ("threads", "processes"))
+    assert bits(one) == bits(two) and one.position.tobytes() == two.position.tobytes()
+
+
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory):
+    """A run that had members enough before the last block, on one thread."""
+    path = tmp_path_factory.mktemp("until") / "run.zarr"
+    lw.solve(fleet(), **SETTINGS, statistics=STATISTICS, until=UNTIL, store=path, threads=1)
+    return path
+
+
+def test_until_stops_a_store_at_the_same_block(stopped, tmp_path):
+    memory = lw.solve(fleet(), **SETTINGS, statistics=STATISTICS, until=UNTIL)
+    assert memory.members == 512
+    stored = lw.solve(fleet(), **SETTINGS, statistics=STATISTICS, until=UNTIL, store=tmp_path / "run.zarr", threads=2)
+    assert differing(stopped, tmp_path / "run.zarr") == []
+    for one in (stored, lw.open_run(stopped)):
+        assert one.members == memory.members and bits(one) == bits(memory) and one.messages == memory.messages
+        assert one.provenance["members"] == memory.members and one.position.tobytes() == memory.position.tobytes()
+    assert lw.open_run(stopped).dataset.sizes["realization"] == memory.members
+    with pytest.raises(IndexError, match=f"of {memory.members}"):
+        lw.open_run(stopped, [memory.members])
+
+
+def test_until_stops_a_resumed_store_at_the_same_block(stopped, tmp_path):
+    path = shutil.copytree(stopped, tmp_path / "run.zarr")
+    before = tree(path)
+    assert lw.resume(path).members == 512 and tree(path) == before
+    (path / "blocks/000000000.json").unlink()
+    (path / "position/c.0.0.0.0").unlink(missing_ok=True)
+    assert lw.resume(path, threads=2).members == 512 and tree(path) == before
+
+
+CODE = """
+import sys
+import lgvi_warp as lw
+from tests.support.stores import STATISTICS, fleet
+lw.solve(fleet(2048), "psi_s", h=0.01, t1=60.0, save=lw.SaveAt(every=0.5), threads=1, statistics=STATISTICS,
+         keep=sys.argv[2], store=sys.argv[1])
+"""
+
+
+def start(path, keep):
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    return subprocess.Popen([sys.executable, "-c", CODE, str(path), keep], env=env)
+
+
+@pytest.mark.parametrize("keep", ["none", pytest.param("all", marks=pytest.mark.slow)])
+def test_killed_and_gone_on_with(keep, tmp_path):
+    lasting = {"h": 0.01, "t1": 60.0, "save": lw.SaveAt(every=0.5)}
+    path, other = tmp_path / "run.zarr", tmp_path / "other.zarr"
+    undisturbed = lw.solve(fleet(2048), "psi_s", **lasting, statistics=STATISTICS, keep=keep, store=other)
+    process = start(path, keep)
+    while len(list(path.glob("blocks/*.json"))) < 2 and process.poll() is None:
+        time.sleep(0.002)
+    process.kill()
+    assert process.wait() != 0 and 0 < len(list(path.glob("blocks/*.json"))) < 8
+    assert bits(lw.resume(path)) == bits(undisturbed) and differing(other, path) == []
+
+
+def test_the_command_restores_the_statistics_of_the_scene(tmp_path, capsys):
+    scene = (ROOT / "examples/paper.toml").read_text()
+    scene += '\n[[run.statistics]]\ntype = "mean"\nof = "position"\n'
+    scene += '[run.until]\nstatistic = "mean position[2]"\nhalf_width = 10.0\nmembers = 256\n'
+    (tmp_path / "scene.toml").write_text(scene.replace("[run]", '[run]\nkeep = "none"'))
+    options = [
+        "--members",
+        "1003",
+        "--duration",
+        "1",
+        "--store",
+        "zarr",
+        "--out",
+        str(tmp_path),
+    ]
+    assert cli.main(["run", str(tmp_path / "scene.toml"), *options]) == 0
+    before, said = tree(tmp_path / "run.zarr"), capsys.readouterr().out
+    assert "mean position" in said and "reached with 256 members" in said
+    (tmp_path / "run.zarr/blocks/000000000.json").unlink()
+    (tmp_path / "statistics.png").unlink()
+    assert cli.main(["resume", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert "mean position" in said and "reached with 256 members" in said and (tmp_path / "statistics.png").exists()
+    assert tree(tmp_path / "run.zarr") == before
+    assert cli.main(["info", str(tmp_path)]) == 0
+    assert "statistics of each block" in (said := capsys.readouterr().out) and "1 of 1 finished; complete" in said
+
+
+def shallow(samples, members):
+    """Whether each member is above 10 m."""
+    return (samples["position"][..., 2] < 10.0).astype(np.float64)
+
+
+def test_statistics_of_functions_are_asked_for_again(tmp_path):
+    statistics = [lw.Mean(shallow)]
+    first = lw.solve(fleet(), **SETTINGS, statistics=statistics, keep="none", store=tmp_path / "run.zarr")
+    (tmp_path / "run.zarr/blocks/000000256.json").unlink()
+    with pytest.raises(lw.SceneError, match=r"mean shallow: are of functions .* give statistics="):
+        lw.resume(tmp_path)
+    with pytest.raises(lw.SceneError, match="are not the run's"):
+        lw.resume(tmp_path, statistics=[lw.Mean("depth")])
+    assert bits(lw.resume(tmp_path, statistics=statistics)) == bits(first)
+    assert not lw.open_run(tmp_path).statistics and bits(lw.open_run(tmp_path, statistics=statistics)) == bits(first)
+
+
+def test_another_observation_is_another_run(whole):
+    store = lw.Store(whole, existing="resume")
+    with pytest.raises(lw.SceneError, match=r"observed\.statistics"):
+        lw.solve(fleet(), **SETTINGS, statistics=[lw.Mean("position")], keep="none", store=store)
+
+
+def test_replicates_of_a_store_are_those_of_memory(tmp_path):
+    base = fleet(2)
+    members = lw.Ensemble(base.scene, 1024, 1, base.vary, lw.Sobol(replicates=16))
+    asked = {"statistics": [*STATISTICS, lw.FirstPassage("depth", above=11.0)], "keep": "none"}
+    memory = lw.solve(members, **SETTINGS, **asked)
+    stored = lw.solve(members, **SETTINGS, **asked, store=tmp_path / "run.zarr", threads=2)
+    assert bits(memory) == bits(stored) == bits(lw.open_run(tmp_path))
+    assert memory.provenance["ensemble"]["sampling"] == {"sobol": {"replicates": 16}}
+    (tmp_path / "run.zarr/blocks/000000256.json").unlink()
+    assert bits(lw.resume(tmp_path)) == bits(memory)
+    again = lw.Store(tmp_path / "run.zarr", existing="resume")
+    for other in ("sobol", lw.Sobol(replicates=8)):
+        with pytest.raises(lw.SceneError, match=r"ensemble\.sampling"):
+            lw.solve(lw.Ensemble(base.scene, 1024, 1, base.vary, other), **SETTINGS, **asked, store=again)
+
+
+def test_a_run_in_parts_has_no_until(tmp_path):
+    with pytest.raises(lw.SceneError, match="runs in parts"):
+        lw.solve(fleet(), **SETTINGS, until=UNTIL, store=tmp_path / "run.zarr", only=range(1))
+
+
+def test_parts_of_a_run_are_merged_with_their_statistics(whole, memory, tmp_path):
+    for i, only in enumerate((range(0, 2), range(2, 4))):
+        lw.solve(fleet(), **SETTINGS, statistics=STATISTICS, keep="none", store=tmp_path / f"{i}.zarr", only=only)
+    lw.merge([tmp_path / "0.zarr", tmp_path / "1.zarr"], tmp_path / "run.zarr")
+    assert differing(whole, tmp_path / "run.zarr") == [] and bits(lw.open_run(tmp_path / "run.zarr")) == bits(memory)
+
+
+@pytest.mark.parametrize("given", [[], STATISTICS])
+def test_an_observation_is_told_and_read(given):
+    observed = observe(1003, lw.Scene.load(ROOT / "examples/paper.toml").run, given, "failed", UNTIL)
+    assert observation_of(observed.to_dict() | {"fields": ["position"]}).to_dict() == observed.to_dict()
+
+
+MASS = {"vehicle.mass": lw.Normal(relative=0.001)}
+RATES = {"start.angular_velocity": lw.Normal(std=0.01)}
+
+
+@pytest.mark.parametrize(
+    ("vary", "sampling"),
+    [
+        (MASS | RATES, "sobol"),
+        (MASS | RATES, lw.Sobol(replicates=4)),
+        (MASS, lw.Halton(replicates=8)),
+        (MASS, lw.LatinHypercube(8)),
+        ({}, lw.Grid({"start.position[0]": [0.0, 1.0], "vehicle.mass": [123.0, 124.0, 125.0, 126.0]})),
+        ({}, lw.Table(values={"vehicle.mass": np.linspace(123.0, 124.0, 8)})),
+        (RATES, "random"),
+    ],
+)
+@pytest.mark.parametrize("chosen", [None, [5, 2, 3]])
+def test_the_plan_of_a_store_is_the_plan_of_the_run(vary, sampling, chosen, tmp_path):
+    members = lw.Ensemble(fleet(2).scene, 8, 3, vary, sampling)
+    members = members if chosen is None else members.subset(chosen)
+    method = lw.Method("psi_s", solver="newton", iterations=3, tolerance=1e-9)
+    plan = make_plan(members, method, h=0.1, t1=1.0, checks="all", on_failure="substep")
+    create(lw.Store(tmp_path / "run.zarr"), plan, provenance(plan), messages(plan))
+    for again in (Folder(tmp_path / "run.zarr").plan(), pickle.loads(pickle.dumps(plan))):
+        assert provenance(again) == provenance(plan) and again.method == plan.method and again.spec == plan.spec
+        one, other = again.ensemble.select(0, members.members), members.select(0, members.members)
+        for name in ("position", "attitude", "velocity", "angular_velocity", "indices"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+        for name, values in other.parameters.items():
+            np.testing.assert_array_equal(one.parameters[name], values)

@@ -1,0 +1,706 @@
+"""A run in a store: the bits of one in memory, whatever reads it; and how it is refused, damaged, mended and exported."""
+
+import errno
+import json
+import os
+import resource
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import zarr
+
+import lgvi_warp as lw
+from lgvi_warp import cli
+from lgvi_warp.common import files as durable
+from lgvi_warp.common import machine, safe_files
+from lgvi_warp.engine.block import blocks
+from lgvi_warp.engine.executors.threads import Threads
+from lgvi_warp.runs import member_fields
+from lgvi_warp.runs.provenance import messages, provenance
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.runs.store import folder as store
+from lgvi_warp.runs.store import layout as store_layout
+from lgvi_warp.runs.store.run import Stored
+from lgvi_warp.runs.store.sink import packed, unpacked
+from lgvi_warp.runs.store.state import state
+from tests.conftest import ROOT
+from tests.support.stores import MEMBERS, SETTINGS, differing, fleet, markers, tree
+from tests.support.toy_keeper import DepthSum
+
+FIELDS = ("position", "attitude", "velocity", "angular_velocity")
+
+
+@pytest.fixture(scope="module")
+def memory():
+    return lw.solve(fleet(), **SETTINGS)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A complete store, which no test changes."""
+    path = tmp_path_factory.mktemp("store") / "run.zarr"
+    lw.solve(fleet(), **SETTINGS, store=path)
+    return path
+
+
+@pytest.fixture
+def copy(whole, tmp_path):
+    return shutil.copytree(whole, tmp_path / "run.zarr")
+
+
+def test_it_has_the_bits_of_a_run_in_memory(whole, memory):
+    stored = lw.open_run(whole.parent)
+    for name in FIELDS:
+        assert stored.samples[name].tobytes() == memory.samples[name].tobytes()
+    for name in ("time", *(one.name for one in member_fields.present(make_plan(fleet(), **SETTINGS)))):
+        assert getattr(stored, name).tobytes() == getattr(memory, name).tobytes()
+    assert stored.parameters.keys() == memory.parameters.keys()
+    for name, values in memory.parameters.items():
+        np.testing.assert_array_equal(stored.parameters[name], values)
+    assert stored.provenance == json.loads(json.dumps(memory.provenance)) and stored.messages == memory.messages
+    np.testing.assert_array_equal(stored.energy, memory.energy)
+
+
+def test_some_members_alone_are_read(whole, memory):
+    some = lw.open_run(whole, [5, 1002, 300])
+    assert some.position.tobytes() == memory.position[:, [5, 1002, 300]].tobytes() and some.members == 3
+    assert lw.open_run(whole, slice(250, 260)).parameters["vehicle.mass"].shape == (10,)
+
+
+def test_xarray_opens_it_without_a_remark(whole, memory, recwarn):
+    import xarray
+
+    dataset = xarray.open_zarr(whole)
+    assert dataset.attrs["Conventions"] == "CF-1.11" and dataset.attrs["complete"]
+    assert dataset.position.dims == ("time", "realization", "component") and dataset.position.attrs["units"] == "m"
+    assert dataset.status.attrs["flag_meanings"].split()[0] == "ok" and dataset["vehicle.mass"].attrs["units"] == "kg"
+    np.testing.assert_array_equal(dataset.position.values, memory.position)
+    np.testing.assert_array_equal(dataset.realization.values, np.arange(MEMBERS))
+    assert dataset.provenance == json.dumps(json.loads(dataset.provenance)) and len(recwarn) == 0
+    view = lw.open_run(whole).dataset
+    assert float(view.position.isel(time=-1, realization=7, component=2)) == memory.position[-1, 7, 2]
+
+
+def test_chunks_are_raw_numbers_with_a_checksum_one_block_each(whole, memory):
+    array = zarr.open_array(whole / "position", mode="r")
+    assert array.chunks == (31, 256, 3)
+    data = (whole / "position" / "c.0.1.0").read_bytes()
+    assert data[:-4] == memory.position[:, 256:512].tobytes()
+    assert int.from_bytes(data[-4:], "little") == durable.checksum(data[:-4])
+
+
+def test_long_runs_are_cut_in_equal_chunks_of_about_10_mb():
+    plan = make_plan(fleet(8192), "psi_s", h=0.01, t1=100.0, save=lw.SaveAt(every=0.01))
+    found = {one.name: one for one in store_layout.columns(plan, lw.Store("run.zarr"))}
+    assert [found[name].times for name in FIELDS] == [1429, 527, 1429, 1429]
+    assert all(0.6e7 < found[name].bytes <= 1.01e7 for name in FIELDS)
+    assert found["position"].key(blocks(8192)[3], 2) == "position/c.2.3.0"
+
+
+def test_a_column_for_each_number_of_a_member():
+    plan = make_plan(fleet(20), lw.Method("rk5", rtol=1e-6, atol=1e-9), h=0.1, t1=1.0)
+    names = [one.name for one in store_layout.columns(plan, lw.Store("run.zarr")) if not one.times]
+    assert names == [
+        "realization",
+        "status",
+        "failure_time",
+        "failure_value",
+        "warnings",
+        "warning_time",
+        "warning_value",
+        "substeps",
+        "steps_made",
+        "steps_tried",
+        "vehicle.mass",
+    ]
+
+
+def test_time_chunks_come_together(tmp_path, memory):
+    result = lw.solve(fleet(), **SETTINGS, store=lw.Store(tmp_path / "run.zarr", chunk_bytes=50_000))
+    assert len(list((tmp_path / "run.zarr" / "position").glob("c.*"))) == 4 * 4
+    assert all(result.samples[name].tobytes() == memory.samples[name].tobytes() for name in FIELDS)
+
+
+def test_float32_and_fewer_fields(tmp_path, memory):
+    chosen = lw.Store(tmp_path / "run.zarr", dtype="float32", fields=("position",))
+    result = lw.solve(fleet(), **SETTINGS, store=chosen)
+    assert list(result.samples) == ["position"] and result.position.dtype == np.float32
+    np.testing.assert_array_equal(result.position, memory.position.astype(np.float32))
+    with pytest.raises(AttributeError, match="velocity was not kept"):
+        _ = result.velocity
+    lw.resume(tmp_path)
+
+
+LARGER = """
+import sys
+import lgvi_warp as lw
+from tests.support.stores import fleet
+lw.solve(fleet(20000), "psi_s", h=0.01, t1=5.0, save=lw.SaveAt(every=0.01), threads=2, store=sys.argv[1])
+assert lw.open_run(sys.argv[1], [7]).position.shape == (501, 1, 3)
+# ru_maxrss would begin with what the process that started it had.
+with open("/proc/self/status") as file:
+    print(next(int(line.split()[1]) * 1024 for line in file if line.startswith("VmHWM")))
+"""
+
+
+@pytest.mark.slow
+def test_samples_may_be_larger_than_the_memory_of_the_run(tmp_path):
+    """1.44 GB of samples by a process that never has half of that."""
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    arguments = [sys.executable, "-c", LARGER, str(tmp_path / "run.zarr")]
+    peak = int(subprocess.run(arguments, capture_output=True, text=True, env=env, check=True).stdout)
+    stored = sum(path.stat().st_size for path in tmp_path.rglob("c.*"))
+    assert stored > 1.4e9 and peak < stored / 2
+
+
+def test_the_same_run_leaves_the_same_bytes(whole, tmp_path):
+    lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", threads=1)
+    assert differing(whole, tmp_path / "run.zarr") == []
+
+
+def test_an_existing_run_is_refused_replaced_or_gone_on_with(copy):
+    with pytest.raises(lw.SceneError, match=r"holds a run already.*resume.*--overwrite"):
+        lw.solve(fleet(), **SETTINGS, store=copy)
+    before = tree(copy)
+    lw.solve(fleet(), **SETTINGS, store=lw.Store(copy, existing="resume"))
+    assert tree(copy) == before
+    with pytest.raises(lw.SceneError, match=r"ensemble.members is 1003 in the store and 1004 here: is another run"):
+        lw.solve(fleet(1004), **SETTINGS, store=lw.Store(copy, existing="resume"))
+    with pytest.raises(lw.SceneError, match=r"stores .*float32"):
+        lw.solve(fleet(), **SETTINGS, store=lw.Store(copy, dtype="float32", existing="resume"))
+    lw.solve(fleet(300), **SETTINGS, store=lw.Store(copy, existing="overwrite"))
+    assert lw.open_run(copy).members == 300
+    assert sorted(path.name for path in copy.parent.iterdir()) == ["run.zarr"]
+
+
+def test_bad_settings_are_refused_at_once(tmp_path):
+    with pytest.raises(lw.SceneError) as refused:
+        lw.Store(tmp_path / "run", dtype="float16", fields=("speed",), existing="keep")
+    text = str(refused.value)
+    assert "4 faults" in text and ".zarr" in text and "float16" in text and "speed" in text and "keep" in text
+
+
+def test_a_run_in_use_is_left_alone(copy):
+    with store.held(copy), pytest.raises(lw.SceneError, match="another run is writing"):
+        lw.resume(copy)
+
+
+def remove(path):
+    path.unlink()
+
+
+def tear(path):
+    with path.open("r+b") as file:
+        file.truncate(path.stat().st_size - 7)
+
+
+def flip(path):
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+
+
+WORDS = {flip: "has changed", tear: "is torn", remove: "is missing"}
+# Samples, numbers of members (each in all three ways) and what describes them.
+DAMAGED = (
+    *((name, harm) for name in ("position/c.0.2.0", "status/c.1", "vehicle.mass/c.3") for harm in WORDS),
+    ("attitude/c.0.0.0.0", tear),
+    ("position/zarr.json", flip),
+    ("created.json", flip),
+)
+BLOCK_OF = {"position/c.0.2.0": 512, "status/c.1": 256, "vehicle.mass/c.3": 768, "attitude/c.0.0.0.0": 0}
+
+
+@pytest.mark.parametrize(("name", "harm"), DAMAGED, ids=[f"{h.__name__} {n}" for n, h in DAMAGED])
+def test_damage_is_seen_and_its_block_alone_runs_again(copy, whole, name, harm, capsys):
+    harm(copy / name)
+    word = "is damaged" if name == "created.json" else WORDS[harm]
+    assert cli.main(["info", str(copy)]) == 1
+    assert f"damage      {name} {word}" in capsys.readouterr().out
+    before = markers(copy)
+    lw.resume(copy)
+    assert differing(whole, copy) == [] and cli.main(["info", str(copy)]) == 0
+    after = markers(copy)
+    again = [int(one.removesuffix(".json")) for one in after if after[one] != before[one]]
+    assert again == ([BLOCK_OF[name]] if name in BLOCK_OF else [])
+
+
+def test_damaged_times_are_mended_by_the_same_run(copy, whole):
+    flip(copy / "time" / "c.0")
+    with pytest.raises(lw.SceneError, match=r"time/c.0 has changed; run the same scene again"):
+        lw.resume(copy)
+    lw.solve(fleet(), **SETTINGS, store=lw.Store(copy, existing="resume"))
+    assert differing(whole, copy) == []
+
+
+def test_lost_times_are_not_taken_for_nan(copy, whole):
+    """A missing chunk reads as NaN: a run that went on with that would write it down as right."""
+    for name in ("time/c.0", "step/c.0"):
+        (copy / name).unlink()
+        before = tree(copy)
+        with pytest.raises(lw.SceneError, match=f"{name} is missing; run the same scene again"):
+            lw.resume(copy)
+        assert tree(copy) == before
+        if name.startswith("time"):
+            with pytest.raises(lw.SceneError, match=r"time/c.0 is missing"):
+                lw.open_run(copy)
+        lw.solve(fleet(), **SETTINGS, store=lw.Store(copy, existing="resume"))
+        assert differing(whole, copy) == []
+
+
+def test_lost_folders_are_made_again(copy, whole):
+    for name in ("blocks", "parts", "position"):
+        shutil.rmtree(copy / name)
+    lw.resume(copy)
+    assert differing(whole, copy) == []
+
+
+def test_what_was_there_is_told(copy):
+    (copy / "blocks" / "000000256.json").unlink()
+    assert "went on: 3 of 4 blocks were there and whole, 1 ran" in lw.resume(copy).messages
+    result = lw.solve(fleet(), **SETTINGS, store=lw.Store(copy, existing="resume"))
+    assert result.messages == ("nothing was missing: 4 of 4 blocks were there and whole",) and not result.run_seconds
+
+
+@pytest.mark.parametrize("to", ["netcdf", "parquet"])
+def test_what_is_damaged_is_not_exported(copy, tmp_path, to):
+    """What is missing would be exported as NaN."""
+    out = tmp_path / "run.out"
+    (copy / "blocks" / "000000256.json").unlink()
+    with pytest.raises(lw.SceneError, match=r"1 blocks are not marked as finished; `lgvi-warp resume .*` mends it"):
+        lw.export(copy, to, out)
+    lw.resume(copy)
+    (copy / "velocity" / "c.0.2.0").unlink()
+    with pytest.raises(lw.SceneError, match=r"velocity/c.0.2.0 is missing; `lgvi-warp resume"):
+        lw.export(copy, to, out)
+    with pytest.raises(lw.SceneError, match=r"is a folder; give the name of a file"):
+        lw.export(copy, to, tmp_path)
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["run.zarr"]
+
+
+@pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
+@pytest.mark.parametrize("to", ["netcdf", "parquet"])
+def test_a_full_disk_is_told_by_an_export(whole, tmp_path, to, capsys):
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, before[1]))
+    try:
+        assert cli.main(["export", str(whole), "--to", to, "--out", str(tmp_path / "run.out")]) == 1
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    said = capsys.readouterr().err
+    assert said.startswith(f"lgvi-warp: {tmp_path / 'run.out'}: ") and said.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_damaged_marker_runs_its_block_again(copy, whole):
+    flip(copy / "blocks" / "000000256.json")
+    assert state(copy)["finished"] == 3
+    lw.resume(copy)
+    assert differing(whole, copy) == []
+
+
+def test_damaged_settings_are_refused(copy):
+    text = (copy / "zarr.json").read_text()
+    (copy / "zarr.json").write_text(text.replace('\\"step\\": 0.01', '\\"step\\": 0.02', 1))
+    with pytest.raises(lw.SceneError, match="is damaged"):
+        lw.resume(copy)
+
+
+def test_a_run_that_is_not_complete_is_not_opened_by_mistake(tmp_path):
+    part = lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", only=range(1, 3))
+    assert part.members == 512 and np.isfinite(part.position).all()
+    with pytest.raises(lw.SceneError, match=r"2 blocks are missing.*lgvi-warp resume"):
+        lw.open_run(tmp_path)
+    with pytest.raises(lw.SceneError, match="not complete"):
+        lw.export(tmp_path, "netcdf")
+    some = lw.open_run(tmp_path, incomplete=True)
+    assert np.isnan(some.position[:, 0]).all() and "2 blocks are missing" in some.messages[-1]
+
+
+def test_parts_of_a_run_are_merged(tmp_path, whole):
+    for name, only in (("a", range(0, 1)), ("b", range(2, 4)), ("c", range(0, 2))):
+        lw.solve(fleet(), **SETTINGS, store=tmp_path / name / "run.zarr", only=only)
+    assert not lw.merge([tmp_path / "a", tmp_path / "b"], tmp_path / "some").complete
+    folder = lw.merge([tmp_path / name for name in "abc"], tmp_path / "all")
+    assert folder.complete and differing(whole, folder.path) == []
+    lw.resume(tmp_path / "some")
+    assert differing(whole, tmp_path / "some" / "run.zarr") == []
+    with pytest.raises(lw.SceneError, match="holds a run already"):
+        lw.merge([tmp_path / "a"], tmp_path / "all")
+    # Nor is what comes of a complete run that has lost a block.
+    (folder.path / "blocks" / "000000256.json").unlink()
+    lost = lw.merge([folder.path], tmp_path / "lost")
+    assert not lost.complete and lw.resume(lost.path).members == MEMBERS and differing(whole, lost.path) == []
+
+
+def test_a_store_in_use_is_not_replaced_by_a_merge(copy, tmp_path):
+    with store.held(copy), pytest.raises(lw.SceneError, match="another run is writing"):
+        lw.merge([copy], tmp_path, overwrite=True)
+    assert lw.merge([copy], tmp_path, overwrite=True).complete
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["run.zarr"]
+
+
+def test_parts_that_may_only_be_read_are_merged(copy, whole, tmp_path):
+    """What comes of them may be written: modes are not copied."""
+    for one in copy.rglob("*"):
+        one.chmod(0o555 if one.is_dir() else 0o444)
+    made = lw.merge([copy], tmp_path / "all").path
+    assert differing(whole, made) == []
+    assert all(one.stat().st_mode & 0o200 for one in made.rglob("*"))
+    for one in copy.rglob("*"):
+        one.chmod(0o755)
+
+
+def test_a_part_that_is_damaged_lends_no_times(tmp_path, whole):
+    for name, only in (("a", range(0, 2)), ("b", range(2, 4))):
+        lw.solve(fleet(), **SETTINGS, store=tmp_path / name / "run.zarr", only=only)
+    (tmp_path / "a" / "run.zarr" / "time" / "c.0").unlink()
+    assert differing(whole, lw.merge([tmp_path / "a", tmp_path / "b"], tmp_path / "all").path) == []
+    with pytest.raises(lw.SceneError, match=r"time/c.0 is missing"):
+        lw.merge([tmp_path / "a"], tmp_path / "none")
+
+
+def test_only_parts_of_one_run_are_merged(tmp_path, whole):
+    lw.solve(fleet(), **{**SETTINGS, "t1": 2.0}, store=tmp_path / "run.zarr", only=range(0, 1))
+    with pytest.raises(lw.SceneError, match=r"steps is 200 in .*run.zarr and 300 in .*: these are parts of different"):
+        lw.merge([whole, tmp_path], tmp_path / "all")
+    flipped = shutil.copytree(whole, tmp_path / "flipped.zarr")
+    flip(flipped / "position" / "c.0.1.0")
+    with pytest.raises(lw.SceneError, match=r"flipped.zarr.*torn, missing or changed"):
+        lw.merge([flipped], tmp_path / "all")
+
+
+def test_blocks_beyond_the_run_are_refused(tmp_path):
+    for only in (range(4, 9), range(2, 2), range(-1, 2), range(0, 4, 2)):
+        with pytest.raises(lw.SceneError, match=f"blocks {only.start}:{only.stop}: are not within the 4"):
+            lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", only=only)
+    assert list(tmp_path.iterdir()) == []
+    # The last of equal parts may be shorter.
+    assert lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", only=range(3, 6)).members == 1003 - 768
+    with pytest.raises(lw.SceneError, match="is for a run into a store"):
+        lw.solve(fleet(), **SETTINGS, only=range(0, 1))
+
+
+def test_explicit_states_and_subsets_go_on_from_the_store_alone(tmp_path):
+    chosen = fleet(600).subset(np.arange(599, 99, -1))
+    lw.solve(chosen, **SETTINGS, store=tmp_path / "a.zarr")
+    lw.solve(chosen, **SETTINGS, store=tmp_path / "b.zarr", only=range(0, 1))
+    lw.resume(tmp_path / "b.zarr")
+    assert differing(tmp_path / "a.zarr", tmp_path / "b.zarr") == []
+    assert list(lw.open_run(tmp_path / "a.zarr").dataset.realization.values[:2]) == [599, 598]
+
+
+RANDOM = np.random.default_rng(5).uniform(0.1, 0.9, (700, 4))
+# 600 members of each: given as arrays, of 700 rows.
+ARRAYS = {
+    "table": lambda u: lw.Table({"vehicle.mass": 123.0 + u[:, 0], "start.angular_velocity": u[:, 1:]}),
+    "levels": lambda u: lw.Levels(u),
+}
+
+
+@pytest.mark.parametrize("kind", ARRAYS)
+def test_values_given_as_arrays_lie_in_the_store_as_arrays(kind, tmp_path):
+    def members(u):
+        vary = fleet().vary if kind == "levels" else {"start.position": lw.Normal(std=1.0)}
+        return lw.Ensemble(fleet().scene, 600, 1, vary, ARRAYS[kind](u))
+
+    whole = lw.solve(members(RANDOM), **SETTINGS)
+    for ensemble, name in ((members(RANDOM), "a"), (members(RANDOM).subset(np.arange(599, 99, -1)), "c")):
+        stored = lw.solve(ensemble, **SETTINGS, store=tmp_path / f"{name}.zarr")
+        lw.solve(ensemble, **SETTINGS, store=tmp_path / f"{name}b.zarr", only=range(0, 1))
+        lw.resume(tmp_path / f"{name}b.zarr")
+        assert differing(tmp_path / f"{name}.zarr", tmp_path / f"{name}b.zarr") == []
+        assert state(tmp_path / f"{name}b.zarr")["complete"]
+        np.testing.assert_array_equal(stored.position, whole.position[:, ensemble.indices])
+    given = store.Folder(tmp_path / "a.zarr").group()["explicit"]
+    assert {name: array.shape[0] for name, array in given.arrays()} == dict.fromkeys(members(RANDOM).explicit(), 600)
+    # In memory provenance is the section of a scene file.
+    assert whole.provenance["ensemble"] == members(RANDOM).to_dict()
+    assert len((tmp_path / "a.zarr" / "zarr.json").read_bytes()) < 40_000
+    other = RANDOM.copy()
+    other[599, 0] += 0.01
+    again = lw.Store(tmp_path / "a.zarr", existing="resume")
+    with pytest.raises(lw.SceneError, match=r"ensemble\.arrays_sha256 .* is another run"):
+        lw.solve(members(other), **SETTINGS, store=again)
+    other[599:] = RANDOM[599:]
+    other[600:] = 0.5  # rows that no member has
+    np.testing.assert_array_equal(lw.solve(members(other), **SETTINGS, store=again).position, whole.position)
+
+
+def test_other_states_are_another_run(tmp_path):
+    scene, n = fleet().scene, 300
+    states = np.zeros((n, 3)), np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3)), np.full((n, 3), 0.1)
+    lw.solve(lw.Ensemble.from_states(scene, *states), **SETTINGS, store=tmp_path / "a.zarr", only=range(0, 1))
+    other = lw.Ensemble.from_states(scene, states[0] + 1.0, *states[1:])
+    with pytest.raises(lw.SceneError, match=r"ensemble\.arrays_sha256 .* is another run"):
+        lw.solve(other, **SETTINGS, store=lw.Store(tmp_path / "a.zarr", existing="resume"))
+    whole = lw.solve(lw.Ensemble.from_states(scene, *states), **SETTINGS)
+    np.testing.assert_array_equal(lw.resume(tmp_path / "a.zarr").position, whole.position)
+
+
+class Mine(lw.Wrench):
+    """A law of a user, which no scene file knows."""
+
+    type = "mine"
+
+
+def test_a_law_of_your_own_goes_on_with_its_ensemble(tmp_path):
+    scene = lw.Scene(fleet().scene.vehicle, terms=[Mine(force=[0.1, 0.0, 0.0], torque=[0.0, 0.0, 0.0])])
+    own = lw.Ensemble(scene, 300, 1, {"mine.force": lw.Normal(std=0.1)})
+    whole = lw.solve(own, **SETTINGS, store=tmp_path / "a.zarr")
+    lw.solve(own, **SETTINGS, store=tmp_path / "b.zarr", only=range(0, 1))
+    with pytest.raises(lw.SceneError, match=r"'mine': is not known"):
+        lw.resume(tmp_path / "b.zarr")
+    assert lw.resume(tmp_path / "b.zarr", own).energy.tobytes() == whole.energy.tobytes()
+    assert differing(tmp_path / "a.zarr", tmp_path / "b.zarr") == []
+    assert state(tmp_path / "b.zarr")["complete"]
+
+
+def test_another_version_or_machine_is_refused_unless_forced(copy, monkeypatch):
+    versions = machine.versions() | {"numpy": "0.1"}
+    monkeypatch.setattr(machine, "versions", lambda: versions)
+    with pytest.raises(lw.SceneError, match=r"versions.numpy is '.*' in the store and '0.1' here: the same bits"):
+        lw.resume(copy)
+    assert any("continued although versions.numpy" in text for text in lw.resume(copy, force=True).messages)
+    monkeypatch.setattr(machine, "cpu_name", lambda: "abacus")
+    with pytest.raises(lw.SceneError, match="2 faults"):
+        lw.resume(copy)
+
+
+def test_more_threads_or_another_python_are_no_difference(copy, monkeypatch):
+    monkeypatch.setattr(machine, "thread_count", lambda: 17)
+    monkeypatch.setattr(machine, "versions", lambda versions=machine.versions(): versions | {"python": "9"})
+    assert lw.resume(copy, threads=2).members == MEMBERS
+
+
+def test_a_full_disk_keeps_what_is_finished(tmp_path, whole, monkeypatch, capsys):
+    left = 400_000
+
+    def limited(file, view, write=durable.write_all):
+        nonlocal left
+        left -= len(view)
+        if left < 0:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        write(file, view)
+
+    monkeypatch.setattr(durable, "write_all", limited)
+    path = tmp_path / "run.zarr"
+    with pytest.raises(
+        OSError, match=r"No space left on device: the blocks that were finished are kept.*lgvi-warp resume"
+    ):
+        lw.solve(fleet(), **SETTINGS, store=path, threads=1)
+    assert not list(path.rglob(f"*{durable.UNFINISHED}")) and state(path)["damage"] == []
+    monkeypatch.undo()
+    lw.resume(path)
+    assert differing(whole, path) == []
+
+
+def test_a_disk_that_is_full_when_a_block_was_written_already(tmp_path, whole, monkeypatch):
+    """Some systems find out when they sync: the run ends, and all other blocks that were written are there."""
+
+    def limited(beside, target, sync=durable.sync_file):
+        if target.name == "000000256.json":
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        sync(beside, target)
+
+    monkeypatch.setattr(durable, "sync_file", limited)
+    path = tmp_path / "run.zarr"
+    with pytest.raises(OSError, match=r"No space left on device: the blocks that were finished are kept"):
+        lw.solve(fleet(), **SETTINGS, store=path, threads=1)
+    assert state(path)["damage"] == [] and 1 <= state(path)["finished"] <= 3
+    assert not list(path.rglob(f"*{durable.UNFINISHED}")) and not state(path)["complete"]
+    monkeypatch.undo()
+    lw.resume(path)
+    assert differing(whole, path) == []
+
+
+def test_an_interrupted_run_keeps_the_blocks_that_were_written(tmp_path, whole):
+    def interrupted(fraction):
+        if fraction > 0.8:
+            raise KeyboardInterrupt
+
+    path = tmp_path / "run.zarr"
+    with pytest.raises(KeyboardInterrupt):
+        lw.solve(fleet(), **SETTINGS, store=path, threads=1, progress=interrupted)
+    assert state(path)["finished"] == 3 and not list(path.rglob(f"*{durable.UNFINISHED}"))
+    lw.resume(path)
+    assert differing(whole, path) == []
+
+
+def test_a_file_that_may_not_grow_is_told_as_a_full_disk(tmp_path, capsys):
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    arguments = ["run", str(ROOT / "examples" / "paper.toml"), "--members", "500", "--set", "run.save_every=0.1",
+                 "--duration", "3", "--out", str(tmp_path), "--store", "zarr", "--quiet"]  # fmt: skip
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, before[1]))
+    try:
+        assert cli.main(arguments) == 1
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    text = capsys.readouterr().err
+    assert "File too large: the blocks that were finished are kept" in text and "run.zarr" in text
+
+
+def test_too_small_a_disk_is_refused_before_the_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: shutil._ntuple_diskusage(10**9, 10**9, 10**6))
+    with pytest.raises(lw.SceneError, match=r"needs 0.00 GB, and the disk has 0.00 GB left; save less often"):
+        lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_that_is_read_only(tmp_path):
+    tmp_path.chmod(0o500)
+    with pytest.raises(OSError, match="choose a folder that can be written"):
+        lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr")
+
+
+def test_a_file_system_that_is_read_only(tmp_path, monkeypatch, capsys):
+    def refused(*_, **__):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(tmp_path))
+
+    monkeypatch.setattr("lgvi_warp.runs.store.create.skeleton", refused)
+    arguments = [
+        "run",
+        str(ROOT / "examples" / "paper.toml"),
+        "--members",
+        "5",
+        "--out",
+        str(tmp_path),
+        "--store",
+        "zarr",
+    ]
+    assert cli.main([*arguments, "--quiet"]) == 1
+    assert "Read-only file system: choose a folder that can be written" in capsys.readouterr().err
+
+
+def test_chunks_are_synced_before_their_block_is_marked(tmp_path, monkeypatch):
+    order = []
+    sync, rename = os.fsync, safe_files.rename
+    monkeypatch.setattr(os, "fsync", lambda fd: (order.append(("sync", os.readlink(f"/proc/self/fd/{fd}"))), sync(fd)))
+    monkeypatch.setattr(
+        safe_files, "rename", lambda root, path, to: (order.append(("name", str(to))), rename(root, path, to))[1]
+    )
+    lw.solve(fleet(200), **SETTINGS, store=tmp_path / "run.zarr", threads=1)
+    root = str(tmp_path / "run.zarr")
+    marked = order.index(("name", f"{root}/blocks/000000000.json"))
+    written = [
+        i for i, (what, name) in enumerate(order) if what == "name" and name.startswith(f"{root}/") and "/c." in name
+    ]
+    assert len(written) == 13 and max(written) < marked
+    for i in written:
+        name = order[i][1]
+        assert any(what == "sync" and one.startswith(f"{name}.") for what, one in order[:i])
+    assert any(one == ("sync", f"{root}/position") for one in order[max(written) : marked])
+    assert order.index(("name", f"{root}/zarr.json")) > marked
+
+
+def test_parts_of_keepers_lie_in_the_store(tmp_path, memory):
+    plan = make_plan(fleet(), **SETTINGS)
+    plan.compile()
+
+    def run(name, only=None, existing="refuse"):
+        keeper = DepthSum(plan)
+        chosen = lw.Store(tmp_path / name, existing=existing)
+        Stored(plan, chosen, provenance(plan), messages(plan), (keeper,), only).run(Threads(2))
+        return keeper
+
+    one = run("a.zarr")
+    run("b.zarr", range(1, 3))
+    two = run("b.zarr", existing="resume")
+    assert one.merged == two.merged == [0, 256, 512, 768]
+    assert one.sums.tobytes() == two.sums.tobytes()
+    np.testing.assert_allclose(one.sums, memory.position[..., 2].sum(axis=1), rtol=1e-12)
+    assert differing(tmp_path / "a.zarr", tmp_path / "b.zarr") == []
+    with pytest.raises(lw.SceneError, match=r"stores \['depth sum'\], not \[\]"):
+        lw.resume(tmp_path / "b.zarr")
+    path = tmp_path / "b.zarr" / "parts" / "000000512.npy"
+    flip(path)
+    assert any("000000512.npy has changed" in text for text in state(tmp_path / "b.zarr")["damage"])
+    assert run("b.zarr", existing="resume").sums.tobytes() == one.sums.tobytes()
+    assert differing(tmp_path / "a.zarr", tmp_path / "b.zarr") == []
+
+
+def test_parts_of_several_keepers_lie_in_one_file(tmp_path):
+    plan = make_plan(fleet(10), **SETTINGS)
+    several = DepthSum(plan), DepthSum(plan), DepthSum(plan)
+    given = np.arange(4.0), np.zeros(0), np.array([-0.0, np.nan])
+    for keeper, name in zip(several, ("second", "a third", "first"), strict=True):
+        keeper.name = name
+    path = tmp_path / "000000000.npy"
+    path.write_bytes(packed(several, given))
+    found = unpacked(several[::-1], tmp_path, path.name)
+    assert [one.tobytes() for one in found] == [one.tobytes() for one in given[::-1]]
+    assert [one.tobytes() for one in unpacked(several[1:2], tmp_path, path.name)] == [b""]
+
+
+def test_keepers_that_cannot_be_stored_are_refused(tmp_path):
+    plan = make_plan(fleet(10), **SETTINGS)
+    named = [DepthSum(plan), DepthSum(plan), object()]
+    with pytest.raises(lw.SceneError) as refused:
+        Stored(plan, lw.Store(tmp_path / "a.zarr"), {}, (), tuple(named)).run(Threads(1))
+    assert "to_arrays" in str(refused.value) and "'depth sum'" in str(refused.value)
+
+
+@pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
+def test_netcdf(whole, memory, tmp_path):
+    import xarray
+
+    path = lw.export(whole, "netcdf", tmp_path / "run.nc")
+    with xarray.open_dataset(path, engine="netcdf4") as dataset:
+        np.testing.assert_array_equal(dataset.attitude.values, memory.attitude)
+        assert dataset.position.attrs["units"] == "m" and dataset.attrs["Conventions"] == "CF-1.11"
+        assert dataset.status.values.dtype == np.uint8 and json.loads(dataset.attrs["provenance"])["steps"] == 300
+    assert [one.name for one in tmp_path.iterdir()] == ["run.nc"]
+
+
+def test_parquet(whole, memory, tmp_path):
+    import pyarrow.parquet as pq
+
+    table = pq.read_table(lw.export(whole, "parquet", tmp_path / "run.parquet"))
+    assert table.num_rows == MEMBERS * 31
+    at = 700 * 31 + 11
+    assert table["realization"][at].as_py() == 700 and table["time"][at].as_py() == memory.time[11]
+    assert table["position_2"][at].as_py() == memory.position[11, 700, 2]
+    assert table["attitude_12"][at].as_py() == memory.attitude[11, 700, 1, 2]
+    assert table["vehicle.mass"][at].as_py() == memory.parameters["vehicle.mass"][700]
+    assert [table.schema.field(name).metadata for name in ("velocity_0", "vehicle.mass")] == [
+        {b"units": b"m s-1"},
+        {b"units": b"kg"},
+    ]
+    with pytest.raises(lw.SceneError, match=r"to = 'csv'"):
+        lw.export(whole, "csv")
+
+
+def test_what_is_no_run_is_named(tmp_path):
+    for call in (lw.open_run, lw.resume, state):
+        with pytest.raises(lw.SceneError, match=r"holds no store; give the folder of a run made with --store zarr"):
+            call(tmp_path)
+    with pytest.raises(lw.SceneError, match="is not there"):
+        lw.open_run(tmp_path / "none")
+    (tmp_path / "empty.zarr").mkdir()
+    with pytest.raises(lw.SceneError, match="holds no run"):
+        lw.open_run(tmp_path)
+
+
+class Tilted:
+    """A law of a user's, which says of itself where it lies in memory."""
+
+    def ppf(self, u):
+        return 0.1 * np.sqrt(u)
+
+
+def test_a_distribution_of_your_own_goes_on_with_its_ensemble(tmp_path):
+    def own():
+        return lw.Ensemble(fleet().scene, 600, 1, {"start.position": Tilted()})
+
+    whole, path = tmp_path / "whole.zarr", tmp_path / "run.zarr"
+    lw.solve(own(), **SETTINGS, store=whole)
+    lw.solve(own(), **SETTINGS, store=path)
+    (path / "blocks" / "000000256.json").unlink()
+    with pytest.raises(lw.SceneError, match="a law of your own, which a file does not hold; give the ensemble again"):
+        lw.resume(path)
+    lw.resume(path, own())
+    assert differing(whole, path) == []

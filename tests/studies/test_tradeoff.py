@@ -1,0 +1,261 @@
+"""Speed against accuracy: errors that are checked, a front that is one, suggestions that keep what was asked."""
+
+import csv
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp import cli
+from lgvi_warp.common import machine
+from lgvi_warp.studies import comparison, cost
+from lgvi_warp.studies import suggest as suggestion
+from lgvi_warp.studies import tradeoff as tradeoffs
+from lgvi_warp.studies.comparison import Sample
+from tests.conftest import ROOT
+from tests.support.random_scenes import judged, random_scene
+
+PAPER = str(ROOT / "examples" / "paper.toml")
+SHORT = ["--members", "24", "--duration", "4", "--set", "run.save_every=1.0"]
+METHODS = ("kl8(psi_x)", "psi_x", "su4(psi_x)")
+
+
+@pytest.fixture(scope="module")
+def found(scene):
+    """The trade-off of three methods over four seconds."""
+    fleet = lw.Ensemble(scene, 24, 1, scene.ensemble_settings.vary)
+    # Compiled before, so that the time is for running, however busy the machine is.
+    for method in METHODS:
+        for dtype in machine.DTYPES:
+            lw.solve(fleet, method, h=0.5, t1=0.5, dtype=dtype)
+    return lw.tradeoff(fleet, 4.0, methods=METHODS, seconds=20.0)
+
+
+@pytest.mark.parametrize("of", ["position", "attitude"])
+@pytest.mark.parametrize("kind", tradeoffs.KINDS)
+def test_the_front_is_monotone_and_nothing_beats_it(found, of, kind):
+    front = found.front(of, kind)
+    costs, errors = [one.us_per_vehicle_second for one in front], [one.error(of, kind) for one in front]
+    assert len(front) > 3 and costs == sorted(costs) and errors == sorted(errors, reverse=True)
+    for one in found.shown(of, kind):
+        assert any(
+            c <= one.us_per_vehicle_second and e <= one.error(of, kind) for c, e in zip(costs, errors, strict=True)
+        )
+
+
+def test_what_is_shown_is_ten_times_the_reference(found):
+    for of in ("position", "attitude", "velocity"):
+        least = min(one.error(of) for one in found.shown(of))
+        assert least >= tradeoffs.TRUST * found.reference_error[of] > 0.0
+
+
+@pytest.mark.parametrize(("method", "order", "least"), [("psi_x", 2, 1e-9), ("su4(psi_x)", 4, 1e-9)])
+def test_errors_scale_with_the_order(found, method, order, least):
+    line = [one for one in found.shown("attitude") if one.setting.name == method and one.setting.dtype == "float64"]
+    fine = [one for one in line if least < one.error("attitude") < 1e-3]
+    slope = np.polyfit(np.log([one.setting.h for one in fine]), np.log([one.error("attitude") for one in fine]), 1)[0]
+    assert len(fine) >= 3 and abs(slope - order) < 0.3
+
+
+def test_the_reference_is_the_truth(found, scene):
+    sample = Sample(scene, 4.0)
+    reference = comparison.make_reference(sample, seconds=5.0)
+    other = sample.run(sample.setting("kl6(psi_s)", 40))
+    apart = comparison.errors(comparison.distances(other, reference.result), -1 + len(sample.times))
+    assert apart["position"]["path_max"] < 1e-11 and reference.error("position") < 1e-11
+
+
+def test_a_bad_reference_is_refused(scene, monkeypatch):
+    def bad(sample, of="position", **_):
+        return good(sample, of, goal=1e9, methods=("psi_x", "phi"))
+
+    good = comparison.make_reference
+    monkeypatch.setattr(comparison, "make_reference", bad)
+    with pytest.raises(lw.SceneError, match=r"no reference: phi at h = .* differ by .*shorter t1"):
+        lw.tradeoff(scene, 40.0, methods=["psi_x"])
+    with pytest.raises(lw.SceneError, match=r"cannot be checked: phi at h = .* differ by .*larger error"):
+        lw.suggest(scene, 1e-6, t1=40.0, methods=["psi_x"])
+
+
+def test_a_reference_that_agrees_with_itself_less_hides_more(scene):
+    sample = Sample(scene, 4.0)
+    reference = comparison.make_reference(sample, goal=1e-4, methods=("psi_x", "psi_s"), seconds=2.0)
+    worse = dataclasses.replace(reference, own={name: own * 1e4 for name, own in reference.own.items()})
+    trials = [tradeoffs.tried(sample, sample.setting("psi_x", m), reference) for m in (4, 8)]
+    last = len(sample.times) - 1
+    for one, shown in ((reference, True), (worse, False)):
+        measured = tradeoffs.measurements(sample, trials, one, one.result, last)
+        assert all(m.trusted["position"] is shown for m in measured)
+
+
+def test_one_cost_a_step_for_each_kernel(found):
+    by_kernel = {}
+    for one in found.measurements:
+        by_kernel.setdefault((one.setting.name, one.setting.dtype), []).append(
+            one.us_per_vehicle_second * one.setting.h
+        )
+    assert len(by_kernel) == 2 * len(METHODS) + len(set(METHODS) & set(tradeoffs.COMPENSATED))
+    assert all(np.ptp(steps) <= 1e-12 * max(steps) for steps in by_kernel.values())
+    assert any(len(steps) > 3 for steps in by_kernel.values())
+    doubtful = [one for one in found.measurements if one.cost_spread > cost.DISAGREE]
+    assert bool(doubtful) == any("readings of cost disagree" in message for message in found.messages)
+
+
+def test_errors_of_whatever_statistics_know(scene, tmp_path):
+    of = "depth"
+    fleet = lw.Ensemble(scene, 24, 1, scene.ensemble_settings.vary)
+    found = lw.tradeoff(fleet, 4.0, of, methods=["psi_x"], seconds=4.0)
+    assert found.of == of and found.units[of] == "m" and len(found.front()) > 2
+    for one in found.measurements:
+        assert one.error(of) <= one.error("position") * (1.0 + 1e-9)
+    assert (
+        f"{of}_path_max" in found.rows()[0]
+        and json.loads(found.to_json())["units"][of]
+        and of in tradeoffs.report_text(found)
+    )
+    assert lw.plot_tradeoff(found, tmp_path / "of.png").stat().st_size > 10_000
+    suggested = lw.suggest(fleet, 1e-4, of, t1=4.0, methods=["psi_x"], seconds=5.0)
+    assert suggested.of == of and suggested.margin >= 1.0
+    times = lw.SaveAt(at=list(Sample(fleet, 4.0).times[1:]))
+    result = lw.solve(fleet, t1=4.0, save=times, threads=1, **suggested.settings)
+    assert suggestion.verified(fleet, result, suggested)[0] <= 1.05e-4
+
+
+def test_growth_of_exponential_and_power():
+    t = np.linspace(0.0, 50.0, 21)
+    grown = comparison.fitted(t, np.exp(0.3 * t), 50.0)
+    assert grown.power is None and math.isclose(grown.doubling, math.log(2.0) / 0.3, rel_tol=1e-9)
+    assert math.isclose(grown.predictable["float64"], math.log(1e-2 / 2.0**-53) / 0.3, rel_tol=1e-6)
+    assert grown.predictable["float32"] <= 42.5  # within the run
+    slow = comparison.fitted(t, 1.0 + 2.0 * t, 50.0)
+    assert slow.power is not None and slow.doubling == math.inf and slow.predictable["float64"] == math.inf
+
+
+def test_biases_shrink_with_the_step_and_are_one_for_other_members(scene):
+    fleet = lw.Ensemble(scene, 64, 1, scene.ensemble_settings.vary)
+    sample = Sample(fleet, 4.0)
+    fine = sample.run(sample.setting("kl8(psi_x)", 8))
+    near = [comparison.biases(sample.run(sample.setting("psi_x", m)), fine)["position_mean"] for m in (2, 8)]
+    assert near[0] / near[1] == pytest.approx(16.0, rel=0.2)
+    others = Sample(lw.Ensemble(scene, 64, 2, scene.ensemble_settings.vary), 4.0)
+    chance = comparison.biases(others.run(others.setting("kl8(psi_x)", 8)), fine)
+    assert 0.3 < chance["position_mean"] < 4.0 and 0.3 < chance["position_std"] < 4.0
+
+
+@pytest.mark.slow
+def test_noise_compares_statistics_only(tmp_path):
+    vehicle = lw.Vehicle(100.0, [50.0, 60.0, 70.0], [5.0, 6.0, 7.0], 981.0, [0.0, 0.0, -0.01])
+    current = lw.GaussMarkovCurrent(standard_deviation=[0.2, 0.2, 0.05], time_constant=30.0)
+    fleet = lw.Ensemble(lw.Scene(vehicle, lw.Environment(gravity=9.81), [current]), 32, 1)
+    found = lw.tradeoff(fleet, 4.0, methods=["psi_x"], seconds=60.0)
+    assert found.front() == [] and "noise acts" in found.messages[0]
+    assert all(0.0 < one.biases["position_mean"] < 5.0 for one in found.measurements)
+    assert lw.plot_tradeoff(found, tmp_path / "noise.png").stat().st_size > 10_000
+    with pytest.raises(lw.SceneError, match=r"error = 0.001: noise acts.*tradeoff"):
+        lw.suggest(fleet, 1e-3, t1=4.0)
+
+
+@pytest.mark.slow
+def test_events_end_what_is_compared(scene, tmp_path):
+    falling = dataclasses.replace(scene, events=[{"type": "floor", "depth": 11.0}])
+    found = lw.tradeoff(lw.Ensemble(falling, 1, 1), 4.0, methods=["psi_x"], seconds=60.0)
+    assert found.front()[-1].error() < 1e-6 and found.measurements[0].biases == {}
+    assert lw.plot_tradeoff(found, tmp_path / "one.png").stat().st_size > 10_000
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [104, 105, 107])
+def test_a_suggestion_keeps_the_error(seed):
+    fleet, asked = random_scene(seed)
+    found = lw.suggest(fleet, **asked, methods=METHODS, seconds=60.0)
+    sample = Sample(fleet, asked["t1"], fleet.members)
+    reference = comparison.make_reference(sample, asked["of"], asked["error"] / 100.0)
+    times = lw.SaveAt(at=list(sample.times[1:]))
+    result = lw.solve(fleet, t1=asked["t1"], save=times, threads=1, **found.settings)
+    apart = comparison.distances(result, reference.result)[asked["of"]]
+    assert apart.max() <= asked["error"] and found.margin >= 1.0
+    error, members = suggestion.verified(fleet, result, found)
+    assert error <= 1.05 * asked["error"] and members == 64
+    assert found.memory_bytes > 0 and found.run_seconds > 0.0 and found.setting.method in str(found)
+
+
+@pytest.mark.slow
+def test_suggestions_for_twenty_scenes():
+    kept = cheap = 0
+    for seed in range(20, 40):
+        fleet, asked = random_scene(seed)
+        error, cost, _ = judged(fleet, lw.suggest(fleet, **asked), asked, rounds=15)
+        kept, cheap = kept + (error <= 1.0), cheap + (cost <= 1.5)
+    assert kept >= 19 and cheap >= 19
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"error": -1.0}, ["error = -1.0", "above 0 [m]"]),
+        ({"of": "spead"}, ["of = 'spead'", "did you mean 'speed'"]),
+        ({"of": "max(depth)"}, ["of = 'max(depth)'", "give 'depth'"]),
+        ({"of": ["depth", "speed"]}, ["of = ['depth', 'speed']", "one of them"]),
+        ({"methods": ["psi_z"]}, ["methods = 'psi_z'", "psi_x"]),
+        ({"methods": []}, ["methods = []", "name one"]),
+        ({"t1": 0.0}, ["t1 = 0.0"]),
+    ],
+)
+def test_bad_arguments_are_refused_with_the_remedy(scene, arguments, words):
+    with pytest.raises(lw.SceneError) as caught:
+        lw.suggest(scene, **({"t1": 1.0} | arguments))
+    assert all(word in str(caught.value) for word in words)
+
+
+def test_the_command_writes_files_that_load_again(tmp_path, capsys):
+    options = ["--methods", "psi_x,kl8(psi_x)", "--seconds", "8"]
+    assert cli.main(["tradeoff", PAPER, "--out", str(tmp_path), *SHORT, *options]) == 0
+    out = capsys.readouterr().out
+    for word in (
+        "sample      24 members",
+        "reference   ",
+        "they agree to",
+        "predictable ",
+        "psi_x",
+        "Bias of",
+        "tradeoff.png",
+    ):
+        assert word in out
+    content = json.loads((tmp_path / "tradeoff.json").read_text())
+    with (tmp_path / "tradeoff.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(content["measurements"]) > 8 and content["units"]["position"] == "m"
+    assert [float(row["h"]) for row in rows] == [one["setting"]["h"] for one in content["measurements"]]
+    assert sum(row["front"] == "True" for row in rows) == len(content["front"])
+    from matplotlib.image import imread
+
+    picture = imread(tmp_path / "tradeoff.png")
+    assert picture.shape[1] > 1500 and all(third.std() > 0.05 for third in np.array_split(picture[..., :3], 3, axis=1))
+
+
+def test_run_with_an_error_chooses_and_checks(tmp_path, capsys):
+    options = ["--error", "1e-4", "--of", "attitude", "--method", "psi_x"]
+    assert cli.main(["run", PAPER, "--out", str(tmp_path), *SHORT, *options]) == 0
+    out = capsys.readouterr().out
+    for word in (
+        "chosen      psi_x",
+        "attitude to",
+        "predicted",
+        "members     24, psi_x",
+        "checked     error of attitude",
+    ):
+        assert word in out
+    assert lw.Result.load(tmp_path / "result.npz").provenance["method"]["name"] == "psi_x"
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [(["--error", "1e-3", "--step", "0.1"], ["--step 0.1", "leave out"]), (["--of", "position"], ["--error 1e-3"])],
+)
+def test_options_that_contradict_are_refused(options, words, tmp_path, capsys):
+    assert cli.main(["run", PAPER, "--out", str(tmp_path), *SHORT, *options]) == 2
+    text = capsys.readouterr().err
+    assert all(word in text for word in words)

@@ -1,0 +1,162 @@
+"""Forty runs that keep their bits: results, statistics and stores, over the terms, methods, precisions and ways of running.
+
+Bits depend on the processor's vector instructions and on the versions of Warp and NumPy: the hashes are kept for each
+such machine, in tests/data/bits.json. On a machine that is not among them nothing is known.
+"""
+
+import argparse
+import functools
+import hashlib
+import json
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import warp as wp
+
+import lgvi_warp as lw
+
+FILE = Path(__file__).parents[1] / "data" / "bits.json"
+MEMBERS = 300
+
+STATISTICS = [
+    lw.Mean("position"), lw.Covariance(["position", "speed"]), lw.Quantiles("depth", (0.05, 0.5, 0.95), size=64),
+    lw.Extremes("velocity"), lw.Histogram("depth", bins=10, limits=(0.0, 30.0)), lw.Exceedance("depth", above=10.1),
+    lw.FirstPassage("depth", above=10.1), lw.CircularMean("euler[2]"), lw.MeanAttitude(), lw.Mean("energy"),
+    lw.PathMaximum("speed", then=[lw.Mean(), lw.Quantiles(levels=(0.5, 0.99), size=64)]), lw.PathTime("depth", above=10.1),
+    lw.PathMean("depth"), lw.PathRms("speed"), lw.PathRange("position"), lw.Outcome("stopped"), lw.EndTime("failed"),
+]  # fmt: skip
+VARY = {
+    "start.angular_velocity": lw.Normal(std=0.05),
+    "start.position": lw.Normal(std=0.2),
+    "vehicle.buoyancy": lw.Normal(relative=0.001),
+}
+
+
+def named(name, **parts):
+    """Members of a named vehicle under way at a depth of 10 m."""
+    start = lw.Start([0.0, 0.0, 10.0], euler_deg=[1.0, 2.0, 3.0], velocity=[1.0, 0.1, -0.1])
+    scene = lw.Scene.named(name)
+    return lw.Ensemble(
+        lw.Scene(scene.vehicle, scene.environment, parts.pop("terms", scene.terms), start, **parts), MEMBERS, 1, VARY
+    )
+
+
+def paper(**ensemble):
+    """Members of the paper's vehicle."""
+    return lw.Ensemble(named("nordkvist_sanyal").scene, MEMBERS, 1, VARY, **ensemble)
+
+
+def solved(fleet, method="psi_s", **settings):
+    """A second of a run, eleven samples."""
+    return lw.solve(fleet, method, **{"h": 0.02, "t1": 1.0, "save": lw.SaveAt(every=0.1), "checks": "all"} | settings)
+
+
+def hashed(result):
+    """Samples, outcomes, parameters and statistics of a result."""
+    total = hashlib.sha256()
+    parts = dict(result.samples) | {f"p/{name}": value for name, value in result.parameters.items()}
+    parts |= {name: getattr(result, name) for name in ("status", "failure_time", "warnings", "warning_value")}
+    for name, one in result.statistics.items():
+        parts |= {f"s/{name}/{key}": value for key, value in one.arrays.items()}
+    for name in sorted(parts):
+        total.update(name.encode())
+        total.update(np.ascontiguousarray(parts[name]).tobytes())
+    return total.hexdigest()
+
+
+def stored(fleet, **settings):
+    """The numbers in a store: what is in no text."""
+    total = hashlib.sha256()
+    with tempfile.TemporaryDirectory() as folder:
+        solved(fleet, store=Path(folder) / "run.zarr", **settings)
+        for path in sorted(Path(folder).rglob("*")):
+            # Texts tell of versions and of the machine; chunks of arrays lie below a folder "c", and are named by numbers.
+            if path.is_file() and path.name.replace(".", "").isdigit():
+                total.update(path.relative_to(folder).as_posix().encode())
+                total.update(path.read_bytes())
+    return total.hexdigest()
+
+
+def _terms() -> dict[str, Callable[[], str]]:
+    from tests.laws.cases import CASES
+
+    names = ("drag", "quadratic drag", "drag matrix", "current", "current profile", "tether", "wrench schedule", "thrusters",
+             "waves", "Gauss-Markov current", "fins", "control fins with rates", "cross-flow", "body lift", "stratification",
+             "wrench noise", "all together")  # fmt: skip
+
+    def run(name):
+        return hashed(solved(named("torpedo", terms=list(CASES[name].terms)), "psi_x"))
+
+    return {f"term {name}": functools.partial(run, name) for name in names}
+
+
+def _methods() -> dict[str, Callable[[], str]]:
+    settings = {
+        "psi": {}, "phi": {}, "psi_1": {}, "psi_w": {}, "kl6(psi_s)": {}, "su4(psi_x)": {}, "rk4": {}, "cg3": {},
+        "rkn6_11": {}, "gauss4": {}, "psi_s": {"dtype": "float32"}, "psi_x": {"dtype": "float32_compensated"},
+    }  # fmt: skip
+    found = {
+        f"method {method} {asked.get('dtype', '')}".strip(): functools.partial(
+            lambda method, asked: hashed(solved(paper(), method, **asked)), method, asked
+        )
+        for method, asked in settings.items()
+    }
+    tight = lw.Method("rk8", rtol=1e-9, atol=1e-12)
+    divided = {"h": 0.4, "t1": 2.0, "save": lw.SaveAt(every=0.4), "on_failure": "substep"}
+    return found | {
+        "method rk8 adaptive": lambda: hashed(solved(paper(), tight)),
+        "divided steps": lambda: hashed(solved(paper(), "psi_s", **divided)),
+    }
+
+
+def _samplings() -> dict[str, Callable[[], str]]:
+    kinds = {
+        "random": "random", "sobol": lw.Sobol(replicates=4), "halton": lw.Halton(),
+        "latin hypercube": lw.LatinHypercube(group=100),
+    }  # fmt: skip
+    return {
+        f"statistics, {name}": functools.partial(
+            lambda kind: hashed(solved(paper(sampling=kind), statistics=STATISTICS, keep="none")), kind
+        )
+        for name, kind in kinds.items()
+    }
+
+
+def _others() -> dict[str, Callable[[], str]]:
+    floor = [lw.Floor(depth=10.1), lw.StopTime(at=0.73)]
+    return {
+        **{f"vehicle {name}": functools.partial(lambda name: hashed(solved(named(name), "psi_x")), name)
+           for name in ("remus_100", "bluerov2_heavy", "sphere")},
+        "events": lambda: hashed(solved(named("remus_100", events=floor), "psi_x", statistics=STATISTICS)),
+        "store": lambda: stored(paper()),
+        "store with statistics": lambda: stored(paper(), statistics=STATISTICS, keep=[3, 17]),
+    }  # fmt: skip
+
+
+RUNS: dict[str, Callable[[], str]] = _terms() | _methods() | _samplings() | _others()
+
+
+def machine() -> str:
+    """What bits depend on: vector instructions, versions of Warp and of NumPy."""
+    flags = Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").exists() else ""
+    vectors = next((name for name in ("avx512f", "avx2") if name in flags), "unknown")
+    vendor = next((name for name in ("AuthenticAMD", "GenuineIntel") if name in flags), "unknown")
+    return f"{vendor} {vectors}, warp {wp.config.version}, numpy {np.__version__}"
+
+
+def recorded() -> dict[str, str]:
+    """Hashes of this machine; none where nothing is known of it."""
+    return json.loads(FILE.read_text()).get(machine(), {}) if FILE.exists() else {}
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--write", action="store_true", help="record what this machine gives")
+    asked = parser.parse_args()
+    known, found = recorded(), {name: run() for name, run in RUNS.items()}
+    print(f"{len(found)} runs, {sum(known.get(name) != one for name, one in found.items())} other than recorded")
+    if asked.write:
+        everything = json.loads(FILE.read_text()) if FILE.exists() else {}
+        FILE.write_text(json.dumps(everything | {machine(): found}, indent=1) + "\n")

@@ -1,0 +1,165 @@
+"""Elementary functions in lanes, against NumPy in extended precision. "eps" is the spacing of numbers at 1.
+
+The bounds: each function rounds its last addition (1/2 eps) after a correction that is itself right to an eps or two;
+twice what was measured over 4e5 arguments a range. Where long double is no longer than double (not on x86), NumPy's own
+1/2 eps is within them.
+"""
+
+import functools
+
+import numpy as np
+import pytest
+import warp as wp
+
+from lgvi_kernels.lanes import functions as lm
+from lgvi_kernels.lanes.arithmetic import REALS, WIDTHS, lane
+from lgvi_kernels.lanes.flags import CPU_FLAGS
+
+NAMES = ("root", "exponential", "sine", "cosine", "logarithm", "decay", "greatest", "clamp")
+FORMATS = {"float64": (wp.float64, np.float64), "float32": (wp.float32, np.float32)}
+THOROUGH = [(1, "float64"), (8, "float64"), (1, "float32"), (16, "float32")]
+LARGEST = {"float64": 700.0, "float32": 87.0}
+ERRORS = {"root": 1.0, "exponential": 2.0, "sine": 2.0, "cosine": 2.0, "logarithm": 3.0, "decay": 4.0}
+
+
+@functools.cache
+def kernel(width, name):
+    """All functions of the arguments a: rows in the order of NAMES; greatest and clamp with b and c."""
+    Lane = lane(width, FORMATS[name][0])
+
+    @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": CPU_FLAGS})
+    def evaluate(a: wp.array2d(dtype=Lane), out: wp.array2d(dtype=Lane)):
+        i = wp.tid()
+        x = a[0, i]
+        out[0, i] = lm.root(x)
+        out[1, i] = lm.exponential(x)
+        out[2, i] = lm.sine(x)
+        out[3, i] = lm.cosine(x)
+        out[4, i] = lm.logarithm(x)
+        out[5, i] = lm.decay(x)
+        out[6, i] = lm.greatest(x, a[1, i])
+        out[7, i] = lm.clamp(x, a[1, i], a[2, i])
+
+    return evaluate
+
+
+def evaluate(width, name, a, b=0.0, c=0.0):
+    """{function: its values at the numbers a, b, c} by a kernel of this width and type."""
+    real, dtype = FORMATS[name]
+    arguments = np.stack([np.broadcast_to(x, np.shape(a)) for x in (a, b, c)]).astype(dtype)
+    packets = -(-arguments.shape[1] // width)
+    padded = np.pad(arguments, ((0, 0), (0, packets * width - arguments.shape[1])), constant_values=1.0)
+    out = wp.zeros((len(NAMES), packets), dtype=lane(width, real), device="cpu")
+    given = wp.array(padded.reshape(3, packets, width), dtype=lane(width, real), shape=(3, packets), device="cpu")
+    wp.launch(kernel(width, name), packets, inputs=[given], outputs=[out], device="cpu")
+    return dict(zip(NAMES, out.numpy().reshape(len(NAMES), -1)[:, : arguments.shape[1]]))
+
+
+def exact_decay(x):
+    """(1 - e^-x) / x."""
+    return np.divide(-np.expm1(-x), x, out=np.ones_like(x), where=x != 0.0)
+
+
+EXACT = {
+    "root": np.sqrt,
+    "exponential": np.exp,
+    "sine": np.sin,
+    "cosine": np.cos,
+    "logarithm": np.log,
+    "decay": exact_decay,
+}
+
+
+def arguments(function, name):
+    """Arguments of one function: wide, near its zeros and where it changes branch."""
+    rng, n, top = np.random.default_rng(1), 20_000, LARGEST[name]
+    tiny = 10.0 ** rng.uniform(-30.0, 0.0, n)
+    if function in ("sine", "cosine"):
+        turns = np.arange(-63000, 63000, 7) * (np.pi / 2)
+        spread = [rng.uniform(-reach, reach, n) for reach in (1.0, 10.0, 1e3, 1e5)]
+        return np.concatenate([*spread, turns, turns + np.pi / 4, tiny, -tiny])
+    if function == "exponential":
+        halves = (np.arange(-100, 100) + 0.5) * np.log(2.0)
+        return np.concatenate([rng.uniform(-top, top, n), rng.uniform(-1.0, 1.0, n), halves, tiny, -tiny])
+    if function == "decay":
+        large = 10.0 ** rng.uniform(0.0, 6.0, n)
+        return np.concatenate([rng.uniform(-3.0, 3.0, n), large, -rng.uniform(0.0, top, n), tiny, -tiny, [0.0, 1e6]])
+    near_one = 1.0 + rng.uniform(-1.0, 1.0, n) * 10.0 ** rng.uniform(-12.0, -0.5, n)
+    return np.concatenate([np.exp(rng.uniform(-top, top, n)), near_one])
+
+
+def errors(function, name, width):
+    """Errors [eps] at all arguments: absolute ones of sine and cosine, relative ones of the others."""
+    dtype = FORMATS[name][1]
+    x = arguments(function, name).astype(dtype)
+    if function == "logarithm":
+        # ln 1 = 0 has no relative error: it is among the special values.
+        x = x[x != 1.0]
+    exact = EXACT[function](x.astype(np.longdouble))
+    scale = 1.0 if function in ("sine", "cosine") else np.abs(exact)
+    return np.abs(evaluate(width, name, x)[function] - exact) / scale / np.finfo(dtype).eps
+
+
+@pytest.mark.parametrize("function", ERRORS)
+@pytest.mark.parametrize(("width", "name"), THOROUGH)
+def test_function(function, width, name):
+    # A number that is not one fails the comparison too.
+    assert errors(function, name, width).max() < ERRORS[function]
+
+
+@pytest.mark.parametrize(("width", "name"), THOROUGH)
+def test_special_values(width, name):
+    nan, inf = np.nan, np.inf
+    x = [0.0, inf, -inf, nan, -1.0, 1e4, -1e4, 1.0]
+    got = evaluate(width, name, x)
+    expected = {
+        "root": [0.0, inf, nan, nan, nan, 100.0, nan, 1.0],
+        "exponential": [1.0, inf, 0.0, nan, np.exp(-1.0), inf, 0.0, np.e],
+        "sine": [0.0, nan, nan, nan, np.sin(-1.0), np.sin(1e4), np.sin(-1e4), np.sin(1.0)],
+        "cosine": [1.0, nan, nan, nan, np.cos(1.0), np.cos(1e4), np.cos(1e4), np.cos(1.0)],
+        "logarithm": [nan, None, nan, nan, nan, np.log(1e4), nan, 0.0],
+        "decay": [1.0, 0.0, None, nan, np.e - 1.0, 1e-4, None, 1.0 - np.exp(-1.0)],
+    }
+    for function, values in expected.items():
+        # None: outside the function's range.
+        kept = [i for i, value in enumerate(values) if value is not None]
+        np.testing.assert_allclose(got[function][kept], [values[i] for i in kept], rtol=4e-7, err_msg=function)
+
+
+@pytest.mark.parametrize(("width", "name"), THOROUGH)
+def test_the_exponential_ends_where_the_format_does(width, name):
+    dtype = FORMATS[name][1]
+    info = np.finfo(dtype)
+    last = np.log(np.longdouble(info.max)).astype(dtype) * (1.0 - info.eps)
+    first = np.log(np.longdouble(info.smallest_subnormal)).astype(dtype)
+    with np.errstate(over="ignore", under="ignore"):
+        x = np.array([last, last * dtype(1.0 + 1e-5), first, first * dtype(1.01), 0.99 * first], dtype)
+        got = evaluate(width, name, x)["exponential"]
+        exact = np.exp(x.astype(np.longdouble)).astype(dtype)
+    assert np.isfinite(got[0]) and got[1] == np.inf and got[3] == 0.0
+    # Below the normal numbers, the spacing is that of the smallest.
+    np.testing.assert_allclose(got[[0, 2, 4]], exact[[0, 2, 4]], rtol=2 * info.eps, atol=info.smallest_subnormal)
+
+
+@pytest.mark.parametrize(("width", "name"), THOROUGH)
+def test_clamp_and_greatest(width, name):
+    rng = np.random.default_rng(2)
+    a, b, c = rng.normal(size=(3, 1000)).astype(FORMATS[name][1])
+    low, high = np.minimum(b, c), np.maximum(b, c)
+    got = evaluate(width, name, a, low, high)
+    np.testing.assert_array_equal(got["greatest"], np.maximum(a, low))
+    np.testing.assert_array_equal(got["clamp"], np.clip(a, low, high))
+    assert np.isnan(evaluate(width, name, [np.nan], [-1.0], [1.0])["clamp"]).all()
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_width_gives_the_same_bits(name):
+    x = np.concatenate([np.random.default_rng(3).uniform(0.01, 80.0, 4096), [0.0, np.inf, np.nan]])
+    first, *others = (evaluate(width, name, x, 1.0, 2.0) for width in WIDTHS)
+    for other in others:
+        for function in NAMES:
+            np.testing.assert_array_equal(other[function], first[function], err_msg=function)
+
+
+def test_every_type_was_tested():
+    assert {FORMATS[name][0] for name in FORMATS} == set(REALS)

@@ -195,7 +195,7 @@ class Record:
 
 def tests_for(records, path, mutant):
     """Tests to run, in order, as their records; what a later record has replaces an earlier one."""
-    chosen, seen, now = [], set(), where()
+    chosen, seen = [], set()
     levels = [record.levels(path, mutant) for record in records]
     known = {}
     for record in records:
@@ -204,9 +204,9 @@ def tests_for(records, path, mutant):
         names = set()
         for record, found in zip(records, levels):
             names |= {n for n in found[level] if n in known and known[n][0] is record} if level < len(found) else set()
-        names = {n for n in names - seen if n.split("::")[0] in now and not known[n][1]["failed"]}
+        names = {name for name in names - seen if not known[name][1]["failed"]}
         seen |= names
-        chosen += in_order([known[name][1] for name in names])
+        chosen += in_order([known[name][1] | {"test": now(name)} for name in names if now(name)])
         if chosen and level == 0 and "lgvi_kernels" not in path.parts and inside_function(path, mutant.line):
             break  # a line of a function: other tests of the file do not run it
     return chosen
@@ -251,6 +251,23 @@ def inside_function(path, line):
 def where():
     """Each test file's name -> its path now."""
     return {path.name: str(path.relative_to(ROOT)) for path in (ROOT / "tests").rglob("test_*.py")}
+
+
+@functools.cache
+def defined():
+    """Each test function -> names of the files that define it."""
+    found = defaultdict(set)
+    for name, path in where().items():
+        for function in re.findall(r"^def (test_\w+)", (ROOT / path).read_text(), re.MULTILINE):
+            found[function].add(name)
+    return found
+
+
+def now(test):
+    """A recorded test's name now: in its file, or in the only one that has it after a move; else None."""
+    file, _, name = test.partition("::")
+    files = defined()[name.split("[")[0]]
+    return test if file in files else f"{next(iter(files))}::{name}" if len(files) == 1 else None
 
 
 # --- a fault at work

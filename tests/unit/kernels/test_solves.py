@@ -63,7 +63,11 @@ def iterates():
     out = wp.zeros(((STEPS + 1) * ROWS, COUNT // 8), dtype=Lane, device="cpu")
     wp.launch(evaluate, COUNT // 8, inputs=[given], outputs=[out], device="cpu")
     values = np.moveaxis(out.numpy().reshape(STEPS + 1, ROWS, COUNT), 1, 2)
-    return a, P, {"quartic": values[..., :1], "cayley": values[..., 1:4], "newton": values[..., 4:7], "W": values[..., 7:10]}
+    return (
+        a,
+        P,
+        {"quartic": values[..., :1], "cayley": values[..., 1:4], "newton": values[..., 4:7], "W": values[..., 7:10]},
+    )
 
 
 def cay(c):

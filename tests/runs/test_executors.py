@@ -175,6 +175,50 @@ def test_dask(client, memory, tmp_path):
     assert same(stored, memory)
 
 
+def test_threads_of_one_dask_worker_share_it(memory):
+    """Each thread takes a block of its own; a run that ends early leaves none at work."""
+    from distributed import Client, LocalCluster
+
+    from lgvi_warp.engine.executors import dask
+
+    with (
+        LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster,
+        Client(cluster) as client,
+    ):
+        assert same(lw.solve(fleet(), **SETTINGS, executor=dask.Dask(client)), memory)
+        work, at_once = Overlapping(), []
+        for _ in dask.Dask(client).run(work, blocks(2048), lambda *_: None):
+            at_once.append(work.most)
+            break
+        assert at_once == [2] and sum(dask._at_work.values()) == 0 and 2 <= len(work.begun) < 8
+
+
+class Overlapping:
+    """Work that notes how many blocks run at once, and waits for its end; it is sent as itself within one process."""
+
+    begun, running, most = [], 0, 0  # noqa: RUF012
+
+    class plan:  # noqa: N801
+        class grid:  # noqa: N801
+            steps = 1
+
+        @staticmethod
+        def compile():
+            return 0.0
+
+    def __call__(self, block, halted, advanced):
+        cls = type(self)
+        cls.begun.append(block.first)
+        cls.running += 1
+        cls.most = max(cls.most, cls.running)
+        for _ in range(10 if block.first == 0 else 200):
+            if halted():
+                break
+            time.sleep(0.02)
+        cls.running -= 1
+        return block.first
+
+
 @pytest.mark.slow
 def test_statistics_on_dask_end_with_the_run(client, tmp_path):
     """Blocks that are at work when there are members enough leave nothing in the store."""

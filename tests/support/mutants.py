@@ -19,7 +19,6 @@ import os
 import random
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
@@ -30,7 +29,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from tests.support.mutants_pytest import ROOT, SITE
-from tests.support.mutations import mutants
+from tests.support.mutations import mutants, parses
 
 HOME = ROOT / ".mutants"
 RECORDS, CACHE, SITES, PRISTINE = HOME / "records", HOME / "cache", HOME / "site", HOME / "pristine"
@@ -55,8 +54,13 @@ def candidates(folder):
     sources, found = {}, []
     for path in sorted(folder.rglob("*.py")):
         sources[path] = path.read_text()
-        found += [(path, mutant) for mutant in mutants(sources[path], device="lgvi_kernels" in path.parts)]
+        found += [(path, mutant) for mutant in mutants(sources[path], device=is_device(path))]
     return found, sources
+
+
+def is_device(path):
+    """Whether a file is device code."""
+    return "lgvi_kernels" in path.parts
 
 
 def sampled(found, sources, count, seed):
@@ -70,7 +74,8 @@ def sampled(found, sources, count, seed):
     for place in places:
         kinds = lines[place]
         path, mutant = draw.choice(kinds[draw.choice(sorted(kinds))])
-        if (str(path.relative_to(ROOT)), *mutant.shown(sources[path])) not in known:
+        counts = (str(path.relative_to(ROOT)), *mutant.shown(sources[path])) not in known
+        if counts and parses(mutant.applied(sources[path])):
             chosen.append((path, mutant))
         if len(chosen) == count:
             break
@@ -88,15 +93,25 @@ def equivalent():
 
 def record(arguments):
     """Run tests and write the lines, the kernels and the time of each."""
-    folder = RECORDS / time.strftime("%Y%m%d-%H%M%S")
+    RECORDS.mkdir(parents=True, exist_ok=True)
+    folder = Path(tempfile.mkdtemp(prefix=time.strftime("%Y%m%d-%H%M%S-"), dir=RECORDS))
     tree = folder / "tree"
     copy_tree(tree)
     SITES.mkdir(parents=True, exist_ok=True)
     (SITES / "sitecustomize.py").write_text(SITE)
     environment = environment_of(tree, CACHE, folder / "tmp")
+    CACHE.mkdir(parents=True, exist_ok=True)
     environment["MUTANTS_RECORD"] = str(folder)
     environment["PYTHONPATH"] = f"{SITES}{os.pathsep}{environment['PYTHONPATH']}"
-    command = [*PYTEST, "-m", "not slow", "-n", "2", "--dist", "worksteal", *(arguments or ["tests"])]
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        *PYTEST,
+        "-m",
+        "not slow",
+        *(arguments or ["-n", "2", "--dist", "worksteal", "tests"]),
+    ]
     code = subprocess.run(command, cwd=tree, env=environment).returncode
     shutil.rmtree(folder / "tmp", ignore_errors=True)
     combine(folder)
@@ -188,14 +203,14 @@ class Record:
         lines = self.lines_of(path)
         end = mutant.line
         exact, anywhere = lines.get(end, set()), set().union(*lines.values()) if lines else set()
-        if "lgvi_kernels" in path.parts:
+        if is_device(path):
             return [*self.tests_of_device(path, mutant), exact, anywhere]
         return [exact, anywhere]
 
 
 def tests_for(records, path, mutant):
     """Tests to run, in order, as their records; what a later record has replaces an earlier one."""
-    chosen, seen = [], set()
+    chosen, seen, device = [], set(), is_device(path)
     levels = [record.levels(path, mutant) for record in records]
     known = {}
     for record in records:
@@ -206,25 +221,25 @@ def tests_for(records, path, mutant):
             names |= {n for n in found[level] if n in known and known[n][0] is record} if level < len(found) else set()
         names = {name for name in names - seen if not known[name][1]["failed"]}
         seen |= names
-        chosen += in_order([known[name][1] | {"test": now(name)} for name in names if now(name)])
-        if chosen and level == 0 and "lgvi_kernels" not in path.parts and inside_function(path, mutant.line):
+        chosen += in_order([known[name][1] | {"test": now(name)} for name in names if now(name)], device)
+        if chosen and level == 0 and not device and inside_function(path, mutant.line):
             break  # a line of a function: other tests of the file do not run it
     return chosen
 
 
-def in_order(tests):
+def in_order(tests, device):
     """One test of each function first, the fastest first."""
     place, counts = {}, defaultdict(int)
-    for test in sorted(tests, key=cost):
+    for test in sorted(tests, key=lambda test: cost(test, device)):
         function = test["test"].split("[")[0]
         place[test["test"]] = counts[function]
         counts[function] += 1
-    return sorted(tests, key=lambda test: (place[test["test"]] > 0, cost(test)))
+    return sorted(tests, key=lambda test: (place[test["test"]] > 0, cost(test, device)))
 
 
-def cost(test):
-    """Expected time of a test whose kernels are compiled anew [s]."""
-    return test["time"] + COMPILE * len(test["kernels"])
+def cost(test, device=False):
+    """Expected time of a test, with its kernels compiled anew if the fault is in device code [s]."""
+    return test["time"] + device * COMPILE * len(test["kernels"])
 
 
 @functools.cache
@@ -272,17 +287,7 @@ def now(test):
 
 # --- a fault at work
 
-PYTEST = [
-    sys.executable,
-    "-m",
-    "pytest",
-    "-q",
-    "--tb=line",
-    "-p",
-    "no:cacheprovider",
-    "-p",
-    "tests.support.mutants_pytest",
-]
+PYTEST = ["-q", "--tb=line", "-p", "no:cacheprovider", "-p", "tests.support.mutants_pytest"]
 
 
 def copy_tree(folder):
@@ -320,47 +325,49 @@ class Slot:
     def __init__(self, folder):
         self.folder, self.tree = Path(folder), Path(folder) / "tree"
         copy_tree(self.tree)
+        command = [*apart(), sys.executable, str(Path(__file__).with_name("mutants_server.py"))]
+        environment = environment_of(self.tree, CACHE, self.folder / "tmp")
+        self.server = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment, start_new_session=True
+        )
 
-    def run(self, tests, seconds):
+    def close(self):
+        """End its process."""
+        self.server.stdin.close()
+        self.server.wait()
+
+    def run(self, tests, seconds, device=False):
         """Run tests until one fails.
 
         Returns:
             The test that failed, and how; or None.
         """
-        temporary, cache = self.folder / "tmp", self.folder / "cache"
-        shutil.rmtree(temporary, ignore_errors=True)
-        shutil.rmtree(cache, ignore_errors=True)
+        temporary, cache, select = self.folder / "tmp", self.folder / "cache", self.folder / "select.json"
+        for folder in (temporary, cache):
+            shutil.rmtree(folder, ignore_errors=True)
         if CACHE.exists():
             shutil.copytree(CACHE, cache, copy_function=os.link)
-        select = self.folder / "select.json"
-        select.write_text(json.dumps({test["test"]: PATIENCE + SLOWER * cost(test) for test in tests}))
+        select.write_text(json.dumps({test["test"]: PATIENCE + SLOWER * cost(test, device) for test in tests}))
         select.with_suffix(".outcome").unlink(missing_ok=True)
-        environment = environment_of(self.tree, cache, temporary) | {"MUTANTS_SELECT": str(select)}
-        files = list(dict.fromkeys(where()[test["test"].split("::")[0]] for test in tests))
-        files = [name for name in files if (self.tree / name).exists()]
-        command = [*apart(), *PYTEST, "-x", "--basetemp", str(temporary / "pytest"), *files]
-        with (self.folder / "log").open("w") as log:
-            process = subprocess.Popen(
-                command, cwd=self.tree, env=environment, stdout=log, stderr=log, start_new_session=True
-            )
-            try:
-                code = process.wait(seconds)
-            except subprocess.TimeoutExpired:
-                code = None
-            finally:
-                if process.poll() is None:
-                    os.killpg(process.pid, signal.SIGKILL)
-                    process.wait()
+        files = dict.fromkeys(where()[test["test"].split("::")[0]] for test in tests)
+        task = {
+            "tree": str(self.tree),
+            "log": str(self.folder / "log"),
+            "environment": environment_of(self.tree, cache, temporary) | {"MUTANTS_SELECT": str(select)},
+            "arguments": [*PYTEST, "-x", "--basetemp", str(temporary / "pytest"), *files],
+            "seconds": seconds,
+        }
+        self.server.stdin.write(json.dumps(task) + "\n")
+        self.server.stdin.flush()
+        in_time = json.loads(self.server.stdout.readline())
         try:
             outcome = json.loads(select.with_suffix(".outcome").read_text())
         except (OSError, ValueError):
             outcome = {"test": "", "outcome": "not started"}
-        if outcome["outcome"] == "passed" or (code is None and outcome["outcome"] == "running"):
-            return None
-        if outcome["outcome"] == "not started" and code is None:
+        if outcome["outcome"] == "passed" or (not in_time and outcome["outcome"] != "failed"):
             return None
         how = {"running": "ended or hung", "not started": "not collected"}.get(outcome["outcome"], "failed")
-        return outcome["test"] or "collection", how
+        return outcome["test"] or tests[0]["test"], how
 
     def tried(self, path, mutant, tests, limit):
         """Whether a test finds a fault: (test and how, or None; seconds; tests run)."""
@@ -368,11 +375,11 @@ class Slot:
         source, begin, ran = path.read_text(), time.perf_counter(), 0
         try:
             place.write_text(mutant.applied(source))
-            for batch in batches(tests):
+            for batch in batches(tests, is_device(path)):
                 left = limit - (time.perf_counter() - begin)
                 if left <= 0:
                     break
-                found = self.run(batch, max(left, 30.0))
+                found = self.run(batch, max(left, 30.0), is_device(path))
                 ran += len(batch)
                 if found:
                     return found, time.perf_counter() - begin, ran
@@ -381,14 +388,14 @@ class Slot:
             place.write_text(source)
 
 
-def batches(tests):
+def batches(tests, device):
     """Tests in groups of growing time, each run by a process."""
     rest = list(tests)
     for most in BATCHES:
         batch, total = [], 0.0
-        while rest and (not batch or total + cost(rest[0]) <= most):
+        while rest and (not batch or total + cost(rest[0], device) <= most):
             batch.append(rest.pop(0))
-            total += cost(batch[-1])
+            total += cost(batch[-1], device)
         if batch:
             # One file after the other: fixtures of a file are made once.
             first = {}
@@ -433,7 +440,9 @@ def try_room(name, count, seed, limit, jobs, only):
 
         with ThreadPoolExecutor(jobs) as pool:
             list(pool.map(trial, chosen))
-        unsure = unsound(slots[0], {o[0][0] for o in outcomes.values() if o[0]}, records)
+        unsure = unsound(slots[0], {o[0][0] for o in outcomes.values() if o[0]}, tests)
+        for slot in slots:
+            slot.close()
     counts = {"faults": len(outcomes), "found": 0, "survived": 0, "unsure": 0}
     for caught, _, _ in outcomes.values():
         counts["survived" if not caught else "unsure" if caught[0] in unsure else "found"] += 1
@@ -442,9 +451,9 @@ def try_room(name, count, seed, limit, jobs, only):
     return counts
 
 
-def unsound(slot, names, records):
+def unsound(slot, names, tests):
     """Which of these tests fail without a fault."""
-    known = {name: test for record in records for name, test in record.tests.items()}
+    known = {test["test"]: test for chosen in tests.values() for test in chosen}
     passed = set(PRISTINE.read_text().splitlines()) if PRISTINE.exists() else set()
     left, failing = [known[name] for name in sorted(names - passed) if name in known], set()
     while left:

@@ -302,7 +302,7 @@ class Finder(ast.NodeVisitor):
 
 
 def mutants(source, device=False):
-    """All faults of a file that are still Python.
+    """All faults of a file; few of them are no Python any more.
 
     Args:
         source: its text.
@@ -313,7 +313,7 @@ def mutants(source, device=False):
     """
     finder = Finder(source, device)
     finder.visit(ast.parse(source))
-    return sorted((m for m in finder.found if parses(m.applied(source))), key=lambda m: (m.line, m.start, m.text))
+    return sorted(finder.found, key=lambda mutant: (mutant.line, mutant.start, mutant.text))
 
 
 def parses(source):

@@ -343,9 +343,8 @@ class Slot:
             The test that failed, and how; or None.
         """
         temporary, cache, select = self.folder / "tmp", self.folder / "cache", self.folder / "select.json"
-        for folder in (temporary, cache):
-            shutil.rmtree(folder, ignore_errors=True)
-        if CACHE.exists():
+        shutil.rmtree(temporary, ignore_errors=True)
+        if not cache.exists() and CACHE.exists():
             shutil.copytree(CACHE, cache, copy_function=os.link)
         select.write_text(json.dumps({test["test"]: PATIENCE + SLOWER * cost(test, device) for test in tests}))
         select.with_suffix(".outcome").unlink(missing_ok=True)
@@ -386,6 +385,8 @@ class Slot:
             return None, time.perf_counter() - begin, ran
         finally:
             place.write_text(source)
+            if {"common", "engine"} & set(path.parts):  # what writes kernels may have spoilt them
+                shutil.rmtree(self.folder / "cache", ignore_errors=True)
 
 
 def batches(tests, device):

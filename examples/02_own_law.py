@@ -8,10 +8,25 @@ import numpy as np
 import warp as wp
 
 import lgvi_warp as lw
-from lgvi_kernels.lanes.arithmetic import add, cross, div, dot, lane, lane3, mul, neg, ones, sub, vec3  # noqa: F401
-from lgvi_kernels.lanes.functions import exponential
-from lgvi_kernels.lanes.state import struct
-from lgvi_kernels.lanes.view import add_outer, add_rows, to_body, to_inertial
+from lgvi_kernels.law import (  # noqa: F401
+    add,
+    add_outer,
+    add_rows,
+    cross,
+    div,
+    dot,
+    exponential,
+    lane,
+    lane3,
+    mul,
+    neg,
+    ones,
+    struct,
+    sub,
+    to_body,
+    to_inertial,
+    vec3,
+)
 
 # 1. A law with a potential: U = -energy exp(-|d|^2 / (2 reach^2)), d from the dock to the vehicle's nose.
 
@@ -49,21 +64,25 @@ class Dock(lw.Term):
     type: ClassVar[str] = "dock"
     device: ClassVar[Any] = DockOnDevice
 
-    position: Any = lw.quantity((3,), "m")
-    nose: Any = lw.quantity((3,), "m", (0.0, 0.0, 0.0))
-    energy: Any = lw.quantity((), "J", least=0.0)
-    reach: Any = lw.quantity((), "m", least=1e-3)
+    position: Any = lw.number((3,), "m")
+    nose: Any = lw.number((3,), "m", (0.0, 0.0, 0.0))
+    energy: Any = lw.number((), "J", least=0.0)
+    reach: Any = lw.number((), "m", least=1e-3)
 
-    def packed(self, own, setting):
+    def packed(self, numbers, context):
         """As dock_params() has them: the nose from the origin of the forces, in the kernel's axes."""
-        values = {"position": own["position"], "energy": own["energy"], "inverse_square": own["reach"] ** -2.0}
-        return lw.Packed(values | {"nose": setting.frame.point(own["nose"])})
+        values = {
+            "position": numbers["position"],
+            "energy": numbers["energy"],
+            "inverse_square": numbers["reach"] ** -2.0,
+        }
+        return lw.Packed(values | {"nose": context.frame.point(numbers["nose"])})
 
-    def potential(self, own, position, attitude, setting):
+    def potential(self, numbers, position, attitude, parameters):
         """U [J]."""
-        nose = position + (attitude @ own["nose"][..., None])[..., 0]
-        d = nose - own["position"]
-        return -own["energy"] * np.exp(-0.5 * np.sum(d * d, axis=-1) / own["reach"] ** 2)
+        nose = position + (attitude @ numbers["nose"][..., None])[..., 0]
+        d = nose - numbers["position"]
+        return -numbers["energy"] * np.exp(-0.5 * np.sum(d * d, axis=-1) / numbers["reach"] ** 2)
 
 
 # 2. A damping law: force -c v at the centre of drag, which moves at v, and torque -angular Om, both times e^(depth / height).
@@ -111,15 +130,15 @@ class Mud(lw.Term):
     type: ClassVar[str] = "mud"
     device: ClassVar[Any] = MudOnDevice
 
-    floor: Any = lw.quantity((), "m")
-    height: Any = lw.quantity((), "m", least=1e-3)
-    linear: Any = lw.quantity((), "N s/m", 0.0, least=0.0)
-    angular: Any = lw.quantity((), "N m s", 0.0, least=0.0)
-    center: Any = lw.quantity((3,), "m", (0.0, 0.0, 0.0))
+    floor: Any = lw.number((), "m")
+    height: Any = lw.number((), "m", least=1e-3)
+    linear: Any = lw.number((), "N s/m", 0.0, least=0.0)
+    angular: Any = lw.number((), "N m s", 0.0, least=0.0)
+    center: Any = lw.number((3,), "m", (0.0, 0.0, 0.0))
 
-    def packed(self, own, setting):
+    def packed(self, numbers, context):
         """The centre from the origin of the forces; the rest as it is."""
-        return lw.Packed(dict(own) | {"center": setting.frame.point(own["center"])})
+        return lw.Packed(dict(numbers) | {"center": context.frame.point(numbers["center"])})
 
 
 # 3. A fleet that feels both.

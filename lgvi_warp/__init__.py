@@ -18,8 +18,8 @@ from lgvi_warp.physics.terms import (
     Fins,
     GaussMarkovCurrent,
     Packed,
+    PackingContext,
     Restoring,
-    Setting,
     Stratification,
     Term,
     Tether,
@@ -29,13 +29,23 @@ from lgvi_warp.physics.terms import (
     Wrench,
     WrenchNoise,
     WrenchSchedule,
-    quantity,
-    register,
+    number,
+    register_term,
 )
 from lgvi_warp.physics.terms.events import Box, Event, Floor, StopTime, Surface
 from lgvi_warp.physics.vehicle import Vehicle
 from lgvi_warp.runs.result import Result
-from lgvi_warp.sampling.designs import Grid, Halton, LatinHypercube, Levels, Morris, Random, Saltelli, Sobol, Table
+from lgvi_warp.sampling.designs import (
+    Grid,
+    Halton,
+    LatinHypercube,
+    Morris,
+    Random,
+    Saltelli,
+    Sobol,
+    Table,
+    UnitCubePoints,
+)
 from lgvi_warp.sampling.distributions.basic import Choice, LogNormal, Normal, TruncatedNormal, Uniform
 from lgvi_warp.sampling.distributions.joint import (
     CorrelatedNormal,
@@ -44,7 +54,7 @@ from lgvi_warp.sampling.distributions.joint import (
     RotationNormal,
     UniformRotation,
 )
-from lgvi_warp.sampling.distributions.named import Frozen
+from lgvi_warp.sampling.distributions.named import ScipyDistribution
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import Environment, Start
@@ -80,9 +90,9 @@ if TYPE_CHECKING:
     from lgvi_warp.runs.store.open import open_run
     from lgvi_warp.runs.store.resume import resume
     from lgvi_warp.runs.store.settings import Store
-    from lgvi_warp.scene.vehicles.fossen import from_fossen, vehicles
-    from lgvi_warp.scene.vehicles.sdf import from_sdf
-    from lgvi_warp.scene.vehicles.yaml import from_yaml
+    from lgvi_warp.scene.vehicles.fossen import vehicle_tables_from_fossen, vehicles
+    from lgvi_warp.scene.vehicles.sdf import vehicle_tables_from_sdf
+    from lgvi_warp.scene.vehicles.yaml import vehicle_tables_from_yaml
     from lgvi_warp.studies import sensitivity as uq
     from lgvi_warp.studies.stability.map import StabilityMap, stability_map
     from lgvi_warp.studies.suggest import suggest
@@ -114,9 +124,9 @@ _LAZY = {
     "stability_map": "lgvi_warp.studies.stability.map",
     "log_rerun": "lgvi_warp.views.rerun",
     "check_law": "lgvi_warp.engine.laws.check",
-    "from_fossen": "lgvi_warp.scene.vehicles.fossen",
-    "from_sdf": "lgvi_warp.scene.vehicles.sdf",
-    "from_yaml": "lgvi_warp.scene.vehicles.yaml",
+    "vehicle_tables_from_fossen": "lgvi_warp.scene.vehicles.fossen",
+    "vehicle_tables_from_sdf": "lgvi_warp.scene.vehicles.sdf",
+    "vehicle_tables_from_yaml": "lgvi_warp.scene.vehicles.yaml",
     "vehicles": "lgvi_warp.scene.vehicles.fossen",
 }
 
@@ -143,14 +153,12 @@ __all__ = [
     "Fins",
     "FirstPassage",
     "Floor",
-    "Frozen",
     "GaussMarkovCurrent",
     "Grid",
     "Halton",
     "Histogram",
     "Interrupted",
     "LatinHypercube",
-    "Levels",
     "LogNormal",
     "Mean",
     "MeanAttitude",
@@ -160,6 +168,7 @@ __all__ = [
     "Normal",
     "Outcome",
     "Packed",
+    "PackingContext",
     "PathMaximum",
     "PathMean",
     "PathMinimum",
@@ -179,7 +188,7 @@ __all__ = [
     "SaveAt",
     "Scene",
     "SceneError",
-    "Setting",
+    "ScipyDistribution",
     "Sobol",
     "StabilityMap",
     "Start",
@@ -195,6 +204,7 @@ __all__ = [
     "TruncatedNormal",
     "Uniform",
     "UniformRotation",
+    "UnitCubePoints",
     "Until",
     "Vehicle",
     "Warnings",
@@ -205,11 +215,9 @@ __all__ = [
     "WrenchSchedule",
     "check_law",
     "export",
-    "from_fossen",
-    "from_sdf",
-    "from_yaml",
     "log_rerun",
     "merge",
+    "number",
     "open_run",
     "plot",
     "plot_sensitivity",
@@ -217,14 +225,16 @@ __all__ = [
     "plot_statistics",
     "plot_tradeoff",
     "predict",
-    "quantity",
-    "register",
+    "register_term",
     "resume",
     "solve",
     "stability_map",
     "suggest",
     "tradeoff",
     "uq",
+    "vehicle_tables_from_fossen",
+    "vehicle_tables_from_sdf",
+    "vehicle_tables_from_yaml",
     "vehicles",
 ]
 
@@ -236,10 +246,27 @@ _MODULES = {
     "terms": "lgvi_warp.physics.terms",
 }
 
+# Old public names, each with the name that replaces it.
+_RENAMED = {
+    "Frozen": "ScipyDistribution",
+    "Levels": "UnitCubePoints",
+    "Setting": "PackingContext",
+    "from_fossen": "vehicle_tables_from_fossen",
+    "from_sdf": "vehicle_tables_from_sdf",
+    "from_yaml": "vehicle_tables_from_yaml",
+    "quantity": "number",
+    "register": "register_term",
+}
+
 
 def __getattr__(name: str) -> Any:
     from importlib import import_module
 
+    if name in _RENAMED:
+        import warnings
+
+        warnings.warn(f"lw.{name} is now lw.{_RENAMED[name]}; write that", DeprecationWarning, stacklevel=2)
+        return getattr(import_module(__name__), _RENAMED[name])
     if name in _MODULES:
         value: Any = import_module(_MODULES[name])
     elif name in _LAZY:

@@ -86,7 +86,7 @@ def parser() -> argparse.ArgumentParser:
         "--resume", action="store_true", help="go on with a run.zarr that is there, if it is this run"
     )
     _add_check(verbs)
-    _add_plan(verbs)
+    _add_predict(verbs)
     _add_store_verbs(verbs)
     trade = verbs.add_parser(
         "tradeoff", help="speed against accuracy of every method, step and precision: tradeoff.json, .csv and .png"
@@ -191,19 +191,21 @@ def _add_check(verbs: Any) -> None:
     verb.add_argument("--quiet", action="store_true", help="the exit code alone")
 
 
-def _add_plan(verbs: Any) -> None:
-    """Add the verb plan with its arguments."""
-    plan = verbs.add_parser(
-        "plan", help="time, memory and disk that a run would take, from a small one on this machine"
+def _add_predict(verbs: Any) -> None:
+    """Add the verb predict with its arguments."""
+    predict = verbs.add_parser(
+        "predict",
+        aliases=["plan"],
+        help="time, memory and disk that a run would take, from a small one on this machine",
     )
-    _add_scene(plan, "runs/NAME of the scene")
-    plan.add_argument("--method", help="as for run")
-    plan.add_argument("--step", metavar="S", help="time step [s]")
-    plan.add_argument("--dtype", help="as for run")
-    _add_keep(plan)
-    plan.add_argument("--threads", metavar="N", type=int, help="threads (default: all cores)")
-    plan.add_argument("--store", choices=["npz", "zarr"], default="npz", help="as for run")
-    plan.add_argument("--store-dtype", metavar="D", help="as for run")
+    _add_scene(predict, "runs/NAME of the scene")
+    predict.add_argument("--method", help="as for run")
+    predict.add_argument("--step", metavar="S", help="time step [s]")
+    predict.add_argument("--dtype", help="as for run")
+    _add_keep(predict)
+    predict.add_argument("--threads", metavar="N", type=int, help="threads (default: all cores)")
+    predict.add_argument("--store", choices=["npz", "zarr"], default="npz", help="as for run")
+    predict.add_argument("--store-dtype", metavar="D", help="as for run")
 
 
 def _add_store_verbs(verbs: Any) -> None:

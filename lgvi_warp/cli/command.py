@@ -11,7 +11,7 @@ from collections.abc import Callable
 from lgvi_warp.cli.arguments import parser
 from lgvi_warp.cli.check import check
 from lgvi_warp.cli.machine import bench, info
-from lgvi_warp.cli.runs import plan, resume, run
+from lgvi_warp.cli.runs import predict, resume, run
 from lgvi_warp.cli.settings import RUN, out_of
 from lgvi_warp.cli.signals import Ended, Signals, Streams
 from lgvi_warp.cli.stores import export, merge
@@ -22,7 +22,8 @@ VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
     "run": run,
     "check": check,
     "resume": resume,
-    "plan": plan,
+    "predict": predict,
+    "plan": predict,  # its name before
     "merge": merge,
     "export": export,
     "tradeoff": tradeoff,
@@ -93,7 +94,7 @@ def left(chosen: argparse.Namespace) -> str:
     Returns:
         One sentence, with the way to go on where there is one.
     """
-    if chosen.verb in ("info", "check", "plan", "bench"):
+    if chosen.verb in ("info", "check", "predict", "plan", "bench"):
         return "nothing was to be written"
     store = chosen.dir if chosen.verb == "resume" else None
     if chosen.verb == "run" and chosen.store == "zarr" and (out_of(chosen) / RUN).exists():

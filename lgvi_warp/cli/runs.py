@@ -1,4 +1,4 @@
-"""The verbs run, plan and resume."""
+"""The verbs run, predict and resume."""
 
 from __future__ import annotations
 
@@ -213,8 +213,8 @@ def resume(chosen: argparse.Namespace) -> int:
     return 1 if told(faults) or all_failed(result) else 0
 
 
-def plan(chosen: argparse.Namespace) -> int:
-    """Run the verb plan: predict time, memory and disk that a run would take.
+def predict(chosen: argparse.Namespace) -> int:
+    """Run the verb predict: the time, memory and disk that a run would take.
 
     Args:
         chosen: The command's parsed arguments.
@@ -225,9 +225,9 @@ def plan(chosen: argparse.Namespace) -> int:
     Raises:
         SceneError: The scene or an argument is refused.
     """
-    from lgvi_warp.runs.predict import predict
+    from lgvi_warp.runs import predict as prediction
     from lgvi_warp.scene.scene import Scene
 
     scene = Scene.load(chosen.scene, overrides(chosen))
-    print(predict(scene, threads=chosen.threads, store=store_settings(chosen)))
+    print(prediction.predict(scene, threads=chosen.threads, store=store_settings(chosen)))
     return 0

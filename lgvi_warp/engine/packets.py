@@ -22,7 +22,7 @@ from lgvi_warp.engine.step_warnings import at_start, munk_factor, row_limits
 from lgvi_warp.engine.survey import frame_of
 from lgvi_warp.methods import modified_inertia
 from lgvi_warp.physics import inertia, notation, vehicle
-from lgvi_warp.physics.terms.base import Packed, Setting
+from lgvi_warp.physics.terms.base import Packed, PackingContext
 from lgvi_warp.physics.terms.drag import Drag
 from lgvi_warp.physics.terms.events import Event
 from lgvi_warp.sampling.members import Members
@@ -79,13 +79,13 @@ class Packets:
         width, Lane = plan.spec.width, plan.advance.types.Lane
         self.count = -(-members.count // width)
         Inertia, Params, Events = plan.advance.types.Inertia, plan.advance.types.Params, plan.advance.types.Events
-        setting = Setting(
+        context = PackingContext(
             members.parameters, self.frame, members.indices, members.seed, plan.grid.h, plan.model.aligned
         )
-        params, table, memory = self._laws(setting)
+        params, table, memory = self._laws(context)
         self.inertia = _structs(self._inertia(), Inertia)
         self.params = _structs(params, Params)
-        self.events = _structs(self._events(setting), Events)
+        self.events = _structs(self._events(context), Events)
         self.table = _rows(table, Lane)
         self.memory = _rows(memory, Lane)
         state = self._state()
@@ -207,22 +207,22 @@ class Packets:
         else:
             target[...] = self._lanes(value[:, None])[:, 0]
 
-    def _laws(self, setting: Setting) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _laws(self, context: PackingContext) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Params, table and memory of the laws: each term's numbers, one after the other."""
         packed: list[Packed] = []
         for i, (term, module) in enumerate(self.plan.model.laws):
-            parameters = Ensemble.own(term, setting.parameters)
+            parameters = Ensemble.own(term, context.parameters)
             if i == 0 and self.plan.spec.drag:
                 assert isinstance(term, Drag)
                 by_axes = module is LAWS["drag"]
                 exact = (
                     term.packed_exact(parameters, self.frame, self.scale)
                     if by_axes
-                    else term.packed_directions(parameters, setting)
+                    else term.packed_directions(parameters, context)
                 )
                 packed.append(exact)
             else:
-                packed.append(term.packed(parameters, setting))
+                packed.append(term.packed(parameters, context))
         dtype = self.plan.dtypes[1]
         varied = any(len(leaf) > 1 for numbers in packed for leaf in _leaves(numbers.values))
         data = np.zeros(self.count if varied else 1, dtype)
@@ -254,8 +254,8 @@ class Packets:
         """Rows (m, d) as (packets, d, width), one entry a packet even for one member."""
         return pack(values, self.plan.spec.width).astype(DTYPES[self.plan.dtype])
 
-    def _events(self, setting: Setting) -> np.ndarray:
-        packed = [event.packed(Ensemble.own(event, setting.parameters), setting) for event, _ in self.plan.model.events]
+    def _events(self, context: PackingContext) -> np.ndarray:
+        packed = [event.packed(Ensemble.own(event, context.parameters), context) for event, _ in self.plan.model.events]
         varied = any(len(leaf) > 1 for numbers in packed for leaf in _leaves(numbers.values))
         data = np.zeros(self.count if varied else 1, self.plan.dtypes[2])
         node: Any = data
@@ -289,11 +289,11 @@ class Packets:
     def _water_at_start(self) -> np.ndarray:
         """R^T u (m, 3) [m/s]: velocity of the water in the user's body axes where each member starts."""
         m = self.members
-        setting = Setting(m.parameters, self.frame, m.indices, m.seed, self.plan.grid.h)
+        context = PackingContext(m.parameters, self.frame, m.indices, m.seed, self.plan.grid.h)
         total = np.zeros_like(m.position)
         for term, _ in self.plan.model.laws:
             parameters = Ensemble.own(term, m.parameters)
-            total = total + term.water_at_start(parameters, m.position, setting)
+            total = total + term.water_at_start(parameters, m.position, context)
         return notation.rotate_into(m.attitude, total)
 
     def advance(self, k0: int, k1: int) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from lgvi_warp.methods.method import Method, middle_axis
 from lgvi_warp.physics import inertia, terms, vehicle
 from lgvi_warp.physics.inertia import Frame
-from lgvi_warp.physics.terms.base import Setting
+from lgvi_warp.physics.terms.base import PackingContext
 from lgvi_warp.physics.terms.drag import Drag, has_exact_flow
 from lgvi_warp.scene.ensemble import Ensemble, over_members
 from lgvi_warp.scene.oddities import Oddities
@@ -83,7 +83,7 @@ class Survey:
     """What holds for at least one member, and the largest values.
 
     Attributes:
-        turned: axes other than the user's, or forces about another origin (see `Setting.aligned`).
+        turned: axes other than the user's, or forces about another origin (see `PackingContext.aligned`).
         bent: drag has no exact flow along the kernel's axes.
         mass: rank of the mass matrix among SHAPES_OF_MASS.
         coupled: velocities and angular velocities are coupled.
@@ -152,8 +152,8 @@ def survey(ensemble: Ensemble, method: Method, h: float) -> Survey:
 def _look(ensemble: Ensemble, method: Method, h: float, first: int, stop: int) -> Survey:
     p = ensemble.parameters(first, stop)
     frame, U, coupling = frame_of(method, p)
-    setting = Setting(p, frame, ensemble.indices_of(first, stop), ensemble.seed, h, frame.aligned)
-    implied = {t.key for t in terms.IMPLIED if any(np.any(v) for v in t.packed({}, setting).values.values())}
+    context = PackingContext(p, frame, ensemble.indices_of(first, stop), ensemble.seed, h, frame.aligned)
+    implied = {t.key for t in terms.IMPLIED if any(np.any(v) for v in t.packed({}, context).values.values())}
     terms_and_numbers = {term.key: (term, ensemble.own(term, p)) for term in ensemble.scene.terms}
     return Survey(
         turned=not frame.aligned,

@@ -99,13 +99,13 @@ class Unturned(lw.Tether):
 def test_a_point_that_is_not_moved():
     report = lw.check_law(Unturned(anchor=(1.0, 2.0, 3.0), stiffness=5.0, attachment=(0.5, 0.0, 0.0)))
     assert names_of_failed(report) == ["law: any axes"]
-    assert "setting.frame" in str(report)
+    assert "context.frame" in str(report)
 
 
 class NoPotential(lw.Tether):
     """Says it has a potential, and has none."""
 
-    def potential(self, own, position, attitude, setting):
+    def potential(self, own, position, attitude, parameters):
         return 0.0
 
 
@@ -167,7 +167,7 @@ class Stirred(lw.Term):
     type: ClassVar[str] = "stirred"
     device: ClassVar[Any] = StirredDevice
 
-    strength: Any = lw.quantity((), "1/s")
+    strength: Any = lw.number((), "1/s")
 
     def packed(self, own, setting):
         return lw.Packed(dict(own))

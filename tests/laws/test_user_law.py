@@ -41,7 +41,7 @@ START = {"b": (0.0, 0.0, 2.0), "nu": (0.5, 0.2, 0.1), "Om": (0.1, 0.3, -0.2)}
 def registered():
     """The example's types, known to scene files for one test."""
     for kind in (own_law.Dock, own_law.Mud):
-        terms.register(kind)
+        terms.register_term(kind)
     yield
     for kind in (own_law.Dock, own_law.Mud):
         terms.TYPES.pop(kind.type)
@@ -160,7 +160,7 @@ def test_a_scene_file_without_them_is_refused():
 
 def test_a_type_is_taken_once(registered):
     with pytest.raises(ValueError, match="no other term has"):
-        terms.register(own_law.Dock)
+        terms.register_term(own_law.Dock)
 
 
 def test_the_law_on_the_page_is_right(tmp_path):

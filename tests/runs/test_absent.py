@@ -107,7 +107,7 @@ def test_a_term_of_zeros_is_absent():
 
 def test_a_polynomial_is_there_only_if_asked_for(tmp_path):
     plain = CASES["thrusters"].terms[0]
-    numbers = {one.name: getattr(plain, one.name) for one in plain.quantities()}
+    numbers = {one.name: getattr(plain, one.name) for one in plain.number_fields()}
     scenes = {
         name: lw.Scene(VEHICLE, terms=[terms.Thrusters(**numbers | {"polynomial": curve})])
         for name, curve in (("none", None), ("square", (0.0, 1.0)), ("cubic", (0.0, 0.0, 1.0)))
@@ -164,7 +164,7 @@ def test_a_varied_member_is_as_if_alone_with_its_numbers(method):
         # And as a scene that has these numbers, to round-off: diagonal matrices are told in another way.
         own = {
             term.key: type(term)(**{
-                f.name: p[f"{term.key}.{f.name}"][member % len(p[f"{term.key}.{f.name}"])] for f in term.quantities()
+                f.name: p[f"{term.key}.{f.name}"][member % len(p[f"{term.key}.{f.name}"])] for f in term.number_fields()
             })
             for term in scene().terms
         }  # fmt: skip

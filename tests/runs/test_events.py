@@ -125,7 +125,7 @@ def test_a_users_condition():
     class FarAway(events.Event):
         type: ClassVar[str] = "far"
         device: ClassVar[Any] = FarFromHome
-        radius: Any = lw.quantity((), "m")
+        radius: Any = lw.number((), "m")
 
     r = lw.solve(fleet(50, [FarAway(radius=2.0)]), h=0.05, t1=5.0)
     assert r.status.counts().keys() == {"ok", "condition"}

@@ -249,7 +249,7 @@ class Own(lw.Term):
 class Told(Own):
     """One whose potential is known to the host."""
 
-    def potential(self, own, position, attitude, setting):
+    def potential(self, own, position, attitude, parameters):
         return position[..., 2]
 
 

@@ -1,4 +1,4 @@
-"""What `lgvi-warp plan` says before a run: sizes by arithmetic, so nearly exact; time from a trial, so roughly."""
+"""What `lgvi-warp predict` says before a run: sizes by arithmetic, so nearly exact; time from a trial, so roughly."""
 
 import os
 import subprocess
@@ -79,7 +79,7 @@ def test_a_run_takes_about_what_was_said():
 
 
 def test_the_command(tmp_path, capsys):
-    arguments = ["plan", str(ROOT / "examples" / "paper.toml"), "--members", "500", "--duration", "2",
+    arguments = ["predict", str(ROOT / "examples" / "paper.toml"), "--members", "500", "--duration", "2",
                  "--set", "run.save_every=0.5", "--store", "zarr", "--out", str(tmp_path / "x")]  # fmt: skip
     assert cli.main(arguments) == 0
     out = capsys.readouterr().out

@@ -397,7 +397,7 @@ RANDOM = np.random.default_rng(5).uniform(0.1, 0.9, (700, 4))
 # 600 members of each: given as arrays, of 700 rows.
 ARRAYS = {
     "table": lambda u: lw.Table({"vehicle.mass": 123.0 + u[:, 0], "start.angular_velocity": u[:, 1:]}),
-    "levels": lambda u: lw.Levels(u),
+    "levels": lambda u: lw.UnitCubePoints(u),
 }
 
 

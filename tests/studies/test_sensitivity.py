@@ -261,7 +261,7 @@ LINES = np.random.default_rng(0).uniform(0.01, 0.99, (40, 3))
 @pytest.mark.parametrize(
     "sampling",
     ["random", "sobol", "halton", {"latin_hypercube": {"group": 20}}, "saltelli", "morris",
-     lw.Grid({"vehicle.buoyancy": 8, "vehicle.mass": 5}), lw.Table(values=HEAVIER), lw.Levels(LINES)],
+     lw.Grid({"vehicle.buoyancy": 8, "vehicle.mass": 5}), lw.Table(values=HEAVIER), lw.UnitCubePoints(LINES)],
     ids=lambda one: str(one)[:20],
 )  # fmt: skip
 def test_a_member_runs_again_alone_with_its_bits(sinking, sampling):

@@ -13,7 +13,8 @@ from xml.etree import ElementTree
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-import lgvi_warp as lw
+from lgvi_warp import vehicle_tables_from_sdf as from_sdf
+from lgvi_warp import vehicle_tables_from_yaml as from_yaml
 
 SHAPES = {
     "box": lambda g: np.prod([float(x) for x in (g.findtext("size") or "1 1 1").split()]),
@@ -173,7 +174,7 @@ def rows(folder):
         models = [m for m in root.findall("model") + root.findall("world/model") if m.find("link") is not None]
         for model in (m for m in models if m.findtext("static") not in ("true", "1")):
             name = model.get("name")
-            tables = lw.from_sdf(path, model=name, **beside)
+            tables = from_sdf(path, model=name, **beside)
             rho, g = (tables["environment"][key] for key in ("water_density", "gravity"))
             if beside:
                 rho, g = water(tree(world).find("world"))
@@ -183,7 +184,7 @@ def rows(folder):
             theirs = about_gravity(of_sdf(path, name, main, rho, g), tilts())
             yield f"{path.name}: {name}", np.diag(about_gravity(of_tables(tables), tilts())), np.diag(theirs)
     for path in sorted(Path(folder).rglob("*.yaml")):
-        tables = lw.from_yaml(path)
+        tables = from_yaml(path)
         theirs = about_gravity(of_yaml(path, tables["environment"]["gravity"]), tilts())
         yield path.name, np.diag(about_gravity(of_tables(tables), tilts())), np.diag(theirs)
 

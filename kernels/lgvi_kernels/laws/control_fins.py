@@ -5,10 +5,22 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, mul, neg, ones, sub  # noqa: F401
-from lgvi_kernels.lanes.functions import clamp, cosine, sine
-from lgvi_kernels.lanes.state import struct
-from lgvi_kernels.lanes.view import command, middle_of_half, remember, remembered, row1
+from lgvi_kernels.law import (  # noqa: F401
+    add,
+    clamp,
+    command,
+    cosine,
+    middle_of_half,
+    mul,
+    neg,
+    ones,
+    remember,
+    remembered,
+    row1,
+    sine,
+    struct,
+    sub,
+)
 from lgvi_kernels.laws import fins
 from lgvi_kernels.laws.fins import add_fins, note_lift_and_drag, speed_along
 

@@ -5,10 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, dot, lane3, mul, neg, ones, sub  # noqa: F401
-from lgvi_kernels.lanes.functions import root
-from lgvi_kernels.lanes.state import struct
-from lgvi_kernels.lanes.view import add_outer, add_rows, row1
+from lgvi_kernels.law import add, add_outer, add_rows, dot, lane3, mul, neg, ones, root, row1, struct, sub  # noqa: F401
 
 
 @functools.cache

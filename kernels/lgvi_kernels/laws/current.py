@@ -5,8 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, lane3  # noqa: F401
-from lgvi_kernels.lanes.state import struct
+from lgvi_kernels.law import add, lane3, struct  # noqa: F401
 
 FLOW = "steady"
 

@@ -5,10 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, mul, neg  # noqa: F401
-from lgvi_kernels.lanes.functions import cosine, sine
-from lgvi_kernels.lanes.state import struct
-from lgvi_kernels.lanes.view import row1, row3
+from lgvi_kernels.law import add, cosine, mul, neg, row1, row3, sine, struct  # noqa: F401
 
 FLOW = "uniform"
 

@@ -5,9 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, div, mul, ones, positive, sub  # noqa: F401
-from lgvi_kernels.lanes.state import struct
-from lgvi_kernels.lanes.view import ramp, row1, row3
+from lgvi_kernels.law import add, div, mul, ones, positive, ramp, row1, row3, struct, sub  # noqa: F401
 
 FLOW = "varying"
 

@@ -9,10 +9,8 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import absolute, add, div, lane3, mul, ones, positive, sub, vec3  # noqa: F401
-from lgvi_kernels.lanes.functions import decay
-from lgvi_kernels.lanes.state import struct
 from lgvi_kernels.lanes.sums import pushed, twisted
+from lgvi_kernels.law import absolute, add, decay, div, lane3, mul, ones, positive, struct, sub, vec3  # noqa: F401
 
 PARTS = ("linear_force", "linear_torque", "quadratic_force", "quadratic_torque")
 

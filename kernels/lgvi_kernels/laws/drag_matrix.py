@@ -5,9 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import absolute, add, mul, vec3  # noqa: F401
-from lgvi_kernels.lanes.state import struct
-from lgvi_kernels.lanes.view import row3
+from lgvi_kernels.law import absolute, add, mul, row3, struct, vec3  # noqa: F401
 
 
 @functools.cache

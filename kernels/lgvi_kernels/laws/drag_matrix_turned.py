@@ -5,9 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import absolute, add, dot, mul  # noqa: F401
-from lgvi_kernels.lanes.state import struct
-from lgvi_kernels.lanes.view import add_outer, row3
+from lgvi_kernels.law import absolute, add, add_outer, dot, mul, row3, struct  # noqa: F401
 from lgvi_kernels.laws.drag_matrix import add_three
 
 

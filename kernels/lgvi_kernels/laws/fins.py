@@ -5,10 +5,22 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, div, dot, mul, ones, sub, vec3  # noqa: F401
-from lgvi_kernels.lanes.functions import greatest, root
-from lgvi_kernels.lanes.state import struct
-from lgvi_kernels.lanes.view import remember, remembered, row1, row3
+from lgvi_kernels.law import (  # noqa: F401
+    add,
+    div,
+    dot,
+    greatest,
+    mul,
+    ones,
+    remember,
+    remembered,
+    root,
+    row1,
+    row3,
+    struct,
+    sub,
+    vec3,
+)
 
 # Rows of one fin: the twists that measure the speed along its chord c and normal n (6 and 6, each also the wrench of a unit
 # force), then rho A / 2 times lift slope, drag coefficient and added drag coefficient; and as MATRICES say.

@@ -5,10 +5,21 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, div, int_lane, lane, lane3, mul, ones, sub, vec3  # noqa: F401
-from lgvi_kernels.lanes.functions import normals3
-from lgvi_kernels.lanes.state import struct
-from lgvi_kernels.lanes.view import remember, remembered
+from lgvi_kernels.law import (  # noqa: F401
+    add,
+    div,
+    int_lane,
+    lane,
+    lane3,
+    mul,
+    normals3,
+    ones,
+    remember,
+    remembered,
+    struct,
+    sub,
+    vec3,
+)
 
 FLOW = "uniform"
 NOISE = True

@@ -5,9 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, dot, mul  # noqa: F401
-from lgvi_kernels.lanes.state import struct
-from lgvi_kernels.lanes.view import row3
+from lgvi_kernels.law import add, dot, mul, row3, struct  # noqa: F401
 
 
 @functools.cache

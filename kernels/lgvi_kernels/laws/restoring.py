@@ -5,8 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, cross, dot, lane3, sub  # noqa: F401
-from lgvi_kernels.lanes.functions import root
+from lgvi_kernels.law import add, cross, dot, lane3, root, sub  # noqa: F401
 
 POTENTIAL = True
 SEPARABLE = True

@@ -5,8 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, cross, dot, lane, lane3, mul, neg, sub  # noqa: F401
-from lgvi_kernels.lanes.state import struct
+from lgvi_kernels.law import add, cross, dot, lane, lane3, mul, neg, struct, sub  # noqa: F401
 
 POTENTIAL = True
 

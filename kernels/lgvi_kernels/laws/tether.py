@@ -5,9 +5,22 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, cross, div, dot, lane, lane3, mul, ones, sub, vec3  # noqa: F401
-from lgvi_kernels.lanes.functions import greatest, root
-from lgvi_kernels.lanes.view import to_body, to_inertial
+from lgvi_kernels.law import (  # noqa: F401
+    add,
+    cross,
+    div,
+    dot,
+    greatest,
+    lane,
+    lane3,
+    mul,
+    ones,
+    root,
+    sub,
+    to_body,
+    to_inertial,
+    vec3,
+)
 
 POTENTIAL = True
 

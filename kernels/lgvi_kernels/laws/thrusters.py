@@ -5,10 +5,26 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import absolute, add, div, mul, neg, ones, positive, sub, vec3  # noqa: F401
-from lgvi_kernels.lanes.functions import exponential, greatest
-from lgvi_kernels.lanes.state import struct
-from lgvi_kernels.lanes.view import command, middle_of_half, remember, remembered, row1, row3
+from lgvi_kernels.law import (  # noqa: F401
+    absolute,
+    add,
+    command,
+    div,
+    exponential,
+    greatest,
+    middle_of_half,
+    mul,
+    neg,
+    ones,
+    positive,
+    remember,
+    remembered,
+    row1,
+    row3,
+    struct,
+    sub,
+    vec3,
+)
 
 # Rows of one thruster: force and torque per newton (6), coefficient forward and backward, dead band, limit, 1 / lag.
 ROWS = 11

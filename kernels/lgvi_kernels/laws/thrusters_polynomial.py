@@ -5,10 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, mul, neg, ones, sub, vec3  # noqa: F401
-from lgvi_kernels.lanes.functions import greatest
-from lgvi_kernels.lanes.state import struct
-from lgvi_kernels.lanes.view import remembered, row1, row3
+from lgvi_kernels.law import add, greatest, mul, neg, ones, remembered, row1, row3, struct, sub, vec3  # noqa: F401
 from lgvi_kernels.laws.thrusters import ROWS, commanded, evolve  # noqa: F401
 
 

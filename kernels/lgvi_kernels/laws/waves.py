@@ -5,10 +5,22 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, mul, neg, ones, positive, sub, vec3  # noqa: F401
-from lgvi_kernels.lanes.functions import cosine, exponential, greatest, sine
-from lgvi_kernels.lanes.state import struct
-from lgvi_kernels.lanes.view import row1, row3
+from lgvi_kernels.law import (  # noqa: F401
+    add,
+    cosine,
+    exponential,
+    greatest,
+    mul,
+    neg,
+    ones,
+    positive,
+    row1,
+    row3,
+    sine,
+    struct,
+    sub,
+    vec3,
+)
 
 FLOW = "varying"
 

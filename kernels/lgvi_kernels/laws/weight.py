@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import absolute, add, lane, mul, sub  # noqa: F401
+from lgvi_kernels.law import absolute, add, lane, mul, sub  # noqa: F401
 
 POTENTIAL = True
 SEPARABLE = True

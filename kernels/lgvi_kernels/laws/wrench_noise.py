@@ -5,9 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, div, int_lane, lane3, mul, ones  # noqa: F401
-from lgvi_kernels.lanes.functions import normals3, root
-from lgvi_kernels.lanes.state import struct
+from lgvi_kernels.law import add, div, int_lane, lane3, mul, normals3, ones, root, struct  # noqa: F401
 
 NOISE = True
 

@@ -5,9 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, lane, mul, ones  # noqa: F401
-from lgvi_kernels.lanes.state import struct
-from lgvi_kernels.lanes.view import table3
+from lgvi_kernels.law import add, lane, mul, ones, struct, table3  # noqa: F401
 
 
 @functools.cache

@@ -5,8 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import lane3, least, sub  # noqa: F401
-from lgvi_kernels.lanes.state import struct
+from lgvi_kernels.law import lane3, least, struct, sub  # noqa: F401
 
 
 @functools.cache

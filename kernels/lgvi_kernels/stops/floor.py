@@ -5,8 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import lane, sub  # noqa: F401
-from lgvi_kernels.lanes.state import struct
+from lgvi_kernels.law import lane, struct, sub  # noqa: F401
 
 
 @functools.cache

@@ -19,7 +19,7 @@ from lgvi_warp.engine import kernel_cache
 from lgvi_warp.engine.packets import Packets, pack
 from lgvi_warp.physics import inertia, notation, vehicle
 from lgvi_warp.physics.inertia import Frame
-from lgvi_warp.physics.terms.base import Setting, Term
+from lgvi_warp.physics.terms.base import PackingContext, Term
 from lgvi_warp.physics.vehicle import Vehicle
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import Environment
@@ -159,15 +159,15 @@ class Bench:
         self.examine = _built(term, module, self.width)
         self.Params = np.dtype(self.examine.Params.numpy_dtype())
 
-    def setting(self, parameters: Mapping[str, np.ndarray], elsewhere: bool = False) -> Setting:
-        """The setting that packed() receives.
+    def context(self, parameters: Mapping[str, np.ndarray], elsewhere: bool = False) -> PackingContext:
+        """The context that packed() receives.
 
         Args:
             parameters: parameters of the scene by name, each (1, ...) or (n, ...).
             elsewhere: whether the kernel's axes are TURN at ORIGIN; by default they are the user's.
 
         Returns:
-            The setting for `count` members.
+            The context for `count` members.
         """
         I6 = vehicle.inertia6(parameters)
         n, none = len(I6), np.zeros((len(I6), 3, 3))
@@ -176,7 +176,7 @@ class Bench:
         M, _, Js = inertia.schur(I6)
         M, Js = (np.swapaxes(Q, 1, 2) @ A @ Q for A in (M, Js))
         frame = Frame(Q, origin, origin, M, np.einsum("nii->ni", Js), none, none)
-        return Setting(parameters, frame, np.arange(self.count), self.seed, KICK)
+        return PackingContext(parameters, frame, np.arange(self.count), self.seed, KICK)
 
     def at(self, views: Views) -> dict[str, np.ndarray]:
         """Evaluate every role of the law.
@@ -195,11 +195,11 @@ class Bank(Packets):
 
     Args:
         bench: the bench with the term and the compiled kernel.
-        setting: what packed() receives.
+        context: what packed() receives.
         views: views at which the law's memory is first updated.
     """
 
-    def __init__(self, bench: Bench, setting: Setting, views: Views):
+    def __init__(self, bench: Bench, context: PackingContext, views: Views):
         # What Packets asks of a Plan and of Members to pack laws.
         plan: Any = SimpleNamespace(
             model=SimpleNamespace(laws=((bench.term, bench.module),)),
@@ -207,10 +207,10 @@ class Bank(Packets):
             dtypes=(None, bench.Params, None),
             dtype="float64",
         )
-        members: Any = SimpleNamespace(count=bench.count, parameters=setting.parameters, indices=setting.members)
-        self.plan, self.members, self.frame, self.bench = plan, members, setting.frame, bench
+        members: Any = SimpleNamespace(count=bench.count, parameters=context.parameters, indices=context.members)
+        self.plan, self.members, self.frame, self.bench = plan, members, context.frame, bench
         self.count = bench.count // bench.width
-        params, table, memory = self._laws(setting)
+        params, table, memory = self._laws(context)
         Lane = bench.examine.Lane
         self.params = wp.array(params, dtype=bench.examine.Params, device="cpu")
         self.table, self.memory = (wp.array(x, dtype=Lane, shape=x.shape[:2], device="cpu") for x in (table, memory))

@@ -15,7 +15,7 @@ from lgvi_warp.common.machine import default_width
 from lgvi_warp.engine import model
 from lgvi_warp.engine.laws.bench import ORIGIN, TURN, Bank, Bench, Views, short, simple_scene, sizes
 from lgvi_warp.physics import notation, terms
-from lgvi_warp.physics.terms.base import Packed, Setting, Term
+from lgvi_warp.physics.terms.base import Packed, PackingContext, Term
 from lgvi_warp.physics.terms.events import Event
 from lgvi_warp.scene.scene import Scene
 
@@ -134,14 +134,14 @@ def _judged(name: str, difference: np.ndarray, allowed: np.ndarray | float, view
 
 def _numbers(bench: Bench, step: float) -> Iterator[Check]:
     """Whether packed() fills what params() names; then packs, and lets the law remember once."""
-    term, setting = bench.term, bench.setting(bench.parameters)
+    term, context = bench.term, bench.context(bench.parameters)
     try:
-        packed = term.packed(bench.own, setting)
+        packed = term.packed(bench.own, context)
     except Exception as error:
         packed = f"fails: {type(error).__name__}: {error}"  # type: ignore[assignment]
     if not isinstance(packed, Packed):
         text = packed if isinstance(packed, str) else f"returns {packed!r:.60}"
-        remedy = "write packed(self, own, setting) that returns lw.Packed({name: numbers}), names as in params()"
+        remedy = "write packed(self, numbers, context) that returns lw.Packed({name: numbers}), names as in params()"
         yield Check("packed", 1.0, 0.0, False, f"packed() {text}; {remedy}")
         return
     filled = set(packed.values) | ({"first"} if packed.rows is not None else set())
@@ -156,7 +156,7 @@ def _numbers(bench: Bench, step: float) -> Iterator[Check]:
     text = "" if good else f"{type(term).__name__}.memory must say whether packed() gives memory"
     yield Check("memory", float(not good), 0.0, good, text)
     if good and not wrong:
-        packets = _attempt(lambda: Bank(bench, setting, bench.views), "with shared numbers")
+        packets = _attempt(lambda: Bank(bench, context, bench.views), "with shared numbers")
         if isinstance(packets, str):
             yield Check(
                 "packed", 1.0, 0.0, False, f"{packets}; give arrays (1,), (1, 3) or (n,), (n, 3), and whole numbers"
@@ -207,7 +207,7 @@ def _packing(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
     back = np.arange(bench.count).reshape(-1, bench.width)[:, ::-1].reshape(-1)
     mixed = bench.at(Views(**{name: value[back] for name, value in vars(views).items()}))
     each = {name: np.repeat(value, bench.count, axis=0) for name, value in bench.parameters.items()}
-    varied = _tried(bench, bench.setting(each), views, "where numbers have one entry a member")
+    varied = _tried(bench, bench.context(each), views, "where numbers have one entry a member")
     for role, value in here.items():
         yield _judged(f"{role}: lanes apart", mixed[role][back] - value, 0.0, views, "a lane must not look at others")
         if isinstance(varied, str):
@@ -221,9 +221,9 @@ def _packing(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
         yield from _axes(bench, here)
 
 
-def _tried(bench: Bench, setting: Setting, views: Views, where: str) -> dict[str, np.ndarray] | str:
-    """The law's numbers by role in another setting, or a message where packed() fails in it."""
-    return _attempt(lambda: Bank(bench, setting, views).evaluate(views), where)
+def _tried(bench: Bench, context: PackingContext, views: Views, where: str) -> dict[str, np.ndarray] | str:
+    """The law's numbers by role in another context, or a message where packed() fails in it."""
+    return _attempt(lambda: Bank(bench, context, views).evaluate(views), where)
 
 
 def _attempt(make: Callable[[], Any], where: str) -> Any:
@@ -237,7 +237,7 @@ def _attempt(make: Callable[[], Any], where: str) -> Any:
 def _axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
     """The same wrench from a frame with other axes and origin."""
     views, turned_views = bench.views, bench.views.elsewhere()
-    turned = _tried(bench, bench.setting(bench.parameters, True), turned_views, "in other axes of the body")
+    turned = _tried(bench, bench.context(bench.parameters, True), turned_views, "in other axes of the body")
     for role in set(here) & {"law", "damping"}:
         if isinstance(turned, str):
             yield Check(f"{role}: any axes", np.inf, 0.0, False, turned)
@@ -250,7 +250,7 @@ def _axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
         limit = (
             ROUNDINGS * EPS * max(np.abs(here[role]).max(), np.abs(turned[role]).max(), np.abs(wrench).max()) * 100.0
         )
-        remedy = "turn vectors by setting.frame.vector(), points by .point(), torques by .torque() in packed()"
+        remedy = "turn vectors by context.frame.vector(), points by .point(), torques by .torque() in packed()"
         yield _judged(f"{role}: any axes", difference, limit, views, remedy)
 
 
@@ -378,11 +378,11 @@ def _water(bench: Bench, u: Callable[[Views], np.ndarray], rounded: np.ndarray) 
     term, views = bench.term, bench.views
     velocity = term.water(bench.own, views.position[:, None], views.time, bench.parameters)
     if velocity is None and type(term).water_at_start is Term.water_at_start:
-        text = f"write water(own, position, time, parameters) in {type(term).__name__}: start and energy need it"
+        text = f"write water(numbers, position, time, parameters) in {type(term).__name__}: start and energy need it"
         return Check("flow: water()", np.inf, 0.0, False, text)
     if velocity is None:
         views = views.changed(time=0.0 * views.time)
-        host = term.water_at_start(bench.own, views.position, bench.setting(bench.parameters))
+        host = term.water_at_start(bench.own, views.position, bench.context(bench.parameters))
     else:
         host = velocity[:, 0]
     limit = ROUNDINGS * EPS * (max(np.abs(host).max(), 1e-300) + rounded)

@@ -8,7 +8,7 @@ from typing import Any
 
 from lgvi_warp.common.errors import Faults, SceneError, closest, shown
 from lgvi_warp.common.names import folded
-from lgvi_warp.physics.terms.base import AnyTerm, Packed, Setting, Term, build, few_enough, quantity
+from lgvi_warp.physics.terms.base import AnyTerm, Packed, PackingContext, Term, build, few_enough, number
 from lgvi_warp.physics.terms.control_fins import ControlFins
 from lgvi_warp.physics.terms.cross_flow import CrossFlow
 from lgvi_warp.physics.terms.current import Current, CurrentProfile
@@ -35,7 +35,7 @@ RESERVED = ("vehicle", "environment", "start")
 IMPLIED: tuple[Term, ...] = (Weight(), Restoring())
 
 
-def register(kind: type[AnyTerm]) -> type[AnyTerm]:
+def register_term(kind: type[AnyTerm]) -> type[AnyTerm]:
     """Make a user's term or event known to scene files by its `type`. It may be used as a decorator of the class.
 
     Args:
@@ -147,8 +147,8 @@ __all__ = [
     "Fins",
     "GaussMarkovCurrent",
     "Packed",
+    "PackingContext",
     "Restoring",
-    "Setting",
     "Stratification",
     "Term",
     "Tether",
@@ -160,6 +160,6 @@ __all__ = [
     "WrenchSchedule",
     "build",
     "from_list",
-    "quantity",
-    "register",
+    "number",
+    "register_term",
 ]

@@ -21,7 +21,7 @@ CONSERVED = frozenset({"energy", "horizontal_momentum", "vertical_angular_moment
 
 
 @dataclass(frozen=True)
-class Setting:
+class PackingContext:
     """What a term may look at when it packs its numbers for the device: the scene's parameters, the frame, the run.
 
     Args:
@@ -59,7 +59,7 @@ class Packed(NamedTuple):
     work: int = 0
 
 
-def quantity(
+def number(
     shape: tuple[Any, ...], unit: str, default: Any = dataclasses.MISSING, least: float = -np.inf, most: float = np.inf
 ) -> Any:
     """Declare a numeric field of a term.
@@ -85,7 +85,7 @@ def quantity(
 class Term:
     """A force, a moment or a motion of the water that a scene names.
 
-    Fields declared by `quantity` are arrays after construction.
+    Fields declared by `number` are arrays after construction.
 
     Class attributes: `type` is the name in a scene file; `device` is the module of lgvi_kernels.laws by name, or any object
     with the same functions; `timed` says whether the law depends on time; `dissipative`, whether its damping never creates
@@ -116,7 +116,7 @@ class Term:
         elif self.key and (wrong := names.wrong_with(self.key)):
             faults.add("name" if self.name else "type", self.key, *wrong)
         lengths: dict[str, int] = {}
-        for item in self.quantities():
+        for item in self.number_fields():
             value = getattr(self, item.name)
             object.__setattr__(self, item.name, _checked(faults, item, value, lengths))
         if not faults:
@@ -124,11 +124,11 @@ class Term:
         faults.raise_if_any()
 
     @classmethod
-    def quantities(cls) -> tuple[dataclasses.Field[Any], ...]:
+    def number_fields(cls) -> tuple[dataclasses.Field[Any], ...]:
         """The fields that hold numbers.
 
         Returns:
-            The dataclass fields declared by `quantity`, in the order of the class.
+            The dataclass fields declared by `number`, in the order of the class.
         """
         return tuple(item for item in dataclasses.fields(cls) if "shape" in item.metadata)
 
@@ -150,30 +150,30 @@ class Term:
         Returns:
             The array of each numeric field, by the field's name, in the field's own shape.
         """
-        return {item.name: getattr(self, item.name) for item in self.quantities()}
+        return {item.name: getattr(self, item.name) for item in self.number_fields()}
 
-    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         """Which members have numbers that this term cannot take: not finite, or out of bounds.
 
         Args:
-            own: The term's numbers by field, each of shape (n, ...).
+            numbers: The term's numbers by field, each of shape (n, ...).
 
         Returns:
             A mask (n,) for each numeric field, True where the member's number is refused.
         """
         bad = {}
-        for item in self.quantities():
-            value = own[item.name].reshape(len(own[item.name]), -1)
+        for item in self.number_fields():
+            value = numbers[item.name].reshape(len(numbers[item.name]), -1)
             low, high = item.metadata["least"], item.metadata["most"]
             with np.errstate(invalid="ignore"):
                 bad[item.name] = ~np.all(np.isfinite(value) & (value >= low) & (value <= high), axis=1)
         return bad
 
-    def present(self, own: Numbers) -> bool:
+    def present(self, numbers: Numbers) -> bool:
         """Whether any member feels the term; by default always, since the scene names it.
 
         Args:
-            own: The term's numbers by field, each of shape (n, ...).
+            numbers: The term's numbers by field, each of shape (n, ...).
 
         Returns:
             False where the term has no effect, so that the kernel leaves its code out.
@@ -202,19 +202,19 @@ class Term:
         """The device code for the axes of this run.
 
         Args:
-            aligned: As of `Setting`: whether the kernel's axes and origin are the user's.
+            aligned: As of `PackingContext`: whether the kernel's axes and origin are the user's.
 
         Returns:
             The name of a module of lgvi_kernels.laws, or an object with the same functions.
         """
         return self.device
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Pack the term's numbers for its device code, in the kernel's axes. Every term must define this.
 
         Args:
-            own: The term's numbers by field, each of shape (n, ...), n = 1 where members share them.
-            setting: The scene's parameters, the frame and the run.
+            numbers: The term's numbers by field, each of shape (n, ...), n = 1 where members share them.
+            context: The scene's parameters, the frame and the run.
 
         Returns:
             The fields of the device struct, and the rows, memory and scratch rows that the device code needs.
@@ -222,13 +222,13 @@ class Term:
         Raises:
             NotImplementedError: Where the term does not define it.
         """
-        raise NotImplementedError(f"{type(self).__name__} must define packed(own, setting): see docs/add_a_law.md")
+        raise NotImplementedError(f"{type(self).__name__} must define packed(numbers, context): see docs/add_a_law.md")
 
-    def water(self, own: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray | None:
+    def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray | None:
         """Velocity of the water that this term moves; by default it moves none.
 
         Args:
-            own: The term's numbers by field, each of shape (n, ...).
+            numbers: The term's numbers by field, each of shape (n, ...).
             position: Positions (k, n, 3) [m] in inertial axes.
             time: Times (k,) [s].
             parameters: All parameters of the scene, by name.
@@ -239,30 +239,30 @@ class Term:
         """
         return None
 
-    def water_at_start(self, own: Numbers, position: np.ndarray, setting: Setting) -> np.ndarray:
+    def water_at_start(self, numbers: Numbers, position: np.ndarray, context: PackingContext) -> np.ndarray:
         """Velocity of the water where members start; by default that of `water` at t = 0.
 
         Args:
-            own: The term's numbers by field, each of shape (n, ...).
+            numbers: The term's numbers by field, each of shape (n, ...).
             position: Positions (n, 3) [m] at the start, in inertial axes.
-            setting: The scene's parameters, the frame and the run.
+            context: The scene's parameters, the frame and the run.
 
         Returns:
             Velocity (n, 3) [m/s] in inertial axes.
         """
-        still = self.water(own, position[None], np.zeros(1), setting.parameters)
+        still = self.water(numbers, position[None], np.zeros(1), context.parameters)
         return np.zeros_like(position) if still is None else still[0]
 
     def potential(
-        self, own: Numbers, position: np.ndarray, attitude: np.ndarray, setting: Numbers
+        self, numbers: Numbers, position: np.ndarray, attitude: np.ndarray, parameters: Numbers
     ) -> np.ndarray | float:
         """Potential energy of the law at sampled states.
 
         Args:
-            own: The term's numbers by field, each of shape (n, ...).
+            numbers: The term's numbers by field, each of shape (n, ...).
             position: Positions (k, n, 3) [m] in inertial axes.
             attitude: Attitudes (k, n, 3, 3), body to inertial axes.
-            setting: All parameters of the scene, by name.
+            parameters: All parameters of the scene, by name.
 
         Returns:
             Energy (k, n) [J]; 0 for a law without a potential.

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, knots, quantity
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number
 from lgvi_warp.physics.terms.fins import Fins, fin_rows, side_by_side
 from lgvi_warp.physics.terms.wrench import commands, first_row, not_rising, refuse_idle, rising
 
@@ -39,11 +39,11 @@ class ControlFins(Fins):
     device: ClassVar[str] = "control_fins"
     timed: ClassVar[bool] = True
 
-    limit: Any = quantity(("n",), "rad", 0.35, least=0.0)
-    rate_limit: Any = quantity(("n",), "rad/s", UNLIMITED, least=0.0)
-    command: Any = quantity(("n",), "rad", None)
-    times: Any = quantity(("k",), "s", None)
-    command_schedule: Any = quantity(("k", "n"), "rad", None)
+    limit: Any = number(("n",), "rad", 0.35, least=0.0)
+    rate_limit: Any = number(("n",), "rad/s", UNLIMITED, least=0.0)
+    command: Any = number(("n",), "rad", None)
+    times: Any = number(("k",), "s", None)
+    command_schedule: Any = number(("k", "n"), "rad", None)
 
     def __post_init__(self) -> None:
         first = first_row(self.command_schedule)
@@ -64,12 +64,12 @@ class ControlFins(Fins):
         if self.__dict__["_both"]:
             faults.add("command", self.command, "is given beside command_schedule", "keep one of them")
 
-    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         """In addition, refuses times that do not rise; raises SceneError for members' numbers that would have no effect."""
-        bad = super().unphysical(own)
-        bad["times"] = bad["times"] | not_rising(own["times"])
+        bad = super().unphysical(numbers)
+        bad["times"] = bad["times"] | not_rising(numbers["times"])
         remedy = f"give {self.key}.rate_limit below {UNLIMITED:g} rad/s in the scene as well"
-        refuse_idle(self, own, "rate_limit", own["rate_limit"] < UNLIMITED, remedy)
+        refuse_idle(self, numbers, "rate_limit", numbers["rate_limit"] < UNLIMITED, remedy)
         return bad
 
     @property
@@ -77,17 +77,17 @@ class ControlFins(Fins):
         """Whether the rate of some fin is limited."""
         return bool(np.any(self.rate_limit < UNLIMITED))
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The device rows: those of each fin, then the command table of each fin."""
-        fins = side_by_side([fin_rows(own, setting), own["limit"][..., None], own["rate_limit"][..., None]])
-        times, schedule = commands(own)
+        fins = side_by_side([fin_rows(numbers, context), numbers["limit"][..., None], numbers["rate_limit"][..., None]])
+        times, schedule = commands(numbers)
         count = schedule.shape[2]
         tables = [knots(times, schedule[:, :, i : i + 1]) for i in range(count)]
         rows = side_by_side([fins.reshape(len(fins), -1), *tables])
         values = {"count": count, "knots": times.shape[1] - 1, "limited": int(self.memory), "memory": 0}
         if not self.memory:
             return Packed(values, rows, work=2 * count)
-        start = np.clip(_at_start(times, schedule), -own["limit"], own["limit"])
+        start = np.clip(_at_start(times, schedule), -numbers["limit"], numbers["limit"])
         return Packed(values, rows, start, 2 * count)
 
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantity
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 from lgvi_warp.physics.terms.fins import side_by_side, twist
 from lgvi_warp.physics.terms.wrench import not_rising, rising
 
@@ -35,9 +35,9 @@ class CrossFlow(Term):
     type: ClassVar[str] = "cross_flow"
     device: ClassVar[str] = "cross_flow"
 
-    stations: Any = quantity(("k",), "m")
-    diameters: Any = quantity(("k",), "m", least=0.0)
-    drag_coefficient: Any = quantity(("k",), "1", least=0.0)
+    stations: Any = number(("k",), "m")
+    diameters: Any = number(("k",), "m", least=0.0)
+    drag_coefficient: Any = number(("k",), "1", least=0.0)
 
     def __post_init__(self) -> None:
         if np.ndim(np.asarray(self.drag_coefficient, dtype=object)) == 0:
@@ -51,23 +51,23 @@ class CrossFlow(Term):
         if len(self.stations) < 2:
             faults.add("stations", self.stations, "has one station", "give two or more, from stern to bow")
 
-    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         """In addition, refuses members whose stations do not rise."""
-        bad = super().unphysical(own)
-        bad["stations"] = bad["stations"] | not_rising(own["stations"])
+        bad = super().unphysical(numbers)
+        bad["stations"] = bad["stations"] | not_rising(numbers["stations"])
         return bad
 
-    def present(self, own: Numbers) -> bool:
+    def present(self, numbers: Numbers) -> bool:
         """Whether some member has a diameter and a drag coefficient above 0."""
-        return bool(np.any(own["diameters"]) and np.any(own["drag_coefficient"]))
+        return bool(np.any(numbers["diameters"]) and np.any(numbers["drag_coefficient"]))
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The two directions across the hull, and two strips per segment: station, and rho/2 Cd D times its length."""
-        a, b = (twist(setting.frame, np.zeros((1, 3)), direction) for direction in ACROSS)
+        a, b = (twist(context.frame, np.zeros((1, 3)), direction) for direction in ACROSS)
         values: dict[str, Any] = {"a": a[:, :3], "a_arm": a[:, 3:], "b": b[:, :3], "b_arm": b[:, 3:]}
-        stations, strength = own["stations"], own["drag_coefficient"] * own["diameters"]
+        stations, strength = numbers["stations"], numbers["drag_coefficient"] * numbers["diameters"]
         half_length = 0.5 * np.diff(stations)
-        half_density = 0.5 * setting.parameters["environment.water_density"][:, None]
+        half_density = 0.5 * context.parameters["environment.water_density"][:, None]
         strips = []
         for place in GAUSS:
             x, c = (table[:, :-1] + place * np.diff(table) for table in (stations, strength))

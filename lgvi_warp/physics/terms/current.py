@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, knots, quantity
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number
 from lgvi_warp.physics.terms.wrench import not_rising, rising
 
 
@@ -23,19 +23,19 @@ class Current(Term):
     type: ClassVar[str] = "current"
     device: ClassVar[str] = "current"
 
-    velocity: Any = quantity((3,), "m/s")
+    velocity: Any = number((3,), "m/s")
 
-    def present(self, own: Numbers) -> bool:
+    def present(self, numbers: Numbers) -> bool:
         """Whether the current of some member is not zero."""
-        return bool(np.any(own["velocity"]))
+        return bool(np.any(numbers["velocity"]))
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The velocity unchanged: the kernel's inertial axes are the user's."""
-        return Packed({"velocity": own["velocity"]})
+        return Packed({"velocity": numbers["velocity"]})
 
-    def water(self, own: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
+    def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
         """The same velocity (k, n, 3) [m/s] at all positions and times."""
-        return np.broadcast_to(own["velocity"], position.shape)
+        return np.broadcast_to(numbers["velocity"], position.shape)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -53,25 +53,25 @@ class CurrentProfile(Term):
     type: ClassVar[str] = "current_profile"
     device: ClassVar[str] = "current_profile"
 
-    depths: Any = quantity(("k",), "m")
-    velocities: Any = quantity(("k", 3), "m/s")
+    depths: Any = number(("k",), "m")
+    velocities: Any = number(("k", 3), "m/s")
 
     def check(self, faults: Faults) -> None:
         """Adds a fault where depths do not rise."""
         rising(faults, "depths", self.depths)
 
-    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         """In addition, refuses members whose depths do not rise."""
-        bad = super().unphysical(own)
-        return bad | {"depths": bad["depths"] | not_rising(own["depths"])}
+        bad = super().unphysical(numbers)
+        return bad | {"depths": bad["depths"] | not_rising(numbers["depths"])}
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The table as device rows, knot by knot."""
-        return Packed({"count": own["depths"].shape[1] - 1}, knots(own["depths"], own["velocities"]))
+        return Packed({"count": numbers["depths"].shape[1] - 1}, knots(numbers["depths"], numbers["velocities"]))
 
-    def water(self, own: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
+    def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
         """Velocity (k, n, 3) [m/s] at the depth of each position, whatever the time."""
-        depths, velocities = own["depths"], own["velocities"]
+        depths, velocities = numbers["depths"], numbers["velocities"]
         result = np.empty(position.shape)
         for i in range(position.shape[1]):
             at, values = depths[i % len(depths)], velocities[i % len(velocities)]

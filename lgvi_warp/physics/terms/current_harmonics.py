@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantity
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 
 
 def above_zero(faults: Faults, key: str, values: np.ndarray, unit: str) -> None:
@@ -66,9 +66,9 @@ class CurrentHarmonics(Term):
     device: ClassVar[str] = "current_harmonics"
     timed: ClassVar[bool] = True
 
-    amplitudes: Any = quantity(("k", 3), "m/s")
-    periods: Any = quantity(("k",), "s")
-    phases: Any = quantity(("k",), "rad", None)
+    amplitudes: Any = number(("k", 3), "m/s")
+    periods: Any = number(("k",), "s")
+    phases: Any = number(("k",), "rad", None)
 
     def __post_init__(self) -> None:
         if self.phases is None:
@@ -79,26 +79,26 @@ class CurrentHarmonics(Term):
         """Adds a fault where a period is not above 0."""
         above_zero(faults, "periods", self.periods, "s")
 
-    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         """In addition, refuses members with a period that is not above 0."""
-        bad = super().unphysical(own)
-        return bad | {"periods": bad["periods"] | not_above_zero(own["periods"])}
+        bad = super().unphysical(numbers)
+        return bad | {"periods": bad["periods"] | not_above_zero(numbers["periods"])}
 
-    def present(self, own: Numbers) -> bool:
+    def present(self, numbers: Numbers) -> bool:
         """Whether some amplitude of some member is not zero."""
-        return bool(np.any(own["amplitudes"]))
+        return bool(np.any(numbers["amplitudes"]))
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Device rows of each harmonic: amplitude, angular frequency [rad/s], phase."""
-        columns = [own["amplitudes"], 2.0 * np.pi / own["periods"][..., None], own["phases"][..., None]]
+        columns = [numbers["amplitudes"], 2.0 * np.pi / numbers["periods"][..., None], numbers["phases"][..., None]]
         n = max(len(column) for column in columns)
         rows = np.concatenate([np.broadcast_to(column, (n, *column.shape[1:])) for column in columns], axis=2)
         return Packed({"count": rows.shape[1]}, rows.reshape(n, -1))
 
-    def water(self, own: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
+    def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
         """Velocity (k, n, 3) [m/s] at each time, the same at all positions."""
         total = np.zeros(position.shape)
-        for j in range(own["periods"].shape[1]):
-            angle = 2.0 * np.pi / own["periods"][:, j] * time[:, None] + own["phases"][:, j]
-            total = total + np.cos(angle)[..., None] * own["amplitudes"][:, j]
+        for j in range(numbers["periods"].shape[1]):
+            angle = 2.0 * np.pi / numbers["periods"][:, j] * time[:, None] + numbers["phases"][:, j]
+            total = total + np.cos(angle)[..., None] * numbers["amplitudes"][:, j]
         return total

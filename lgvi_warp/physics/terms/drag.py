@@ -10,7 +10,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics import vehicle
 from lgvi_warp.physics.inertia import Frame, motion_from
-from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantity
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 
 ZEROS = (0.0,) * 6
 # Off-diagonal elements below this fraction of the largest are round-off of the turned axes.
@@ -38,29 +38,29 @@ class Drag(Term):
     type: ClassVar[str] = "drag"
     device: ClassVar[str] = "drag_matrix"
 
-    linear: Any = quantity((6,), "N s/m, N m s", ZEROS, least=0.0)
-    quadratic: Any = quantity((6,), "N s2/m2, N m s2", ZEROS, least=0.0)
+    linear: Any = number((6,), "N s/m, N m s", ZEROS, least=0.0)
+    quadratic: Any = number((6,), "N s2/m2, N m s2", ZEROS, least=0.0)
 
-    def present(self, own: Numbers) -> bool:
+    def present(self, numbers: Numbers) -> bool:
         """Whether some coefficient is not zero."""
-        return bool(np.any(own["linear"]) or np.any(own["quadratic"]))
+        return bool(np.any(numbers["linear"]) or np.any(numbers["quadratic"]))
 
-    def parts(self, own: Numbers) -> tuple[str, ...]:
+    def parts(self, numbers: Numbers) -> tuple[str, ...]:
         """Which parts of the exact flow some member has.
 
         Args:
-            own: The term's numbers by field, each of shape (n, 6).
+            numbers: The term's numbers by field, each of shape (n, 6).
 
         Returns:
             Names of `PARTS`: "linear_force" and so on.
         """
-        return tuple(part for part, (kind, half) in PARTS.items() if np.any(own[kind][:, half]))
+        return tuple(part for part, (kind, half) in PARTS.items() if np.any(numbers[kind][:, half]))
 
-    def packed_exact(self, own: Numbers, frame: Frame, scale: np.ndarray) -> Packed:
+    def packed_exact(self, numbers: Numbers, frame: Frame, scale: np.ndarray) -> Packed:
         """The numbers for the exact flow of drag, which acts on each momentum by itself.
 
         Args:
-            own: The term's numbers by field, each of shape (n, 6).
+            numbers: The term's numbers by field, each of shape (n, 6).
             frame: The kernel's frame, whose axes are the user's up to their order (`has_exact_flow`).
             scale: The factor by which the kernel divides momenta, (1,) or (n,).
 
@@ -70,39 +70,39 @@ class Drag(Term):
         inertia = {"force": np.einsum("nii->ni", frame.M), "torque": frame.J}
         values = {}
         for where, half in (("force", slice(0, 3)), ("torque", slice(3, 6))):
-            linear, quadratic = (_turned(frame.Q, own[kind][:, half]) for kind in ("linear", "quadratic"))
+            linear, quadratic = (_turned(frame.Q, numbers[kind][:, half]) for kind in ("linear", "quadratic"))
             values[f"linear_{where}"] = linear / inertia[where]
             values[f"quadratic_{where}"] = quadratic * scale[:, None] / inertia[where] ** 2
         return Packed(values)
 
-    def packed_directions(self, own: Numbers, setting: Setting) -> Packed:
+    def packed_directions(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The numbers for drag along one axis after the other, where inertia is coupled.
 
         Args:
-            own: The term's numbers by field, each of shape (n, 6).
-            setting: The scene's parameters, the frame and the run.
+            numbers: The term's numbers by field, each of shape (n, 6).
+            context: The scene's parameters, the frame and the run.
 
         Returns:
             For each axis the column of the inverse inertia, divided by its diagonal element L, and the coefficients times L.
         """
-        frame = setting.frame
+        frame = context.frame
         scale = frame.J.max(axis=1)
-        inverse = np.linalg.inv(vehicle.inertia6(setting.parameters))
+        inverse = np.linalg.inv(vehicle.inertia6(context.parameters))
         L = np.einsum("nii->ni", inverse)
         columns = inverse / L[:, None, :]
         values = {"turn": frame.Q, "origin": frame.forces}
         for where, half in (("force", slice(0, 3)), ("torque", slice(3, 6))):
             values[f"mass_{where}"] = 1.0 / (L[:, half] * scale[:, None])
             for kind in ("linear", "quadratic"):
-                values[f"{kind}_{where}"] = own[kind][:, half] * L[:, half]
+                values[f"{kind}_{where}"] = numbers[kind][:, half] * L[:, half]
         for j, axis in enumerate("uvwpqr"):
             values[f"velocity_{axis}"], values[f"rate_{axis}"] = columns[:, :3, j], columns[:, 3:, j]
         return Packed(values)
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The coefficients as diagonal matrices, packed as those of `DragMatrix`."""
-        matrices = {kind: own[kind][:, :, None] * np.eye(6) for kind in ("linear", "quadratic")}
-        return packed_matrix(matrices["linear"], matrices["quadratic"], setting)
+        matrices = {kind: numbers[kind][:, :, None] * np.eye(6) for kind in ("linear", "quadratic")}
+        return packed_matrix(matrices["linear"], matrices["quadratic"], context)
 
     def device_in(self, aligned: bool) -> str:
         """The device code of `DragMatrix`, in the form for these axes."""
@@ -149,8 +149,8 @@ class DragMatrix(Term):
     type: ClassVar[str] = "drag_matrix"
     device: ClassVar[str] = "drag_matrix"
 
-    linear: Any = quantity((6, 6), "N s/m, N s, N m s", ((0.0,) * 6,) * 6)
-    quadratic: Any = quantity((6, 6), "N s2/m2, N s2, N m s2", ((0.0,) * 6,) * 6)
+    linear: Any = number((6, 6), "N s/m, N s, N m s", ((0.0,) * 6,) * 6)
+    quadratic: Any = number((6, 6), "N s2/m2, N s2, N m s2", ((0.0,) * 6,) * 6)
 
     def check(self, faults: Faults) -> None:
         """Adds a fault where a matrix creates energy."""
@@ -161,20 +161,20 @@ class DragMatrix(Term):
             if bad:
                 faults.add(kind, matrix, f"creates energy at the velocity {np.round(velocity, 3).tolist()}", remedy)
 
-    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         """In addition, refuses members whose matrix creates energy."""
-        bad = super().unphysical(own)
+        bad = super().unphysical(numbers)
         for kind in ("linear", "quadratic"):
-            bad[kind] = bad[kind] | _creates_energy(np.nan_to_num(own[kind]), kind == "quadratic")[0]
+            bad[kind] = bad[kind] | _creates_energy(np.nan_to_num(numbers[kind]), kind == "quadratic")[0]
         return bad
 
-    def present(self, own: Numbers) -> bool:
+    def present(self, numbers: Numbers) -> bool:
         """Whether some coefficient is not zero."""
-        return bool(np.any(own["linear"]) or np.any(own["quadratic"]))
+        return bool(np.any(numbers["linear"]) or np.any(numbers["quadratic"]))
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The matrices in the axes and about the origin of the forces."""
-        return packed_matrix(own["linear"], own["quadratic"], setting)
+        return packed_matrix(numbers["linear"], numbers["quadratic"], context)
 
     def device_in(self, aligned: bool) -> str:
         """The code that reads matrices directly, or for turned axes the code that first finds the user's velocities."""
@@ -202,7 +202,7 @@ def _creates_energy(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, 
     return bad, worst
 
 
-def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, setting: Setting) -> Packed:
+def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, context: PackingContext) -> Packed:
     """Device rows of drag matrices: the linear matrix, then the quadratic one.
 
     Where the kernel's axes are turned, the quadratic part is given for each velocity that has a column: its twist (6), which
@@ -211,19 +211,19 @@ def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, setting: Setting) -
     Args:
         linear: Linear coefficients (n, 6, 6), user's axes and origin.
         quadratic: Quadratic coefficients (n, 6, 6), user's axes and origin.
-        setting: The scene's parameters, the frame and the run.
+        context: The scene's parameters, the frame and the run.
 
     Returns:
         The rows, and which parts are present.
     """
     # X gives the user's velocities from those at the origin of the forces in the kernel's axes.
-    X = motion_from(setting.frame.forces, setting.frame.Q)
+    X = motion_from(context.frame.forces, context.frame.Q)
     n = max(len(linear), len(quadratic), len(X))
     X = np.broadcast_to(X, (n, 6, 6))
     XT = np.swapaxes(X, 1, 2)
     values = {"constant": int(np.any(linear))}
     rows = [(XT @ linear @ X).reshape(n, 36)]
-    if setting.aligned:
+    if context.aligned:
         rows.append((XT @ quadratic @ X).reshape(n, 36))
         return Packed(values | {"quadratic": int(np.any(quadratic))}, np.concatenate(rows, axis=1))
     columns = [j for j in range(6) if np.any(quadratic[:, :, j])]

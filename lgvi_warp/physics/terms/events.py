@@ -10,7 +10,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError, closest, shown
 from lgvi_warp.common.status import Status
-from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, build, few_enough, quantity
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, build, few_enough, number
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -28,9 +28,9 @@ class Event(Term):
     kinds: ClassVar[dict[str, Any]] = {}
     acts: ClassVar[bool] = False
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The numbers unchanged: events look at the position of the body's origin, in inertial axes."""
-        return Packed(dict(own))
+        return Packed(dict(numbers))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -45,7 +45,7 @@ class Surface(Event):
     device: ClassVar[str] = "surface"
     status: ClassVar[Status] = Status.SURFACE
 
-    depth: Any = quantity((), "m", 0.0)
+    depth: Any = number((), "m", 0.0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -60,7 +60,7 @@ class Floor(Event):
     device: ClassVar[str] = "floor"
     status: ClassVar[Status] = Status.FLOOR
 
-    depth: Any = quantity((), "m")
+    depth: Any = number((), "m")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -76,13 +76,13 @@ class Box(Event):
     device: ClassVar[str] = "box"
     status: ClassVar[Status] = Status.BOX
 
-    lower: Any = quantity((3,), "m")
-    upper: Any = quantity((3,), "m")
+    lower: Any = number((3,), "m")
+    upper: Any = number((3,), "m")
 
-    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         """In addition, refuses members whose corners span no box."""
-        bad = super().unphysical(own)
-        crossed = np.any(own["upper"] <= own["lower"], axis=1)
+        bad = super().unphysical(numbers)
+        crossed = np.any(numbers["upper"] <= numbers["lower"], axis=1)
         return {"lower": bad["lower"] | crossed, "upper": bad["upper"] | crossed}
 
     def check(self, faults: Faults) -> None:
@@ -106,7 +106,7 @@ class StopTime(Event):
     status: ClassVar[Status] = Status.TIME
     timed: ClassVar[bool] = True
 
-    at: Any = quantity((), "s", least=0.0)
+    at: Any = number((), "s", least=0.0)
 
 
 TYPES = Event.kinds

@@ -9,7 +9,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.inertia import Frame
-from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantity
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 
 # Below this sine of the angle between them, chord and normal count as parallel.
 PARALLEL = 1e-6
@@ -37,13 +37,13 @@ class Fins(Term):
     type: ClassVar[str] = "fins"
     device: ClassVar[str] = "fins"
 
-    position: Any = quantity(("n", 3), "m")
-    chord: Any = quantity(("n", 3), "1")
-    normal: Any = quantity(("n", 3), "1")
-    area: Any = quantity(("n",), "m2", least=0.0)
-    lift_slope: Any = quantity(("n",), "1/rad", least=0.0)
-    drag: Any = quantity(("n",), "1", least=0.0)
-    drag_normal: Any = quantity(("n",), "1", 0.0, least=0.0)
+    position: Any = number(("n", 3), "m")
+    chord: Any = number(("n", 3), "1")
+    normal: Any = number(("n", 3), "1")
+    area: Any = number(("n",), "m2", least=0.0)
+    lift_slope: Any = number(("n",), "1/rad", least=0.0)
+    drag: Any = number(("n",), "1", least=0.0)
+    drag_normal: Any = number(("n",), "1", 0.0, least=0.0)
 
     def __post_init__(self) -> None:
         self.repeat("area", "lift_slope", "drag", "drag_normal")
@@ -72,17 +72,17 @@ class Fins(Term):
             elif _degenerate(chord, normal):
                 faults.add(f"normal[{i}]", normal, "is along the chord", "give a direction across the fin's plane")
 
-    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         """In addition, refuses members whose chord and normal span no plane."""
-        bad = super().unphysical(own)
-        chord, normal = np.nan_to_num(own["chord"]), np.nan_to_num(own["normal"])
+        bad = super().unphysical(numbers)
+        chord, normal = np.nan_to_num(numbers["chord"]), np.nan_to_num(numbers["normal"])
         bad["chord"] = bad["chord"] | ~np.all(np.any(chord, axis=-1), axis=-1)
         bad["normal"] = bad["normal"] | np.any(_degenerate(chord, normal), axis=-1)
         return bad
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Device rows of each fin, see `fin_rows`."""
-        rows = fin_rows(own, setting)
+        rows = fin_rows(numbers, context)
         count = rows.shape[1]
         return Packed({"count": count}, rows.reshape(len(rows), -1), work=2 * count)
 
@@ -93,24 +93,24 @@ def _degenerate(chord: np.ndarray, normal: np.ndarray) -> Any:
     return np.linalg.norm(np.cross(chord, normal), axis=-1) <= PARALLEL * size
 
 
-def fin_rows(own: Numbers, setting: Setting) -> np.ndarray:
+def fin_rows(numbers: Numbers, context: PackingContext) -> np.ndarray:
     """Device rows of fins: the twists c and n along chord and normal, rho A/2 times the three coefficients, and S and W.
 
     S = c c^T + n n^T and W = n c^T - c n^T, block by block (lgvi_kernels/laws/fins.py).
 
     Args:
-        own: The term's numbers by field, each of shape (members, fins, ...).
-        setting: The scene's parameters, the frame and the run.
+        numbers: The term's numbers by field, each of shape (members, fins, ...).
+        context: The scene's parameters, the frame and the run.
 
     Returns:
         Rows (members, fins, 51).
     """
-    chord = own["chord"] / np.linalg.norm(own["chord"], axis=-1, keepdims=True)
-    normal = own["normal"] - np.sum(own["normal"] * chord, axis=-1, keepdims=True) * chord
+    chord = numbers["chord"] / np.linalg.norm(numbers["chord"], axis=-1, keepdims=True)
+    normal = numbers["normal"] - np.sum(numbers["normal"] * chord, axis=-1, keepdims=True) * chord
     normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-    half = 0.5 * setting.parameters["environment.water_density"][:, None] * own["area"]
-    sizes = [half * own[name] for name in ("lift_slope", "drag", "drag_normal")]
-    c, n = (twist(setting.frame, own["position"], direction) for direction in (chord, normal))
+    half = 0.5 * context.parameters["environment.water_density"][:, None] * numbers["area"]
+    sizes = [half * numbers[name] for name in ("lift_slope", "drag", "drag_normal")]
+    c, n = (twist(context.frame, numbers["position"], direction) for direction in (chord, normal))
     cc, nn, nc = (a[..., :, None] * b[..., None, :] for a, b in ((c, c), (n, n), (n, c)))
     S, W = cc + nn, nc - np.swapaxes(nc, -1, -2)
     off = ([1, 2, 0], [2, 0, 1])

@@ -9,7 +9,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.random import uniforms_of
-from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantity
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 from lgvi_warp.physics.terms.current_harmonics import above_zero, not_above_zero
 from lgvi_warp.physics.terms.wrench_noise import noise_key
 
@@ -33,8 +33,8 @@ class GaussMarkovCurrent(Term):
     device: ClassVar[str] = "gauss_markov_current"
     timed: ClassVar[bool] = True
 
-    standard_deviation: Any = quantity((3,), "m/s", least=0.0)
-    time_constant: Any = quantity((), "s")
+    standard_deviation: Any = number((3,), "m/s", least=0.0)
+    time_constant: Any = number((), "s")
     start: str = "zero"
 
     def check(self, faults: Faults) -> None:
@@ -42,38 +42,38 @@ class GaussMarkovCurrent(Term):
         above_zero(faults, "time_constant", self.time_constant, "s")
         faults.choice("start", self.start, STARTS)
 
-    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         """In addition, refuses members whose time constant is not above 0."""
-        bad = super().unphysical(own)
-        return bad | {"time_constant": bad["time_constant"] | not_above_zero(own["time_constant"])}
+        bad = super().unphysical(numbers)
+        return bad | {"time_constant": bad["time_constant"] | not_above_zero(numbers["time_constant"])}
 
-    def present(self, own: Numbers) -> bool:
+    def present(self, numbers: Numbers) -> bool:
         """Whether some standard deviation is not zero."""
-        return bool(np.any(own["standard_deviation"]))
+        return bool(np.any(numbers["standard_deviation"]))
 
     @property
     def memory(self) -> bool:
         """Always true: the current itself is remembered."""
         return True
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Decay and spread of the process over one step, exact; the memory holds u twice and du/dt."""
-        steps = setting.h / own["time_constant"]
-        spread = own["standard_deviation"] * np.sqrt(-np.expm1(-2.0 * steps))[:, None]
-        first = self._first(own, setting)
-        values = {"decay": np.exp(-steps), "spread": spread} | noise_key(self.key, setting)
+        steps = context.h / numbers["time_constant"]
+        spread = numbers["standard_deviation"] * np.sqrt(-np.expm1(-2.0 * steps))[:, None]
+        first = self._first(numbers, context)
+        values = {"decay": np.exp(-steps), "spread": spread} | noise_key(self.key, context)
         return Packed(values, memory=np.concatenate([first, first, np.zeros_like(first)], axis=1))
 
-    def water_at_start(self, own: Numbers, position: np.ndarray, setting: Setting) -> np.ndarray:
+    def water_at_start(self, numbers: Numbers, position: np.ndarray, context: PackingContext) -> np.ndarray:
         """The current (n, 3) [m/s] of each member at t = 0."""
-        return np.broadcast_to(self._first(own, setting), position.shape)
+        return np.broadcast_to(self._first(numbers, context), position.shape)
 
-    def _first(self, own: Numbers, setting: Setting) -> np.ndarray:
+    def _first(self, numbers: Numbers, context: PackingContext) -> np.ndarray:
         """u at t = 0, (1 or n, 3) [m/s], drawn by seed, member and the term's name, as every number that varies by member."""
         from scipy.special import ndtri
 
         if self.start == "zero":
             return np.zeros((1, 3))
-        name, members = f"{self.key}.start", setting.members
-        u = uniforms_of(setting.seed, name, members, 3)
-        return np.asarray(own["standard_deviation"] * ndtri(u))
+        name, members = f"{self.key}.start", context.members
+        u = uniforms_of(context.seed, name, members, 3)
+        return np.asarray(numbers["standard_deviation"] * ndtri(u))

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from lgvi_warp.physics import vehicle
-from lgvi_warp.physics.terms.base import CONSERVED, Numbers, Packed, Setting, Term
+from lgvi_warp.physics.terms.base import CONSERVED, Numbers, Packed, PackingContext, Term
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -23,13 +23,15 @@ class Weight(Term):
         """All three: its potential depends on depth alone."""
         return CONSERVED
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The net force (m - rho V) g, formed here in float64 since it cancels, whatever the kernel's precision."""
-        return Packed({"net": net(setting.parameters)})
+        return Packed({"net": net(context.parameters)})
 
-    def potential(self, own: Numbers, position: np.ndarray, attitude: np.ndarray, setting: Numbers) -> np.ndarray:
+    def potential(
+        self, numbers: Numbers, position: np.ndarray, attitude: np.ndarray, parameters: Numbers
+    ) -> np.ndarray:
         """Energy U = -net b3, (k, n) [J], b3 the depth."""
-        return -net(setting) * position[..., 2]
+        return -net(parameters) * position[..., 2]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -44,14 +46,16 @@ class Restoring(Term):
         """All three: its potential depends only on the attitude relative to the vertical."""
         return CONSERVED
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The vector B r_b - W r_g [N m] about the origin of the forces, in the kernel's axes."""
-        p, origin = setting.parameters, setting.frame.forces
-        return Packed({"moment": setting.frame.vector(moment(p) + net(p)[:, None] * origin)})
+        p, origin = context.parameters, context.frame.forces
+        return Packed({"moment": context.frame.vector(moment(p) + net(p)[:, None] * origin)})
 
-    def potential(self, own: Numbers, position: np.ndarray, attitude: np.ndarray, setting: Numbers) -> np.ndarray:
+    def potential(
+        self, numbers: Numbers, position: np.ndarray, attitude: np.ndarray, parameters: Numbers
+    ) -> np.ndarray:
         """Energy U = (B r_b - W r_g).R^T e3, (k, n) [J]."""
-        return np.sum(moment(setting) * attitude[..., 2, :], axis=-1)
+        return np.sum(moment(parameters) * attitude[..., 2, :], axis=-1)
 
 
 def net(p: Numbers) -> np.ndarray:

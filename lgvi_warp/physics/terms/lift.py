@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.physics.inertia import motion_from
-from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantity
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -26,15 +26,15 @@ class BodyLift(Term):
     device: ClassVar[str] = "lift"
     dissipative: ClassVar[bool] = False
 
-    matrix: Any = quantity((6, 6), "kg/m, kg, kg m")
+    matrix: Any = number((6, 6), "kg/m, kg, kg m")
 
-    def present(self, own: Numbers) -> bool:
+    def present(self, numbers: Numbers) -> bool:
         """Whether some coefficient is not zero."""
-        return bool(np.any(own["matrix"]))
+        return bool(np.any(numbers["matrix"]))
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Rows that measure u (6), and the matrix (36), in the axes and about the origin of the forces."""
-        X = motion_from(setting.frame.forces, setting.frame.Q)
-        matrix = np.swapaxes(X, 1, 2) @ own["matrix"] @ X
+        X = motion_from(context.frame.forces, context.frame.Q)
+        matrix = np.swapaxes(X, 1, 2) @ numbers["matrix"] @ X
         ahead = np.broadcast_to(X[:, 0, :], (len(matrix), 6))
         return Packed({}, np.concatenate([ahead, matrix.reshape(-1, 36)], axis=1))

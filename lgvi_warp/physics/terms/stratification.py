@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.physics.terms.base import CONSERVED, Numbers, Packed, Setting, Term, quantity
+from lgvi_warp.physics.terms.base import CONSERVED, Numbers, Packed, PackingContext, Term, number
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -25,26 +25,28 @@ class Stratification(Term):
     type: ClassVar[str] = "stratification"
     device: ClassVar[str] = "stratification"
 
-    gradient: Any = quantity((), "1/m")
-    reference_depth: Any = quantity((), "m", 0.0)
+    gradient: Any = number((), "1/m")
+    reference_depth: Any = number((), "m", 0.0)
 
-    def present(self, own: Numbers) -> bool:
+    def present(self, numbers: Numbers) -> bool:
         """Whether the gradient of some member is not zero."""
-        return bool(np.any(own["gradient"]))
+        return bool(np.any(numbers["gradient"]))
 
     @property
     def conserves(self) -> frozenset[str]:
         """All three: its potential depends on the depth of the centre of buoyancy alone."""
         return CONSERVED
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Only the deviation from B, since B itself is part of `Weight`."""
-        center = setting.frame.point(setting.parameters["vehicle.center_of_buoyancy"])
-        stiffness = setting.parameters["vehicle.buoyancy"] * own["gradient"]
-        return Packed({"stiffness": stiffness, "center": center, "reference_depth": own["reference_depth"]})
+        center = context.frame.point(context.parameters["vehicle.center_of_buoyancy"])
+        stiffness = context.parameters["vehicle.buoyancy"] * numbers["gradient"]
+        return Packed({"stiffness": stiffness, "center": center, "reference_depth": numbers["reference_depth"]})
 
-    def potential(self, own: Numbers, position: np.ndarray, attitude: np.ndarray, setting: Numbers) -> np.ndarray:
+    def potential(
+        self, numbers: Numbers, position: np.ndarray, attitude: np.ndarray, parameters: Numbers
+    ) -> np.ndarray:
         """Energy U = B gradient (d - reference_depth)^2 / 2, (k, n) [J]."""
-        center = np.sum(setting["vehicle.center_of_buoyancy"] * attitude[..., 2, :], axis=-1)
-        depth = position[..., 2] + center - own["reference_depth"]
-        return 0.5 * setting["vehicle.buoyancy"] * own["gradient"] * depth**2
+        center = np.sum(parameters["vehicle.center_of_buoyancy"] * attitude[..., 2, :], axis=-1)
+        depth = position[..., 2] + center - numbers["reference_depth"]
+        return 0.5 * parameters["vehicle.buoyancy"] * numbers["gradient"] * depth**2

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantity
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -24,23 +24,25 @@ class Tether(Term):
     type: ClassVar[str] = "tether"
     device: ClassVar[str] = "tether"
 
-    anchor: Any = quantity((3,), "m")
-    stiffness: Any = quantity((), "N/m", least=0.0)
-    attachment: Any = quantity((3,), "m", (0.0, 0.0, 0.0))
-    rest_length: Any = quantity((), "m", 0.0, least=0.0)
+    anchor: Any = number((3,), "m")
+    stiffness: Any = number((), "N/m", least=0.0)
+    attachment: Any = number((3,), "m", (0.0, 0.0, 0.0))
+    rest_length: Any = number((), "m", 0.0, least=0.0)
 
     @property
     def conserves(self) -> frozenset[str]:
         """Energy only: the anchor takes up momentum."""
         return frozenset({"energy"})
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The numbers, with the attachment from the origin of the forces in the kernel's axes."""
-        values = {key: own[key] for key in ("anchor", "stiffness", "rest_length")}
-        return Packed(values | {"attachment": setting.frame.point(own["attachment"])})
+        values = {key: numbers[key] for key in ("anchor", "stiffness", "rest_length")}
+        return Packed(values | {"attachment": context.frame.point(numbers["attachment"])})
 
-    def potential(self, own: Numbers, position: np.ndarray, attitude: np.ndarray, setting: Numbers) -> np.ndarray:
+    def potential(
+        self, numbers: Numbers, position: np.ndarray, attitude: np.ndarray, parameters: Numbers
+    ) -> np.ndarray:
         """Energy U = stiffness max(length - rest_length, 0)^2 / 2, (k, n) [J]."""
-        end = position + np.einsum("knij,nj->kni", attitude, np.broadcast_to(own["attachment"], position.shape[1:]))
-        stretch = np.maximum(np.linalg.norm(end - own["anchor"], axis=-1) - own["rest_length"], 0.0)
-        return 0.5 * own["stiffness"] * stretch**2
+        end = position + np.einsum("knij,nj->kni", attitude, np.broadcast_to(numbers["attachment"], position.shape[1:]))
+        stretch = np.maximum(np.linalg.norm(end - numbers["anchor"], axis=-1) - numbers["rest_length"], 0.0)
+        return 0.5 * numbers["stiffness"] * stretch**2

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, knots, quantity
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number
 from lgvi_warp.physics.terms.wrench import commands, first_row, not_rising, refuse_idle, rising
 
 
@@ -42,18 +42,18 @@ class Thrusters(Term):
     device: ClassVar[str] = "thrusters"
     timed: ClassVar[bool] = True
 
-    position: Any = quantity(("n", 3), "m")
-    direction: Any = quantity(("n", 3), "1")
-    coefficient: Any = quantity(("n",), "N per unit^2", None, least=0.0)
-    coefficient_astern: Any = quantity(("n",), "N per unit^2", None, least=0.0)
-    polynomial: Any = quantity(("p",), "1 per unit, 1 per unit^2 ...", None)
-    polynomial_astern: Any = quantity(("q",), "1 per unit, 1 per unit^2 ...", None)
-    dead_band: Any = quantity(("n",), "unit", None, least=0.0)
-    limit: Any = quantity(("n",), "unit", None, least=0.0)
-    time_constant: Any = quantity(("n",), "s", None, least=0.0)
-    command: Any = quantity(("n",), "unit", None)
-    times: Any = quantity(("k",), "s", None)
-    command_schedule: Any = quantity(("k", "n"), "unit", None)
+    position: Any = number(("n", 3), "m")
+    direction: Any = number(("n", 3), "1")
+    coefficient: Any = number(("n",), "N per unit^2", None, least=0.0)
+    coefficient_astern: Any = number(("n",), "N per unit^2", None, least=0.0)
+    polynomial: Any = number(("p",), "1 per unit, 1 per unit^2 ...", None)
+    polynomial_astern: Any = number(("q",), "1 per unit, 1 per unit^2 ...", None)
+    dead_band: Any = number(("n",), "unit", None, least=0.0)
+    limit: Any = number(("n",), "unit", None, least=0.0)
+    time_constant: Any = number(("n",), "s", None, least=0.0)
+    command: Any = number(("n",), "unit", None)
+    times: Any = number(("k",), "s", None)
+    command_schedule: Any = number(("k", "n"), "unit", None)
 
     def __post_init__(self) -> None:
         if self.coefficient is None:
@@ -150,26 +150,26 @@ class Thrusters(Term):
         if self.__dict__["_both"]:
             faults.add("command", self.command, "differs from the first of command_schedule", "keep one of them")
 
-    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         """In addition, refuses directions without length and times that do not rise.
 
         Raises SceneError for members' numbers that would have no effect.
         """
-        bad = super().unphysical(own)
-        bad["direction"] = bad["direction"] | np.any(~np.any(own["direction"], axis=-1), axis=-1)
-        bad["times"] = bad["times"] | not_rising(own["times"])
+        bad = super().unphysical(numbers)
+        bad["direction"] = bad["direction"] | np.any(~np.any(numbers["direction"], axis=-1), axis=-1)
+        bad["times"] = bad["times"] | not_rising(numbers["times"])
         remedy = f"give {self.key}.time_constant above 0 [s] in the scene as well"
-        refuse_idle(self, own, "time_constant", own["time_constant"] > 0.0, remedy)
-        self._refuse_idle_polynomial(own)
+        refuse_idle(self, numbers, "time_constant", numbers["time_constant"] > 0.0, remedy)
+        self._refuse_idle_polynomial(numbers)
         return bad
 
-    def _refuse_idle_polynomial(self, own: Numbers) -> None:
+    def _refuse_idle_polynomial(self, numbers: Numbers) -> None:
         """Refuse members' polynomials in a scene that has none, since its device code does not read them."""
         faults = Faults(f"{self.key}.")
         for name in ("polynomial", "polynomial_astern"):
-            if self.is_square and not np.all(own[name] == SQUARE):
+            if self.is_square and not np.all(numbers[name] == SQUARE):
                 fault = "does not act: the scene has none"
-                faults.add(name, own[name][0], fault, f"give {self.key}.{name} in the scene as well")
+                faults.add(name, numbers[name][0], fault, f"give {self.key}.{name} in the scene as well")
         faults.raise_if_any()
 
     @property
@@ -177,16 +177,16 @@ class Thrusters(Term):
         """Whether some thruster has a lag."""
         return bool(np.any(self.time_constant > 0.0))
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The device rows: those of each thruster, then the command table of each thruster."""
-        direction = own["direction"] / np.linalg.norm(own["direction"], axis=-1, keepdims=True)
-        arms = np.cross(own["position"] + 0.0 * direction, direction + 0.0 * own["position"])
-        force, torque = setting.frame.vector(direction), setting.frame.torque(arms, direction + 0.0 * arms)
+        direction = numbers["direction"] / np.linalg.norm(numbers["direction"], axis=-1, keepdims=True)
+        arms = np.cross(numbers["position"] + 0.0 * direction, direction + 0.0 * numbers["position"])
+        force, torque = context.frame.vector(direction), context.frame.torque(arms, direction + 0.0 * arms)
         with np.errstate(divide="ignore"):
-            rate = np.where(own["time_constant"] > 0.0, 1.0 / own["time_constant"], FAST)
-        numbers = [own[key] for key in ("coefficient", "coefficient_astern", "dead_band", "limit")]
-        blocks = [force, torque, *(x[..., None] for x in (*numbers, rate))]
-        times, schedule = commands(own)
+            rate = np.where(numbers["time_constant"] > 0.0, 1.0 / numbers["time_constant"], FAST)
+        settings = [numbers[key] for key in ("coefficient", "coefficient_astern", "dead_band", "limit")]
+        blocks = [force, torque, *(x[..., None] for x in (*settings, rate))]
+        times, schedule = commands(numbers)
         n = max(*(len(block) for block in blocks), len(times), len(schedule))
         columns = [np.broadcast_to(block, (n, *block.shape[1:])) for block in blocks]
         rows = [np.concatenate(columns, axis=2).reshape(n, -1)]
@@ -196,7 +196,7 @@ class Thrusters(Term):
         count = schedule.shape[2]
         powers = 0
         if not self.is_square:
-            curves, powers = side_by_side(own["polynomial"], own["polynomial_astern"])
+            curves, powers = side_by_side(numbers["polynomial"], numbers["polynomial_astern"])
             rows.append(curves)
             n = max(len(block) for block in rows)
             rows = [np.broadcast_to(block, (n, block.shape[1])) for block in rows]
@@ -205,7 +205,7 @@ class Thrusters(Term):
         if not self.memory:
             return Packed(values | {"memory": 0}, np.concatenate(rows, axis=1))
         first = np.stack([np.interp(0.0, t, c) for t, c in _columns(times, schedule)])
-        start = np.clip(first.reshape(-1, count), -own["limit"], own["limit"])
+        start = np.clip(first.reshape(-1, count), -numbers["limit"], numbers["limit"])
         return Packed(values, np.concatenate(rows, axis=1), start)
 
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantity
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 from lgvi_warp.physics.terms.current_harmonics import above_zero, not_above_zero, zeros_like_first
 
 
@@ -30,10 +30,10 @@ class Waves(Term):
     device: ClassVar[str] = "waves"
     timed: ClassVar[bool] = True
 
-    amplitudes: Any = quantity(("k",), "m", least=0.0)
-    periods: Any = quantity(("k",), "s")
-    headings_deg: Any = quantity(("k",), "deg")
-    phases: Any = quantity(("k",), "rad", None)
+    amplitudes: Any = number(("k",), "m", least=0.0)
+    periods: Any = number(("k",), "s")
+    headings_deg: Any = number(("k",), "deg")
+    phases: Any = number(("k",), "rad", None)
 
     def __post_init__(self) -> None:
         if self.phases is None:
@@ -44,33 +44,33 @@ class Waves(Term):
         """Adds a fault where a period is not above 0."""
         above_zero(faults, "periods", self.periods, "s")
 
-    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         """In addition, refuses members with a period that is not above 0."""
-        bad = super().unphysical(own)
-        return bad | {"periods": bad["periods"] | not_above_zero(own["periods"])}
+        bad = super().unphysical(numbers)
+        return bad | {"periods": bad["periods"] | not_above_zero(numbers["periods"])}
 
-    def present(self, own: Numbers) -> bool:
+    def present(self, numbers: Numbers) -> bool:
         """Whether some amplitude of some member is not zero."""
-        return bool(np.any(own["amplitudes"]))
+        return bool(np.any(numbers["amplitudes"]))
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Device rows of each component; raises SceneError where there is no gravity, hence no wavenumber."""
-        g = setting.parameters["environment.gravity"]
+        g = context.parameters["environment.gravity"]
         if np.any(g <= 0.0):
             faults = Faults()
             fault = f"leaves the length of {self.key} unknown (wavenumber = omega^2 / gravity)"
             faults.add("environment.gravity", float(g.min()), fault, f"give gravity above 0, or leave {self.key} out")
             faults.raise_if_any()
-        rows = np.stack(np.broadcast_arrays(*_components(own, g)), axis=-1)
+        rows = np.stack(np.broadcast_arrays(*_components(numbers, g)), axis=-1)
         return Packed({"count": rows.shape[1]}, rows.reshape(len(rows), -1))
 
-    def water(self, own: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
+    def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
         """Orbital velocity (k, n, 3) [m/s] at positions and times; above the surface as at the surface."""
         gravity = parameters["environment.gravity"]
         total = np.zeros(position.shape)
         x, y, depth = np.moveaxis(position, -1, 0)
-        for j in range(own["periods"].shape[1]):
-            north, east, k, omega, phase, *speed = (table[:, j] for table in _components(own, gravity))
+        for j in range(numbers["periods"].shape[1]):
+            north, east, k, omega, phase, *speed = (table[:, j] for table in _components(numbers, gravity))
             theta = north * x + east * y + (phase - omega * time[:, None])
             e = np.exp(-k * np.maximum(depth, 0.0))
             cosine, sine = e * np.cos(theta), e * np.sin(theta)
@@ -78,9 +78,9 @@ class Waves(Term):
         return total
 
 
-def _components(own: Numbers, gravity: np.ndarray) -> tuple[np.ndarray, ...]:
+def _components(numbers: Numbers, gravity: np.ndarray) -> tuple[np.ndarray, ...]:
     """The device table of the components, each entry of shape (n, k), n = 1 or the number of members."""
-    omega, heading = 2.0 * np.pi / own["periods"], np.radians(own["headings_deg"])
+    omega, heading = 2.0 * np.pi / numbers["periods"], np.radians(numbers["headings_deg"])
     k = omega**2 / gravity[:, None]
-    speed, along, across = own["amplitudes"] * omega, np.cos(heading), np.sin(heading)
-    return k * along, k * across, k, omega, own["phases"], speed * along, speed * across, speed
+    speed, along, across = numbers["amplitudes"] * omega, np.cos(heading), np.sin(heading)
+    return k * along, k * across, k, omega, numbers["phases"], speed * along, speed * across, speed

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, knots, quantity
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number
 
 SHAPES = ("linear", "steps")
 
@@ -25,17 +25,17 @@ class Wrench(Term):
     type: ClassVar[str] = "wrench"
     device: ClassVar[str] = "wrench"
 
-    force: Any = quantity((3,), "N", (0.0, 0.0, 0.0))
-    torque: Any = quantity((3,), "N m", (0.0, 0.0, 0.0))
+    force: Any = number((3,), "N", (0.0, 0.0, 0.0))
+    torque: Any = number((3,), "N m", (0.0, 0.0, 0.0))
 
-    def present(self, own: Numbers) -> bool:
+    def present(self, numbers: Numbers) -> bool:
         """Whether force or torque of some member is not zero."""
-        return bool(np.any(own["force"]) or np.any(own["torque"]))
+        return bool(np.any(numbers["force"]) or np.any(numbers["torque"]))
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Force and torque about the origin of the forces, in the kernel's axes."""
-        force, torque = own["force"], own["torque"]
-        return Packed({"force": setting.frame.vector(force), "torque": setting.frame.torque(torque, force)})
+        force, torque = numbers["force"], numbers["torque"]
+        return Packed({"force": context.frame.vector(force), "torque": context.frame.torque(torque, force)})
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -58,9 +58,9 @@ class WrenchSchedule(Term):
     device: ClassVar[str] = "wrench_schedule"
     timed: ClassVar[bool] = True
 
-    times: Any = quantity(("k",), "s")
-    force: Any = quantity(("k", 3), "N")
-    torque: Any = quantity(("k", 3), "N m", None)
+    times: Any = number(("k",), "s")
+    force: Any = number(("k", 3), "N")
+    torque: Any = number(("k", 3), "N m", None)
     interpolation: str = "linear"
 
     def __post_init__(self) -> None:
@@ -73,19 +73,21 @@ class WrenchSchedule(Term):
         rising(faults, "times", self.times)
         faults.choice("interpolation", self.interpolation, SHAPES)
 
-    def unphysical(self, own: Numbers) -> dict[str, np.ndarray]:
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         """In addition, refuses members whose times do not rise."""
-        bad = super().unphysical(own)
-        return bad | {"times": bad["times"] | not_rising(own["times"])}
+        bad = super().unphysical(numbers)
+        return bad | {"times": bad["times"] | not_rising(numbers["times"])}
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Two tables: the force, and the torque about the origin of the forces."""
-        force = setting.frame.vector(own["force"])
-        torque = setting.frame.torque(own["torque"] + 0.0 * own["force"], own["force"] + 0.0 * own["torque"])
-        tables = [knots(own["times"], values, self.interpolation == "steps") for values in (force, torque)]
+        force = context.frame.vector(numbers["force"])
+        torque = context.frame.torque(
+            numbers["torque"] + 0.0 * numbers["force"], numbers["force"] + 0.0 * numbers["torque"]
+        )
+        tables = [knots(numbers["times"], values, self.interpolation == "steps") for values in (force, torque)]
         n = max(len(table) for table in tables)
         rows = np.concatenate([np.broadcast_to(table, (n, table.shape[1])) for table in tables], axis=1)
-        return Packed({"count": own["times"].shape[1] - 1}, rows)
+        return Packed({"count": numbers["times"].shape[1] - 1}, rows)
 
 
 def not_rising(values: np.ndarray) -> np.ndarray:
@@ -115,27 +117,27 @@ def first_row(schedule: Any) -> Any:
         return 0.0
 
 
-def commands(own: Numbers) -> tuple[np.ndarray, np.ndarray]:
+def commands(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
     """Times and commands of a term; a command that is held is the only row of the schedule.
 
     Args:
-        own: The term's numbers by field, each of shape (n, ...).
+        numbers: The term's numbers by field, each of shape (n, ...).
 
     Returns:
         Times (n, k) [s] and commands (n, k, units).
     """
-    schedule = own["command_schedule"]
-    return own["times"], own["command"][:, None, :] if schedule.shape[1] == 1 else schedule
+    schedule = numbers["command_schedule"]
+    return numbers["times"], numbers["command"][:, None, :] if schedule.shape[1] == 1 else schedule
 
 
-def refuse_idle(term: Any, own: Numbers, rate: str, remembers: np.ndarray, remedy: str) -> None:
+def refuse_idle(term: Any, numbers: Numbers, rate: str, remembers: np.ndarray, remedy: str) -> None:
     """Refuse members' numbers that would have no effect, since the scene's kernel does not read them.
 
     That is `command` in a scene with a schedule and the reverse, and the numbers of a memory that the scene does not have.
 
     Args:
         term: The term of the scene.
-        own: Members' numbers by field, each of shape (n, ...).
+        numbers: Members' numbers by field, each of shape (n, ...).
         rate: Name of the field that gives the term a memory, such as "time_constant".
         remembers: Whether each member's number in that field needs the memory, (n, units).
         remedy: What to do, for the message.
@@ -146,13 +148,15 @@ def refuse_idle(term: Any, own: Numbers, rate: str, remembers: np.ndarray, remed
     faults = Faults(f"{term.key}.")
     held = len(term.command_schedule) == 1
     acts, idle = ("command", ("times", "command_schedule")) if held else ("command_schedule", ("command",))
-    unread = {name: (own[name] != getattr(term, name), f"a {acts}", f"vary {term.key}.{acts}") for name in idle}
+    unread = {name: (numbers[name] != getattr(term, name), f"a {acts}", f"vary {term.key}.{acts}") for name in idle}
     if not term.memory:
         unread[rate] = (remembers, "none", remedy)
     for name, (bad, alternative, what_to_do) in unread.items():
         if np.any(bad):
             i = int(bad.reshape(len(bad), -1).any(axis=1).argmax())
-            faults.add(f"{name} of member {i}", own[name][i], f"does not act: the scene has {alternative}", what_to_do)
+            faults.add(
+                f"{name} of member {i}", numbers[name][i], f"does not act: the scene has {alternative}", what_to_do
+            )
     faults.raise_if_any()
 
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.physics.terms.base import Numbers, Packed, Setting, Term, quantity
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 
 
 def channel(key: str) -> int:
@@ -25,20 +25,20 @@ def channel(key: str) -> int:
     return _signed(2 * zlib.crc32(key.encode()))
 
 
-def noise_key(key: str, setting: Setting) -> dict[str, Any]:
+def noise_key(key: str, context: PackingContext) -> dict[str, Any]:
     """What keys a term's random numbers, besides the step: the low 64 bits of the seed, the member, the term.
 
     Args:
         key: Name of the term.
-        setting: The scene's parameters, the frame and the run.
+        context: The scene's parameters, the frame and the run.
 
     Returns:
         Fields "member", "seed0", "seed1" and "channel" of the device struct.
     """
     return {
-        "member": setting.members.astype(np.int32),
-        "seed0": _signed(setting.seed),
-        "seed1": _signed(setting.seed >> 32),
+        "member": context.members.astype(np.int32),
+        "seed0": _signed(context.seed),
+        "seed1": _signed(context.seed >> 32),
         "channel": channel(key),
     }
 
@@ -63,19 +63,19 @@ class WrenchNoise(Term):
     device: ClassVar[str] = "wrench_noise"
     timed: ClassVar[bool] = True
 
-    force: Any = quantity((3,), "N s^1/2", (0.0, 0.0, 0.0), least=0.0)
-    torque: Any = quantity((3,), "N m s^1/2", (0.0, 0.0, 0.0), least=0.0)
+    force: Any = number((3,), "N s^1/2", (0.0, 0.0, 0.0), least=0.0)
+    torque: Any = number((3,), "N m s^1/2", (0.0, 0.0, 0.0), least=0.0)
 
-    def present(self, own: Numbers) -> bool:
+    def present(self, numbers: Numbers) -> bool:
         """Whether some strength of some member is not zero."""
-        return bool(np.any(own["force"]) or np.any(own["torque"]))
+        return bool(np.any(numbers["force"]) or np.any(numbers["torque"]))
 
-    def packed(self, own: Numbers, setting: Setting) -> Packed:
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The force and moment of each of the user's axes: drawn there, the numbers do not depend on the kernel's axes."""
-        frame, none = setting.frame, np.zeros((1, 3))
-        values = noise_key(self.key, setting)
+        frame, none = context.frame, np.zeros((1, 3))
+        values = noise_key(self.key, context)
         for i, axis in enumerate("xyz"):
-            force, torque = (own[name] * np.eye(3)[i] for name in ("force", "torque"))
+            force, torque = (numbers[name] * np.eye(3)[i] for name in ("force", "torque"))
             moment = frame.torque(none + 0.0 * force, force)
             values |= {
                 f"force{axis}": frame.vector(force),

@@ -16,13 +16,14 @@ from lgvi_warp.sampling.designs.base import Drawn, Replicated, Sampling
 from lgvi_warp.sampling.designs.designs import Morris, Saltelli, salib_problem
 from lgvi_warp.sampling.designs.grid import Grid
 from lgvi_warp.sampling.designs.hypercube import LatinHypercube
-from lgvi_warp.sampling.designs.levels import Levels
+from lgvi_warp.sampling.designs.levels import UnitCubePoints
 from lgvi_warp.sampling.designs.random import Random
 from lgvi_warp.sampling.designs.sequences import Halton, Sobol, sobol_points
 from lgvi_warp.sampling.designs.table import Table
 
 KINDS: dict[str, type[Sampling]] = {
-    design.kind: design for design in (Random, LatinHypercube, Sobol, Halton, Saltelli, Morris, Grid, Table, Levels)
+    design.kind: design
+    for design in (Random, LatinHypercube, Sobol, Halton, Saltelli, Morris, Grid, Table, UnitCubePoints)
 }
 
 
@@ -64,7 +65,6 @@ __all__ = [
     "Grid",
     "Halton",
     "LatinHypercube",
-    "Levels",
     "Morris",
     "Random",
     "Replicated",
@@ -72,6 +72,7 @@ __all__ = [
     "Sampling",
     "Sobol",
     "Table",
+    "UnitCubePoints",
     "salib_problem",
     "sampling_of",
     "sobol_points",

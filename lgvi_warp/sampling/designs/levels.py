@@ -16,7 +16,7 @@ from lgvi_warp.sampling.designs.space import Space
 
 
 @dataclass(frozen=True, eq=False)
-class Levels(Sampling):
+class UnitCubePoints(Sampling):
     """A design of your own: points in the open unit cube, whose columns are in the order of the names.
 
     `ensemble.space` says which column is which: an entry that varies by itself has one column of its name, a joint

@@ -34,10 +34,10 @@ SCIPY = {
 
 
 @dataclass(frozen=True, eq=False)
-class Frozen(Distribution):
-    """A frozen distribution of scipy.stats, as lw.Frozen(scipy.stats.gamma(2.0, scale=3.0)); in `vary` it needs no wrapper.
+class ScipyDistribution(Distribution):
+    """A frozen distribution of scipy.stats, as lw.ScipyDistribution(scipy.stats.gamma(2.0, scale=3.0)).
 
-    Its values are absolute: the scene's own value plays no part.
+    In `vary` it needs no wrapper. Its values are absolute: the scene's own value plays no part.
 
     Args:
         distribution: The frozen distribution; its parameters are one number or one per component.
@@ -65,7 +65,7 @@ class Frozen(Distribution):
         faults.raise_if_any()
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Frozen) and self.to_dict() == other.to_dict()
+        return isinstance(other, ScipyDistribution) and self.to_dict() == other.to_dict()
 
     def __hash__(self) -> int:
         return hash(self.name)
@@ -101,7 +101,7 @@ class Frozen(Distribution):
         return {"scipy": {"name": self.name} | self._numbers()}
 
     @classmethod
-    def from_table(cls, key: str, kind: str, values: Mapping[str, Any]) -> Frozen:
+    def from_table(cls, key: str, kind: str, values: Mapping[str, Any]) -> ScipyDistribution:
         """Build a distribution from what `to_dict` gives.
 
         Args:
@@ -322,7 +322,7 @@ def as_law(key: str, value: Any) -> Any:
         edges = distribution._histogram[1]
         return Histogram(np.diff(distribution.cdf(edges)).tolist(), np.asarray(edges).tolist())
     if is_frozen(value):
-        return Frozen(value)
+        return ScipyDistribution(value)
     if type(value).__name__ == "multivariate_normal_frozen":
         return CorrelatedNormal(covariance=np.asarray(value.cov).tolist(), mean=np.asarray(value.mean).tolist())
     try:
@@ -349,18 +349,18 @@ def from_dict(key: str, content: Any) -> Distribution:
         faults.add(key, content, "is not a distribution", "write { normal = { std = 1.0 } }")
         faults.raise_if_any()
     kind, values = next(iter(content.items()))
-    foreign = kind in SCIPY or kind == Frozen.kind
+    foreign = kind in SCIPY or kind == ScipyDistribution.kind
     if kind == OwnLaw.kind:
         faults.add(key, values, "is a law of your own, which a file does not hold", "give the ensemble again")
     elif not foreign and kind not in KINDS:
-        faults.keys(key, [kind], [*KINDS, *SCIPY, Frozen.kind])
+        faults.keys(key, [kind], [*KINDS, *SCIPY, ScipyDistribution.kind])
     elif not isinstance(values, Mapping):
         faults.add(f"{key}.{kind}", values, "is not a table", "write { normal = { std = 1.0 } }")
     elif not foreign:
         faults.keys(f"{key}.{kind}", values, [item.name for item in fields(KINDS[kind])])
     faults.raise_if_any()
     if foreign:
-        return Frozen.from_table(key, kind, values)
+        return ScipyDistribution.from_table(key, kind, values)
     try:
         return KINDS[kind](**values)
     except SceneError as error:

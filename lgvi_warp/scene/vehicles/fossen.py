@@ -340,7 +340,7 @@ def read_name(name: str) -> Name | None:
     return Name("even" if even else "quadratic", row, columns)
 
 
-def from_fossen(
+def vehicle_tables_from_fossen(
     coefficients: Mapping[str, float],
     *,
     mass: float,

@@ -16,7 +16,7 @@ from lgvi_warp.scene.vehicles.robot_model import GAZEBO_DENSITY, Model, listed, 
 from lgvi_warp.scene.vehicles.robot_xml import parse_xml
 
 
-def from_sdf(
+def vehicle_tables_from_sdf(
     source: str | os.PathLike[str],
     *,
     model: str | None = None,

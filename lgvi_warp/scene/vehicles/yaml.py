@@ -50,7 +50,7 @@ _ALIASES = {
 _NOT_NEEDED = ("model", "name", "type", "base_link", "body_frame", "tf_prefix", "length", "width", "height", "radius")
 
 
-def from_yaml(
+def vehicle_tables_from_yaml(
     source: str | os.PathLike[str],
     *,
     position_axes: str = "flu",

@@ -196,7 +196,7 @@ class Model:
         if self.levels:
             inside = np.empty_like(X)
             inside[:, self._columns] = np.clip(X, 2.0**-53, 1.0 - 2.0**-53)
-            fleet = Ensemble(self.scene, None, 0, self.vary, samplings.Levels(inside))
+            fleet = Ensemble(self.scene, None, 0, self.vary, samplings.UnitCubePoints(inside))
         else:
             fleet = Ensemble(self.scene, None, 0, None, samplings.Table(values=dict(zip(self.names, X.T, strict=True))))
         if dry:

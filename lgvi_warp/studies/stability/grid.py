@@ -312,7 +312,7 @@ class Grid:
         if section == "environment":
             return {"gravity": "m/s2", "water_density": "kg/m3"}[name]
         terms = (term for term in (*self.scene.terms, *self.scene.events) if term.key == section)
-        units = {field.name: str(field.metadata["unit"]) for term in terms for field in term.quantities()}
+        units = {field.name: str(field.metadata["unit"]) for term in terms for field in term.number_fields()}
         return units.get(name, "")
 
     @property

@@ -122,6 +122,6 @@ def test_plan_counts_by_what_a_container_leaves(monkeypatch, capsys):
 
     monkeypatch.setattr(container, "cpu_quota", lambda: 0.5)
     monkeypatch.setattr(container, "memory_limit", lambda: 10**7)
-    assert cli.main(["plan", str(ROOT / "examples" / "paper.toml"), "--members", "20", "--duration", "2"]) == 0
+    assert cli.main(["predict", str(ROOT / "examples" / "paper.toml"), "--members", "20", "--duration", "2"]) == 0
     told = capsys.readouterr().out
     assert "1 threads" in told and "more than the memory holds" in told

@@ -265,16 +265,16 @@ def test_states_with_names_are_read_by_them(drifting):
 def test_levels_with_names(drifting):
     u = np.array([[0.1, 0.2], [0.9, 0.7]])
     vary = {MASS: lw.Normal(std=0.1), BUOYANCY: lw.Normal(std=1.0)}
-    by_order = lw.Ensemble(drifting, None, 0, vary, lw.Levels(u)).parameters(0, 2)  # buoyancy, mass
+    by_order = lw.Ensemble(drifting, None, 0, vary, lw.UnitCubePoints(u)).parameters(0, 2)  # buoyancy, mass
     for points in (pd.DataFrame({MASS: u[:, 1], BUOYANCY: u[:, 0]}), {BUOYANCY: u[:, 0], MASS: u[:, 1]}):
-        fleet = lw.Ensemble(drifting, None, 0, vary, lw.Levels(points))
+        fleet = lw.Ensemble(drifting, None, 0, vary, lw.UnitCubePoints(points))
         back = lw.Ensemble.from_scene(lw.Scene.from_dict(drifting.to_dict() | {"ensemble": fleet.to_dict()}))
         for one in (fleet, back):
             np.testing.assert_array_equal(one.parameters(0, 2)[MASS], by_order[MASS])
             np.testing.assert_array_equal(one.parameters(0, 2)[BUOYANCY], by_order[BUOYANCY])
-    message = faults(lw.Ensemble, drifting, None, 0, vary, lw.Levels({"mass": u[:, 0], BUOYANCY: u[:, 1]}))
+    message = faults(lw.Ensemble, drifting, None, 0, vary, lw.UnitCubePoints({"mass": u[:, 0], BUOYANCY: u[:, 1]}))
     assert "did you mean 'vehicle.mass'" in message
-    assert "do not name 2 columns" in faults(lw.Levels, u, [MASS])
+    assert "do not name 2 columns" in faults(lw.UnitCubePoints, u, [MASS])
 
 
 def test_labels_that_no_door_reads_are_refused():

@@ -288,7 +288,7 @@ FROZEN = {
 def test_laws_of_scipy_by_name(kind):
     exact, values = FROZEN[kind]
     law = from_dict("key", {kind: values})
-    assert law == lw.Frozen(exact) and law.to_dict() == {kind: values}
+    assert law == lw.ScipyDistribution(exact) and law.to_dict() == {kind: values}
     u = uniforms(5, kind, 0, 20_000, 1)[:, 0]
     x = law.quantile(u, np.array(10.0))
     np.testing.assert_array_equal(x, exact.ppf(u))
@@ -301,7 +301,7 @@ def test_any_law_of_scipy():
         (stats.binom(5, 0.3), {"name": "binom", "n": 5, "p": 0.3}),
         (stats.norm([1.0, 2.0, 3.0], 0.1), {"name": "norm", "loc": [1.0, 2.0, 3.0], "scale": 0.1}),
     ):
-        mine = lw.Frozen(law)
+        mine = lw.ScipyDistribution(law)
         assert mine.to_dict() == {"scipy": content} and from_dict("key", mine.to_dict()) == mine
 
 
@@ -325,8 +325,8 @@ def test_bad_tables_of_scipy(content, text):
 
 
 def test_what_is_no_frozen_law():
-    assert "no frozen distribution" in refused(lw.Frozen, distribution=stats.gamma)
-    assert "scipy.stats refuses" in refused(lw.Frozen, distribution=stats.gamma(-1.0))
+    assert "no frozen distribution" in refused(lw.ScipyDistribution, distribution=stats.gamma)
+    assert "scipy.stats refuses" in refused(lw.ScipyDistribution, distribution=stats.gamma(-1.0))
 
 
 class Triangle:

@@ -70,15 +70,15 @@ def test_blocks_subsets_and_longer_ensembles_have_the_same_members(scene, conten
     assert_same(longer.select(0, n), whole, slice(0, n))
 
 
-@pytest.mark.parametrize("kind", [lw.Table, lw.Levels])
+@pytest.mark.parametrize("kind", [lw.Table, lw.UnitCubePoints])
 def test_lines_may_be_added(scene, kind):
     """Members of the lines that were there stay as they are, and so do the numbers drawn beside a table."""
     lines = np.random.default_rng(2).uniform(0.1, 0.9, (50, 2))
     vary = {"vehicle.buoyancy": lw.Uniform(half_width=1.0), "start.position[2]": lw.Normal(std=1.0)}
 
     def of(rows):
-        if kind is lw.Levels:
-            return lw.Ensemble(scene, None, 3, vary, lw.Levels(rows))
+        if kind is lw.UnitCubePoints:
+            return lw.Ensemble(scene, None, 3, vary, lw.UnitCubePoints(rows))
         return lw.Ensemble(
             scene, None, 3, vary, lw.Table({"vehicle.mass": rows[:, 0], "start.position[0]": rows[:, 1]})
         )
@@ -409,7 +409,7 @@ def test_columns_that_no_scene_has_are_left_out(scene, tmp_path):
 def test_the_first_lines_alone(scene, kind):
     lines = np.random.default_rng(4).uniform(0.1, 0.9, (30, 1))
     vary = {"start.position[2]": lw.Normal(std=1.0)}
-    design = lw.Levels(lines) if kind == "levels" else lw.Table({"vehicle.mass": 120.0 + lines[:, 0]})
+    design = lw.UnitCubePoints(lines) if kind == "levels" else lw.Table({"vehicle.mass": 120.0 + lines[:, 0]})
     whole, part = (lw.Ensemble(scene, members, 3, vary, design) for members in (None, 20))
     assert (whole.members, part.members) == (30, 20)
     assert_same(part.select(0, 20), whole.select(0, 30), slice(0, 20))
@@ -422,7 +422,7 @@ def test_the_first_lines_alone(scene, kind):
 def test_a_design_of_ones_own(scene):
     u = np.random.default_rng(1).random((20, 2))
     vary = {"vehicle.mass": lw.Uniform(low=100.0, high=110.0), "environment.gravity": lw.Uniform(low=9.0, high=10.0)}
-    fleet = lw.Ensemble(scene, None, 0, vary, lw.Levels(u))
+    fleet = lw.Ensemble(scene, None, 0, vary, lw.UnitCubePoints(u))
     assert fleet.space.keys == ("environment.gravity", "vehicle.mass")
     np.testing.assert_allclose(fleet.parameters(0, 20)["environment.gravity"], 9.0 + u[:, 0], rtol=1e-15)
     np.testing.assert_allclose(fleet.parameters(3, 9)["vehicle.mass"], 100.0 + 10.0 * u[3:9, 1], rtol=1e-15)

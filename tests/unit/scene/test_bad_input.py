@@ -235,12 +235,12 @@ FOSSEN = [
 
 @pytest.mark.parametrize(("given", "words"), [(row[0], row[1:]) for row in FOSSEN])
 def test_fossens_coefficients(given, words):
-    (fault,) = refused(lw.from_fossen, given, **BODY)
+    (fault,) = refused(lw.vehicle_tables_from_fossen, given, **BODY)
     assert all(word in fault for word in words), fault
 
 
 def test_fossens_drag_that_creates_energy():
-    made = lw.from_fossen({"X_u": -1.0, "X_v": -100.0, "Y_v": -1.0}, **BODY)
+    made = lw.vehicle_tables_from_fossen({"X_u": -1.0, "X_v": -100.0, "Y_v": -1.0}, **BODY)
     (fault,) = refused(from_dict, made)
     assert "drag_matrix.linear" in fault and "creates energy" in fault and "minus Fossen's" in fault
 
@@ -265,7 +265,7 @@ SDF = [
 
 @pytest.mark.parametrize(("text", "more", "words"), [(row[0], row[1], row[2:]) for row in SDF])
 def test_sdf(text, more, words):
-    fault = next(one for one in refused(lw.from_sdf, text, **more) if words[0] in one)
+    fault = next(one for one in refused(lw.vehicle_tables_from_sdf, text, **more) if words[0] in one)
     assert all(word in fault for word in words), fault
 
 
@@ -285,7 +285,7 @@ YAML = [
 @pytest.mark.parametrize(("text", "words"), [(row[0], row[1:]) for row in YAML])
 def test_yaml(text, words):
     pytest.importorskip("yaml")
-    (fault,) = refused(lw.from_yaml, text)
+    (fault,) = refused(lw.vehicle_tables_from_yaml, text)
     assert all(word in fault for word in words), fault
 
 
@@ -435,7 +435,7 @@ class Pull(lw.Term):
     type: ClassVar[str] = "pull"
     device: ClassVar[Any] = device(law=pull_law)
 
-    k: Any = lw.quantity((), "N")
+    k: Any = lw.number((), "N")
 
 
 class Packs(Pull):

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp import vehicle_tables_from_fossen as from_fossen
+from lgvi_warp import vehicle_tables_from_sdf as from_sdf
+from lgvi_warp import vehicle_tables_from_yaml as from_yaml
 from lgvi_warp.scene.vehicles import fossen as co
 from lgvi_warp.scene.vehicles import poses as coefficients_poses
 
@@ -31,7 +34,7 @@ def skew(r):
 
 
 def test_added_mass_is_minus_the_derivatives():
-    vehicle = co.from_fossen(DIAGONAL | PAIRS, **BODY)["vehicle"]
+    vehicle = from_fossen(DIAGONAL | PAIRS, **BODY)["vehicle"]
     A = np.diag([0.93, 35.5, 35.5, 0.0704, 4.88, 4.88])
     A[1, 5] = A[5, 1] = -1.93
     A[2, 4] = A[4, 2] = 1.93
@@ -41,11 +44,11 @@ def test_added_mass_is_minus_the_derivatives():
 @pytest.mark.parametrize("left_out", [("Y_rdot", "Z_qdot"), ("N_vdot", "M_wdot")])
 def test_one_of_a_pair_suffices(left_out):
     fewer = {key: value for key, value in PAIRS.items() if key not in left_out}
-    assert co.from_fossen(DIAGONAL | fewer, **BODY) == co.from_fossen(DIAGONAL | PAIRS, **BODY)
+    assert from_fossen(DIAGONAL | fewer, **BODY) == from_fossen(DIAGONAL | PAIRS, **BODY)
 
 
 def test_a_pair_that_differs_is_refused():
-    message = refused(co.from_fossen, DIAGONAL | PAIRS | {"N_vdot": -1.93}, count=1, **BODY)
+    message = refused(from_fossen, DIAGONAL | PAIRS | {"N_vdot": -1.93}, count=1, **BODY)
     assert "Y_rdot = 1.93" in message and "N_vdot = -1.93" in message
 
 
@@ -58,7 +61,7 @@ def test_rigid_body_matrix_about_the_origin():
     about_center = sum(mi * skew(ri - center).T @ skew(ri - center) for mi, ri in zip(m, r, strict=True))
     energy = 0.5 * sum(mi * np.sum((nu[:3] + np.cross(nu[3:], ri)) ** 2) for mi, ri in zip(m, r, strict=True))
     for about, inertia in (("origin", about_origin), ("gravity", about_center)):
-        made = co.from_fossen({}, mass=m.sum(), inertia=inertia, center_of_gravity=center, inertia_about=about)
+        made = from_fossen({}, mass=m.sum(), inertia=inertia, center_of_gravity=center, inertia_about=about)
         M = np.array(made["vehicle"]["rigid_body_mass_matrix"])
         np.testing.assert_allclose(0.5 * nu @ M @ nu, energy, rtol=1e-13)
 
@@ -67,12 +70,12 @@ def test_rigid_body_matrix_about_the_origin():
     "name", ["X_udot", "Xudot", "X_du", "Xdu", "X_{\\dot u}", "X_{\\dot{u}}", "X_u_dot", "X_dot_u"]
 )
 def test_spellings_of_added_mass(name):
-    assert np.array(co.from_fossen({name: -2.5}, **BODY)["vehicle"]["added_mass_matrix"])[0, 0] == 2.5
+    assert np.array(from_fossen({name: -2.5}, **BODY)["vehicle"]["added_mass_matrix"])[0, 0] == 2.5
 
 
 @pytest.mark.parametrize("name", ["X_uu", "X_u|u|", "Xuu", "X_{u|u|}", "X_{|u|u}", "X_|u|u", "Xuabsu", "X_{uu}"])
 def test_spellings_of_quadratic_drag(name):
-    (term,) = co.from_fossen({name: -1.62}, **BODY)["terms"]
+    (term,) = from_fossen({name: -1.62}, **BODY)["terms"]
     assert term == {"type": "drag", "linear": [0.0] * 6, "quadratic": [1.62, 0.0, 0.0, 0.0, 0.0, 0.0]}
 
 
@@ -87,11 +90,11 @@ def test_every_name_finds_its_place(row, force, column, velocity):
 @pytest.mark.parametrize("name", ["", "X", "Q_u", "X_t", "X_uvw", "mass", "X_prop", "Y_uudr", "xudot"])
 def test_what_is_no_name(name):
     assert co.read_name(name) is None
-    assert f"{name} = -1.0" in refused(co.from_fossen, {name: -1.0}, count=1, **BODY)
+    assert f"{name} = -1.0" in refused(from_fossen, {name: -1.0}, count=1, **BODY)
 
 
 def test_cross_terms_become_matrices():
-    (term,) = co.from_fossen({"Y_v|v|": -1310.0, "Y_rr": 0.632, "N_r": -2.0, "M_ww": 3.18}, **BODY)["terms"]
+    (term,) = from_fossen({"Y_v|v|": -1310.0, "Y_rr": 0.632, "N_r": -2.0, "M_ww": 3.18}, **BODY)["terms"]
     assert term["type"] == "drag_matrix"
     quadratic = np.array(term["quadratic"])
     assert quadratic[1, 1] == 1310.0 and quadratic[1, 5] == -0.632 and quadratic[4, 2] == -3.18
@@ -100,52 +103,52 @@ def test_cross_terms_become_matrices():
 
 
 def test_without_drag_there_is_no_term():
-    assert co.from_fossen(DIAGONAL, **BODY)["terms"] == []
+    assert from_fossen(DIAGONAL, **BODY)["terms"] == []
 
 
 @pytest.mark.parametrize("name", [*DIAGONAL, "X_u", "N_r", "X_uu", "N_r|r|"])
 def test_positive_diagonal_derivatives_are_refused(name):
-    message = refused(co.from_fossen, {name: 3.0}, count=1, **BODY)
+    message = refused(from_fossen, {name: 3.0}, count=1, **BODY)
     assert f"{name} = 3.0" in message and "Fossen" in message and "-3" in message
 
 
 @pytest.mark.parametrize("name", ["X_qq", "X_vv", "M_rr"])
 def test_even_terms_are_not_taken_for_drag(name):
     """Prestero's X_qq q^2 belongs to the added mass; read as |q| q it would push back for one sign of q only."""
-    assert "|" in refused(co.from_fossen, {name: -1.93}, count=1, **BODY)
-    assert co.from_fossen({name: -1.93}, ignore=[name], **BODY)["terms"] == []
+    assert "|" in refused(from_fossen, {name: -1.93}, count=1, **BODY)
+    assert from_fossen({name: -1.93}, ignore=[name], **BODY)["terms"] == []
 
 
 @pytest.mark.parametrize("name", ["Y_uv", "X_wq", "Y_v|r|"])
 def test_products_are_refused_and_can_be_left_out(name):
-    assert "product" in refused(co.from_fossen, {name: 1.0}, count=1, **BODY)
-    assert co.from_fossen({name: 1.0}, ignore=[name], **BODY)["terms"] == []
+    assert "product" in refused(from_fossen, {name: 1.0}, count=1, **BODY)
+    assert from_fossen({name: 1.0}, ignore=[name], **BODY)["terms"] == []
 
 
 def test_the_same_coefficient_twice_is_refused():
-    assert "also as X_udot" in refused(co.from_fossen, {"X_udot": -1.0, "Xdu": -1.0}, count=1, **BODY)
+    assert "also as X_udot" in refused(from_fossen, {"X_udot": -1.0, "Xdu": -1.0}, count=1, **BODY)
 
 
 def test_all_faults_of_a_map_come_at_once():
     given = {"X_udot": 0.93, "Y_uv": -28.6, "Q": 1.0, "X_uu": float("nan"), "N_r": "no"}
-    message = refused(co.from_fossen, given, mass=-1.0, inertia=(1.0, 1.0), count=7)
+    message = refused(from_fossen, given, mass=-1.0, inertia=(1.0, 1.0), count=7)
     for key in (*given, "mass", "inertia"):
         assert f"{key} = " in message
 
 
 def test_a_sum_that_is_not_positive_definite_is_refused():
-    assert "positive definite" in refused(co.from_fossen, {"X_udot": -1.0, "X_vdot": -50.0}, **BODY)
+    assert "positive definite" in refused(from_fossen, {"X_udot": -1.0, "X_vdot": -50.0}, **BODY)
     # About the origin 1 kg 2 m off the centre of gravity the inertia is at least 4 kg m2: 3 was meant about the other point.
     off = {"mass": 1.0, "inertia": (3.0, 3.0, 3.0), "center_of_gravity": (2.0, 0.0, 0.0)}
-    assert "positive definite" in refused(co.from_fossen, {}, **off)
-    co.from_fossen({}, inertia_about="gravity", **off)
-    assert "inertia_about" in refused(co.from_fossen, {}, inertia_about="CG", count=1, **BODY)
+    assert "positive definite" in refused(from_fossen, {}, **off)
+    from_fossen({}, inertia_about="gravity", **off)
+    assert "inertia_about" in refused(from_fossen, {}, inertia_about="CG", count=1, **BODY)
 
 
 def test_weight_and_buoyancy():
-    vehicle = co.from_fossen({}, gravity=9.8, **BODY)["vehicle"]
+    vehicle = from_fossen({}, gravity=9.8, **BODY)["vehicle"]
     assert vehicle["weight"] == vehicle["buoyancy"] == 30.48 * 9.8
-    vehicle = co.from_fossen({}, weight=299.0, buoyancy=308.0, **BODY)["vehicle"]
+    vehicle = from_fossen({}, weight=299.0, buoyancy=308.0, **BODY)["vehicle"]
     assert (vehicle["weight"], vehicle["buoyancy"]) == (299.0, 308.0)
 
 
@@ -173,7 +176,7 @@ def sdf(pose="0 0 0 0 0 0", added="", coefficients="", attributes=""):
 def test_sdf_axes_are_turned_by_half_a_turn_about_x():
     """Port becomes starboard and up becomes down: the energy of one motion is the same in both axes."""
     added = "<fluid_added_mass><xx>1</xx><yy>9</yy><zz>8</zz><xz>0.5</xz><yr>-1.5</yr><zq>2</zq><pp>1</pp><qq>3</qq><rr>4</rr>"
-    vehicle = lw.from_sdf(sdf("0.1 0.2 0.3 0 0 0", added + "</fluid_added_mass>"))["vehicle"]
+    vehicle = from_sdf(sdf("0.1 0.2 0.3 0 0 0", added + "</fluid_added_mass>"))["vehicle"]
     assert vehicle["center_of_gravity"] == [0.1, -0.2, -0.3]
     A = np.diag([1.0, 9.0, 8.0, 1.0, 3.0, 4.0])
     A[0, 2] = A[2, 0] = 0.5
@@ -196,7 +199,7 @@ def test_sdf_axes_are_turned_by_half_a_turn_about_x():
 )
 def test_sdf_pose_turns_the_inertia(pose, attributes):
     """A quarter of a turn about z: the axis x of the inertia's frame lies along y of the link."""
-    M = np.array(lw.from_sdf(sdf(pose, attributes=attributes))["vehicle"]["rigid_body_mass_matrix"])
+    M = np.array(from_sdf(sdf(pose, attributes=attributes))["vehicle"]["rigid_body_mass_matrix"])
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     flu = turn @ INERTIA @ turn.T
     np.testing.assert_allclose(M[3:, 3:], HALF_TURN[3:, 3:] @ flu @ HALF_TURN[3:, 3:], atol=1e-14)
@@ -213,7 +216,7 @@ def test_rpy_is_yaw_after_pitch_after_roll():
 @pytest.mark.parametrize("quadratic", ["xUabsU", "xUU"])
 def test_the_plugin_in_either_sign(sign, quadratic):
     text = f"<xDotU>{sign * 5}</xDotU><yDotV>{sign * 6}</yDotV><xU>{sign * 2}</xU><{quadratic}>{sign * 7}</{quadratic}>"
-    made = lw.from_sdf(sdf(coefficients=text))
+    made = from_sdf(sdf(coefficients=text))
     np.testing.assert_array_equal(np.diag(made["vehicle"]["added_mass_matrix"]), [5.0, 6.0, 0.0, 0.0, 0.0, 0.0])
     (term,) = made["terms"]
     assert (term["type"], term["linear"][0], term["quadratic"][0]) == ("drag", 2.0, 7.0)
@@ -222,7 +225,7 @@ def test_the_plugin_in_either_sign(sign, quadratic):
 def test_the_plugins_cross_terms_change_sign_with_the_axes():
     """Y_r r with y to port, r about up, is Y_r r with y to starboard, r about down; Z_q keeps its sign, X_w changes it."""
     text = "<yV>-3</yV><yR>1.5</yR><zQ>2.5</zQ><xW>0.5</xW><yRabsR>0.25</yRabsR>"
-    (term,) = lw.from_sdf(sdf(coefficients=text))["terms"]
+    (term,) = from_sdf(sdf(coefficients=text))["terms"]
     linear = np.array(term["linear"])
     assert (linear[1, 1], linear[1, 5], linear[2, 4], linear[0, 2]) == (3.0, -1.5, -2.5, 0.5)
     # With nothing on the diagonal to tell, the signs are Fossen's.
@@ -230,27 +233,27 @@ def test_the_plugins_cross_terms_change_sign_with_the_axes():
 
 
 def test_sdf_buoyancy():
-    assert lw.from_sdf(sdf(), volume=0.02, water_density=1000.0)["vehicle"]["buoyancy"] == pytest.approx(196.133)
+    assert from_sdf(sdf(), volume=0.02, water_density=1000.0)["vehicle"]["buoyancy"] == pytest.approx(196.133)
     text = sdf(coefficients="<xU>-1</xU><water_density>1025</water_density>")
-    assert lw.from_sdf(text, volume=0.02)["vehicle"]["buoyancy"] == pytest.approx(0.02 * 1025.0 * 9.80665)
-    made = lw.from_sdf(sdf(), buoyancy=200.0, center_of_buoyancy=(0.0, 0.1, 0.2))["vehicle"]
+    assert from_sdf(text, volume=0.02)["vehicle"]["buoyancy"] == pytest.approx(0.02 * 1025.0 * 9.80665)
+    made = from_sdf(sdf(), buoyancy=200.0, center_of_buoyancy=(0.0, 0.1, 0.2))["vehicle"]
     assert made["buoyancy"] == 200.0 and made["center_of_buoyancy"] == [0.0, -0.1, -0.2]
 
 
 def test_sdf_faults():
-    assert "both signs" in refused(lw.from_sdf, sdf(coefficients="<xU>-1</xU><yV>1</yV>"), count=1)
-    assert "<xUabsV>" in refused(lw.from_sdf, sdf(coefficients="<xUabsV>1</xUabsV>"), count=1)
-    assert "not XML" in refused(lw.from_sdf, "<sdf><link></sdf>")
-    assert "base" in refused(lw.from_sdf, sdf(), link="bse")
-    assert "give the path" in refused(lw.from_sdf, "nowhere.sdf")
-    message = refused(lw.from_sdf, sdf("0 0", "<fluid_added_mass><xx>-1</xx></fluid_added_mass>"), count=2)
+    assert "both signs" in refused(from_sdf, sdf(coefficients="<xU>-1</xU><yV>1</yV>"), count=1)
+    assert "<xUabsV>" in refused(from_sdf, sdf(coefficients="<xUabsV>1</xUabsV>"), count=1)
+    assert "not XML" in refused(from_sdf, "<sdf><link></sdf>")
+    assert "base" in refused(from_sdf, sdf(), link="bse")
+    assert "give the path" in refused(from_sdf, "nowhere.sdf")
+    message = refused(from_sdf, sdf("0 0", "<fluid_added_mass><xx>-1</xx></fluid_added_mass>"), count=2)
     assert "<pose>" in message and "<fluid_added_mass>" in message
 
 
 def test_sdf_from_a_file_and_by_the_name_of_the_link(tmp_path):
     path = tmp_path / "model.sdf"
     path.write_text(sdf(), encoding="utf-8")
-    assert lw.from_sdf(path) == lw.from_sdf(str(path)) == lw.from_sdf(sdf(), link="base")
+    assert from_sdf(path) == from_sdf(str(path)) == from_sdf(sdf(), link="base")
 
 
 # YAML
@@ -275,47 +278,45 @@ def yaml():
 
 
 def test_yaml_positions_are_flu_and_matrices_frd(yaml):
-    made = lw.from_yaml(UUV)
+    made = from_yaml(UUV)
     vehicle, (term,) = made["vehicle"], made["terms"]
     assert vehicle["center_of_gravity"] == [0.1, -0.2, -0.3] and vehicle["center_of_buoyancy"] == [0.0, 0.0, -0.4]
     assert np.array(vehicle["added_mass_matrix"])[1, 5] == -1.5 and np.array(vehicle["added_mass_matrix"])[2, 4] == 2.0
     assert vehicle["buoyancy"] == pytest.approx(0.02 * 1000.0 * 9.80665)
     assert term == {"type": "drag", "linear": [1.0, 2, 3, 4, 5, 6], "quadratic": [7.0, 8, 9, 10, 11, 12]}
-    assert (
-        vehicle["rigid_body_mass_matrix"] == lw.from_sdf(sdf("0.1 0.2 0.3 0 0 0"))["vehicle"]["rigid_body_mass_matrix"]
-    )
+    assert vehicle["rigid_body_mass_matrix"] == from_sdf(sdf("0.1 0.2 0.3 0 0 0"))["vehicle"]["rigid_body_mass_matrix"]
 
 
 def test_yaml_axes_can_be_named(yaml):
-    vehicle = lw.from_yaml(UUV, position_axes="frd", matrix_axes="flu")["vehicle"]
+    vehicle = from_yaml(UUV, position_axes="frd", matrix_axes="flu")["vehicle"]
     assert vehicle["center_of_gravity"] == [0.1, 0.2, 0.3]
     # Y_r, Z_q: both axes change sign, the product does not.
     assert np.array(vehicle["added_mass_matrix"])[1, 5] == -1.5
-    assert "position_axes" in refused(lw.from_yaml, UUV, position_axes="ned", count=1)
+    assert "position_axes" in refused(from_yaml, UUV, position_axes="ned", count=1)
 
 
 def test_yaml_with_fossens_names(yaml):
     head = "mass: 30.48\ninertia: [0.177, 3.45, 3.45]\n"
     flat = head + "".join(f"{key}: {value}\n" for key, value in (DIAGONAL | PAIRS).items())
     nested = head + "coefficients:\n" + "".join(f"  {key}: {value}\n" for key, value in (DIAGONAL | PAIRS).items())
-    expected = co.from_fossen(DIAGONAL | PAIRS, mass=30.48, inertia=(0.177, 3.45, 3.45))
-    assert lw.from_yaml(flat) == lw.from_yaml(nested) == expected
+    expected = from_fossen(DIAGONAL | PAIRS, mass=30.48, inertia=(0.177, 3.45, 3.45))
+    assert from_yaml(flat) == from_yaml(nested) == expected
 
 
 def test_yaml_faults(yaml):
-    message = refused(lw.from_yaml, "volume: 0.02\nmas: 3\nlinear_damping: [1, 2]\nMa: [1, -1, 1, 1, 1, 1]\n")
+    message = refused(from_yaml, "volume: 0.02\nmas: 3\nlinear_damping: [1, 2]\nMa: [1, -1, 1, 1, 1, 1]\n")
     for key in ("mass", "inertia", "mas = 3", "density", "linear", "both signs"):
         assert key in message
-    assert "not a map" in refused(lw.from_yaml, "- 1\n- 2\n")
-    assert "give the path" in refused(lw.from_yaml, "nowhere.yaml")
-    assert lw.from_yaml(UUV + "thrusters: 4\n", ignore=["thrusters"]) == lw.from_yaml(UUV)
-    assert lw.from_yaml(UUV, mass=21.0)["vehicle"]["weight"] == 21.0 * 9.80665
+    assert "not a map" in refused(from_yaml, "- 1\n- 2\n")
+    assert "give the path" in refused(from_yaml, "nowhere.yaml")
+    assert from_yaml(UUV + "thrusters: 4\n", ignore=["thrusters"]) == from_yaml(UUV)
+    assert from_yaml(UUV, mass=21.0)["vehicle"]["weight"] == 21.0 * 9.80665
 
 
 def test_without_pyyaml_the_message_says_how_to_install_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "yaml", None)
     with pytest.raises(ImportError, match="pip install"):
-        lw.from_yaml(UUV)
+        from_yaml(UUV)
 
 
 # Round trip
@@ -326,14 +327,14 @@ def test_the_three_forms_agree(yaml):
     added = "".join(f"<{n}>{v}</{n}>" for n, v in (("xx", 0.93), ("yy", 35.5), ("zz", 35.5), ("pp", 0.0704)))
     added += "<qq>4.88</qq><rr>4.88</rr><yr>-1.93</yr><zq>1.93</zq>"
     text = sdf("0 0 -0.0196 0 0 0", f"<fluid_added_mass>{added}</fluid_added_mass>", "<xUabsU>-1.62</xUabsU>")
-    from_sdf = lw.from_sdf(text)
+    tables_sdf = from_sdf(text)
     given = {"mass": 20.0, "inertia": HALF_TURN[3:, 3:] @ INERTIA @ HALF_TURN[3:, 3:], "inertia_about": "gravity"}
     center = {"center_of_gravity": (0.0, 0.0, 0.0196)}
-    from_fossen = co.from_fossen(DIAGONAL | PAIRS | {"X_uu": -1.62}, **given, **center)
-    assert from_sdf["terms"] == from_fossen["terms"]
-    for key, value in from_fossen["vehicle"].items():
-        np.testing.assert_allclose(from_sdf["vehicle"][key], value, atol=1e-15, err_msg=key)
-    content = {key: np.asarray(value).tolist() for key, value in from_fossen["vehicle"].items()}
+    tables_fossen = from_fossen(DIAGONAL | PAIRS | {"X_uu": -1.62}, **given, **center)
+    assert tables_sdf["terms"] == tables_fossen["terms"]
+    for key, value in tables_fossen["vehicle"].items():
+        np.testing.assert_allclose(tables_sdf["vehicle"][key], value, atol=1e-15, err_msg=key)
+    content = {key: np.asarray(value).tolist() for key, value in tables_fossen["vehicle"].items()}
     text = yaml.safe_dump(
         {
             "mass": 20.0,
@@ -343,20 +344,20 @@ def test_the_three_forms_agree(yaml):
             "quadratic_damping": [-1.62, 0.0, 0.0, 0.0, 0.0, 0.0],
         }
     )
-    from_yaml = lw.from_yaml(text)
-    assert from_yaml["terms"] == from_fossen["terms"]
-    for key, value in from_fossen["vehicle"].items():
-        np.testing.assert_allclose(from_yaml["vehicle"][key], value, atol=1e-15, err_msg=key)
+    tables_yaml = from_yaml(text)
+    assert tables_yaml["terms"] == tables_fossen["terms"]
+    for key, value in tables_fossen["vehicle"].items():
+        np.testing.assert_allclose(tables_yaml["vehicle"][key], value, atol=1e-15, err_msg=key)
 
 
 def test_the_dict_makes_a_vehicle():
-    given = co.from_fossen(DIAGONAL | PAIRS, **BODY)["vehicle"]
+    given = from_fossen(DIAGONAL | PAIRS, **BODY)["vehicle"]
     np.testing.assert_array_equal(lw.Vehicle(**given).added_mass_matrix, given["added_mass_matrix"])
 
 
 def test_a_scene_from_what_an_importer_returns():
     given = {"X_udot": -1.0, "Y_vdot": -2.0, "Z_wdot": -2.0, "X_u": -3.0}
-    tables = lw.from_fossen(given, mass=10.0, inertia=[0.1, 0.5, 0.5])
+    tables = from_fossen(given, mass=10.0, inertia=[0.1, 0.5, 0.5])
     scene = lw.Scene.from_dict(tables)
     assert [term.type for term in scene.terms] == ["drag"]
     np.testing.assert_array_equal(scene.terms[0].linear, [3.0, 0.0, 0.0, 0.0, 0.0, 0.0])

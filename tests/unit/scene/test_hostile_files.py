@@ -16,6 +16,8 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp import vehicle_tables_from_sdf as from_sdf
+from lgvi_warp import vehicle_tables_from_yaml as from_yaml
 from lgvi_warp.cli import main
 from lgvi_warp.cli.settings import out_of
 from lgvi_warp.common import errors, reading
@@ -234,16 +236,16 @@ YAML = {
 def test_yaml_is_refused(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text, words = YAML[name]
-    refused(lw.from_yaml, text, words=words)
+    refused(from_yaml, text, words=words)
     assert tree(tmp_path) == []
 
 
 def test_yaml_that_two_versions_read_alike_is_read():
-    plain = lw.from_yaml(GOOD + "buoyancy: 290.0\n")
-    other = lw.from_yaml("mass: 3e1\ninertia: &j [1.0, 2, 2]\nbuoyancy: 2_90.0\nspare: {cog: [0, 0, 0]}\n")
+    plain = from_yaml(GOOD + "buoyancy: 290.0\n")
+    other = from_yaml("mass: 3e1\ninertia: &j [1.0, 2, 2]\nbuoyancy: 2_90.0\nspare: {cog: [0, 0, 0]}\n")
     assert plain == other
     quoted = "mass: 30\ninertia: [1, 2, 2]\n'010': 3\n"
-    refused(lw.from_yaml, quoted, words=("010 = 3", "unknown key"))
+    refused(from_yaml, quoted, words=("010 = 3", "unknown key"))
 
 
 # Files that are none. What opens them waits, or never ends.
@@ -255,8 +257,8 @@ def doors(tmp_path):
     return {
         "scene": lw.Scene.load,
         "table": lambda path: lw.Table(str(path)),
-        "YAML": lw.from_yaml,
-        "SDF": lw.from_sdf,
+        "YAML": from_yaml,
+        "SDF": from_sdf,
     }
 
 
@@ -342,7 +344,7 @@ ARGUMENTS = [
     (["run", PAPER, "--keep", "-1"], "run.keep"),
     (["run", PAPER, "--threads", "-1", "--members", "8"], "threads = -1"),
     (["run", PAPER, "--threads", "1000000000", "--members", "8"], "threads = 1000000000: is more than 100,000"),
-    (["plan", PAPER, "--threads", "0"], "threads = 0"),
+    (["predict", PAPER, "--threads", "0"], "threads = 0"),
     (["run", PAPER, "--error", "nan", "--members", "8"], "error = nan"),
     (["run", PAPER, "--error", "inf", "--members", "8"], "error = inf"),
     (["run", PAPER, "--error", "-1", "--members", "8"], "error = -1"),

@@ -11,6 +11,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import lgvi_warp as lw
+from lgvi_warp import vehicle_tables_from_fossen as from_fossen
+from lgvi_warp import vehicle_tables_from_sdf as from_sdf
+from lgvi_warp import vehicle_tables_from_yaml as from_yaml
 from lgvi_warp.runs.provenance import messages
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene.vehicles import robot_xml as coefficients_xml
@@ -40,7 +43,7 @@ def warnings_of(tables):
 @pytest.mark.parametrize("name", MAIN)
 def test_restoring_forces_are_gazebos(name):
     """Force and torque about the main link's origin, at attitudes of any kind, in a computation of the test's own."""
-    tables = lw.from_sdf(FILES / f"{name}.sdf")
+    tables = from_sdf(FILES / f"{name}.sdf")
     water = tables["environment"]
     theirs = righting.of_sdf(FILES / f"{name}.sdf", name, MAIN[name], water["water_density"], water["gravity"])
     attitudes = Rotation.random(20, random_state=1).as_matrix()
@@ -50,10 +53,10 @@ def test_restoring_forces_are_gazebos(name):
     assert sum(up for _, up in righting.of_tables(tables)) == pytest.approx(sum(up for _, up in theirs), abs=1e-10)
 
 
-@pytest.mark.parametrize("read,file", [(lw.from_sdf, "frame_rov.sdf"), (lw.from_sdf, "long_auv.sdf"),
-                                       (lw.from_sdf, "survey_auv.urdf"), (lw.from_yaml, "survey_auv.yaml")])  # fmt: skip
+@pytest.mark.parametrize("read,file", [(from_sdf, "frame_rov.sdf"), (from_sdf, "long_auv.sdf"),
+                                       (from_sdf, "survey_auv.urdf"), (from_yaml, "survey_auv.yaml")])  # fmt: skip
 def test_vehicles_float_upright(read, file):
-    if read is lw.from_yaml:
+    if read is from_yaml:
         pytest.importorskip("yaml")
     tables = read(FILES / file)
     forces, tilts = righting.of_tables(tables), righting.tilts()
@@ -63,19 +66,19 @@ def test_vehicles_float_upright(read, file):
 
 
 def test_the_world_gives_gravity_and_density():
-    assert lw.from_sdf(FILES / "frame_rov.sdf")["environment"] == {"gravity": 9.81, "water_density": 1021.0}
+    assert from_sdf(FILES / "frame_rov.sdf")["environment"] == {"gravity": 9.81, "water_density": 1021.0}
     world = "<sdf><world><gravity>0 0 -1.6</gravity><plugin name='gz::sim::systems::Buoyancy'/></world></sdf>"
-    moon = lw.from_sdf(FILES / "long_auv.sdf", world=world)
+    moon = from_sdf(FILES / "long_auv.sdf", world=world)
     assert moon["environment"] == {"gravity": 1.6, "water_density": 1000.0}
-    earth = lw.from_sdf(FILES / "long_auv.sdf")
+    earth = from_sdf(FILES / "long_auv.sdf")
     assert moon["vehicle"]["buoyancy"] / earth["vehicle"]["buoyancy"] == pytest.approx(1.6 / 9.80665)
-    given = lw.from_sdf(FILES / "frame_rov.sdf", water_density=1000.0, gravity=9.8)
+    given = from_sdf(FILES / "frame_rov.sdf", water_density=1000.0, gravity=9.8)
     assert given["environment"] == {"gravity": 9.8, "water_density": 1000.0}
 
 
 def test_a_model_that_buoyancy_is_not_enabled_for_sinks():
     text = (FILES / "frame_rov.sdf").read_text().replace("<enable>frame_rov", "<enable>other")
-    tables = lw.from_sdf(text)
+    tables = from_sdf(text)
     assert tables["vehicle"]["buoyancy"] == 0.0 and "other alone" in warnings_of(tables)
 
 
@@ -88,7 +91,7 @@ def test_inertia_is_that_of_all_links(name):
     model = next(m for m in righting.tree(FILES / f"{name}.sdf").iter("model") if m.get("name") == name)
     place = righting.frames(model, np.eye(4))
     to_main = np.linalg.inv(place[MAIN[name]])
-    tables = lw.from_sdf(FILES / f"{name}.sdf")["vehicle"]
+    tables = from_sdf(FILES / f"{name}.sdf")["vehicle"]
     M = np.array(tables["rigid_body_mass_matrix"])
     for nu in RNG.normal(size=(5, 6)):
         v, w = nu[:3], nu[3:]
@@ -108,7 +111,7 @@ def test_added_mass_of_a_fixed_link_moves_with_it():
     model = next(m for m in righting.tree(FILES / "frame_rov.sdf").iter("model") if m.get("name") == "frame_rov")
     T = np.linalg.inv(righting.frames(model, np.eye(4))["base_link"]) @ righting.frames(model, np.eye(4))["camera"]
     text = (FILES / "frame_rov.sdf").read_text()
-    A = np.array(lw.from_sdf(text.replace("DotU>-5<", "DotU>0<").replace("DotV>-7<", "DotV>0<").replace("DotW>-14<", "DotW>0<")
+    A = np.array(from_sdf(text.replace("DotU>-5<", "DotU>0<").replace("DotV>-7<", "DotV>0<").replace("DotW>-14<", "DotW>0<")
                              .replace(">-0.1</", ">0</"))["vehicle"]["added_mass_matrix"])  # fmt: skip
     for nu in RNG.normal(size=(3, 6)):
         v = T[:3, :3].T @ (nu[:3] + np.cross(nu[3:], T[:3, 3]))
@@ -154,7 +157,7 @@ def with_plugin(coefficients):
 
 def test_damping_is_gazebos_with_every_sign():
     plugin = righting.ElementTree.fromstring(f"<plugin>{CROSS}</plugin>")
-    tables = lw.from_sdf(with_plugin(CROSS))
+    tables = from_sdf(with_plugin(CROSS))
     for nu in RNG.normal(size=(6, 6)):
         np.testing.assert_allclose(SIX @ damping(tables, SIX @ nu), gazebo_damping(plugin, nu), atol=1e-12)
 
@@ -162,8 +165,8 @@ def test_damping_is_gazebos_with_every_sign():
 def test_added_mass_given_twice_is_refused():
     twice = link(outside="<plugin name='Hydrodynamics'><link_name>hull</link_name><xDotU>-1</xDotU>{}</plugin>")
     twice = twice.replace("</mass>", "</mass><fluid_added_mass><xx>1</xx></fluid_added_mass>")
-    assert "both give added mass" in refused(lw.from_sdf, twice.replace("{}", ""))
-    off = lw.from_sdf(twice.replace("{}", "<disable_added_mass>true</disable_added_mass>"))
+    assert "both give added mass" in refused(from_sdf, twice.replace("{}", ""))
+    off = from_sdf(twice.replace("{}", "<disable_added_mass>true</disable_added_mass>"))
     assert np.count_nonzero(off["vehicle"]["added_mass_matrix"]) == 1
 
 
@@ -172,15 +175,15 @@ def test_coefficients_of_another_link_are_moved_or_refused():
     front = "<link name='front'><pose>1 0 0 0 0 0</pose><inertial><mass>1</mass></inertial></link>"
     front += "<joint name='j' type='fixed'><parent>hull</parent><child>front</child></joint>"
     front += "<plugin name='Hydrodynamics'><link_name>front</link_name><yV>-3</yV><yDotV>-2</yDotV>{}</plugin>"
-    tables = lw.from_sdf(link(outside=front), link="hull")
+    tables = from_sdf(link(outside=front), link="hull")
     (term,) = tables["terms"]
     expected = np.zeros((6, 6))
     expected[np.ix_([1, 5], [1, 5])] = 1.0
     np.testing.assert_allclose(term["linear"], 3.0 * expected, atol=1e-15)
     np.testing.assert_allclose(tables["vehicle"]["added_mass_matrix"], 2.0 * expected, atol=1e-15)
     quadratic = front.replace("{}", "<yVabsV>-1</yVabsV>")
-    assert "another point" in refused(lw.from_sdf, link(outside=quadratic), link="hull")
-    assert lw.from_sdf(link(outside=quadratic))["terms"][0]["quadratic"][1] == 1.0
+    assert "another point" in refused(from_sdf, link(outside=quadratic), link="hull")
+    assert from_sdf(link(outside=quadratic))["terms"][0]["quadratic"][1] == 1.0
 
 
 def test_added_mass_beside_the_diagonal_keeps_its_energy():
@@ -192,7 +195,7 @@ def test_added_mass_beside_the_diagonal_keeps_its_energy():
     for i, j, value in ((1, 5, 0.5), (0, 2, 0.3), (0, 4, -0.2)):
         flu[i, j] = flu[j, i] = -value
     camera = "<fluid_added_mass><xx>0.1</xx><yy>0.2</yy><zz>0.2</zz></fluid_added_mass>"
-    A = np.array(lw.from_sdf(with_plugin(text).replace(camera, ""))["vehicle"]["added_mass_matrix"])
+    A = np.array(from_sdf(with_plugin(text).replace(camera, ""))["vehicle"]["added_mass_matrix"])
     for nu in RNG.normal(size=(4, 6)):
         np.testing.assert_allclose((SIX @ nu) @ A @ (SIX @ nu), nu @ flu @ nu, rtol=1e-12)
 
@@ -206,18 +209,18 @@ def uuv_damping(read, nu):
 def test_damping_is_uuv_simulators():
     yaml = pytest.importorskip("yaml")
     read = yaml.safe_load((FILES / "survey_auv.yaml").read_text())
-    tables, by_plugin = lw.from_yaml(FILES / "survey_auv.yaml"), lw.from_sdf(FILES / "survey_auv.urdf")
+    tables, by_plugin = from_yaml(FILES / "survey_auv.yaml"), from_sdf(FILES / "survey_auv.urdf")
     for nu in RNG.normal(size=(6, 6)):
         np.testing.assert_allclose(damping(tables, nu), uuv_damping(read, nu), atol=1e-12)
         np.testing.assert_allclose(damping(by_plugin, nu), uuv_damping(read, nu), atol=1e-12)
     assert "by its diagonal" in warnings_of(tables)
-    full = lw.from_yaml(FILES / "survey_auv.yaml", quadratic="full")["terms"][0]
+    full = from_yaml(FILES / "survey_auv.yaml", quadratic="full")["terms"][0]
     np.testing.assert_array_equal(full["quadratic"], -np.array(read["quad_damping"]))
 
 
 def test_the_plugin_of_a_urdf_gives_the_vehicle_of_the_yaml_file():
     pytest.importorskip("yaml")
-    by_file, by_plugin = lw.from_yaml(FILES / "survey_auv.yaml"), lw.from_sdf(FILES / "survey_auv.urdf")
+    by_file, by_plugin = from_yaml(FILES / "survey_auv.yaml"), from_sdf(FILES / "survey_auv.urdf")
     for key in ("weight", "buoyancy", "center_of_buoyancy", "added_mass_matrix", "center_of_gravity"):
         np.testing.assert_allclose(by_plugin["vehicle"][key], by_file["vehicle"][key], rtol=1e-12, err_msg=key)
     np.testing.assert_allclose(by_plugin["vehicle"]["rigid_body_mass_matrix"], by_file["vehicle"]["rigid_body_mass_matrix"],
@@ -226,13 +229,13 @@ def test_the_plugin_of_a_urdf_gives_the_vehicle_of_the_yaml_file():
 
 
 def test_a_current_is_turned_from_east_north_up():
-    terms = lw.from_sdf(FILES / "long_auv.sdf")["terms"]
+    terms = from_sdf(FILES / "long_auv.sdf")["terms"]
     assert {"type": "current", "velocity": [0.1, 0.2, 0.0]} in terms
 
 
 def test_a_controllers_gain_is_no_drag():
     controller = "<plugin name='controller'><kP>12</kP><kI>1</kI></plugin>"
-    assert lw.from_sdf(link(outside=controller))["terms"] == []
+    assert from_sdf(link(outside=controller))["terms"] == []
 
 
 # Shapes
@@ -258,19 +261,19 @@ def link(shape="<box/>", mass="20", more="", outside=""):
 
 @pytest.mark.parametrize("shape", VOLUMES)
 def test_volumes_of_shapes(shape):
-    tables = lw.from_sdf(link(shape), gravity=10.0)
+    tables = from_sdf(link(shape), gravity=10.0)
     assert tables["vehicle"]["buoyancy"] == pytest.approx(1e4 * VOLUMES[shape], rel=1e-14)
     np.testing.assert_allclose(tables["vehicle"]["center_of_buoyancy"], [0.1, -0.2, -0.3])
 
 
 def test_shapes_in_other_files_need_a_volume():
     mesh = "<mesh><uri>model://hull.dae</uri></mesh>"
-    message = refused(lw.from_sdf, link(mesh))
+    message = refused(from_sdf, link(mesh))
     assert "hull <collision> = 'shape'" in message and "give volume=" in message
-    tables = lw.from_sdf(link(mesh), volume=0.02, center_of_buoyancy=(0.0, 0.0, 0.1))
+    tables = from_sdf(link(mesh), volume=0.02, center_of_buoyancy=(0.0, 0.0, 0.1))
     assert tables["vehicle"]["buoyancy"] == pytest.approx(0.02 * 1000.0 * 9.80665)
-    assert lw.from_sdf(link(mesh), buoyancy=200.0)["vehicle"]["buoyancy"] == 200.0
-    plane = lw.from_sdf(link("<plane/>"))["vehicle"]
+    assert from_sdf(link(mesh), buoyancy=200.0)["vehicle"]["buoyancy"] == 200.0
+    plane = from_sdf(link("<plane/>"))["vehicle"]
     assert plane["buoyancy"] == plane["weight"]
     assert "no collision shape displaces water" in warnings_of({"vehicle": plane})
 
@@ -286,54 +289,54 @@ def test_shapes_in_other_files_need_a_volume():
 def test_a_mass_that_is_no_number_is_refused(mass, remedy):
     """Even where another link has one: that is a battery, not the vehicle."""
     battery = '<link name="battery"><inertial><mass>5</mass></inertial></link>'
-    message = refused(lw.from_sdf, link(mass=mass, outside=battery))
+    message = refused(from_sdf, link(mass=mass, outside=battery))
     assert "hull <mass>" in message and remedy in message and "\n" not in message
 
 
 def test_a_negative_mass_is_refused():
     assert "is negative" in refused(
-        lw.from_sdf, link(outside='<link name="b"><inertial><mass>-1</mass></inertial></link>')
+        from_sdf, link(outside='<link name="b"><inertial><mass>-1</mass></inertial></link>')
     )
 
 
 def test_templates_and_xacro_are_named():
-    assert "erb" in refused(lw.from_sdf, "<sdf><%= mass %></sdf>")
+    assert "erb" in refused(from_sdf, "<sdf><%= mass %></sdf>")
     xacro = '<robot xmlns:xacro="x"><xacro:property name="mass" value="3"/><link name="a"/></robot>'
-    message = refused(lw.from_sdf, xacro)
+    message = refused(from_sdf, xacro)
     assert 'xacro:property name="mass"' in message and "not executed" in message and "run xacro" in message
     plugin = (
         "<plugin name='uuv'><link name='a'><hydrodynamic_model><type>sphere</type></hydrodynamic_model></link></plugin>"
     )
     urdf = f"<robot><link name='a'><inertial><mass value='3'/></inertial></link><gazebo>{plugin}</gazebo></robot>"
-    assert "a <type> = 'sphere'" in refused(lw.from_sdf, urdf)
-    assert "${m}" in refused(lw.from_sdf, urdf.replace("'3'", "'${m}'"))
+    assert "a <type> = 'sphere'" in refused(from_sdf, urdf)
+    assert "${m}" in refused(from_sdf, urdf.replace("'3'", "'${m}'"))
 
 
 def test_models_and_what_they_include():
     two = "".join(f'<model name="{n}"><link name="l"><inertial><mass>1</mass></inertial></link></model>' for n in "ab")
-    message = refused(lw.from_sdf, f"<sdf><world>{two}</world></sdf>")
+    message = refused(from_sdf, f"<sdf><world>{two}</world></sdf>")
     assert "several: a, b" in message and "model=" in message
-    assert lw.from_sdf(f"<sdf><world>{two}</world></sdf>", model="b")["vehicle"]["weight"] == 9.8
-    assert "known: a, b" in refused(lw.from_sdf, f"<sdf>{two}</sdf>", model="rov")
+    assert from_sdf(f"<sdf><world>{two}</world></sdf>", model="b")["vehicle"]["weight"] == 9.8
+    assert "known: a, b" in refused(from_sdf, f"<sdf>{two}</sdf>", model="rov")
     assert "includes model://rov" in refused(
-        lw.from_sdf, "<sdf><world><include><uri>model://rov</uri></include></world></sdf>"
+        from_sdf, "<sdf><world><include><uri>model://rov</uri></include></world></sdf>"
     )
-    included = lw.from_sdf(link(outside="<include><uri>model://arm</uri></include>"))
+    included = from_sdf(link(outside="<include><uri>model://arm</uri></include>"))
     assert "model://arm" in warnings_of(included)
-    assert "several: x::a, y::a" in refused(lw.from_sdf, link(outside="".join(
+    assert "several: x::a, y::a" in refused(from_sdf, link(outside="".join(
         f"<model name='{n}'><link name='a'/></model>" for n in "xy")), link="a")  # fmt: skip
 
 
 def test_frames_that_run_in_circles_are_refused():
     loop = '<frame name="f"><pose relative_to="g"/></frame><frame name="g"><pose relative_to="f"/></frame>'
     placed = '<link name="x"><pose relative_to="f">0 0 0 0 0 0</pose></link>'
-    assert "relative to itself" in refused(lw.from_sdf, link(outside=loop + placed))
-    assert "no frame of the model" in refused(lw.from_sdf, link(outside=placed.replace('"f"', '"nowhere"')))
+    assert "relative to itself" in refused(from_sdf, link(outside=loop + placed))
+    assert "no frame of the model" in refused(from_sdf, link(outside=placed.replace('"f"', '"nowhere"')))
     chain = "".join(f'<frame name="f{i}"><pose relative_to="f{i + 1}"/></frame>' for i in range(1500))
-    assert "relative" in refused(lw.from_sdf, link(outside=chain + placed.replace('"f"', '"f0"')))
+    assert "relative" in refused(from_sdf, link(outside=chain + placed.replace('"f"', '"f0"')))
     attached = '<frame name="f" attached_to="g"/><frame name="g" attached_to="f"/>'
     joint = '<joint name="j" type="fixed"><parent>hull</parent><child>f</child></joint>'
-    lw.from_sdf(link(outside=attached + joint))
+    from_sdf(link(outside=attached + joint))
 
 
 ENTITIES = "".join(f'<!ENTITY e{i + 1} "' + f"&e{i};" * 10 + '">' for i in range(10))
@@ -361,7 +364,7 @@ HOSTILE = {
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_xml_is_refused_in_time(name):
     began = time.process_time()
-    message = refused(lw.from_sdf, HOSTILE[name])
+    message = refused(from_sdf, HOSTILE[name])
     assert time.process_time() - began < 2.0
     assert len(message) < 2_000 and "\n" not in message
 
@@ -372,15 +375,15 @@ def test_hostile_files_are_refused(tmp_path):
     os.mkfifo(tmp_path / "pipe.sdf")
     for path in (tmp_path, tmp_path / "none.sdf", tmp_path / "latin.sdf", tmp_path / "bytes.sdf", tmp_path / "pipe.sdf",
                  "/dev/zero", "a\0b", None, 3):  # fmt: skip
-        assert refused(lw.from_sdf, path).startswith("SDF ")
+        assert refused(from_sdf, path).startswith("SDF ")
 
 
 def test_a_byte_order_mark_and_other_encodings_are_read(tmp_path):
-    expected = lw.from_sdf(link())
-    assert lw.from_sdf("\ufeff" + link()) == expected
+    expected = from_sdf(link())
+    assert from_sdf("\ufeff" + link()) == expected
     for encoding in ("utf-8-sig", "utf-16"):
         (tmp_path / "model.sdf").write_bytes(link().encode(encoding))
-        assert lw.from_sdf(tmp_path / "model.sdf") == expected
+        assert from_sdf(tmp_path / "model.sdf") == expected
 
 
 def test_the_limits_are_above_real_files():
@@ -391,22 +394,22 @@ def test_the_limits_are_above_real_files():
 
 
 def test_a_heavy_top_is_a_warning():
-    tables = lw.from_sdf(link().replace("0.1 0.2 0.3 0.4", "0 0 -0.3 0.4"))
+    tables = from_sdf(link().replace("0.1 0.2 0.3 0.4", "0 0 -0.3 0.4"))
     assert "turns upside down" in warnings_of(tables) and "0.3 m above" in warnings_of(tables)
-    fossen = lw.from_fossen({}, mass=1.0, inertia=(1.0, 1.0, 1.0), center_of_gravity=(0.0, 0.0, -0.02))
+    fossen = from_fossen({}, mass=1.0, inertia=(1.0, 1.0, 1.0), center_of_gravity=(0.0, 0.0, -0.02))
     assert "0.02 m above" in warnings_of(fossen)
-    assert "upside" not in warnings_of(lw.from_sdf(link()))
+    assert "upside" not in warnings_of(from_sdf(link()))
 
 
 def test_moving_links_and_plugins_not_read_are_named():
-    told = warnings_of(lw.from_sdf(FILES / "frame_rov.sdf"))
+    told = warnings_of(from_sdf(FILES / "frame_rov.sdf"))
     assert "links that can move are held where the file has them: propeller" in told and "thruster (1)" in told
-    told = warnings_of(lw.from_sdf(FILES / "long_auv.sdf"))
+    told = warnings_of(from_sdf(FILES / "long_auv.sdf"))
     assert "tray::battery" in told and "weight" not in told and "<xUU>, <yVV>" in told
 
 
 def test_warnings_are_messages_of_the_run():
-    scene = lw.Scene.from_dict(lw.from_sdf(FILES / "frame_rov.sdf"))
+    scene = lw.Scene.from_dict(from_sdf(FILES / "frame_rov.sdf"))
     told = " ".join(messages(make_plan(one(scene), "psi_x", h=0.01, t1=0.1)))
     assert "propeller" in told and "thruster" in told
     assert lw.Scene.from_dict(scene.to_dict()).vehicle.warnings == scene.vehicle.warnings
@@ -430,12 +433,12 @@ def test_inertia_that_misses_the_triangle_is_taken_from_a_file():
     rigid = np.diag([*[69.7] * 3, *inertia])
     message = refused(lw.Vehicle, rigid_body_mass_matrix=rigid)
     assert "two of which sum to less than the third" in message and "inertia_tolerance = 0.13" in message
-    scene = lw.Scene.from_dict(lw.from_fossen({}, mass=69.7, inertia=inertia))
+    scene = lw.Scene.from_dict(from_fossen({}, mass=69.7, inertia=inertia))
     assert "by 13 % of it" in scene.vehicle.warnings[0]
     assert lw.Scene.from_dict(scene.to_dict()).vehicle.warnings == scene.vehicle.warnings
     varied = {"vehicle.rigid_body_mass_matrix": lw.Normal(relative=1e-3)}
     assert lw.Ensemble(scene, 20, 1, varied).members == 20
-    far = lw.from_fossen({}, mass=69.7, inertia=(0.6, 20.0, 35.0))
+    far = from_fossen({}, mass=69.7, inertia=(0.6, 20.0, 35.0))
     assert "no rigid body has" in refused(lw.Scene.from_dict, far)
     assert "inertia_tolerance" in refused(lw.Vehicle, rigid_body_mass_matrix=rigid, inertia_tolerance=-1.0)
 

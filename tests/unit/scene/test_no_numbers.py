@@ -87,9 +87,9 @@ DOORS = {
     "choice": lambda x: lw.Choice(x),
     "weights": lambda x: lw.Choice([1.0, 2.0, 3.0], weights=x),
     "correlated": lambda x: lw.CorrelatedNormal(std=x),
-    "frozen": lambda x: lw.Frozen(stats.norm(loc=x)),
+    "frozen": lambda x: lw.ScipyDistribution(stats.norm(loc=x)),
     "table": lambda x: lw.Table({"vehicle.mass": x}),
-    "levels": lambda x: lw.Levels([x]),
+    "levels": lambda x: lw.UnitCubePoints([x]),
     "grid": lambda x: lw.Grid({"vehicle.mass": x}),
     "saving": lambda x: lw.SaveAt(at=x),
     "limits": lambda x: lw.Exceedance("position", above=x),
@@ -126,7 +126,7 @@ def test_a_mask_says_how_many_and_where():
 @pytest.mark.parametrize("name", ["norm", "gamma", "uniform", "poisson", "t", "beta", "lognorm"])
 def test_a_law_without_its_numbers_is_refused(scene, name):
     law = getattr(stats, name)
-    for make in (lambda: lw.Ensemble(scene, 4, 0, {"vehicle.mass": law}), lambda: lw.Frozen(law),
+    for make in (lambda: lw.Ensemble(scene, 4, 0, {"vehicle.mass": law}), lambda: lw.ScipyDistribution(law),
                  lambda: EnsembleSettings(4, 0, {"vehicle.mass": law}),
                  lambda: lw.uq.model(scene, {"vehicle.mass": law}, "depth", h=0.01, t1=0.1),
                  lambda: lw.uq.sobol(scene, "depth", vary={"vehicle.mass": law}, h=0.01, t1=0.1)):  # fmt: skip
@@ -158,7 +158,7 @@ def test_a_table_of_a_law_without_numbers_is_refused(scene, table):
 
 
 def test_what_was_frozen_without_numbers_is_read_again():
-    law = lw.Frozen(stats.norm())
+    law = lw.ScipyDistribution(stats.norm())
     settings = EnsembleSettings(4, 0, {"vehicle.mass": law.to_dict()})
     levels = np.array([0.2, 0.7])
     np.testing.assert_array_equal(settings.vary["vehicle.mass"].quantile(levels, 0.0), stats.norm().ppf(levels))

@@ -67,7 +67,7 @@ def test_the_remus_matrices_follow_from_the_printed_derivatives():
     printed |= {"Y_rdot": 1.93, "N_vdot": 1.93, "Z_qdot": -1.93, "M_wdot": -1.93}
     printed |= {"X_uu": -1.62, "Y_vv": -1310.0, "Y_rr": 0.632, "Z_ww": -131.0, "Z_qq": -0.632, "K_pp": -0.13}
     printed |= {"M_ww": 3.18, "M_qq": -188.0, "N_vv": -3.18, "N_rr": -94.0}
-    made = co.from_fossen(
+    made = co.vehicle_tables_from_fossen(
         printed,
         mass=30.48,
         inertia=(0.177, 3.45, 3.45),

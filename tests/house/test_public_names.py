@@ -1,0 +1,48 @@
+"""Public names that were replaced: the old ones still work, warn, and name the new ones."""
+
+import pickle
+
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp.cli.arguments import parser
+from lgvi_warp.cli.command import VERBS
+
+RENAMED = {
+    "Frozen": "ScipyDistribution",
+    "Levels": "UnitCubePoints",
+    "Setting": "PackingContext",
+    "from_fossen": "vehicle_tables_from_fossen",
+    "from_sdf": "vehicle_tables_from_sdf",
+    "from_yaml": "vehicle_tables_from_yaml",
+    "quantity": "number",
+    "register": "register_term",
+}
+
+
+@pytest.mark.parametrize(("old", "new"), RENAMED.items())
+def test_an_old_name_is_the_new_thing_and_warns_each_time(old, new):
+    for _ in range(2):
+        with pytest.warns(DeprecationWarning, match=rf"lw\.{old} is now lw\.{new};") as warned:
+            assert getattr(lw, old) is getattr(lw, new)
+        assert warned[0].filename == __file__
+    assert new in lw.__all__ and old not in lw.__all__
+
+
+def test_an_old_name_pickles_as_the_new_class():
+    with pytest.warns(DeprecationWarning, match="UnitCubePoints"):
+        design = lw.Levels([[0.25, 0.5]])
+    loaded = pickle.loads(pickle.dumps(design))
+    assert type(loaded) is lw.UnitCubePoints and loaded.points.tolist() == [[0.25, 0.5]]
+
+
+def test_an_unknown_name_is_still_unknown():
+    with pytest.raises(AttributeError, match="no attribute 'Setings'"):
+        lw.Setings
+
+
+def test_the_verb_plan_is_the_verb_predict():
+    chosen = [vars(parser().parse_args([verb, "scene.toml", "--members", "3"])) for verb in ("plan", "predict")]
+    assert chosen[0].pop("verb") == "plan" and chosen[1].pop("verb") == "predict" and chosen[0] == chosen[1]
+    assert VERBS["plan"] is VERBS["predict"]
+    assert "predict (plan)" in parser().format_help()

@@ -1,0 +1,28 @@
+"""What a kernel is asked for, decided before it is compiled."""
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp.runs.settle import make_plan
+from tests.laws.cases import CASES
+from tests.support.tools import one, vehicle
+
+
+@pytest.mark.parametrize("name", ["current harmonics", "Gauss-Markov current", "current profile"])
+@pytest.mark.parametrize("gravity", [0.0, 9.8])
+@pytest.mark.parametrize("buoyancy", [0.0, 10.0])
+def test_water_that_accelerates_pushes_by_the_displaced_mass(name, gravity, buoyancy):
+    """Buoyancy over gravity is the displaced mass: without gravity nobody knows it, unless nothing is displaced."""
+    body = lw.Vehicle(2.0, (1.0, 2.0, 2.5), np.zeros((3, 3)), buoyancy)
+    scene = lw.Scene(body, lw.Environment(gravity=gravity), terms=list(CASES[name].terms))
+    if gravity == 0.0 and buoyancy > 0.0:
+        with pytest.raises(lw.SceneError, match=r"environment\.gravity = 0.*displaced mass unknown.*give gravity"):
+            make_plan(one(scene), "psi_s", h=0.01, t1=0.1)
+    else:
+        assert make_plan(one(scene), "psi_s", h=0.01, t1=0.1).model.flow in ("uniform", "varying")
+
+
+def test_steady_water_needs_no_gravity():
+    scene = lw.Scene(vehicle(net=0.0), lw.Environment(gravity=0.0), terms=list(CASES["current"].terms))
+    assert make_plan(one(scene), "psi_s", h=0.01, t1=0.1).model.flow == "steady"

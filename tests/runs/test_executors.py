@@ -196,7 +196,7 @@ def test_threads_of_one_dask_worker_share_it(memory):
 class Overlapping:
     """Work that notes how many blocks run at once, and waits for its end; it is sent as itself within one process."""
 
-    begun, running, most = [], 0, 0  # noqa: RUF012
+    begun, running, most = [], 0, 0
 
     class plan:  # noqa: N801
         class grid:  # noqa: N801
@@ -380,27 +380,31 @@ class Deadly:
         os._exit(7)
 
 
-@pytest.mark.slow
-def test_workers_end_with_the_run(tmp_path):
-    """A run that is killed leaves no process behind that goes on writing."""
-    code = """
-import lgvi_warp as lw, sys
-from tests.support.stores import fleet
+ORPHANS = """
+import sys
+from pathlib import Path
+from lgvi_warp.engine.block import blocks
+from lgvi_warp.engine.executors.processes import Processes
+from tests.support.toy_work import Traced
 if __name__ == "__main__":
-    def shown(fraction):
-        import multiprocessing
-        print(*[child.pid for child in multiprocessing.active_children()], flush=True)
-    lw.solve(fleet(4096), "psi_s", h=0.01, t1=600.0, executor="processes", threads=2, progress=shown)
+    list(Processes(2).run(Traced(Path(sys.argv[1]), 30.0), blocks(2048), lambda *_: None))
 """
-    (tmp_path / "script.py").write_text(code)
-    run = subprocess.Popen([sys.executable, str(tmp_path / "script.py")], stdout=subprocess.PIPE, text=True,
+
+
+def test_workers_end_with_the_run(tmp_path):
+    """A run that is killed leaves no process behind that goes on, in blocks that would take minutes."""
+    (tmp_path / "script.py").write_text(ORPHANS)
+    work = Traced(tmp_path / "begun")
+    work.folder.mkdir()
+    run = subprocess.Popen([sys.executable, str(tmp_path / "script.py"), str(work.folder)],
                            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})  # fmt: skip
-    pids = [int(word) for word in run.stdout.readline().split()]
+    while len(pids := [pid for _, pid in work.begun()]) < 2:
+        assert run.poll() is None
+        time.sleep(0.05)
+    assert all(alive(pid) for pid in pids)
     run.kill()
     run.wait()
-    run.stdout.close()
-    assert len(pids) == 2
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + 20.0
     while any(alive(pid) for pid in pids) and time.monotonic() < deadline:
         time.sleep(0.05)
     assert not any(alive(pid) for pid in pids)

@@ -26,3 +26,32 @@ def test_water_that_accelerates_pushes_by_the_displaced_mass(name, gravity, buoy
 def test_steady_water_needs_no_gravity():
     scene = lw.Scene(vehicle(net=0.0), lw.Environment(gravity=0.0), terms=list(CASES["current"].terms))
     assert make_plan(one(scene), "psi_s", h=0.01, t1=0.1).model.flow == "steady"
+
+
+@pytest.mark.parametrize(
+    ("names", "timed", "memory", "flow"),
+    [
+        ((), False, False, "none"),
+        (("drag",), False, False, "none"),
+        (("tether",), False, False, "none"),
+        (("drag", "current"), False, False, "steady"),
+        (("tether", "wrench schedule"), True, False, "none"),
+        (("current harmonics", "drag"), True, False, "uniform"),
+        (("drag", "waves"), True, False, "varying"),
+        (("tether", "thrusters"), True, True, "none"),
+        (("Gauss-Markov current", "tether"), True, True, "uniform"),
+    ],
+)
+def test_a_kernel_has_what_any_of_its_terms_needs(names, timed, memory, flow):
+    acting = sum((CASES[name].terms for name in names), ())
+    for terms in (acting, acting[::-1]):
+        model = make_plan(one(lw.Scene(vehicle(), terms=list(terms))), "psi_s", h=0.01, t1=0.1).model
+        assert (model.timed, model.memory, model.flow) == (timed, memory, flow)
+
+
+@pytest.mark.parametrize("at", [0, 1])
+def test_an_event_of_the_time_wants_the_time(at):
+    events = [lw.Floor(depth=10.0)]
+    events.insert(at, lw.StopTime(at=1.0))
+    assert make_plan(one(lw.Scene(vehicle(), events=events)), "psi_s", h=0.01, t1=0.1).model.timed
+    assert not make_plan(one(lw.Scene(vehicle(), events=[lw.Floor(depth=10.0)])), "psi_s", h=0.01, t1=0.1).model.timed

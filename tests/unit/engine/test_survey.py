@@ -66,7 +66,7 @@ def test_one_odd_member_is_coupled(at_once):
     assert seen(fleet(scene, vehicle__added_mass_matrix=added)).left > 1e-3
 
 
-@pytest.mark.parametrize(("i", "j"), np.ndindex(3, 3))
+@pytest.mark.parametrize(("i", "j"), list(np.ndindex(3, 3)))
 def test_each_coupling_alone_is_seen(i, j):
     """A velocity along axis i that is coupled with a rate about axis j is one entry of U, above its diagonal or on it."""
     rigid = np.diag([10.0, 10.0, 10.0, 0.5, 0.5, 0.5])

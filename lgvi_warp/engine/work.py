@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.common.machine import DTYPES
-from lgvi_warp.engine.block import SHAPES, Block
+from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.keepers.protocol import BlockStore, Keeper
 from lgvi_warp.physics import notation
+from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.statistics.samples import Fields
 
@@ -31,12 +32,12 @@ class Work:
     Args:
         plan: the plan of the run.
         keepers: what is kept of the members.
-        sink: the store; None (default) for none.
+        store: the store; None (default) for none.
     """
 
     plan: Plan
     keepers: tuple[Keeper, ...]
-    sink: BlockStore | None = None
+    store: BlockStore | None = None
 
     def __call__(
         self,
@@ -61,15 +62,15 @@ class Work:
             steps_made += vehicle_steps
             advanced(steps_made)
 
-        if self.sink is None:
+        if self.store is None:
             return run_block(self.plan, block, self.keepers, halted, add)
-        stored = self.sink.parts(block, self.keepers)
+        stored = self.store.parts(block, self.keepers)
         if stored is not None:
             return stored
-        results = run_block(self.plan, block, (*self.keepers, self.sink), halted, add)
+        results = run_block(self.plan, block, (*self.keepers, self.store), halted, add)
         if results is None:
             return None
-        self.sink.finish(block, results[-1], self.keepers, results[:-1])
+        self.store.finish(block, results[-1], self.keepers, results[:-1])
         return results[:-1]
 
 
@@ -164,7 +165,7 @@ def unpacked(fields: Mapping[str, int], raw: np.ndarray, frame: Frame) -> dict[s
     samples: dict[str, np.ndarray] = {}
     column = 0
     for name, size in fields.items():
-        shape = SHAPES[name]
+        shape = TABLE[name].shape
         values = raw[..., column : column + size]
         if size == 2 * int(np.prod(shape)):
             values = np.add(*np.split(values, 2, axis=-1), dtype=np.float64)

@@ -19,8 +19,8 @@ from lgvi_warp.common.errors import Faults, SceneError, closest, shown
 from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.ends import Ends
 from lgvi_warp.statistics.estimate import Estimate
-from lgvi_warp.statistics.functional import quantity
-from lgvi_warp.statistics.quantity import Quantity, component
+from lgvi_warp.statistics.functional import Functional, over_path, quantity
+from lgvi_warp.statistics.quantity import Quantity
 from lgvi_warp.statistics.tree import Part
 from lgvi_warp.statistics.values import Values
 
@@ -55,7 +55,7 @@ class Gatherer:
         raise TypeError(f"{type(self).__name__} is abstract")
 
 
-class Rows(Gatherer):
+class RowGatherer(Gatherer):
     """Gathers one row of each array for each sample time, as the samples come."""
 
     def __init__(self, statistic: Statistic):
@@ -82,7 +82,8 @@ class Statistic:
 
     Args:
         of: a quantity (see lw.Quantity): "position", "position[2]", "depth", "speed", "euler[0]", "energy", ..., a
-            function of (samples, members), or a list of these taken together.
+            function of (samples, members), or a list of these taken together; or one number of each member's path,
+            "max(depth)", for statistics of numbers.
         name: key of the estimate in the result; by default the type and the quantity, as in "mean position".
         confidence: confidence level of the intervals, between 0 and 1; by default 0.95.
         stopped: whether a member that an event stopped counts with the state that it stopped in ("held", the default),
@@ -128,10 +129,14 @@ class Statistic:
         if self.at is not None and (not isinstance(self.at, str) or not self.at):
             faults.add("at", self.at, "is no outcome", 'give "floor", the name of an event, or "stopped"')
         elif self.at is not None and not self.of_numbers:
-            faults.add("at", self.at, "is one moment, and this is of all times", "leave it out, or ask for a mean")
+            faults.add(
+                "at", self.at, "is one moment, and this statistic is of all times", "leave it out, or ask for a mean"
+            )
         if self.of is not None:
             with faults.including():
                 object.__setattr__(self, "_quantity", self.meant())
+                if self.path is not None:
+                    self.check_one_number(faults, "", self.path.label)
         self.check(faults)
         faults.raise_if_any()
 
@@ -167,6 +172,25 @@ class Statistic:
                 [f"{self.type}.of = None: is missing; say what it is of: lw.{type(self).__name__}('depth')"]
             )
         return meaning
+
+    @property
+    def path(self) -> Functional | None:
+        """The expression that it is of, if that looks over the members' paths; else None."""
+        return over_path(self.quantity)
+
+    def check_one_number(self, faults: Faults, where: str, number: str) -> None:
+        """Note a fault if it cannot be of one number of each member.
+
+        Args:
+            faults: the list that faults are added to.
+            where: where the statistic stands, such as "then[0].".
+            number: what the number is: "a path_maximum".
+        """
+        if not self.of_numbers:
+            remark = f"is of samples in time, and {number} is one number of each member"
+            faults.add(f"{where}type", self.type, remark, "ask for its mean, quantiles, or an exceedance")
+        elif self.at is not None:
+            faults.add(f"{where}at", self.at, f"says when, and {number} has no time", "leave it out")
 
     @property
     def key(self) -> str:
@@ -221,7 +245,7 @@ class Statistic:
             time: (k,) [s], all sample times of the run.
             count: number of members of the block.
         """
-        return Rows(self)
+        return RowGatherer(self)
 
     def rows(self, values: Values) -> Part:
         """Return the part of a block at some sample times: arrays with one row for each time.
@@ -330,14 +354,6 @@ class Statistic:
             if value is not None and plain(value) != plain(default):
                 content[argument.name] = plain(value)
         return content
-
-    def alone(self, i: int) -> Quantity:
-        """Return one component of the quantity.
-
-        Args:
-            i: index of the component.
-        """
-        return component(self.quantity, i)
 
 
 def together(each: Sequence[Sequence[Part]]) -> list[Part]:

@@ -371,7 +371,7 @@ class Slot:
     def tried(self, path, mutant, tests, limit):
         """Whether a test finds a fault: (test and how, or None; seconds; tests run)."""
         place = self.tree / path.relative_to(ROOT)
-        source, begin, ran = path.read_text(), time.perf_counter(), 0
+        source, begin, ran = place.read_text(), time.perf_counter(), 0
         try:
             place.write_text(mutant.applied(source))
             for batch in batches(tests, is_device(path)):

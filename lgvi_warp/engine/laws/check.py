@@ -12,7 +12,7 @@ from lgvi_kernels.laws import LAWS
 from lgvi_kernels.stops import STOPS
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.machine import default_width
-from lgvi_warp.engine import model
+from lgvi_warp.engine import kernel_choice
 from lgvi_warp.engine.laws.bench import ORIGIN, TURN, Bank, Bench, Views, short, simple_scene, sizes
 from lgvi_warp.physics import notation, terms
 from lgvi_warp.physics.terms.base import Packed, PackingContext, Term
@@ -105,8 +105,8 @@ def check_law(
     """
     if not isinstance(term, Term):
         raise SceneError([f"term = {term!r}: is no term; give an object such as lw.Drag(...), not its class"])
-    known, roles = (STOPS, ("distance",)) if isinstance(term, Event) else (LAWS, model.ROLES)
-    module = model.device_module(term, term.device_in(False), known, *roles)
+    known, roles = (STOPS, ("distance",)) if isinstance(term, Event) else (LAWS, kernel_choice.ROLES)
+    module = kernel_choice.device_module(term, term.device_in(False), known, *roles)
     bench = Bench(term, module, scene or simple_scene(), max(1, -(-samples // default_width("float64"))), seed)
     checks: list[Check] = []
     for examine in (_numbers, _finite, _whole, _potential, _damping, _flow):
@@ -128,7 +128,7 @@ def _judged(name: str, difference: np.ndarray, allowed: np.ndarray | float, view
         )
     i, j = np.unravel_index(ratio.argmax(), ratio.shape)
     good = bool(np.all(worst <= limit) and np.isfinite(limit).all())
-    text = "" if good else f"{views.told(int(i))}; {remedy}"
+    text = "" if good else f"{views.description(int(i))}; {remedy}"
     return Check(name, float(worst[i, j]), float(limit[i, j]), good, text)
 
 

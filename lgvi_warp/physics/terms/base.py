@@ -89,7 +89,7 @@ class Term:
 
     Class attributes: `type` is the name in a scene file; `device` is the module of lgvi_kernels.laws by name, or any object
     with the same functions; `timed` says whether the law depends on time; `dissipative`, whether its damping never creates
-    energy. docs/add_a_law.md shows how to write one.
+    energy. docs/develop/add_a_force.md shows how to write one.
 
     Args:
         name: Name of the term in parameters ("name.field"), which tells two terms of one type apart; by default the type.
@@ -222,7 +222,9 @@ class Term:
         Raises:
             NotImplementedError: Where the term does not define it.
         """
-        raise NotImplementedError(f"{type(self).__name__} must define packed(numbers, context): see docs/add_a_law.md")
+        raise NotImplementedError(
+            f"{type(self).__name__} must define packed(numbers, context): see docs/develop/add_a_force.md"
+        )
 
     def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray | None:
         """Velocity of the water that this term moves; by default it moves none.

@@ -15,5 +15,5 @@ class BodyLift(Law):
     matrix: Array
 
     def damping(self, view: View) -> Array:
-        """u times the matrix."""
+        """D (6, 6): the speed ahead times the matrix."""
         return np.asarray(view.nu[0] * self.matrix)

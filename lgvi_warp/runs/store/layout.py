@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from lgvi_warp.common import machine
-from lgvi_warp.engine.block import SHAPES, Block, blocks
+from lgvi_warp.engine.block import Block, blocks
+from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.runs import member_fields
-from lgvi_warp.runs.result import MEANINGS, UNITS
 
 if TYPE_CHECKING:
     from lgvi_warp.engine.plan import Plan
@@ -44,7 +44,7 @@ class Chunking(Protocol):
 
 
 @dataclass(frozen=True)
-class Column:
+class StoreArray:
     """One array of a store, of shape (k, n, *tail), or (n, *tail) without times.
 
     Attributes:
@@ -124,7 +124,7 @@ class Column:
         return int(np.prod(self.chunk)) * np.dtype(self.dtype).itemsize + 4
 
 
-def columns(plan: Plan, store: Chunking) -> tuple[Column, ...]:
+def columns(plan: Plan, store: Chunking) -> tuple[StoreArray, ...]:
     """List the arrays that a run fills block by block.
 
     Args:
@@ -137,34 +137,39 @@ def columns(plan: Plan, store: Chunking) -> tuple[Column, ...]:
     length = blocks(plan.ensemble.members)[0].count
     arrays = (
         *_samples(plan, length, store),
-        Column(MEMBER, (), "<i8", length, 0, {"standard_name": "realization", "long_name": "member of the ensemble"}),
-        *(Column(item.name, (), item.dtype, length, 0, item.attributes) for item in member_fields.present(plan)),
+        StoreArray(
+            MEMBER, (), "<i8", length, 0, {"standard_name": "realization", "long_name": "member of the ensemble"}
+        ),
+        *(StoreArray(item.name, (), item.dtype, length, 0, item.attributes) for item in member_fields.present(plan)),
         *_parameters(plan, length),
     )
     return tuple(dataclasses.replace(column, along=store.along) for column in arrays)
 
 
-def _samples(plan: Plan, length: int, store: Chunking) -> list[Column]:
+def _samples(plan: Plan, length: int, store: Chunking) -> list[StoreArray]:
     real = np.dtype(machine.DTYPES[plan.dtype])
     k = len(plan.grid.times)
     arrays = []
     for name in (name for name in plan.fields if store.fields is None or name in store.fields):
         computed = np.dtype("f8") if plan.spec.compensated and name == "position" else real
+        field = TABLE[name]
         stored = np.dtype(store.dtype) if store.dtype else computed
-        row = length * int(np.prod(SHAPES[name])) * stored.itemsize
+        row = length * int(np.prod(field.shape)) * stored.itemsize
         # Chunks of equal length along the times, so that the last one is nearly full as well.
         pieces = -(-k // max(1, store.chunk_bytes // row))
-        attributes = {"units": UNITS[name], "long_name": MEANINGS[name]}
-        arrays.append(Column(name, SHAPES[name], stored.newbyteorder("<").str, length, -(-k // pieces), attributes))
+        kind = stored.newbyteorder("<").str
+        arrays.append(StoreArray(name, field.shape, kind, length, -(-k // pieces), field.attributes))
     return arrays
 
 
-def _parameters(plan: Plan, length: int) -> list[Column]:
+def _parameters(plan: Plan, length: int) -> list[StoreArray]:
     ensemble = plan.ensemble
     first = ensemble.parameters(0, 1)
     units = parameter_units(ensemble.scene)
     return [
-        Column(name, first[name].shape[1:], "<f8", length, 0, {"long_name": f"parameter {name}", "units": units[name]})
+        StoreArray(
+            name, first[name].shape[1:], "<f8", length, 0, {"long_name": f"parameter {name}", "units": units[name]}
+        )
         for name in ensemble.varied()
     ]
 

@@ -197,7 +197,12 @@ VEHICLES = [
     (BODY | {"weight": 98.0}, "vehicle.weight = 98.0", "6x6 form", "give rigid_body_mass_matrix"),
     (full(DIAGONAL + np.eye(6, k=1)), "vehicle.rigid_body_mass_matrix", "not symmetric", "give a symmetric matrix"),
     (full(-DIAGONAL), "vehicle.rigid_body_mass_matrix", "not positive definite", "[[m I, -m hat(r_g)]"),
-    (full(np.diag([1.0, 2, 3, 1, 1, 1])), "vehicle.rigid_body_mass_matrix", "no m I in its first block", "[[m I"),
+    (
+        full(np.diag([1.0, 2, 3, 1, 1, 1])),
+        "vehicle.rigid_body_mass_matrix",
+        "not have m I as its upper left block",
+        "[[m I",
+    ),
     (full(np.eye(3)), "vehicle.rigid_body_mass_matrix", "shape (3, 3)", "symmetric 6x6 matrix"),
     (full(added_mass_matrix=-2.0 * DIAGONAL), "vehicle.added_mass_matrix", "not positive definite", "X_udot"),
     (
@@ -206,7 +211,7 @@ VEHICLES = [
         "is missing",
         "beside added_mass_matrix",
     ),
-    (full(mass=10.0), "vehicle.mass = 10.0", "says again", "keep one of the two forms"),
+    (full(mass=10.0), "vehicle.mass = 10.0", "repeats what", "keep one of the two forms"),
     (full(weight=NAN), "vehicle.weight = nan", "not finite", "[N]"),
     (full(center_of_gravity=[1.0]), "vehicle.center_of_gravity = [1.0]", "shape (1,)", "(3,) [m]"),
 ]
@@ -370,9 +375,15 @@ def test_numbers_that_would_do_nothing(table, name, remedy):
 NOISE = {"type": "wrench_noise", "force": [1.0, 1.0, 1.0]}
 MATRIX = {"type": "drag_matrix", "linear": np.eye(6).tolist()}
 SETTINGS = [
-    (MATRIX, {"method": "kl6(psi_s)"}, "method = 'kl6(psi_s)'", "a damping matrix does not", "use psi_s"),
-    (MATRIX, {"method": "tj4(psi_x)"}, "method = 'tj4(psi_x)'", "keeps its order only for maps that undo", "use psi_x"),
-    (TIDE, {"method": "su4(psi_s)"}, "method = 'su4(psi_s)'", "water that varies does not", "use psi_s"),
+    (MATRIX, {"method": "kl6(psi_s)"}, "method = 'kl6(psi_s)'", "a damping matrix prevents that", "use psi_s"),
+    (
+        MATRIX,
+        {"method": "tj4(psi_x)"},
+        "method = 'tj4(psi_x)'",
+        "keeps its order only if a step of -h undoes",
+        "use psi_x",
+    ),
+    (TIDE, {"method": "su4(psi_s)"}, "method = 'su4(psi_s)'", "water that varies prevents that", "use psi_s"),
     (NOISE, {"method": "psi"}, "method = 'psi'", "noise more than once a step", "use psi_s"),
     (
         {"type": "drag", "linear": [0.0, 0.0, 3e5, 0.0, 0.0, 0.0]},
@@ -441,15 +452,15 @@ class Pull(lw.Term):
 class Packs(Pull):
     what: ClassVar[Any] = None
 
-    def packed(self, own, setting):
+    def packed(self, numbers, context):
         return self.what
 
 
 LAWS = [
     (device(law=pull_short), "pull.law = '(w, view)'", "takes 2 arguments", "write law(w, view, p)"),
     (device(law=pull_plain), "pull.law", "not a Warp function", "@wp.func"),
-    (device(law=pull_law, params=None), "pull.device", "has no params(width, real)", "add_a_law.md"),
-    (device(), "pull.device", "has none of law, damping, flow, evolve", "add_a_law.md"),
+    (device(law=pull_law, params=None), "pull.device", "has no params(width, real)", "add_a_force.md"),
+    (device(), "pull.device", "has none of law, damping, flow, evolve", "add_a_force.md"),
     ("pull", "pull.device = 'pull'", "not known", "give a module"),
 ]
 
@@ -463,23 +474,29 @@ def test_a_users_law(made, words):
         assert all(word in fault for word in words), fault
 
 
+@pytest.mark.kernel
 def test_a_law_that_returns_nothing():
     term = type("Bad", (Packs,), {"device": device(law=pull_silent), "__annotations__": {}})(k=1.0)
     (fault,) = refused(lw.check_law, term)
     assert "pull.device" in fault and "does not compile" in fault and "return what the role adds to" in fault
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize("given", [None, {"k": np.ones(1)}], ids=["nothing", "a dict"])
 def test_packed_that_returns_something_else(given):
     report = lw.check_law(type("Bad", (Packs,), {"what": given, "__annotations__": {}})(k=1.0))
     assert not report.ok and "packed() returns" in str(report) and "lw.Packed({name: numbers})" in str(report)
 
 
+@pytest.mark.kernel
 def test_packed_left_out():
     report = lw.check_law(Pull(k=1.0))
-    assert not report.ok and "NotImplementedError" in str(report) and "write packed(self, own, setting)" in str(report)
+    assert (
+        not report.ok and "NotImplementedError" in str(report) and "write packed(self, numbers, context)" in str(report)
+    )
 
 
+@pytest.mark.kernel
 def test_numbers_of_the_wrong_shape():
     wrong = type("Bad", (Packs,), {"what": lw.Packed({"k": np.ones((1, 3))}), "__annotations__": {}})
     report = lw.check_law(wrong(k=1.0))
@@ -509,6 +526,7 @@ def test_a_quadratic_matrix_of_members_that_creates_energy():
     lw.Ensemble(scene, 2000, 0, {"drag_matrix.quadratic": lw.Uniform(relative=0.3)})
 
 
+@pytest.mark.kernel
 def test_a_broken_law_in_solve():
     broken = device(law=pull_silent)
     Broken = type("Broken", (Pull,), {"device": broken})
@@ -537,6 +555,7 @@ def law(w: Any, view: Any, p: Any):
 """
 
 
+@pytest.mark.kernel
 def test_a_law_defined_twice_as_in_a_notebook(tmp_path):
     results = []
     for i in range(2):
@@ -545,6 +564,8 @@ def test_a_law_defined_twice_as_in_a_notebook(tmp_path):
         spec = importlib.util.spec_from_file_location("cell", path)
         cell = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(cell)
-        Lift = type("Lift", (Pull,), {"device": cell, "packed": lambda self, own, setting: lw.Packed(dict(own))})
+        Lift = type(
+            "Lift", (Pull,), {"device": cell, "packed": lambda self, numbers, context: lw.Packed(dict(numbers))}
+        )
         results.append(lw.solve(lw.Scene(from_table(MATRIX).vehicle, terms=[Lift(k=1.0)]), h=0.01, t1=0.1).position)
     assert np.array_equal(*results)

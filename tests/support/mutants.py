@@ -472,7 +472,10 @@ def main():
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
-        "--record", nargs=argparse.REMAINDER, metavar="TESTS", help="record what tests run (default: those of make test)"
+        "--record",
+        nargs=argparse.REMAINDER,
+        metavar="TESTS",
+        help="record what tests run (default: those of make test)",
     )
     parser.add_argument("--room", action="append", choices=list(rooms()), help="default: every room")
     parser.add_argument("--sample", type=int, default=40)

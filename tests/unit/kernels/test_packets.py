@@ -10,6 +10,8 @@ from lgvi_kernels.lanes.arithmetic import lane, lane3, vec3
 from lgvi_kernels.lanes.flags import CPU_FLAGS
 from lgvi_kernels.lanes.state import state_struct, struct
 
+pytestmark = pytest.mark.kernel
+
 VECTORS = ("R0", "R1", "R2", "b", "p", "pi")
 ENTRIES = 18
 LIMIT, TINY = 1e-3, 1e-4

@@ -12,6 +12,8 @@ from lgvi_kernels.lanes.flags import CPU_FLAGS
 from lgvi_kernels.maps import coupled, rotation
 from lgvi_warp.physics.inertia import hat
 
+pytestmark = pytest.mark.kernel
+
 STEPS, COUNT, ROWS = 5, 64, 12
 J = np.array([0.55, 0.8, 1.0])
 S = np.array([[0.3, 0.04, -0.03], [0.04, 0.2, 0.05], [-0.03, 0.05, 0.25]])

@@ -5,12 +5,12 @@ import json
 
 import pytest
 
-from lgvi_warp.engine.block import SHAPES
 from lgvi_warp.runs import member_fields
 from lgvi_warp.runs.store.layout import KEPT_MEMBER, MEMBER
 from lgvi_warp.runs.store.layout_check import Layout, NotOursError, StoredArray, layout_of
 
 MEMBERS, BLOCK, TIMES = 1003, 256, 31
+SHAPES = {"position": (3,), "attitude": (3, 3), "velocity": (3,), "angular_velocity": (3,)}
 
 
 def arrays():

@@ -20,12 +20,12 @@ def test_water_that_accelerates_pushes_by_the_displaced_mass(name, gravity, buoy
         with pytest.raises(lw.SceneError, match=r"environment\.gravity = 0.*displaced mass unknown.*give gravity"):
             make_plan(one(scene), "psi_s", h=0.01, t1=0.1)
     else:
-        assert make_plan(one(scene), "psi_s", h=0.01, t1=0.1).model.flow in ("uniform", "varying")
+        assert make_plan(one(scene), "psi_s", h=0.01, t1=0.1).kernel_choice.flow in ("uniform", "varying")
 
 
 def test_steady_water_needs_no_gravity():
     scene = lw.Scene(vehicle(net=0.0), lw.Environment(gravity=0.0), terms=list(CASES["current"].terms))
-    assert make_plan(one(scene), "psi_s", h=0.01, t1=0.1).model.flow == "steady"
+    assert make_plan(one(scene), "psi_s", h=0.01, t1=0.1).kernel_choice.flow == "steady"
 
 
 @pytest.mark.parametrize(
@@ -45,13 +45,13 @@ def test_steady_water_needs_no_gravity():
 def test_a_kernel_has_what_any_of_its_terms_needs(names, timed, memory, flow):
     acting = sum((CASES[name].terms for name in names), ())
     for terms in (acting, acting[::-1]):
-        model = make_plan(one(lw.Scene(vehicle(), terms=list(terms))), "psi_s", h=0.01, t1=0.1).model
-        assert (model.timed, model.memory, model.flow) == (timed, memory, flow)
+        choice = make_plan(one(lw.Scene(vehicle(), terms=list(terms))), "psi_s", h=0.01, t1=0.1).kernel_choice
+        assert (choice.timed, choice.memory, choice.flow) == (timed, memory, flow)
 
 
 @pytest.mark.parametrize("at", [0, 1])
 def test_an_event_of_the_time_wants_the_time(at):
     events = [lw.Floor(depth=10.0)]
     events.insert(at, lw.StopTime(at=1.0))
-    assert make_plan(one(lw.Scene(vehicle(), events=events)), "psi_s", h=0.01, t1=0.1).model.timed
-    assert not make_plan(one(lw.Scene(vehicle(), events=[lw.Floor(depth=10.0)])), "psi_s", h=0.01, t1=0.1).model.timed
+    assert make_plan(one(lw.Scene(vehicle(), events=events)), "psi_s", h=0.01, t1=0.1).kernel_choice.timed
+    assert not make_plan(one(lw.Scene(vehicle(), events=[lw.Floor(depth=10.0)])), "psi_s", h=0.01, t1=0.1).kernel_choice.timed

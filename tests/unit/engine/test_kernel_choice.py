@@ -54,4 +54,6 @@ def test_an_event_of_the_time_wants_the_time(at):
     events = [lw.Floor(depth=10.0)]
     events.insert(at, lw.StopTime(at=1.0))
     assert make_plan(one(lw.Scene(vehicle(), events=events)), "psi_s", h=0.01, t1=0.1).kernel_choice.timed
-    assert not make_plan(one(lw.Scene(vehicle(), events=[lw.Floor(depth=10.0)])), "psi_s", h=0.01, t1=0.1).kernel_choice.timed
+    assert not make_plan(
+        one(lw.Scene(vehicle(), events=[lw.Floor(depth=10.0)])), "psi_s", h=0.01, t1=0.1
+    ).kernel_choice.timed

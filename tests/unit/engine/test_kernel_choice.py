@@ -57,3 +57,14 @@ def test_an_event_of_the_time_wants_the_time(at):
     assert not make_plan(
         one(lw.Scene(vehicle(), events=[lw.Floor(depth=10.0)])), "psi_s", h=0.01, t1=0.1
     ).kernel_choice.timed
+
+
+@pytest.mark.parametrize("method", ["psi_s", "psi", "psi_1", "kl6(psi_s)", "psi_x", "psi_w"])
+def test_without_forces_nothing_is_kicked(method):
+    letters = {}
+    for net in (0.0, 2.0):
+        choice = make_plan(
+            one(lw.Scene(vehicle(net=net), lw.Environment(gravity=9.8))), method, h=0.01, t1=0.1
+        ).kernel_choice
+        letters[net] = {letter for letter, _ in (*choice.program, *([choice.lead] if choice.lead else []))}
+    assert "K" in letters[2.0] and letters[0.0] == letters[2.0] - {"K"}

@@ -279,6 +279,11 @@ class Finder(ast.NodeVisitor):
             return
         self.generic_visit(node)
 
+    def visit_keyword(self, node):
+        """Its value; not whether NumPy may keep an array that it need not copy."""
+        if node.arg != "copy":
+            self.visit(node.value)
+
     def condition(self, node):
         """A condition that always or never holds."""
         if not isinstance(node.test, ast.Constant | ast.Call) or not self.text(node.test).startswith("wp.static"):

@@ -262,3 +262,16 @@ def test_attitudes_of_a_map_are_the_first_and_any():
     assert abs(R[1:].mean(axis=0)).max() < 5.0 * np.sqrt(1.0 / 3.0 / len(R))
     np.testing.assert_allclose((R[1:] ** 2).mean(axis=0), 1.0 / 3.0, atol=5.0 * np.sqrt(4.0 / 45.0 / len(R)))
     assert abs((np.trace(R[1:], axis1=1, axis2=2) ** 2).mean() - 1.0) < 0.1
+
+
+def test_classes_are_counted_by_name():
+    found = made_map([[0, 1, 4], [0, 4, 0]])
+    counts = found.counts("psi_s")
+    assert set(counts) == {cell.name.lower() for cell in Cell} and sum(counts.values()) == 6
+    assert [counts[Cell(code).name.lower()] for code in (0, 1, 4)] == [3, 1, 2]
+
+
+@pytest.mark.parametrize("ask", ["counts", "silent", "limit"])
+def test_a_method_that_the_map_has_not_is_refused(ask):
+    with pytest.raises(lw.SceneError, match=r"method = 'psi'.*'psi_s'"):
+        getattr(made_map([[0, 1, 2], [2, 0, 0]]), ask)("psi")

@@ -4,7 +4,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: run quick test test-long coverage lint bench bench-peers clean
+.PHONY: run quick test test-long coverage mutants lint bench bench-peers clean
 
 run: $(VENV)/.run
 	$(BIN)/lgvi-warp run examples/paper.toml --out runs/paper
@@ -17,6 +17,14 @@ test: lint
 
 test-long: $(VENV)/.dev
 	$(BIN)/python -m pytest -n auto --dist worksteal
+
+# Faults that no test finds: `make mutants ROOM=runs SAMPLE=40 SEED=1`; without ROOM in every room.
+mutants: $(VENV)/.dev .mutants/recorded
+	$(BIN)/python -m tests.support.mutants $(addprefix --room ,$(ROOM)) --sample $(or $(SAMPLE),40) --seed $(or $(SEED),1)
+
+.mutants/recorded:
+	$(BIN)/python -m tests.support.mutants --record
+	touch $@
 
 # TESTS="not slow and not kernel": of quick tests alone; TESTS= : of all. Device code, and processes that tests start, do not count.
 TESTS ?= not slow
@@ -45,7 +53,7 @@ bench-peers: .venv-peers/.done
 	touch $@
 
 clean:
-	rm -rf $(VENV) .venv-peers runs build dist .mypy_cache .ruff_cache .pytest_cache
+	rm -rf $(VENV) .venv-peers .mutants runs build dist .mypy_cache .ruff_cache .pytest_cache
 
 # Each stamp stands for an installed set of extras; a change of pyproject.toml installs anew.
 $(VENV)/bin/python:

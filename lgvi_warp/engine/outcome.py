@@ -37,12 +37,12 @@ class Outcome:
     event: np.ndarray
 
     @classmethod
-    def clear(cls, members: int, paces: int = 0) -> Outcome:
+    def clear(cls, members: int, paces: int) -> Outcome:
         """The outcome of members that reached the end without a fault.
 
         Args:
             members: number of members, m.
-            paces: number of columns of `chosen`: 2 for adaptive steps, else 0 (default).
+            paces: number of columns of `chosen`: 2 for adaptive steps, else 0.
 
         Returns:
             An outcome whose entries are all zero.

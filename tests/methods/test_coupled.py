@@ -70,13 +70,13 @@ def twin(laws, method, h, steps):
     return b, R, nu + R.T @ water(look(at_end, body, h), body).velocity, Om
 
 
-# psi_x with every law; the others, whose kicks are the same, with the laws that see the frame most. The rest: test-long.
-SHORT = {("psi_x", name) for name in [None, *CASES]} | {
-    (method, name) for method in PROGRAMS for name in (None, "drag matrix", "current profile", "thrusters")
+# Each method with one law of each type at once; psi_x also with what these leave out: drag along axes, and water that is
+# the same everywhere. Each law alone: test-long.
+SHORT = {(method, name) for method in PROGRAMS for name in (None, "all together")} | {
+    ("psi_x", name) for name in ("drag", "current harmonics")
 }
 
 
-@pytest.mark.slow_but("psi_w-None", "psi_x-None", "psi_x-drag matrix", "psi_x-thrusters", "psi_x8-None")
 @pytest.mark.parametrize(
     ("method", "name"),
     [

@@ -175,6 +175,50 @@ def test_dask(client, memory, tmp_path):
     assert same(stored, memory)
 
 
+def test_threads_of_one_dask_worker_share_it(memory):
+    """Each thread takes a block of its own; a run that ends early leaves none at work."""
+    from distributed import Client, LocalCluster
+
+    from lgvi_warp.engine.executors import dask
+
+    with (
+        LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster,
+        Client(cluster) as client,
+    ):
+        assert same(lw.solve(fleet(), **SETTINGS, executor=dask.Dask(client)), memory)
+        work, at_once = Overlapping(), []
+        for _ in dask.Dask(client).run(work, blocks(2048), lambda *_: None):
+            at_once.append(work.most)
+            break
+        assert at_once == [2] and sum(dask._at_work.values()) == 0 and 2 <= len(work.begun) < 8
+
+
+class Overlapping:
+    """Work that notes how many blocks run at once, and waits for its end; it is sent as itself within one process."""
+
+    begun, running, most = [], 0, 0
+
+    class plan:  # noqa: N801
+        class grid:  # noqa: N801
+            steps = 1
+
+        @staticmethod
+        def compile():
+            return 0.0
+
+    def __call__(self, block, halted, advanced):
+        cls = type(self)
+        cls.begun.append(block.first)
+        cls.running += 1
+        cls.most = max(cls.most, cls.running)
+        for _ in range(10 if block.first == 0 else 200):
+            if halted():
+                break
+            time.sleep(0.02)
+        cls.running -= 1
+        return block.first
+
+
 @pytest.mark.slow
 def test_statistics_on_dask_end_with_the_run(client, tmp_path):
     """Blocks that are at work when there are members enough leave nothing in the store."""
@@ -336,27 +380,31 @@ class Deadly:
         os._exit(7)
 
 
-@pytest.mark.slow
-def test_workers_end_with_the_run(tmp_path):
-    """A run that is killed leaves no process behind that goes on writing."""
-    code = """
-import lgvi_warp as lw, sys
-from tests.support.stores import fleet
+ORPHANS = """
+import sys
+from pathlib import Path
+from lgvi_warp.engine.block import blocks
+from lgvi_warp.engine.executors.processes import Processes
+from tests.support.toy_work import Traced
 if __name__ == "__main__":
-    def shown(fraction):
-        import multiprocessing
-        print(*[child.pid for child in multiprocessing.active_children()], flush=True)
-    lw.solve(fleet(4096), "psi_s", h=0.01, t1=600.0, executor="processes", threads=2, progress=shown)
+    list(Processes(2).run(Traced(Path(sys.argv[1]), 30.0), blocks(2048), lambda *_: None))
 """
-    (tmp_path / "script.py").write_text(code)
-    run = subprocess.Popen([sys.executable, str(tmp_path / "script.py")], stdout=subprocess.PIPE, text=True,
+
+
+def test_workers_end_with_the_run(tmp_path):
+    """A run that is killed leaves no process behind that goes on, in blocks that would take minutes."""
+    (tmp_path / "script.py").write_text(ORPHANS)
+    work = Traced(tmp_path / "begun")
+    work.folder.mkdir()
+    run = subprocess.Popen([sys.executable, str(tmp_path / "script.py"), str(work.folder)],
                            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})  # fmt: skip
-    pids = [int(word) for word in run.stdout.readline().split()]
+    while len(pids := [pid for _, pid in work.begun()]) < 2:
+        assert run.poll() is None
+        time.sleep(0.05)
+    assert all(alive(pid) for pid in pids)
     run.kill()
     run.wait()
-    run.stdout.close()
-    assert len(pids) == 2
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + 20.0
     while any(alive(pid) for pid in pids) and time.monotonic() < deadline:
         time.sleep(0.05)
     assert not any(alive(pid) for pid in pids)

@@ -129,6 +129,23 @@ def test_damage_is_seen_and_mended(copy, whole, name, harm, word, capsys):
     assert differing(whole, copy) == [] and cli.main(["info", str(copy)]) == 0
 
 
+@pytest.mark.parametrize(
+    ("harm", "said"),
+    [
+        ((), "nothing was missing: 4 of 4 blocks were there and whole"),
+        (("kept/blocks/000000000.json",), "went on: 4 of 4 blocks were there and whole, 0 ran, and 1 of kept members"),
+        (("blocks/000000512.json",), "went on: 3 of 4 blocks were there and whole, 1 ran"),
+        (("kept",), "went on: 4 of 4 blocks were there and whole, 0 ran, and 2 of kept members"),
+    ],
+    ids=["nothing", "a kept block", "a block", "all kept"],
+)
+def test_a_resume_counts_what_ran(copy, whole, harm, said):
+    for name in harm:
+        shutil.rmtree(copy / name) if (copy / name).is_dir() else (copy / name).unlink()
+    assert lw.resume(copy).messages[-1] == said
+    assert differing(whole, copy) == []
+
+
 def test_a_lost_group_is_not_silently_none(copy):
     shutil.rmtree(copy / "kept")
     with pytest.raises(lw.SceneError, match=r"kept: is missing; `lgvi-warp resume"):

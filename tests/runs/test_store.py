@@ -295,6 +295,32 @@ def test_a_full_disk_is_told_by_an_export(whole, tmp_path, to, capsys):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("error", "number", "text"),
+    [
+        (OSError(errno.EDQUOT, "Disk quota exceeded"), errno.EDQUOT, "Disk quota exceeded"),
+        (RuntimeError("NetCDF: HDF error"), errno.EIO, "was not written (NetCDF: HDF error); is the disk full?"),
+    ],
+    ids=["the system's", "the library's"],
+)
+def test_an_export_that_fails_says_what_the_library_says(error, number, text, whole, tmp_path, monkeypatch):
+    def fail(folder, path):
+        raise error
+
+    monkeypatch.setattr("lgvi_warp.runs.store.export._netcdf", fail)
+    with pytest.raises(OSError) as caught:
+        lw.export(whole, "netcdf", tmp_path / "run.nc")
+    assert (caught.value.errno, caught.value.strerror, caught.value.filename) == (
+        number,
+        text,
+        str(tmp_path / "run.nc"),
+    )
+
+
+def test_values_are_read_when_they_are_used(whole):
+    assert lw.open_run(whole).dataset.position.chunks is not None
+
+
 def test_a_damaged_marker_runs_its_block_again(copy, whole):
     flip(copy / "blocks" / "000000256.json")
     assert state(copy)["finished"] == 3

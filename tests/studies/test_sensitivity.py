@@ -329,6 +329,25 @@ def test_a_quantity_that_is_not_finite_is_a_failure(scene):
     assert "quantity not finite" in message
 
 
+def test_members_that_reach_the_surface_count_with_where_they_arrive():
+    """Neutral bodies that rise at their own speeds: at t1 each is where it is, or has been stopped at the surface."""
+    body = lw.Vehicle(20.0, (1.0, 1.2, 1.4), (10.0, 10.0, 10.0), 20.0 * 9.8)
+    start = lw.Start(position=(0.0, 0.0, 5.0), velocity=(0.3, 0.0, -1.0))
+    rising = lw.Scene(body, lw.Environment(gravity=9.8), start=start, events=[lw.Surface()])
+    names, settings = ["start.position[2]", "start.velocity[2]"], {"h": 0.1, "t1": 4.0}
+    X = np.column_stack([np.linspace(0.5, 6.0, 12), np.repeat([-1.0, -0.2], 6)])
+    Y = uq.model(rising, names, ["position[2]", "position[0]"], **settings)(X)
+    end = np.minimum(X[:, 0] / -X[:, 1], 4.0)
+    np.testing.assert_allclose(Y, np.column_stack([X[:, 0] + X[:, 1] * end, 0.3 * end]), atol=1e-9)
+    assert 0 < (end < 4.0).sum() < 12
+
+    vary = {"start.position[2]": lw.Uniform(low=1.0, high=7.0), "start.velocity[0]": lw.Uniform(low=0.2, high=0.4)}
+    found = uq.sobol(rising, "position[2]", samples=256, vary=vary, seed=1, **settings)
+    # z - 4 above 4 m, else 0: half of the members arrive, and the speed to the north is no matter.
+    assert found.failed == 0 and found.std[0] ** 2 == pytest.approx(15.0 / 16.0, rel=0.05)
+    np.testing.assert_allclose(found.total.ravel(), [1.0, 0.0], atol=0.02)
+
+
 # Quantities --------------------------------------------------------------------------------------------------------------
 
 

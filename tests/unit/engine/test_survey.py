@@ -66,6 +66,17 @@ def test_one_odd_member_is_coupled(at_once):
     assert seen(fleet(scene, vehicle__added_mass_matrix=added)).left > 1e-3
 
 
+@pytest.mark.parametrize(("i", "j"), list(np.ndindex(3, 3)))
+def test_each_coupling_alone_is_seen(i, j):
+    """A velocity along axis i that is coupled with a rate about axis j is one entry of U, above its diagonal or on it."""
+    rigid = np.diag([10.0, 10.0, 10.0, 0.5, 0.5, 0.5])
+    added = np.diag([10.0, 20.0, 30.0, 0.5, 1.5, 2.0])
+    added[i, 3 + j] = added[3 + j, i] = 0.7
+    body = lw.Vehicle(rigid_body_mass_matrix=rigid, added_mass_matrix=added, weight=98.0, buoyancy=98.0)
+    found = seen(lw.Ensemble.from_scene(lw.Scene(body)), "psi_x").couplings
+    assert [COUPLINGS[number] for number in found] == [(min(i, j), max(i, j))]
+
+
 def test_laws_that_one_member_feels(at_once):
     bare = scene_of()
     scene = lw.Scene(bare.vehicle, bare.environment, terms=[lw.Drag(), lw.Current(velocity=(0.0, 0.0, 0.0))])

@@ -10,7 +10,7 @@ from scipy import stats
 
 import lgvi_warp as lw
 from lgvi_warp.common.random import uniforms
-from lgvi_warp.sampling.distributions.named import from_dict
+from lgvi_warp.sampling.distributions.named import as_law, from_dict
 
 LEVELS = np.array([1e-12, 1e-6, 0.02, 0.3, 0.5, 0.77, 0.999, 1.0 - 1e-9])
 N = 200_000
@@ -245,3 +245,15 @@ def test_bad_tables_name_the_key(content, text):
     with pytest.raises(lw.SceneError, match="the key") as caught:
         from_dict("the key", content)
     assert text in str(caught.value)
+
+
+@pytest.mark.parametrize("shift", [{"loc": 10.0}, 10.0])
+def test_a_histogram_of_scipy_keeps_its_shift(shift):
+    """A frozen histogram is taken with its parameters, by name or by place; without any it is one of ours."""
+    edges = np.array([0.0, 1.0, 3.0])
+    plain = stats.rv_histogram((np.array([1.0, 3.0]), edges), density=False)
+    shifted = plain(**shift) if isinstance(shift, dict) else plain(shift)
+    levels = np.linspace(0.05, 0.95, 10)
+    for given in (plain, shifted):
+        own = as_law("x", given)
+        np.testing.assert_allclose(own.quantile(levels[:, None], np.zeros(1)).ravel(), given.ppf(levels), rtol=1e-12)

@@ -703,3 +703,10 @@ def test_many_members_take_little_memory(scene):
     # 65,536 members at a time: a 3x3 matrix, its copy and a few numbers of each are below 30 doubles; of all members they
     # would be 72 MB.
     assert peak < 65_536 * 8 * 60
+
+
+@pytest.mark.parametrize("axes", [None, {}, [1.0], "vehicle.mass", 3])
+def test_a_grid_names_what_it_is_a_grid_of(axes):
+    """What is no table of axes is one fault, and no error of Python's follows."""
+    (fault,) = faults(lw.Grid, axes)
+    assert fault.startswith("ensemble.sampling.grid.axes = ") and "names nothing" in fault

@@ -339,6 +339,17 @@ def test_frames_that_run_in_circles_are_refused():
     from_sdf(link(outside=attached + joint))
 
 
+@pytest.mark.parametrize("circle", ["a", "ab", "abc"])
+def test_joints_that_run_in_circles_are_refused(circle):
+    """A chain of joints that leads back to a link, to itself at once too, is told; nothing looks for its pose for ever."""
+    links = "".join(f"<link name='{name}'/>" for name in circle)
+    ends = zip(circle, circle[1:] + circle[0])
+    joints = "".join(
+        f"<joint name='{a}{b}' type='fixed'><parent link='{a}'/><child link='{b}'/></joint>" for a, b in ends
+    )
+    assert "is above itself" in refused(from_sdf, f"<robot name='r'>{links}{joints}</robot>")
+
+
 ENTITIES = "".join(f'<!ENTITY e{i + 1} "' + f"&e{i};" * 10 + '">' for i in range(10))
 HOSTILE = {
     "entities that grow": f'<!DOCTYPE sdf [<!ENTITY e0 "ha">{ENTITIES}]><sdf>&e10;</sdf>',

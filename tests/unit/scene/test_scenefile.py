@@ -107,6 +107,14 @@ def test_unknown_names_are_told_what_was_meant():
     assert "did you mean 'std'?" in only_fault(vary + '"vehicle.mass" = { normal = { sdt = 0.1 } }\n').split("\n")[0]
 
 
+def test_a_faulty_term_is_no_reason_to_doubt_the_names_of_its_numbers():
+    """What varies in a term that cannot be built is not known; in other sections a wrong name is still one."""
+    text = SMALL + '[[terms]]\ntype = "drag"\nlinear = [1.0, 2.0]\n[ensemble.vary]\n'
+    text += '"drag.linear[0]" = { normal = { std = 1.0 } }\n"vehicle.mas" = { normal = { std = 1.0 } }\n'
+    term, name = faults(text)
+    assert term.startswith("drag.linear = [1.0, 2.0]") and "did you mean 'vehicle.mass'?" in name
+
+
 def test_what_is_missing_is_named():
     assert "vehicle" in only_fault("") and "mass and inertia" in only_fault("")
     assert only_fault("[vehicle]\nmass = 1.0\n").startswith("vehicle.inertia = None: is missing")

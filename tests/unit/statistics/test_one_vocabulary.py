@@ -148,3 +148,20 @@ def test_a_quantity_of_the_users_may_be_asked_for_everywhere(result):
     assert (asked.name, asked.unit) == ("sunk", "m")
     np.testing.assert_array_equal(asked.values(result)[..., 0], sunk)
     assert lw.Mean(own).quantity is own
+
+
+@pytest.mark.parametrize(
+    ("of", "labels"),
+    [
+        ("position", ("position[0]", "position[1]", "position[2]")),
+        ("max(position)", ("max(position)[0]", "max(position)[1]", "max(position)[2]")),
+        ("max(position)[1]", ("max(position)[1]",)),
+        ("max(position[1])", ("max(position[1])",)),
+        ("norm(velocity)", ("norm(velocity)",)),
+        ("range(norm(velocity))", ("range(norm(velocity))",)),
+    ],
+)
+def test_each_component_is_named_by_an_expression_for_it(of, labels):
+    assert functional("of", of).labels == labels
+    for label in labels:
+        assert functional("of", label).labels == (label,) and functional("of", label).size == 1

@@ -11,6 +11,7 @@ from lgvi_warp.statistics.estimate import Estimates
 from lgvi_warp.statistics.table import table
 from lgvi_warp.statistics.tree import Tree
 from lgvi_warp.statistics.values import Values, dealt
+from tests.unit.statistics.test_statistics import check_as_files_hold_it
 
 FLOOR, SURFACE, OK, FAILED = lw.Status.FLOOR, lw.Status.SURFACE, lw.Status.OK, lw.Status.NON_FINITE
 TIMES = np.linspace(0.0, 10.0, 6)
@@ -206,3 +207,10 @@ def test_what_is_refused(make, text):
     with pytest.raises(lw.SceneError) as error:
         make()
     assert text in str(error.value)
+
+
+@pytest.mark.parametrize("replicates", [1, 4])
+def test_every_kind_is_the_same_from_a_file(replicates):
+    ends = ends_of(400)
+    for statistic in (lw.Outcome("floor"), lw.EndTime("floor")):
+        check_as_files_hold_it(gathered(statistic, ends, replicates=replicates))

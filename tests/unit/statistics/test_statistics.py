@@ -769,6 +769,35 @@ def test_blocks_in_any_order_give_the_same_bits(kind, values):
             assert all(one[key].tobytes() == other[key].tobytes() for key in one.arrays)
 
 
+def check_as_files_hold_it(found):
+    """Estimates are the same again from arrays and text, and as a dataset each array has the dimensions of its shape."""
+    again = Estimates.from_arrays(*Estimates(found).to_arrays())
+    for one in found:
+        other, dataset = again[one.name], one.dataset
+        assert (other.settings, other.unit, other.dims, other.interval) == (
+            one.settings,
+            one.unit,
+            one.dims,
+            one.interval,
+        )
+        assert set(dataset.data_vars) == set(one.arrays) == set(other.arrays)
+        for name, values in one.arrays.items():
+            np.testing.assert_array_equal(dataset[name].values, values)
+            np.testing.assert_array_equal(other[name], values)
+            assert dataset[name].dims == one.dims[name] and set(one.dims[name]) <= set(one.coordinates)
+        for name, values in one.coordinates.items():
+            np.testing.assert_array_equal(other.coordinates[name], values)
+            assert name not in dataset.dims or len(values) == dataset.sizes[name]
+
+
+@pytest.mark.parametrize("replicates", [1, 4])
+@pytest.mark.parametrize("kind", [name for name, one in TYPES.items() if not one.of_ends])
+def test_every_kind_is_the_same_from_a_file(kind, replicates, values):
+    x, good = (array[:, :400] for array in values)
+    x = {"first_passage": x[..., :1], "mean_attitude": rotations(0.1 * x).reshape(4, 400, 9)}.get(kind, x)
+    check_as_files_hold_it(gathered(OF_EVERY_KIND[kind](scalar(3)), x, good=good, replicates=replicates))
+
+
 def test_coins_are_fair_and_fixed():
     thrown = [sketch.coin(level, i, 2) for level in range(8) for i in range(512)]
     # 4,096 throws: five standard deviations are 160.

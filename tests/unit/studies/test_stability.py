@@ -9,9 +9,9 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
-from lgvi_warp.physics import vehicle
+from lgvi_warp.physics import notation, vehicle
 from lgvi_warp.scene.settings import RunSettings
-from lgvi_warp.studies.stability.grid import Axis, Line, StabilityGrid
+from lgvi_warp.studies.stability.grid import Axis, Line, StabilityGrid, _rotations
 from lgvi_warp.studies.stability.limits import drag_limit, drag_rate, oscillation_limit, rates, rotation_limit
 from lgvi_warp.studies.stability.map import Cell, StabilityMap, cells_of
 from lgvi_warp.studies.stability.runs import REFUSED, Found
@@ -251,3 +251,27 @@ def test_json_round_trip(tmp_path):
     rows = files[1].read_text().splitlines()
     assert len(rows) == 7 and rows[0].startswith("method,h,angular_velocity,class,error_attitude")
     assert rows[3].startswith("psi_s,4.0,1.0,flagged,0.2,0.5,refused")
+
+
+def test_attitudes_of_a_map_are_the_first_and_any():
+    """The first direction keeps the axes; the others are uniform on all rotations, of which the trace tells."""
+    vectors = _rotations(np.random.default_rng(1), 20_000)
+    R = notation.matrix_from_rotation_vector(vectors)
+    np.testing.assert_array_equal(R[0], np.eye(3))
+    # Each entry of a random rotation has mean 0 and mean square 1/3; five standard errors.
+    assert abs(R[1:].mean(axis=0)).max() < 5.0 * np.sqrt(1.0 / 3.0 / len(R))
+    np.testing.assert_allclose((R[1:] ** 2).mean(axis=0), 1.0 / 3.0, atol=5.0 * np.sqrt(4.0 / 45.0 / len(R)))
+    assert abs((np.trace(R[1:], axis1=1, axis2=2) ** 2).mean() - 1.0) < 0.1
+
+
+def test_classes_are_counted_by_name():
+    found = made_map([[0, 1, 4], [0, 4, 0]])
+    counts = found.counts("psi_s")
+    assert set(counts) == {cell.name.lower() for cell in Cell} and sum(counts.values()) == 6
+    assert [counts[Cell(code).name.lower()] for code in (0, 1, 4)] == [3, 1, 2]
+
+
+@pytest.mark.parametrize("ask", ["counts", "silent", "limit"])
+def test_a_method_that_the_map_has_not_is_refused(ask):
+    with pytest.raises(lw.SceneError, match=r"method = 'psi'.*'psi_s'"):
+        getattr(made_map([[0, 1, 2], [2, 0, 0]]), ask)("psi")

@@ -1,0 +1,41 @@
+"""Without the libraries of an extra, what needs them says which extra installs them, and in no other error."""
+
+import sys
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp.common import yaml_text
+from lgvi_warp.engine.executors import executor_of
+from lgvi_warp.runs.store.settings import needed
+from lgvi_warp.sampling.designs.space import Space
+from lgvi_warp.statistics.estimate import Estimate
+from lgvi_warp.studies.sensitivity import analyses
+from lgvi_warp.views import plots, rerun
+
+ESTIMATE = Estimate("mean x", {}, "m", 0.95, "", {"value": ("time",)}, {"value": np.zeros(2)}, {"time": np.arange(2.0)})
+DOORS = {
+    "screening": (
+        lambda: lw.Morris(4).draw(Space(0, ("a", "b"), (1, 1), (("a", (0,)), ("b", (1,)))), np.arange(3)),
+        "SALib.sample",
+        "uq",
+    ),
+    "sensitivity": (lambda: analyses._salib("sobol"), "SALib.analyze.sobol", "uq"),
+    "datasets of statistics": (lambda: ESTIMATE.dataset, "xarray", "store"),
+    "stores: checksums": (needed, "google_crc32c", "store"),
+    "stores: xarray": (needed, "xarray", "store"),
+    "stores: zarr": (needed, "zarr", "store"),
+    "clusters": (lambda: executor_of("dask", 1, "tcp://127.0.0.1:1"), "distributed", "cluster"),
+    "YAML": (lambda: yaml_text.parsed("a: 1"), "yaml", "yaml"),
+    "plots": (plots.figure_class, "matplotlib.figure", "viz"),
+    "recordings": (lambda: rerun.log_rerun(None, "x"), "rerun", "viz"),
+}
+
+
+@pytest.mark.parametrize("door", DOORS)
+def test_a_missing_library_is_named_with_its_extra(door, monkeypatch):
+    action, library, extra = DOORS[door]
+    monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises((ImportError, lw.SceneError), match=rf"pip install 'lgvi-warp\[{extra}\]'"):
+        action()

@@ -1,0 +1,24 @@
+"""How members are divided into blocks: stores of all versions depend on it."""
+
+import pytest
+
+from lgvi_warp.engine.block import Block, block_size, blocks
+
+
+@pytest.mark.parametrize(
+    ("members", "size"),
+    [
+        (1, 256), (256, 256), (16_383, 256), (16_384, 512), (32_767, 512), (32_768, 1024), (65_535, 1024),
+        (65_536, 2048), (131_071, 2048), (131_072, 4096), (10_000_000, 4096),
+    ],
+)  # fmt: skip
+def test_the_size_at_its_borders(members, size):
+    assert block_size(members) == size
+
+
+@pytest.mark.parametrize("members", [1, 255, 256, 257, 512, 1003, 16_384, 16_385])
+def test_each_member_is_in_one_block(members):
+    found = blocks(members)
+    assert [i for block in found for i in range(block.first, block.stop)] == list(range(members))
+    assert {block.count for block in found[:-1]} <= {block_size(members)} and 0 < found[-1].count <= block_size(members)
+    assert found[0] == Block(0, min(members, block_size(members)))

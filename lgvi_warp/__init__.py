@@ -6,46 +6,33 @@ from lgvi_warp.common.errors import Interrupted, MembersFailed, SceneError
 from lgvi_warp.common.status import Status, Warnings
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
-from lgvi_warp.physics.terms import (
-    BodyLift,
-    ControlFins,
-    CrossFlow,
-    Current,
-    CurrentHarmonics,
-    CurrentProfile,
-    Drag,
-    DragMatrix,
-    Fins,
-    GaussMarkovCurrent,
-    Packed,
-    PackingContext,
-    Restoring,
-    Stratification,
-    Term,
-    Tether,
-    Thrusters,
-    Waves,
-    Weight,
-    Wrench,
-    WrenchNoise,
-    WrenchSchedule,
-    number,
-    register_term,
-)
+from lgvi_warp.physics.terms import register_term
+from lgvi_warp.physics.terms.base import Packed, PackingContext, Term, number
+from lgvi_warp.physics.terms.control_fins import ControlFins
+from lgvi_warp.physics.terms.cross_flow import CrossFlow
+from lgvi_warp.physics.terms.current import Current, CurrentProfile
+from lgvi_warp.physics.terms.current_harmonics import CurrentHarmonics
+from lgvi_warp.physics.terms.drag import Drag, DragMatrix
 from lgvi_warp.physics.terms.events import Box, Event, Floor, StopTime, Surface
+from lgvi_warp.physics.terms.fins import Fins
+from lgvi_warp.physics.terms.gauss_markov_current import GaussMarkovCurrent
+from lgvi_warp.physics.terms.hydrostatics import Restoring, Weight
+from lgvi_warp.physics.terms.lift import BodyLift
+from lgvi_warp.physics.terms.stratification import Stratification
+from lgvi_warp.physics.terms.tether import Tether
+from lgvi_warp.physics.terms.thrusters import Thrusters
+from lgvi_warp.physics.terms.waves import Waves
+from lgvi_warp.physics.terms.wrench import Wrench, WrenchSchedule
+from lgvi_warp.physics.terms.wrench_noise import WrenchNoise
 from lgvi_warp.physics.vehicle import Vehicle
 from lgvi_warp.runs.result import Result
-from lgvi_warp.sampling.designs import (
-    Grid,
-    Halton,
-    LatinHypercube,
-    Morris,
-    Random,
-    Saltelli,
-    Sobol,
-    Table,
-    UnitCubePoints,
-)
+from lgvi_warp.sampling.designs.designs import Morris, Saltelli
+from lgvi_warp.sampling.designs.grid import Grid
+from lgvi_warp.sampling.designs.hypercube import LatinHypercube
+from lgvi_warp.sampling.designs.levels import UnitCubePoints
+from lgvi_warp.sampling.designs.random import Random
+from lgvi_warp.sampling.designs.sequences import Halton, Sobol
+from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.sampling.distributions.basic import Choice, LogNormal, Normal, TruncatedNormal, Uniform
 from lgvi_warp.sampling.distributions.joint import (
     CorrelatedNormal,
@@ -58,26 +45,13 @@ from lgvi_warp.sampling.distributions.named import ScipyDistribution
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import Environment, Start
-from lgvi_warp.statistics import (
-    CircularMean,
-    Covariance,
-    EndTime,
-    Exceedance,
-    Extremes,
-    FirstPassage,
-    Histogram,
-    Mean,
-    MeanAttitude,
-    Outcome,
-    PathMaximum,
-    PathMean,
-    PathMinimum,
-    PathRange,
-    PathRms,
-    PathTime,
-    Quantiles,
-    Quantity,
-)
+from lgvi_warp.statistics.angles import CircularMean, MeanAttitude
+from lgvi_warp.statistics.counts import Exceedance, FirstPassage, Histogram
+from lgvi_warp.statistics.moments import Covariance, Mean
+from lgvi_warp.statistics.order import Extremes, Quantiles
+from lgvi_warp.statistics.outcomes import EndTime, Outcome
+from lgvi_warp.statistics.path import PathMaximum, PathMean, PathMinimum, PathRange, PathRms, PathTime
+from lgvi_warp.statistics.quantity import Quantity
 from lgvi_warp.statistics.until import Until
 
 if TYPE_CHECKING:

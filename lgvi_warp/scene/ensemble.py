@@ -18,7 +18,7 @@ from lgvi_warp.common.labelled import columns_by_name, is_labelled, match
 from lgvi_warp.common.real_numbers import column_names
 from lgvi_warp.physics import notation
 from lgvi_warp.physics import vehicle as vehicles
-from lgvi_warp.sampling.designs import Sampling
+from lgvi_warp.sampling.designs.base import Sampling
 from lgvi_warp.sampling.designs.space import Space
 from lgvi_warp.sampling.members import STATES, Members
 from lgvi_warp.scene import variations

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
-from lgvi_warp.common import names
+from lgvi_warp.common import names, registry
 from lgvi_warp.common.errors import Faults, SceneError, ragged
 from lgvi_warp.physics.inertia import Frame
 
@@ -108,6 +108,10 @@ class Term:
     dissipative: ClassVar[bool] = True
 
     name: str = ""
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        registry.add(cls.kinds, cls)
 
     def __post_init__(self) -> None:
         faults = Faults(f"{self.key}.")

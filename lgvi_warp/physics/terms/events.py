@@ -110,7 +110,6 @@ class StopTime(Event):
 
 
 TYPES = Event.kinds
-TYPES.update({kind.type: kind for kind in (Surface, Floor, Box, StopTime)})
 
 
 def from_list(given: Any) -> tuple[Event, ...]:

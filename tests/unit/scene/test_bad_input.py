@@ -115,7 +115,7 @@ TERMS = [
     # names and types
     ({"type": "dragg"}, "terms[0].type = 'dragg'", "not known", "did you mean 'drag'?"),
     ({"type": ["drag"]}, "terms[0].type = ['drag']", "not known", "did you mean 'drag'?"),
-    ({"linear": [1.0] * 6}, "terms[0].type = ''", "known: drag"),
+    ({"linear": [1.0] * 6}, "terms[0].type = ''", "known: body_lift"),
     ({"type": "weight"}, "terms[0].type = 'weight'", "follows from the vehicle"),
     ({"type": "drag", "quad": 1.0}, "terms[0].quad = 1.0", "unknown key", "did you mean 'quadratic'?"),
     ({"type": "tether"}, "terms[0].anchor", "is missing", "give it [m]"),

@@ -21,7 +21,8 @@ class Spec(NamedTuple):
 
     maps: the sub-maps after the leading one, as (letter, coefficient); lead: the sub-map that opens a step and merges with
     the end of the step before, or None; laws: modules of laws, drag by its exact flow first if it is there; events: modules
-    of events; drag: the parts of drag along the axes (by its exact flow, or as rates), or none; mass: shape of M
+    of events; numbers: declared numbers of each law, then of each event (see params_of); drag: the parts of drag along the
+    axes (by its exact flow, or as rates), or none; mass: shape of M
     ("isotropic", "diagonal", "full"); parts: what the inertia holds besides (see inertia_struct); coupling: which of U12,
     U13, U23 and of the three pitches some member has; flow: "none", "steady" (uniform, the same for ever), "uniform",
     "varying"; timed: whether a law looks at the time; averages: alpha and beta of (15), (16), or None for conservative
@@ -37,6 +38,7 @@ class Spec(NamedTuple):
     maps: tuple
     lead: tuple | None
     laws: tuple
+    numbers: tuple
     mass: str
     solver: str
     iterations: int
@@ -142,7 +144,8 @@ def make_types(spec):
     width, real = spec.width, spec.real
     Lane = lane(width, real)
     Inertia = inertia_struct(width, real, spec.mass, spec.parts)
-    Params, Events = params_of(spec.laws, width, real), params_of(spec.events, width, real)
+    Params = params_of(spec.laws, spec.numbers, width, real)
+    Events = params_of(spec.events, spec.numbers[len(spec.laws) :], width, real)
     DragFlow = drag.flow_struct(width, real)
     Constants = struct(
         "Constants",

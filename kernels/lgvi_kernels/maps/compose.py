@@ -5,6 +5,7 @@ from typing import Any
 
 import warp as wp
 
+from lgvi_kernels.lanes.arithmetic import lane, lane3
 from lgvi_kernels.lanes.state import struct
 
 
@@ -20,12 +21,23 @@ def plays(law, role):
     return getattr(law, role, None)
 
 
+def numbers_struct(numbers, width, real):
+    """A struct of declared numbers, given by name and length: 1 for a lane, 3 for a 3-vector of lanes."""
+    kinds = {1: lane(width, real), 3: lane3(width, real)}
+    return struct("Numbers", **{name: kinds[length] for name, length in numbers} or {"unused": wp.uint8})
+
+
 @functools.cache
-def params_of(laws, width, real):
-    """The parameters of several laws, nested as `own` and `rest`."""
+def params_of(laws, numbers, width, real):
+    """The parameters of several laws, nested as `own` and `rest`.
+
+    numbers: for each law the (name, length) of the numbers that its Term declares, of which the struct of a law without
+    `params` is made.
+    """
     if not laws:
         return struct("NoParams", unused=wp.uint8)
-    return struct("Params", own=laws[0].params(width, real), rest=params_of(laws[1:], width, real))
+    make = getattr(laws[0], "params", None) or functools.partial(numbers_struct, numbers[0])
+    return struct("Params", own=make(width, real), rest=params_of(laws[1:], numbers[1:], width, real))
 
 
 @functools.cache

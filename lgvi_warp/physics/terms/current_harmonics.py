@@ -7,34 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
-
-
-def above_zero(faults: Faults, key: str, values: np.ndarray, unit: str) -> None:
-    """Add a fault where some number is not above 0.
-
-    Args:
-        faults: Collects the faults.
-        key: Name of the field.
-        values: Numbers of any shape.
-        unit: Unit of the numbers, for the message.
-    """
-    if np.any(values <= 0.0):
-        faults.add(key, values, "is not positive", f"give numbers above 0 [{unit}]")
-
-
-def not_above_zero(values: np.ndarray) -> np.ndarray:
-    """Which members have a number that is not above 0.
-
-    Args:
-        values: Numbers (n, ...).
-
-    Returns:
-        Mask (n,), True also where a number is NaN.
-    """
-    with np.errstate(invalid="ignore"):
-        return ~np.all(values.reshape(len(values), -1) > 0.0, axis=1)
 
 
 def zeros_like_first(values: Any) -> np.ndarray:
@@ -67,22 +40,13 @@ class CurrentHarmonics(Term):
     timed: ClassVar[bool] = True
 
     amplitudes: Any = number(("k", 3), "m/s")
-    periods: Any = number(("k",), "s")
+    periods: Any = number(("k",), "s", above=0.0)
     phases: Any = number(("k",), "rad", None)
 
     def __post_init__(self) -> None:
         if self.phases is None:
             object.__setattr__(self, "phases", zeros_like_first(self.amplitudes))
         super().__post_init__()
-
-    def check(self, faults: Faults) -> None:
-        """Adds a fault where a period is not above 0."""
-        above_zero(faults, "periods", self.periods, "s")
-
-    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, refuses members with a period that is not above 0."""
-        bad = super().unphysical(numbers)
-        return bad | {"periods": bad["periods"] | not_above_zero(numbers["periods"])}
 
     def present(self, numbers: Numbers) -> bool:
         """Whether some amplitude of some member is not zero."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
-from lgvi_warp.physics.terms.current_harmonics import above_zero, not_above_zero, zeros_like_first
+from lgvi_warp.physics.terms.current_harmonics import zeros_like_first
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -31,7 +31,7 @@ class Waves(Term):
     timed: ClassVar[bool] = True
 
     amplitudes: Any = number(("k",), "m", least=0.0)
-    periods: Any = number(("k",), "s")
+    periods: Any = number(("k",), "s", above=0.0)
     headings_deg: Any = number(("k",), "deg")
     phases: Any = number(("k",), "rad", None)
 
@@ -39,15 +39,6 @@ class Waves(Term):
         if self.phases is None:
             object.__setattr__(self, "phases", zeros_like_first(self.amplitudes))
         super().__post_init__()
-
-    def check(self, faults: Faults) -> None:
-        """Adds a fault where a period is not above 0."""
-        above_zero(faults, "periods", self.periods, "s")
-
-    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, refuses members with a period that is not above 0."""
-        bad = super().unphysical(numbers)
-        return bad | {"periods": bad["periods"] | not_above_zero(numbers["periods"])}
 
     def present(self, numbers: Numbers) -> bool:
         """Whether some amplitude of some member is not zero."""

@@ -448,7 +448,6 @@ class Packs(Pull):
 LAWS = [
     (device(law=pull_short), "pull.law = '(w, view)'", "takes 2 arguments", "write law(w, view, p)"),
     (device(law=pull_plain), "pull.law", "not a Warp function", "@wp.func"),
-    (device(law=pull_law, params=None), "pull.device", "has no params(width, real)", "add_a_law.md"),
     (device(), "pull.device", "has none of law, damping, flow, evolve", "add_a_law.md"),
     ("pull", "pull.device = 'pull'", "not known", "give a module"),
 ]
@@ -461,6 +460,17 @@ def test_a_users_law(made, words):
     for check in (lambda: lw.check_law(term), lambda: make_plan(fleet, h=0.01, t1=0.1)):
         (fault,) = refused(check)
         assert all(word in fault for word in words), fault
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Wide(Pull):
+    row: Any = lw.number((6,), "N", (1.0,) * 6)
+
+
+def test_a_law_without_a_struct_whose_numbers_make_none():
+    bare = type("Bare", (Wide,), {"device": device(law=pull_law, params=None), "__annotations__": {}})
+    (fault,) = refused(lw.check_law, bare(k=1.0))
+    assert all(word in fault for word in ("pull.device", "has no params(width, real)", "add_a_law.md")), fault
 
 
 def test_a_law_that_returns_nothing():
@@ -476,8 +486,12 @@ def test_packed_that_returns_something_else(given):
 
 
 def test_packed_left_out():
-    report = lw.check_law(Pull(k=1.0))
-    assert not report.ok and "NotImplementedError" in str(report) and "write packed(self, own, setting)" in str(report)
+    # Numbers and vectors are packed as they are declared; a number of another shape is not.
+    assert lw.check_law(Pull(k=1.0)).ok
+    report = lw.check_law(Wide(k=1.0))
+    assert (
+        not report.ok and "NotImplementedError" in str(report) and "write packed(self, numbers, context)" in str(report)
+    )
 
 
 def test_numbers_of_the_wrong_shape():

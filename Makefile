@@ -1,18 +1,28 @@
 # Everything from a fresh clone: `make run`, `make test`. Needs Python 3.11 or later, with venv.
+# `make quick` and `make quick ROOM=statistics`: the tests of all rooms, or of one, that load no kernel.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: run test test-long lint bench bench-peers clean
+.PHONY: run quick test test-long coverage lint bench bench-peers clean
 
 run: $(VENV)/.run
 	$(BIN)/lgvi-warp run examples/paper.toml --out runs/paper
+
+quick: $(VENV)/.dev
+	$(BIN)/python -m pytest -n auto --dist worksteal -m "not slow and not kernel" tests/unit/$(ROOM)
 
 test: lint
 	$(BIN)/python -m pytest -n auto --dist worksteal -m "not slow"
 
 test-long: $(VENV)/.dev
 	$(BIN)/python -m pytest -n auto --dist worksteal
+
+# TESTS="not slow and not kernel": of quick tests alone; TESTS= : of all. Device code, and processes that tests start, do not count.
+TESTS ?= not slow
+coverage: $(VENV)/.dev
+	$(BIN)/python -m pytest -n auto --dist worksteal -m "$(TESTS)" --cov lgvi_warp --cov-report=
+	$(BIN)/python -m tests.house.coverage_by_room
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
@@ -21,13 +31,13 @@ lint: $(VENV)/.dev
 	$(BIN)/lint-imports
 
 bench: $(VENV)/.dev
-	$(BIN)/python benchmarks/run.py
+	$(BIN)/python -m benchmarks run
 
 # Other systems on the same problem; their packages go into an environment of their own.
 bench-peers: .venv-peers/.done
-	.venv-peers/bin/python benchmarks/peers/run.py --out runs/peers_1
-	.venv-peers/bin/python benchmarks/peers/run.py --threads $$(nproc) --out runs/peers_all
-	.venv-peers/bin/python benchmarks/peers/page.py runs/peers_1/peers.jsonl runs/peers_all/peers.jsonl --write
+	.venv-peers/bin/python -m benchmarks peers --out runs/peers_1
+	.venv-peers/bin/python -m benchmarks peers --threads $$(nproc) --out runs/peers_all
+	.venv-peers/bin/python -m benchmarks table peers runs/peers_1/peers.jsonl runs/peers_all/peers.jsonl --write
 
 .venv-peers/.done: benchmarks/peers/requirements.txt pyproject.toml
 	$(PYTHON) -m venv .venv-peers

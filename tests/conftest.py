@@ -1,11 +1,14 @@
 """Fixtures: the paper's example, as numbers, as a scene and as the reference's body."""
 
+import contextlib
 import fnmatch
 import json
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
+import warp._src.context as context
 
 import lgvi_warp as lw
 from lgvi_warp.reference.submaps import Body, State
@@ -28,6 +31,19 @@ def pytest_collection_modifyitems(items):
         slow_for, slow_but = item.get_closest_marker("slow_for"), item.get_closest_marker("slow_but")
         if (slow_for and matches(case, slow_for)) or (slow_but and not matches(case, slow_but)):
             item.add_marker(pytest.mark.slow)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_protocol(item):
+    """Let a unit test, its fixtures included, load a kernel only where it is marked: `make quick` leaves such tests out."""
+    marked = item.get_closest_marker("kernel") or not item.path.is_relative_to(ROOT / "tests" / "unit")
+    with contextlib.nullcontext() if marked else mock.patch.object(context.Module, "load", refuse):
+        return (yield)
+
+
+def refuse(module, *_, **__):
+    """In place of Warp's Module.load."""
+    pytest.fail(f"this test loads the kernel {module.name}: mark it with @pytest.mark.kernel")
 
 
 @pytest.fixture(scope="session")

@@ -1,12 +1,7 @@
-"""Draw time against error from the lines of run.py, and tabulate the cheapest time of each peer for each error.
-
-python benchmarks/peers/plot.py DIR/peers.jsonl [--out DIR/peers.png]
-"""
+"""Draw time against error from the lines of run.py, and tabulate the cheapest time of each peer for each error."""
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 from collections import defaultdict
 from pathlib import Path
@@ -19,16 +14,6 @@ TITLES = {
     "vehicle": "the paper's vehicle",
     "rigid": "its rigid body alone: no added mass, no restoring moment",
 }
-
-
-def main() -> None:
-    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    arguments.add_argument("lines", type=Path)
-    arguments.add_argument("--out", type=Path)
-    chosen = arguments.parse_args()
-    records = [json.loads(line) for line in chosen.lines.read_text().splitlines()]
-    draw(records, chosen.out or chosen.lines.with_suffix(".png"))
-    print(table(records))
 
 
 def curves(records: list[Record], problem: str) -> dict[tuple[str, str], list[tuple[float, float]]]:
@@ -125,7 +110,3 @@ def _panel(panel: Any, found: dict[tuple[str, str], list[tuple[float, float]]], 
     panel.set_xlabel("largest error at the end (position [m] or attitude), smaller to the right")
     panel.set_ylabel("microseconds per vehicle and simulated second")
     panel.grid(True, which="major", alpha=0.3)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,9 +1,7 @@
 """The same problem solved by lgvi_warp and by other systems: time against error, one JSON line for each setting.
 
-python benchmarks/peers/run.py                        all peers, one thread
-python benchmarks/peers/run.py --quick --peers numba,lgvi_warp --out DIR
-
-With --out the lines also go to DIR/peers.jsonl, and plot.py draws DIR/peers.png and prints its table to stderr.
+With --out DIR the lines also go to DIR/peers.jsonl, DIR/peers.png is drawn and its table printed to stderr; --draw DIR
+does the latter two again from DIR/peers.jsonl.
 A peer that is not installed gives a line with "missing". All settings take turns, so that what slows the machine for a
 while slows them all; times leave out compilation. Versions: requirements.txt.
 """
@@ -12,43 +10,48 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import json
 import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT))
+from benchmarks.pages import read, show
 
 PEERS = ("lgvi_warp", "heyoka", "numba", "numba_simd", "jax", "diffrax", "warp_ordinary", "mujoco", "newton")
 RIGID_MEMBERS = 1024
 
 
-def main() -> None:
-    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    arguments.add_argument("--quick", action="store_true", help="512 members and 5 s: to see that it runs")
-    arguments.add_argument("--peers", default=",".join(PEERS), help=f"of {', '.join(PEERS)}")
-    arguments.add_argument("--threads", type=int, default=1, help="for every peer (default 1)")
-    arguments.add_argument("--rounds", type=int, default=3, help="of all settings in turn; times are medians")
-    arguments.add_argument("--out", type=Path, help="a folder for peers.jsonl and peers.png")
-    chosen = arguments.parse_args()
-    names = chosen.peers.split(",")
-    if unknown := set(names) - set(PEERS):
-        arguments.error(f"no peers: {', '.join(sorted(unknown))}")
-    keep_to_cores(chosen.threads)
-    lines = []
-    for record in measure(names, chosen.quick, chosen.threads, chosen.rounds):
-        lines.append(json.dumps(record))
-        print(lines[-1], flush=True)
-    if chosen.out:
-        chosen.out.mkdir(parents=True, exist_ok=True)
-        (chosen.out / "peers.jsonl").write_text("\n".join(lines) + "\n")
-        from benchmarks.peers import plot
+def add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--quick", action="store_true", help="512 members and 5 s: to see that it runs")
+    parser.add_argument("--peers", default=",".join(PEERS), help=f"of {', '.join(PEERS)}")
+    parser.add_argument("--threads", type=int, default=1, help="for every peer (default 1)")
+    parser.add_argument("--rounds", type=int, default=3, help="of all settings in turn; times are medians")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="a folder for peers.jsonl and peers.png")
+    parser.add_argument("--draw", type=Path, metavar="DIR", help="measure nothing: draw the lines of an earlier --out")
 
-        plot.draw([json.loads(line) for line in lines], chosen.out / "peers.png")
-        note("\n" + plot.table([json.loads(line) for line in lines]))
+
+def main(peers: str, quick: bool, threads: int, rounds: int, out: Path | None, draw: Path | None) -> None:
+    if draw:
+        return picture(draw)
+    names = peers.split(",")
+    if unknown := set(names) - set(PEERS):
+        raise SystemExit(f"no peers: {', '.join(sorted(unknown))}; --peers takes some of {', '.join(PEERS)}")
+    keep_to_cores(threads)
+    lines = [show(record) for record in measure(names, quick, threads, rounds)]
+    if out:
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "peers.jsonl").write_text("\n".join(lines) + "\n")
+        picture(out)
+
+
+def picture(folder: Path) -> None:
+    """Draw the lines of a folder, and print their table."""
+    from benchmarks.peers import plot
+
+    records = read(folder / "peers.jsonl")
+    plot.draw(records, folder / "peers.png")
+    note("\n" + plot.table(records))
 
 
 def keep_to_cores(threads: int) -> None:
@@ -112,7 +115,3 @@ def measure(names: list[str], quick: bool, threads: int, rounds: int) -> Iterato
 def kinds(name: str, module: Any) -> tuple[str, ...]:
     """The problems that a peer takes."""
     return ("vehicle", "rigid") if name == "lgvi_warp" else (getattr(module, "PROBLEM", "vehicle"),)
-
-
-if __name__ == "__main__":
-    main()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import platform
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -110,6 +109,8 @@ def versions() -> dict[str, str]:
     Returns:
         Name -> version, of Python and four packages.
     """
+    from importlib import metadata
+
     names = ("lgvi-warp", "warp-lang", "numpy", "scipy")
     return {"python": platform.python_version()} | {name: metadata.version(name) for name in names}
 

@@ -4,13 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-SHAPES: dict[str, tuple[int, ...]] = {
-    "position": (3,),
-    "attitude": (3, 3),
-    "velocity": (3,),
-    "angular_velocity": (3,),
-}
-
 
 @dataclass(frozen=True)
 class Block:

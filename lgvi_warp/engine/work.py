@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.common.machine import DTYPES
-from lgvi_warp.engine.block import SHAPES, Block
+from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.keepers.protocol import BlockStore, Keeper
 from lgvi_warp.physics import notation
+from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.statistics.samples import Fields
 
@@ -164,7 +165,7 @@ def unpacked(fields: Mapping[str, int], raw: np.ndarray, frame: Frame) -> dict[s
     samples: dict[str, np.ndarray] = {}
     column = 0
     for name, size in fields.items():
-        shape = SHAPES[name]
+        shape = TABLE[name].shape
         values = raw[..., column : column + size]
         if size == 2 * int(np.prod(shape)):
             values = np.add(*np.split(values, 2, axis=-1), dtype=np.float64)

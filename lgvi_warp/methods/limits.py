@@ -1,8 +1,8 @@
 """How large a step each method bears: limits of stability measured by method, or computed.
 
-Limits are in h times the angular frequency of an oscillation, found by `python benchmarks/warning_limits.py`: the fastest
-one whose amplitude stays bounded, for the Munk moment with M = (1, 100, 100) and 0.3 rad, and for the restoring moment of a
-sphere and 0.3 rad.
+Limits are in h times the angular frequency of an oscillation (`python -m benchmarks table warning_limits` finds them): the
+fastest one whose amplitude stays bounded, for the Munk moment with M = (1, 100, 100) and 0.3 rad, and for the restoring
+moment of a sphere and 0.3 rad.
 """
 
 from __future__ import annotations

@@ -10,8 +10,7 @@ from fractions import Fraction
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-
-FIELDS = ("position", "attitude", "velocity", "angular_velocity")
+from lgvi_warp.physics.fields import FIELDS
 
 # A grid whose step would be more than this many times shorter than the one asked for is refused.
 MOST_SHORTENING = 20

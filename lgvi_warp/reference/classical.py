@@ -36,8 +36,10 @@ CG3_B = (1.0, -2.0 / 3.0, 2.0 / 3.0)
 
 
 def cg3(b: Array, R: Array, nu: Array, Om: Array, body: Body, h: float) -> Motion:
-    """Crouch-Grossman, order 3, on SE(3) x R6: R <- R exp(h b1 Om1) exp(h b2 Om2) exp(h b3 Om3), and b by the same
-    screws. Returns b, R, nu, Om at k + 1."""
+    """Crouch-Grossman, order 3, on SE(3) x R6: R <- R exp(h b1 Om1) exp(h b2 Om2) exp(h b3 Om3).
+
+    b moves by the same screws. Returns b, R, nu, Om at k + 1.
+    """
     stages: list[Stage] = []
     for row in CG3_A:
         bi, Ri, nui, Omi = crouch_grossman_row(b, R, nu, Om, h, row, stages)

@@ -65,8 +65,10 @@ def rates(x: State, body: Body, h: float) -> Array:
 
 
 def solve_stages(x: State, body: Body, h: float, method: Gauss, K: Array) -> tuple[Array, int]:
-    """K_i = f(y + h sum_j a_ij K_j), (s, 18), by fixed-point iteration from a guess K until the change is round-off or
-    no longer falls, and the number of iterations. Raises NotConverged."""
+    """K_i = f(y + h sum_j a_ij K_j), (s, 18), by fixed-point iteration from a guess K, and the number of iterations.
+
+    The iteration ends where the change is round-off or no longer falls. Raises NotConverged.
+    """
     y, smallest = pack(x), np.inf
     for iteration in range(1, MOST_ITERATIONS + 1):
         Y = y + h * method.a @ K

@@ -82,9 +82,9 @@ def at(x: State, origin: Array) -> State:
 
 
 def derivatives(x: State, body: Body, h: float, origin: Array = USER) -> tuple[Array, Array, Array, Array]:
-    """b' (3,), R' (3, 3), p' (3,), pi' (3,), eq. (1) and (3) of Nordkvist & Sanyal 2010 with all laws: b' = R nu + u,
-    R' = R hat(Om), p' = p x Om + f, pi' = pi x Om + p x nu + m; h [s] is the step, which some laws look at.
+    """b' (3,), R' (3, 3), p' (3,), pi' (3,), eq. (1) and (3) of Nordkvist & Sanyal 2010 with all laws.
 
+    b' = R nu + u, R' = R hat(Om), p' = p x Om + f, pi' = pi x Om + p x nu + m; h [s] is the step, which some laws look at.
     origin (3,) [m]: where x has its b and pi, from the user's origin.
     """
     x = at(x, -origin)

@@ -28,8 +28,11 @@ def act(x: State, u: Array, t: float) -> State:
 
 
 def rkmk4(x: State, body: Body, h: float, origin: Array = USER) -> State:
-    """Munthe-Kaas & Owren (1999): order 4 with two commutators (Hairer, Lubich & Wanner, IV.8, in body axes, so that
-    their signs are opposite). origin (3,) [m]: the point of the body that R turns about."""
+    """Munthe-Kaas & Owren (1999): order 4 with two commutators.
+
+    As in Hairer, Lubich & Wanner, IV.8, but in body axes, where the commutators have opposite signs. origin (3,) [m]: the
+    point of the body that R turns about.
+    """
     x = at(remembered_half(x, body, h, second=False), origin)
 
     def k(u: Array, c: float) -> Array:

@@ -21,8 +21,10 @@ Program = Sequence[tuple[str, float]]
 
 
 def splitting(first: str, *half: float) -> Program:
-    """A palindrome from `first` in turn, from the coefficients that are printed: the last but one of its half and the
-    middle one follow, since those of each part sum to one."""
+    """A palindrome that begins with `first`, from the printed coefficients of its half.
+
+    The last but one of the half and the middle one follow, since those of each part sum to one.
+    """
     parts, c = (first, "A" if first == "B" else "B"), list(half)
     n = len(c)
     c.append(0.5 - sum(c[n % 2 :: 2]))
@@ -51,8 +53,10 @@ ORDERS = {"strang": 2, "rkn4_6": 4, "rkn6_11": 6, "rkn6_14": 6}
 
 
 def modified_inertia(pi: Array, J: Array, h: float, order: int = 10) -> Array:
-    """J~ (3, 3) of the preprocessed discrete Moser-Veselov rotation, order 2 to 10: J~^-1 = (1 + s) J^-1 + d I, where s and
-    d are polynomials in h^2 |pi|^2 / 2 and h^2 pi.J^-1 pi / 2, which the rotation conserves.
+    """J~ (3, 3) of the preprocessed discrete Moser-Veselov rotation, order 2 to 10.
+
+    J~^-1 = (1 + s) J^-1 + d I, where s and d are polynomials in h^2 |pi|^2 / 2 and h^2 pi.J^-1 pi / 2, which the rotation
+    conserves.
 
     Hairer & Vilmart (2006), J. Phys. A 39, 13225, whose coefficients are symmetric functions of the moments J. Since J~
     depends on pi, the rotation is symplectic to that order only, where D of equation (24) is so exactly. Raises NoSolution.

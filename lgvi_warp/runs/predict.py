@@ -18,7 +18,7 @@ import numpy as np
 from lgvi_warp.common import files as durable
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.engine.block import SHAPES, Block, blocks
+from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.engine.executors import check_threads
 from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.keepers.memory import Samples
@@ -27,6 +27,7 @@ from lgvi_warp.engine.keepers.protocol import Keeper
 from lgvi_warp.engine.plan import SEGMENT_SAMPLE_BYTES, Plan
 from lgvi_warp.engine.work import Work
 from lgvi_warp.methods.saveat import SaveAt, TimeGrid
+from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.runs import member_fields
 from lgvi_warp.runs.sizes import Sizes, sizes
 from lgvi_warp.runs.store.create import create
@@ -135,6 +136,9 @@ def predict(
     from lgvi_warp.runs.settle import make_plan
     from lgvi_warp.runs.store.solve import settled
 
+    faults = Faults()
+    check_threads(faults, threads)
+    faults.raise_if_any()
     ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
     statistics, keep, until = (settings.pop(name, None) for name in ("statistics", "keep", "until"))
     scene = ensemble.scene
@@ -142,9 +146,6 @@ def predict(
     fields = (settings.get("save") or SaveAt()).fields
     plan = make_plan(ensemble, **settings, fields=observed.fields)
     compile_seconds = plan.compile()
-    faults = Faults()
-    check_threads(faults, threads)
-    faults.raise_if_any()
     count = threads or machine.thread_count()
     set_up, step = costs(plan, count, observed)
     asked_store = store if isinstance(store, Store) or store is None else Store(store)
@@ -221,7 +222,7 @@ def _result_bytes(plan: Plan, fields: Sequence[str] | None = None) -> int:
     """Size of a result in memory, and about that of its file [bytes]; fields: of its samples, by default all of the plan."""
     k, n = len(plan.grid.times), plan.ensemble.members
     real = np.dtype(machine.DTYPES[plan.dtype]).itemsize
-    rows = {name: int(np.prod(SHAPES[name])) * real for name in (plan.fields if fields is None else fields)}
+    rows = {name: int(np.prod(TABLE[name].shape)) * real for name in (plan.fields if fields is None else fields)}
     if plan.spec.compensated and "position" in rows:
         rows["position"] = 24
     first = plan.ensemble.parameters(0, 1)

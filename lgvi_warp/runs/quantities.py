@@ -12,7 +12,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.real_numbers import NotReal, real_results
-from lgvi_warp.methods.saveat import FIELDS
+from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.result import Result
 from lgvi_warp.statistics.functional import Functional, functional
 from lgvi_warp.statistics.quantity import Quantity
@@ -26,8 +26,8 @@ OfInterest = str | Quantity | Callable[..., Any]
 class OfResult:
     """A quantity of interest of a result: a `Functional`, or a function of a Result.
 
-    "position[2]" is the value at the end; max(...), min(...), mean(...) and range(...) are over the samples that were kept;
-    norm(...) is the length of a vector.
+    "position[2]" is the value at the end; max(...), min(...), mean(...) and range(...) are over the path, as its
+    samples were kept; norm(...) is the length of a vector.
 
     Attributes:
         label: Its name.

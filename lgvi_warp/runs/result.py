@@ -18,6 +18,7 @@ from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.status import StatusArray, WarningArray
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
+from lgvi_warp.physics.fields import IN_FILES, TABLE
 from lgvi_warp.physics.terms import from_list
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.runs import member_fields, result_file
@@ -27,23 +28,6 @@ if TYPE_CHECKING:
     import xarray
 
     from lgvi_warp.scene.ensemble import Ensemble
-
-UNITS = {
-    "position": "m",
-    "attitude": "1",
-    "quaternion_wxyz": "1",
-    "velocity": "m s-1",
-    "angular_velocity": "rad s-1",
-    "energy": "J",
-}
-MEANINGS = {
-    "position": "position in inertial axes, north east down",
-    "attitude": "rotation from body to inertial axes",
-    "quaternion_wxyz": "unit quaternion of the attitude, scalar first",
-    "velocity": "velocity in body axes",
-    "angular_velocity": "angular velocity in body axes",
-    "energy": "kinetic and potential energy",
-}
 
 END_TIME = {"units": "s", "long_name": "time of the event or of the failure of a member, or the end of the run"}
 
@@ -206,8 +190,7 @@ class Result:
         data = {}
         for name in names:
             values = getattr(self, name)
-            attributes = {"units": UNITS[name], "long_name": MEANINGS[name]}
-            data[name] = (("time", "realization", *dims.get(values.ndim - 2, ())), values, attributes)
+            data[name] = (("time", "realization", *dims.get(values.ndim - 2, ())), values, TABLE[name].attributes)
         for member_field in self._member_fields():
             data[member_field.name] = (
                 ("realization",),
@@ -303,7 +286,7 @@ class Result:
         provenance = texts["provenance"]
         result = cls(
             time=content["time"],
-            samples={name: content[name] for name in content if name in UNITS},
+            samples={name: content[name] for name in content if name in IN_FILES},
             **cls.per_member(content),
             parameters=_below("parameters/", content),
             messages=tuple(texts["messages"]),
@@ -316,7 +299,7 @@ class Result:
             return result
         members = kept["members"]
         few = replace(result.part(members), parameters=_below("parameters/", kept), statistics=Estimates())
-        few = replace(few, samples={name: kept[name] for name in kept if name in UNITS})
+        few = replace(few, samples={name: kept[name] for name in kept if name in IN_FILES})
         return replace(result, kept=few, kept_members=members)
 
 

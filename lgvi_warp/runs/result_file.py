@@ -11,12 +11,9 @@ import numpy as np
 
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.safe_files import parsed
+from lgvi_warp.physics.fields import IN_FILES, TABLE
 from lgvi_warp.runs import member_fields
 
-# Shape of one member's sample at one time, by field.
-SHAPES: dict[str, tuple[int, ...]] = {
-    "position": (3,), "attitude": (3, 3), "quaternion_wxyz": (4,), "velocity": (3,), "angular_velocity": (3,), "energy": (),
-}  # fmt: skip
 TEXTS = ("messages", "provenance", "statistics")
 
 
@@ -62,8 +59,8 @@ def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
     m = content["kept/members"].size if "kept/members" in content else 0
     for name, array in content.items():
         base = name.removeprefix("kept/")
-        if base in SHAPES:
-            good = array.shape == (k, n if base == name else m, *SHAPES[base]) and array.dtype.kind == "f"
+        if base in IN_FILES:
+            good = array.shape == (k, n if base == name else m, *TABLE[base].shape) and array.dtype.kind == "f"
         elif name in TEXTS:
             good = array.dtype.kind == "U" and array.shape == ()
         elif name == "time":

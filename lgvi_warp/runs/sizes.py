@@ -87,7 +87,7 @@ def _of_times(plan: Plan, statistics: Sequence[Statistic], count: int) -> Sizes:
     file = len(packed([keeper], [part]))
     joined, reading, estimates = 0, 0, 0
     with np.errstate(all="ignore"):
-        for statistic, block_part in zip(statistics, part, strict=True):
+        for statistic, block_part in zip(keeper.statistics, part, strict=True):
             tree = _fullest(statistic, block_part, 1 + len(others))
             read, more = _peak(lambda: keeper.said(statistic, tree))  # noqa: B023
             joined, reading = joined + sum(map(_bytes, tree)), max(reading, more)

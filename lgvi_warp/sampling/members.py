@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-STATES = ("position", "attitude", "velocity", "angular_velocity")
-
 
 @dataclass(frozen=True, eq=False)
 class Members:

@@ -18,13 +18,14 @@ from lgvi_warp.common.labelled import columns_by_name, is_labelled, match
 from lgvi_warp.common.real_numbers import column_names
 from lgvi_warp.physics import notation
 from lgvi_warp.physics import vehicle as vehicles
+from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.sampling.designs.base import Sampling
 from lgvi_warp.sampling.designs.space import Space
-from lgvi_warp.sampling.members import STATES, Members
+from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.scene.settings import MOST_MEMBERS, EnsembleSettings
-from lgvi_warp.scene.start import ATTITUDES, SHAPES, resolve_attitude
+from lgvi_warp.scene.start import ATTITUDES, NAMES, resolve_attitude
 from lgvi_warp.scene.variations import MATRICES, Target, Variation
 
 
@@ -148,7 +149,7 @@ class Ensemble:
             SceneError: If an array holds no real numbers, has a wrong shape or unphysical values.
         """
         faults = Faults()
-        states = dict(zip(STATES, (position, attitude, velocity, angular_velocity), strict=True))
+        states = dict(zip(FIELDS, (position, attitude, velocity, angular_velocity), strict=True))
         explicit = {f"start.{key}": _state(faults, key, value) for key, value in states.items()}
         faults.raise_if_any()
         n = len(explicit["start.position"]) if explicit["start.position"].ndim else 0
@@ -607,7 +608,7 @@ def check_names(vary: Mapping[str, Any], parameters: Sequence[str]) -> None:
         SceneError: If a name is not among them and is none of the start; the message lists every such name.
     """
     faults = Faults("ensemble.vary.")
-    known = [*parameters, *(f"start.{name}" for name in SHAPES)]
+    known = [*parameters, *(f"start.{name}" for name in NAMES)]
     for key, law in vary.items():
         for target in variations.targets(key):
             if target.name not in known:

@@ -10,27 +10,12 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics import notation
+from lgvi_warp.physics.fields import TABLE
 
 ATTITUDES = ("attitude", "rotation_vector", "quaternion_wxyz", "euler_deg")
-
-
 VELOCITIES = ("velocity", "velocity_inertial")
-
-
-SHAPES = {
-    "position": (3,),
-    "attitude": (3, 3),
-    "rotation_vector": (3,),
-    "quaternion_wxyz": (4,),
-    "euler_deg": (3,),
-    "velocity": (3,),
-    "velocity_inertial": (3,),
-    "angular_velocity": (3,),
-}
-
-
-UNITS = {"position": "m", "rotation_vector": "rad", "euler_deg": "deg", "velocity": "m/s", "velocity_inertial": "m/s",
-         "angular_velocity": "rad/s"}  # fmt: skip
+# In the order of a scene file.
+NAMES = ("position", *ATTITUDES, *VELOCITIES, "angular_velocity")
 
 
 @dataclass(frozen=True)
@@ -99,10 +84,10 @@ class Start:
             chosen = [name for name in names if getattr(self, name) is not None]
             if len(chosen) > 1:
                 faults.add(" and ".join(chosen), "...", "say the same thing twice", "keep one of them")
-        for name, shape in SHAPES.items():
+        for name in NAMES:
             value = getattr(self, name)
             if value is not None:
-                object.__setattr__(self, name, faults.finite(name, value, shape, UNITS.get(name, "")))
+                object.__setattr__(self, name, faults.finite(name, value, TABLE[name].shape, TABLE[name].unit))
         self._check_attitude(faults)
         faults.raise_if_any()
 
@@ -124,11 +109,11 @@ class Start:
         Returns:
             Values by name: position (3,) [m], one attitude, one velocity (3,) [m/s] and angular_velocity (3,) [rad/s].
         """
-        chosen = {name: getattr(self, name) for name in SHAPES if getattr(self, name) is not None}
+        chosen = {name: getattr(self, name) for name in NAMES if getattr(self, name) is not None}
         for names in (("position",), ATTITUDES[1:], VELOCITIES, ("angular_velocity",)):
             alternatives = ATTITUDES if names == ATTITUDES[1:] else names
             if not any(name in chosen for name in alternatives):
-                chosen[names[0]] = np.zeros(SHAPES[names[0]])
+                chosen[names[0]] = np.zeros(TABLE[names[0]].shape)
         return chosen
 
     def to_dict(self) -> dict[str, Any]:
@@ -137,7 +122,7 @@ class Start:
         Returns:
             The values that the user gave, by name, as lists.
         """
-        return {name: getattr(self, name).tolist() for name in SHAPES if getattr(self, name) is not None}
+        return {name: getattr(self, name).tolist() for name in NAMES if getattr(self, name) is not None}
 
 
 def resolve_attitude(values: Mapping[str, np.ndarray]) -> np.ndarray:

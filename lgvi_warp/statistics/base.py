@@ -20,8 +20,8 @@ from lgvi_warp.common.errors import Faults, SceneError, closest, shown
 from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.ends import Ends
 from lgvi_warp.statistics.estimate import Estimate
-from lgvi_warp.statistics.functional import quantity
-from lgvi_warp.statistics.quantity import Quantity, component
+from lgvi_warp.statistics.functional import Functional, over_path, quantity
+from lgvi_warp.statistics.quantity import Quantity
 from lgvi_warp.statistics.tree import Part
 from lgvi_warp.statistics.values import Values
 
@@ -83,7 +83,8 @@ class Statistic:
 
     Args:
         of: a quantity (see lw.Quantity): "position", "position[2]", "depth", "speed", "euler[0]", "energy", ..., a
-            function of (samples, members), or a list of these taken together.
+            function of (samples, members), or a list of these taken together; or one number of each member's path,
+            "max(depth)", for statistics of numbers.
         name: key of the estimate in the result; by default the type and the quantity, as in "mean position".
         confidence: confidence level of the intervals, between 0 and 1; by default 0.95.
         stopped: whether a member that an event stopped counts with the state that it stopped in ("held", the default),
@@ -132,6 +133,8 @@ class Statistic:
         if self.of is not None:
             with faults.including():
                 object.__setattr__(self, "_quantity", self.meant())
+                if self.path is not None:
+                    self.check_one_number(faults, "", self.path.label)
         self.check(faults)
         faults.raise_if_any()
 
@@ -167,6 +170,25 @@ class Statistic:
                 [f"{self.type}.of = None: is missing; say what it is of: lw.{type(self).__name__}('depth')"]
             )
         return meaning
+
+    @property
+    def path(self) -> Functional | None:
+        """The expression that it is of, if that looks over the members' paths; else None."""
+        return over_path(self.quantity)
+
+    def check_one_number(self, faults: Faults, where: str, number: str) -> None:
+        """Note a fault if it cannot be of one number of each member.
+
+        Args:
+            faults: the list that faults are added to.
+            where: where the statistic stands, such as "then[0].".
+            number: what the number is: "a path_maximum".
+        """
+        if not self.of_numbers:
+            remark = f"is of samples in time, and {number} is one number of each member"
+            faults.add(f"{where}type", self.type, remark, "ask for its mean, quantiles, or an exceedance")
+        elif self.at is not None:
+            faults.add(f"{where}at", self.at, f"says when, and {number} has no time", "leave it out")
 
     @property
     def key(self) -> str:
@@ -330,14 +352,6 @@ class Statistic:
             if value is not None and plain(value) != plain(default):
                 content[argument.name] = plain(value)
         return content
-
-    def alone(self, i: int) -> Quantity:
-        """Return one component of the quantity.
-
-        Args:
-            i: index of the component.
-        """
-        return component(self.quantity, i)
 
 
 def together(each: Sequence[Sequence[Part]]) -> list[Part]:

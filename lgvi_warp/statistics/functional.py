@@ -8,20 +8,28 @@ here.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError, closest, shown
+from lgvi_warp.statistics import reductions
 from lgvi_warp.statistics.quantity import KNOWN, Quantity, joined, named
+from lgvi_warp.statistics.reductions import Reduction
 
 if TYPE_CHECKING:
     from lgvi_warp.sampling.members import Members
     from lgvi_warp.statistics.samples import Fields
 
-OVER_TIME: dict[str, Callable[..., np.ndarray]] = {"max": np.max, "min": np.min, "mean": np.mean, "range": np.ptp}
+OVER_TIME = {
+    "max": reductions.MAXIMUM,
+    "min": reductions.MINIMUM,
+    "mean": reductions.MEAN,
+    "range": reductions.RANGE,
+}
 FUNCTIONS = (*OVER_TIME, "norm")
 
 
@@ -42,9 +50,43 @@ class Functional:
     entry: int | None = None
 
     @property
+    def _turn(self) -> int | None:
+        """Index of the function that reduces the path."""
+        return next((i for i, name in enumerate(self.functions) if name in OVER_TIME), None)
+
+    @property
     def over_path(self) -> bool:
         """Whether it reduces the path: one row for each member instead of one for each time."""
-        return any(name in OVER_TIME for name in self.functions)
+        return self._turn is not None
+
+    @property
+    def inner(self) -> Quantity:
+        """The quantity at each time: all of it, or what is reduced over the path."""
+        if not self.over_path:
+            return self.as_quantity()
+        functions = self.functions[: self._turn]
+        label = reduce(lambda text, name: f"{name}({text})", functions, self.quantity.name)
+        return Functional(label, self.quantity, functions).as_quantity()
+
+    @property
+    def reduction(self) -> Reduction:
+        """The reduction of the path, with the functions and the entry that are taken of it."""
+        assert self._turn is not None
+        reduction, functions = OVER_TIME[self.functions[self._turn]], self.functions[self._turn + 1 :]
+        if not functions and self.entry is None:
+            return reduction
+
+        def finish(state: np.ndarray) -> np.ndarray:
+            values = self._applied(functions, np.moveaxis(reduction.finish(state), -2, -1))
+            return np.ascontiguousarray(np.moveaxis(values, -1, -2))
+
+        return replace(reduction, finish=finish, of_samples=reduction.of_samples and not functions)
+
+    def _applied(self, functions: Sequence[str], values: np.ndarray) -> np.ndarray:
+        """The lengths that the functions name, and the entry, along the last axis."""
+        for _ in functions:
+            values = np.sqrt(np.sum(values**2, axis=-1, keepdims=True))
+        return values if self.entry is None else values[..., self.entry : self.entry + 1]
 
     @property
     def unit(self) -> str:
@@ -75,23 +117,14 @@ class Functional:
         Returns:
             float64: (k, n, size), or (n, size) if it reduces the path.
         """
-        values = np.moveaxis(self.quantity(samples, members).astype(np.float64, copy=False), 1, 2)
-        for name in self.functions:
-            if name == "norm":
-                values = np.sqrt(np.sum(values**2, axis=-1, keepdims=True))
-            else:
-                values = np.asarray(OVER_TIME[name](values, axis=0))
-        return values if self.entry is None else values[..., self.entry : self.entry + 1]
-
-    def at_each_time(self) -> Quantity:
-        """Return the same as a Quantity.
-
-        Raises:
-            SceneError: it reduces the path, and has no number at each time.
-        """
         if self.over_path:
-            remedy = f"ask for {self.quantity.name}, or for lw.PathMaximum({self.quantity.name!r}) and the like"
-            raise SceneError([f"{self.label}: looks over the path, and has no number at each time; {remedy}"])
+            values = self.inner(samples, members).astype(np.float64, copy=False)
+            return self.reduction.over(values, samples.time).T
+        values = np.moveaxis(self.quantity(samples, members).astype(np.float64, copy=False), 1, 2)
+        return self._applied(self.functions, values)
+
+    def as_quantity(self) -> Quantity:
+        """Return the same as a Quantity; where it reduces the path, that has a name, and no number at each time."""
         if not self.functions and self.entry is None:
             return self.quantity
         return replace(self.quantity, name=self.label, labels=self.labels, function=self)
@@ -127,7 +160,7 @@ def functional(key: str, of: Any) -> Functional:
     if not re.fullmatch(r"\w+(\[[\d,]+\])?", inner):
         form = 'write "position[2]", "depth", "norm(velocity)" or "max(depth)"'
         raise SceneError([f"{key} = {shown(of)}: is no quantity; {form}, of {', '.join(KNOWN)}"])
-    base = Functional(text, named(key, inner), tuple(reversed(names)))
+    base = Functional(text, named(key, of, inner), tuple(reversed(names)))
     if entry is not None and (base.size == 1 or entry >= base.size):
         raise SceneError([f"{key} = {shown(of)}: {outer} has {base.size} component{'s' * (base.size > 1)}; "
                           f"give one of them from 0, or {outer} alone"])  # fmt: skip
@@ -157,12 +190,25 @@ def quantity(key: str, of: Any) -> Quantity:
     if isinstance(of, Quantity):
         return of
     if isinstance(of, str):
-        if "(" in of:
-            return functional(key, of).at_each_time()
-        return named(key, of)
+        return functional(key, of).as_quantity()
     if callable(of):
         return Quantity(str(getattr(of, "__name__", type(of).__name__)), of)
     if isinstance(of, Sequence) and len(of):
-        return joined([quantity(f"{key}[{i}]", item) for i, item in enumerate(of)])
+        parts = [quantity(f"{key}[{i}]", item) for i, item in enumerate(of)]
+        for i, (part, item) in enumerate(zip(parts, of, strict=True)):
+            if len(of) > 1 and over_path(part):
+                remark = "looks over the path, and a list is of numbers at each time; ask for it alone"
+                raise SceneError([f"{key}[{i}] = {shown(item)}: {remark}"])
+        return joined(parts)
     remedy = f"give one of {', '.join(KNOWN)}, one component as in 'position[2]', or a function of (samples, members)"
     raise SceneError([f"{key} = {shown(of)}: is no quantity; {remedy}"])
+
+
+def over_path(quantity: Quantity) -> Functional | None:
+    """Return the expression of a quantity that reduces the path; None for a quantity at each time.
+
+    Args:
+        quantity: a quantity.
+    """
+    expression = quantity.function
+    return expression if isinstance(expression, Functional) and expression.over_path else None

@@ -10,6 +10,8 @@ import numpy as np
 
 # A number that stands alone, not an index in brackets.
 _NUMBER = re.compile(r"(?<![\w.\[])-?\d+(?:\.\d*)?(?:e[+-]?\d+)?(?![\w.\]])")
+# Spaces beside commas and inside of brackets.
+_SPACE = re.compile(r"(?<=[,(\[])\s+|\s+(?=[,)\]])")
 # The minus sign of a number or of its exponent, not a hyphen between words.
 _MINUS = re.compile(r"(?<!\w)-(?=[\d.])|(?<=\de)-(?=\d)")
 
@@ -26,12 +28,12 @@ def spelled(value: Any) -> str:
 
 
 def canonical(name: str) -> str:
-    """Return a name with its numbers as `spelled`: "exceedance depth above 10" for "... above 10.0".
+    """Return a name as all its spellings have it: "above 10" for "above 10.0", "attitude[0,1]" for "attitude[0, 1]".
 
     Args:
         name: the name of a statistic.
     """
-    return _NUMBER.sub(lambda match: spelled(float(match[0])), name)
+    return _SPACE.sub("", _NUMBER.sub(lambda match: spelled(float(match[0])), name))
 
 
 def word(name: str) -> str:

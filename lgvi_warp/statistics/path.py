@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
-from lgvi_warp.statistics.base import Gatherer
+from lgvi_warp.statistics import reductions
+from lgvi_warp.statistics.base import Gatherer, Statistic
 from lgvi_warp.statistics.counts import Condition
+from lgvi_warp.statistics.functional import Functional, functional
+from lgvi_warp.statistics.quantity import Quantity
+from lgvi_warp.statistics.reductions import Reduction
 from lgvi_warp.statistics.then import Then
 from lgvi_warp.statistics.tree import Part
 from lgvi_warp.statistics.values import Values
@@ -18,7 +22,7 @@ class _Walk(Gatherer):
     """Follows the paths of a block's members, sample by sample, and whether all samples counted."""
 
     def __init__(self, statistic: OfPath, time: np.ndarray):
-        self._statistic, self._time = statistic, time
+        self._statistic, self._time, self._reduction = statistic, time, statistic.reduction
         # One row for each replicate; one row without replicates.
         self._state: np.ndarray | None = None
         self._last = np.empty(0)
@@ -31,23 +35,23 @@ class _Walk(Gatherer):
         samples = values.x.reshape(*rows, *values.x.shape[1:])
         # Samples are taken one by one, so that the bits do not depend on how many come at once.
         for t, x in zip(range(when.start, when.stop), samples, strict=True):
-            self._state = self._statistic.start(x) if self._state is None else self._stepped(self._state, t, x)
+            self._state = self._reduction.start(x) if self._state is None else self._stepped(self._state, t, x)
             self._last = x
         self._last = self._last.copy()
         if values.good is not None:
             complete = values.good.reshape(*rows, values.good.shape[1]).all(axis=0)
             self._whole = complete if self._whole is None else self._whole & complete
         self._place = (values.first, values.block, values.size, values.replicates)
-        self._single = values.single and self._statistic.of_samples
+        self._single = values.single and self._reduction.of_samples
 
     def _stepped(self, state: np.ndarray, t: int, x: np.ndarray) -> np.ndarray:
         dt = float(self._time[t] - self._time[t - 1])
-        return self._statistic.step(state, self._last, x, dt, dt / float(self._time[t] - self._time[0]))
+        return self._reduction.step(state, self._last, x, dt, dt / float(self._time[t] - self._time[0]))
 
     def close(self) -> Part:
         """Return the parts of all statistics of the paths' numbers."""
         assert self._state is not None
-        x = self._statistic.finish(self._state)
+        x = self._reduction.finish(self._state)
         good = None if self._whole is None or self._whole.all() else self._whole
         values = Values(x.astype(np.float32) if self._single else x, good, *self._place)
         return self._statistic.gather(values, self._time)
@@ -67,42 +71,16 @@ class OfPath(Then):
     """
 
     of_numbers: ClassVar[bool] = False
-    # Whether the path's number is one of its samples, so that float32 holds it exactly.
-    of_samples: ClassVar[bool] = False
+    _reduction: ClassVar[Reduction]
+
+    @property
+    def reduction(self) -> Reduction:
+        """How samples (replicates, d components, members) become the number of each path."""
+        return self._reduction
 
     def open(self, time: np.ndarray, count: int) -> _Walk:
         """Return the object that follows the members of a block."""
         return _Walk(self, time)
-
-    # The reduction of a path, for arrays (replicates, d components, members), from its first sample on.
-
-    def start(self, x: np.ndarray) -> np.ndarray:
-        """Return the state of the paths after their first sample.
-
-        Args:
-            x: (R, d, n), the first sample: R replicates, d components, n members.
-        """
-        return x
-
-    def step(self, state: np.ndarray, before: np.ndarray, x: np.ndarray, dt: float, share: float) -> np.ndarray:
-        """Return the state of the paths after another sample.
-
-        Args:
-            state: what `start` or the previous `step` returned.
-            before: (R, d, n), the sample before.
-            x: (R, d, n), the sample.
-            dt: time [s] between the two.
-            share: dt divided by the time since the first sample.
-        """
-        raise TypeError(f"{type(self).__name__} is abstract")
-
-    def finish(self, state: np.ndarray) -> np.ndarray:
-        """Return the number of each path, (R, d, n).
-
-        Args:
-            state: the state after the last sample.
-        """
-        return state
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,11 +97,7 @@ class PathMaximum(OfPath):
     """
 
     type: ClassVar[str] = "path_maximum"
-    of_samples: ClassVar[bool] = True
-
-    def step(self, state: np.ndarray, before: np.ndarray, x: np.ndarray, dt: float, share: float) -> np.ndarray:
-        """Keep the larger of state and sample."""
-        return np.maximum(state, x)
+    _reduction: ClassVar[Reduction] = reductions.MAXIMUM
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,11 +110,7 @@ class PathMinimum(OfPath):
     """
 
     type: ClassVar[str] = "path_minimum"
-    of_samples: ClassVar[bool] = True
-
-    def step(self, state: np.ndarray, before: np.ndarray, x: np.ndarray, dt: float, share: float) -> np.ndarray:
-        """Keep the smaller of state and sample."""
-        return np.minimum(state, x)
+    _reduction: ClassVar[Reduction] = reductions.MINIMUM
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,18 +123,7 @@ class PathRange(OfPath):
     """
 
     type: ClassVar[str] = "path_range"
-
-    def start(self, x: np.ndarray) -> np.ndarray:
-        """Return smallest and largest value so far, (2, R, d, n)."""
-        return np.stack([x, x])
-
-    def step(self, state: np.ndarray, before: np.ndarray, x: np.ndarray, dt: float, share: float) -> np.ndarray:
-        """Keep the smaller and the larger value."""
-        return np.stack([np.minimum(state[0], x), np.maximum(state[1], x)])
-
-    def finish(self, state: np.ndarray) -> np.ndarray:
-        """Return the largest less the smallest value."""
-        return np.asarray(state[1] - state[0])
+    _reduction: ClassVar[Reduction] = reductions.RANGE
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,14 +139,11 @@ class PathMean(OfPath):
     """
 
     type: ClassVar[str] = "path_mean"
-
-    def step(self, state: np.ndarray, before: np.ndarray, x: np.ndarray, dt: float, share: float) -> np.ndarray:
-        """Move the average so far towards the average since the sample before."""
-        return np.asarray(state + share * (0.5 * (before + x) - state))
+    _reduction: ClassVar[Reduction] = reductions.MEAN
 
 
 @dataclass(frozen=True, eq=False)
-class PathRms(PathMean):
+class PathRms(OfPath):
     """The root of the average over time of a quantity's square for each member, then statistics of it.
 
     The square is taken as linear between samples.
@@ -198,18 +154,7 @@ class PathRms(PathMean):
     """
 
     type: ClassVar[str] = "path_rms"
-
-    def start(self, x: np.ndarray) -> np.ndarray:
-        """Return the square of the first sample."""
-        return np.asarray(x * x)
-
-    def step(self, state: np.ndarray, before: np.ndarray, x: np.ndarray, dt: float, share: float) -> np.ndarray:
-        """Average the squares over time as `PathMean` does."""
-        return super().step(state, before * before, x * x, dt, share)
-
-    def finish(self, state: np.ndarray) -> np.ndarray:
-        """Return the square root of the average."""
-        return np.asarray(np.sqrt(state))
+    _reduction: ClassVar[Reduction] = reductions.ROOT_MEAN_SQUARE
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,12 +188,12 @@ class PathTime(OfPath, Condition):
     def _labels(self) -> tuple[str, ...]:
         return tuple(f"{label}{self.limits_text}" for label in super()._labels)
 
-    def start(self, x: np.ndarray) -> np.ndarray:
-        """Return zero time for all members."""
-        return np.zeros(x.shape)
+    @property
+    def reduction(self) -> Reduction:
+        """The sum of the parts of time for which the condition holds."""
+        return Reduction(self._step, lambda x: np.zeros(x.shape))
 
-    def step(self, state: np.ndarray, before: np.ndarray, x: np.ndarray, dt: float, share: float) -> np.ndarray:
-        """Add the part of dt for which the condition holds."""
+    def _step(self, state: np.ndarray, before: np.ndarray, x: np.ndarray, dt: float, share: float) -> np.ndarray:
         above, below = self.limits(x.shape[-2])
         if above is None and below is None:
             fraction = 0.5 * ((before != 0.0) + 1.0 * (x != 0.0))
@@ -265,3 +210,48 @@ def _part(beyond: np.ndarray, length: np.ndarray) -> np.ndarray:
     """Fraction of lines of this length that lies beyond a number, 0 to 1; of a line of no length either 0 or 1."""
     moves = length > 0.0
     return np.where(moves, np.clip(beyond / np.where(moves, length, 1.0), 0.0, 1.0), 1.0 * (beyond > 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class OfExpression(OfPath):
+    """The number that an expression such as "max(depth)" gives for each member's path, then a statistic of it.
+
+    The name of an estimate has the expression: "mean max(depth)".
+
+    Args:
+        of: the expression.
+        then: the statistic, without `of`.
+    """
+
+    def meant(self) -> Quantity:
+        """Return the quantity at each time, of which the path's number is made."""
+        return self._functional.inner
+
+    @property
+    def _functional(self) -> Functional:
+        return functional("of", self.of)
+
+    @property
+    def key(self) -> str:
+        """The name of the number: the expression."""
+        return self._functional.label
+
+    @property
+    def reduction(self) -> Reduction:
+        """The expression's."""
+        return self._functional.reduction
+
+    @property
+    def _labels(self) -> tuple[str, ...]:
+        return self._functional.labels
+
+
+def followed(statistic: Statistic) -> Statistic:
+    """Return the statistic that is gathered for one: of paths, where it is of an expression that looks over them.
+
+    Args:
+        statistic: a statistic, such as lw.Quantiles("max(depth)").
+    """
+    if statistic.path is None:
+        return statistic
+    return OfExpression(statistic.path.label, then=replace(statistic, of=None), stopped=statistic.stopped)

@@ -12,9 +12,9 @@ import numpy as np
 
 from lgvi_warp.common.errors import SceneError, closest, shown
 from lgvi_warp.common.real_numbers import NotReal, real_results
-from lgvi_warp.methods.saveat import FIELDS
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
+from lgvi_warp.physics.fields import FIELDS, TABLE
 
 if TYPE_CHECKING:
     from lgvi_warp.physics.terms.base import Term
@@ -120,34 +120,34 @@ def _energy(samples: Fields, members: Members) -> np.ndarray:
     return invariants.energy(block)
 
 
-def _labels(name: str, *shape: int) -> tuple[str, ...]:
-    return tuple(f"{name}[{', '.join(map(str, index))}]" for index in np.ndindex(*shape))
+def _known(name: str, fields: tuple[str, ...], function: Function) -> Quantity:
+    field = TABLE[name]
+    return Quantity(name, function, field.unit, fields, field.labels, needs_limit=True)
 
 
 KNOWN: dict[str, Quantity] = {
-    one.name: replace(one, needs_limit=True)
-    for one in (
-        Quantity("position", _field("position"), "m", ("position",), _labels("position", 3)),
-        Quantity("depth", lambda samples, members: samples["position"][..., 2], "m", ("position",)),
-        Quantity("velocity", _field("velocity"), "m/s", ("velocity",), _labels("velocity", 3)),
-        Quantity("velocity_inertial", _velocity_inertial, "m/s", ("attitude", "velocity"), _labels("velocity_inertial", 3)),
-        Quantity("speed", _speed, "m/s", ("velocity",)),
-        Quantity(
-            "angular_velocity", _field("angular_velocity"), "rad/s", ("angular_velocity",), _labels("angular_velocity", 3)
-        ),
-        Quantity("attitude", _field("attitude"), "1", ("attitude",), _labels("attitude", 3, 3)),
-        Quantity("quaternion_wxyz", _quaternion_wxyz, "1", ("attitude",), _labels("quaternion_wxyz", 4)),
-        Quantity("euler", _euler, "rad", ("attitude",), _labels("euler", 3)),
-        Quantity("energy", _energy, "J"),
+    quantity.name: quantity
+    for quantity in (
+        _known("position", ("position",), _field("position")),
+        _known("depth", ("position",), lambda samples, members: samples["position"][..., 2]),
+        _known("velocity", ("velocity",), _field("velocity")),
+        _known("velocity_inertial", ("attitude", "velocity"), _velocity_inertial),
+        _known("speed", ("velocity",), _speed),
+        _known("angular_velocity", ("angular_velocity",), _field("angular_velocity")),
+        _known("attitude", ("attitude",), _field("attitude")),
+        _known("quaternion_wxyz", ("attitude",), _quaternion_wxyz),
+        _known("euler", ("attitude",), _euler),
+        _known("energy", FIELDS, _energy),
     )
-}  # fmt: skip
+}
 
 
-def named(key: str, text: str) -> Quantity:
+def named(key: str, of: str, text: str) -> Quantity:
     """Return the quantity of a name, or one component of it.
 
     Args:
         key: the key that messages name.
+        of: what was asked for, which messages show.
         text: a name such as "position", or a component such as "position[2]".
 
     Raises:
@@ -156,14 +156,15 @@ def named(key: str, text: str) -> Quantity:
     match = re.fullmatch(r"(\w+)(\[[\d, ]+\])?", text.strip())
     base = KNOWN.get(match[1]) if match else None
     if base is None:
-        raise SceneError([f"{key} = {shown(text)}: is not known; {closest(text, KNOWN)}"])
+        raise SceneError([f"{key} = {shown(of)}: is not known; {closest(text, KNOWN)}"])
     assert match is not None
     if match[2] is None:
         return base
     label = f"{base.name}[{', '.join(match[2][1:-1].replace(' ', '').split(','))}]"
     if label not in base.labels:
-        remark = "has one component" if base.size == 1 else f"has the components {', '.join(base.labels)}"
-        raise SceneError([f"{key} = {shown(text)}: {base.name} {remark}; give one of them"])
+        one = f"has one component; give {base.name!r}"
+        remark = one if base.size == 1 else f"has the components {', '.join(base.labels)}; give one of them"
+        raise SceneError([f"{key} = {shown(of)}: {base.name} {remark}"])
     return component(base, base.labels.index(label))
 
 

@@ -39,13 +39,10 @@ class Then(Statistic):
         with faults.including():
             statistics = list(from_list(entries, f"{self.type}.then", whole=False))
         for i, statistic in enumerate(statistics):
-            if not statistic.of_numbers:
-                remark = f"is of samples in time, and a {self.type} is one number of each member"
-                faults.add(f"then[{i}].type", statistic.type, remark, "ask for its mean, quantiles, or an exceedance")
-            elif statistic.of is not None:
+            if statistic.of_numbers and statistic.of is not None:
                 faults.add(f"then[{i}].of", statistic.of, "is given already", f"leave it out: it is of the {self.type}")
-            elif statistic.at is not None:
-                faults.add(f"then[{i}].at", statistic.at, f"says when, and a {self.type} has no time", "leave it out")
+            else:
+                statistic.check_one_number(faults, f"then[{i}].", f"a {self.type}")
         object.__setattr__(self, "then", tuple(statistics))
         if self.of is not None and not faults:
             with faults.including():  # report a missing limit now, not during the run

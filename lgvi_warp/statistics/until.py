@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, SceneError, closest
+from lgvi_warp.common.errors import Faults, SceneError, closest, shown
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.estimate import Estimate
+from lgvi_warp.statistics.functional import quantity
 from lgvi_warp.statistics.moments import Covariance, Mean
 from lgvi_warp.statistics.naming import canonical
 from lgvi_warp.statistics.order import Quantiles
-from lgvi_warp.statistics.quantity import KNOWN
 
 # After a look, the number of members grows by at least this fraction before the next one.
 GROWTH = 0.05
@@ -185,16 +185,9 @@ def watch(until: Until, statistics: Sequence[Statistic], times: np.ndarray) -> W
         rows = np.flatnonzero(np.abs(times - until.at) <= 1e-9 * max(1.0, times[-1]))
         if not len(rows):
             faults.add("at", until.at, "is no sample time", "give a time at which samples are kept, or leave it out")
-    known = _named(statistics)
-    target = known.get(until.statistic)
-    if target is None and isinstance(until.statistic, str):
-        alike = (candidate for name, candidate in known.items() if canonical(name) == canonical(until.statistic))
-        target = next(alike, None) or _mean(until.statistic)
-    if target is None:
-        hint = closest(until.statistic, known or KNOWN)
-        if known and not hint.startswith("did you mean"):  # list the statistics alone, not their components
-            hint = closest(until.statistic, dict.fromkeys(name for _, name, _ in known.values()))
-        faults.add("statistic", until.statistic, "is none of the run's statistics", hint)
+    target = None
+    with faults.including():
+        target = _target(until.statistic, _named(statistics))
     faults.raise_if_any()
     assert target is not None
     if target[0].type == "extremes":
@@ -235,13 +228,26 @@ def _entries(one: Statistic) -> dict[str, dict[str, int]]:
     return entries
 
 
-def _mean(name: str) -> Named | None:
-    """The mean that a name asks for; None if it asks for none."""
-    mean = re.fullmatch(r"mean (.+)", name)
-    if mean is None:
-        return None
-    try:
-        added = Mean(mean[1])
-    except SceneError:
-        return None
-    return added, added.key, {}
+def _target(name: str, known: Mapping[str, Named]) -> Named:
+    """What a name asks to watch: one of those known, or a mean that is added to them.
+
+    Raises:
+        SceneError: it asks for neither.
+    """
+    alike = (known[spelling] for spelling in known if canonical(spelling) == canonical(name))
+    if (target := known.get(name) or next(alike, None)) is not None:
+        return target
+    hint, of = closest(name, known), name.removeprefix("mean ")
+    if of != name:
+        try:
+            quantity("until.statistic", of)
+        except SceneError:
+            if not hint.startswith("did you mean"):
+                raise
+        else:
+            added = Mean(of)
+            return added, added.key, {}
+    if not hint.startswith("did you mean"):  # list the statistics alone, not their components
+        estimates = dict.fromkeys(estimate for _, estimate, _ in known.values())
+        hint = closest(name, estimates) if known else 'give a mean, such as "mean depth", or statistics'
+    raise SceneError([f"until.statistic = {shown(name)}: is none of the run's statistics; {hint}"])

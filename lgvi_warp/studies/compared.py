@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import SceneError
+from lgvi_warp.physics.fields import FIELDS, TABLE
 from lgvi_warp.runs.quantities import samples_of
 from lgvi_warp.runs.result import Result
 from lgvi_warp.statistics.functional import Functional, functional
 
 # Quantities that results are always compared in, and their units. Attitudes differ by the angle between them.
-QUANTITIES = {"position": "m", "attitude": "rad", "velocity": "m/s", "angular_velocity": "rad/s", "energy": "J"}
+QUANTITIES = {name: TABLE[name].unit for name in (*FIELDS, "energy")} | {"attitude": "rad"}
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,7 @@ def compared_in(of: Any) -> Compared:
         raise SceneError([f"of = {of!r}: is several quantities; errors are of one of them: give its name"])
     parsed = functional("of", of)
     if parsed.over_path:
-        remedy = f"give {parsed.quantity.name!r}, whose largest error over the path is reported"
+        remedy = f"give {parsed.inner.name!r}, whose largest error over the path is reported"
         raise SceneError(
             [f"of = {parsed.label!r}: looks over the path, and errors are of a quantity at each time; {remedy}"]
         )

@@ -17,9 +17,10 @@ from lgvi_warp.common.status import stop_time
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods import saveat
 from lgvi_warp.methods.method import Method
-from lgvi_warp.methods.saveat import FIELDS, TimeGrid
+from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
+from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.result import Result
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.scene.ensemble import Ensemble

@@ -14,7 +14,7 @@ SOURCE_ROOTS = {"lgvi_warp": ROOT, "lgvi_kernels": ROOT / "kernels"}
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 # The lowest first; those of one floor side by side.
 ROOMS = (
-    ("common",), ("physics", "methods"), ("sampling",), ("statistics",), ("scene",), ("engine",), ("runs",), ("studies",),
+    ("common",), ("physics",), ("methods",), ("sampling",), ("statistics",), ("scene",), ("engine",), ("runs",), ("studies",),
     ("views",), ("cli",),
 )  # fmt: skip
 

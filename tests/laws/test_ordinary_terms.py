@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from benchmarks import scenes
+from benchmarks import problems
 from benchmarks.cases.ordinary_terms.kernel import command
 from tests.support.tools import difference, last
 
@@ -12,7 +12,7 @@ from tests.support.tools import difference, last
 @pytest.mark.slow
 @pytest.mark.parametrize(("steps", "bound"), [(1, 1e-12), (100, 1e-9)])
 def test_ordinary_kernel(steps, bound):
-    scene, h = scenes.all_terms(noise=False), 0.01
+    scene, h = problems.all_terms(noise=False), 0.01
     start = lw.Ensemble(scene).select(0, 1)
     states = [np.repeat(x, 3, 0) for x in (start.position, start.attitude, start.velocity, start.angular_velocity)]
     arrays, run = command(scene, states, h, steps)

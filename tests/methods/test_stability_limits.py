@@ -11,7 +11,7 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.limits_table import EXPLICIT_DRAG, LARGE, MASS, METHODS, MOTIONS, SMALL, measured, munk_run
+from benchmarks.tables.limits import EXPLICIT_DRAG, LARGE, MASS, METHODS, MOTIONS, SMALL, measured, munk_run
 from lgvi_warp.studies.stability.limits import LIMITS
 
 # method -> (limit, whether stable windows above the first loss count).

@@ -1,13 +1,13 @@
 """The limits that warnings compare with are those that runs show: of the Munk moment, and of a restoring moment.
 
-Reference: the fastest oscillation of 0.3 rad that stays bounded over 1,000 steps (benchmarks/warning_limits.py), against the
-tables of lgvi_warp.methods.limits; and for the Munk moment with M = (1, 100, 100) the figures known beforehand. The amplitude
-at the limit grows without bound in w, so that the criterion of 1 rad moves it by a few per cent: within 5 %.
+Reference: the fastest oscillation of 0.3 rad that stays bounded over 1,000 steps (`benchmarks.tables.warning_limits`), against
+the tables of lgvi_warp.methods.limits; and for the Munk moment with M = (1, 100, 100) the figures known beforehand. The
+amplitude at the limit grows without bound in w, so that the criterion of 1 rad moves it by a few per cent: within 5 %.
 """
 
 import pytest
 
-from benchmarks.warning_limits import limit, munk, names, restoring
+from benchmarks.tables.warning_limits import limit, munk, names, restoring
 from lgvi_warp.methods import limits
 
 KNOWN = {"phi": 1.41, "psi": 1.50, "psi_s": 2.13, "psi_1": 2.00, "cg3": 1.69, "rkmk4": 2.43}

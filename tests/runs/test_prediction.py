@@ -67,7 +67,7 @@ def test_costs_are_those_of_a_machine_that_keeps_its_word(monkeypatch, members, 
 
 @pytest.mark.slow
 def test_a_run_takes_about_what_was_said():
-    """Within a factor of 4 either way on a busy machine; benchmarks/large_table.py prints the ratio."""
+    """Within a factor of 4 either way on a busy machine; benchmarks/tables/large.py prints the ratio."""
     settings = {**SETTINGS, "t1": 40.0}
     prediction.TRIAL_SECONDS = 0.3
     lw.solve(fleet(20000), **{**settings, "t1": 1.0})

@@ -14,7 +14,7 @@ from lgvi_warp import cli
 from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.engine.keepers import observation
 from lgvi_warp.engine.keepers.statistics import Gathered
-from lgvi_warp.methods.saveat import FIELDS
+from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene import scene as scenes
 from lgvi_warp.scene.scene import from_dict
@@ -436,6 +436,26 @@ def test_a_run_stops_when_it_knows_enough_of_paths():
     assert r.members < 20_000 and r.statistics["mean path_time depth above 10"].half_width[0, 0] <= 0.02
 
 
+def test_an_expression_over_the_path_is_what_the_statistic_of_paths_is():
+    ask = {"h": 0.1, "t1": 1.0, "save": lw.SaveAt(every=0.2), "keep": "none"}
+    pairs = {
+        "max(depth)": lw.PathMaximum, "min(velocity)": lw.PathMinimum, "range(norm(velocity))": lw.PathRange,
+        "mean(position[2])": lw.PathMean,
+    }  # fmt: skip
+    asked = [lw.Mean(text) for text in pairs] + [lw.Quantiles("max(depth)", (0.05, 0.95))]
+    of_paths = [kind(text[text.index("(") + 1 : -1]) for text, kind in pairs.items()]
+    of_paths += [lw.PathMaximum("depth", lw.Quantiles(levels=(0.05, 0.95)))]
+    until = lw.Until("quantiles max(depth) 0.95", 0.15)
+    r = lw.solve(falling(5000), **ask, statistics=[*asked, *of_paths], until=until)
+    found = list(r.statistics.values())
+    assert [estimate.name for estimate in found[:5]] == [*(f"mean {text}" for text in pairs), "quantiles max(depth)"]
+    for estimate, of_path in zip(found[:5], found[5:], strict=True):
+        assert estimate.arrays.keys() == of_path.arrays.keys() and estimate.unit == of_path.unit
+        assert all(estimate[name].tobytes() == of_path[name].tobytes() for name in estimate.arrays)
+        assert estimate.time.tolist() == [1.0]
+    assert 1024 <= r.members < 5000 and found[4].half_width[0, 1, 0] <= 0.15 and "reached with" in r.messages[-1]
+
+
 def test_a_run_says_when_it_does_not_know_enough():
     r = lw.solve(falling(2000), h=0.1, t1=1.0, keep="none", until=lw.Until("mean depth", 1e-9))
     assert r.members == 2000 and any("not reached with 2000" in message for message in r.messages)
@@ -623,6 +643,9 @@ type = "path_maximum"
 of = "speed"
 then = [{ type = "mean" }, { type = "exceedance", above = 1.0 }]
 [[run.statistics]]
+type = "quantiles"
+of = "max(norm(velocity))"
+[[run.statistics]]
 type = "path_time"
 of = "depth"
 above = 10
@@ -642,7 +665,7 @@ def path(tmp_path):
 
 def test_scene_files(path):
     scene = lw.Scene.load(path)
-    assert [one.type for one in scene.run.statistics] == ["mean", "quantiles", "path_maximum", "path_time"]
+    assert [one.type for one in scene.run.statistics] == ["mean", "quantiles", "path_maximum", "quantiles", "path_time"]
     assert scene.run.keep == "none" and scene.run.until == lw.Until("mean position[2]", 1.0)
     content = scene.to_dict()
     assert from_dict(content).to_dict() == content

@@ -6,7 +6,7 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
 from lgvi_warp.methods.method import PROGRAMS
-from lgvi_warp.methods.saveat import FIELDS
+from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.reference import advance as twin
 from lgvi_warp.reference import rotation
 from tests.support.tools import METHODS, PAIRS, body_of, one, random_states, scene_of, to_state

@@ -13,6 +13,7 @@ import pytest
 import zarr
 
 import lgvi_warp as lw
+from benchmarks.problems import DepthSum
 from lgvi_warp import cli
 from lgvi_warp.common import files as durable
 from lgvi_warp.common import machine, safe_files
@@ -28,7 +29,6 @@ from lgvi_warp.runs.store.sink import packed, unpacked
 from lgvi_warp.runs.store.state import state
 from tests.conftest import ROOT
 from tests.support.stores import MEMBERS, SETTINGS, differing, fleet, markers, tree
-from tests.support.toy_keeper import DepthSum
 
 FIELDS = ("position", "attitude", "velocity", "angular_velocity")
 

@@ -9,6 +9,9 @@ import warp as wp
 
 import lgvi_warp as lw
 import lgvi_warp.physics.notation
+from benchmarks.problems import difference as difference
+from benchmarks.problems import random_states as random_states
+from benchmarks.problems import slope as slope
 from lgvi_warp.reference.submaps import Body, State
 from lgvi_warp.reference.terms.restoring import Restoring
 from lgvi_warp.reference.terms.weight import Weight
@@ -65,13 +68,6 @@ def one(scene, b=(0.0, 0.0, 0.0), R=None, nu=(0.0, 0.0, 0.0), Om=(0.0, 0.0, 0.0)
 SHAPES = ((3,), (3, 3), (3,), (3,))
 
 
-def random_states(seed, n, speed=1.0, spin=1.0):
-    """b, R, nu, Om of n random states."""
-    rng = np.random.default_rng(seed)
-    R = lw.notation.matrix_from_rotation_vector(rng.normal(size=(n, 3)))
-    return rng.normal(size=(n, 3)), R, speed * rng.normal(size=(n, 3)), spin * rng.normal(size=(n, 3))
-
-
 def last(result, member=0):
     """b, R, nu, Om of the last sample of a member."""
     fields = (result.position, result.attitude, result.velocity, result.angular_velocity)
@@ -91,16 +87,6 @@ def from_state(body, x):
 def expected(entry):
     """b, R, nu, Om of an entry of paper_example.json."""
     return tuple(np.array(entry[key]) for key in ("b", "R", "nu", "Omega"))
-
-
-def difference(x, y):
-    """Largest difference of two states (b, R, nu, Om), each relative to the size of its quantity, at least 1."""
-    return max(np.abs(u - v).max() / max(1.0, np.abs(v).max()) for u, v in zip(x, y, strict=True))
-
-
-def slope(h, error):
-    """Fitted order of convergence."""
-    return np.polyfit(np.log(h), np.log(error), 1)[0]
 
 
 def generated(plan, folder):

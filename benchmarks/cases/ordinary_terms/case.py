@@ -1,6 +1,6 @@
 """The packet kernel against the ordinary one with all terms at once, one core; the ordinary module is compiled first."""
 
-from benchmarks import scenes
+from benchmarks import problems
 from benchmarks.cases.ordinary_terms.kernel import command
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.sampling.distributions.basic import Normal
@@ -12,7 +12,7 @@ STEP = 0.01
 
 def run(quick):
     members, steps = (512, 20) if quick else (4096, 100)
-    fleet = Ensemble(scenes.all_terms(), members, 1, {"start.angular_velocity": Normal(relative=0.1)})
+    fleet = Ensemble(problems.all_terms(), members, 1, {"start.angular_velocity": Normal(relative=0.1)})
     start = fleet.select(0, members)
     states = (start.position, start.attitude, start.velocity, start.angular_velocity)
     for dtype in ("float64", "float32"):

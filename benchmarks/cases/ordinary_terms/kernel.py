@@ -2,7 +2,7 @@
 
 wp.mat33 and wp.vec3 throughout, tables as wp.arrays, Warp's own elementary functions and random numbers, equation (24) by
 the paper's Newton iteration on the exponential map to a tolerance, 6x6 systems by elimination of 3x3 blocks, Warp's default
-module options. It makes psi_s with the laws of benchmarks/scenes.all_terms() for a vehicle with M and J uncoupled.
+module options. It makes psi_s with the laws of benchmarks.problems.all_terms() for a vehicle with M and J uncoupled.
 """
 
 import functools

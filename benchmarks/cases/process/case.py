@@ -1,5 +1,7 @@
-"""The whole process `lgvi-warp run examples/paper.toml`, plots and recording included, beside a bare process that
-imports warp, matplotlib and rerun, and the kernel's own time: both caches warm."""
+"""The whole process `lgvi-warp run examples/paper.toml` beside a bare process, and the kernel's own time.
+
+Plots and recording are included; the bare process imports warp, matplotlib and rerun. Both caches are warm.
+"""
 
 import subprocess
 import sys

@@ -5,29 +5,16 @@ sample times, and without any. The least time of rounds in turn; core_s is that 
 on the machine disturbs less. Memory is that of a process of its own.
 """
 
-import json
-import subprocess
-import sys
 import time
-from pathlib import Path
 from statistics import median
 
 import lgvi_warp as lw
+from benchmarks import own_process
 from lgvi_warp.common import machine
 from lgvi_warp.engine.keepers.observation import Observation
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.studies import speed
-
-ROOT = Path(__file__).resolve().parents[3]
-MEMORY = """
-import json, sys
-sys.path[:0] = [{root!r}, {root!r} + "/kernels"]
-from benchmarks.cases.statistics import case
-from benchmarks.scenes import peak_memory
-seconds, _ = case.runs({members}, {steps})["statistics"]()
-print(json.dumps({{"run_s": seconds, "peak_MiB": peak_memory() / 2**20}}))
-"""
 
 
 def statistics():
@@ -88,8 +75,10 @@ def run(quick):
             "core_s_to_no_samples": round(cores / least["no samples"][1], 3),
         }
     for n in (members // 10, members):
-        code = MEMORY.format(root=str(ROOT), members=n, steps=steps)
-        done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-        yield {"members": n, "steps": steps, "run": "statistics, own process"} | {
-            name: round(value, 2) for name, value in json.loads(done.stdout.splitlines()[-1]).items()
-        }
+        yield {"members": n, "steps": steps, "run": "statistics, own process"} | own_process.call(alone, n, steps)
+
+
+def alone(members, steps):
+    """Seconds of a run with all statistics, and the peak memory of this process."""
+    seconds, _ = runs(members, steps)["statistics"]()
+    return {"run_s": round(seconds, 2), "peak_MiB": round(own_process.peak_memory() / 2**20, 2)}

@@ -1,6 +1,6 @@
-"""Bytes per second into a store, beside the same bytes in plain files of the same sizes, each synced; a whole run into a
-store beside the same in memory; and statistics alone with a store beside without.
+"""Bytes per second into a store, a whole run into a store, and statistics alone with a store.
 
+Beside them: the same bytes in plain files of the same sizes, each synced; the same run in memory; no store.
 Both of a pair run in turn, in an order that changes; ratios are the median of the pairs', seconds and MB/s the best of each.
 The store writes with as many threads as a run has, one a core, until every block is durable; plain files with two a
 core, as each of them waits for the disk.
@@ -16,6 +16,7 @@ from statistics import median
 import numpy as np
 
 from benchmarks.cases.statistics.case import statistics
+from benchmarks.problems import DepthSum
 from lgvi_warp.common import machine
 from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.executors.threads import Threads
@@ -33,7 +34,6 @@ from lgvi_warp.runs.store.run import Stored
 from lgvi_warp.runs.store.settings import Store
 from lgvi_warp.runs.store.sink import Sink
 from lgvi_warp.studies import speed
-from tests.support.toy_keeper import DepthSum
 
 
 def in_turn(calls, rounds):

@@ -4,7 +4,7 @@ All scenes of one precision take turns in one run. `more_than_none` is what a te
 restoring moment alone; `over_none` is the ratio to it.
 """
 
-from benchmarks import scenes
+from benchmarks import problems
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.sampling.distributions.basic import Normal
 from lgvi_warp.scene.ensemble import Ensemble
@@ -16,8 +16,8 @@ SPREAD = {"start.angular_velocity": Normal(relative=0.1)}
 
 def entries():
     """(name, method, scene) of all that is measured, "none" first."""
-    alone = scenes.each_term() | {"all terms": scenes.all_terms()}
-    vehicles = {"none": alone["none"]} | scenes.coupled()
+    alone = problems.each_term() | {"all terms": problems.all_terms()}
+    vehicles = {"none": alone["none"]} | problems.coupled()
     found = [(name, "psi_s", scene) for name, scene in alone.items()]
     return found + [(name, method, scene) for name, scene in vehicles.items() for method in ("psi_x", "psi_x8")]
 

@@ -1,4 +1,4 @@
-"""The laws a scene may name, one file each: the struct that it reads, `params(width, real)`, and one or more of
+"""The laws a scene may name, one file each: the struct that it reads, `params(width, real)`, and one or more functions.
 
 law(w, view, p): a force and torque from position, attitude and time, POTENTIAL if they follow from a potential,
 SEPARABLE if that is a sum of one of position, at most quadratic, and one of attitude;

@@ -12,9 +12,9 @@ NOISE = True
 
 @functools.cache
 def params(width, real):
-    """Params: for each of the user's axes, the noise's force [N s^1/2], that force's torque about the origin of the forces
-    and the noise's torque [N m s^1/2], in the kernel's axes.
+    """Params: for each of the user's axes, the noise's force and torques, in the kernel's axes.
 
+    forceX, momentX, torqueX: the force [N s^1/2], its torque about the origin of the forces, the torque [N m s^1/2];
     member, seed0, seed1, channel: what the noise is keyed by, besides the step; the torques have channel + 1.
     """
     Lane3 = lane3(width, real)

@@ -64,7 +64,6 @@ def make_rates(Rates, Wrench, everything, velocities, kind, mass, coupled, drift
     scaled: momenta are divided by max J; drag: the function that adds drag along the axes, where it is not among
     `everything`, or None.
     """
-
     isotropic, munk = mass == "isotropic", make_munk(mass == "diagonal")
     group, inertial = kind not in ("vector", "inertial"), kind == "inertial"
 

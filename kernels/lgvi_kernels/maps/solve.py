@@ -59,8 +59,9 @@ NOT_CONVERGED = 2
 
 @functools.cache
 def make_solve(real, solver, iterations, adaptive, checked):
-    """The functions (F, alarm, a, J, tolerance) -> (F, alarm) that solves equation (24) in every lane, and the same with
-    the square of the measure of the step's size that is to stay below 1, given after J.
+    """Two functions (F, alarm, a, J, tolerance) -> (F, alarm) that solve equation (24) in every lane.
+
+    The second takes, after J, the square of the measure of the step's size, which is to stay below 1.
 
     `iterations` Newton steps are made in all lanes. `adaptive` goes on, in the lanes that need it, until the residual is
     below the tolerance: a lane's bits depend on that lane alone. `checked` raises the alarm of a lane whose equation has

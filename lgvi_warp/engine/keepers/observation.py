@@ -11,7 +11,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.status import failed, stopped
 from lgvi_warp.engine.keepers.statistics import Gathered
-from lgvi_warp.methods.saveat import FIELDS
+from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.events import Event
 from lgvi_warp.scene.settings import check_keep
 from lgvi_warp.statistics.base import Statistic, from_list

@@ -10,6 +10,7 @@ import numpy as np
 from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.estimate import Estimate, Estimates
+from lgvi_warp.statistics.path import followed
 from lgvi_warp.statistics.samples import Fields
 from lgvi_warp.statistics.tree import Part, Tree
 from lgvi_warp.statistics.values import Values, dealt
@@ -30,15 +31,20 @@ class Gathered:
         members: number of members of the run.
         statistics: the statistics to gather.
         replicates: R, number of independent replicates (default 1).
+
+    Attributes:
+        statistics: those that blocks gather: of paths, where one looks over them.
+        time: (k,) [s], sample times.
     """
 
     # Name of its results in a store.
     name = "statistics"
 
     def __init__(self, time: np.ndarray, members: int, statistics: Sequence[Statistic], replicates: int = 1):
-        self._statistics, self.time, self._replicates = tuple(statistics), time, replicates
+        self._asked, self.time, self._replicates = tuple(statistics), time, replicates
+        self.statistics = tuple(map(followed, statistics))
         self._size = blocks(members)[0].count
-        self._trees = [Tree(statistic.join) for statistic in self._statistics]
+        self._trees = [Tree(statistic.join) for statistic in self.statistics]
 
     def open(self, plan: Plan, block: Block, members: Members) -> _BlockStatistics:
         """The keeper of a block's statistics.
@@ -52,7 +58,7 @@ class Gathered:
             A keeper that closes with one part for each statistic.
         """
         place = (block.first, block.first // self._size, self._size)
-        return _BlockStatistics(self._statistics, plan, members, place, self.time, self._replicates)
+        return _BlockStatistics(self.statistics, plan, members, place, self.time, self._replicates)
 
     def merge(self, block: Block, part: list[Part]) -> None:
         """Add a block's parts to the trees.
@@ -76,8 +82,8 @@ class Gathered:
             The estimates, in the order of the statistics.
         """
         estimates: list[Estimate] = []
-        for statistic, tree in zip(self._statistics, self._trees, strict=True):
-            if chosen is None or statistic is chosen:
+        for asked, statistic, tree in zip(self._asked, self.statistics, self._trees, strict=True):
+            if chosen is None or asked is chosen:
                 with np.errstate(invalid="ignore", over="ignore"):
                     estimates += self.said(statistic, tree.parts())
         return estimates
@@ -108,7 +114,7 @@ class Gathered:
     @property
     def apart(self) -> set[str]:
         """Names of estimates that leave members out on purpose: those of how members end."""
-        return {part.key for statistic in self._statistics if statistic.at_end for part in statistic.parts()}
+        return {part.key for statistic in self.statistics if statistic.at_end for part in statistic.parts()}
 
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs to gather blocks, without what was gathered here."""

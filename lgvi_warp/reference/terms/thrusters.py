@@ -12,9 +12,12 @@ from lgvi_warp.reference.terms.wrench import at_time
 
 @dataclass(frozen=True)
 class Thrusters(Law):
-    """position, direction (n, 3) [m, 1]; forward, backward (n,) [N per command squared]; dead_band, limit (n,);
+    """Thrusters that follow a command.
+
+    position, direction (n, 3) [m, 1]; forward, backward (n,) [N per command squared]; dead_band, limit (n,);
     time_constant (n,) [s], 0 for none; times (k,) [s] and command (k, n); polynomial, polynomial_astern (p,): of the
-    command beyond the dead band, from the first power up, w^2 by default."""
+    command beyond the dead band, from the first power up, w^2 by default.
+    """
 
     position: Array
     direction: Array

@@ -15,7 +15,7 @@ import numpy as np
 from lgvi_warp.common import files as durable
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.engine.block import Block
-from lgvi_warp.methods.saveat import FIELDS
+from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.store.folder import KEPT, Folder
 from lgvi_warp.runs.store.layout import KEPT_MEMBER, MEMBER
 from lgvi_warp.runs.store.open import folder_of, open_run

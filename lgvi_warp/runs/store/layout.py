@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from lgvi_warp.common import machine
-from lgvi_warp.engine.block import SHAPES, Block, blocks
+from lgvi_warp.engine.block import Block, blocks
+from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.runs import member_fields
-from lgvi_warp.runs.result import MEANINGS, UNITS
 
 if TYPE_CHECKING:
     from lgvi_warp.engine.plan import Plan
@@ -150,12 +150,13 @@ def _samples(plan: Plan, length: int, store: Chunking) -> list[Column]:
     arrays = []
     for name in (name for name in plan.fields if store.fields is None or name in store.fields):
         computed = np.dtype("f8") if plan.spec.compensated and name == "position" else real
+        field = TABLE[name]
         stored = np.dtype(store.dtype) if store.dtype else computed
-        row = length * int(np.prod(SHAPES[name])) * stored.itemsize
+        row = length * int(np.prod(field.shape)) * stored.itemsize
         # Chunks of equal length along the times, so that the last one is nearly full as well.
         pieces = -(-k // max(1, store.chunk_bytes // row))
-        attributes = {"units": UNITS[name], "long_name": MEANINGS[name]}
-        arrays.append(Column(name, SHAPES[name], stored.newbyteorder("<").str, length, -(-k // pieces), attributes))
+        kind = stored.newbyteorder("<").str
+        arrays.append(Column(name, field.shape, kind, length, -(-k // pieces), field.attributes))
     return arrays
 
 

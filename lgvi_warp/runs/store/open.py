@@ -15,9 +15,10 @@ from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.status import Status
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.keepers.observation import Observation, Observing, observation_of, replicates_of
+from lgvi_warp.physics.fields import IN_FILES
 from lgvi_warp.physics.terms import from_list
 from lgvi_warp.physics.terms.base import Term
-from lgvi_warp.runs.result import END_TIME, UNITS, Result
+from lgvi_warp.runs.result import END_TIME, Result
 from lgvi_warp.runs.store.folder import KEPT, ROOT, Folder
 from lgvi_warp.runs.store.kept import keep_of, members_kept
 from lgvi_warp.runs.store.layout import KEPT_MEMBER, MEMBER
@@ -242,7 +243,7 @@ def result_of(
     n, planned = folder.members, int(folder.recipe["members"])
     at = _places(members, n)
     arrays = {name: array for name, array in group.arrays()}
-    fields = tuple(name for name in arrays if name in UNITS)
+    fields = tuple(name for name in arrays if name in IN_FILES)
     varied = tuple(name for name in arrays if "." in name)
     small = Arrays(group, tuple(name for name in arrays if name not in (*fields, *varied, "time", "step")), 0, at)
     with understood(folder.path / ROOT):

@@ -14,8 +14,8 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import TimeGrid
+from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.sampling.designs.table import Table, moved
-from lgvi_warp.sampling.members import STATES
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 
@@ -134,7 +134,7 @@ def ensemble_of(
             scene = {**scene, "ensemble": {**scene["ensemble"], "sampling": table}}
     bare_scene = Scene.from_dict(scene)
     if "explicit" in settings:
-        states = {name: explicit[f"start.{name}"] for name in STATES}
+        states = {name: explicit[f"start.{name}"] for name in FIELDS}
         parameters = {name: value for name, value in explicit.items() if not name.startswith("start.")}
         ensemble = Ensemble.from_states(bare_scene, **states, parameters=parameters)
         ensemble.seed = int(settings["seed"])

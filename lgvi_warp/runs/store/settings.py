@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lgvi_warp.common.errors import Faults, SceneError
-from lgvi_warp.methods.saveat import FIELDS
+from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.store.arrays import whole_array
 from lgvi_warp.runs.store.layout import MEMBER, parameter_units
 

@@ -10,7 +10,7 @@ from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.executors.base import Executor
 from lgvi_warp.engine.keepers.observation import Observation, Observing
 from lgvi_warp.engine.plan import Plan
-from lgvi_warp.methods.saveat import FIELDS
+from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.provenance import messages, provenance
 from lgvi_warp.runs.result import Result
 from lgvi_warp.runs.store.folder import Folder

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from lgvi_warp.common.machine import DTYPES
-from lgvi_warp.methods.saveat import FIELDS
+from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.store.layout_check import NotOursError, is_text
 from lgvi_warp.scene.settings import MOST_MEMBERS
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.status import Status, failed
-from lgvi_warp.methods.saveat import FIELDS, SaveAt
+from lgvi_warp.methods.saveat import SaveAt
+from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.quantities import OfInterest, OfResult, quantities
 from lgvi_warp.runs.solve import solve
 from lgvi_warp.scene.ensemble import Ensemble

@@ -11,8 +11,8 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.physics import notation, vehicle
+from lgvi_warp.physics.fields import FIELDS, TABLE
 from lgvi_warp.physics.terms.drag import Drag
-from lgvi_warp.sampling.members import STATES
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.stability import limits as stability_limits
@@ -20,8 +20,8 @@ from lgvi_warp.studies.stability import limits as stability_limits
 # Names of axes that are no parameters of the scene -> unit and label.
 SPECIAL = {
     "h": ("s", "step h"),
-    "angular_velocity": ("rad/s", "|angular velocity|"),
-    "speed": ("m/s", "speed"),
+    "angular_velocity": (TABLE["angular_velocity"].unit, "|angular velocity|"),
+    "speed": (TABLE["speed"].unit, "speed"),
     "added_mass_ratio": ("1", "largest added mass / mass"),
     "drag_number": ("1/s", "largest drag rate (l + 2 q |v|) / I"),
 }
@@ -327,7 +327,7 @@ class Grid:
     def _build(self, rng: np.random.Generator) -> None:
         """Compute the state, the step and the parameters of every member."""
         n, d = math.prod(self.shape), self.shape[2]
-        self.state = {name: np.repeat(getattr(self.base, name), n, axis=0) for name in STATES}
+        self.state = {name: np.repeat(getattr(self.base, name), n, axis=0) for name in FIELDS}
         self.varied: dict[str, np.ndarray] = {}
         self.direction: dict[str, np.ndarray] = {}
         for name in ("velocity", "angular_velocity"):
@@ -406,7 +406,7 @@ class Grid:
         Raises:
             SceneError: for unphysical values.
         """
-        b, R, nu, Om = (self.state[name][members] for name in STATES)
+        b, R, nu, Om = (self.state[name][members] for name in FIELDS)
         varied = {name: value[members] for name, value in self.varied.items()}
         return Ensemble.from_states(self.scene, b, R, nu, Om, varied)
 

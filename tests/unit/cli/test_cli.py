@@ -29,6 +29,7 @@ def finished(tmp_path_factory):
     return out, subprocess.run(arguments, capture_output=True, text=True, cwd=out.parent)
 
 
+@pytest.mark.kernel
 def test_run_writes_three_files_and_a_summary(finished):
     out, done = finished
     assert (done.returncode, done.stderr) == (0, "")
@@ -37,6 +38,7 @@ def test_run_writes_three_files_and_a_summary(finished):
         assert word in done.stdout
 
 
+@pytest.mark.kernel
 def test_the_result_is_that_of_solve(finished, scene):
     result = lw.Result.load(finished[0] / "result.npz")
     fleet = lw.Ensemble(scene, 20, 1, scene.ensemble_settings.vary)
@@ -45,6 +47,7 @@ def test_the_result_is_that_of_solve(finished, scene):
     assert result.provenance["ensemble"]["members"] == 20
 
 
+@pytest.mark.kernel
 def test_the_picture_is_not_empty(finished):
     from matplotlib.image import imread
 
@@ -53,6 +56,7 @@ def test_the_picture_is_not_empty(finished):
     assert all(third.std() > 0.05 for third in np.array_split(picture[..., :3], 3, axis=1))
 
 
+@pytest.mark.kernel
 def test_the_recording_holds_every_pose(finished):
     import rerun as rr  # noqa: F401  (the chunk module needs it)
     from rerun.chunk import RrdReader
@@ -68,11 +72,13 @@ def test_the_recording_holds_every_pose(finished):
     assert rows == 5
 
 
+@pytest.mark.kernel
 def test_quiet_says_nothing(tmp_path, capfd):
     assert cli.main(["run", PAPER, "--out", str(tmp_path), *SMALL, "--quiet"]) == 0
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.kernel
 def test_options_reach_the_run(tmp_path, capsys):
     options = [
         "--method",
@@ -123,6 +129,7 @@ def test_an_output_that_cannot_be_written_is_named(tmp_path, capsys):
     assert "file" in capsys.readouterr().err
 
 
+@pytest.mark.kernel
 def test_every_member_failing_is_an_exit_code_and_a_reason(tmp_path, capsys):
     fast = ["--set", "start.angular_velocity=[900.0, 0.0, 0.0]", "--step", "0.1"]
     assert cli.main(["run", PAPER, "--out", str(tmp_path), *SMALL, *fast]) == 1
@@ -131,6 +138,7 @@ def test_every_member_failing_is_an_exit_code_and_a_reason(tmp_path, capsys):
     assert "fleet.png was not written" in out.err and (tmp_path / "result.npz").exists()
 
 
+@pytest.mark.kernel
 def test_a_run_in_a_store(tmp_path, capsys):
     """run --store zarr, refused a second time, gone on with, described, exported."""
     out = tmp_path / "whole"
@@ -149,6 +157,7 @@ def test_a_run_in_a_store(tmp_path, capsys):
     assert cli.main(["export", str(out), "--to", "parquet"]) == 0 and (out / "run.parquet").exists()
 
 
+@pytest.mark.kernel
 def test_a_run_in_parts(tmp_path, capsys):
     """run --blocks into two folders, merge; what is in none of them is named and resumed."""
     run = ["run", PAPER, "--members", "600", *SMALL[2:], "--store", "zarr", "--quiet"]
@@ -243,6 +252,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_run(tmp_path, mon
         assert capsys.readouterr().err == text
 
 
+@pytest.mark.kernel
 def test_a_recording_that_cannot_be_begun_is_told(finished, tmp_path):
     result = lw.Result.load(finished[0] / "result.npz")
     with pytest.raises(OSError, match=r"could not be written .*; is the disk full, or the folder read-only"):
@@ -279,12 +289,14 @@ def test_exit_codes_are_told(capsys):
     assert "exit codes: 0 done; 1 members, files or the disk failed" in capsys.readouterr().out
 
 
+@pytest.mark.kernel
 def test_info(capsys):
     assert cli.main(["info"]) == 0
     out = capsys.readouterr().out
     assert all(word in out for word in ("cpu", "threads", "warp-lang 1.19", "vehicles per packet", "GFMA/s"))
 
 
+@pytest.mark.kernel
 def test_bench(capsys):
     assert cli.main(["bench", "--members", "64", "--steps", "10"]) == 0
     records = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
@@ -292,6 +304,7 @@ def test_bench(capsys):
     assert all(r["ns_per_vehicle_step"] > 0 and r["part_of_peak"] > 0 for r in records)
 
 
+@pytest.mark.kernel
 def test_warnings_are_counted_and_explained(tmp_path, capsys):
     # At h = 0.5 and 3 m/s both oscillations of the paper's vehicle are coarse; nothing fails.
     options = ["--checks", "all", "--step", "0.5", "--set", "start.velocity_inertial=[0.1,0.2,3.0]"]
@@ -303,6 +316,7 @@ def test_warnings_are_counted_and_explained(tmp_path, capsys):
     assert f"(first: member 0 at 0 s, h sqrt(B|r|/J) = {result.warning_value[0]:.4g})" in said
 
 
+@pytest.mark.kernel
 def test_raise_exits_with_1_and_writes_the_files(tmp_path, capsys):
     options = ["--on-failure", "raise", "--set", "start.angular_velocity=[0,0,500]"]
     assert cli.main(["run", PAPER, "--out", str(tmp_path), *SMALL, *options]) == 1
@@ -311,12 +325,14 @@ def test_raise_exits_with_1_and_writes_the_files(tmp_path, capsys):
     assert lw.Result.load(tmp_path / "result.npz").status.counts() == {"step_too_large": 20}
 
 
+@pytest.mark.kernel
 def test_substep_is_told_of(tmp_path, capsys):
     options = ["--on-failure", "substep", "--set", "start.angular_velocity=[0,0,250]"]
     assert cli.main(["run", PAPER, "--out", str(tmp_path), *SMALL, *options]) == 0
     assert "substeps    4,000 steps of 20 members" in capsys.readouterr().out
 
 
+@pytest.mark.kernel
 def test_a_step_is_chosen_by_options(tmp_path, capsys):
     options = ["--method", "rk8", "--rtol", "1e-9", "--atol", "1e-9", "--step", "0.5"]
     assert cli.main(["run", PAPER, "--out", str(tmp_path), *SMALL, *options]) == 0

@@ -117,6 +117,7 @@ def test_info_tells_what_a_container_leaves(monkeypatch, capsys):
         assert all(word in told for word in words)
 
 
+@pytest.mark.kernel
 def test_plan_counts_by_what_a_container_leaves(monkeypatch, capsys):
     from tests.conftest import ROOT
 

@@ -141,6 +141,7 @@ def drawn(width, name, member, step, channel, seed0, seed1):
     return out.numpy().reshape(7, -1).T
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize(("width", "name"), [(1, "float64"), (8, "float64"), (1, "float32"), (16, "float32")])
 @pytest.mark.parametrize(
     ("step", "channel", "seed0", "seed1"), [(0, 0, 0, 0), (2**31 - 1, 3, -1, 12345), (77, -5, 99, -(2**31))]
@@ -153,6 +154,7 @@ def test_kernel_and_twin(width, name, step, channel, seed0, seed1):
     np.testing.assert_array_equal(got[:, 4:], got[:, :3])
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_width_gives_the_same_bits(name):
     member = np.arange(1024) * 7919
@@ -161,6 +163,7 @@ def test_every_width_gives_the_same_bits(name):
         np.testing.assert_array_equal(other, first)
 
 
+@pytest.mark.kernel
 def test_small_radii_in_float32():
     """Uniform numbers next to 1 give radii next to 0: they are drawn from the word, so float32 does not lose them."""
     member = np.arange(1 << 21)

@@ -15,6 +15,8 @@ from lgvi_kernels.lanes import functions as lm
 from lgvi_kernels.lanes.arithmetic import REALS, WIDTHS, lane
 from lgvi_kernels.lanes.flags import CPU_FLAGS
 
+pytestmark = pytest.mark.kernel
+
 NAMES = ("root", "exponential", "sine", "cosine", "logarithm", "decay", "greatest", "clamp")
 FORMATS = {"float64": (wp.float64, np.float64), "float32": (wp.float32, np.float32)}
 THOROUGH = [(1, "float64"), (8, "float64"), (1, "float32"), (16, "float32")]

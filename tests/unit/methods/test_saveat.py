@@ -44,11 +44,13 @@ def test_decimals_are_taken_as_meant():
     assert time_grid(1e6, 1e8, lw.SaveAt()).steps == 100
 
 
+@pytest.mark.kernel
 def test_a_spacing_of_the_scene_longer_than_the_run_is_dropped_with_a_message(scene):
     result = lw.solve(lw.Ensemble(scene), h=0.01, t1=0.1)
     assert list(result.time) == [0.0, 0.1] and "save_every" in result.messages[0]
 
 
+@pytest.mark.kernel
 def test_the_message_reaches_the_result(scene):
     result = lw.solve(lw.Ensemble(scene), h=0.03, t1=0.1)
     assert "shortened" in result.messages[0] and result.provenance["step"] == pytest.approx(0.025)

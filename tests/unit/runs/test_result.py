@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.methods.saveat import FIELDS
 from lgvi_warp.physics import energy as invariants
+from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.reference import energy
 from tests.support.tools import TURN, body_of, one, random_states, scene_of, to_state
+
+pytestmark = pytest.mark.kernel
 
 
 @pytest.fixture(scope="module")

@@ -473,18 +473,21 @@ def test_a_law_without_a_struct_whose_numbers_make_none():
     assert all(word in fault for word in ("pull.device", "has no params(width, real)", "add_a_law.md")), fault
 
 
+@pytest.mark.kernel
 def test_a_law_that_returns_nothing():
     term = type("Bad", (Packs,), {"device": device(law=pull_silent), "__annotations__": {}})(k=1.0)
     (fault,) = refused(lw.check_law, term)
     assert "pull.device" in fault and "does not compile" in fault and "return what the role adds to" in fault
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize("given", [None, {"k": np.ones(1)}], ids=["nothing", "a dict"])
 def test_packed_that_returns_something_else(given):
     report = lw.check_law(type("Bad", (Packs,), {"what": given, "__annotations__": {}})(k=1.0))
     assert not report.ok and "packed() returns" in str(report) and "lw.Packed({name: numbers})" in str(report)
 
 
+@pytest.mark.kernel
 def test_packed_left_out():
     # Numbers and vectors are packed as they are declared; a number of another shape is not.
     assert lw.check_law(Pull(k=1.0)).ok
@@ -494,6 +497,7 @@ def test_packed_left_out():
     )
 
 
+@pytest.mark.kernel
 def test_numbers_of_the_wrong_shape():
     wrong = type("Bad", (Packs,), {"what": lw.Packed({"k": np.ones((1, 3))}), "__annotations__": {}})
     report = lw.check_law(wrong(k=1.0))
@@ -523,6 +527,7 @@ def test_a_quadratic_matrix_of_members_that_creates_energy():
     lw.Ensemble(scene, 2000, 0, {"drag_matrix.quadratic": lw.Uniform(relative=0.3)})
 
 
+@pytest.mark.kernel
 def test_a_broken_law_in_solve():
     broken = device(law=pull_silent)
     Broken = type("Broken", (Pull,), {"device": broken})
@@ -551,6 +556,7 @@ def law(w: Any, view: Any, p: Any):
 """
 
 
+@pytest.mark.kernel
 def test_a_law_defined_twice_as_in_a_notebook(tmp_path):
     results = []
     for i in range(2):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from benchmarks import scenes as benchmarks
+from benchmarks import problems
 from lgvi_warp.cli import main
 from lgvi_warp.scene import ensemble as ensembles
 from lgvi_warp.scene import plausibility
@@ -242,6 +242,7 @@ def test_of_very_many_samples_the_last_are_looked_at(monkeypatch):
     assert len(plausibility.on_the_way(scene(), samples(velocity=v[:2])).messages(1)) == 1
 
 
+@pytest.mark.kernel
 def test_a_result_says_what_is_odd():
     fleet = lw.Ensemble(
         lw.Scene(lw.Vehicle(10.0, [1.0, 2.0, 2.5], buoyancy=200.0), start=lw.Start([0.0, 0.0, 1.0])),
@@ -267,7 +268,7 @@ def test_no_example_is_odd(path):
 
 
 def test_no_scene_of_the_benchmarks_is_odd():
-    for name, one in {**benchmarks.each_term(), **benchmarks.coupled(), "all": benchmarks.all_terms()}.items():
+    for name, one in {**problems.each_term(), **problems.coupled(), "all": problems.all_terms()}.items():
         assert said(one) == (), name
 
 

@@ -615,7 +615,7 @@ def test_coverage_of_rotations_by_replicates():
 
 @pytest.mark.slow
 def test_coverage_of_sobol_sequences():
-    from benchmarks.coverage_table import replicated
+    from benchmarks.tables.coverage import replicated
 
     for name, held, narrower in replicated(REPETITIONS, {"sobol": {"replicates": 16}}):
         # A mean of lognormal numbers has skewed estimates.
@@ -869,7 +869,7 @@ def test_all_faults_at_once():
 
 @pytest.mark.slow
 def test_coverage_of_runs_that_stop_by_themselves():
-    from benchmarks.coverage_table import stops
+    from benchmarks.tables.coverage import stops
 
     for law, least, _, held, _ in stops(REPETITIONS):
         # Stopping costs some coverage where looks begin early and the distribution is skewed (docs/statistics.md).

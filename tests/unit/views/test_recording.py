@@ -6,6 +6,8 @@ import rerun as rr
 import lgvi_warp as lw
 from tests.support.tools import one, scene_of
 
+pytestmark = pytest.mark.kernel
+
 
 @pytest.fixture
 def result():

@@ -1,27 +1,18 @@
-"""Measure the largest stable step of every method, on motions of one rate; write the table of docs/where_it_breaks.md.
-
-python benchmarks/limits_table.py            # JSON lines, then the table, which also goes into the page
+"""Measure the largest stable step of every method, on motions of one rate: JSON lines, then the table.
 
 A run has one step, so the rate varies: by the speed (Munk oscillation), the arm of buoyancy (restoring oscillation), the drag
 coefficient and the spin, over the members of one run. Where a limit lies between two members, a second run looks there.
 """
 
 import functools
-import json
 import math
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np
 
 import lgvi_warp as lw
+from benchmarks.pages import markdown, show
 from lgvi_warp.physics import notation
 from lgvi_warp.studies.stability.limits import LIMITS
-
-TARGET = Path(__file__).resolve().parent.parent / "docs" / "where_it_breaks.md"
-BEGIN, END = "<!-- limits: begin -->", "<!-- limits: end -->"
 
 METHODS = (
     "phi", "psi", "psi_s", "psi_1", "psi_x", "psi_x8", "psi_w", "tj4(psi_s)", "su4(psi_s)", "kl6(psi_s)", "kl8(psi_s)",
@@ -173,22 +164,18 @@ def table(records):
         rows.append([f"`{r['method']}`", *cells, shown(r["munk_theory"]),
                      shown(r["drag_first"]) if explicit else "", shown(r["drag_theory"]) if explicit else "",
                      shown(r["rotation_first"]), shown(r["rotation_theory"])])  # fmt: skip
-    return "\n".join("| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows))
+    return markdown(head, rows)
 
 
-def main():
-    """Measure, print, and write the table into the page."""
+def add_options(parser):
+    parser.add_argument("methods", nargs="*", metavar="METHOD", help="only these, printed and not written")
+
+
+def main(methods):
     records = []
-    for method in sys.argv[1:] or METHODS:
+    for method in methods or METHODS:
         records.append(record(method))
-        print(json.dumps({k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in records[-1].items()}),
-              flush=True)  # fmt: skip
-    text = table(records)
-    print(text)
-    if TARGET.exists() and not sys.argv[1:] and BEGIN in (page := TARGET.read_text()):
-        before, rest = page.split(BEGIN)
-        TARGET.write_text(f"{before}{BEGIN}\n{text}\n{END}{rest.split(END)[1]}")
-
-
-if __name__ == "__main__":
-    main()
+        show({k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in records[-1].items()})
+    if not methods:
+        return table(records)
+    print(table(records))

@@ -1,31 +1,18 @@
-"""Measure what each term costs and write the table of docs/terms/COST.md.
-
-python benchmarks/term_table.py
-"""
-
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+"""Measure what each term costs, alone and all together."""
 
 from benchmarks.cases.terms import case
-from lgvi_warp.common import machine, warp_setup
+from benchmarks.pages import markdown, stamp
+from lgvi_warp.common import machine
 
-TARGET = Path(__file__).resolve().parent.parent / "docs" / "terms" / "COST.md"
-
-TEXT = """# What each term costs
-
-Nanoseconds per vehicle and step on one core: psi_s with the term alone, and what that is more than with weight,
+TEXT = """Nanoseconds per vehicle and step on one core: psi_s with the term alone, and what that is more than with weight,
 buoyancy and restoring moment alone ("none"). One run, all scenes in turn, medians; {members} vehicles in lanes
 (float64: {width64}, float32: {width32} a packet, methods of turns in two
 registers where the processor has enough), h = {step} s, checks on. The numbers of the terms are those of
-`benchmarks/scenes.py`: of waves 8 components, of cross-flow 10 stations, of thrusters and fins 4, of control fins 2,
+`benchmarks/problems.py`: of waves 8 components, of cross-flow 10 stations, of thrusters and fins 4, of control fins 2,
 of tables 4 knots.
 
-Machine: {cpu}, {simd}; Warp {warp}, NumPy {numpy}. Written by `python benchmarks/term_table.py`; do not edit.
+{stamp}
 
-| term | float64 ns | more than none | float32 ns | more than none |
-| --- | ---: | ---: | ---: | ---: |
 {terms}
 
 Terms that share work cost less together than the sum of their rows. The first law with a damping matrix
@@ -35,8 +22,6 @@ the inertia needs no V.
 
 Methods for coupled inertia, without terms; the ratio is to psi_s for the uncoupled vehicle ("none" above):
 
-| vehicle | method | float64 ns | ratio | float32 ns | ratio |
-| --- | --- | ---: | ---: | ---: | ---: |
 {methods}
 """
 
@@ -50,40 +35,33 @@ def rows(records):
 
 
 def table(found):
-    """The lines of both tables."""
+    """Both tables."""
     terms, methods = [], []
     for (name, method), pair in found.items():
         if method == "psi_s":
             numbers = [f"{one[key]:.1f}" for one in pair for key in ("ns_per_vehicle_step", "more_than_none")]
-            terms.append(f"| {name} | {' | '.join(numbers)} |")
+            terms.append([name, *numbers])
         else:
             numbers = [f"{one[key]:.{digits}f}" for one in pair for key, digits in RATIOS]
-            methods.append(f"| {'uncoupled' if name == 'none' else name} | {method} | {' | '.join(numbers)} |")
-    return "\n".join(terms), "\n".join(methods)
+            methods.append(["uncoupled" if name == "none" else name, method, *numbers])
+    head = (
+        ["float64 ns", "more than none", "float32 ns", "more than none"],
+        ["float64 ns", "ratio", "float32 ns", "ratio"],
+    )
+    return markdown(["term", *head[0]], terms, "lrrrr"), markdown(["vehicle", "method", *head[1]], methods, "llrrrr")
 
 
 RATIOS = (("ns_per_vehicle_step", 1), ("over_none", 2))
 
 
 def main():
-    warp_setup.start()
-    described, versions = machine.describe(), machine.versions()
     terms, methods = table(rows(case.run(quick=False)))
-    text = TEXT.format(
+    return TEXT.format(
         members=4096,
         width64=machine.default_width("float64"),
         width32=machine.default_width("float32"),
         step=case.STEP,
-        cpu=described["cpu"],
-        simd=described["simd"],
-        warp=versions["warp-lang"],
-        numpy=versions["numpy"],
+        stamp=stamp("term"),
         terms=terms,
         methods=methods,
     )
-    TARGET.write_text(text)
-    print(text)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,22 +1,14 @@
 """The fastest oscillation that each method bears, by h w: of the Munk moment and of a restoring moment.
 
-python benchmarks/warning_limits.py                    all methods, as JSON lines
-python benchmarks/warning_limits.py psi_s kl8(psi_x)   some of them
-
 Members of one run differ in w, at h = 1 s; the run is repeated between the last w that was stable and the first that was
 not. Stable: the member ran to the end and its angle, 0.3 rad at the start, stayed below 1 rad. Resonances below the limit
 that are narrower than a twentieth of w are passed over: at h w = 1.41 (four steps a period) many methods have one.
 """
 
-import json
-import sys
-from pathlib import Path
-
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
 import lgvi_warp as lw
+from benchmarks.pages import show
 from lgvi_warp.methods.method import COMPOSITIONS, EXPLICIT, GAUSS, HALVES, PROGRAMS, TWO_PART
 from lgvi_warp.physics import notation
 
@@ -81,13 +73,10 @@ def names():
     return [*PROGRAMS, *EXPLICIT, *TWO_PART, *composed, *GAUSS]
 
 
-def main():
-    for name in sys.argv[1:] or names():
-        print(
-            json.dumps({"method": name} | {make.__name__: round(limit(make, name), 3) for make in (munk, restoring)}),
-            flush=True,
-        )
+def add_options(parser):
+    parser.add_argument("methods", nargs="*", metavar="METHOD", help="default: all; printed as JSON lines")
 
 
-if __name__ == "__main__":
-    main()
+def main(methods):
+    for name in methods or names():
+        show({"method": name} | {make.__name__: round(limit(make, name), 3) for make in (munk, restoring)})

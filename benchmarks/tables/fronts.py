@@ -1,21 +1,12 @@
-"""Measure the fronts of accuracy against time of four scenes and write docs/accuracy_and_speed.md, with a picture of each.
-
-python benchmarks/fronts.py
-"""
+"""Measure the fronts of accuracy against time of four scenes, with a picture of each beside the page."""
 
 import sys
-from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
 import lgvi_warp as lw
-from lgvi_warp.common import machine, warp_setup
+from benchmarks.pages import PAGES, ROOT, markdown, stamp
 
-ROOT = Path(__file__).resolve().parent.parent
-TARGET = ROOT / "docs" / "accuracy_and_speed.md"
-BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 DECADES = range(-1, -13, -1)
 SPREAD = {"start.angular_velocity": lw.Normal(relative=0.1)}
 
@@ -63,32 +54,29 @@ def section(name, make):
     """The text of one scene."""
     fleet, t1 = make()
     found = lw.tradeoff(fleet, t1=t1, seconds=90.0)
-    picture = ROOT / "docs" / f"accuracy_{name}.png"
+    picture = (ROOT / PAGES["fronts"]).parent / f"accuracy_{name}.png"
     lw.plot_tradeoff(found, picture)
     lines = [f"## {make.__doc__.strip()}", "", f"![errors and cost]({picture.name})", ""]
     lines += [f"Reference: {found.reference}. {' '.join(f'{text}.' for text in found.messages)}", ""]
-    lines += ["| largest error in position [m] | cheapest setting | step [s] | dtype | us per vehicle and second |",
-              "| ---: | --- | ---: | --- | ---: |"]  # fmt: skip
+    rows = []
     for decade in DECADES:
         one = cheapest(found, 10.0**decade)
         if one is not None:
             s = one.setting
-            lines.append(f"| 1e{decade} | `{s.method}` | {s.h:.3g} | {s.dtype} | {one.us_per_vehicle_second:.3g} |")
-    print("\n".join(lines), flush=True)
-    return "\n".join(lines)
+            rows.append([f"1e{decade}", f"`{s.method}`", f"{s.h:.3g}", s.dtype, f"{one.us_per_vehicle_second:.3g}"])
+    head = ["largest error in position [m]", "cheapest setting", "step [s]", "dtype", "us per vehicle and second"]
+    text = "\n".join([*lines, markdown(head, rows, "rlrlr")])
+    print(text, file=sys.stderr, flush=True)
+    return text
 
 
-def main():
-    warp_setup.start()
-    chosen = sys.argv[1:] or list(SCENES)
-    described, versions = machine.describe(), machine.versions()
-    where = f"One core of {described['cpu']}, {described['simd']}; Warp {versions['warp-lang']}."
-    head = f"{where} Written by `python benchmarks/fronts.py`."
-    text = "\n\n".join([head, *(section(name, SCENES[name]) for name in chosen)])
-    page = TARGET.read_text()
-    before, rest = page.split(BEGIN)
-    TARGET.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{rest.split(END)[1]}")
+def add_options(parser):
+    parser.add_argument(
+        "scenes", nargs="*", choices=[*SCENES, []], metavar="SCENE", help=f"of {', '.join(SCENES)}; default: all"
+    )
 
 
-if __name__ == "__main__":
-    main()
+def main(scenes):
+    sections = [section(name, SCENES[name]) for name in scenes or SCENES]
+    where = f"One core. {stamp('fronts', ' '.join(scenes))}"
+    return "\n\n".join([where, *sections])

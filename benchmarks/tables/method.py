@@ -1,37 +1,11 @@
-"""Measure every method in every precision at every width and write docs/methods.md: some 500 kernels, half an hour.
+"""Measure every method in every precision at every width: some 500 kernels, half an hour."""
 
-python benchmarks/method_table.py [file of JSON lines: those of `python benchmarks/run.py methods`, in place of measuring]
-"""
-
-import json
-import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
 from benchmarks.cases.methods import case
-from lgvi_warp.common import machine, warp_setup
+from benchmarks.pages import markdown, read, show, stamp
 
-TARGET = Path(__file__).resolve().parent.parent / "docs" / "methods.md"
 SOUND = 1.5
-
-TEXT = """# Methods, precisions and widths
-
-Nanoseconds per vehicle and step of the paper's vehicle on one core, at the default width; for rk5 and rk8 that choose
-their steps, per step of the grid. `ratio` is float64 over float32. `worst` is the width of this precision that makes the
-worst use of the core's rate of fused multiply-adds at that width, and how many times worse it is than the default width:
-a method's operations are the same at every width, so above {sound} something was not vectorised as it should be. `load`
-is the longest that a kernel of the row took to compile, or to load from Warp's cache [s].
-
-{cpu}, {simd}. Written by `python benchmarks/method_table.py`; do not edit.
-
-| method | float64 [ns] | worst | float32 [ns] | worst | ratio | float32_compensated [ns] | worst | load [s] |
-| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |
-{rows}
-
-{notes}
-"""
-
 
 WHY = """Four float32 are passed as two pairs by the calling convention of x86-64, and LLVM keeps the pairs: a register half as
 wide as it should be; no default on AVX uses that width. The operations of a turn of `psi_x`, and of a solve of (24), wait
@@ -53,11 +27,11 @@ def cells(records, method, dtype):
 
 
 def row(records, method):
-    """A line of the table."""
+    """The cells of a line of the table."""
     (t64, c64, w64), (t32, c32, w32), (_, cc, wc) = (cells(records, method, dtype) for dtype in case.DTYPES)
     ratio = f"{t64 / t32:.2f}" if t64 and t32 else ""
     load = max(one["load_seconds"] for one in records if one["method"] == method and "width" in one)
-    return f"| `{method}` | {c64} | {w64} | {c32} | {w32} | {ratio} | {cc} | {wc} | {load:.1f} |"
+    return [f"`{method}`", c64, w64, c32, w32, ratio, cc, wc, f"{load:.1f}"]
 
 
 def notes(records):
@@ -88,21 +62,20 @@ def notes(records):
     return "\n\n".join(lines)
 
 
-def main():
-    warp_setup.start()
-    if len(sys.argv) > 1:
-        lines = Path(sys.argv[1]).read_text().splitlines()
-        records = [one for one in map(json.loads, lines) if "method" in one]
+def add_options(parser):
+    what = "JSON lines of `python -m benchmarks run methods`, in place of measuring"
+    parser.add_argument("lines", nargs="?", type=Path, metavar="FILE", help=what)
+
+
+def main(lines):
+    if lines:
+        records = [one for one in read(lines) if "method" in one]
     else:
         records = []
         for one in case.run(False):
             records.append(one)
-            print(json.dumps(one), flush=True)
-    described = machine.describe()
-    rows = "\n".join(row(records, method) for method in case.METHODS)
-    text = TEXT.format(cpu=described["cpu"], simd=described["simd"], rows=rows, notes=notes(records), sound=SOUND)
-    TARGET.write_text(text)
-
-
-if __name__ == "__main__":
-    main()
+            show(one)
+    head = ["method", "float64 [ns]", "worst", "float32 [ns]", "worst", "ratio", "float32_compensated [ns]", "worst",
+            "load [s]"]  # fmt: skip
+    table = markdown(head, (row(records, method) for method in case.METHODS), "lrrrrrrrr")
+    return "\n\n".join([stamp("method"), table, notes(records)])

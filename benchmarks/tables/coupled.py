@@ -1,27 +1,18 @@
-"""Measure the methods for coupled inertia and write the tables of docs/coupled_inertia.md.
+"""Measure the methods for coupled inertia.
 
-python benchmarks/coupled_table.py
-
-Bodies, starts and truth are those of tests/methods/test_coupled_reference.py. One step, its structure and the general
+Bodies, starts and truth are those of benchmarks/coupled_problems.py. One step, its structure and the general
 body are measured on the NumPy twin; long runs and fleets on the kernel.
 """
-
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np
 from scipy.optimize import root
 
 import lgvi_warp as lw
+from benchmarks import coupled_problems as case
+from benchmarks.pages import markdown, stamp
+from benchmarks.problems import difference, random_states, slope
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.reference import coupled, rotation
-from tests.methods import test_coupled_reference as case
-from tests.support.tools import difference, random_states, slope
-
-TARGET = Path(__file__).resolve().parent.parent / "docs" / "coupled_inertia.md"
-BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 
 TWIN = {"psi_x": "x6", "psi_x8": "x8", "psi_w": "psi_w"}
 COUPLINGS = (0.1, 0.5, 0.9)
@@ -30,8 +21,7 @@ ZG = (0.0, 0.0005, 0.002, 0.005, 0.0196, 0.05)
 
 def table(caption, head, rows):
     """Markdown: a caption, a blank line, a table."""
-    lines = ["| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows)]
-    return "\n".join([caption, "", *lines])
+    return f"{caption}\n\n{markdown(head, rows)}"
 
 
 def few(x, digits=1):
@@ -144,7 +134,7 @@ def general_body():
             rows.append([f"`{method}`", f"{h:g}", *(few(x, 2) for x in e[i]), order])
     caption = (
         "**Errors of the general body** at t = 5 s, Euclidean norms, against the state in quad precision that "
-        "`tests/methods/test_coupled_reference.py` prints. Order: of R, from the two steps."
+        "`benchmarks/coupled_problems.py` holds. Order: of R, from the two steps."
     )
     return table(caption, ["method", "h [s]", "b [m]", "R", "nu [m/s]", "Om [rad/s]", "order"], rows)
 
@@ -495,13 +485,4 @@ TABLES = (
 
 
 def main():
-    text = TARGET.read_text()
-    before, rest = text.split(BEGIN)
-    after = rest.split(END)[1]
-    measured = "\n\n".join(make() for make in TABLES)
-    TARGET.write_text(f"{before}{BEGIN}\n\n{measured}\n\n{END}{after}")
-    print(measured)
-
-
-if __name__ == "__main__":
-    main()
+    return "\n\n".join([stamp("coupled"), *(make() for make in TABLES)])

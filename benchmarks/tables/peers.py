@@ -1,26 +1,15 @@
-"""The table of docs/accuracy_and_speed.md on other systems, from the lines of one or more runs of run.py.
-
-python benchmarks/peers/page.py runs/peers_1/peers.jsonl runs/peers_all/peers.jsonl [--write]
-
-Prints it; with --write it replaces what the page has between its marks.
-"""
+"""Other systems on the same problem, from the lines of one or more runs of `python -m benchmarks peers`."""
 
 from __future__ import annotations
 
 import argparse
-import json
 import math
-import sys
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT))
+from benchmarks.pages import markdown, read
+from benchmarks.peers.plot import DECADES, HOME, TITLES, front
 
-from benchmarks.peers.plot import DECADES, HOME, TITLES, front  # noqa: E402
-
-TARGET = ROOT / "docs" / "accuracy_and_speed.md"
-BEGIN, END = "<!-- peers: begin -->", "<!-- peers: end -->"
 NAMES = {
     "numba_simd": "numba, written by hand over SIMD lanes",
     "heyoka": "heyoka, batch Taylor or its ensemble",
@@ -40,18 +29,17 @@ brackets how many times lgvi_warp's in float64. {cpu}, {simd}.
 """
 
 
-def main() -> None:
-    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    arguments.add_argument("lines", type=Path, nargs="+")
-    arguments.add_argument("--write", action="store_true", help="into the page")
-    chosen = arguments.parse_args()
-    text = "\n".join(section([json.loads(line) for line in path.read_text().splitlines()]) for path in chosen.lines)
-    if not chosen.write:
-        print(text)
-        return
-    page = TARGET.read_text()
-    before, after = page.split(BEGIN)[0], page.split(END)[1]
-    TARGET.write_text(f"{before}{BEGIN}\n\n{text}\n{END}{after}")
+def add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("lines", type=Path, nargs="+", metavar="FILE", help="peers.jsonl of a run")
+    parser.add_argument("--write", action="store_true", help="into the page; default: print only")
+
+
+def main(lines: list[Path], write: bool) -> str | None:
+    text = "\n".join(section(read(path)) for path in lines)
+    if write:
+        return text
+    print(text)
+    return None
 
 
 def section(records: list[dict[str, Any]]) -> str:
@@ -84,7 +72,7 @@ def section(records: list[dict[str, Any]]) -> str:
 def table(records: list[dict[str, Any]], problem: str, others: list[str]) -> str:
     """A row for each decade."""
     head = ["error", HOME, f"{HOME}, float32", *(NAMES[name] for name in others)]
-    lines = [f"| {' | '.join(head)} |", "|" + " --- |" * len(head)]
+    rows = []
     for exponent in DECADES:
         target = 10.0**exponent
         home, method = front(records, problem, "float64", HOME, target)
@@ -93,8 +81,8 @@ def table(records: list[dict[str, Any]], problem: str, others: list[str]) -> str
         for name in others:
             time, _ = front(records, problem, "float64", name, target)
             cells.append(f"{time:.3g} ({ratio(time / home)})" if math.isfinite(time + home) else "")
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines) + "\n"
+        rows.append(cells)
+    return markdown(head, rows) + "\n"
 
 
 def ratio(value: float) -> str:
@@ -127,7 +115,3 @@ def behind(records: list[dict[str, Any]], problem: str, others: list[str]) -> st
     if not lines:
         return "lgvi_warp is ahead of each at every error.\n"
     return "**Where lgvi_warp is behind, or leads by less than was wanted:**\n\n" + "\n".join(lines) + "\n"
-
-
-if __name__ == "__main__":
-    main()

@@ -1,9 +1,10 @@
-"""The scenes of the benchmarks of terms: the paper's vehicle in nearly neutral trim with each term alone, and with all."""
+"""What benchmarks and tests solve: the paper's vehicle in nearly neutral trim with each term alone, and with all; states."""
 
 import numpy as np
 
 import lgvi_warp as lw
-from lgvi_warp.physics import terms
+from benchmarks.coupled_problems import GENERAL
+from lgvi_warp.physics import notation, terms
 
 GRAVITY = 9.8
 START = lw.Start([0.0, 0.0, 10.0], rotation_vector=[1.0, 2.0, 3.0], velocity_inertial=[0.3, 0.2, 0.1],
@@ -177,13 +178,8 @@ def each_term():
 def coupled():
     """Name -> a vehicle whose M and J are coupled, with no terms: for psi_x, psi_x8 and psi_w."""
     named = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.5})  # as printed it rises at metres a second
-    I6 = np.array([
-        [24, 0.3, -0.2, 0.1, 0.9, 0.6], [0.3, 42, 0.5, -0.8, 0.15, 1.8], [-0.2, 0.5, 48, -0.5, -1.5, 0.05],
-        [0.1, -0.8, -0.5, 0.98, 0.032, -0.066], [0.9, 0.15, -1.5, 0.032, 3.59, 0.074],
-        [0.6, 1.8, 0.05, -0.066, 0.074, 3.326],
-    ])  # fmt: skip
     rigid = np.diag([20.0, 20.0, 20.0, 0.5, 2.5, 2.5])
-    general = lw.Vehicle(rigid_body_mass_matrix=rigid, added_mass_matrix=I6 - rigid, weight=196.0, buoyancy=196.5,
+    general = lw.Vehicle(rigid_body_mass_matrix=rigid, added_mass_matrix=GENERAL - rigid, weight=196.0, buoyancy=196.5,
                          center_of_buoyancy=[0.0, 0.0, -0.02])  # fmt: skip
     return {
         "remus_100": lw.Scene(named.vehicle, named.environment, start=START),
@@ -191,10 +187,55 @@ def coupled():
     }
 
 
-def peak_memory():
-    """The largest resident memory of this process so far [bytes].
+def random_states(seed, n, speed=1.0, spin=1.0):
+    """b, R, nu, Om of n random states."""
+    rng = np.random.default_rng(seed)
+    R = notation.matrix_from_rotation_vector(rng.normal(size=(n, 3)))
+    return rng.normal(size=(n, 3)), R, speed * rng.normal(size=(n, 3)), spin * rng.normal(size=(n, 3))
 
-    ru_maxrss would begin with what the process that started it had.
+
+def difference(x, y):
+    """Largest difference of two states (b, R, nu, Om), each relative to the size of its quantity, at least 1."""
+    return max(np.abs(u - v).max() / max(1.0, np.abs(v).max()) for u, v in zip(x, y, strict=True))
+
+
+def slope(h, error):
+    """Fitted order of convergence."""
+    return np.polyfit(np.log(h), np.log(error), 1)[0]
+
+
+class DepthSum:
+    """A keeper of the simplest kind: the sum of the depths of each sample time; its parts go into a store and come back.
+
+    sums: (k,) [m] over all members. merged: the first members of the blocks, as they came.
     """
-    with open("/proc/self/status") as file:
-        return next(int(line.split()[1]) * 1024 for line in file if line.startswith("VmHWM"))
+
+    name = "depth sum"
+
+    def __init__(self, plan):
+        self.sums, self.merged = np.zeros(len(plan.grid.times)), []
+
+    def open(self, plan, block, members):
+        return BlockSum(len(plan.grid.times))
+
+    def merge(self, block, part):
+        self.sums += part
+        self.merged.append(block.first)
+
+    def to_arrays(self, part):
+        return {"sums": part}, {"times": len(part)}
+
+    def from_arrays(self, arrays, content):
+        assert len(arrays["sums"]) == content["times"]
+        return arrays["sums"]
+
+
+class BlockSum:
+    def __init__(self, times):
+        self.sums = np.zeros(times)
+
+    def take(self, when, samples):
+        self.sums[when] = samples["position"][..., 2].sum(axis=1)
+
+    def close(self, outcome):
+        return self.sums

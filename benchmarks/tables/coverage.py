@@ -1,23 +1,16 @@
 """How often the intervals of statistics hold the true value, of so many repetitions with known truth: a Markdown table.
 
-python benchmarks/coverage_table.py
-
 The second table stops each repetition by itself as lw.Until does: looks at blocks of 256 members from `members` on, then
 whenever 5 % came to them, until the interval of a mean is narrow enough. The third is of designs with replicates: functions
 of x = a . z, z four normal numbers from four columns of the unit cube; with the median width of the intervals, over that of
 as many independent members'. The fourth stops these, with looks at powers of two. These take a fifth of the repetitions.
 """
 
-import argparse
-import sys
-from pathlib import Path
-
 import numpy as np
 from scipy.special import ive, ndtr, ndtri
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-
 import lgvi_warp as lw
+from benchmarks.pages import line, markdown
 from lgvi_warp.physics.notation import matrix_from_rotation_vector
 from lgvi_warp.sampling.designs import sampling_of
 from lgvi_warp.sampling.designs.space import Space
@@ -221,37 +214,35 @@ def replicated_stops(repetitions, design, most=16_384):
         yield law, wanted, *stopped(repetitions, lw.Until("mean x", half), chosen, truth, settings["replicates"])
 
 
-def main():
-    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    arguments.add_argument("--repetitions", type=int, default=10_000)
-    chosen = arguments.parse_args()
-    n = chosen.repetitions
-    print(f"| part that holds of {n:,} intervals of 95 %, of members: | {' | '.join(f'{one:,}' for one in FEW)} |")
-    print("|---|" + "---|" * len(FEW))
-    for row in zip(*(kinds(n, members) for members in FEW), strict=True):
-        print(f"| {row[0][0]} | " + " | ".join(f"{part:.1%}" for _, part in row) + " |", flush=True)
-    print("\n| stopped: mean of | first look at | half width as of | holds | members taken |\n|---|---|---|---|---|")
-    for law, least, wanted, part, taken in stops(n):
-        print(f"| {law} | {least} | {wanted} | {part:.1%} | {taken:.0f} |", flush=True)
-    few = max(1, n // 5)
-    print(
-        f"\n| {few:,} intervals of 95 %, each of {MEMBERS:,} members: hold, width | {' | '.join(map(called, DESIGNS))} |"
-    )
-    print("|---|" + "---|" * len(DESIGNS))
-    columns = [list(replicated(few, design)) for design in DESIGNS]
-    for row in zip(*columns, strict=True):
-        print(f"| {row[0][0]} | " + " | ".join(f"{part:.1%}, {width:.2f}" for _, part, width in row) + " |", flush=True)
-    print("\n| stopped: mean of | design | half width as of | holds | members taken |\n|---|---|---|---|---|")
-    for design in DESIGNS[:2]:
-        for law, wanted, part, taken in replicated_stops(few, design):
-            print(f"| {law} | {called(design)} | {wanted} | {part:.1%} | {taken:.0f} |", flush=True)
+def add_options(parser):
+    parser.add_argument("--repetitions", type=int, default=10_000)
+
+
+def main(repetitions):
+    head = [f"part that holds of {repetitions:,} intervals of 95 %, of members:", *(f"{one:,}" for one in FEW)]
+    columns = zip(*(kinds(repetitions, members) for members in FEW), strict=True)
+    show(head, ([row[0][0], *(f"{part:.1%}" for _, part in row)] for row in columns))
+    head = ["stopped: mean of", "first look at", "half width as of", "holds", "members taken"]
+    show(head, ([law, f"{least}", f"{wanted}", f"{part:.1%}", f"{taken:.0f}"]
+                for law, least, wanted, part, taken in stops(repetitions)))  # fmt: skip
+    few = max(1, repetitions // 5)
+    head = [f"{few:,} intervals of 95 %, each of {MEMBERS:,} members: hold, width", *map(called, DESIGNS)]
+    columns = zip(*(replicated(few, design) for design in DESIGNS), strict=True)
+    show(head, ([row[0][0], *(f"{part:.1%}, {width:.2f}" for _, part, width in row)] for row in columns))
+    head = ["stopped: mean of", "design", "half width as of", "holds", "members taken"]
+    show(head, ([law, called(design), f"{wanted}", f"{part:.1%}", f"{taken:.0f}"] for design in DESIGNS[:2]
+                for law, wanted, part, taken in replicated_stops(few, design)))  # fmt: skip
+
+
+def show(head, rows):
+    """Print a table, each row once it is measured."""
+    print(markdown(head, ()))
+    for row in rows:
+        print(line(row), flush=True)
+    print()
 
 
 def called(design):
     """A design's name and replicates."""
     ((kind, settings),) = design.items()
     return f"`{kind}`, {settings['replicates']}"
-
-
-if __name__ == "__main__":
-    main()

@@ -1,0 +1,60 @@
+"""The fields of a vehicle's motion: shape, unit and meaning of each, by name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from numpy import ndindex
+
+
+@dataclass(frozen=True)
+class Field:
+    """Numbers of one vehicle at one time.
+
+    Args:
+        name: name in scene files, results and stores.
+        shape: shape of the numbers; () for one number.
+        unit: their unit, as messages write it.
+        meaning: what they are, in a few words.
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    unit: str
+    meaning: str
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Attributes of a variable in xarray, Zarr and NetCDF; the unit as UDUNITS writes it, "m s-1"."""
+        return {"units": self.unit.replace("/s", " s-1"), "long_name": self.meaning}
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the entries: "position[2]", "attitude[0, 1]"; the field's name where it has one."""
+        if not self.shape:
+            return (self.name,)
+        return tuple(f"{self.name}[{', '.join(map(str, index))}]" for index in ndindex(*self.shape))
+
+
+TABLE = {
+    field.name: field
+    for field in (
+        Field("position", (3,), "m", "position in inertial axes, north east down"),
+        Field("attitude", (3, 3), "1", "rotation from body to inertial axes"),
+        Field("velocity", (3,), "m/s", "velocity in body axes"),
+        Field("angular_velocity", (3,), "rad/s", "angular velocity in body axes"),
+        # All others follow from these four.
+        Field("depth", (), "m", "depth below the surface"),
+        Field("velocity_inertial", (3,), "m/s", "velocity in inertial axes"),
+        Field("speed", (), "m/s", "length of the velocity"),
+        Field("quaternion_wxyz", (4,), "1", "unit quaternion of the attitude, scalar first"),
+        Field("euler", (3,), "rad", "roll, pitch and yaw"),
+        Field("euler_deg", (3,), "deg", "roll, pitch and yaw"),
+        Field("rotation_vector", (3,), "rad", "axis of the attitude times its angle"),
+        Field("energy", (), "J", "kinetic and potential energy"),
+    )
+}
+# Names of the samples that a run computes.
+FIELDS = tuple(TABLE)[:4]
+# Names of the samples that a file may hold.
+IN_FILES = (*FIELDS, "quaternion_wxyz", "energy")

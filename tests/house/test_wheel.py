@@ -1,0 +1,86 @@
+"""What is built for others is whole: it is installed into an empty environment and runs there."""
+
+import os
+import subprocess
+import sys
+import sysconfig
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import ROOT
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """The folder of the wheel and the source archive, built without network."""
+    folder = tmp_path_factory.mktemp("dist")
+    subprocess.run([sys.executable, "-m", "hatchling", "build", "-d", str(folder)], check=True, cwd=ROOT)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def installed(built, tmp_path_factory):
+    """Run a command of an environment that holds the wheel, and sees this environment's other packages, in an empty folder."""
+    environment, folder = tmp_path_factory.mktemp("environment"), tmp_path_factory.mktemp("empty")
+    variables = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    scripts = environment / ("Scripts" if os.name == "nt" else "bin")
+    (wheel,) = built.glob("*.whl")
+
+    def run(command, *arguments):
+        return subprocess.run(
+            [scripts / command, *map(str, arguments)],
+            check=True,
+            cwd=folder,
+            env=variables,
+            capture_output=True,
+            text=True,
+        ).stdout
+
+    subprocess.run([sys.executable, "-m", "venv", environment], check=True)
+    run("python", "-m", "pip", "install", "--no-index", "--no-deps", wheel)
+    packages = Path(run("python", "-c", "import sysconfig; print(sysconfig.get_path('purelib'))").strip())
+    # A path in a .pth file is searched, but the .pth files in that folder are not read: no editable install is seen.
+    (packages / "others.pth").write_text(sysconfig.get_path("purelib"))
+    return run
+
+
+def test_the_wheel_holds_the_packages_and_their_data(built):
+    (wheel,) = built.glob("*.whl")
+    names = set(zipfile.ZipFile(wheel).namelist())
+    tracked = subprocess.run(["git", "ls-files"], check=True, cwd=ROOT, capture_output=True, text=True).stdout.split()
+    packages = {"lgvi_warp", "lgvi_warp_command", "lgvi_kernels"}
+    expected = {name.removeprefix("kernels/") for name in tracked}
+    expected = {name for name in expected if name.partition("/")[0] in packages}
+    assert {name for name in names if ".dist-info/" not in name} == expected
+    assert {"lgvi_warp/py.typed", "lgvi_warp/__init__.pyi", "lgvi_warp/scene/vehicles/remus_100.toml"} <= names
+
+
+def test_the_source_archive_holds_what_the_tests_need(built):
+    (archive,) = built.glob("*.tar.gz")
+    with tarfile.open(archive) as content:
+        names = {name.partition("/")[2] for name in content.getnames()}
+    assert {"pyproject.toml", "LICENSE", "README.md", "tests/conftest.py", "examples/paper.toml"} <= names
+
+
+def test_the_package_is_imported_from_the_environment(installed):
+    place = installed(
+        "python", "-c", "import lgvi_warp, lgvi_kernels; print(lgvi_warp.__file__, lgvi_kernels.__file__)"
+    )
+    assert str(ROOT) not in place and place.count("environment") == 2
+
+
+def test_the_command_helps(installed):
+    assert "lgvi-warp" in installed("lgvi-warp", "--help")
+
+
+def test_an_example_runs(installed):
+    installed(
+        "lgvi-warp", "run", ROOT / "examples" / "paper.toml", "--members", "8", "--duration", "2", "--out", "paper"
+    )
+    listed = installed("python", "-c", "import os; print(*sorted(os.listdir('paper')))").split()
+    assert {"result.npz", "fleet.png"} <= set(listed)

@@ -13,9 +13,9 @@ PAGES = {
     "fronts": "docs/guide/accuracy_and_speed.md",
     "large": "docs/guide/large_ensembles.md",
     "limits": "docs/guide/when_it_breaks.md",
-    "method": "docs/guide/methods.md",
+    "method": "docs/reference/method_costs.md",
     "peers": "docs/guide/accuracy_and_speed.md",
-    "sampling": "docs/reference/sampling_cost.md",
+    "sampling": "docs/reference/sampling_costs.md",
     "solver": "docs/explain/solvers.md",
     "term": "docs/reference/term_costs.md",
 }

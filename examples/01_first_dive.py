@@ -10,7 +10,7 @@ vehicle = lw.Vehicle(
     center_of_buoyancy=[0.0, 0.0, -0.007],  # m
 )
 start = lw.Start(
-    position=[0.0, 0.0, 10.0],  # m: north, east, down
+    position=[0.0, 0.0, 100.0],  # m: north, east, down
     euler_deg=[0.0, 10.0, 0.0],  # roll, pitch, yaw
     velocity=[1.0, 0.0, 0.0],  # m/s: ahead
     angular_velocity=[0.0, 0.0, 0.1],  # rad/s

@@ -3,7 +3,7 @@
     python examples/03_remus_100.py [picture]
 
 Twice, since the hull is unstable in pitch and nothing steers its depth: held in the horizontal plane by an exact
-symmetry (centre of gravity at the origin, no propeller torque), and as published. docs/remus_100.md has the comparison.
+symmetry (centre of gravity at the origin, no propeller torque), and as published. docs/guide/remus_100.md has the comparison.
 """
 
 import dataclasses

@@ -35,11 +35,11 @@ def report(result: Any, out: Path, quiet: bool, begun: float) -> list[str]:
     written = write(result, drawn, out)
     if not quiet:
         print("\n".join([*written.note_lines(), summary(result, drawn, written.files, time.perf_counter() - begun)]))
-    told(written.empty)
+    print_faults(written.empty)
     return written.faults
 
 
-def told(faults: list[str]) -> list[str]:
+def print_faults(faults: list[str]) -> list[str]:
     """Print faults on stderr.
 
     Args:
@@ -153,7 +153,7 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
         "status      " + ", ".join(f"{name} {number:,}" for name, number in result.status.counts().items()),
     ]
     if result.samples:
-        lines += _energy_lines(result, drawn)
+        lines += energy_lines(result, drawn)
     elif result.kept is not None:
         lines.append(f"kept        {result.kept.members:,} members' samples, run again")
     elif settings.get("observed", {}).get("keep") == "failed":
@@ -181,8 +181,16 @@ INVARIANTS = {
 }
 
 
-def _energy_lines(result: Any, drawn: Any) -> list[str]:
-    """Line on the drift of conserved quantities, or on the change of energy where forces do work."""
+def energy_lines(result: Any, drawn: Any) -> list[str]:
+    """Line on the drift of conserved quantities, or on the change of energy where forces do work.
+
+    Args:
+        result: The run's result.
+        drawn: The members of it that are drawn, as a result.
+
+    Returns:
+        One line; none where no energy is known.
+    """
     import math
 
     from lgvi_warp.physics import energy as invariants

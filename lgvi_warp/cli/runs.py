@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli.progress import shown
-from lgvi_warp.cli.report import report, told
+from lgvi_warp.cli.report import print_faults, report
 from lgvi_warp.cli.settings import block_range, folder, overrides, store_settings
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.common.errors import Interrupted, MembersFailed, SceneError
@@ -62,7 +62,7 @@ def run(chosen: argparse.Namespace) -> int:
         raise Ended(rescued(result, out)) from error
     if suggested:
         faults += check_error(scene, result, suggested, chosen.quiet)
-    return 1 if told(faults) or all_failed(result) else 0
+    return 1 if print_faults(faults) or all_failed(result) else 0
 
 
 def rescued(result: Any, out: Path) -> str:
@@ -210,7 +210,7 @@ def resume(chosen: argparse.Namespace) -> int:
             result, failures = error.result, [str(error)]
     assert result.store is not None
     faults = report(result, result.store.parent, chosen.quiet, begun) + failures
-    return 1 if told(faults) or all_failed(result) else 0
+    return 1 if print_faults(faults) or all_failed(result) else 0
 
 
 def predict(chosen: argparse.Namespace) -> int:

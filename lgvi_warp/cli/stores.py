@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from lgvi_warp.cli.report import size_of, told
+from lgvi_warp.cli.report import print_faults, size_of
 
 
 def merge(chosen: argparse.Namespace) -> int:
@@ -27,7 +27,7 @@ def merge(chosen: argparse.Namespace) -> int:
         blocks = len(folder.unfinished())
         missing = f"{blocks} of {len(folder.runs)} blocks are in none of the folders; lgvi-warp resume {folder.path} runs them"
         kept = f"the members that it keeps are missing; lgvi-warp resume {folder.path} runs them, or says why not"
-        told([f"{folder.path}: {missing if blocks else kept}"])
+        print_faults([f"{folder.path}: {missing if blocks else kept}"])
     elif not chosen.quiet:
         print(f"file        {folder.path} ({size_of(folder.path) / 1e6:.1f} MB), complete")
     return 0 if folder.complete else 1

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from lgvi_warp.cli.progress import part_of, shown
-from lgvi_warp.cli.report import told
+from lgvi_warp.cli.report import print_faults
 from lgvi_warp.cli.settings import folder, overrides
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.cli.writing import Written
@@ -27,8 +27,8 @@ def finish(written: Written, report: str, quiet: bool) -> int:
     if not quiet:
         files = (f"file        {path}" for path in written.files)
         print("\n".join([report, "", *written.note_lines(), *files]))
-    told(written.empty)
-    return 1 if told(written.faults) else 0
+    print_faults(written.empty)
+    return 1 if print_faults(written.faults) else 0
 
 
 def tradeoff(chosen: argparse.Namespace) -> int:
@@ -88,7 +88,7 @@ def sensitivity(chosen: argparse.Namespace) -> int:
                 options = {"samples": 256} | options
                 indices = uq.sobol(scene, of, second_order=not first, **options, **settings)
     except (uq.FailedMembers, ImportError) as error:
-        return len(told([str(error)]))
+        return len(print_faults([str(error)]))
     written = Written(indices.save(out))
     written.draw(plot_sensitivity, indices, out / "sensitivity.png")
     return finish(written, str(indices), chosen.quiet)
@@ -111,7 +111,7 @@ def stability(chosen: argparse.Namespace) -> int:
 
     if chosen.grid is not None and (chosen.x is not None or chosen.y is not None):
         raise SceneError(
-            [f"--grid {chosen.grid}: says the axes that --x and --y say; leave out --grid, or both of them"]
+            [f"--grid {chosen.grid}: names the same axes as --x and --y; leave out --grid, or both of them"]
         )
     changes = overrides(chosen)
     scene = Scene.load(chosen.scene, changes)

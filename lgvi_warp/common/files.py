@@ -358,7 +358,7 @@ def put_folder(beside: Path, target: Path) -> None:
     old = beside
     if not target.exists():
         beside.replace(target)
-    elif not _exchanged(beside, target):
+    elif not exchanged(beside, target):
         # Two steps where the system cannot exchange folders: `restored` mends a crash between them.
         old = scratch.beside(target, scratch.OLD)
         target.replace(old)
@@ -367,8 +367,16 @@ def put_folder(beside: Path, target: Path) -> None:
     scratch.remove_folder(old)
 
 
-def _exchanged(one: Path, other: Path) -> bool:
-    """Exchange two folders in one step; return False where the system cannot."""
+def exchanged(one: Path, other: Path) -> bool:
+    """Exchange two folders in one step.
+
+    Args:
+        one: Path of a folder.
+        other: Path of the other folder.
+
+    Returns:
+        Whether they were exchanged; False where the system cannot.
+    """
     try:
         rename = ctypes.CDLL(None, use_errno=True).renameat2
     except (OSError, AttributeError, TypeError):

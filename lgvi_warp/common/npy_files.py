@@ -82,7 +82,7 @@ def _described(file: Any) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
     """(shape, whether columns come first, type) of an array, from its header. Raises ValueError."""
     try:
         if np.lib.format.read_magic(file) != (1, 0):
-            raise ValueError("is no array of the version of NumPy's format that is written")
+            raise ValueError("is an array in another version of NumPy's format than runs write")
         return np.lib.format.read_array_header_1_0(file)
     except (SyntaxError, TypeError, RecursionError, MemoryError, ValueError) as error:
         raise ValueError(f"has a header that cannot be read ({' '.join(str(error).split())[:100]})") from None

@@ -252,7 +252,7 @@ def entries(root: Path, below: str = "") -> Iterator[tuple[str, os.DirEntry[str]
         OSError: A folder cannot be read.
     """
     if below.count("/") > MOST_DEEP:
-        raise SceneError([f"{root / below}: is deeper than the folders of a run are; take it away"])
+        raise SceneError([f"{root / below}: lies deeper than the folders of a run do; remove it"])
     with os.scandir(root / below) as listing:
         for entry in sorted(listing, key=lambda item: item.name):
             name = f"{below}{entry.name}"

@@ -154,7 +154,7 @@ _WARNING_VALUE = {
     Warnings.DRAG_STIFF: "h (l + 2 q|v|) / I",
     Warnings.MUNK_UNSTABLE: "h w",
     Warnings.RESTORING_UNSTABLE: "h sqrt(B|r|/J)",
-    Warnings.ENERGY: "energy created over what there was to exchange",
+    Warnings.ENERGY: "energy created over the energy available",
 }
 
 

@@ -66,11 +66,12 @@ def start() -> None:
     """
     # Two threads that redirect stderr at once would leave it closed.
     with build_lock:
-        _start()
+        start_once()
 
 
 @functools.cache
-def _start() -> None:
+def start_once() -> None:
+    """Initialise Warp on the first call; later calls do nothing."""
     if wp.config.log_level == wp.LOG_INFO:
         wp.config.log_level = wp.LOG_WARNING
     chosen = wp.config.kernel_cache_dir

@@ -56,7 +56,9 @@ def parsed(text: str) -> Any:
     except yaml.YAMLError as error:
         raise SceneError([f"YAML: {' '.join(str(error).split())}; mend that line"]) from None
     except Exception as error:  # PyYAML passes on what int(), float() and dates raise
-        raise SceneError([f"YAML: has a value that is none ({type(error).__name__}: {error}); mend it"]) from None
+        raise SceneError(
+            [f"YAML: has a value that cannot be read ({type(error).__name__}: {error}); mend it"]
+        ) from None
 
 
 def _depth(text: str) -> int:
@@ -108,7 +110,7 @@ def _look(yaml: Any, faults: Faults, root: Any) -> None:
 def _size(yaml: Any, node: Any, sizes: dict[int, int], above: set[int]) -> int:
     """Number of values of a node, aliases written out. Raises SceneError where a node contains itself."""
     if id(node) in above:
-        raise SceneError([f"YAML: {_line(node)}: holds itself by an alias; write it out"])
+        raise SceneError([f"YAML: {_line(node)}: contains itself through an alias; write it out"])
     if id(node) not in sizes:
         above.add(id(node))
         children: list[Any] = []

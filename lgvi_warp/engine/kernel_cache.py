@@ -41,7 +41,7 @@ LOCKS, SCRATCH, SUMS = "lgvi_warp_locks", "lgvi_warp_scratch_", ".sha256"
 # Folders that Warp leaves when it is killed while it compiles, and the age at which they belong to no process [s].
 TORN, OURS, OLD = re.compile(r"(\w+)_p\d+_t\d+"), "wp_make_", 86_400.0
 
-_loaded: weakref.WeakSet[Any] = weakref.WeakSet()
+loaded: weakref.WeakSet[Any] = weakref.WeakSet()
 
 
 def load(module: Any) -> None:
@@ -55,7 +55,7 @@ def load(module: Any) -> None:
     """
     warp_setup.start()
     with build_lock:
-        if module in _loaded:
+        if module in loaded:
             return
         cache = Path(wp.config.kernel_cache_dir)
         folder = cache / module.get_module_identifier(BLOCK_DIM)
@@ -64,8 +64,8 @@ def load(module: Any) -> None:
             if is_whole(code):
                 wp.load_module(module, device="cpu")
             else:
-                _compile(module, cache, code)
-        _loaded.add(module)
+                compile_module(module, cache, code)
+        loaded.add(module)
 
 
 @contextlib.contextmanager
@@ -111,12 +111,21 @@ def _sha256(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def _compile(module: Any, cache: Path, code: Path) -> None:
-    """Compile and load a kernel in a scratch folder, then put its files into the cache, checksums last."""
+def compile_module(module: Any, cache: Path, code: Path) -> None:
+    """Compile and load a kernel in a scratch folder, then put its files into the cache, checksums last.
+
+    Args:
+        module: Warp's module of the kernel.
+        cache: The cache's folder.
+        code: The file that will hold the kernel's code.
+
+    Raises:
+        OSError: The cache has no room, or cannot be written.
+    """
     with _explained(cache):
         sweep(cache, code.parent)
         seek_room(cache)
-        with _scratch(cache) as scratch, _clang_headers(scratch):
+        with scratch_folder(cache) as scratch, _clang_headers(scratch):
             wp.config.kernel_cache_dir = str(scratch)
             try:
                 wp.load_module(module, device="cpu")
@@ -142,8 +151,15 @@ def _move(compiled: Path, code: Path) -> None:
 
 
 @contextlib.contextmanager
-def _scratch(cache: Path) -> Iterator[Path]:
-    """A folder of this process's own, which `sweep` leaves alone while it lives."""
+def scratch_folder(cache: Path) -> Iterator[Path]:
+    """A folder of this process's own, which `sweep` leaves alone while it lives.
+
+    Args:
+        cache: The cache's folder.
+
+    Yields:
+        The folder, removed at the end.
+    """
     with contextlib.ExitStack() as stack:
         with one_at_a_time(SCRATCH):
             path = Path(tempfile.mkdtemp(prefix=SCRATCH, dir=cache))
@@ -156,7 +172,7 @@ def _scratch(cache: Path) -> Iterator[Path]:
 def _clang_headers(scratch: Path) -> Iterator[None]:
     """Let Clang keep its precompiled header in the scratch folder where the system's temporary folder has no room."""
     folders, thread = warp_setup.header_folders(), threading.get_ident()
-    if thread in folders or _temporary_room():
+    if thread in folders or temporary_room():
         yield
         return
     with tempfile.TemporaryDirectory(prefix="wp_pch_", dir=scratch) as folder:
@@ -167,7 +183,8 @@ def _clang_headers(scratch: Path) -> Iterator[None]:
             del folders[thread]
 
 
-def _temporary_room() -> bool:
+def temporary_room() -> bool:
+    """Whether the system's folder for temporary files has room for a precompiled header."""
     try:
         seek_room(Path(tempfile.gettempdir()))
     except OSError:

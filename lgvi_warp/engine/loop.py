@@ -14,7 +14,7 @@ from lgvi_warp.engine.executors.base import Executor
 from lgvi_warp.engine.work import Work, in_order
 
 
-class Progress:
+class RunProgress:
     """The fraction of a run's vehicle-steps made so far, reported from any thread.
 
     Args:
@@ -85,7 +85,7 @@ def run_blocks(
         for block, results in done:
             merged.begun = block.stop
             # Results from the store may not be this run's own: errors in them are reported as faults of the store.
-            source = work.sink if left is not None and block not in fresh else None
+            source = work.store if left is not None and block not in fresh else None
             with source.understood(block) if source else nullcontext():
                 for keeper, result in zip(work.keepers, results, strict=True):
                     keeper.merge(block, result)
@@ -104,8 +104,8 @@ def _in_turn(
         fresh: Iterator[tuple[Block, Any]] | None = None
         for block in runs:
             if block.first not in wanted:
-                assert work.sink is not None
-                yield block, work.sink.parts(block, work.keepers) or ()
+                assert work.store is not None
+                yield block, work.store.parts(block, work.keepers) or ()
                 continue
             if fresh is None:
                 work.plan.compile()

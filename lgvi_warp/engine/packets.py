@@ -80,9 +80,9 @@ class Packets:
         self.count = -(-members.count // width)
         Inertia, Params, Events = plan.advance.types.Inertia, plan.advance.types.Params, plan.advance.types.Events
         context = PackingContext(
-            members.parameters, self.frame, members.indices, members.seed, plan.grid.h, plan.model.aligned
+            members.parameters, self.frame, members.indices, members.seed, plan.grid.h, plan.kernel_choice.aligned
         )
-        params, table, memory = self._laws(context)
+        params, table, memory = self.packed_laws(context)
         self.inertia = _structs(self._inertia(), Inertia)
         self.params = _structs(params, Params)
         self.events = _structs(self._events(context), Events)
@@ -207,10 +207,17 @@ class Packets:
         else:
             target[...] = self._lanes(value[:, None])[:, 0]
 
-    def _laws(self, context: PackingContext) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Params, table and memory of the laws: each term's numbers, one after the other."""
+    def packed_laws(self, context: PackingContext) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Pack each term's numbers, one after the other.
+
+        Args:
+            context: What the terms may look at.
+
+        Returns:
+            (params, table, memory) of the laws, as the kernel takes them.
+        """
         packed: list[Packed] = []
-        for i, (term, module) in enumerate(self.plan.model.laws):
+        for i, (term, module) in enumerate(self.plan.kernel_choice.laws):
             parameters = Ensemble.own(term, context.parameters)
             if i == 0 and self.plan.spec.drag:
                 assert isinstance(term, Drag)
@@ -255,7 +262,10 @@ class Packets:
         return pack(values, self.plan.spec.width).astype(DTYPES[self.plan.dtype])
 
     def _events(self, context: PackingContext) -> np.ndarray:
-        packed = [event.packed(Ensemble.own(event, context.parameters), context) for event, _ in self.plan.model.events]
+        packed = [
+            event.packed(Ensemble.own(event, context.parameters), context)
+            for event, _ in self.plan.kernel_choice.events
+        ]
         varied = any(len(leaf) > 1 for numbers in packed for leaf in _leaves(numbers.values))
         data = np.zeros(self.count if varied else 1, self.plan.dtypes[2])
         node: Any = data
@@ -291,7 +301,7 @@ class Packets:
         m = self.members
         context = PackingContext(m.parameters, self.frame, m.indices, m.seed, self.plan.grid.h)
         total = np.zeros_like(m.position)
-        for term, _ in self.plan.model.laws:
+        for term, _ in self.plan.kernel_choice.laws:
             parameters = Ensemble.own(term, m.parameters)
             total = total + term.water_at_start(parameters, m.position, context)
         return notation.rotate_into(m.attitude, total)
@@ -350,7 +360,7 @@ class Packets:
         pace = self.state.numpy()[:, STATE_FIELDS + 2 : STATE_FIELDS + kept]
         code = self._of_members(self.status, np.uint8)
         status, stopped_by = code.copy(), np.zeros(m, np.uint8)
-        for number, (event, _) in enumerate(self.plan.model.events):
+        for number, (event, _) in enumerate(self.plan.kernel_choice.events):
             assert isinstance(event, Event)
             stopped = code == FIRST + number
             status[stopped], stopped_by[stopped] = event.status, 1 + number

@@ -24,7 +24,7 @@ from lgvi_warp.common.machine import DTYPES, default_width
 from lgvi_warp.common.status import CHECKS, ON_FAILURE
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
-from lgvi_warp.engine.model import Model, declared, is_built_in, make_model
+from lgvi_warp.engine.kernel_choice import KernelChoice, choose_kernel, declared, is_built_in
 from lgvi_warp.engine.step_warnings import watched
 from lgvi_warp.methods.gauss import gauss
 from lgvi_warp.methods.method import KINDS, Method
@@ -54,7 +54,7 @@ class Plan:
         on_failure: "freeze" (default), "raise" or "substep".
 
     Attributes:
-        model: the laws that act and the method's program for them.
+        kernel_choice: the laws that act and the method's program for them.
         spec: all that decides the kernel's source.
         advance: the kernel and its types.
 
@@ -70,7 +70,7 @@ class Plan:
     width: int | None = None
     checks: str = "safe"
     on_failure: str = "freeze"
-    model: Model = field(init=False)
+    kernel_choice: KernelChoice = field(init=False)
     spec: Spec = field(init=False)
     advance: Advance = field(init=False)
     # Of a plan made by part(): the whole plan, the members and the fields.
@@ -86,22 +86,22 @@ class Plan:
         if self.width is not None:
             faults.choice("width", self.width, WIDTHS)
         if self.checks == "none" and self.ensemble.scene.events:
-            faults.add("checks", self.checks, "leaves events unseen", 'use checks="safe", or drop the events')
+            faults.add("checks", self.checks, "does not see events", 'use checks="safe", or drop the events')
         if self.dtype == "float32_compensated" and (self.method.tableau or self.method.gauss or self.method.two_part):
-            problem = f"sums up what a method of sub-maps changes, which {self.method.name} is not"
+            problem = f"compensates sums of a method of sub-maps, which {self.method.name} is not"
             faults.add("dtype", self.dtype, problem, "use float64, or psi_s, psi_x and their compositions")
         if self.checks == "none" and self.on_failure in ON_FAILURE[1:]:
-            problem = f"leaves failures unseen, which on_failure={self.on_failure!r} waits for"
+            problem = f"does not see failures, which on_failure={self.on_failure!r} waits for"
             faults.add("checks", self.checks, problem, 'use checks="safe", or on_failure="freeze"')
         faults.raise_if_any()
         checked = self.checks != "none"
-        model = make_model(self.ensemble, self.method, self.grid.h, built_in, checked)
-        object.__setattr__(self, "model", model)
+        choice = choose_kernel(self.ensemble, self.method, self.grid.h, built_in, checked)
+        object.__setattr__(self, "kernel_choice", choice)
         self._check_substep()
         if self.width is None:
             # Each turn of psi_x waits for the one before, so two registers pay; the implicit step V of damping laws and
             # compensated sums fill the registers by themselves.
-            full = "dense" in self.model.parts or self.dtype == "float32_compensated"
+            full = "dense" in self.kernel_choice.parts or self.dtype == "float32_compensated"
             chained = self.method.turns and not full
             object.__setattr__(self, "width", default_width(self.dtype, chained=chained))
         object.__setattr__(self, "fields", tuple(name for name in SAMPLE_FIELDS if name in self.fields))
@@ -117,14 +117,15 @@ class Plan:
         if self.on_failure != "substep":
             return
         faults, name = Faults(), self.method.name
-        letters = {letter for letter, _ in self.model.program} | ({self.model.lead[0]} if self.model.lead else set())
+        program, lead = self.kernel_choice.program, self.kernel_choice.lead
+        letters = {letter for letter, _ in (*program, *([lead] if lead else []))}
         if self.method.gauss:
             why = "starts each step from the stages of the last one, which a divided step would have lost"
             faults.add("on_failure", "substep", f"{name} {why}", 'shorten the step, or use on_failure="freeze"')
         elif not letters & SOLVING:
             why = "solves nothing that could fail"
             faults.add("on_failure", "substep", f"{name} {why}", 'use on_failure="freeze"; psi_s and psi solve (24)')
-        for term, module in self.model.laws:
+        for term, module in self.kernel_choice.laws:
             noisy = getattr(module, "NOISE", False)
             if term.memory or noisy:
                 why = (
@@ -150,7 +151,7 @@ class Plan:
         lanes = np.unique(indices // width)[:, None] * width + np.arange(width)
         return lanes[lanes < self.ensemble.members]
 
-    def part(self, indices: Sequence[int], fields: Sequence[str]) -> Plan:
+    def subplan(self, indices: Sequence[int], fields: Sequence[str]) -> Plan:
         """The plan for some of the members, with all choices made for the whole ensemble.
 
         The members' bits are therefore those of the whole run, unless steps are adaptive (see `with_neighbours`).
@@ -174,43 +175,43 @@ class Plan:
     def _sampled(self) -> tuple[str, ...]:
         """The fields that the kernel writes: those kept, and those needed to move them back to the user's origin."""
         needed = set(self.fields)
-        if self.model.moved:
+        if self.kernel_choice.moved:
             needed |= {"attitude"} if "position" in needed else set()
             needed |= {"angular_velocity"} if "velocity" in needed else set()
         return tuple(name for name in SAMPLE_FIELDS if name in needed)
 
     def _spec(self) -> Spec:
-        model, checked = self.model, self.checks != "none"
-        back = min(0.0, *self.method.stages) < 0.0 and bool(model.drag) and self.method.tableau is None
+        choice, checked = self.kernel_choice, self.checks != "none"
+        back = min(0.0, *self.method.stages) < 0.0 and bool(choice.drag) and self.method.tableau is None
         return Spec(
             width=self.width,
             real=wp.float64 if DTYPES[self.dtype] == "float64" else wp.float32,
-            maps=model.program,
-            lead=model.lead,
-            laws=tuple(module for _, module in model.laws),
-            numbers=tuple(declared(term, module) for term, module in (*model.laws, *model.events)),
-            mass=model.mass,
+            maps=choice.program,
+            lead=choice.lead,
+            laws=tuple(module for _, module in choice.laws),
+            numbers=tuple(declared(term, module) for term, module in (*choice.laws, *choice.events)),
+            mass=choice.mass,
             solver=self.method.solver,
             iterations=int(self.method.iterations or 0),
             adaptive=self.method.iterations is None,
             checked=checked,
             fields=self._sampled(),
-            events=tuple(module for _, module in model.events),
-            drag=model.drag,
-            parts=model.parts,
-            coupling=model.coupling,
-            flow=model.flow,
-            timed=model.timed,
-            memory=model.memory,
-            averages=model.averages,
+            events=tuple(module for _, module in choice.events),
+            drag=choice.drag,
+            parts=choice.parts,
+            coupling=choice.coupling,
+            flow=choice.flow,
+            timed=choice.timed,
+            memory=choice.memory,
+            averages=choice.averages,
             composed=len(self.method.stages) > 1,
-            paired=self.method.halved or (self.method.two_part and not model.lead),
+            paired=self.method.halved or (self.method.two_part and not choice.lead),
             gauss=gauss(self.method.gauss) if self.method.gauss else (),
-            lead_time=self.lengths[1][-1] if model.timed else 0.0,
+            lead_time=self.lengths[1][-1] if choice.timed else 0.0,
             explicit=self._explicit(),
             compensated=self.dtype == "float32_compensated",
             looks=watched(self) if self.checks == "all" else (),
-            energy=model.conservative,
+            energy=choice.conservative,
             backward=checked and back,
             substep=self.on_failure == "substep",
         )
@@ -222,7 +223,7 @@ class Plan:
         # A step that is given asks for no estimate: nothing of it then is in the kernel's source.
         estimate = (tableau.errors, tableau.estimate) if self.method.adaptive else ((), 0)
         kind = KINDS.get(self.method.name, "vector")
-        if kind == "vector" and self.model.steady and not self.method.adaptive:
+        if kind == "vector" and self.kernel_choice.steady and not self.method.adaptive:
             kind = "inertial"
         return Explicit(kind, tableau.a, tableau.b, tableau.c, *estimate,
                         self.method.adaptive)  # fmt: skip
@@ -235,20 +236,22 @@ class Plan:
         except OSError:  # of the kernel cache
             raise
         except Exception as error:
-            acting = (*self.model.laws, *self.model.events)
+            acting = (*self.kernel_choice.laws, *self.kernel_choice.events)
             user_laws = [term.key for term, module in acting if not is_built_in(module)]
             if not user_laws:
                 raise
             problem = f"one of them does not compile ({type(error).__name__}: {error})"
             raise SceneError(
-                [f"law {', '.join(user_laws)}: {problem}; lw.check_law(term) says where, docs/add_a_law.md how"]
+                [
+                    f"law {', '.join(user_laws)}: {problem}; lw.check_law(term) says where, docs/develop/add_a_force.md how"
+                ]
             ) from error
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the settings alone: a kernel cannot be pickled, and the other process finds it in Warp's cache."""
         if self._whole:
             # Made anew from these members alone, the plan might choose another kernel.
-            return Plan.part, self._whole
+            return Plan.subplan, self._whole
         settings = (
             self.ensemble,
             self.method,
@@ -300,7 +303,7 @@ class Plan:
     @functools.cached_property
     def lengths(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Lengths of the stages and of the leads, in units of the step h [1]."""
-        lead = self.model.lead
+        lead = self.kernel_choice.lead
         return self.method.lengths(lead[1] if lead else None)
 
     @functools.cached_property

@@ -33,8 +33,8 @@ class Watched(Protocol):
         """The kernel's numbers, such as "float64"."""
 
     @property
-    def model(self) -> Any:
-        """The laws that act and the method's program (see `Model`)."""
+    def kernel_choice(self) -> Any:
+        """The laws that act and the method's program (see `KernelChoice`)."""
 
     @property
     def spec(self) -> Any:
@@ -74,16 +74,16 @@ def watched(plan: Watched) -> tuple[str, ...]:
     Returns:
         Names of rows of lgvi_kernels.advance.monitor, the least serious first.
     """
-    method, model = plan.method, plan.model
+    method, choice = plan.method, plan.kernel_choice
     rows = ["precision"] * (plan.dtype == "float32") + ["orthogonality"]
     if not method.adaptive:
-        munk = model.mass != "isotropic"
-        dragged = bool(model.drag) or any(hasattr(module, "damping") for _, module in model.laws)
+        munk = choice.mass != "isotropic"
+        dragged = bool(choice.drag) or any(hasattr(module, "damping") for _, module in choice.laws)
         rows += ["munk_coarse"] * munk
         rows += ["rotation"] * (method.turns or method.tableau is not None)
-        rows += ["drag"] * (dragged and (method.tableau is not None or model.averages is not None))
+        rows += ["drag"] * (dragged and (method.tableau is not None or choice.averages is not None))
         rows += ["munk_unstable"] * munk
-    return (*rows, *["energy"] * model.conservative)
+    return (*rows, *["energy"] * choice.conservative)
 
 
 def orthogonality_limit(plan: Watched) -> float:

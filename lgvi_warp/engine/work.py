@@ -32,12 +32,12 @@ class Work:
     Args:
         plan: the plan of the run.
         keepers: what is kept of the members.
-        sink: the store; None (default) for none.
+        store: the store; None (default) for none.
     """
 
     plan: Plan
     keepers: tuple[Keeper, ...]
-    sink: BlockStore | None = None
+    store: BlockStore | None = None
 
     def __call__(
         self,
@@ -62,15 +62,15 @@ class Work:
             steps_made += vehicle_steps
             advanced(steps_made)
 
-        if self.sink is None:
+        if self.store is None:
             return run_block(self.plan, block, self.keepers, halted, add)
-        stored = self.sink.parts(block, self.keepers)
+        stored = self.store.parts(block, self.keepers)
         if stored is not None:
             return stored
-        results = run_block(self.plan, block, (*self.keepers, self.sink), halted, add)
+        results = run_block(self.plan, block, (*self.keepers, self.store), halted, add)
         if results is None:
             return None
-        self.sink.finish(block, results[-1], self.keepers, results[:-1])
+        self.store.finish(block, results[-1], self.keepers, results[:-1])
         return results[:-1]
 
 

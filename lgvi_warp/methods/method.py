@@ -226,15 +226,20 @@ class Method:
             if ORDERS.get(base) == 1 or base in EXPLICIT:
                 faults.add("method", self.name, "is a composition of a method that is not symmetric", "compose psi_s")
             elif base in TWO_PART or base in GAUSS:
-                faults.add("method", self.name, "composes what is not of order 2", f"use {base}, or compose psi_s")
+                faults.add(
+                    "method",
+                    self.name,
+                    "is a composition of a method that is not of order 2",
+                    f"use {base}, or compose psi_s",
+                )
             elif composition in HALVES and base in PROGRAMS and not divisible(PROGRAMS[base]):
                 middle = PROGRAMS[base][len(PROGRAMS[base]) // 2][0]
-                faults.add("method", self.name, f"would divide {middle}, the middle of {base}, which is no flow",
+                faults.add("method", self.name, f"would divide {middle}, and only exact flows can be divided",
                            f"use {composition}(psi_s)")  # fmt: skip
         faults.choice("solver", self.solver, SOLVERS)
         n = self.iterations
         if n not in (None, "auto") and (isinstance(n, bool) or not isinstance(n, int) or not 0 <= n <= 100):
-            remedy = 'give one, "auto", or None for the tolerance'
+            remedy = 'give a number of Newton steps, "auto", or None to iterate to the tolerance'
             faults.add("iterations", n, "is not a whole number from 0 to 100", remedy)
         for name in ("alpha", "beta"):
             value = getattr(self, name)
@@ -252,7 +257,7 @@ class Method:
             if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < 1.0:
                 faults.add(name, value, "is not between 0 and 1", "give a tolerance such as 1e-9")
         if len(tolerances) == 1:
-            faults.add(*tolerances.popitem(), "has no counterpart", "give both rtol and atol, or none for a fixed step")
+            faults.add(*tolerances.popitem(), "is given alone", "give both rtol and atol, or none for a fixed step")
         elif tolerances and self.name in ORDERS and not (self.tableau and self.tableau.errors):
             able = " or ".join(name for name, tableau in EXPLICIT.items() if tableau.errors)
             faults.add("rtol, atol", self.name, "estimates no error", f"use {able}, or leave them out")

@@ -73,8 +73,15 @@ class TimeGrid:
         return int(self.sample_steps[-1])
 
 
-def _exact(x: float) -> Fraction:
-    """The number that was meant: 0.1 + 0.2 is 3/10, 0.3333333333333333 is 1/3, 1e-12 is itself."""
+def exact(x: float) -> Fraction:
+    """The number that was meant: 0.1 + 0.2 is 3/10, 0.3333333333333333 is 1/3, 1e-12 is itself.
+
+    Args:
+        x: A number as a float.
+
+    Returns:
+        The simplest fraction whose float is x to 15 digits.
+    """
     simple = Fraction(repr(float(x))).limit_denominator(10**6)
     return simple if abs(float(simple) - x) <= 1e-15 * abs(x) else Fraction(f"{x:.15g}")
 
@@ -108,10 +115,10 @@ def time_grid(h: float, t1: float, save: SaveAt) -> TimeGrid:
             "save.every", save.every, f"asks for more than {MOST_SAMPLES} samples", "save less often, or run in parts"
         )
     faults.raise_if_any()
-    end, meant = _exact(t1), _exact(h)
-    every = end if save.every is None else _exact(save.every)
+    end, meant = exact(t1), exact(h)
+    every = end if save.every is None else exact(save.every)
     regular = int(end / every)
-    sample_times = sorted({_exact(t) for t in save.at or ()} | {Fraction(0), end})
+    sample_times = sorted({exact(t) for t in save.at or ()} | {Fraction(0), end})
     spacing = every
     for t in sample_times:
         spacing = Fraction(

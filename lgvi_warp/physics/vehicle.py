@@ -133,9 +133,7 @@ class Vehicle:
     def _full(self, faults: Faults) -> dict[str, Any]:
         for name in ("mass", "inertia", "added_mass"):
             if getattr(self, name) is not None:
-                faults.add(
-                    name, getattr(self, name), "says again what the 6x6 matrices say", "keep one of the two forms"
-                )
+                faults.add(name, getattr(self, name), "repeats what the 6x6 matrices say", "keep one of the two forms")
         unit = UNITS["rigid_body_mass_matrix"]
         rigid: np.ndarray | None = None
         if self.rigid_body_mass_matrix is None:
@@ -186,9 +184,11 @@ class Vehicle:
         implied = -inertias.vee(rigid[:3, 3:]) / m
         size = np.abs(rigid).max()
         if np.abs(rigid[:3, :3] - m * np.eye(3)).max() > 1e-6 * size:
-            faults.add("rigid_body_mass_matrix", rigid[:3, :3], "has no m I in its first block", remedy)
+            faults.add("rigid_body_mass_matrix", rigid[:3, :3], "does not have m I as its upper left block", remedy)
         if np.abs(rigid[:3, 3:] + m * inertias.hat(implied)).max() > 1e-6 * size:
-            faults.add("rigid_body_mass_matrix", rigid[:3, 3:], "has no -m hat(r_g) in its second block", remedy)
+            faults.add(
+                "rigid_body_mass_matrix", rigid[:3, 3:], "does not have -m hat(r_g) as its upper right block", remedy
+            )
         if center is None:
             return implied, ()
         if np.abs(center - implied).max() > 1e-3 * max(np.abs(center).max(), np.sqrt(np.trace(rigid[3:, 3:]) / m)):

@@ -14,7 +14,14 @@ Program = Sequence[tuple[str, float]]
 def step(
     x: State, body: Body, program: Program, h: float, stages: Sequence[float] = (1.0,), solve: Solver = newton
 ) -> State:
-    """One step of h [s]: the program with g h for each stage coefficient g."""
+    """One step of h [s]: the program with g h for each stage coefficient g.
+
+    Args:
+        x, body: State at the start; inertia and laws.
+        program, h: (letter, coefficient) of each sub-map; step [s].
+        stages: Coefficients of the composition's stages; default one stage.
+        solve: Solver of equation (24).
+    """
     for g in stages:
         for letter, coefficient in program:
             x = (SUBMAPS | FORCED)[letter](x, body, coefficient * g * h, solve)
@@ -30,7 +37,15 @@ def advance(
     stages: Sequence[float] = (1.0,),
     solve: Solver = newton,
 ) -> State:
-    """The state after so many steps."""
+    """The state after so many steps.
+
+    Args:
+        x, body: State at the start; inertia and laws.
+        program, h: (letter, coefficient) of each sub-map; step [s].
+        steps: Number of steps.
+        stages: Coefficients of the composition's stages; default one stage.
+        solve: Solver of equation (24).
+    """
     for _ in range(steps):
         x = step(replace(x, t=x.step * h), body, program, h, stages, solve)
         x = replace(x, step=x.step + 1)
@@ -47,7 +62,16 @@ def trajectory(
     stages: Sequence[float] = (1.0,),
     solve: Solver = newton,
 ) -> list[State]:
-    """The states after 0, every, 2 every, ..., steps steps. Raises ValueError if `every` does not divide `steps`."""
+    """The states after 0, every, 2 every, ..., steps steps. Raises ValueError if `every` does not divide `steps`.
+
+    Args:
+        x, body: State at the start; inertia and laws.
+        program, h: (letter, coefficient) of each sub-map; step [s].
+        steps: Number of steps.
+        every: Steps from one state of the list to the next; default 1.
+        stages: Coefficients of the composition's stages; default one stage.
+        solve: Solver of equation (24).
+    """
     if steps % every:
         raise ValueError(f"every = {every} does not divide steps = {steps}")
     states = [x]
@@ -68,6 +92,13 @@ def arrival(
     """The state where a step from x comes to a distance of 0, and the part of h [s] until then.
 
     distance: positive at x, zero or below after the whole step.
+
+    Args:
+        x, body: State at the start; inertia and laws.
+        program, h: (letter, coefficient) of each sub-map; step [s].
+        distance: Distance to the event, positive at x and not after the whole step.
+        stages: Coefficients of the composition's stages; default one stage.
+        solve: Solver of equation (24).
     """
     start = replace(x, t=x.step * h)
 

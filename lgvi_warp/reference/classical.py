@@ -14,7 +14,13 @@ Stage = tuple[Array, Array, Array, Array]
 
 
 def rates(b: Array, R: Array, nu: Array, Om: Array, body: Body) -> tuple[Array, Array, Array]:
-    """Eq. (1) and (3): db/dt in inertial axes, then dnu/dt and dOm/dt in body axes."""
+    """Eq. (1) and (3): db/dt in inertial axes, then dnu/dt and dOm/dt in body axes.
+
+    Args:
+        b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular
+            velocity (3,) [rad/s], body axes.
+        body: Inertia and laws.
+    """
     force, torque = body.wrench(b, R)
     p, pi = body.M @ nu, body.J @ Om
     nu_rate = np.linalg.solve(body.M, cross(p, Om) + force)
@@ -23,7 +29,13 @@ def rates(b: Array, R: Array, nu: Array, Om: Array, body: Body) -> tuple[Array, 
 
 
 def along_screw(b: Array, R: Array, d: Array, theta: Array) -> tuple[Array, Array]:
-    """(b, R) exp of the twist (d, theta) in SE(3): b + R V d and R exp(hat(theta)), V the integral of exp."""
+    """(b, R) exp of the twist (d, theta) in SE(3): b + R V d and R exp(hat(theta)), V the integral of exp.
+
+    Args:
+        b, R: Position (3,) [m]; attitude (3, 3), body to inertial axes.
+        d: Translation (3,) [m] of the twist.
+        theta: Rotation vector (3,) of the twist.
+    """
     n, H = norm(theta), hat(theta)
     third = (n - math.sin(n)) / n**3 if n > 1e-2 else 1.0 / 6.0 - n**2 / 120.0 + n**4 / 5040.0
     V = np.eye(3) + 0.5 * sinc(0.5 * n) ** 2 * H + third * H @ H
@@ -39,6 +51,11 @@ def cg3(b: Array, R: Array, nu: Array, Om: Array, body: Body, h: float) -> Motio
     """Crouch-Grossman, order 3, on SE(3) x R6: R <- R exp(h b1 Om1) exp(h b2 Om2) exp(h b3 Om3).
 
     b moves by the same screws. Returns b, R, nu, Om at k + 1.
+
+    Args:
+        b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular
+            velocity (3,) [rad/s], body axes.
+        body, h: Inertia and laws; step [s].
     """
     stages: list[Stage] = []
     for row in CG3_A:
@@ -51,7 +68,15 @@ def cg3(b: Array, R: Array, nu: Array, Om: Array, body: Body, h: float) -> Motio
 def crouch_grossman_row(
     b: Array, R: Array, nu: Array, Om: Array, h: float, row: Sequence[float], stages: list[Stage]
 ) -> Motion:
-    """From the state at k along the frozen twists of the stages so far, with the weights of one row of the tableau."""
+    """From the state at k along the frozen twists of the stages so far, with the weights of one row of the tableau.
+
+    Args:
+        b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular
+            velocity (3,) [rad/s], body axes.
+        h: Step [s].
+        row: Weights of the stages, a row of the tableau.
+        stages: nu, Om and their rates at the stages so far.
+    """
     for weight, (nui, Omi, nu_rate, Om_rate) in zip(row, stages, strict=True):
         b, R = along_screw(b, R, h * weight * nui, h * weight * Omi)
         nu, Om = nu + h * weight * nu_rate, Om + h * weight * Om_rate
@@ -69,7 +94,13 @@ def inverse_dexp(theta: Array, Om: Array) -> Array:
 
 
 def rkmk4(b: Array, R: Array, nu: Array, Om: Array, body: Body, h: float) -> Motion:
-    """Runge-Kutta-Munthe-Kaas, order 4 (HLW IV.8.2): RK4 for the rotation vector. Returns b, R, nu, Om at k + 1."""
+    """Runge-Kutta-Munthe-Kaas, order 4 (HLW IV.8.2): RK4 for the rotation vector. Returns b, R, nu, Om at k + 1.
+
+    Args:
+        b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular
+            velocity (3,) [rad/s], body axes.
+        body, h: Inertia and laws; step [s].
+    """
     theta = np.zeros(3)
     rate: tuple[Array, ...] = (np.zeros(3),) * 4
     total = rate

@@ -26,11 +26,11 @@ class Tableau(Protocol):
 
     @property
     def b(self) -> Row:
-        """(stages,)."""
+        """Weights of the stages, (stages,)."""
 
     @property
     def c(self) -> Row:
-        """(stages,)."""
+        """Times of the stages in steps, (stages,)."""
 
     @property
     def errors(self) -> tuple[Row, ...]:
@@ -38,7 +38,7 @@ class Tableau(Protocol):
 
     @property
     def estimate(self) -> int:
-        """Power of h."""
+        """Power of h with which the estimate of the error falls."""
 
 
 # step(x, body, h) -> the state h [s] later.
@@ -61,13 +61,24 @@ def pack(x: State) -> Array:
 
 
 def unpack(y: Array, x: State, t: float) -> State:
-    """The state with y (15,) at t [s], the rest as in x."""
+    """The state with y (15,) at t [s], the rest as in x.
+
+    Args:
+        y: Vector (15,), see `pack`.
+        x: State with the other fields.
+        t: Time [s].
+    """
     first, last = y[3:6], y[6:9]
     return replace(x, b=y[:3], R=np.array([first, cross(last, first), last]), p=y[9:12], pi=y[12:], t=t)
 
 
 def wrench(x: State, body: Body, h: float, nu: Array, Om: Array) -> tuple[Array, Array, Array]:
-    """Force (3,) [N], torque (3,) [N m] of all laws, body axes, and the water's velocity (3,) [m/s], inertial."""
+    """Force (3,) [N], torque (3,) [N m] of all laws, body axes, and the water's velocity (3,) [m/s], inertial.
+
+    Args:
+        x, body, h: State at the start; inertia and laws; step [s].
+        nu, Om: Velocity (3,) [m/s], body axes; angular velocity (3,) [rad/s], body axes.
+    """
     views = look(x, body, h)
     flow = water(views, body)
     force, torque = body.wrench(x.b, x.R, views)
@@ -86,6 +97,10 @@ def derivatives(x: State, body: Body, h: float, origin: Array = USER) -> tuple[A
 
     b' = R nu + u, R' = R hat(Om), p' = p x Om + f, pi' = pi x Om + p x nu + m; h [s] is the step, which some laws look at.
     origin (3,) [m]: where x has its b and pi, from the user's origin.
+
+    Args:
+        x, body, h: State at the start; inertia and laws; step [s].
+        origin: Point (3,) [m] of the body, from the user's origin; default that origin.
     """
     x = at(x, -origin)
     nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, x.pi])), 2)
@@ -96,13 +111,23 @@ def derivatives(x: State, body: Body, h: float, origin: Array = USER) -> tuple[A
 
 
 def rates(x: State, body: Body, h: float, origin: Array = USER) -> Array:
-    """dy/dt (15,)."""
+    """Rate of the vector of `pack`, dy/dt (15,).
+
+    Args:
+        x, body, h: State at the start; inertia and laws; step [s].
+        origin: Point (3,) [m] of the body, from the user's origin; default that origin.
+    """
     b, R, p, pi = derivatives(x, body, h, origin)
     return np.concatenate([b, R[0], R[2], p, pi])
 
 
 def remembered_half(x: State, body: Body, h: float, second: bool) -> State:
-    """What laws remember, half a step of h [s] later; x.t is the step's start, or its end in the second half."""
+    """What laws remember, half a step of h [s] later; x.t is the step's start, or its end in the second half.
+
+    Args:
+        x, body, h: State at the start; inertia and laws; step [s].
+        second: Whether it is the second half of the step.
+    """
     if not any(memory.size for memory in x.memory):
         return x
     middle = replace(x, t=x.t + (-0.5 if second else 0.5) * h)
@@ -110,7 +135,13 @@ def remembered_half(x: State, body: Body, h: float, second: bool) -> State:
 
 
 def stages(x: State, body: Body, h: float, tableau: Tableau, origin: Array = USER) -> Array:
-    """k_i = f(t + c_i h, y + h sum_j a_ij k_j), (stages, 15)."""
+    """k_i = f(t + c_i h, y + h sum_j a_ij k_j), (stages, 15).
+
+    Args:
+        x, body, h: State at the start; inertia and laws; step [s].
+        tableau: Coefficients of the Runge-Kutta method.
+        origin: Point (3,) [m] of the body, from the user's origin; default that origin.
+    """
     y, K = pack(x), np.zeros((len(tableau.b), 15))
     for i, (row, c) in enumerate(zip(tableau.a, tableau.c, strict=True)):
         K[i] = rates(unpack(y + h * np.array(row) @ K[:i], x, x.t + c * h), body, h, origin)
@@ -129,7 +160,13 @@ def stepper(tableau: Tableau, origin: Array = USER) -> Step:
 
 
 def advance(step: Step, x: State, body: Body, h: float, steps: int) -> State:
-    """The state after so many steps of h [s]."""
+    """The state after so many steps of h [s].
+
+    Args:
+        step: Function (x, body, h) that makes one step.
+        x, body, h: State at the start; inertia and laws; step [s].
+        steps: Number of steps.
+    """
     for _ in range(steps):
         x = step(replace(x, t=x.step * h), body, h)
         x = replace(x, step=x.step + 1, t=(x.step + 1) * h)
@@ -140,14 +177,20 @@ def advance_steady(tableau: Tableau, x: State, body: Body, h: float, steps: int,
     """The state after so many steps of h [s] where forces never change in inertial axes: then R p = P + t F is known.
 
     y = (b, two rows of R, pi), (12,), of which p = R^T (R p) at every stage.
+
+    Args:
+        tableau: Coefficients of the Runge-Kutta method.
+        x, body, h: State at the start; inertia and laws; step [s].
+        steps: Number of steps.
+        origin: Point (3,) [m] of the body, from the user's origin; default that origin.
     """
     x = at(x, origin)
     nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, at(x, -origin).pi])), 2)
     P, F = x.R @ x.p, x.R @ wrench(x, body, h, nu, Om)[0]
 
     def unpacked(y: Array, t: float) -> State:
-        whole = unpack(np.concatenate([y[:9], P, y[9:]]), x, t)
-        return replace(whole, p=whole.R.T @ (P + t * F))
+        full_state = unpack(np.concatenate([y[:9], P, y[9:]]), x, t)
+        return replace(full_state, p=full_state.R.T @ (P + t * F))
 
     def f(y: Array, t: float) -> Array:
         rate = rates(unpacked(y, t), body, h, origin)
@@ -163,7 +206,14 @@ def advance_steady(tableau: Tableau, x: State, body: Body, h: float, steps: int,
 
 
 def error_norm(tableau: Tableau, K: Array, h: float, scale: Array) -> float:
-    """The error of a step over the tolerance, HNW (4.11); with two estimates, HNW II.10: e5^2 / sqrt(e5^2 + e3^2 / 100)."""
+    """The error of a step over the tolerance, HNW (4.11); with two estimates, HNW II.10: e5^2 / sqrt(e5^2 + e3^2 / 100).
+
+    Args:
+        tableau: Coefficients of the Runge-Kutta method.
+        K: Rates (stages, 15), with the rate at the end where the tableau asks for it.
+        h: Step [s].
+        scale: Tolerance of each entry of y.
+    """
     norms = [float(np.mean((h * np.array(e) @ K / scale) ** 2)) for e in tableau.errors]
     if len(norms) == 1:
         return math.sqrt(norms[0])
@@ -172,14 +222,26 @@ def error_norm(tableau: Tableau, K: Array, h: float, scale: Array) -> float:
 
 
 def next_factor(tableau: Tableau, error: float, before: float) -> float:
-    """PI control, h <- h factor; error and before: those of this step and of the last accepted."""
+    """PI control, h <- h factor; error and before: those of this step and of the last accepted.
+
+    Args:
+        tableau: Coefficients of the Runge-Kutta method.
+        error: Error of this step over the tolerance.
+        before: Error of the last accepted step over the tolerance.
+    """
     exponent = 1.0 / tableau.estimate - 0.75 * BETA
     factor = SAFETY * max(error, 1e-10) ** -exponent * max(before, 1e-4) ** BETA
     return min(GROW, max(SHRINK, factor))
 
 
 def attempt(x: State, body: Body, h: float, tableau: Tableau, rtol: float, atol: float | Array) -> tuple[State, float]:
-    """The state h [s] later and its error over the tolerance atol + rtol max(|y_k|, |y_k+1|)."""
+    """The state h [s] later and its error over the tolerance atol + rtol max(|y_k|, |y_k+1|).
+
+    Args:
+        x, body, h: State at the start; inertia and laws; step [s].
+        tableau: Coefficients of the Runge-Kutta method.
+        rtol, atol: Relative tolerance; absolute tolerance, one number or (15,).
+    """
     x = remembered_half(x, body, h, second=False)
     K, y = stages(x, body, h, tableau), pack(x)
     y_k1 = y + h * np.array(tableau.b) @ K
@@ -191,7 +253,13 @@ def attempt(x: State, body: Body, h: float, tableau: Tableau, rtol: float, atol:
 
 
 def first_step(x: State, body: Body, tableau: Tableau, rtol: float, atol: float | Array) -> float:
-    """HNW II.4, a starting step: an explicit Euler step of h0 = 0.01 |y| / |f| estimates the second derivative."""
+    """HNW II.4, a starting step: an explicit Euler step of h0 = 0.01 |y| / |f| estimates the second derivative.
+
+    Args:
+        x, body: State at the start; inertia and laws.
+        tableau: Coefficients of the Runge-Kutta method.
+        rtol, atol: Relative tolerance; absolute tolerance, one number or (15,).
+    """
     y, f = pack(x), rates(x, body, 1.0)
     scale = atol + rtol * np.abs(y)
     d0, d1 = (math.sqrt(np.mean((v / scale) ** 2)) for v in (y, f))
@@ -213,20 +281,27 @@ def adaptive(
     """The states at the times [s], rising; steps are shortened to end on them. atol: for all of y, or (15,).
 
     Every state's `step` counts the accepted steps. Raises ValueError where the step becomes too small.
+
+    Args:
+        x, body: State at the start; inertia and laws.
+        times: Times [s], rising.
+        rtol, atol: Relative tolerance; absolute tolerance, one number or (15,).
+        tableau: Coefficients of the Runge-Kutta method.
+        h: First step [s]; default None, chosen by `first_step`.
     """
     h = first_step(x, body, tableau, rtol, atol) if h is None else h
     states, before = [], 1e-4
     for t in times:
         while x.t < t:
             # Not a tiny last step: what is left is divided in two.
-            left = t - x.t
-            taken = left if left <= 1.0001 * h else min(h, 0.5 * left)
+            remaining = t - x.t
+            taken = remaining if remaining <= 1.0001 * h else min(h, 0.5 * remaining)
             new, error = attempt(x, body, taken, tableau, rtol, atol)
             if not math.isfinite(error):
                 error = 1e10
             factor = next_factor(tableau, error, before)
             if error <= 1.0:
-                x, before = (replace(new, t=t) if taken == left else new), error
+                x, before = (replace(new, t=t) if taken == remaining else new), error
                 h = max(h, taken * factor) if taken < h else taken * factor
             else:
                 h = taken * min(1.0, factor)

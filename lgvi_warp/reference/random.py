@@ -38,8 +38,13 @@ def box_muller(words: NDArray[np.uint32]) -> NDArray[np.float64]:
 def normals(
     seed0: ArrayLike, seed1: ArrayLike, member: ArrayLike, step: ArrayLike, channel: ArrayLike
 ) -> NDArray[np.float64]:
-    """Four independent standard normals, shape (..., 4), of whole numbers of 32 bits that are broadcast together."""
-    whole = [np.asarray(x, dtype=np.int64) & WORD for x in (member, step, channel, 0, seed0, seed1)]
-    *counter, seed0, seed1 = np.broadcast_arrays(*whole)
+    """Four independent standard normals, shape (..., 4), of whole numbers of 32 bits that are broadcast together.
+
+    Args:
+        seed0, seed1, member, step, channel: Lower half of the run's seed; upper half; index of the member; number of the
+            step; number of the stream.
+    """
+    numbers = [np.asarray(x, dtype=np.int64) & WORD for x in (member, step, channel, 0, seed0, seed1)]
+    *counter, seed0, seed1 = np.broadcast_arrays(*numbers)
     words = philox4x32(np.stack(counter, axis=-1), np.stack([seed0, seed1], axis=-1))
     return np.concatenate([box_muller(words[..., :2]), box_muller(words[..., 2:])], axis=-1)

@@ -30,13 +30,13 @@ from lgvi_warp.methods.saveat import SaveAt, TimeGrid
 from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.runs import member_fields
 from lgvi_warp.runs.sizes import Sizes, sizes
+from lgvi_warp.runs.store.block_files import BlockFiles, marker
 from lgvi_warp.runs.store.create import create
 from lgvi_warp.runs.store.folder import Folder
 from lgvi_warp.runs.store.kept import group_of
 from lgvi_warp.runs.store.layout import columns, size
 from lgvi_warp.runs.store.recipe import of_store
 from lgvi_warp.runs.store.settings import Store
-from lgvi_warp.runs.store.sink import Sink, marker
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 
@@ -218,8 +218,16 @@ def _seconds(plan: Plan, steps: int, chosen: list[Block], threads: int, observed
     return time.perf_counter() - start
 
 
-def _result_bytes(plan: Plan, fields: Sequence[str] | None = None) -> int:
-    """Size of a result in memory, and about that of its file [bytes]; fields: of its samples, by default all of the plan."""
+def result_bytes(plan: Plan, fields: Sequence[str] | None = None) -> int:
+    """Size of a result in memory, and about that of its file.
+
+    Args:
+        plan: The run.
+        fields: Fields of the samples that the result holds; default None, all of the plan.
+
+    Returns:
+        The size [bytes].
+    """
     k, n = len(plan.grid.times), plan.ensemble.members
     real = np.dtype(machine.DTYPES[plan.dtype]).itemsize
     rows = {name: int(np.prod(TABLE[name].shape)) * real for name in (plan.fields if fields is None else fields)}
@@ -253,7 +261,7 @@ class Sized:
     def disk(self) -> int:
         """Size of the files without a store's metadata [bytes]; for a run in memory about that of its result's file."""
         if self.store is None:
-            return _result_bytes(self.plan, self.fields) + self.statistics.estimates
+            return result_bytes(self.plan, self.fields) + self.statistics.estimates
         each = self.statistics.file + len(marker(self._sums()))
         return size(self.plan, self.store) + each * len(blocks(self.plan.ensemble.members))
 
@@ -262,7 +270,7 @@ class Sized:
         assert self.store is not None
         block, k = blocks(self.plan.ensemble.members)[0], len(self.plan.grid.times)
         keys = {key: column.bytes for column in columns(self.plan, self.store) for key in column.keys(block, k)}
-        keys |= {Sink.parts_key(block): self.statistics.file} if self.statistics.file else {}
+        keys |= {BlockFiles.parts_key(block): self.statistics.file} if self.statistics.file else {}
         return {key: [count, 2**32 - 1] for key, count in keys.items()}
 
     @property
@@ -270,7 +278,7 @@ class Sized:
         """Memory held at the end of the run [bytes]: its result, or what stays in memory beside a store."""
         held = self.statistics.joined + self.statistics.estimates
         if self.store is None:
-            return held + _result_bytes(self.plan, self.fields)
+            return held + result_bytes(self.plan, self.fields)
         each = sum(np.dtype(member_field.dtype).itemsize for member_field in member_fields.present(self.plan))
         return held + each * self.plan.ensemble.members
 
@@ -328,10 +336,10 @@ def again(plan: Plan, observed: Observation, store: Store | None, fields: Sequen
         return []
     wanted = observed.again(np.zeros(plan.ensemble.members, np.uint8))
     if store is None:
-        return [Sized(plan.part(plan.with_neighbours(wanted).tolist(), fields))]
+        return [Sized(plan.subplan(plan.with_neighbours(wanted).tolist(), fields))]
     group = group_of(store, plan, wanted)
     stored_fields = tuple(name for name in fields if store.fields is None or name in store.fields)
-    return [Sized(plan.part(group.members.tolist(), stored_fields), group)]
+    return [Sized(plan.subplan(group.members.tolist(), stored_fields), group)]
 
 
 def writing(runs: Sequence[Sized], folder: Path, threads: int) -> tuple[float, int]:

@@ -52,7 +52,7 @@ def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence
         "width": plan.spec.width,
         "checks": plan.checks,
         "on_failure": plan.on_failure,
-        "terms": [term.type for term, _ in plan.model.laws],
+        "terms": [term.type for term, _ in plan.kernel_choice.laws],
         "kernel": plan.kernel_hash,
         "versions": machine.versions(),
         "machine": machine.describe(),
@@ -76,4 +76,4 @@ def odd_before(plan: Plan) -> tuple[str, ...]:
     ensemble = plan.ensemble
     varies = ensemble.starts_vary or bool(ensemble.varied() and plausibility.own_flows(ensemble.scene))
     starts = plausibility.of_start(ensemble.scene, ensemble.select(0, min(AT_ONCE, ensemble.members) if varies else 1))
-    return plan.model.odd.messages(ensemble.members) + starts.messages(ensemble.members, AT_ONCE)
+    return plan.kernel_choice.odd.messages(ensemble.members) + starts.messages(ensemble.members, AT_ONCE)

@@ -15,7 +15,7 @@ from lgvi_warp.engine.executors.base import Executor
 from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.keepers.memory import Outcomes, Samples
 from lgvi_warp.engine.keepers.observation import Observation, Observing
-from lgvi_warp.engine.loop import Merged, Progress, run_blocks
+from lgvi_warp.engine.loop import Merged, RunProgress, run_blocks
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.engine.work import Work
 from lgvi_warp.runs import member_fields
@@ -85,7 +85,7 @@ def run_plan(
     outcomes, samples = Outcomes(plan), Samples(plan, fields) if observed.samples else None
     observing = Observing(observed, plan.grid.times, total, plan.ensemble.replicates)
     keepers = (outcomes, *((samples,) if samples else ()), *observing.keepers)
-    overall = Progress(total * plan.grid.steps, progress)
+    overall = RunProgress(total * plan.grid.steps, progress)
     start = time.perf_counter()
     merged = Merged()
 
@@ -128,7 +128,7 @@ def again(
     if not len(indices):
         return indices, None
     chosen = plan.with_neighbours(indices)
-    result = run_plan(plan.part([int(i) for i in chosen], fields), threads)
+    result = run_plan(plan.subplan([int(i) for i in chosen], fields), threads)
     return indices, result if len(chosen) == len(indices) else result.part(np.searchsorted(chosen, indices))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.keepers.statistics import Gathered
 from lgvi_warp.engine.work import at_start, samples_of
-from lgvi_warp.runs.store.sink import packed
+from lgvi_warp.runs.store.block_files import packed
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.order import SORTED_AT_ONCE
 from lgvi_warp.statistics.tree import Part

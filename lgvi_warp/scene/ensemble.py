@@ -91,9 +91,10 @@ class Ensemble:
         """
         ensemble = cls.__new__(cls)
         # The ensemble of a scene file was checked when the file was read.
-        ensemble._setup(scene, settings, {}, checked=vars(scene).get("_checked") is settings)
-        if scene.ensemble_settings is settings:
-            object.__setattr__(scene, "_checked", settings)
+        from_file = scene.ensemble_settings is settings
+        ensemble._setup(scene, settings, {}, checked=from_file and scene.ensemble_is_checked)
+        if from_file:
+            scene.note_checked_ensemble()
         if settings.indices is None:
             return ensemble
         most = int(np.max(settings.indices))
@@ -185,8 +186,8 @@ class Ensemble:
         # Positions of these members in the whole ensemble, and the indices that key their noise; None: all, in order.
         self._places: np.ndarray | None = None
         self._indices: np.ndarray | None = None
-        self._variations = self._described()
-        self.space: Space = variations.space(self.seed, self._variations)
+        self.variations = self._described()
+        self.space: Space = variations.space(self.seed, self.variations)
         self._whole = self._counted(settings)
         self.members = self._whole
         if not checked:
@@ -198,12 +199,15 @@ class Ensemble:
         columns = self.sampling.own_values()
         self._turn_by_matrix(faults, columns)
         known = {**self._base, **({} if self._explicit else self._start)}
-        laws = {**self.sampling.laws(), **self.vary}
-        for key in self.sampling.laws().keys() & self.vary.keys():
+        distributions = {**self.sampling.distributions(), **self.vary}
+        for key in self.sampling.distributions().keys() & self.vary.keys():
             faults.add(
                 f'"{key}"', self.vary[key], f"varies what the {self.sampling.kind} gives values", "drop one of them"
             )
-        described = [variations.variation(faults, key, law, known) for key, law in sorted(laws.items())]
+        described = [
+            variations.variation(faults, key, distribution, known)
+            for key, distribution in sorted(distributions.items())
+        ]
         named = [(variation.key, variation.targets) for variation in described if variation]
         self._columns: list[tuple[Target, np.ndarray]] = []
         tables = Faults("ensemble.sampling.table.")
@@ -234,7 +238,7 @@ class Ensemble:
 
     def _turn_by_matrix(self, faults: Faults, columns: Mapping[str, Any]) -> None:
         """Write the scene's attitude as a matrix, whatever form it has, if the attitude itself varies."""
-        keys = [*self.vary, *self.sampling.laws(), *columns]
+        keys = [*self.vary, *self.sampling.distributions(), *columns]
         names = {target.name for key in keys for target in variations.targets(key)}
         if variations.ATTITUDE not in names or self._explicit:
             return
@@ -284,7 +288,7 @@ class Ensemble:
 
     def _check_physical(self) -> None:
         """Refuse unphysical members: all are checked, so few at a time that memory stays small."""
-        targets = [target for v in self._variations for target in v.targets] + [target for target, _ in self._columns]
+        targets = [target for v in self.variations for target in v.targets] + [target for target, _ in self._columns]
         varied = {name for name in (*(target.name for target in targets), *self._explicit) if name in self._base}
         findings: dict[str, _Unphysical] = {}
         for block_findings in over_members(functools.partial(self._look_at, varied), self.members if varied else 0):
@@ -295,7 +299,7 @@ class Ensemble:
                     findings[key].count += finding.count
         faults = Faults()
         for key, finding in findings.items():
-            drawn = any(name in {t.name for v in self._variations for t in v.targets} for name in key.split(" + "))
+            drawn = any(name in {t.name for v in self.variations for t in v.targets} for name in key.split(" + "))
             remedy = "use a smaller spread, TruncatedNormal or LogNormal" if drawn else "give finite, physical values"
             problem = f"is unphysical ({finding.count} of {finding.of if finding.shared else self.members} members)"
             faults.add(f"{key} of member {finding.first}", finding.value, problem, remedy)
@@ -345,7 +349,7 @@ class Ensemble:
             values |= {name: column[rows] for name, column in self._explicit.items() if start or name in self._base}
         wanted = [
             variation
-            for variation in self._variations
+            for variation in self.variations
             if start or any(target.name in self._base for target in variation.targets)
         ]
         if not (wanted or self._columns):
@@ -408,14 +412,14 @@ class Ensemble:
         Returns:
             Names in the order of `scene.parameters()`; those of the start are not among them.
         """
-        drawn = {target.name for variation in self._variations for target in variation.targets}
+        drawn = {target.name for variation in self.variations for target in variation.targets}
         varied = drawn | {target.name for target, _ in self._columns} | self._explicit.keys()
         return [name for name in self._base if name in varied]
 
     @property
     def starts_vary(self) -> bool:
         """Whether the initial state differs from member to member."""
-        names = {target.name for variation in self._variations for target in variation.targets}
+        names = {target.name for variation in self.variations for target in variation.targets}
         return not {*names, *(target.name for target, _ in self._columns), *self._explicit} <= self._base.keys()
 
     def subset(self, indices: Sequence[int] | np.ndarray) -> Ensemble:
@@ -609,11 +613,11 @@ def check_names(vary: Mapping[str, Any], parameters: Sequence[str]) -> None:
     """
     faults = Faults("ensemble.vary.")
     known = [*parameters, *(f"start.{name}" for name in NAMES)]
-    for key, law in vary.items():
+    for key, distribution in vary.items():
         for target in variations.targets(key):
             if target.name not in known:
                 remedy = functools.partial(closest, target.name, known)
-                faults.add(f'"{key}"', law, "does not name what a scene has", remedy)
+                faults.add(f'"{key}"', distribution, "does not name what a scene has", remedy)
     faults.raise_if_any()
 
 

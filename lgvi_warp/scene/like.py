@@ -44,6 +44,13 @@ class SceneLike(Protocol):
     def ensemble_settings(self) -> EnsembleSettings | None:
         """Settings of the ensemble; None if nothing varies."""
 
+    @property
+    def ensemble_is_checked(self) -> bool:
+        """Whether the ensemble of `ensemble_settings` was built before, and so was found to be sound."""
+
+    def note_checked_ensemble(self) -> None:
+        """Remember that the ensemble of `ensemble_settings` is sound."""
+
     def parameters(self) -> dict[str, np.ndarray]:
         """Return every number that may vary from member to member.
 

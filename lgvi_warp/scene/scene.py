@@ -16,7 +16,7 @@ from lgvi_warp.common.names import alike, folded
 from lgvi_warp.physics import terms
 from lgvi_warp.physics.terms import events
 from lgvi_warp.physics.vehicle import Vehicle
-from lgvi_warp.sampling.distributions.named import from_dict as law_from_dict
+from lgvi_warp.sampling.distributions.named import from_dict as distribution_from_dict
 from lgvi_warp.scene.ensemble import Ensemble, check_names
 from lgvi_warp.scene.file import tables_of_file, tables_of_text, with_named_vehicle
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
@@ -51,6 +51,7 @@ class Scene:
     run: RunSettings = field(default_factory=RunSettings)
     ensemble_settings: EnsembleSettings | None = None
     events: Sequence[Any] = ()
+    ensemble_is_checked: bool = field(default=False, init=False, repr=False)
 
     def __post_init__(self) -> None:
         faults = Faults()
@@ -81,6 +82,10 @@ class Scene:
         for first, second in alike(keys):
             problem = f"is the same folder as {first!r} on file systems that do not tell capitals apart"
             faults.add("terms and events", second, problem, f'give each a name of its own: name = "{second}_2"')
+
+    def note_checked_ensemble(self) -> None:
+        """Remember that the ensemble of `ensemble_settings` is sound: it need not be checked again."""
+        object.__setattr__(self, "ensemble_is_checked", True)
 
     def parameters(self) -> dict[str, np.ndarray]:
         """Return every number that may vary from member to member, with the value that this scene has.
@@ -209,8 +214,8 @@ def from_dict(content: Mapping[str, Any]) -> Scene:
     environment = _build(faults, "environment", Environment, tables["environment"])
     start = _build(faults, "start", Start, tables["start"])
     run = _build(faults, "run", RunSettings, tables["run"])
-    laws = _laws(faults, tables["ensemble"].get("vary", {}))
-    settings = _build(faults, "ensemble", EnsembleSettings, {**tables["ensemble"], "vary": laws})
+    distributions = _distributions(faults, tables["ensemble"].get("vary", {}))
+    settings = _build(faults, "ensemble", EnsembleSettings, {**tables["ensemble"], "vary": distributions})
     scene = None
     with faults.including():
         # A default replaces each section that failed, so that the faults of the other sections are found as well.
@@ -223,11 +228,13 @@ def from_dict(content: Mapping[str, Any]) -> Scene:
         if scene is None:
             # Names of a faulty term's parameters are unknown: only names of the other sections can be checked.
             sections = ("vehicle.", "environment.", "start.")
-            laws = {name: law for name, law in laws.items() if str(name).startswith(sections)}
-            settings = EnsembleSettings(vary=laws)
+            distributions = {
+                name: distribution for name, distribution in distributions.items() if str(name).startswith(sections)
+            }
+            settings = EnsembleSettings(vary=distributions)
         sound_scene = scene if vehicle and environment and start else None
         names = (scene or Scene(vehicle or Vehicle(**_STAND_INS))).parameters()
-        _check_ensemble(settings or EnsembleSettings(vary=laws), sound_scene, tuple(names))
+        _check_ensemble(settings or EnsembleSettings(vary=distributions), sound_scene, tuple(names))
     faults.raise_if_any()
     assert scene is not None
     return scene
@@ -257,13 +264,13 @@ def _build(faults: Faults, name: str, kind: Callable[..., Any], table: Mapping[s
 _STAND_INS: dict[str, Any] = {"mass": 1.0, "inertia": (1.0, 1.0, 1.0)}
 
 
-def _laws(faults: Faults, vary: Any) -> dict[str, Any]:
+def _distributions(faults: Faults, vary: Any) -> dict[str, Any]:
     """Build the distributions of the table [ensemble.vary], by name."""
-    laws = {}
+    distributions = {}
     if not isinstance(vary, Mapping):
         faults.add("ensemble.vary", vary, "is not a table", 'write [ensemble.vary] and "vehicle.mass" = {...} below')
         vary = {}
     for key, value in vary.items():
         with faults.including():
-            laws[key] = law_from_dict(f'ensemble.vary."{key}"', value)
-    return laws
+            distributions[key] = distribution_from_dict(f'ensemble.vary."{key}"', value)
+    return distributions

@@ -14,7 +14,7 @@ from lgvi_warp.common.real_numbers import holds_words
 from lgvi_warp.common.status import CHECKS, ON_FAILURE
 from lgvi_warp.methods.method import Method
 from lgvi_warp.sampling.designs import sampling_of
-from lgvi_warp.sampling.distributions import named as laws
+from lgvi_warp.sampling.distributions import named as distributions
 
 # Largest ensemble: a kernel keys a member's noise by its index, a signed word of 32 bits.
 MOST_MEMBERS = 2**31
@@ -188,10 +188,13 @@ class EnsembleSettings:
         if self.indices is not None and not _whole_numbers(self.indices):
             faults.add("indices", self.indices, "is no list of whole numbers from 0", "give members: indices = [17]")
         if isinstance(self.vary, Mapping):
-            named = {", ".join(key) if isinstance(key, tuple) else key: law for key, law in self.vary.items()}
-            for key, law in named.items():
+            named = {
+                ", ".join(key) if isinstance(key, tuple) else key: distribution
+                for key, distribution in self.vary.items()
+            }
+            for key, distribution in named.items():
                 with faults.including():
-                    named[key] = laws.as_law(f'vary."{key}"', law)
+                    named[key] = distributions.as_distribution(f'vary."{key}"', distribution)
             object.__setattr__(self, "vary", named)
         with faults.including():
             object.__setattr__(self, "sampling", sampling_of(self.sampling))

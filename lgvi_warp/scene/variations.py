@@ -86,13 +86,13 @@ class Variation:
 
     Args:
         key: The key as it was given.
-        law: The distribution.
+        distribution: The distribution.
         targets: What the key names.
         wholes: The scene's value of each target's number.
     """
 
     key: str
-    law: Any
+    distribution: Any
     targets: tuple[Target, ...]
     wholes: tuple[np.ndarray, ...]
 
@@ -107,13 +107,15 @@ class Variation:
 
     @property
     def _takes_matrices(self) -> bool:
-        return isinstance(self.law, PositiveDefinite) or (self.law.joint and self.law.kind == "choice")
+        return isinstance(self.distribution, PositiveDefinite) or (
+            self.distribution.joint and self.distribution.kind == "choice"
+        )
 
     @property
     def size(self) -> int:
         """Number of uniform numbers that one draw takes."""
         bases = self.bases
-        return int(self.law.size(bases)) if self.law.joint else max(1, bases[0].size)
+        return int(self.distribution.size(bases)) if self.distribution.joint else max(1, bases[0].size)
 
     def labels(self) -> list[str]:
         """Return a label of each factor of the sampling.
@@ -122,7 +124,7 @@ class Variation:
             One label for each entry that is drawn by itself; the key alone for a joint distribution.
         """
         (target, *_), (base, *_) = self.targets, self.bases
-        if self.law.joint or base.ndim == 0:
+        if self.distribution.joint or base.ndim == 0:
             return [self.key]
         entries: Iterable[Sequence[int]] = np.ndindex(*base.shape)
         if target.name in MATRICES and target.index is None:
@@ -140,10 +142,10 @@ class Variation:
             For each target the target and its values (n, *shape).
         """
         bases = self.bases
-        if self.law.joint:
-            drawn = self.law.draw(u, bases)
+        if self.distribution.joint:
+            drawn = self.distribution.draw(u, bases)
         else:
-            drawn = [self.law.quantile(u.reshape(len(u), *bases[0].shape), bases[0])]
+            drawn = [self.distribution.quantile(u.reshape(len(u), *bases[0].shape), bases[0])]
         return [
             (target, symmetric(values, array) if values.shape[1:] != target.of(array).shape else values)
             for target, array, values in zip(self.targets, self.wholes, drawn, strict=True)
@@ -225,14 +227,14 @@ def _hint(name: str, known: Mapping[str, np.ndarray], also: str) -> str:
 
 
 def known_target(
-    faults: Faults, key: str, law: Any, target: Target, known: Mapping[str, np.ndarray], also: str = ""
+    faults: Faults, key: str, distribution: Any, target: Target, known: Mapping[str, np.ndarray], also: str = ""
 ) -> bool:
     """Check that the scene has a target, and note what is wrong.
 
     Args:
         faults: Collects what is wrong.
         key: The key that names the target, for messages.
-        law: Its distribution, for messages.
+        distribution: Its distribution, for messages.
         target: What is to vary.
         known: The scene's values by name.
         also: Another remedy for a name that the scene does not have; by default none.
@@ -242,17 +244,20 @@ def known_target(
     """
     if target.name not in known:
         remedy = functools.partial(_hint, target.name, known, also)
-        faults.add(f'"{key}"', law, "does not name what the scene has", remedy)
+        faults.add(f'"{key}"', distribution, "does not name what the scene has", remedy)
         return False
     shape = known[target.name].shape
     if target.index is not None:
         if target.name == ATTITUDE:
-            faults.add(f'"{key}"', law, "varies an entry of a rotation", ROTATIONS)
+            faults.add(f'"{key}"', distribution, "varies an entry of a rotation", ROTATIONS)
             return False
         if len(target.index) != len(shape) or any(i >= n for i, n in zip(target.index, shape, strict=True)):
             problem = f"is no entry of {target.name}, of shape {shape}"
             faults.add(
-                f'"{key}"', law, problem, f"give {len(shape)} numbers from 0" if shape else f'write "{target.name}"'
+                f'"{key}"',
+                distribution,
+                problem,
+                f"give {len(shape)} numbers from 0" if shape else f'write "{target.name}"',
             )
             return False
     return True
@@ -263,57 +268,57 @@ ROTATIONS = (
 )
 
 
-def variation(faults: Faults, key: str, law: Any, known: Mapping[str, np.ndarray]) -> Variation | None:
+def variation(faults: Faults, key: str, distribution: Any, known: Mapping[str, np.ndarray]) -> Variation | None:
     """Match a key of `vary` and its distribution with a scene, and note what is wrong.
 
     Args:
         faults: Collects what is wrong.
         key: The key.
-        law: The distribution.
+        distribution: The distribution.
         known: The scene's values by name.
 
     Returns:
         The variation; None if anything is wrong.
     """
-    if not isinstance(law, Distribution):
+    if not isinstance(distribution, Distribution):
         remedy = "give lw.Normal(std=...) or another, or an object with ppf(u), such as scipy.stats.gamma(2.0)"
-        faults.add(f'"{key}"', law, "is not a distribution", remedy)
+        faults.add(f'"{key}"', distribution, "is not a distribution", remedy)
         return None
     named = targets(key)
-    if not all([known_target(faults, key, law, target, known) for target in named]):
+    if not all([known_target(faults, key, distribution, target, known) for target in named]):
         return None
-    described = Variation(key, law, named, tuple(known[target.name] for target in named))
+    described = Variation(key, distribution, named, tuple(known[target.name] for target in named))
     wrong = _misfit(described)
     if wrong:
-        faults.add(f'"{key}"', law, *wrong)
+        faults.add(f'"{key}"', distribution, *wrong)
         return None
     return described
 
 
 def _misfit(found: Variation) -> tuple[str, str] | None:
     """Return what is wrong with a distribution and its targets, and the remedy; None if they fit."""
-    law, named = found.law, found.targets
-    turns = isinstance(law, RotationNormal | UniformRotation)
-    chosen = law.kind == "choice" and law.joint
-    if len(named) > 1 and law.kind != "correlated_normal":
-        return "draws one quantity, several are named", "give lw.CorrelatedNormal, or a law to each"
+    distribution, named = found.distribution, found.targets
+    turns = isinstance(distribution, RotationNormal | UniformRotation)
+    chosen = distribution.kind == "choice" and distribution.joint
+    if len(named) > 1 and distribution.kind != "correlated_normal":
+        return "draws one quantity, several are named", "give lw.CorrelatedNormal, or a distribution to each"
     attitude = any(target.name == ATTITUDE for target in named)
     if turns and not attitude:
-        return "is a law of attitudes", f'vary "{ATTITUDE}"'
+        return "is a distribution of attitudes", f'vary "{ATTITUDE}"'
     if attitude and not (turns or chosen):
         return "cannot vary by entry", ROTATIONS
-    if isinstance(law, PositiveDefinite):
+    if isinstance(distribution, PositiveDefinite):
         if named[0].name not in MATRICES or named[0].index is not None:
-            return "is a law of symmetric matrices", f"vary one of {', '.join(MATRICES)}"
-        if isinstance(law, PhysicalInertia) and named[0].name not in RIGID:
-            return "is a law of a rigid body's inertia", "use PositiveDefinite for added mass"
-    wrong: tuple[str, str] | None = law.fault([base.shape for base in found.bases])
-    if wrong is None and (width := varies_nothing(law, found.bases)):
+            return "is a distribution of symmetric matrices", f"vary one of {', '.join(MATRICES)}"
+        if isinstance(distribution, PhysicalInertia) and named[0].name not in RIGID:
+            return "is a distribution of a rigid body's inertia", "use PositiveDefinite for added mass"
+    wrong: tuple[str, str] | None = distribution.fault([base.shape for base in found.bases])
+    if wrong is None and (width := varies_nothing(distribution, found.bases)):
         return f"is relative to the scene's value, 0, so that its {width} varies nothing", "give an absolute spread"
-    if wrong is None and isinstance(law, PositiveDefinite):
-        wrong = law.unusable(found.wholes[0])
+    if wrong is None and isinstance(distribution, PositiveDefinite):
+        wrong = distribution.unusable(found.wholes[0])
     if wrong is None and chosen:
-        wrong = _no_such_matrices(named[0], np.asarray(law.values, dtype=np.float64))
+        wrong = _no_such_matrices(named[0], np.asarray(distribution.values, dtype=np.float64))
     return wrong
 
 

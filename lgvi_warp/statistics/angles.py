@@ -49,7 +49,7 @@ class CircularMean(Statistic):
         return moments | {key: np.einsum("kdn,kdn->kd", *pair) for key, pair in pairs.items()}
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """Join the moments about the common mean."""
+        # Join the moments about the common mean.
         both, *shifts = joined_means(left, right)
         d = left["cc"].shape[1]
         for key, i, j in (("cc", 0, 0), ("cs", 0, d), ("ss", d, d)):
@@ -154,7 +154,7 @@ class MeanAttitude(Statistic):
         return {"count": values.count, "mean": values.mean, "m11": sums(values.centred, values.centred)}
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """Join the moments about the common mean."""
+        # Join the moments about the common mean.
         both, a, b = joined_means(left, right)
         n, m = left["count"][:, None, None], right["count"][:, None, None]
         shifted = (left["m11"] + n * a[:, :, None] * a[:, None], right["m11"] + m * b[:, :, None] * b[:, None])

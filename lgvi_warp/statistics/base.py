@@ -56,7 +56,7 @@ class Gatherer:
         raise TypeError(f"{type(self).__name__} is abstract")
 
 
-class Rows(Gatherer):
+class RowGatherer(Gatherer):
     """Gathers one row of each array for each sample time, as the samples come."""
 
     def __init__(self, statistic: Statistic):
@@ -129,7 +129,9 @@ class Statistic:
         if self.at is not None and (not isinstance(self.at, str) or not self.at):
             faults.add("at", self.at, "is no outcome", 'give "floor", the name of an event, or "stopped"')
         elif self.at is not None and not self.of_numbers:
-            faults.add("at", self.at, "is one moment, and this is of all times", "leave it out, or ask for a mean")
+            faults.add(
+                "at", self.at, "is one moment, and this statistic is of all times", "leave it out, or ask for a mean"
+            )
         if self.of is not None:
             with faults.including():
                 object.__setattr__(self, "_quantity", self.meant())
@@ -243,7 +245,7 @@ class Statistic:
             time: (k,) [s], all sample times of the run.
             count: number of members of the block.
         """
-        return Rows(self)
+        return RowGatherer(self)
 
     def rows(self, values: Values) -> Part:
         """Return the part of a block at some sample times: arrays with one row for each time.

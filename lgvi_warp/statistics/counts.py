@@ -24,7 +24,6 @@ class Counted(Statistic):
     """A statistic whose part is whole numbers: these add up to the same in any order."""
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """Add the counts of both sets of members."""
         return {key: left[key] + right[key] for key in left}
 
     def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
@@ -77,7 +76,7 @@ class Histogram(Counted):
             faults.add("edges", self.edges, "and bins are both given", "keep one of them")
             return
         if (self.edges is None) == (self.bins is None or self.limits is None):
-            faults.add("edges", self.edges, "or bins and limits are wanted, one of them", "give edges=(0, 10, 20)")
+            faults.add("edges", self.edges, "is missing, and so is bins or limits", "give edges=(0, 10, 20)")
             return
         run = isinstance(self.limits, str) and self.limits == "run"
         if run and self.of is not None:
@@ -149,7 +148,7 @@ class Condition(Statistic):
     below: Any = None
 
     def check(self, faults: Faults) -> None:
-        """Note limits that are no numbers, are missing, or leave nothing between them."""
+        """Note limits that are no numbers, are missing, or have nothing between them."""
         super().check(faults)
         quantity = getattr(self, "_quantity", None)
         fits, limits = (1,) if quantity is None else (1, quantity.size), list[np.ndarray]()
@@ -162,7 +161,7 @@ class Condition(Statistic):
                     limits.append(limit)
         if len(limits) == 2 and not np.all(limits[0] < limits[1]):
             both = self.above, self.below
-            faults.add("above and below", both, "leave nothing between them", "give above < below, or one of them")
+            faults.add("above and below", both, "have nothing between them", "give above < below, or one of them")
         if quantity is not None and self.above is None and self.below is None and quantity.needs_limit:
             unit = f" [{quantity.unit}]" if quantity.unit else ""
             remedy = f"give above=... or below=...{unit}, or a function that says true or false"
@@ -367,7 +366,7 @@ class FirstPassage(Condition, Counted):
         return estimate(self, text, dims | along(times, "level"), arrays, time, levels, "1", labels=())
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
-        """Return probabilities with intervals from the spread of the replicates' curves."""
+        # Probabilities with intervals from the spread of the replicates' curves.
         each = self.each_replicate(parts, replicates)
         overall = self.whole(together(each))
         curve = Curve.of(overall)

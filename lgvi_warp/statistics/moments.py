@@ -150,7 +150,7 @@ class Mean(Statistic):
         return {"count": values.count, "mean": values.mean, "m2": np.einsum("kdn,kdn->kd", c, c)}
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """Join as Chan, Golub & LeVeque (1979)."""
+        # Join as Chan, Golub & LeVeque (1979).
         both, a, b = joined_means(left, right)
         n, m = left["count"][:, None], right["count"][:, None]
         return both | {"m2": left["m2"] + n * a**2 + (right["m2"] + m * b**2)}
@@ -199,7 +199,7 @@ class Covariance(Statistic):
         return moments | {"m21": sums(square, c), "m22": sums(square, square)}
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """Join the moments about the common mean."""
+        # Join the moments about the common mean.
         return joined(left, right)
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:

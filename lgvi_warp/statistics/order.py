@@ -51,7 +51,7 @@ class Extremes(Statistic):
         return part
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """Keep the more extreme value; of equal ones, that of the first member."""
+        # Keep the more extreme value; of equal ones, that of the first member.
         both: Part = {"count": left["count"] + right["count"]}
         for name, better in (
             ("minimum", right["minimum"] < left["minimum"]),
@@ -125,7 +125,6 @@ class Quantiles(Statistic):
         return {"count": values.count} | sketch.of(x, values.size, self.size, values.block)
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """Join two sketches into one."""
         return {"count": left["count"] + right["count"]} | sketch.join(left, right, self.size, place)
 
     def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
@@ -133,8 +132,7 @@ class Quantiles(Statistic):
         return self._in_pieces(parts, time, 1, lambda some, when: self.read(self.whole(some), when))
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
-        """Return quantiles with intervals between sorted values, at ranks that the replicates' spread gives."""
-
+        # Quantiles with intervals between sorted values, at ranks that the replicates' spread gives.
         def read(some: Sequence[Part], when: np.ndarray) -> Estimate:
             return self._read_replicates(self.each_replicate(some, replicates), when)
 

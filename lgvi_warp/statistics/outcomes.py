@@ -122,13 +122,13 @@ class Outcome(OfEnds):
         return np.stack([ends.time, kind])[None], None
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """Join the ends of both sets of members, one after the other."""
+        # Join the ends of both sets of members, one after the other.
         return {"members": left["members"] + right["members"]} | {
             name: np.concatenate([left[name], right[name]]) for name in ("time", "so", "replicate")
         }
 
     def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
-        """Return the ends of the members of one replicate."""
+        # The ends of the members of one replicate.
         chosen = part["replicate"] == replicate
         ends = {name: part[name][chosen] for name in ("time", "so", "replicate")}
         return {"members": part["members"][replicate : replicate + 1]} | ends
@@ -140,7 +140,7 @@ class Outcome(OfEnds):
         return self._estimate(part, at, curve, intervals.wilson(curve.value, curve.members, self.confidence), time)
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
-        """Return probabilities with intervals from the spread of the replicates' curves."""
+        # Probabilities with intervals from the spread of the replicates' curves.
         overall = self.whole(parts)
         ends = np.unique(overall["time"][overall["so"]])
         at = np.union1d(time, ends[:: 1 + len(ends) // MOST_TIMES])

@@ -95,37 +95,35 @@ class Then(Statistic):
         return part
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """Join the parts of each statistic."""
         both: Part = {}
         for i, statistic in enumerate(self.then):
-            both |= {f"{i}/{key}": a for key, a in statistic.join(own(left, i), own(right, i), place).items()}
+            both |= {f"{i}/{key}": a for key, a in statistic.join(part_of(left, i), part_of(right, i), place).items()}
         return both
 
     def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
         """Return the estimates of each statistic, at the end."""
         estimates: list[Estimate] = []
         for i, statistic in enumerate(self.then_of(time)):
-            estimates += statistic.estimates([own(part, i) for part in parts], time[-1:])
+            estimates += statistic.estimates([part_of(part, i) for part in parts], time[-1:])
         return estimates
 
     def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
-        """Return the part of one replicate, for each statistic."""
         replicate_part: Part = {}
         for i, statistic in enumerate(self.then):
             replicate_part |= {
-                f"{i}/{key}": a for key, a in statistic.of_replicate(own(part, i), replicate, replicates).items()
+                f"{i}/{key}": a for key, a in statistic.of_replicate(part_of(part, i), replicate, replicates).items()
             }
         return replicate_part
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
-        """Return the estimates of each statistic from its replicates, at the end."""
+        # The estimates of each statistic from its replicates, at the end.
         estimates: list[Estimate] = []
         for i, statistic in enumerate(self.then_of(time)):
-            estimates += statistic.estimates_of_replicates([own(part, i) for part in parts], time[-1:], replicates)
+            estimates += statistic.estimates_of_replicates([part_of(part, i) for part in parts], time[-1:], replicates)
         return estimates
 
 
-def own(part: Part, i: int) -> Part:
+def part_of(part: Part, i: int) -> Part:
     """Return the arrays of one of the statistics of `then`.
 
     Args:

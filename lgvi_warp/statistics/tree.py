@@ -33,9 +33,9 @@ class Tree:
         """
         level, i = 0, block
         while (neighbour := self._parts.pop((level, i ^ 1), None)) is not None:
-            left, right = (neighbour, part) if i % 2 else (part, neighbour)
+            earlier, later = (neighbour, part) if i % 2 else (part, neighbour)
             level, i = level + 1, i // 2
-            part = self._join(left, right, (level, i))
+            part = self._join(earlier, later, (level, i))
         self._parts[level, i] = part
 
     def parts(self) -> list[Part]:

@@ -29,7 +29,7 @@ class Until:
 
     The run stops at the end of a block. Intervals are looked at in the order of the blocks, so that neither the number
     of members nor any bit depends on threads; with replicates of a design, at powers of two of members.
-    docs/statistics.md says how stopping affects coverage.
+    docs/guide/statistics.md says how stopping affects coverage.
 
     Args:
         statistic: the name of one of the run's statistics as the command prints it: "mean position"; one component,

@@ -38,7 +38,7 @@ PRECISE = ("kl8(psi_x)", "rk8", "kl8(psi_s)", "kl6(psi_x)", "kl6(psi_s)", "rk5",
 
 
 @dataclass(frozen=True)
-class Setting:
+class Candidate:
     """How to solve: method, step, precision and solver.
 
     Attributes:
@@ -128,10 +128,10 @@ class Sample:
         self.whole, self.t1, self.samples = ensemble, float(t1), samples
         self.ensemble = ensemble if ensemble.members <= members else ensemble.subset(range(members))
         self.members = self.ensemble.members
-        end = saveat._exact(self.t1)
+        end = saveat.exact(self.t1)
         every = settings.save_every
-        divides = every is not None and every <= self.t1 and (end / saveat._exact(every)).denominator == 1
-        self.spacing = saveat._exact(every) if divides and every is not None else end / samples
+        divides = every is not None and every <= self.t1 and (end / saveat.exact(every)).denominator == 1
+        self.spacing = saveat.exact(every) if divides and every is not None else end / samples
         count = int(end / self.spacing)
         self.index = np.unique(np.linspace(0, count, min(count, samples) + 1).round().astype(np.int64))
         self.times = np.array([float(int(i) * self.spacing) for i in self.index])
@@ -171,7 +171,7 @@ class Sample:
         """
         return float(self.spacing / m)
 
-    def setting(self, method: str, m: int, dtype: str = "float64", solver: Any = ("quartic", None)) -> Setting:
+    def candidate(self, method: str, m: int, dtype: str = "float64", solver: Any = ("quartic", None)) -> Candidate:
         """Make a setting with the step spacing / m.
 
         Args:
@@ -183,13 +183,13 @@ class Sample:
         Returns:
             The setting.
         """
-        return Setting(method, self.h(m), dtype, *solver)
+        return Candidate(method, self.h(m), dtype, *solver)
 
-    def plan(self, setting: Setting, ensemble: Ensemble | None = None) -> Plan:
+    def plan(self, candidate: Candidate, ensemble: Ensemble | None = None) -> Plan:
         """Make the plan of a run at the sample's times.
 
         Args:
-            setting: method, step, precision and solver.
+            candidate: method, step, precision and solver.
             ensemble: members to run in place of the sample's.
 
         Returns:
@@ -198,15 +198,15 @@ class Sample:
         Raises:
             SceneError: where the scene refuses the method.
         """
-        m = round(float(self.spacing / Fraction(setting.h)))
-        grid = TimeGrid(setting.h, self.index * m, self.times)
-        return Plan(ensemble or self.ensemble, setting.resolved(), grid, FIELDS, setting.dtype)
+        m = round(float(self.spacing / Fraction(candidate.h)))
+        grid = TimeGrid(candidate.h, self.index * m, self.times)
+        return Plan(ensemble or self.ensemble, candidate.resolved(), grid, FIELDS, candidate.dtype)
 
-    def run(self, setting: Setting, ensemble: Ensemble | None = None) -> Result:
+    def run(self, candidate: Candidate, ensemble: Ensemble | None = None) -> Result:
         """Run a setting on one thread.
 
         Args:
-            setting: method, step, precision and solver.
+            candidate: method, step, precision and solver.
             ensemble: members to run in place of the sample's.
 
         Returns:
@@ -215,7 +215,7 @@ class Sample:
         Raises:
             SceneError: where the scene refuses the method.
         """
-        return run_plan(self.plan(setting, ensemble), 1)
+        return run_plan(self.plan(candidate, ensemble), 1)
 
     def accepted(self, methods: Sequence[str], dtype: str = "float64") -> tuple[list[str], dict[str, str]]:
         """Sort methods into those that the scene takes and those that it refuses.
@@ -234,7 +234,7 @@ class Sample:
             except SceneError:
                 continue
             try:
-                self.plan(self.setting(name, 1, dtype))
+                self.plan(self.candidate(name, 1, dtype))
                 good.append(name)
             except SceneError as error:
                 refused[name] = str(error)
@@ -249,7 +249,7 @@ class Sample:
         Returns:
             True if a force or a current of the scene is noise.
         """
-        laws = self.plan(self.setting(method, 1)).model.laws
+        laws = self.plan(self.candidate(method, 1)).kernel_choice.laws
         return any(getattr(module, "NOISE", False) for _, module in laws)
 
 
@@ -369,8 +369,8 @@ def extrapolated(sample: Sample, method: str, m: int) -> Result:
         The result at the sample's times.
     """
     if Method(method).order >= 4:
-        return sample.run(sample.setting(method, m))
-    runs = [sample.run(sample.setting(method, k * m)) for k in (1, 2, 4)]
+        return sample.run(sample.candidate(method, m))
+    runs = [sample.run(sample.candidate(method, k * m)) for k in (1, 2, 4)]
     samples = {}
     for name in FIELDS:
         a, b, c = (run.samples[name] for run in runs)
@@ -492,12 +492,12 @@ NUDGE = 1e-8
 STEEPEST = 3.0
 
 
-def growth(sample: Sample, setting: Setting) -> Growth:
+def growth(sample: Sample, candidate: Candidate) -> Growth:
     """Measure growth by two runs whose starts differ by 1e-8 rad in attitude.
 
     Args:
         sample: members and times.
-        setting: method, step, precision and solver of both runs.
+        candidate: method, step, precision and solver of both runs.
 
     Returns:
         Growth of the difference.
@@ -512,7 +512,7 @@ def growth(sample: Sample, setting: Setting) -> Growth:
     for R in (members.attitude, members.attitude @ notation.matrix_from_rotation_vector(turn)):
         nudged = Ensemble.from_states(fleet.scene, states[0], R, *states[1:], varied)
         nudged.indices, nudged.seed = fleet.indices, fleet.seed
-        runs.append(sample.run(setting, nudged))
+        runs.append(sample.run(candidate, nudged))
     apart = distances(runs[0], runs[1])
     both = np.hypot(apart["position"], apart["attitude"]) / NUDGE
     alive = np.isfinite(both)

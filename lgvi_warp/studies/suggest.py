@@ -25,7 +25,7 @@ from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies import comparison, cost
 from lgvi_warp.studies import tradeoff as tradeoffs
 from lgvi_warp.studies.compared import Compared, compared_in
-from lgvi_warp.studies.comparison import Reference, Sample, Setting
+from lgvi_warp.studies.comparison import Candidate, Reference, Sample
 from lgvi_warp.studies.speed import void
 from lgvi_warp.studies.tradeoff import PRECISIONS, Trial, chosen_methods, costs, growth_of, growth_text, tried
 
@@ -52,7 +52,7 @@ class Suggestion:
 
     Attributes:
         settings: arguments for `lw.solve(fleet, **settings)`: method, h and dtype.
-        setting: the same as a Setting.
+        setting: the same as a Candidate.
         error: error asked for [`unit`].
         of: name of the quantity that the error is of.
         unit: unit of that quantity.
@@ -72,7 +72,7 @@ class Suggestion:
     """
 
     settings: dict[str, Any]
-    setting: Setting
+    setting: Candidate
     error: float
     of: str
     unit: str
@@ -85,7 +85,7 @@ class Suggestion:
     t1: float
     reference: str
     reference_error: float
-    rivals: tuple[tuple[Setting, float, float], ...] = ()
+    rivals: tuple[tuple[Candidate, float, float], ...] = ()
     worst: tuple[int, ...] = ()
     asked: Compared | None = field(default=None, repr=False, compare=False)
     messages: tuple[str, ...] = ()
@@ -180,13 +180,16 @@ def suggest(
     if more is not sample:
         reference = checked_reference(more, compared, error, 0.4 * seconds, taken)
     final = [
-        refined(more, trial.setting, reference, compared.name, error / SAFETY**0.5) for trial in trials[:FINALISTS]
+        refined(more, trial.candidate, reference, compared.name, error / SAFETY**0.5) for trial in trials[:FINALISTS]
     ]
     final = [trial for trial in final if trial.error(compared.name) <= error] or final[:1]
     readings = cost.costs([trial.plan for trial in final], rounds=ROUNDS)
     prices = [reading.us_per_vehicle_second for reading in readings]
     text = cost.disagreement(
-        [(f"{trial.setting.name} {trial.setting.dtype}", price) for trial, price in zip(final, readings, strict=True)]
+        [
+            (f"{trial.candidate.name} {trial.candidate.dtype}", price)
+            for trial, price in zip(final, readings, strict=True)
+        ]
     )
     order = sorted(range(len(final)), key=prices.__getitem__)
     best, price = final[order[0]], prices[order[0]]
@@ -194,21 +197,21 @@ def suggest(
     used = min(threads or machine.thread_count(), len(blocks(ensemble.members)))
     report(1.0)
     return Suggestion(
-        settings=best.setting.options(),
-        setting=best.setting,
+        settings=best.candidate.options(),
+        setting=best.candidate,
         error=float(error),
         of=compared.name,
         unit=compared.unit,
         expected=best.error(compared.name),
         us_per_vehicle_second=price,
-        run_seconds=seconds_of(ensemble, best.setting, sample.t1) / used,
+        run_seconds=seconds_of(ensemble, best.candidate, sample.t1) / used,
         threads=used,
-        memory_bytes=memory_of(ensemble, best.setting, sample.t1),
+        memory_bytes=memory_of(ensemble, best.candidate, sample.t1),
         members=more.members,
         t1=sample.t1,
         reference=reference.text,
         reference_error=reference.error(compared.name),
-        rivals=tuple((final[i].setting, prices[i], final[i].error(compared.name)) for i in order[1:]),
+        rivals=tuple((final[i].candidate, prices[i], final[i].error(compared.name)) for i in order[1:]),
         worst=worst_of(best, reference, compared.name),
         asked=compared,
         messages=(text,) if text else (),
@@ -298,18 +301,18 @@ def search(
         if time.perf_counter() > deadline and priced:
             break
         m, before, worse = sample.coarsest(2.0), math.inf, 0
-        plan = sample.plan(sample.setting(method, m, dtype))
+        plan = sample.plan(sample.candidate(method, m, dtype))
         deadline += plan.compile()
         per_step = step_cost(plan)
         cheapest = min((price for price, _ in priced), default=math.inf)
         while per_step / sample.h(m) < 2.0 * cheapest:
-            trial = tried(sample, sample.setting(method, m, dtype), reference)
+            trial = tried(sample, sample.candidate(method, m, dtype), reference)
             deadline += trial.result.compile_seconds
             size = trial.error(of)
             if size <= target:
                 best = lengthened(sample, trial, m, before, reference, of, target)
                 # Price the step that was found: where a step iterates, its work depends on its length.
-                priced.append((step_cost(best.plan) / best.setting.h, best))
+                priced.append((step_cost(best.plan) / best.candidate.h, best))
                 break
             worse = worse + 1 if size > 0.8 * before and before < 0.1 else 0
             if worse >= 2 or m > 10**7 or time.perf_counter() > deadline:
@@ -358,7 +361,7 @@ def lengthened(
         guess = min(max(guess, low + 1), high - 1)
         if guess <= low or guess >= high or high - low < 0.04 * high:
             break
-        trial = tried(sample, sample.setting(good.setting.method, guess, good.setting.dtype), reference)
+        trial = tried(sample, sample.candidate(good.candidate.method, guess, good.candidate.dtype), reference)
         if trial.error(of) <= target:
             good, high, size = trial, guess, trial.error(of)
         elif math.isfinite(trial.error(of)):
@@ -368,12 +371,12 @@ def lengthened(
     return good
 
 
-def refined(sample: Sample, setting: Setting, reference: Reference, of: str, target: float) -> Trial:
+def refined(sample: Sample, candidate: Candidate, reference: Reference, of: str, target: float) -> Trial:
     """Run a setting on a sample and shorten its step until it keeps the target.
 
     Args:
         sample: members and times.
-        setting: where to begin.
+        candidate: where to begin.
         reference: what errors are measured against.
         of: name of the quantity.
         target: largest error allowed [unit of `of`].
@@ -381,24 +384,26 @@ def refined(sample: Sample, setting: Setting, reference: Reference, of: str, tar
     Returns:
         The last trial; after six shorter steps it may still miss the target.
     """
-    trial = tried(sample, setting, reference)
+    trial = tried(sample, candidate, reference)
     for _ in range(6):
         size = trial.error(of)
         if size <= target:
             break
-        factor = min((size / target) ** (1.0 / Method(setting.method).order) * 1.02, 2.0) if np.isfinite(size) else 1.5
-        m = round(float(sample.spacing) / trial.setting.h)
-        longer = sample.setting(setting.method, max(m + 1, math.ceil(m * factor)), setting.dtype)
+        factor = (
+            min((size / target) ** (1.0 / Method(candidate.method).order) * 1.02, 2.0) if np.isfinite(size) else 1.5
+        )
+        m = round(float(sample.spacing) / trial.candidate.h)
+        longer = sample.candidate(candidate.method, max(m + 1, math.ceil(m * factor)), candidate.dtype)
         trial = tried(sample, longer, reference)
     return trial
 
 
-def seconds_of(fleet: Ensemble, setting: Setting, t1: float, members: int = 256) -> float:
+def seconds_of(fleet: Ensemble, candidate: Candidate, t1: float, members: int = 256) -> float:
     """Predict the CPU time of a whole run from that of a few members.
 
     Args:
         fleet: all members.
-        setting: method, step, precision and solver.
+        candidate: method, step, precision and solver.
         t1: end time [s].
         members: number of members that are timed. Default 256.
 
@@ -406,24 +411,24 @@ def seconds_of(fleet: Ensemble, setting: Setting, t1: float, members: int = 256)
         Time of all members on one core, the scene's samples included and compiling not [s].
     """
     n = min(members, fleet.members)
-    plan = make_plan(fleet.subset(range(n)), setting.resolved(), setting.h, t1, dtype=setting.dtype)
+    plan = make_plan(fleet.subset(range(n)), candidate.resolved(), candidate.h, t1, dtype=candidate.dtype)
     plan.compile()
     return float(cost.timed([lambda: run_plan(plan, 1)], 2).min()) * fleet.members / n
 
 
-def memory_of(fleet: Ensemble, setting: Setting, t1: float) -> int:
+def memory_of(fleet: Ensemble, candidate: Candidate, t1: float) -> int:
     """Predict the memory of a run of all members, with the scene's samples.
 
     Args:
         fleet: all members.
-        setting: method, step, precision and solver.
+        candidate: method, step, precision and solver.
         t1: end time [s].
 
     Returns:
         Memory of the run and its result [bytes].
     """
-    grid = make_plan(fleet.subset([0]), setting.resolved(), setting.h, t1, dtype=setting.dtype).grid
-    a_sample = 18 * np.dtype(machine.DTYPES[setting.dtype]).itemsize
+    grid = make_plan(fleet.subset([0]), candidate.resolved(), candidate.h, t1, dtype=candidate.dtype).grid
+    a_sample = 18 * np.dtype(machine.DTYPES[candidate.dtype]).itemsize
     return fleet.members * (len(grid.times) * a_sample + BYTES_OF_A_MEMBER)
 
 
@@ -441,10 +446,10 @@ def verified(fleet: Ensemble, result: Result, found: Suggestion) -> tuple[float,
     Returns:
         (error, members): largest error over these members and all samples [found.unit], and how many members they are.
     """
-    setting = found.setting
+    candidate = found.setting
     chosen = list(dict.fromkeys((*found.worst, *range(fleet.members))))[:CONFIRMED]
     checked_fleet = fleet.subset(chosen)
-    plan = make_plan(checked_fleet, setting.resolved(), setting.h, float(result.time[-1]), dtype=setting.dtype)
+    plan = make_plan(checked_fleet, candidate.resolved(), candidate.h, float(result.time[-1]), dtype=candidate.dtype)
     h = result.provenance["step"]
     steps = np.rint(result.time / h).astype(np.int64)
     # In double precision, so that the error contains the run's round-off too.

@@ -23,7 +23,7 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies import comparison, cost
 from lgvi_warp.studies.compared import QUANTITIES, Compared, compared_in
-from lgvi_warp.studies.comparison import Growth, Reference, Sample, Setting
+from lgvi_warp.studies.comparison import Candidate, Growth, Reference, Sample
 from lgvi_warp.studies.speed import void
 
 # Tried in this order; names that this version does not know, or that a scene refuses, are left out.
@@ -61,7 +61,7 @@ class Measurement:
         cost_spread: median of the cost's readings over the least, which is taken.
     """
 
-    setting: Setting
+    setting: Candidate
     us_per_vehicle_second: float
     compile_seconds: float
     errors: dict[str, dict[str, float]]
@@ -251,14 +251,14 @@ class Trial:
     """A setting that was run on a sample.
 
     Attributes:
-        setting: method, step, precision and solver.
+        candidate: method, step, precision and solver.
         plan: its plan.
         result: the result at the sample's times.
         errors: quantity -> kind -> error; empty where a member failed or there is no reference.
         cpu_seconds: CPU time of the run, without compiling [s].
     """
 
-    setting: Setting
+    candidate: Candidate
     plan: Plan
     result: Result
     errors: dict[str, dict[str, float]]
@@ -276,12 +276,12 @@ class Trial:
         return self.errors[of]["path_max"] if self.errors else math.inf
 
 
-def tried(sample: Sample, setting: Setting, reference: Reference | None, until: int = -1) -> Trial:
+def tried(sample: Sample, candidate: Candidate, reference: Reference | None, until: int = -1) -> Trial:
     """Run a setting on a sample and measure its errors.
 
     Args:
         sample: members and times.
-        setting: method, step, precision and solver.
+        candidate: method, step, precision and solver.
         reference: what errors are measured against; None for no errors.
         until: index of the last sample that is compared. Default: the last of all.
 
@@ -291,7 +291,7 @@ def tried(sample: Sample, setting: Setting, reference: Reference | None, until: 
     Raises:
         SceneError: where the scene refuses the setting.
     """
-    plan = sample.plan(setting)
+    plan = sample.plan(candidate)
     compile_seconds = plan.compile()
     with np.errstate(all="ignore"):
         begun = cost.thread_seconds()
@@ -303,7 +303,7 @@ def tried(sample: Sample, setting: Setting, reference: Reference | None, until: 
             errors = comparison.errors(comparison.distances(result, reference.result, reference.asked), until)
             if not all(np.isfinite(norms["path_max"]) for norms in errors.values()):
                 errors = {}
-    return Trial(setting, plan, result, errors, cpu_seconds)
+    return Trial(candidate, plan, result, errors, cpu_seconds)
 
 
 def costs(plans: Sequence[Plan], rounds: int = 5) -> list[float]:
@@ -409,7 +409,7 @@ def tradeoff(
     reference, finest, until, growth = None, None, len(sample.times) - 1, None
     if sample.noisy(taken[0]):
         messages.append("noise acts, whose path differs from step to step: only statistics are compared")
-        finest = tried(sample, sample.setting(taken[0], 32 * sample.coarsest(0.5)), None).result
+        finest = tried(sample, sample.candidate(taken[0], 32 * sample.coarsest(0.5)), None).result
     else:
         reference = comparison.make_reference(
             sample, compared, seconds=0.3 * seconds, report=lambda fraction: report(0.2 * fraction)
@@ -471,7 +471,7 @@ def growth_of(sample: Sample, taken: Sequence[str], reference: Reference) -> Gro
     method = max(taken, key=lambda name: Method(name).order)
     often = Sample(sample.whole, sample.t1, sample.members)
     m = max(1, round(float(often.spacing) / reference.result.provenance["step"]))
-    return comparison.growth(often, often.setting(method, m))
+    return comparison.growth(often, often.candidate(method, m))
 
 
 def trusted_until(reference: Reference, of: Compared) -> int:
@@ -530,15 +530,15 @@ def sweep(
     for i, (method, dtype, solver) in enumerate(ladders):
         report(i / len(ladders))
         if time.perf_counter() > latest:
-            skipped.append(f"{sample.setting(method, 1, dtype, solver).name} {dtype}")
+            skipped.append(f"{sample.candidate(method, 1, dtype, solver).name} {dtype}")
             continue
         m, best, worse = sample.coarsest(1.0), math.inf, 0
         for k in range(20 if reference else 5):
             if time.perf_counter() > deadline:
-                name = sample.setting(method, m, dtype, solver).name
+                name = sample.candidate(method, m, dtype, solver).name
                 skipped.append(f"{name} {dtype}" + (" at fine steps" if k else ""))
                 break
-            trial = tried(sample, sample.setting(method, m, dtype, solver), reference, until)
+            trial = tried(sample, sample.candidate(method, m, dtype, solver), reference, until)
             trials.append(trial)
             deadline += trial.result.compile_seconds
             m *= 2
@@ -586,14 +586,14 @@ def between(sample: Sample, trials: list[Trial], reference: Reference, until: in
         if error < best:
             best = error
             near.append(trials[i])
-    tried_already = {trial.setting for trial in trials}
+    tried_already = {trial.candidate for trial in trials}
     for trial in near:
-        m = round(float(sample.spacing) / trial.setting.h)
+        m = round(float(sample.spacing) / trial.candidate.h)
         for step in {round(m / math.sqrt(2.0)), round(m * math.sqrt(2.0))} - {0}:
-            setting = replace(trial.setting, h=sample.h(step))
-            if setting not in tried_already and time.perf_counter() < deadline:
-                tried_already.add(setting)
-                trials.append(tried(sample, setting, reference, until))
+            candidate = replace(trial.candidate, h=sample.h(step))
+            if candidate not in tried_already and time.perf_counter() < deadline:
+                tried_already.add(candidate)
+                trials.append(tried(sample, candidate, reference, until))
 
 
 def measurements(
@@ -620,7 +620,7 @@ def measurements(
     good = [trial for trial in trials if not comparison.failed(trial.result) and (trial.errors or reference is None)]
     compiled: dict[tuple[str, str], float] = {}
     for trial in trials:
-        key = trial.setting.name, trial.setting.dtype
+        key = trial.candidate.name, trial.candidate.dtype
         compiled[key] = max(compiled.get(key, 0.0), trial.result.compile_seconds)
     measured = []
     for trial, price in zip(good, cost.costs([trial.plan for trial in good]), strict=True):
@@ -631,10 +631,10 @@ def measurements(
             drift = invariants.drift(trial.result)["energy"] if kept else math.nan
         measured.append(
             Measurement(
-                setting=trial.setting,
+                setting=trial.candidate,
                 us_per_vehicle_second=price.us_per_vehicle_second,
                 cost_spread=price.spread,
-                compile_seconds=compiled[trial.setting.name, trial.setting.dtype],
+                compile_seconds=compiled[trial.candidate.name, trial.candidate.dtype],
                 errors=trial.errors,
                 energy_drift=drift,
                 biases=biases,

@@ -72,7 +72,7 @@ def sources():
     )
     run = '[run]\nmethod = "psi_s"\nstep = 0.05\nduration = 0.5\nsave_every = 0.1\n'
     laws = []
-    for page in sorted((ROOT / "docs" / "terms").glob("*.md")):
+    for page in sorted((ROOT / "docs" / "guide" / "terms").glob("*.md")):
         laws += [
             block for block in re.findall(r"```toml\n(.*?)```", page.read_text(), re.DOTALL) if "[[terms]]" in block
         ]

@@ -1,4 +1,4 @@
-"""Every extreme, what must come of it and what came: writes docs/extremes.md.
+"""Every extreme, what must come of it and what came: writes docs/explain/extremes.md.
 
 python -m tests.extremes.table
 """
@@ -12,7 +12,7 @@ from lgvi_warp.common.status import Status
 from tests.extremes import cases
 from tests.extremes.cases import DTYPES, GROUPS, METHODS, OK
 
-TARGET = Path(__file__).parents[2] / "docs" / "extremes.md"
+TARGET = Path(__file__).parents[2] / "docs" / "explain" / "extremes.md"
 
 # A position that is off by more than this part of the way is worth a word.
 TELLING = 0.01
@@ -24,7 +24,7 @@ Each line is one vehicle at an extreme, run by the kernel and, step by step the 
 or the status that the vehicle was flagged with. `tests/extremes/test_extremes.py` runs every line and asserts both.
 
 * **error**: the largest of |R - R*|, |p - p*| / |p| and |pi - pi*| / |pi|: what rounding made of the map. The error of the
-  map itself, of second order in the step, is no part of it: it is that of the method (docs/accuracy_and_speed.md).
+  map itself, of second order in the step, is no part of it: it is that of the method (docs/guide/accuracy_and_speed.md).
 * **bound**: G (3 sqrt(n) ({roundings} u + 2 t) + {constants} n u) for n steps: u is the unit of round-off (2^-53 or 2^-24),
   t the tolerance to which psi_s solves its equation (24) twice a step (psi_x solves none), {constants} the constants that
   are rounded once for all steps, and G how much a small error grows during the run, from runs in extended precision that

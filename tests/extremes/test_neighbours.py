@@ -33,7 +33,7 @@ def healthy(n, dragged=False, laws=()):
         shared = {
             name: np.repeat(value, n, axis=0) for name, value in one.parameters(0, 1).items() if np.ndim(value) != 0
         }
-        shared = {name: shared[name] for name in one._explicit if name in shared}
+        shared = {name: shared[name] for name in one.explicit() if name in shared}
         return lw.Ensemble.from_states(one.scene, *states, shared), shared
     scene = lw.Scene(GENERAL.vehicle, GENERAL.environment, terms=laws)
     return lw.Ensemble.from_states(scene, *states), {}

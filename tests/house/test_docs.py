@@ -19,7 +19,7 @@ def snippets(language):
     """(page and line, text) of every fenced snippet of a language."""
     found = []
     for name in ("sampling.md", "sensitivity.md"):
-        text = (ROOT / "docs" / name).read_text()
+        text = (ROOT / "docs" / "guide" / name).read_text()
         for match in re.finditer(rf"```{language}\n(.*?)```", text, re.DOTALL):
             found.append(pytest.param(match[1], id=f"{name}:{text[: match.start()].count(chr(10)) + 1}"))
     return found

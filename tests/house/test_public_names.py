@@ -29,6 +29,13 @@ def test_an_old_name_is_the_new_thing_and_warns_each_time(old, new):
     assert new in lw.__all__ and old not in lw.__all__
 
 
+def test_the_old_name_of_uq():
+    with pytest.warns(DeprecationWarning, match=r"lw\.uq\.Model is now lw\.uq\.ScalarModel;"):
+        assert lw.uq.Model is lw.uq.ScalarModel
+    with pytest.raises(AttributeError, match="no attribute 'Models'"):
+        lw.uq.Models
+
+
 def test_an_old_name_pickles_as_the_new_class():
     with pytest.warns(DeprecationWarning, match="UnitCubePoints"):
         design = lw.Levels([[0.25, 0.5]])

@@ -8,7 +8,7 @@ import pytest
 import lgvi_warp as lw
 from tests.conftest import ROOT
 
-PAGE = (ROOT / "docs" / "statistics.md").read_text()
+PAGE = (ROOT / "docs" / "guide" / "statistics.md").read_text()
 
 
 def snippets(language):

@@ -92,8 +92,8 @@ def test_a_torque_of_the_wrong_sign():
 class Unturned(lw.Tether):
     """Forgets that the kernel's axes and origin are not the user's."""
 
-    def packed(self, own, setting):
-        return lw.Packed({key: own[key] for key in ("anchor", "attachment", "stiffness", "rest_length")})
+    def packed(self, numbers, context):
+        return lw.Packed({key: numbers[key] for key in ("anchor", "attachment", "stiffness", "rest_length")})
 
 
 def test_a_point_that_is_not_moved():
@@ -105,7 +105,7 @@ def test_a_point_that_is_not_moved():
 class NoPotential(lw.Tether):
     """Says it has a potential, and has none."""
 
-    def potential(self, own, position, attitude, parameters):
+    def potential(self, numbers, position, attitude, parameters):
         return 0.0
 
 
@@ -169,8 +169,8 @@ class Stirred(lw.Term):
 
     strength: Any = lw.number((), "1/s")
 
-    def packed(self, own, setting):
-        return lw.Packed(dict(own))
+    def packed(self, numbers, context):
+        return lw.Packed(dict(numbers))
 
 
 def test_a_flow_whose_gradient_is_wrong():
@@ -288,8 +288,8 @@ def test_numbers_that_do_not_fit():
     class Forgetful(Stirred):
         device = HastyDevice
 
-        def packed(self, own, setting):
-            return lw.Packed({"strange": own["strength"]})
+        def packed(self, numbers, context):
+            return lw.Packed({"strange": numbers["strength"]})
 
     report = lw.check_law(Forgetful(strength=0.3))
     assert names_of_failed(report) == ["numbers"]
@@ -298,8 +298,8 @@ def test_numbers_that_do_not_fit():
 
 def test_numbers_that_cannot_vary():
     class Shared(lw.Wrench):
-        def packed(self, own, setting):
-            return lw.Packed({key: own[key].reshape(1, 3) for key in ("force", "torque")})
+        def packed(self, numbers, context):
+            return lw.Packed({key: numbers[key].reshape(1, 3) for key in ("force", "torque")})
 
     report = lw.check_law(Shared(force=(1.0, 2.0, 3.0)))
     assert "law: varied numbers" in names_of_failed(report) and "one entry a member" in str(report)

@@ -96,10 +96,10 @@ DRAG = lw.terms.Drag(quadratic=[20.0, 80.0, 80.0, 3.0, 5.0, 5.0])
 MATRIX = lw.terms.DragMatrix(linear=np.eye(6))
 WRENCH = lw.terms.Wrench(force=[1.0, 0.0, 0.0], torque=[0.0, 0.0, 0.0])
 REFUSED = [
-    ("rkn6_14", TETHER, "wants potentials of position plus such of attitude, which tether is not"),
-    ("rkn6_11", DRAG, "which drag is not"),
-    ("rkn4_6", WRENCH, "which wrench is not"),
-    ("bm4(psi_x)", MATRIX, "keeps its order only for maps that undo themselves"),
+    ("rkn6_14", TETHER, "needs potentials of position plus those of attitude; tether has none such"),
+    ("rkn6_11", DRAG, "drag has none such"),
+    ("rkn4_6", WRENCH, "wrench has none such"),
+    ("bm4(psi_x)", MATRIX, "keeps its order only if a step of -h undoes one of h"),
 ]
 
 
@@ -119,7 +119,7 @@ def test_names_that_do_not_fit(name, words):
 
 
 def test_coupled_inertia_does_not_fit():
-    with pytest.raises(lw.SceneError, match="cannot couple velocities and rates"):
+    with pytest.raises(lw.SceneError, match="cannot advance an inertia that couples velocities and rates"):
         lw.solve(one(coupled_scene_of(())), "rkn6_11", h=0.1, t1=0.1)
 
 

@@ -160,7 +160,7 @@ def test_laws_that_do_not_fit_are_refused(method, name):
         ({"name": "rk6"}, "rk"),
         ({"name": "rk4", "rtol": 1e-8, "atol": 1e-8}, "estimates no error; use rk5 or rk8"),
         ({"name": "psi_s", "rtol": 1e-8, "atol": 1e-8}, "estimates no error"),
-        ({"name": "rk8", "rtol": 1e-8}, "has no counterpart"),
+        ({"name": "rk8", "rtol": 1e-8}, "is given alone"),
         ({"name": "rk8", "rtol": -1.0, "atol": 1e-8}, "is not between 0 and 1"),
     ],
 )

@@ -1,4 +1,4 @@
-"""The README's table Paper to code: every name in it exists, and every equation's function says its number."""
+"""The table of docs/reference/paper_to_code.md: every name in it exists, and every equation's function says its number."""
 
 import importlib
 import re
@@ -9,7 +9,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 ROWS = [
     [cell.strip() for cell in line.strip().strip("|").split("|")]
-    for line in (ROOT / "README.md").read_text().splitlines()
+    for line in (ROOT / "docs" / "reference" / "paper_to_code.md").read_text().splitlines()
     if re.match(r"\| *(\(\d+\)|section)", line)
 ]
 

@@ -50,7 +50,7 @@ from lgvi_warp.runs.store import folder as store
 from tests.support.stores import SETTINGS, fleet
 path, place, count, exchange = sys.argv[1], sys.argv[2], int(sys.argv[3]), sys.argv[4] == "yes"
 if not exchange:
-    durable._exchanged = lambda one, other: False
+    durable.exchanged = lambda one, other: False
 owner, name = {"rename": (durable.Path, "replace"), "sync": (durable, "sync_folder"), "remove": (scratch, "remove_folder"),
                "write": (safe_files, "rename")}[place]
 call, left = getattr(owner, name), [count]
@@ -387,7 +387,7 @@ def test_folders_are_exchanged_in_one_step(tmp_path):
     for name in "ab":
         (tmp_path / name).mkdir()
         (tmp_path / name / name).touch()
-    if not durable._exchanged(tmp_path / "a", tmp_path / "b"):
+    if not durable.exchanged(tmp_path / "a", tmp_path / "b"):
         pytest.skip("this system cannot")
     assert os.listdir(tmp_path / "a") == ["b"] and os.listdir(tmp_path / "b") == ["a"]
 
@@ -476,12 +476,15 @@ def test_a_full_disk_does_not_undo_what_is_overwritten(whole, tmp_path, monkeypa
 
 
 def test_the_page_names_tests_that_there_are():
-    """Each test and each store or result that docs/what_files_can_do.md names for its sentences."""
+    """Each test and each store or result that docs/guide/what_files_can_do.md names for its sentences."""
     text = (
-        (ROOT / "docs" / "what_files_can_do.md").read_text().partition("## Stores and results")[2].partition("\n## ")[0]
+        (ROOT / "docs" / "guide" / "what_files_can_do.md")
+        .read_text()
+        .partition("## Stores and results")[2]
+        .partition("\n## ")[0]
     )
     source = "".join(
-        (ROOT / "tests" / "composition" / f"test_{name}_stores.py").read_text() for name in ("hostile", "faults_of")
+        (ROOT / "tests" / "runs" / f"test_{name}_stores.py").read_text() for name in ("hostile", "faults_of")
     )
     tests = re.findall(r"`(test_\w+)`", text)
     named = re.findall(r'"([^"]+)"', " ".join(re.findall(r"\(`stores`:([^)]*)\)", text.replace("\n", " "))))

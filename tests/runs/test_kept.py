@@ -93,7 +93,7 @@ def test_a_part_is_sent_as_what_it_is():
     own = lw.Ensemble.from_states(fleet(2).scene, states.position, states.attitude, states.velocity,
                                   states.angular_velocity, parameters=given)  # fmt: skip
     plan = make_plan(own, **SETTINGS)
-    part = plan.part([1], ("position",))
+    part = plan.subplan([1], ("position",))
     assert part.spec.mass == plan.spec.mass != make_plan(own.subset([1]), **SETTINGS).spec.mass
     again = pickle.loads(pickle.dumps(part))
     assert again.spec == part.spec and again.fields == ("position",) and again.ensemble.members == 1

@@ -41,7 +41,7 @@ def cache(tmp_path, monkeypatch):
 
 def forget():
     """As a new process."""
-    kernel_cache._loaded.discard(MODULE)
+    kernel_cache.loaded.discard(MODULE)
     MODULE.unload()
 
 
@@ -200,7 +200,7 @@ def test_a_temporary_folder_without_room_is_not_needed(cache, monkeypatch, capfd
     monkeypatch.setattr(warp_setup, "header_folders", lambda: folders)
     before = dict(folders)
     folders.clear()
-    monkeypatch.setattr(kernel_cache, "_temporary_room", lambda: False)
+    monkeypatch.setattr(kernel_cache, "temporary_room", lambda: False)
     made = []
     load_module = wp.load_module
     monkeypatch.setattr(wp, "load_module", lambda *given, **named: made.append(
@@ -212,9 +212,9 @@ def test_a_temporary_folder_without_room_is_not_needed(cache, monkeypatch, capfd
 
 
 def test_the_temporary_folder_is_looked_at(tmp_path, monkeypatch):
-    assert kernel_cache._temporary_room()
+    assert kernel_cache.temporary_room()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
-    assert not kernel_cache._temporary_room()
+    assert not kernel_cache.temporary_room()
 
 
 def test_what_killed_processes_left_is_swept(cache):
@@ -230,7 +230,7 @@ def test_what_killed_processes_left_is_swept(cache):
         os.utime(path, (then, then))
     truncated(cache)
     forget()
-    with kernel_cache._scratch(cache) as alive:
+    with kernel_cache.scratch_folder(cache) as alive:
         assert works()
         assert [path.exists() for path in (dead, mine, old, new, users, alive)] == [False] * 3 + [True] * 3
     assert not alive.exists()
@@ -238,8 +238,8 @@ def test_what_killed_processes_left_is_swept(cache):
 
 def test_threads_compile_once(cache, monkeypatch):
     compiled = []
-    compile_it = kernel_cache._compile
-    monkeypatch.setattr(kernel_cache, "_compile", lambda *given: (compiled.append(given), compile_it(*given)))
+    compile_it = kernel_cache.compile_module
+    monkeypatch.setattr(kernel_cache, "compile_module", lambda *given: (compiled.append(given), compile_it(*given)))
     threads = [threading.Thread(target=kernel_cache.load, args=(MODULE,)) for _ in range(4)]
     for thread in threads:
         thread.start()
@@ -255,7 +255,7 @@ def test_threads_that_start_warp_leave_stderr_as_it_was(monkeypatch):
     before = os.fstat(2).st_ino
     monkeypatch.setattr(wp, "init", slow)
     monkeypatch.setattr(warp_setup, "_has_cuda_driver", lambda: False)
-    warp_setup._start.cache_clear()
+    warp_setup.start_once.cache_clear()
     threads = [threading.Thread(target=warp_setup.start) for _ in range(3)]
     for i, thread in enumerate(threads):
         time.sleep(0.04 * i)

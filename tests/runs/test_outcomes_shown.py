@@ -249,7 +249,7 @@ class Own(lw.Term):
 class Told(Own):
     """One whose potential is known to the host."""
 
-    def potential(self, own, position, attitude, parameters):
+    def potential(self, numbers, position, attitude, parameters):
         return position[..., 2]
 
 
@@ -414,15 +414,15 @@ def test_members_that_are_kept_since_they_failed_are_drawn(mixed, tmp_path):
 
 def test_the_summary_says_work_where_forces_do_some(mixed):
     driven = acted_on(mixed, ACTING["thrust"][0])
-    (line,) = report._energy_lines(driven, driven)
+    (line,) = report.energy_lines(driven, driven)
     assert (
         line.startswith("work        energy changed by up to ") and "J, through wrench (largest of all members)" in line
     )
     tethered = acted_on(mixed, ACTING["an anchor"][0])
-    (line,) = report._energy_lines(tethered, tethered)
+    (line,) = report.energy_lines(tethered, tethered)
     assert line.startswith("drift       energy ") and "momentum" not in line
     lost = ending(mixed, [1] * 7, [2.0] * 7)
-    assert report._energy_lines(lost, lost) == []
+    assert report.energy_lines(lost, lost) == []
 
 
 @pytest.mark.parametrize(

@@ -14,8 +14,8 @@ from lgvi_warp.runs import member_fields
 from lgvi_warp.runs import predict as prediction
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.runs.sizes import sizes
+from lgvi_warp.runs.store.block_files import BlockFiles
 from lgvi_warp.runs.store.folder import Folder
-from lgvi_warp.runs.store.sink import Sink
 from tests.conftest import ROOT
 from tests.support.stores import SETTINGS, STATISTICS, fleet, tree
 
@@ -40,9 +40,9 @@ def test_the_memory_of_a_result_is_counted():
     result = lw.solve(fleet(), **SETTINGS)
     arrays = [*result.samples.values(), result.parameters["vehicle.mass"]]
     arrays += [getattr(result, one.name) for one in member_fields.present(plan)]
-    assert prediction._result_bytes(plan) == sum(x.nbytes for x in arrays)
+    assert prediction.result_bytes(plan) == sum(x.nbytes for x in arrays)
     small, large = (prediction.memory([prediction.Sized(make_plan(fleet(n), **SETTINGS))], 1) for n in (1000, 5000))
-    assert large - small == 4 * prediction._result_bytes(make_plan(fleet(1000), **SETTINGS))
+    assert large - small == 4 * prediction.result_bytes(make_plan(fleet(1000), **SETTINGS))
 
 
 def test_a_store_needs_no_memory_for_samples():
@@ -124,8 +124,8 @@ def gathered_of(folder, statistics):
     """Bytes of the parts that a run has joined at its end."""
     keeper = Gathered(folder.group()["time"][:], folder.members, statistics)
     for block in folder.runs:
-        keeper.merge(block, *Sink(folder.path, ()).parts(block, [keeper]))
-    return sum(array.nbytes for tree in keeper._trees for part in tree.parts() for array in part.values())
+        keeper.merge(block, *BlockFiles(folder.path, ()).parts(block, [keeper]))
+    return sum(array.nbytes for tree in keeper.trees for part in tree.parts() for array in part.values())
 
 
 def test_members_that_are_kept_take_their_share_of_the_time(monkeypatch):

@@ -24,8 +24,8 @@ from lgvi_warp.runs.provenance import messages, provenance
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.runs.store import folder as store
 from lgvi_warp.runs.store import layout as store_layout
-from lgvi_warp.runs.store.run import Stored
-from lgvi_warp.runs.store.sink import packed, unpacked
+from lgvi_warp.runs.store.block_files import packed, unpacked
+from lgvi_warp.runs.store.run import StoredRun
 from lgvi_warp.runs.store.state import state
 from tests.conftest import ROOT
 from tests.support.stores import MEMBERS, SETTINGS, differing, fleet, markers, tree
@@ -604,7 +604,7 @@ def test_parts_of_keepers_lie_in_the_store(tmp_path, memory):
     def run(name, only=None, existing="refuse"):
         keeper = DepthSum(plan)
         chosen = lw.Store(tmp_path / name, existing=existing)
-        Stored(plan, chosen, provenance(plan), messages(plan), (keeper,), only).run(Threads(2))
+        StoredRun(plan, chosen, provenance(plan), messages(plan), (keeper,), only).run(Threads(2))
         return keeper
 
     one = run("a.zarr")
@@ -640,7 +640,7 @@ def test_keepers_that_cannot_be_stored_are_refused(tmp_path):
     plan = make_plan(fleet(10), **SETTINGS)
     named = [DepthSum(plan), DepthSum(plan), object()]
     with pytest.raises(lw.SceneError) as refused:
-        Stored(plan, lw.Store(tmp_path / "a.zarr"), {}, (), tuple(named)).run(Threads(1))
+        StoredRun(plan, lw.Store(tmp_path / "a.zarr"), {}, (), tuple(named)).run(Threads(1))
     assert "to_arrays" in str(refused.value) and "'depth sum'" in str(refused.value)
 
 
@@ -700,7 +700,9 @@ def test_a_distribution_of_your_own_goes_on_with_its_ensemble(tmp_path):
     lw.solve(own(), **SETTINGS, store=whole)
     lw.solve(own(), **SETTINGS, store=path)
     (path / "blocks" / "000000256.json").unlink()
-    with pytest.raises(lw.SceneError, match="a law of your own, which a file does not hold; give the ensemble again"):
+    with pytest.raises(
+        lw.SceneError, match="a distribution of your own, which a file does not hold; give the ensemble again"
+    ):
         lw.resume(path)
     lw.resume(path, own())
     assert differing(whole, path) == []

@@ -10,7 +10,7 @@ from lgvi_warp import cli
 from lgvi_warp.engine.step_warnings import COARSE
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.studies.stability import map as stability
-from lgvi_warp.studies.stability.grid import Grid
+from lgvi_warp.studies.stability.grid import StabilityGrid
 from lgvi_warp.studies.stability.map import Cell, StabilityMap, report_text
 from lgvi_warp.studies.stability.runs import column, judged, make_references
 from tests.conftest import ROOT
@@ -98,7 +98,7 @@ def test_errors_are_those_of_a_run_of_its_own(found, scene):
 
 
 def test_the_reference_is_verified_by_another(scene):
-    grid = Grid(scene, ("h", 0.05, 0.2), ("angular_velocity", 1.0, 8.0), (2, 2), 1, 0, None)
+    grid = StabilityGrid(scene, ("h", 0.05, 0.2), ("angular_velocity", 1.0, 8.0), (2, 2), 1, 0, None)
     columns = [column(h, members, 1.0, 1.0) for h, members in grid.columns()]
     make_references(grid, columns, "attitude", 1e-4, 1, lambda part: None)
     assert all(one.verified.all() for one in columns)
@@ -110,7 +110,7 @@ def test_the_reference_is_verified_by_another(scene):
 def test_what_acts_decides_how_energy_is_judged(scene):
     def kind(*terms):
         one = dataclasses.replace(scene, terms=list(terms))
-        return judged(Grid(one, "h", "angular_velocity", (2, 2), 1, 0, None), ["psi_s"])
+        return judged(StabilityGrid(one, "h", "angular_velocity", (2, 2), 1, 0, None), ["psi_s"])
 
     drag, current = lw.Drag(linear=[1.0] * 6), lw.Current(velocity=[0.3, 0.0, 0.0])
     assert kind() == "conservative" and kind(drag) == "dissipative" and kind(current) == "conservative"
@@ -140,9 +140,9 @@ def test_growth_of_energy_is_over_what_the_start_can_hold(scene):
 
 
 def test_the_worst_status_is_of_a_failure_before_an_event(scene):
-    grid = Grid(scene, "h", "angular_velocity", (2, 2), 3, 0, None)
+    grid = StabilityGrid(scene, "h", "angular_velocity", (2, 2), 3, 0, None)
     status = np.array([0, 16, 3, 0, 0, 16, 255, 16, 1, 0, 0, 0])
-    assert stability._worst_status(grid, status).tolist() == [[3, 16], [255, 0]]
+    assert stability.worst_status(grid, status).tolist() == [[3, 16], [255, 0]]
 
 
 def test_the_same_for_any_number_of_threads(scene):

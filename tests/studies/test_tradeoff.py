@@ -63,7 +63,7 @@ def test_errors_scale_with_the_order(found, method, order, least):
 def test_the_reference_is_the_truth(found, scene):
     sample = Sample(scene, 4.0)
     reference = comparison.make_reference(sample, seconds=5.0)
-    other = sample.run(sample.setting("kl6(psi_s)", 40))
+    other = sample.run(sample.candidate("kl6(psi_s)", 40))
     apart = comparison.errors(comparison.distances(other, reference.result), -1 + len(sample.times))
     assert apart["position"]["path_max"] < 1e-11 and reference.error("position") < 1e-11
 
@@ -84,7 +84,7 @@ def test_a_reference_that_agrees_with_itself_less_hides_more(scene):
     sample = Sample(scene, 4.0)
     reference = comparison.make_reference(sample, goal=1e-4, methods=("psi_x", "psi_s"), seconds=2.0)
     worse = dataclasses.replace(reference, own={name: own * 1e4 for name, own in reference.own.items()})
-    trials = [tradeoffs.tried(sample, sample.setting("psi_x", m), reference) for m in (4, 8)]
+    trials = [tradeoffs.tried(sample, sample.candidate("psi_x", m), reference) for m in (4, 8)]
     last = len(sample.times) - 1
     for one, shown in ((reference, True), (worse, False)):
         measured = tradeoffs.measurements(sample, trials, one, one.result, last)
@@ -137,11 +137,11 @@ def test_growth_of_exponential_and_power():
 def test_biases_shrink_with_the_step_and_are_one_for_other_members(scene):
     fleet = lw.Ensemble(scene, 64, 1, scene.ensemble_settings.vary)
     sample = Sample(fleet, 4.0)
-    fine = sample.run(sample.setting("kl8(psi_x)", 8))
-    near = [comparison.biases(sample.run(sample.setting("psi_x", m)), fine)["position_mean"] for m in (2, 8)]
+    fine = sample.run(sample.candidate("kl8(psi_x)", 8))
+    near = [comparison.biases(sample.run(sample.candidate("psi_x", m)), fine)["position_mean"] for m in (2, 8)]
     assert near[0] / near[1] == pytest.approx(16.0, rel=0.2)
     others = Sample(lw.Ensemble(scene, 64, 2, scene.ensemble_settings.vary), 4.0)
-    chance = comparison.biases(others.run(others.setting("kl8(psi_x)", 8)), fine)
+    chance = comparison.biases(others.run(others.candidate("kl8(psi_x)", 8)), fine)
     assert 0.3 < chance["position_mean"] < 4.0 and 0.3 < chance["position_std"] < 4.0
 
 

@@ -7,7 +7,6 @@ import numpy as np
 import warp as wp
 
 from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
-    _native,
     add,
     cross,
     div,
@@ -15,6 +14,7 @@ from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
     lane,
     lane3,
     mul,
+    native_code,
     neg,
     ones,
     sub,
@@ -30,7 +30,7 @@ WIDTH, REAL = 8, wp.float64
 Lane, Lane3, Rotation = lane(WIDTH, REAL), lane3(WIDTH, REAL), rotation_struct(WIDTH, REAL)
 
 
-@wp.func_native(_native(WIDTH, REAL, "A", "__builtin_elementwise_sqrt(A)"))
+@wp.func_native(native_code(WIDTH, REAL, "A", "__builtin_elementwise_sqrt(A)"))
 def root(a: Lane) -> Lane: ...
 
 

@@ -21,18 +21,18 @@ from lgvi_warp.common import machine
 from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.keepers.observation import Observation, Observing
-from lgvi_warp.engine.loop import Progress, run_blocks
+from lgvi_warp.engine.loop import RunProgress, run_blocks
 from lgvi_warp.engine.outcome import Outcome
 from lgvi_warp.engine.work import Work
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.runs.provenance import messages, provenance
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.runs.store.block_files import BlockFiles
 from lgvi_warp.runs.store.create import create
 from lgvi_warp.runs.store.layout import columns
-from lgvi_warp.runs.store.run import Stored
+from lgvi_warp.runs.store.run import StoredRun
 from lgvi_warp.runs.store.settings import Store
-from lgvi_warp.runs.store.sink import Sink
 from lgvi_warp.studies import speed
 
 
@@ -72,19 +72,19 @@ def into_store(plan, folder, threads, samples):
     """Seconds to put prepared samples into a new store, every block durable; and the sizes of its chunks."""
     chosen = Store(tempfile.mkdtemp(dir=folder) + "/run.zarr")
     create(chosen, plan, provenance(plan), ())
-    sink = Sink(chosen.folder, columns(plan, chosen))
+    block_files = BlockFiles(chosen.folder, columns(plan, chosen))
     k, runs = len(plan.grid.times), blocks(plan.ensemble.members)
     members = {block.first: plan.ensemble.select(block.first, block.stop) for block in runs}
 
     def one(block):
-        writer = sink.open(plan, block, members[block.first])
+        writer = block_files.open(plan, block, members[block.first])
         for first in range(0, k, 10):
             when = slice(first, min(first + 10, k))
             writer.take(when, {name: values[when, : block.count] for name, values in samples.items()})
-        sink.finish(block, writer.close(Outcome.clear(block.count)), (), ())
+        block_files.finish(block, writer.close(Outcome.clear(block.count)), (), ())
 
     start = time.perf_counter()
-    with sink.commits, ThreadPoolExecutor(threads) as pool:
+    with block_files.commits, ThreadPoolExecutor(threads) as pool:
         list(pool.map(one, runs))
     seconds, sizes = time.perf_counter() - start, sizes_of(chosen.folder)
     emptied(chosen.folder)
@@ -150,7 +150,7 @@ def run_record(folder, quick):
     def stored():
         start = time.perf_counter()
         chosen = Store(tempfile.mkdtemp(dir=folder) + "/run.zarr")
-        Stored(plan, chosen, provenance(plan), messages(plan)).run(Threads(threads))
+        StoredRun(plan, chosen, provenance(plan), messages(plan)).run(Threads(threads))
         seconds, sizes = time.perf_counter() - start, sizes_of(chosen.folder)
         emptied(chosen.folder)
         return seconds, sizes
@@ -188,7 +188,7 @@ def statistics_record(folder, quick, what, observed, keepers):
 
     def without():
         start, cores = time.perf_counter(), time.process_time()
-        run_blocks(Work(plan, keepers(plan)), blocks(members), Threads(threads), Progress(1, None).at)
+        run_blocks(Work(plan, keepers(plan)), blocks(members), Threads(threads), RunProgress(1, None).at)
         return time.perf_counter() - start, time.process_time() - cores
 
     def stored():
@@ -196,7 +196,7 @@ def statistics_record(folder, quick, what, observed, keepers):
         chosen = Store(tempfile.mkdtemp(dir=folder) + "/run.zarr", fields=(), existing="resume")
         create(chosen, plan, *told, own)
         there, cores = time.perf_counter(), time.process_time()
-        Stored(plan, chosen, *told, own).run(Threads(threads))
+        StoredRun(plan, chosen, *told, own).run(Threads(threads))
         seconds = time.perf_counter() - there, time.process_time() - cores, there - start
         emptied(chosen.folder)
         return seconds

@@ -96,10 +96,10 @@ def _chain(events, number):
     @wp.func
     def reached(view: Any, p: Any):
         d = distance(view, p.own)
-        other = d - d
+        code_next = d - d
         if wp.static(more):
-            other = reached_next(view, p.rest)
-        return positive(d, other, view.h.dtype(wp.static(float(FIRST + number))) * ones(d))
+            code_next = reached_next(view, p.rest)
+        return positive(d, code_next, view.h.dtype(wp.static(float(FIRST + number))) * ones(d))
 
     @wp.func
     def least_of(view: Any, p: Any, spacing: Any):
@@ -112,11 +112,11 @@ def _chain(events, number):
         d = d + room + room
         code = view.h.dtype(wp.static(float(FIRST + number))) * ones(d)
         if wp.static(more):
-            other, other_room, other_code = least_of_next(view, p.rest, spacing)
-            ahead = d - other
-            d = positive(ahead, other, d)
-            room = positive(ahead, other_room, room)
-            code = positive(ahead, other_code, code)
+            d_next, room_next, code_next = least_of_next(view, p.rest, spacing)
+            ahead = d - d_next
+            d = positive(ahead, d_next, d)
+            room = positive(ahead, room_next, room)
+            code = positive(ahead, code_next, code)
         return d, room, code
 
     return reached, least_of
@@ -176,16 +176,16 @@ def make_arrival(watch, part_step, choose, water_velocity, real, width, most_par
                     if high_distance > end_room[j]:
                         # Less than a margin beyond at the end: a little further.
                         high = wp.min(real(2.0), real(1.0) + real(2.0) * high_distance / (low_distance - high_distance))
-                    made = int(0)
+                    tries = int(0)
                     parts = int(1)
                     side = int(0)
-                    while high - low > real(wp.static(spacing)) and made < wp.static(MOST_EVALUATIONS):
-                        made += 1
+                    while high - low > real(wp.static(spacing)) and tries < wp.static(MOST_EVALUATIONS):
+                        tries += 1
                         # The first try beyond a whole step is at `high`, all others between the two.
                         tried = high
-                        if high <= real(1.0) or made > 1:
+                        if high <= real(1.0) or tries > 1:
                             tried = real(0.5) * (low + high)
-                            if made < wp.static(SECANTS):
+                            if tries < wp.static(SECANTS):
                                 tried = low + (high - low) * low_distance / (low_distance - high_distance)
                                 tried = wp.clamp(tried, low + real(wp.static(spacing)), high - real(wp.static(spacing)))
                         y = part_step(good, c, k, h, tried / real(parts), parts, stage_h, lead_h, opening, lane)
@@ -194,12 +194,12 @@ def make_arrival(watch, part_step, choose, water_velocity, real, width, most_par
                         if failed and parts < wp.static(most_parts):
                             parts = 2 * parts
                         elif failed or not distance[j] == distance[j]:
-                            made = int(wp.static(MOST_EVALUATIONS))
+                            tries = int(wp.static(MOST_EVALUATIONS))
                         elif distance[j] > room[j]:
                             low = tried
                             low_distance = distance[j]
                             if low >= high:
-                                made = int(wp.static(MOST_EVALUATIONS))
+                                tries = int(wp.static(MOST_EVALUATIONS))
                             if side == 1:
                                 high_distance = real(0.5) * high_distance
                             side = int(1)

@@ -105,8 +105,8 @@ def make_advance(spec):
             # From the one number that the compiler then keeps for the stage and its leads.
             opening = real(wp.static(lead_coefficient)) * first_h
         x = read(state, i)
-        one = ones(x.b.x)
-        zero = one - one
+        unity = ones(x.b.x)
+        zero = unity - unity
         frozen = zero
         any_frozen = bool(False)
         if wp.static(checked):
@@ -150,7 +150,7 @@ def make_advance(spec):
                         # Of a chunk that is made again, only those lanes are looked at that made it necessary.
                         x.alarm = energy_alarm(x, c, monitor, k + n, h, opening, suspects)
                     elif n > 1 or (k + n) % wp.static(SINGLE_LOOKS) == 0 or k + n == last:
-                        x.alarm = energy_alarm(x, c, monitor, k + n, h, opening, one - frozen)
+                        x.alarm = energy_alarm(x, c, monitor, k + n, h, opening, unity - frozen)
                 code = failures(x, frozen)
                 if wp.static(substepped):
                     if n == 1 and any_positive(code):

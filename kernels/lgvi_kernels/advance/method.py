@@ -200,9 +200,9 @@ def make_method(spec):
     maps = []
     for i, (letter, coefficient) in enumerate(spec.maps):
         if letter[0] == "R":
-            axes = [int(other[1]) - 1 for other, _ in (*spec.maps[i:], *spec.maps[:i]) if other[0] == "R"]
+            axes = [int(sub_map[1]) - 1 for sub_map, _ in (*spec.maps[i:], *spec.maps[:i]) if sub_map[0] == "R"]
             following = next((axis for axis in axes if axis != axes[0]), axes[0])
-            watched = spec.checked and not any(other[0] == "R" for other, _ in spec.maps[i + 1 :])
+            watched = spec.checked and not any(letters_of[0] == "R" for letters_of, _ in spec.maps[i + 1 :])
             turn = turns.make_turn(axes[0], pitched[axes[0]], following, spec.compensated, watched)
             maps.append((turn, coefficient))
         else:

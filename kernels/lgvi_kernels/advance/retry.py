@@ -74,9 +74,9 @@ def make_retry(spec):
     def retried(good: State, x: State, code: Lane, c: Constants, k: int, h: wp.float64, stage_h: wp.array(dtype=real),
                 lead_h: wp.array(dtype=real), opening: real):  # fmt: skip
         """(state, code) after step k: where it had no solution, by 2, 4, ... equal parts, as soon as those have one."""
-        one = ones(code)
-        zero = one - one
-        left = code + zero
+        unity = ones(code)
+        zero = unity - unity
+        remaining = code + zero
         pending = zero
         for j in range(wp.static(width)):
             if code[j] == real(1.0) or code[j] == real(2.0) or code[j] == real(4.0):
@@ -88,16 +88,16 @@ def make_retry(spec):
             y = in_parts(y, c, k, h, real(1.0) / real(parts), parts, stage_h, lead_h, opening, pending)
             if wp.static(watched):
                 y = to_event(y, c, real(h))
-            wrong = failures(y, one - pending)
-            solved = one - one
+            wrong = failures(y, unity - pending)
+            solved = unity - unity
             for j in range(wp.static(width)):
                 # An event is no failure, but what becomes of the lane.
                 if pending[j] > real(0.0) and (wrong[j] <= real(0.0) or wrong[j] >= real(wp.static(float(FIRST)))):
                     solved[j] = real(1.0)
                     pending[j] = real(0.0)
-                    left[j] = wrong[j]
+                    remaining[j] = wrong[j]
             x = choose(solved, y, x)
-        return x, left
+        return x, remaining
 
     arrival = step
     if watched:

@@ -51,11 +51,11 @@ def make_rows(Lane, State, paced, compensated):
         put(state, i, 12, x.p)
         put(state, i, 15, x.pi)
         if wp.static(paced):
-            one = ones(x.b.x)
-            state[i, 18] = x.pace.stride * one
-            state[i, 19] = x.pace.before * one
-            state[i, 20] = x.pace.made * one
-            state[i, 21] = x.pace.tried * one
+            unity = ones(x.b.x)
+            state[i, 18] = x.pace.stride * unity
+            state[i, 19] = x.pace.before * unity
+            state[i, 20] = x.pace.made * unity
+            state[i, 21] = x.pace.tried * unity
         if wp.static(compensated):
             put(state, i, 18, x.R0_low)
             put(state, i, 21, x.R1_low)

@@ -53,12 +53,12 @@ def make_watching(spec):
     def energy_alarm(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real, among: Lane):
         """The alarm after k steps, with that of the lanes, among these, whose energy explodes."""
         g = created(closed(x, c, k, h, opening), c, monitor, real(wp.float64(k) * h))
-        one = ones(g)
-        over = positive(among, g - real(wp.static(monitors.MOST_ENERGY)) * one, one - one)
+        unity = ones(g)
+        over = positive(among, g - real(wp.static(monitors.MOST_ENERGY)) * unity, unity - unity)
         alarm = x.alarm
         alarm.size = positive(alarm.code, alarm.size, positive(over, g * g, alarm.size))
-        grew = real(wp.static(float(monitors.ENERGY_GREW))) * one
-        alarm.code = positive(alarm.code, alarm.code, positive(over, grew, one - one))
+        grew = real(wp.static(float(monitors.ENERGY_GREW))) * unity
+        alarm.code = positive(alarm.code, alarm.code, positive(over, grew, unity - unity))
         return alarm
 
     @wp.func
@@ -67,15 +67,15 @@ def make_watching(spec):
         g = frozen
         if wp.static(energetic):
             g = created(y, c, monitor, real(wp.float64(k) * h))
-        seen = look_at(y, c, monitor.limits[c.packet % monitor.limits.shape[0]], g)
-        bits = positive(frozen, frozen - frozen, seen.bits)
+        crossings = look_at(y, c, monitor.limits[c.packet % monitor.limits.shape[0]], g)
+        bits = positive(frozen, frozen - frozen, crossings.bits)
         if any_positive(bits):
             for j in range(wp.static(width)):
                 old = monitor.warned[c.packet][j]
                 new = int(bits[j]) & ~old
                 if new > old:
                     monitor.warned_step[c.packet][j] = k
-                    monitor.warned_size[c.packet][j] = seen.size[j]
+                    monitor.warned_size[c.packet][j] = crossings.size[j]
                 monitor.warned[c.packet][j] = old | new
 
     @wp.func(inline=False)

@@ -56,7 +56,7 @@ def symmetric3(width, real):
     return Symmetric3
 
 
-def _head(width, real, arguments):
+def native_head(width, real, arguments):
     """C++ that declares the vector type V and copies the lanes a, b, c into vectors A, B, C."""
     name = "wp::float32" if real == wp.float32 else "wp::float64"
     size = width * (4 if real == wp.float32 else 8)
@@ -65,17 +65,17 @@ def _head(width, real, arguments):
     return f"typedef {name} S; typedef {vector};{loads}"
 
 
-def _native(width, real, arguments, expression):
+def native_code(width, real, arguments, expression):
     """C++ of a function of the lanes a, b, c: the expression is written in their vectors A, B, C (and a number s)."""
     result = f"V R = {expression}; wp::vec_t<{width}, S> r; memcpy(&r, &R, sizeof(V)); return r;"
-    return f"{_head(width, real, arguments)} {result}"
+    return f"{native_head(width, real, arguments)} {result}"
 
 
 def _native_any_positive(width, real):
     """C++ of: some lane of `a` is positive. The maximum would not do: it may drop a lane beside one that is NaN."""
     if width == 1:
         return "return a[0] > 0;"
-    return f"{_head(width, real, 'A')} return __builtin_reduce_or(A > (S)0) != 0;"
+    return f"{native_head(width, real, 'A')} return __builtin_reduce_or(A > (S)0) != 0;"
 
 
 def _native_element(width, real, statement):
@@ -101,7 +101,7 @@ for _real in REALS:
     for _width in WIDTHS:
         _R, _L, _L3, _S3 = _real, lane(_width, _real), lane3(_width, _real), symmetric3(_width, _real)
         _make = _vec3_maker(_width, _real)
-        _native_here = functools.partial(_native, _width, _real)
+        _native_here = functools.partial(native_code, _width, _real)
 
         @wp.func_native(_native_here("AB", "A + B"))
         def add(a: _L, b: _L) -> _L: ...

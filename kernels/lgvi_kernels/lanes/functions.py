@@ -10,7 +10,7 @@ import functools
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import REALS, WIDTHS, _head, _native, int_lane, lane, vec3
+from lgvi_kernels.lanes.arithmetic import REALS, WIDTHS, int_lane, lane, native_code, native_head, vec3
 
 # digits          after the leading one;  bias: the exponent of 1.0
 # rounder         1.5 * 2^digits: a number added to it is rounded, and the last bits are that integer
@@ -90,12 +90,12 @@ def _converted(width, what, name):
 
 
 def _types(width, real, arguments):
-    """C++ of _head, and of vectors of integers of the numbers' size: I with sign, U without."""
+    """C++ of native_head, and of vectors of integers of the numbers' size: I with sign, U without."""
     bits = 64 if real == wp.float64 else 32
     signed, unsigned = (
         _vector(width, *kind, bits // 8) for kind in (("I", f"wp::int{bits}"), ("U", f"wp::uint{bits}"))
     )
-    return f"{_head(width, real, arguments)} {signed} {unsigned}"
+    return f"{native_head(width, real, arguments)} {signed} {unsigned}"
 
 
 def _body(width, real, arguments, statements, result="R"):
@@ -259,7 +259,7 @@ def _normals(width, real):
 for _real in REALS:
     for _width in WIDTHS:
         _L, _I, _4L = lane(_width, _real), int_lane(_width), lane(4 * _width, _real)
-        _native_here = functools.partial(_native, _width, _real)
+        _native_here = functools.partial(native_code, _width, _real)
         _body_here = functools.partial(_body, _width, _real)
 
         @wp.func_native(_native_here("AB", "A > B ? A : B"))

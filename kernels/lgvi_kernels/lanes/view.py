@@ -55,10 +55,10 @@ def remember(view: Any, row: int, value: Any):
 @wp.func
 def ramp(view: Any, row: int, x: Any):
     """How far x is from one knot to the next, 0 to 1, from the two rows that hold the knot and 1 / the distance."""
-    one = ones(x)
+    unity = ones(x)
     t = view.table
     i = view.entry
-    return clamp((x - element(t, i, row, 0)) * element(t, i, row, 1), one - one, one)
+    return clamp((x - element(t, i, row, 0)) * element(t, i, row, 1), unity - unity, unity)
 
 
 @wp.func

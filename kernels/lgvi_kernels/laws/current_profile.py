@@ -20,15 +20,15 @@ def params(width, real):
 def flow(f: Any, view: Any, p: Any):
     """u and du/db3, which within a segment is its slope."""
     depth = view.b.z
-    one = ones(depth)
-    zero = one - one
+    unity = ones(depth)
+    zero = unity - unity
     u = row3(view, p.first)
     for i in range(p.count):
         at = p.first + 3 + 5 * i
         part = ramp(view, at, depth)
         change = row3(view, at + 2)
         u = u + part * change
-        inside = positive(part, positive(one - part, row1(view, at + 1), zero), zero)
+        inside = positive(part, positive(unity - part, row1(view, at + 1), zero), zero)
         f.by_depth = f.by_depth + inside * change
     f.velocity = f.velocity + u
     return f

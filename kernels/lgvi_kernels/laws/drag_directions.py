@@ -39,10 +39,10 @@ def make_axis(component, linear, quadratic):
 
     @wp.func
     def changed(w: Any, decay: Any, gain: Any):
-        one = ones(w)
+        unity = ones(w)
         s = w
         if wp.static(quadratic):
-            s = s / (one + component(gain) * absolute(w))
+            s = s / (unity + component(gain) * absolute(w))
         if wp.static(linear):
             s = component(decay) * s
         return s - w

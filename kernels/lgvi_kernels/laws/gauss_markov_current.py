@@ -58,13 +58,13 @@ def evolve(state: Any, view: Any, p: Any):
     if view.second > 0:
         keep(view, at, recall(view, at + 3))
     else:
-        one = ones(p.decay)
+        unity = ones(p.decay)
         old = recall(view, at + 3)
         noise = normals3(p.decay, p.member, view.step, p.channel, p.seed0, p.seed1)
         new = p.decay * old + p.spread * noise
         keep(view, at, view.h.dtype(0.5) * (old + new))
         keep(view, at + 3, new)
-        keep(view, at + 6, (one / (view.h * one)) * (new - old))
+        keep(view, at + 6, (unity / (view.h * unity)) * (new - old))
     return state
 
 

@@ -112,22 +112,22 @@ def make_G(gauss, View, Wrench, law, velocities, iterations, adaptive, checked, 
             dp = dp + c.inertia.inverse_scale * w.force
             dpi = dpi + c.inertia.inverse_scale * w.torque
         renew(c, i, 0, active, rotate(y, nu))
-        one = ones(active)
+        unity = ones(active)
         e = renew(c, i, 3, active, cross(y.R0, Om)) + renew(c, i, 6, active, cross(y.R1, Om))
         e = e + renew(c, i, 9, active, cross(y.R2, Om))
-        e = e + renew(c, i, 12, active, dp) / (one + dot(x.p, x.p))
-        e = e + renew(c, i, 15, active, dpi) / (one + dot(x.pi, x.pi))
+        e = e + renew(c, i, 12, active, dp) / (unity + dot(x.p, x.p))
+        e = e + renew(c, i, 15, active, dpi) / (unity + dot(x.pi, x.pi))
         return (h * h) * e
 
     @wp.func
     def G(x: Any, c: Any, h: Any):
         """y <- y + h sum_i b_i K_i."""
         extrapolate(c, h)
-        one = ones(x.b.x)
-        zero = one - one
-        bound = (c.tolerance * c.tolerance) * one
-        active = one
-        e = one
+        unity = ones(x.b.x)
+        zero = unity - unity
+        bound = (c.tolerance * c.tolerance) * unity
+        active = unity
+        e = unity
         n = int(0)
         while n < wp.static(rounds) and any_positive(active):
             e = zero
@@ -140,7 +140,7 @@ def make_G(gauss, View, Wrench, law, velocities, iterations, adaptive, checked, 
             # Of lanes that are done the change is that of the last round that they were in: at most the tolerance.
             if wp.static(adaptive):
                 e = positive(active, e, zero)
-            code = positive(e - bound, h.dtype(wp.static(float(NOT_CONVERGED))) * one, zero)
+            code = positive(e - bound, h.dtype(wp.static(float(NOT_CONVERGED))) * unity, zero)
             x.alarm.size = positive(x.alarm.code, x.alarm.size, positive(code, e, zero))
             x.alarm.code = positive(x.alarm.code, x.alarm.code, code)
         weights = wp.static(B)

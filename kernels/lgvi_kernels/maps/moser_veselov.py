@@ -56,9 +56,9 @@ def mv_coefficients(a: Any, J: Any):
 @wp.func
 def outer_root(Q: Any, R: Any):
     """The root y > 0 of y^3 - 3 Q y - 2 R for R >= 0: convex there, so Newton's steps from above stay above."""
-    one = ones(Q)
-    zero = one - one
-    tiny = Q.dtype(wp.static(TINY)) * one
+    unity = ones(Q)
+    zero = unity - unity
+    tiny = Q.dtype(wp.static(TINY)) * unity
     R2 = R + R
     Q3 = Q + Q + Q
     cube_root = exponential(Q.dtype(wp.static(1.0 / 3.0)) * logarithm(greatest(R2, tiny)))
@@ -82,11 +82,11 @@ def mv_explicit(a: Any, J: Any):
     rest = s1 - m
     pair = s2 - m * rest
     larger = m * m - pair
-    whole = positive(larger, m, pair)
-    other = (s * s) / whole
-    product = positive(larger, other, whole)
+    kept = positive(larger, m, pair)
+    regained = (s * s) / kept
+    product = positive(larger, regained, kept)
     two = s.dtype(2.0)
-    return root(positive(larger, m, other)) + root(rest + two * root(product))
+    return root(positive(larger, m, regained)) + root(rest + two * root(product))
 
 
 @wp.func

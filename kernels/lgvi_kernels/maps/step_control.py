@@ -26,8 +26,8 @@ TINY = 1e-36
 @wp.func
 def one_over(y: Any, new: Any, rtol: Any, atol: Any):
     """1 / (atol + rtol max(|y|, |new|)) of each number."""
-    one = ones(y)
-    return one / (atol * one + rtol * greatest(absolute(y), absolute(new)))
+    unity = ones(y)
+    return unity / (atol * unity + rtol * greatest(absolute(y), absolute(new)))
 
 
 @wp.func
@@ -119,10 +119,10 @@ def make_adaptive(stages, finish, errors, estimate, width, real, timed):
             before = real(1e-4)
         tried = int(0)
         while done < h:
-            left = h - done
-            taken = left
-            if left > real(1.0001) * stride:
-                taken = wp.min(stride, real(0.5) * left)
+            remaining = h - done
+            taken = remaining
+            if remaining > real(1.0001) * stride:
+                taken = wp.min(stride, real(0.5) * remaining)
             k = stages(x, c, taken)
             new = finish(x, k, taken)
             error = errors(x, new, k, taken, c.tolerance, c.force_tolerance)
@@ -138,7 +138,7 @@ def make_adaptive(stages, finish, errors, estimate, width, real, timed):
                 x = new
                 x.pace.made = x.pace.made + real(1.0)
                 before = worst
-                if taken == left:
+                if taken == remaining:
                     done = h
                 else:
                     done = done + taken
@@ -153,7 +153,7 @@ def make_adaptive(stages, finish, errors, estimate, width, real, timed):
                 stride = taken * wp.min(real(1.0), factor)
                 if not stride > real(wp.static(SMALLEST[real])) * h:
                     x.alarm = given_up(x.alarm, error, real(1.0), taken)
-                    stride = left
+                    stride = remaining
             if tried >= wp.static(MOST_TRIED):
                 x.alarm = given_up(x.alarm, error, real(0.5) * worst, taken)
                 stride = h

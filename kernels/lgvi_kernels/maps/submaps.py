@@ -218,13 +218,13 @@ def fold_pair(maps):
     """One function (x, constants, h1, h2): the maps before the middle over h1, after it over h2, a middle over their mean."""
     n = len(maps) // 2
     before, after = fold(maps[:n]), fold(maps[len(maps) - n :])
-    whole = len(maps) % 2 == 1
+    has_middle = len(maps) % 2 == 1
     middle = fold(maps[n : n + 1])
 
     @wp.func
     def pair(x: Any, c: Any, h1: Any, h2: Any):
         x = before(x, c, h1)
-        if wp.static(whole):
+        if wp.static(has_middle):
             x = middle(x, c, h1.dtype(0.5) * (h1 + h2))
         return after(x, c, h2)
 

@@ -173,7 +173,7 @@ def make_turn(axis, pitched, following, compensated, watched=False):
     @wp.func
     def R_i(x: Any, c: Any, h: Any):
         """The exact flow of (pi_i - k_i p_i)^2 / (2 Js_i) with the tangent of half the angle replaced by its series."""
-        one = ones(x.b.x)
+        unity = ones(x.b.x)
         g = h * component(c.inertia.half_over_J)
         y = g * component(x.pi)
         t = tangent(y, h.dtype(wp.static(1.0 / 3.0)))
@@ -183,16 +183,16 @@ def make_turn(axis, pitched, following, compensated, watched=False):
             k = component(c.inertia.pitch)
             k2 = k + k
             w = (g * k) * component(x.p)
-            r = one + w * w
+            r = unity + w * w
             n = t - w
-            m = one + t * w
-            q = one + t * t
-            inverse = one / (q * (r + t * (w * r)))
+            m = unity + t * w
+            q = unity + t * t
+            inverse = unity / (q * (r + t * (w * r)))
             t = (n * (q * r)) * inverse
             s = ((n + n) * (m * m)) * inverse
             length = k2 * (w - (y * (q * m)) * inverse)
         else:
-            s = (t + t) / (one + t * t)
+            s = (t + t) / (unity + t * t)
         if wp.static(watched):
             Y = (h * c.inertia.half_over_J) * x.pi
             x.alarm.size = largest(x.alarm.size, dot(Y, Y))

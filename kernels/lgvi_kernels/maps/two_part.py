@@ -35,13 +35,13 @@ def modified(a: Any, inertia: Any):
     w = inertia.inverse_J * a
     N = half * dot(a, a)
     H = half * dot(a, w)
-    one = ones(N)
-    s = one + series(inertia.shrink, N, H)
+    unity = ones(N)
+    s = unity + series(inertia.shrink, N, H)
     d = series(inertia.shift, N, H)
     i = s * inertia.inverse_J + vec3(d, d, d)
     J = vec3(i.y * i.z, i.z * i.x, i.x * i.y)
     far = a.x.dtype(wp.static(REACH)) * dot(w, w)
-    return (i.x * J.x) * a, J, positive(least(i.x, least(i.y, i.z)), far, one + far)
+    return (i.x * J.x) * a, J, positive(least(i.x, least(i.y, i.z)), far, unity + far)
 
 
 def make_A(Rotation, solve_within, View, Wrench, law):

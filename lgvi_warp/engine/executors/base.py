@@ -26,7 +26,7 @@ class Executor(Protocol):
     """Runs blocks in any order and anywhere; results do not depend on it."""
 
     def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
-        """Do the work of every block; closing the generator ends what still runs.
+        """Run all blocks and yield each with its result, as it finishes; closing the generator cancels what still runs.
 
         Args:
             work: what is done with each block.

@@ -37,7 +37,7 @@ class Dask:
     workers: int = 1
 
     def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
-        """Do the work of every block.
+        """Run all blocks and yield each with its result.
 
         Args:
             work: what is done with each block.

@@ -29,7 +29,7 @@ class Threads:
     threads: int
 
     def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
-        """Do the work of every block.
+        """Run all blocks and yield each with its result.
 
         The first exception halts running blocks, drops those that have not begun, and is raised. After an interrupt from
         the keyboard, blocks that finished nevertheless are yielded first, since a launch cannot be cut short.

@@ -44,7 +44,7 @@ class Gathered:
         self._asked, self.time, self._replicates = tuple(statistics), time, replicates
         self.statistics = tuple(map(followed, statistics))
         self._size = blocks(members)[0].count
-        self._trees = [Tree(statistic.join) for statistic in self.statistics]
+        self.trees = [Tree(statistic.join) for statistic in self.statistics]
 
     def open(self, plan: Plan, block: Block, members: Members) -> _BlockStatistics:
         """The keeper of a block's statistics.
@@ -69,7 +69,7 @@ class Gathered:
         """
         # Squares of a failing member may overflow: the statistic reports it, so no warning from NumPy.
         with np.errstate(invalid="ignore", over="ignore"):
-            for tree, statistic_part in zip(self._trees, part, strict=True):
+            for tree, statistic_part in zip(self.trees, part, strict=True):
                 tree.add(block.first // self._size, statistic_part)
 
     def estimates(self, chosen: Statistic | None = None) -> list[Estimate]:
@@ -82,7 +82,7 @@ class Gathered:
             The estimates, in the order of the statistics.
         """
         estimates: list[Estimate] = []
-        for asked, statistic, tree in zip(self._asked, self.statistics, self._trees, strict=True):
+        for asked, statistic, tree in zip(self._asked, self.statistics, self.trees, strict=True):
             if chosen is None or asked is chosen:
                 with np.errstate(invalid="ignore", over="ignore"):
                     estimates += self.said(statistic, tree.parts())
@@ -118,7 +118,7 @@ class Gathered:
 
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs to gather blocks, without what was gathered here."""
-        return {name: value for name, value in vars(self).items() if name != "_trees"}
+        return {name: value for name, value in vars(self).items() if name != "trees"}
 
     @staticmethod
     def to_arrays(part: Sequence[Part]) -> tuple[dict[str, np.ndarray], Any]:

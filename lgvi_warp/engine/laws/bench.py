@@ -16,7 +16,7 @@ from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.machine import default_width
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
-from lgvi_warp.engine.model import declared
+from lgvi_warp.engine.kernel_choice import declared
 from lgvi_warp.engine.packets import Packets, pack
 from lgvi_warp.physics import inertia, notation, vehicle
 from lgvi_warp.physics.inertia import Frame
@@ -99,7 +99,7 @@ class Views:
             self.time,
         )
 
-    def told(self, i: int) -> str:
+    def description(self, i: int) -> str:
         """One view in words, for a message.
 
         Args:
@@ -203,7 +203,7 @@ class Bank(Packets):
     def __init__(self, bench: Bench, context: PackingContext, views: Views):
         # What Packets asks of a Plan and of Members to pack laws.
         plan: Any = SimpleNamespace(
-            model=SimpleNamespace(laws=((bench.term, bench.module),)),
+            kernel_choice=SimpleNamespace(laws=((bench.term, bench.module),)),
             spec=SimpleNamespace(width=bench.width, drag=(), gauss=()),
             dtypes=(None, bench.Params, None),
             dtype="float64",
@@ -211,7 +211,7 @@ class Bank(Packets):
         members: Any = SimpleNamespace(count=bench.count, parameters=context.parameters, indices=context.members)
         self.plan, self.members, self.frame, self.bench = plan, members, context.frame, bench
         self.count = bench.count // bench.width
-        params, table, memory = self._laws(context)
+        params, table, memory = self.packed_laws(context)
         Lane = bench.examine.Lane
         self.params = wp.array(params, dtype=bench.examine.Params, device="cpu")
         self.table, self.memory = (wp.array(x, dtype=Lane, shape=x.shape[:2], device="cpu") for x in (table, memory))
@@ -249,10 +249,12 @@ def _built(term: Term, module: Any, width: int) -> Any:
         hash(module)
     except TypeError:
         remedy = "give a module, or a class that holds the functions"
-        raise SceneError([f"{term.key}.device = {module!r}: cannot be a key of the kernels made; {remedy}"]) from None
+        raise SceneError(
+            [f"{term.key}.device = {module!r}: is not hashable, as the key of a compiled kernel must be; {remedy}"]
+        ) from None
     remedy = (
         "return what the role adds to (w, D, f, state); name fields as the View and params() do; import the operators of "
-        "lanes that are used; no `if` on a lane, no plain number times a lane: docs/add_a_law.md"
+        "lanes that are used; no `if` on a lane, no plain number times a lane: docs/develop/add_a_force.md"
     )
     try:
         examine = make_examine(module, declared(term, module), width, wp.float64)

@@ -11,7 +11,7 @@ import numpy as np
 from lgvi_kernels import built_in
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.machine import default_width
-from lgvi_warp.engine import model
+from lgvi_warp.engine import kernel_choice
 from lgvi_warp.engine.laws.bench import ORIGIN, TURN, Bank, Bench, Views, short, simple_scene, sizes
 from lgvi_warp.physics import notation, terms
 from lgvi_warp.physics.terms.base import Packed, PackingContext, Term
@@ -103,7 +103,7 @@ def check_law(
     """
     if not isinstance(term, Term):
         raise SceneError([f"term = {term!r}: is no term; give an object such as lw.Drag(...), not its class"])
-    module = model.device_module(term, term.device_in(False), built_in)
+    module = kernel_choice.device_module(term, term.device_in(False), built_in)
     bench = Bench(term, module, scene or simple_scene(), max(1, -(-samples // default_width("float64"))), seed)
     checks: list[Check] = []
     for examine in (_numbers, _finite, _whole, _potential, _damping, _flow):
@@ -125,7 +125,7 @@ def _judged(name: str, difference: np.ndarray, allowed: np.ndarray | float, view
         )
     i, j = np.unravel_index(ratio.argmax(), ratio.shape)
     good = bool(np.all(worst <= limit) and np.isfinite(limit).all())
-    text = "" if good else f"{views.told(int(i))}; {remedy}"
+    text = "" if good else f"{views.description(int(i))}; {remedy}"
     return Check(name, float(worst[i, j]), float(limit[i, j]), good, text)
 
 

@@ -107,7 +107,7 @@ class Term:
 
     Class attributes: `type` is the name in a scene file, which knows the class as soon as it is made; `device` is the module
     of lgvi_kernels.laws by name, or any object with the same functions; `timed` says whether the law depends on time;
-    `dissipative`, whether its damping never creates energy. docs/add_a_law.md shows how to write one.
+    `dissipative`, whether its damping never creates energy. docs/develop/add_a_force.md shows how to write one.
 
     Args:
         name: Name of the term in parameters ("name.field"), which tells two terms of one type apart; by default the type.
@@ -258,7 +258,7 @@ class Term:
         """
         if self.lanes() is None:
             raise NotImplementedError(
-                f"{type(self).__name__} must define packed(numbers, context): see docs/add_a_law.md"
+                f"{type(self).__name__} must define packed(numbers, context): see docs/develop/add_a_force.md"
             )
         frame = context.frame
         turned: dict[str | None, Any] = {"vector": frame.vector, "point": frame.point, None: np.asarray}

@@ -28,7 +28,6 @@ class Current(Term):
         return bool(np.any(numbers["velocity"]))
 
     def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
-        """The same velocity (k, n, 3) [m/s] at all positions and times."""
         return np.broadcast_to(numbers["velocity"], position.shape)
 
 
@@ -55,7 +54,7 @@ class CurrentProfile(Term):
         return Packed({"count": numbers["depths"].shape[1] - 1}, knots(numbers["depths"], numbers["velocities"]))
 
     def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
-        """Velocity (k, n, 3) [m/s] at the depth of each position, whatever the time."""
+        # Velocity (k, n, 3) [m/s] at the depth of each position, whatever the time.
         depths, velocities = numbers["depths"], numbers["velocities"]
         result = np.empty(position.shape)
         for i in range(position.shape[1]):

@@ -62,7 +62,7 @@ class CurrentHarmonics(Harmonics):
         return Packed({"count": rows.shape[1]}, rows.reshape(n, -1))
 
     def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
-        """Velocity (k, n, 3) [m/s] at each time, the same at all positions."""
+        # Velocity (k, n, 3) [m/s] at each time, the same at all positions.
         total = np.zeros(position.shape)
         for j in range(numbers["periods"].shape[1]):
             angle = 2.0 * np.pi / numbers["periods"][:, j] * time[:, None] + numbers["phases"][:, j]

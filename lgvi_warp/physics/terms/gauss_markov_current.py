@@ -58,7 +58,6 @@ class GaussMarkovCurrent(Term):
         return Packed(values, memory=np.concatenate([first, first, np.zeros_like(first)], axis=1))
 
     def water_at_start(self, numbers: Numbers, position: np.ndarray, context: PackingContext) -> np.ndarray:
-        """The current (n, 3) [m/s] of each member at t = 0."""
         return np.broadcast_to(self._first(numbers, context), position.shape)
 
     def _first(self, numbers: Numbers, context: PackingContext) -> np.ndarray:

@@ -30,7 +30,7 @@ class Weight(Term):
     def potential(
         self, numbers: Numbers, position: np.ndarray, attitude: np.ndarray, parameters: Numbers
     ) -> np.ndarray:
-        """Energy U = -net b3, (k, n) [J], b3 the depth."""
+        # Energy U = -net b3, (k, n) [J], b3 the depth.
         return -net(parameters) * position[..., 2]
 
 
@@ -54,7 +54,7 @@ class Restoring(Term):
     def potential(
         self, numbers: Numbers, position: np.ndarray, attitude: np.ndarray, parameters: Numbers
     ) -> np.ndarray:
-        """Energy U = (B r_b - W r_g).R^T e3, (k, n) [J]."""
+        # Energy U = (B r_b - W r_g).R^T e3, (k, n) [J].
         return np.sum(moment(parameters) * attitude[..., 2, :], axis=-1)
 
 

@@ -46,7 +46,7 @@ class Stratification(Term):
     def potential(
         self, numbers: Numbers, position: np.ndarray, attitude: np.ndarray, parameters: Numbers
     ) -> np.ndarray:
-        """Energy U = B gradient (d - reference_depth)^2 / 2, (k, n) [J]."""
+        # Energy U = B gradient (d - reference_depth)^2 / 2, (k, n) [J].
         center = np.sum(parameters["vehicle.center_of_buoyancy"] * attitude[..., 2, :], axis=-1)
         depth = position[..., 2] + center - numbers["reference_depth"]
         return 0.5 * parameters["vehicle.buoyancy"] * numbers["gradient"] * depth**2

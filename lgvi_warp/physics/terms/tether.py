@@ -37,7 +37,7 @@ class Tether(Term):
     def potential(
         self, numbers: Numbers, position: np.ndarray, attitude: np.ndarray, parameters: Numbers
     ) -> np.ndarray:
-        """Energy U = stiffness max(length - rest_length, 0)^2 / 2, (k, n) [J]."""
+        # Energy U = stiffness max(length - rest_length, 0)^2 / 2, (k, n) [J].
         end = position + np.einsum("knij,nj->kni", attitude, np.broadcast_to(numbers["attachment"], position.shape[1:]))
         stretch = np.maximum(np.linalg.norm(end - numbers["anchor"], axis=-1) - numbers["rest_length"], 0.0)
         return 0.5 * numbers["stiffness"] * stretch**2

@@ -43,7 +43,7 @@ class Waves(Harmonics):
         return Packed({"count": rows.shape[1]}, rows.reshape(len(rows), -1))
 
     def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
-        """Orbital velocity (k, n, 3) [m/s] at positions and times; above the surface as at the surface."""
+        # Orbital velocity (k, n, 3) [m/s] at positions and times; above the surface as at the surface.
         gravity = parameters["environment.gravity"]
         total = np.zeros(position.shape)
         x, y, depth = np.moveaxis(position, -1, 0)

@@ -72,7 +72,7 @@ class Law:
         return STILL
 
     def potential(self, view: View) -> float:
-        """U(b, R) [J]."""
+        """Potential energy U(b, R) [J]; 0 by default."""
         return 0.0
 
     def start(self) -> Array:

@@ -13,7 +13,7 @@ class CrossFlow(Law):
 
     def points(self) -> list[tuple[float, float]]:
         """(x, weight times Cd D) of each Gauss point, Cd D linear in each segment."""
-        strength, found = self.drag_coefficient * self.diameters, []
+        strength, strips = self.drag_coefficient * self.diameters, []
         for i in range(len(self.stations) - 1):
             middle, half = (
                 0.5 * (self.stations[i] + self.stations[i + 1]),
@@ -21,8 +21,8 @@ class CrossFlow(Law):
             )
             for x in (middle - half / math.sqrt(3.0), middle + half / math.sqrt(3.0)):
                 part = (x - self.stations[i]) / (2.0 * half)
-                found.append((x, half * ((1.0 - part) * strength[i] + part * strength[i + 1])))
-        return found
+                strips.append((x, half * ((1.0 - part) * strength[i] + part * strength[i + 1])))
+        return strips
 
     def damping(self, view: View) -> Array:
         """Sum of c |w| A^T A, w = A (nu; Om) = (v + x r, w - x q)."""

@@ -9,7 +9,7 @@ class Current(Law):
     """Numbers as those of `lw.Current`."""
 
     def flow(self, view: View) -> Flow:
-        """u = const."""
+        """The constant velocity, without derivatives."""
         return Flow(np.asarray(self.velocity), np.zeros(3), np.zeros((3, 3)))
 
 

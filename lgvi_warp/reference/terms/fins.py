@@ -12,16 +12,22 @@ class Fins(Law):
     """Numbers as those of `lw.Fins`; density [kg/m3]."""
 
     def deflection(self, view: View) -> Array:
-        """None."""
+        """Angles (n,) [rad]: 0, since these fins do not turn."""
         return np.zeros(len(self.area))
 
     def damping(self, view: View) -> Array:
-        """Sum over fins."""
+        """D (6, 6), the sum over the fins."""
         angles = self.deflection(view)
-        return np.asarray(sum((self.one(i, angle, view) for i, angle in enumerate(angles)), np.zeros((6, 6))))
+        return np.asarray(sum((self.fin_damping(i, angle, view) for i, angle in enumerate(angles)), np.zeros((6, 6))))
 
-    def one(self, i: int, angle: float, view: View) -> Array:
-        """D (6, 6) of a fin: -l (uc n - un c) - d (uc c + un n), l = kl uc un / V, d = kd V + kn un^2 / V."""
+    def fin_damping(self, i: int, angle: float, view: View) -> Array:
+        """D (6, 6) of a fin: -l (uc n - un c) - d (uc c + un n), l = kl uc un / V, d = kd V + kn un^2 / V.
+
+        Args:
+            i: Number of the fin, from 0.
+            angle: Angle of deflection [rad].
+            view: What the law sees.
+        """
         c, n = turned(*orthonormal(self.chord[i], self.normal[i]), angle)
         chord, normal = (np.concatenate([e, cross(self.position[i], e)]) for e in (c, n))
         twist = np.concatenate([view.nu, view.Om])
@@ -47,5 +53,10 @@ def orthonormal(chord: Array, normal: Array) -> tuple[Array, Array]:
 
 
 def turned(c: Array, n: Array, angle: float) -> tuple[Array, Array]:
-    """c' = cos c + sin n, n' = cos n - sin c."""
+    """c' = cos c + sin n, n' = cos n - sin c.
+
+    Args:
+        c, n: Unit vector (3,) along the chord; unit vector (3,) along the normal.
+        angle: Angle of deflection [rad].
+    """
     return math.cos(angle) * c + math.sin(angle) * n, math.cos(angle) * n - math.sin(angle) * c

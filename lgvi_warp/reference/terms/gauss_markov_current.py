@@ -32,5 +32,5 @@ class GaussMarkovCurrent(Law):
         return np.concatenate([0.5 * (old + new), new, (new - old) / view.h])
 
     def flow(self, view: View) -> Flow:
-        """As remembered."""
+        """The velocity and the rate that are remembered."""
         return Flow(view.memory[:3], view.memory[6:], np.zeros((3, 3)))

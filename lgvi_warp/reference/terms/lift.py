@@ -10,5 +10,5 @@ class BodyLift(Law):
     """Numbers as those of `lw.BodyLift`: force_i = -u sum_j matrix_ij v_j."""
 
     def damping(self, view: View) -> Array:
-        """u times the matrix."""
+        """D (6, 6): the speed ahead times the matrix."""
         return np.asarray(view.nu[0] * self.matrix)

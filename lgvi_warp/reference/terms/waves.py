@@ -13,10 +13,18 @@ class Waves(Law):
     def flow(self, view: View) -> Flow:
         """The sum of the components (Faltinsen 1990, table 2.1)."""
         components = zip(self.amplitudes, self.periods, self.headings_deg, self.phases, strict=True)
-        return sum((self.component(view, *one) for one in components), STILL)
+        return sum((self.component(view, *numbers) for numbers in components), STILL)
 
     def component(self, view: View, a: float, period: float, heading_deg: float, phase: float) -> Flow:
-        """One wave: u = Re (heading, -i down)^T a omega e^(-k depth) e^(-i theta), and its derivatives."""
+        """One wave: u = Re (heading, -i down)^T a omega e^(-k depth) e^(-i theta), and its derivatives.
+
+        Args:
+            view: What the law sees.
+            a: Amplitude [m].
+            period: Period [s].
+            heading_deg: Direction of travel, from north [degrees].
+            phase: Phase [rad].
+        """
         omega, heading = 2.0 * math.pi / period, math.radians(heading_deg)
         k = omega**2 / self.gravity
         along = np.array([math.cos(heading), math.sin(heading), 0.0])

@@ -10,7 +10,7 @@ class Wrench(Law):
     """Numbers as those of `lw.Wrench`."""
 
     def wrench(self, view: View) -> tuple[Array, Array]:
-        """As they are."""
+        """The constant force [N] and torque [N m]."""
         return np.asarray(self.force), np.asarray(self.torque)
 
 
@@ -20,12 +20,19 @@ class WrenchSchedule(Law):
     steps = False
 
     def wrench(self, view: View) -> tuple[Array, Array]:
-        """The tables at view.t."""
+        """Force [N] and torque [N m] of the tables at view.t."""
         return at_time(view.t, self.times, self.force, self.steps), at_time(view.t, self.times, self.torque, self.steps)
 
 
 def at_time(t: float, times: Array, values: Array, steps: bool) -> Array:
-    """A table's row at t: linear between the times, or held from each to the next; constant outside."""
+    """A table's row at t: linear between the times, or held from each to the next; constant outside.
+
+    Args:
+        t: Time [s].
+        times: Times [s], rising.
+        values: Values (k, 3) at the times.
+        steps: Whether each value holds until the next time.
+    """
     if steps:
         return np.asarray(np.asarray(values)[max(int(np.searchsorted(times, t, side="left")) - 1, 0)])
     return np.array([np.interp(t, times, column) for column in np.transpose(values)])

@@ -15,7 +15,7 @@ class WrenchNoise(Law):
     seed1 = 0
 
     def wrench(self, view: View) -> tuple[Array, Array]:
-        """S xi / sqrt(h)."""
+        """Force and torque S xi / sqrt(h), held over the step."""
         channels = np.array([self.channel, self.channel + 1])
         xi = normals(self.seed0, self.seed1, view.member, view.step, channels)[:, :3] / np.sqrt(view.h)
         return self.force * xi[0], self.torque * xi[1]

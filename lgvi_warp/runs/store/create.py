@@ -15,11 +15,11 @@ from lgvi_warp.common import scratch
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.engine.keepers.protocol import Keeper, PartKeeper
 from lgvi_warp.runs.store.arrays import array, whole_array
+from lgvi_warp.runs.store.block_files import marker
 from lgvi_warp.runs.store.folder import CREATED, FORMAT, ROOT, check_names, checksum_of
 from lgvi_warp.runs.store.layout import columns, size
 from lgvi_warp.runs.store.recipe import recipe
 from lgvi_warp.runs.store.settings import Store
-from lgvi_warp.runs.store.sink import marker
 
 if TYPE_CHECKING:
     from lgvi_warp.engine.plan import Plan

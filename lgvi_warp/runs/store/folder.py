@@ -28,11 +28,11 @@ from lgvi_warp.common.write_lock import write_lock
 from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.runs.store import layout_check as store_check
 from lgvi_warp.runs.store import texts as store_texts
-from lgvi_warp.runs.store.layout import Column
+from lgvi_warp.runs.store.block_files import BlockFiles, name_of, read_marker
+from lgvi_warp.runs.store.layout import StoreArray
 from lgvi_warp.runs.store.layout_check import understood
 from lgvi_warp.runs.store.recipe import ensemble_of, plan_of
 from lgvi_warp.runs.store.settings import needed
-from lgvi_warp.runs.store.sink import Sink, name_of, read_marker
 
 if TYPE_CHECKING:
     from lgvi_warp.engine.plan import Plan
@@ -120,9 +120,9 @@ class Folder:
         return [block for block in blocks(int(self.recipe["members"])) if block.first < self.members]
 
     @property
-    def sink(self) -> Sink:
+    def block_files(self) -> BlockFiles:
         """The keeper that knows its blocks and their files."""
-        return Sink(self.path, self.layout.columns)
+        return BlockFiles(self.path, self.layout.columns)
 
     def checked(self) -> Any:
         """Return the zarr store through which zarr and xarray read the folder, with all checks."""
@@ -153,8 +153,10 @@ class Folder:
 
     def unfinished(self) -> list[Block]:
         """List the blocks that have no valid marker."""
-        sink, marked = self.sink, safe_files.names(self.path, "blocks")
-        return [block for block in self.runs if f"{name_of(block)}.json" not in marked or sink.sums(block) is None]
+        block_files, marked = self.block_files, safe_files.names(self.path, "blocks")
+        return [
+            block for block in self.runs if f"{name_of(block)}.json" not in marked or block_files.sums(block) is None
+        ]
 
     def plan(self, ensemble: Ensemble | None = None) -> Plan:
         """Build the plan of the run again.
@@ -275,7 +277,7 @@ def checksum_of(texts: Sequence[str]) -> int:
     return durable.checksum("\0".join(texts).encode())
 
 
-def check_names(found: Sequence[Column]) -> None:
+def check_names(found: Sequence[StoreArray]) -> None:
     """Check that each array's name can be that of a folder.
 
     Args:

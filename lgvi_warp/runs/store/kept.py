@@ -22,7 +22,7 @@ from lgvi_warp.engine.keepers.observation import Observation
 from lgvi_warp.runs.store.arrays import whole_array
 from lgvi_warp.runs.store.folder import KEPT, Folder, refuse_foreign
 from lgvi_warp.runs.store.layout import KEPT_MEMBER
-from lgvi_warp.runs.store.run import Stored
+from lgvi_warp.runs.store.run import StoredRun
 from lgvi_warp.runs.store.settings import Store
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ class KeptRun:
     fields: tuple[str, ...]
 
     def __call__(
-        self, run: Stored, members: int, executor: Executor, progress: Callable[[float], None] | None = None
+        self, run: StoredRun, members: int, executor: Executor, progress: Callable[[float], None] | None = None
     ) -> int:
         """Run the blocks that are missing or damaged.
 
@@ -116,9 +116,9 @@ class KeptRun:
                 scratch.remove_folder(beside)
         if not len(wanted):
             return 0
-        plan = run.plan.part(group.members.tolist(), self.fields)
+        plan = run.plan.subplan(group.members.tolist(), self.fields)
         content = {key: value for key, value in run.provenance.items() if key != "observed"}
-        again = Stored(plan, group, content | {"kernel": plan.kernel_hash}, run.messages)
+        again = StoredRun(plan, group, content | {"kernel": plan.kernel_hash}, run.messages)
         return again.run(executor, progress and _after(progress, members, len(group.members))).ran
 
 

@@ -44,7 +44,7 @@ class Chunking(Protocol):
 
 
 @dataclass(frozen=True)
-class Column:
+class StoreArray:
     """One array of a store, of shape (k, n, *tail), or (n, *tail) without times.
 
     Attributes:
@@ -124,7 +124,7 @@ class Column:
         return int(np.prod(self.chunk)) * np.dtype(self.dtype).itemsize + 4
 
 
-def columns(plan: Plan, store: Chunking) -> tuple[Column, ...]:
+def columns(plan: Plan, store: Chunking) -> tuple[StoreArray, ...]:
     """List the arrays that a run fills block by block.
 
     Args:
@@ -137,14 +137,16 @@ def columns(plan: Plan, store: Chunking) -> tuple[Column, ...]:
     length = blocks(plan.ensemble.members)[0].count
     arrays = (
         *_samples(plan, length, store),
-        Column(MEMBER, (), "<i8", length, 0, {"standard_name": "realization", "long_name": "member of the ensemble"}),
-        *(Column(item.name, (), item.dtype, length, 0, item.attributes) for item in member_fields.present(plan)),
+        StoreArray(
+            MEMBER, (), "<i8", length, 0, {"standard_name": "realization", "long_name": "member of the ensemble"}
+        ),
+        *(StoreArray(item.name, (), item.dtype, length, 0, item.attributes) for item in member_fields.present(plan)),
         *_parameters(plan, length),
     )
     return tuple(dataclasses.replace(column, along=store.along) for column in arrays)
 
 
-def _samples(plan: Plan, length: int, store: Chunking) -> list[Column]:
+def _samples(plan: Plan, length: int, store: Chunking) -> list[StoreArray]:
     real = np.dtype(machine.DTYPES[plan.dtype])
     k = len(plan.grid.times)
     arrays = []
@@ -156,16 +158,18 @@ def _samples(plan: Plan, length: int, store: Chunking) -> list[Column]:
         # Chunks of equal length along the times, so that the last one is nearly full as well.
         pieces = -(-k // max(1, store.chunk_bytes // row))
         kind = stored.newbyteorder("<").str
-        arrays.append(Column(name, field.shape, kind, length, -(-k // pieces), field.attributes))
+        arrays.append(StoreArray(name, field.shape, kind, length, -(-k // pieces), field.attributes))
     return arrays
 
 
-def _parameters(plan: Plan, length: int) -> list[Column]:
+def _parameters(plan: Plan, length: int) -> list[StoreArray]:
     ensemble = plan.ensemble
     first = ensemble.parameters(0, 1)
     units = parameter_units(ensemble.scene)
     return [
-        Column(name, first[name].shape[1:], "<f8", length, 0, {"long_name": f"parameter {name}", "units": units[name]})
+        StoreArray(
+            name, first[name].shape[1:], "<f8", length, 0, {"long_name": f"parameter {name}", "units": units[name]}
+        )
         for name in ensemble.varied()
     ]
 

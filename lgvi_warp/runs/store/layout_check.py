@@ -22,7 +22,7 @@ from lgvi_warp.common.errors import SceneError
 from lgvi_warp.engine.block import block_size
 from lgvi_warp.physics.fields import FIELDS, TABLE
 from lgvi_warp.runs import member_fields
-from lgvi_warp.runs.store.layout import KEPT_MEMBER, MEMBER, Column
+from lgvi_warp.runs.store.layout import KEPT_MEMBER, MEMBER, StoreArray
 
 # Types of arrays: NumPy's type strings by zarr's names.
 TYPES = {"float64": "<f8", "float32": "<f4", "int64": "<i8", "uint16": "<u2", "uint8": "|u1"}
@@ -143,7 +143,7 @@ class Layout:
 
     arrays: dict[str, StoredArray]
     groups: tuple[str, ...]
-    columns: tuple[Column, ...]
+    columns: tuple[StoreArray, ...]
     times: int
 
     def frame(self) -> dict[str, int | None]:
@@ -316,7 +316,7 @@ def _checked(arrays: dict[str, StoredArray], groups: tuple[str, ...], members: i
             raise NotOursError(f"{name} has the type {array.dtype}, shape {array.shape} and chunks {array.chunk}")
         if name not in fixed and not name.startswith("explicit/"):
             tail, times = array.shape[1 + timed :], array.chunk[0] if timed else 0
-            columns.append(Column(name, tail, array.dtype, length, times, array.attributes, along))
+            columns.append(StoreArray(name, tail, array.dtype, length, times, array.attributes, along))
     return Layout(arrays, groups, tuple(columns), k)
 
 

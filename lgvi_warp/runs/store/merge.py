@@ -11,6 +11,7 @@ from lgvi_warp.common import files as durable
 from lgvi_warp.common import safe_files, scratch
 from lgvi_warp.common.errors import MembersFailed, SceneError
 from lgvi_warp.engine.block import Block
+from lgvi_warp.runs.store.block_files import marker
 from lgvi_warp.runs.store.commits import Commits
 from lgvi_warp.runs.store.folder import CREATED, ROOT, Folder, held, refuse_foreign
 from lgvi_warp.runs.store.kept import keep_of, members_kept
@@ -18,7 +19,6 @@ from lgvi_warp.runs.store.open import folder_of
 from lgvi_warp.runs.store.recipe import same_run
 from lgvi_warp.runs.store.resume import resume
 from lgvi_warp.runs.store.run import explained
-from lgvi_warp.runs.store.sink import marker
 
 
 def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], overwrite: bool = False) -> Folder:
@@ -91,11 +91,11 @@ def _copy_block(parts: Sequence[Folder], block: Block, target: Path, commits: Co
     """Copy a block from the first store that has it whole. Raises SceneError if it is damaged in each that has it."""
     damage = []
     for part in parts:
-        sink = part.sink
-        sums = sink.sums(block)
+        block_files = part.block_files
+        sums = block_files.sums(block)
         if sums is None:
             continue
-        if unfit := sink.unfit(block, sums, part.layout.times, part.recipe["keepers"]):
+        if unfit := block_files.unfit(block, sums, part.layout.times, part.recipe["keepers"]):
             damage += [f"{part.path}: {text}; `lgvi-warp resume {part.path}` first" for text in unfit]
             continue
         files = durable.Files(target)
@@ -109,7 +109,7 @@ def _copy_block(parts: Sequence[Folder], block: Block, target: Path, commits: Co
                 files.drop()
                 break
         else:
-            commits.add(files, target / "blocks" / sink.marker(block).name, marker(sums))
+            commits.add(files, target / "blocks" / block_files.marker(block).name, marker(sums))
             return
     if damage:
         raise SceneError(damage)

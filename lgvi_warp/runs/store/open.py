@@ -19,11 +19,11 @@ from lgvi_warp.physics.fields import IN_FILES
 from lgvi_warp.physics.terms import from_list
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.runs.result import END_TIME, Result
+from lgvi_warp.runs.store.block_files import name_of
 from lgvi_warp.runs.store.folder import KEPT, ROOT, Folder
 from lgvi_warp.runs.store.kept import keep_of, members_kept
 from lgvi_warp.runs.store.layout import KEPT_MEMBER, MEMBER
 from lgvi_warp.runs.store.layout_check import understood
-from lgvi_warp.runs.store.sink import name_of
 from lgvi_warp.statistics.estimate import Estimates
 
 if TYPE_CHECKING:
@@ -191,18 +191,18 @@ def gathered(folder: Folder, observed: Observation) -> Observing:
     """
     replicates = replicates_of(folder.provenance["ensemble"])
     observing = Observing(observed, times_of(folder), int(folder.recipe["members"]), replicates)
-    sink = folder.sink
+    block_files = folder.block_files
     for block in folder.runs:
-        _check_parts(folder, sink.sums(block), block)
-        with understood(folder.path / sink.parts_key(block)):
-            for keeper, part in zip(observing.keepers, sink.parts(block, observing.keepers) or (), strict=True):
+        _check_parts(folder, block_files.sums(block), block)
+        with understood(folder.path / block_files.parts_key(block)):
+            for keeper, part in zip(observing.keepers, block_files.parts(block, observing.keepers) or (), strict=True):
                 keeper.merge(block, part)
     return observing
 
 
 def _check_parts(folder: Folder, sums: Mapping[str, Sequence[int]] | None, block: Block) -> None:
     """Check that a block's parts are those that were written. Raises SceneError."""
-    key = folder.sink.parts_key(block)
+    key = folder.block_files.parts_key(block)
     if sums is None:
         faults = [f"blocks/{name_of(block)}.json is missing or damaged"]
     elif key not in sums and not folder.recipe["keepers"]:

@@ -18,7 +18,7 @@ from lgvi_warp.runs.store.kept import KeptRun
 from lgvi_warp.runs.store.layout_check import understood
 from lgvi_warp.runs.store.open import folder_of, result_of
 from lgvi_warp.runs.store.recipe import of_store, refuse_another
-from lgvi_warp.runs.store.run import Stored
+from lgvi_warp.runs.store.run import StoredRun
 from lgvi_warp.runs.store.solve import went_on
 from lgvi_warp.runs.store.state import store_of
 from lgvi_warp.scene.ensemble import Ensemble
@@ -73,7 +73,7 @@ def resume(
     messages = refuse_another(folder.path, folder.provenance, now, force)
     runner = executor_of(executor, threads, scheduler)
     # Provenance and messages stay those of the start of the run, on whatever machine it goes on.
-    run = Stored(
+    run = StoredRun(
         plan, store_of(folder, force), folder.provenance, folder.messages, (*keepers, *observing.keepers), None,
         observing.enough, KeptRun(observed, tuple((observed_content or {}).get("fields", ()))),
     )  # fmt: skip

@@ -14,22 +14,22 @@ from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.engine.executors.base import Executor
 from lgvi_warp.engine.keepers.protocol import Keeper, PartKeeper
-from lgvi_warp.engine.loop import Progress, run_blocks
+from lgvi_warp.engine.loop import RunProgress, run_blocks
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.engine.work import Work
+from lgvi_warp.runs.store.block_files import BlockFiles, check
 from lgvi_warp.runs.store.create import create, names_of, skeleton
 from lgvi_warp.runs.store.folder import ROOT, Folder, foreign, held, refuse_foreign
 from lgvi_warp.runs.store.layout import columns
 from lgvi_warp.runs.store.recipe import refuse_another
 from lgvi_warp.runs.store.settings import Store
-from lgvi_warp.runs.store.sink import Sink, check
 
 # Errors of the system for a full disk, a quota and a file that is too large.
 FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
 @dataclass(frozen=True)
-class Stored:
+class StoredRun:
     """A run into a store, new or continued.
 
     It is complete when every block is there, or as many as `enough` asks for, and `last` is done.
@@ -53,7 +53,7 @@ class Stored:
     keepers: tuple[Keeper, ...] = ()
     only: range | None = None
     enough: Callable[[int], bool] = lambda members: False
-    last: Callable[[Stored, int, Executor, Callable[[float], None] | None], int] = lambda *_: 0
+    last: Callable[[StoredRun, int, Executor, Callable[[float], None] | None], int] = lambda *_: 0
 
     def run(self, executor: Executor, progress: Callable[[float], None] | None = None) -> Folder:
         """Run the blocks that are missing or damaged.
@@ -73,24 +73,24 @@ class Stored:
         path = self.store.folder
         with self._alone():
             self._begin()
-            sink = Sink(path, columns(self.plan, self.store))
-            sink.remove_unfinished()
+            block_files = BlockFiles(path, columns(self.plan, self.store))
+            block_files.remove_unfinished()
             self._mend()
-            missing = self._left(sink)
+            missing = self._left(block_files)
             try:
-                with sink.commits:
-                    members = self._blocks(sink, missing, executor, progress)
+                with block_files.commits:
+                    members = self._blocks(block_files, missing, executor, progress)
             except OSError as error:
                 raise explained(error, self.store.whole) from error
             finally:
-                sink.remove_unfinished()
+                block_files.remove_unfinished()
             folder = Folder(path, self.store.whole)
             folder.ran = sum(block.first < members for block in missing)
             folder.found = sum(block.first < members for block in self._runs()) - folder.ran
             beyond = [] if self.only else [block for block in self._runs() if block.first >= members]
             if beyond:
                 # How many blocks ran beyond the last one depends on the number of threads: the store keeps none of them.
-                sink.remove(beyond, len(self.plan.grid.times))
+                block_files.remove(beyond, len(self.plan.grid.times))
             if beyond or not folder.unfinished():
                 folder.ran_kept = self.last(self, members if beyond else self.plan.ensemble.members, executor, progress)
                 folder.finish(members if beyond else None)
@@ -161,24 +161,28 @@ class Stored:
         finally:
             scratch.remove_folder(beside)
 
-    def _left(self, sink: Sink) -> list[Block]:
+    def _left(self, block_files: BlockFiles) -> list[Block]:
         """Blocks that are not finished or not whole; a damaged one loses its marker."""
         missing = []
-        for block, faults in check(sink, self._runs(), len(self.plan.grid.times), self.keepers):
+        for block, faults in check(block_files, self._runs(), len(self.plan.grid.times), self.keepers):
             if faults:
-                sink.marker(block).unlink(missing_ok=True)
+                block_files.marker(block).unlink(missing_ok=True)
                 missing.append(block)
         return missing
 
     def _blocks(
-        self, sink: Sink, left: Sequence[Block], executor: Executor, progress: Callable[[float], None] | None
+        self,
+        block_files: BlockFiles,
+        left: Sequence[Block],
+        executor: Executor,
+        progress: Callable[[float], None] | None,
     ) -> int:
         """Run the blocks left, and merge the parts of all in order. Returns where their members end."""
         runs, n, steps = self._runs(), self.plan.ensemble.members, self.plan.grid.steps
-        overall = Progress(n * steps, progress)
+        overall = RunProgress(n * steps, progress)
         for block in set(runs) - set(left):
             overall.at(block, block.count * steps)
-        members = run_blocks(Work(self.plan, self.keepers, sink), runs, executor, overall.at, left, self.enough)
+        members = run_blocks(Work(self.plan, self.keepers, block_files), runs, executor, overall.at, left, self.enough)
         if progress and members < runs[-1].stop:
             progress(1.0)
         return members

@@ -17,7 +17,7 @@ from lgvi_warp.runs.store.folder import Folder
 from lgvi_warp.runs.store.kept import KeptRun
 from lgvi_warp.runs.store.open import result_of
 from lgvi_warp.runs.store.recipe import of_store
-from lgvi_warp.runs.store.run import Stored
+from lgvi_warp.runs.store.run import StoredRun
 from lgvi_warp.runs.store.settings import Store
 
 
@@ -56,7 +56,7 @@ def run_stored(
     saved_fields = plan.fields if fields is None else fields
     kept = tuple(name for name in saved_fields if store.fields is None or name in store.fields)
     content = of_store(provenance(plan, observed, kept), plan.ensemble)
-    folder = Stored(
+    folder = StoredRun(
         plan, into, content, messages(plan), observing.keepers, only, observing.enough, KeptRun(observed, kept)
     ).run(executor, progress)
     runs = blocks(plan.ensemble.members)

@@ -7,11 +7,11 @@ from typing import Any
 
 from lgvi_warp.common import safe_files
 from lgvi_warp.common.errors import SceneError
+from lgvi_warp.runs.store.block_files import check, name_of
 from lgvi_warp.runs.store.folder import KEPT, ROOT, Folder
 from lgvi_warp.runs.store.kept import keep_of, members_kept
 from lgvi_warp.runs.store.open import folder_of
 from lgvi_warp.runs.store.settings import Store
-from lgvi_warp.runs.store.sink import check, name_of
 
 
 def store_of(folder: Folder, force: bool = False) -> Store:
@@ -46,7 +46,7 @@ def state(path: str | os.PathLike[str]) -> dict[str, Any]:
     runs = folder.runs
     damage = folder.damage()
     samples, finished = folder.layout.times, 0
-    for _, faults in check(folder.sink, runs, samples, folder.recipe["keepers"]):
+    for _, faults in check(folder.block_files, runs, samples, folder.recipe["keepers"]):
         if faults != ["is not finished"]:
             finished += not faults
             damage += faults
@@ -88,7 +88,7 @@ def kept_state(folder: Folder, sound: bool) -> tuple[int, list[str]]:
     if group is None:
         return wanted, [f"{KEPT} is missing"] if wanted else []
     damage = group.damage()
-    for block, faults in check(group.sink, group.runs, group.layout.times):
+    for block, faults in check(group.block_files, group.runs, group.layout.times):
         if faults == ["is not finished"]:
             faults = [f"blocks/{name_of(block)}.json is missing or damaged"] if folder.complete else []
         damage += faults

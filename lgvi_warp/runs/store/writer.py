@@ -10,7 +10,7 @@ import numpy as np
 from lgvi_warp.common.files import Files
 from lgvi_warp.engine.block import Block
 from lgvi_warp.runs import member_fields
-from lgvi_warp.runs.store.layout import MEMBER, Column
+from lgvi_warp.runs.store.layout import MEMBER, StoreArray
 
 if TYPE_CHECKING:
     from lgvi_warp.engine.outcome import Outcome
@@ -26,7 +26,7 @@ class Room(list[dict[str, np.ndarray]]):
         return Room, ()
 
     @staticmethod
-    def made(columns: tuple[Column, ...]) -> dict[str, np.ndarray]:
+    def empty_chunks(columns: tuple[StoreArray, ...]) -> dict[str, np.ndarray]:
         """Allocate a chunk for each array that has times.
 
         Args:
@@ -50,7 +50,9 @@ class BlockWriter:
         members: Its members.
     """
 
-    def __init__(self, root: Path, columns: tuple[Column, ...], room: Room, plan: Plan, block: Block, members: Members):
+    def __init__(
+        self, root: Path, columns: tuple[StoreArray, ...], room: Room, plan: Plan, block: Block, members: Members
+    ):
         self._plan, self._block, self._members = plan, block, members
         self._columns = columns
         self._samples = len(plan.grid.times)
@@ -59,7 +61,7 @@ class BlockWriter:
         try:
             self._chunks = room.pop()
         except IndexError:
-            self._chunks = room.made(columns)
+            self._chunks = room.empty_chunks(columns)
         if block.count < columns[0].length:
             for column in columns:
                 if column.times:
@@ -76,7 +78,7 @@ class BlockWriter:
             if column.times:
                 self._take(column, when, samples[column.name])
 
-    def _take(self, column: Column, when: slice, values: np.ndarray) -> None:
+    def _take(self, column: StoreArray, when: slice, values: np.ndarray) -> None:
         chunk = self._chunks[column.name]
         t = when.start
         while t < when.stop:
@@ -89,7 +91,7 @@ class BlockWriter:
                 self._write(column, number, chunk)
             t = stop
 
-    def _write(self, column: Column, number: int, chunk: np.ndarray) -> None:
+    def _write(self, column: StoreArray, number: int, chunk: np.ndarray) -> None:
         self._files.write(column.key(self._block, number), chunk, checked=True)
 
     def close(self, outcome: Outcome) -> Files:
@@ -112,5 +114,5 @@ class BlockWriter:
         return self._files
 
 
-def _empty(column: Column) -> np.ndarray:
+def _empty(column: StoreArray) -> np.ndarray:
     return np.full(column.chunk, column.fill, column.dtype)

@@ -55,7 +55,7 @@ class Sampling:
         """
         raise TypeError(f"{type(self).__name__} is abstract")
 
-    def laws(self) -> dict[str, Any]:
+    def distributions(self) -> dict[str, Any]:
         """Distributions that the sampling itself brings.
 
         Returns:

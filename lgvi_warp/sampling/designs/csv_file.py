@@ -81,7 +81,7 @@ def _check_names(faults: Faults, path: str, line: int, names: Sequence[str], del
     elif delimiter == "," and any(name.count("[") != name.count("]") for name in names):
         torn = next(name for name in names if name.count("[") != name.count("]"))
         remedy = 'quote a name with a comma: "vehicle.inertia[0,1]"'
-        faults.add("file", path, f"has a name that a comma tears apart, {torn!r} (line {line})", remedy)
+        faults.add("file", path, f"has a name that a comma splits, {torn!r} (line {line})", remedy)
 
 
 def _check_chosen(faults: Faults, path: str, line: int, names: Sequence[str], chosen: Sequence[str]) -> None:

@@ -42,7 +42,7 @@ class Saltelli(Sampling):
         return (2 if self.second_order else 1) * len(space.factors) + 2
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
-        """In addition, adds a fault where nothing varies."""
+        # Also a fault where nothing varies.
         if not space.factors:
             faults.add("sampling", self.kind, "has nothing that varies", "give [ensemble.vary]")
             return
@@ -103,9 +103,11 @@ class Morris(Sampling):
         return len(space.factors) + 1
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
-        """In addition, adds a fault where fewer than two factors vary."""
+        # Also a fault where fewer than two factors vary.
         if len(space.factors) < 2:
-            faults.add("sampling", self.kind, f"has {len(space.factors)} factors to tell apart", "vary two or more")
+            faults.add(
+                "sampling", self.kind, f"needs two or more factors, and has {len(space.factors)}", "vary two or more"
+            )
             return
         super().check(faults, space, members)
 

@@ -48,7 +48,7 @@ class Grid(Sampling):
                 faults.add(f'"{name}"', axis, "is no list of values", "give [value, value, ...] or a number of levels")
         faults.raise_if_any()
 
-    def laws(self) -> dict[str, Any]:
+    def distributions(self) -> dict[str, Any]:
         """A `Choice` among the values, for each name that has a list of them."""
         return {name: Choice(axis) for name, axis in self.axes.items() if not isinstance(axis, int | np.integer)}
 
@@ -66,13 +66,12 @@ class Grid(Sampling):
         return math.prod(self._radices(space)[1])
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
-        """In addition, adds a fault for a number of levels without a distribution in `vary`."""
+        # Also a fault for a number of levels without a distribution in `vary`.
         for name in self.axes:
             if name not in space.keys:
-                fault = "is a number of levels of what has no law"
-                faults.add(
-                    f'sampling.grid."{name}"', self.axes[name], fault, "give it a law in vary, or a list of values"
-                )
+                fault = "is a number of levels of what has no distribution"
+                remedy = "give it a distribution in vary, or a list of values"
+                faults.add(f'sampling.grid."{name}"', self.axes[name], fault, remedy)
         super().check(faults, space, members)
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:

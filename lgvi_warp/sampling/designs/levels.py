@@ -47,7 +47,7 @@ class UnitCubePoints(Sampling):
         if array is not None and (array.ndim != 2 or not len(array)):
             faults.add("points", array, f"has shape {array.shape}", "give an array of shape (members, dimensions)")
         elif array is not None and not np.all((array > 0.0) & (array < 1.0)):
-            faults.add("points", array, "leaves the open unit cube", "give levels above 0 and below 1")
+            faults.add("points", array, "has points outside the open unit cube", "give levels above 0 and below 1")
         elif array is not None and self.names is not None and len(self.names) != array.shape[1]:
             faults.add("names", self.names, f"do not name {array.shape[1]} columns", "give one for each column")
         faults.raise_if_any()
@@ -77,7 +77,7 @@ class UnitCubePoints(Sampling):
         return len(self.points)
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
-        """In addition, adds a fault where the columns are not those of the cube."""
+        # Also a fault where the columns are not those of the cube.
         if self.points.shape[1] != space.dimensions:
             remedy = f"give {space.dimensions}, of {', '.join(space.keys) or 'nothing'}"
             faults.add("sampling.levels.points", "...", f"has {self.points.shape[1]} columns", remedy)

@@ -46,7 +46,7 @@ class Distribution:
         if self.widths and len(widths_given) != 1:
             remedy = f"give one of {', '.join(self.widths)}"
             faults.add(" and ".join(widths_given) or "width", "...", f"{len(widths_given)} given", remedy)
-        values = {name: faults.finite(name, value) for name, value in self._given().items()}
+        values = {name: faults.finite(name, value) for name, value in self.numbers_by_name().items()}
         for name, array in values.items():
             if array is not None and name not in ("mean", "median", "low", "high", "values") and np.any(array < 0.0):
                 faults.add(name, array, "is negative", "give a spread from 0")
@@ -56,7 +56,8 @@ class Distribution:
         self._check_more(faults)
         faults.raise_if_any()
 
-    def _given(self) -> dict[str, Any]:
+    def numbers_by_name(self) -> dict[str, Any]:
+        """The numbers that were given, by the names of their fields."""
         return {item.name: getattr(self, item.name) for item in fields(self) if getattr(self, item.name) is not None}
 
     def _check_more(self, faults: Faults) -> None:
@@ -68,7 +69,7 @@ class Distribution:
         Returns:
             Numbers or arrays, in the order of the fields.
         """
-        return list(self._given().values())
+        return list(self.numbers_by_name().values())
 
     @property
     def joint(self) -> bool:
@@ -115,7 +116,7 @@ class Distribution:
         Returns:
             The kind, with the numbers that were given, arrays as lists.
         """
-        return {self.kind: {key: np.asarray(value).tolist() for key, value in self._given().items()}}
+        return {self.kind: {key: np.asarray(value).tolist() for key, value in self.numbers_by_name().items()}}
 
 
 def ordered(low: np.ndarray, high: np.ndarray) -> bool:
@@ -134,11 +135,11 @@ def ordered(low: np.ndarray, high: np.ndarray) -> bool:
         return False
 
 
-def varies_nothing(law: Distribution, bases: Sequence[np.ndarray]) -> str | None:
+def varies_nothing(distribution: Distribution, bases: Sequence[np.ndarray]) -> str | None:
     """Find a distribution that is relative to the scene's value where that is 0, so that nothing would vary.
 
     Args:
-        law: The distribution.
+        distribution: The distribution.
         bases: The scene's value of each quantity that it draws.
 
     Returns:
@@ -146,10 +147,11 @@ def varies_nothing(law: Distribution, bases: Sequence[np.ndarray]) -> str | None
     """
     if any(np.any(base) for base in bases):
         return None
-    relative = getattr(law, "relative", None)
+    relative = getattr(distribution, "relative", None)
     if relative is not None and np.any(relative):
         return "relative"
-    return "sigma" if isinstance(law, LogNormal) and law.median is None and np.any(law.sigma) else None
+    has_sigma = isinstance(distribution, LogNormal) and distribution.median is None and np.any(distribution.sigma)
+    return "sigma" if has_sigma else None
 
 
 def _width(std: Spread | None, relative: Spread | None, base: np.ndarray) -> np.ndarray:

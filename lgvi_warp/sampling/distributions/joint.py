@@ -95,15 +95,15 @@ def root(matrix: np.ndarray) -> np.ndarray:
         return np.asarray((axes * np.sqrt(np.maximum(values, 0.0))) @ axes.T)
 
 
-def _covariance(faults: Faults, law: Any, size: int | None) -> np.ndarray | None:
+def _covariance(faults: Faults, distribution: Any, size: int | None) -> np.ndarray | None:
     """The covariance that was given, or that follows from std and correlation; None after adding a fault."""
-    arguments = {name for name in ("covariance", "std", "correlation") if getattr(law, name, None) is not None}
+    arguments = {name for name in ("covariance", "std", "correlation") if getattr(distribution, name, None) is not None}
     if ("covariance" in arguments) == ("std" in arguments) or arguments == {"covariance", "correlation"}:
         fault = f"{' and '.join(sorted(arguments)) or 'nothing'} given"
         faults.add("covariance", "...", fault, "give covariance, or std (and correlation)")
         return None
     name = "correlation" if "correlation" in arguments else next(iter(arguments))
-    matrix = np.asarray(faults.finite(name, getattr(law, name)), dtype=np.float64)
+    matrix = np.asarray(faults.finite(name, getattr(distribution, name)), dtype=np.float64)
     if matrix.dtype == object or np.any(np.isnan(matrix)):
         return None
     if name != "std" and not (
@@ -112,13 +112,13 @@ def _covariance(faults: Faults, law: Any, size: int | None) -> np.ndarray | None
         faults.add(name, matrix, "is no symmetric matrix", "give n x n numbers, the same on both sides of the diagonal")
         return None
     if name != "covariance":
-        std = faults.finite("std", law.std)
+        std = faults.finite("std", distribution.std)
         n = size or (len(matrix) if name == "correlation" else max(1, matrix.size))
         if std is None or std.ndim > 1 or std.size not in (1, n):
-            faults.add("std", law.std, f"does not fit {n} components", f"give one number or {n}")
+            faults.add("std", distribution.std, f"does not fit {n} components", f"give one number or {n}")
             return None
         if np.any(std < 0.0):
-            faults.add("std", law.std, "is negative", "give a spread from 0")
+            faults.add("std", distribution.std, "is negative", "give a spread from 0")
             return None
         std = np.broadcast_to(std, n)
         if name == "correlation" and np.any(np.abs(np.diag(matrix) - 1.0) > SIX_DIGITS):
@@ -127,12 +127,15 @@ def _covariance(faults: Faults, law: Any, size: int | None) -> np.ndarray | None
         matrix = np.outer(std, std) * (correlation(matrix)[1] if name == "correlation" else np.eye(n))
     matrix = 0.5 * (matrix + matrix.T)
     if np.any(np.diag(matrix) < 0.0):
-        faults.add(name, getattr(law, name), "has a negative variance on its diagonal", "give variances from 0")
+        faults.add(
+            name, getattr(distribution, name), "has a negative variance on its diagonal", "give variances from 0"
+        )
         return None
     std, C = correlation(matrix)
     least = -np.inf if np.any(matrix[std == 0.0]) else float(np.linalg.eigvalsh(C)[0])
     if least < -SIX_DIGITS:
-        faults.add(name, getattr(law, name), f"is not positive semidefinite (eigenvalue {least:.3g} of the correlation)",
+        faults.add(name, getattr(distribution, name),
+                   f"is not positive semidefinite (eigenvalue {least:.3g} of the correlation)",
                    "give what some numbers can have: no correlation beyond 1, and such that agree")  # fmt: skip
         return None
     return matrix

@@ -52,7 +52,7 @@ class ScipyDistribution(Distribution):
         elif not is_frozen(self.distribution):
             faults.add("distribution", self.distribution, "is no frozen distribution of scipy.stats",
                        "give one with its numbers, such as scipy.stats.gamma(2.0, scale=3.0)")  # fmt: skip
-        elif not all([faults.finite(name, value) is not None for name, value in self._given_numbers().items()]):
+        elif not all([faults.finite(name, value) is not None for name, value in self.numbers_by_name().items()]):
             pass
         elif not np.all(np.isfinite(self.distribution.ppf(0.5))):
             faults.add(
@@ -71,14 +71,14 @@ class ScipyDistribution(Distribution):
         """The distribution's name in scipy.stats."""
         return str(getattr(self.distribution.dist, "name", None) or type(self.distribution.dist).__name__)
 
-    def _given_numbers(self) -> dict[str, Any]:
+    def numbers_by_name(self) -> dict[str, Any]:
         """The parameters by their names in scipy.stats, as they were given."""
         known = [*_shapes(self.distribution.dist), "loc", "scale"]
         return dict(zip(known, self.distribution.args, strict=False)) | dict(self.distribution.kwds)
 
     def _numbers(self) -> dict[str, Any]:
         """The parameters as lists; loc = 0 for a distribution that was frozen with none, so that a file holds a number."""
-        parameters = self._given_numbers() or {"loc": 0.0}
+        parameters = self.numbers_by_name() or {"loc": 0.0}
         return {name: np.asarray(value).tolist() for name, value in parameters.items()}
 
     def numbers(self) -> list[Any]:
@@ -142,7 +142,7 @@ class ScipyDistribution(Distribution):
 
 
 @dataclass(frozen=True, eq=False)
-class Histogram(Distribution):
+class BinnedDistribution(Distribution):
     """Distribution given by a histogram, uniform within each bin.
 
     Its values are absolute: the scene's own value plays no part. It is "histogram" in a scene file and
@@ -178,33 +178,34 @@ class Histogram(Distribution):
 
 
 @dataclass(frozen=True, eq=False)
-class OwnLaw(Distribution):
+class UserDistribution(Distribution):
     """A distribution given by an object of the user's with quantiles: ppf(u), or icdf(u) as scipy's new distributions have.
 
     Its values are absolute. A file stores only its text, so that a run read from a file needs the ensemble again.
 
     Args:
-        law: The object.
+        distribution: The object.
 
     Raises:
         SceneError: Where the object gives no finite numbers at the levels 0.25 and 0.75.
     """
 
-    law: Any = None
+    distribution: Any = None
     kind: ClassVar[str] = "own"
 
     def __post_init__(self) -> None:
         faults = Faults()
-        unfrozen = name_of_unfrozen(self.law)
+        unfrozen = name_of_unfrozen(self.distribution)
         if unfrozen is not None:
-            faults.add("law", f"scipy.stats.{unfrozen}", *without_numbers(self.law))
+            faults.add("distribution", f"scipy.stats.{unfrozen}", *without_numbers(self.distribution))
             faults.raise_if_any()
         try:
             usable = bool(np.all(np.isfinite(self._quantiles(np.array([0.25, 0.75])))))
         except Exception:  # whatever a user's object raises
             usable = False
         if not usable:
-            faults.add("law", self.law, "gives no numbers at the levels 0.25 and 0.75", "give an object with ppf(u)")
+            fault = "gives no numbers at the levels 0.25 and 0.75"
+            faults.add("distribution", self.distribution, fault, "give an object with ppf(u)")
         faults.raise_if_any()
 
     def numbers(self) -> list[Any]:
@@ -216,23 +217,23 @@ class OwnLaw(Distribution):
         return self._quantiles(u)
 
     def _quantiles(self, u: np.ndarray) -> np.ndarray:
-        return real_results(quantiles_of(self.law)(u)).astype(np.float64)
+        return real_results(quantiles_of(self.distribution)(u)).astype(np.float64)
 
     def to_dict(self) -> dict[str, Any]:
         """Its text without the memory address, so that the same distribution always gives the same provenance."""
-        return {self.kind: {"law": re.sub(r" at 0x[0-9a-fA-F]+", "", str(self.law))}}
+        return {self.kind: {"law": re.sub(r" at 0x[0-9a-fA-F]+", "", str(self.distribution))}}
 
 
-def quantiles_of(law: Any) -> Any:
+def quantiles_of(distribution: Any) -> Any:
     """The quantile function of an object.
 
     Args:
-        law: Any object.
+        distribution: Any object.
 
     Returns:
         Its method ppf or icdf; None where it has neither.
     """
-    function = getattr(law, "ppf", None) or getattr(law, "icdf", None)
+    function = getattr(distribution, "ppf", None) or getattr(distribution, "icdf", None)
     return function if callable(function) else None
 
 
@@ -281,17 +282,17 @@ def without_numbers(value: Any) -> tuple[str, str]:
     )
 
 
-def _shapes(law: Any) -> list[str]:
+def _shapes(distribution: Any) -> list[str]:
     """Names of the shape parameters of a distribution of scipy.stats."""
-    return [name for name in (law.shapes or "").replace(" ", "").split(",") if name]
+    return [name for name in (distribution.shapes or "").replace(" ", "").split(",") if name]
 
 
-def _numbers_of(law: Any) -> list[str]:
+def _numbers_of(distribution: Any) -> list[str]:
     """Names of all parameters of a distribution of scipy.stats."""
-    return [*_shapes(law), "loc"] + ["scale"] * hasattr(law, "pdf")
+    return [*_shapes(distribution), "loc"] + ["scale"] * hasattr(distribution, "pdf")
 
 
-def as_law(key: str, value: Any) -> Any:
+def as_distribution(key: str, value: Any) -> Any:
     """Turn what stands in `vary` into a distribution, where it is one.
 
     Args:
@@ -312,13 +313,13 @@ def as_law(key: str, value: Any) -> Any:
     distribution = getattr(value, "dist", value)
     if type(distribution).__name__ == "rv_histogram" and not parameters:
         edges = distribution._histogram[1]
-        return Histogram(np.diff(distribution.cdf(edges)).tolist(), np.asarray(edges).tolist())
+        return BinnedDistribution(np.diff(distribution.cdf(edges)).tolist(), np.asarray(edges).tolist())
     if is_frozen(value):
         return ScipyDistribution(value)
     if type(value).__name__ == "multivariate_normal_frozen":
         return CorrelatedNormal(covariance=np.asarray(value.cov).tolist(), mean=np.asarray(value.mean).tolist())
     try:
-        return OwnLaw(value) if quantiles_of(value) else value
+        return UserDistribution(value) if quantiles_of(value) else value
     except SceneError as error:
         raise SceneError(f"{key}: {fault}" for fault in error.faults) from None
 
@@ -342,10 +343,10 @@ def from_dict(key: str, content: Any) -> Distribution:
         faults.raise_if_any()
     kind, values = next(iter(content.items()))
     foreign = kind in SCIPY or kind == ScipyDistribution.kind
-    if kind == OwnLaw.kind:
-        faults.add(key, values, "is a law of your own, which a file does not hold", "give the ensemble again")
+    if kind == UserDistribution.kind:
+        faults.add(key, values, "is a distribution of your own, which a file does not hold", "give the ensemble again")
     elif not foreign and kind not in KINDS:
-        faults.keys(key, [kind], [*(other for other in KINDS if other != OwnLaw.kind), *SCIPY])
+        faults.keys(key, [kind], [*(other for other in KINDS if other != UserDistribution.kind), *SCIPY])
     elif not isinstance(values, Mapping):
         faults.add(f"{key}.{kind}", values, "is not a table", "write { normal = { std = 1.0 } }")
     elif not foreign:

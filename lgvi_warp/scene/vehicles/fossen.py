@@ -406,22 +406,22 @@ def about_gravity(faults: Faults, body: Coefficients, inertia_about: str) -> Non
         body.inertia = body.inertia + body.mass * S @ S
 
 
-def add_derivatives(faults: Faults, body: Coefficients, given: Mapping[str, Any], ignore: Iterable[str] = ()) -> None:
+def add_derivatives(faults: Faults, body: Coefficients, values: Mapping[str, Any], ignore: Iterable[str] = ()) -> None:
     """Put derivatives into the body's matrices of added mass and drag, which are minus their values.
 
     Args:
         faults: Collects what is wrong.
         body: The body; its matrices are set in place.
-        given: Values by name, in any spelling of `read_name`.
+        values: Values by name, in any spelling of `read_name`.
         ignore: Names to leave out; by default none.
     """
-    if not isinstance(given, Mapping):
-        faults.add("coefficients", given, "is not a map of names", 'write {"X_udot": -30.0, "X_u": -4.0, ...}')
-        given = {}
+    if not isinstance(values, Mapping):
+        faults.add("coefficients", values, "is not a map of names", 'write {"X_udot": -30.0, "X_u": -4.0, ...}')
+        values = {}
     ignore = {ignore} if isinstance(ignore, str) else set(ignore)
     matrices = {"dot": np.zeros((6, 6)), "linear": np.zeros((6, 6)), "quadratic": np.zeros((6, 6))}
     keys: dict[tuple[str, int, int], str] = {}
-    for key, value in given.items():
+    for key, value in values.items():
         if key in ignore:
             continue
         name = read_name(key)
@@ -436,7 +436,7 @@ def add_derivatives(faults: Faults, body: Coefficients, given: Mapping[str, Any]
         if number is not None:
             refuse_sign(faults, key, number, name)
             matrices[name.kind][name.row, name.columns[0]] = -number
-    body.added_mass = with_partners(faults, matrices["dot"], keys, given)
+    body.added_mass = with_partners(faults, matrices["dot"], keys, values)
     body.linear, body.quadratic = matrices["linear"], matrices["quadratic"]
 
 

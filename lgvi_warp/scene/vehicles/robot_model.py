@@ -44,7 +44,7 @@ class Water:
 
 
 @dataclass
-class Model:
+class RobotModel:
     """A model as read from a file.
 
     Args:
@@ -95,7 +95,7 @@ def refuse_crowd(elements: Sequence[Element]) -> None:
 # URDF and SDF -------------------------------------------------------------------------------------------------------
 
 
-def read_model(faults: Faults, root: Element, name: str | None, link: str | None) -> Model:
+def read_model(faults: Faults, root: Element, name: str | None, link: str | None) -> RobotModel:
     """Read the model of a file: that of a URDF, or the chosen one of an SDF file.
 
     Args:
@@ -113,7 +113,7 @@ def read_model(faults: Faults, root: Element, name: str | None, link: str | None
     return model_of_urdf(faults, root) if root.tag == "robot" else model_of_sdf(faults, root, name, link)
 
 
-def model_of_urdf(faults: Faults, root: Element) -> Model:
+def model_of_urdf(faults: Faults, root: Element) -> RobotModel:
     """Read the model of a URDF file.
 
     Args:
@@ -129,7 +129,7 @@ def model_of_urdf(faults: Faults, root: Element) -> Model:
     for tag in ("link", "joint", "plugin", "collision"):
         refuse_crowd(list(root.iter(tag)))
     links, joints = read_urdf(faults, root)
-    read = Model(root.get("name", "robot"), links, joints, [], Water())
+    read = RobotModel(root.get("name", "robot"), links, joints, [], Water())
     add_plugins(faults, read, list(plugins_of(root)), "")
     return read
 
@@ -137,7 +137,7 @@ def model_of_urdf(faults: Faults, root: Element) -> Model:
 # SDF ----------------------------------------------------------------------------------------------------------------
 
 
-def model_of_sdf(faults: Faults, root: Element, name: str | None, link: str | None) -> Model:
+def model_of_sdf(faults: Faults, root: Element, name: str | None, link: str | None) -> RobotModel:
     """Read one model of an SDF file.
 
     Args:
@@ -156,7 +156,7 @@ def model_of_sdf(faults: Faults, root: Element, name: str | None, link: str | No
     for tag in ("link", "joint", "plugin", "collision", "frame", "model"):
         refuse_crowd(list(element.iter(tag)))
     scope = Scope(element)
-    read = Model(element.get("name", ""), {}, [], [], Water())
+    read = RobotModel(element.get("name", ""), {}, [], [], Water())
     if world is not None:
         read.water = read_water(faults, read.warnings, world)
     poses = Poses(faults, scope)
@@ -372,7 +372,7 @@ def read_fluid_added_mass(faults: Faults, where: str, element: Element | None) -
     return matrix
 
 
-def add_plugins(faults: Faults, read: Model, plugins: Sequence[Element], prefix: str) -> None:
+def add_plugins(faults: Faults, read: RobotModel, plugins: Sequence[Element], prefix: str) -> None:
     """Add the coefficients that plugins give to the model.
 
     Args:

@@ -12,7 +12,7 @@ from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.scene.vehicles.fossen import HALF_TURN, HALF_TURN_6, STANDARD_GRAVITY, Coefficients, rigid_body, turned
 from lgvi_warp.scene.vehicles.links import Link, Lump, beside, joined, link_named, lumped, main_link
 from lgvi_warp.scene.vehicles.plugins import Hydrodynamics, add_to
-from lgvi_warp.scene.vehicles.robot_model import GAZEBO_DENSITY, Model, listed, read_model, read_water, world_of
+from lgvi_warp.scene.vehicles.robot_model import GAZEBO_DENSITY, RobotModel, listed, read_model, read_water, world_of
 from lgvi_warp.scene.vehicles.robot_xml import parse_xml
 
 
@@ -85,7 +85,7 @@ def vehicle_tables_from_sdf(
 
 
 def add_hydrodynamics(
-    faults: Faults, body: Coefficients, read: Model, main: Link, own: Sequence[Hydrodynamics]
+    faults: Faults, body: Coefficients, read: RobotModel, main: Link, own: Sequence[Hydrodynamics]
 ) -> None:
     """Add the coefficients that plugins give to the body.
 
@@ -104,7 +104,7 @@ def add_hydrodynamics(
         add_to(faults, body, hydrodynamics, main.pose.inverse().then(body_link.pose))
 
 
-def refuse_empty(faults: Faults, read: Model) -> None:
+def refuse_empty(faults: Faults, read: RobotModel) -> None:
     """Refuse a model that has no link.
 
     Args:
@@ -120,7 +120,7 @@ def refuse_empty(faults: Faults, read: Model) -> None:
         raise SceneError([f"SDF link: {known}; give an SDF model with a <link>"])
 
 
-def refuse_unweighed(read: Model, main: Link, parts: Sequence[Link]) -> None:
+def refuse_unweighed(read: RobotModel, main: Link, parts: Sequence[Link]) -> None:
     """Refuse a main link without inertia; note other links without it, to which Gazebo gives 1 kg.
 
     Args:
@@ -138,7 +138,7 @@ def refuse_unweighed(read: Model, main: Link, parts: Sequence[Link]) -> None:
         read.warnings.append(f"links without <inertial>, to which Gazebo gives 1 kg and 1 kg m2: {listed(unweighed)}")
 
 
-def weight_of(read: Model, volume: float | None) -> float | None:
+def weight_of(read: RobotModel, volume: float | None) -> float | None:
     """Return the weight of the displaced water.
 
     Args:
@@ -175,7 +175,7 @@ def body_of(faults: Faults, lump: Lump, buoyancy: float | None, at: Any, gravity
     return body
 
 
-def chosen_link(read: Model, link: str | None) -> str:
+def chosen_link(read: RobotModel, link: str | None) -> str:
     """Return the full name of the main link.
 
     Args:
@@ -195,7 +195,7 @@ def chosen_link(read: Model, link: str | None) -> str:
     return main_link(read.links, read.joints)
 
 
-def together(read: Model, main: Link) -> list[str]:
+def together(read: RobotModel, main: Link) -> list[str]:
     """Return the links that form one body with the main link; warn of moving links and of those left out.
 
     Args:
@@ -217,7 +217,7 @@ def together(read: Model, main: Link) -> list[str]:
     return every
 
 
-def set_water(faults: Faults, read: Model, density: float | None, gravity: float | None) -> None:
+def set_water(faults: Faults, read: RobotModel, density: float | None, gravity: float | None) -> None:
     """Set density and gravity of the model: as given, else the world's, else a plugin's, else the default.
 
     Args:
@@ -234,7 +234,7 @@ def set_water(faults: Faults, read: Model, density: float | None, gravity: float
 
 
 def displaced_by(
-    read: Model, parts: Sequence[Link], main: Link, own: Sequence[Hydrodynamics]
+    read: RobotModel, parts: Sequence[Link], main: Link, own: Sequence[Hydrodynamics]
 ) -> tuple[float, np.ndarray]:
     """Return displaced volume and its centre, of the shapes or as uuv_simulator's plugin gives it.
 
@@ -265,7 +265,7 @@ def displaced_by(
     return lump.volume, lump.volume_center
 
 
-def has_buoyancy(read: Model, name: str) -> bool:
+def has_buoyancy(read: RobotModel, name: str) -> bool:
     """Return whether Gazebo's Buoyancy system acts on a link.
 
     Args:
@@ -281,7 +281,7 @@ def has_buoyancy(read: Model, name: str) -> bool:
     )
 
 
-def refuse_shapeless(faults: Faults, read: Model, parts: Sequence[Link], own: Sequence[Hydrodynamics]) -> None:
+def refuse_shapeless(faults: Faults, read: RobotModel, parts: Sequence[Link], own: Sequence[Hydrodynamics]) -> None:
     """Note shapes whose volume lies in another file: without them the vehicle would sink.
 
     Args:

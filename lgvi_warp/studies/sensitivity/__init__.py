@@ -8,7 +8,9 @@ The designs and the estimates are SALib's (extra: uq).
 
 from __future__ import annotations
 
-from lgvi_warp.studies.sensitivity.adaptor import Model, model
+from typing import Any
+
+from lgvi_warp.studies.sensitivity.adaptor import ScalarModel, model
 from lgvi_warp.studies.sensitivity.analyses import morris, morris_of, sobol, sobol_of
 from lgvi_warp.studies.sensitivity.indices import Indices, MorrisEffects, SobolIndices
 from lgvi_warp.studies.sensitivity.outputs import FailedMembers, Outputs, evaluate
@@ -16,9 +18,9 @@ from lgvi_warp.studies.sensitivity.outputs import FailedMembers, Outputs, evalua
 __all__ = [
     "FailedMembers",
     "Indices",
-    "Model",
     "MorrisEffects",
     "Outputs",
+    "ScalarModel",
     "SobolIndices",
     "evaluate",
     "model",
@@ -27,3 +29,12 @@ __all__ = [
     "sobol",
     "sobol_of",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "Model":
+        import warnings
+
+        warnings.warn("lw.uq.Model is now lw.uq.ScalarModel; write that", DeprecationWarning, stacklevel=2)
+        return ScalarModel
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -21,7 +21,7 @@ from lgvi_warp.studies.sensitivity.columns import as_given, columns_of, names_of
 from lgvi_warp.studies.sensitivity.outputs import FailedMembers, evaluate
 
 
-class Model:
+class ScalarModel:
     """A scene as a function of what varies, for SALib, scipy and other libraries; made by `model`.
 
     Args:
@@ -55,7 +55,7 @@ class Model:
             )
         self._fleet = Ensemble(scene, 1, 0, self.vary)
         self._variations = as_given(self._fleet)
-        joint = [variation.key for variation in self._variations if variation.law.joint]
+        joint = [variation.key for variation in self._variations if variation.distribution.joint]
         if joint and not levels:
             raise SceneError([f"vary.\"{key}\": is a joint distribution, whose values are not single numbers; use levels=True"
                               for key in joint])  # fmt: skip
@@ -96,12 +96,12 @@ class Model:
         faults = Faults("vary.")
         bounds, kinds = [], []
         for variation in self._variations:
-            for law in self._single_laws(variation):
-                described = _salib_law(*law)
+            for distribution in self._single_distributions(variation):
+                described = _salib_distribution(*distribution)
                 if described is None:
                     faults.add(
                         f'"{variation.key}"',
-                        variation.law,
+                        variation.distribution,
                         "is unknown to SALib",
                         "use levels=True",
                     )
@@ -114,12 +114,14 @@ class Model:
         return {"num_vars": len(self.names), "names": list(self.names), "bounds": bounds, "dists": kinds}
 
     @staticmethod
-    def _single_laws(one: Any) -> list[tuple[Any, np.ndarray, dict[str, np.ndarray]]]:
+    def _single_distributions(one: Any) -> list[tuple[Any, np.ndarray, dict[str, np.ndarray]]]:
         """List (distribution, the scene's value, the distribution's numbers) of each entry of a variation."""
         (base,) = one.bases
-        numbers = {name: np.broadcast_to(value, base.shape).reshape(-1) for name, value in one.law._given().items()
-                   if np.ndim(value) <= base.ndim and one.law.kind != "choice"}  # fmt: skip
-        return [(one.law, value, {name: column[i] for name, column in numbers.items()})
+        distribution = one.distribution
+        numbers = {name: np.broadcast_to(value, base.shape).reshape(-1)
+                   for name, value in distribution.numbers_by_name().items()
+                   if np.ndim(value) <= base.ndim and distribution.kind != "choice"}  # fmt: skip
+        return [(distribution, value, {name: column[i] for name, column in numbers.items()})
                 for i, value in enumerate(np.reshape(base, -1))]  # fmt: skip
 
     @property
@@ -233,7 +235,7 @@ class _Column:
         label = self.fleet.space.factors[self.column][0]
         (wanted,) = variations.targets(label)
         split = self.fleet.space.split(cube)
-        for variation in self.fleet._variations:
+        for variation in self.fleet.variations:
             for target, values in variation.values(split[variation.key]):
                 if target == wanted:
                     return values.reshape(np.shape(u))
@@ -243,19 +245,20 @@ class _Column:
         raise KeyError(label)
 
 
-def _salib_law(law: Any, base: Any, numbers: Mapping[str, Any]) -> tuple[str, list[float]] | None:
+def _salib_distribution(distribution: Any, base: Any, numbers: Mapping[str, Any]) -> tuple[str, list[float]] | None:
     """Translate a distribution to SALib's (name, bounds); None where SALib has none for it."""
     base = float(base)
     mean = float(numbers.get("mean", base))
-    if law.kind == "normal":
+    if distribution.kind == "normal":
         return "norm", [mean, float(numbers["std"] if "std" in numbers else abs(base) * numbers["relative"])]
-    if law.kind == "uniform":
-        low, high = (float(law.quantile(np.array([u]), np.array(base)).reshape(-1)[0]) if np.ndim(law.high) == 0 else None
+    if distribution.kind == "uniform":
+        scalar = np.ndim(distribution.high) == 0
+        low, high = (float(distribution.quantile(np.array([u]), np.array(base)).reshape(-1)[0]) if scalar else None
                      for u in (0.0, 1.0))  # fmt: skip
         if low is None or high is None:
             low, high = float(numbers["low"]), float(numbers["high"])
         return "unif", [low, high]
-    if law.kind == "lognormal" and float(numbers.get("median", base)) > 0.0:
+    if distribution.kind == "lognormal" and float(numbers.get("median", base)) > 0.0:
         return "lognorm", [float(np.log(numbers.get("median", base))), float(numbers["sigma"])]
     return None
 
@@ -268,7 +271,7 @@ def model(
     levels: bool = False,
     failed: str = "refuse",
     **settings: Any,
-) -> Model:
+) -> ScalarModel:
     """Turn a scene into a function of what varies.
 
     f(X) takes X (n, d) and returns Y (n,) or (n, m), for SALib; f.scipy(X) takes X (d, n), for scipy's sobol_indices.
@@ -288,4 +291,4 @@ def model(
     Raises:
         SceneError: for faulty arguments, all in one message.
     """
-    return Model(scene, vary, of, levels, failed, settings)
+    return ScalarModel(scene, vary, of, levels, failed, settings)

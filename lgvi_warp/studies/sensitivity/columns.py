@@ -44,7 +44,7 @@ def as_given(fleet: Ensemble) -> list[Variation]:
     Returns:
         Its variations.
     """
-    by_key = {variation.key: variation for variation in fleet._variations}
+    by_key = {variation.key: variation for variation in fleet.variations}
     return [by_key[key] for key in fleet.vary]
 
 

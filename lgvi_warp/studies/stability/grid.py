@@ -159,7 +159,7 @@ def axis_of(given: Any) -> Axis:
     return Axis.parse(given)
 
 
-class Grid:
+class StabilityGrid:
     """Every cell of a map of two axes, with several starts in each.
 
     Members are numbered (y, x, direction), the last fastest. The first direction is the scene's own start; the others are

@@ -23,7 +23,7 @@ from lgvi_warp.runs.provenance import provenance
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.compared import QUANTITIES, compared_in
 from lgvi_warp.studies.speed import void
-from lgvi_warp.studies.stability.grid import Grid, Line
+from lgvi_warp.studies.stability.grid import Line, StabilityGrid
 from lgvi_warp.studies.stability.limits import LIMITS
 from lgvi_warp.studies.stability.runs import (
     LEAST_DRIVEN,
@@ -384,7 +384,7 @@ def stability_map(
     grid = None
     with faults.including():
         both = (points, points) if isinstance(points, int) else tuple(points)
-        grid = Grid(scene, x, y, both, directions, seed, h)
+        grid = StabilityGrid(scene, x, y, both, directions, seed, h)
     faults.raise_if_any()
     assert grid is not None and compared is not None
     refused = refusals(grid, names, dtype)
@@ -419,7 +419,7 @@ def stability_map(
         classes=classes,
         errors={name: _worst(grid, outcome.error) for name, outcome in outcomes.items()},
         energies={name: _worst(grid, outcome.growth / energy_bound) for name, outcome in outcomes.items()},
-        statuses={name: _worst_status(grid, outcome.status) for name, outcome in outcomes.items()},
+        statuses={name: worst_status(grid, outcome.status) for name, outcome in outcomes.items()},
         ratios=_ratios(grid, list(outcomes)),
         of=compared.name,
         unit=compared.unit,
@@ -439,15 +439,22 @@ def stability_map(
     return result
 
 
-def _worst(grid: Grid, values: np.ndarray) -> np.ndarray:
+def _worst(grid: StabilityGrid, values: np.ndarray) -> np.ndarray:
     """Take the largest value over the starts of each cell (ny, nx)."""
     return np.max(values.reshape(grid.shape), axis=2)
 
 
-def _worst_status(grid: Grid, status: np.ndarray) -> np.ndarray:
+def worst_status(grid: StabilityGrid, status: np.ndarray) -> np.ndarray:
     """Take the worst status over the starts of each cell (ny, nx).
 
     Refusals by the program come first, then failures, events and OK.
+
+    Args:
+        grid: The map's grid.
+        status: Status of each start (members,).
+
+    Returns:
+        Status of each cell (ny, nx).
     """
     rank = np.where(stopped(status), status - 500, np.where(status == Status.OK, -1000, status)).reshape(grid.shape)
     chosen = np.argmax(rank, axis=2)[:, :, None]
@@ -473,7 +480,7 @@ def cells_of(one: Found, verified: np.ndarray, error: float, energy_bound: float
     return np.where(unbounded, np.where(flagged, Cell.FAILED, Cell.SILENT), np.where(flagged, Cell.FLAGGED, quiet))
 
 
-def _ratios(grid: Grid, methods: Sequence[str]) -> dict[str, dict[str, np.ndarray]]:
+def _ratios(grid: StabilityGrid, methods: Sequence[str]) -> dict[str, dict[str, np.ndarray]]:
     """Compute the step over each analytic limit, of the fastest start of each cell.
 
     Returns method -> limit -> (ny, nx) [1]. Limits that a method does not have, or whose motion is absent, are left out.
@@ -487,7 +494,9 @@ def _ratios(grid: Grid, methods: Sequence[str]) -> dict[str, dict[str, np.ndarra
     return ratios
 
 
-def _provenance(grid: Grid, methods: Sequence[str], dtype: str, seed: int, energy_bound: float) -> dict[str, Any]:
+def _provenance(
+    grid: StabilityGrid, methods: Sequence[str], dtype: str, seed: int, energy_bound: float
+) -> dict[str, Any]:
     """Describe the scene, the settings, the versions and the machine of a map."""
     content = provenance(plan_of(grid, np.arange(1), methods[0], SHORTEST, "float64"))
     content = {name: content[name] for name in ("scene", "versions", "machine", "checks")}

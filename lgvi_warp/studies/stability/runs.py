@@ -23,7 +23,7 @@ from lgvi_warp.runs.run import run_plan
 from lgvi_warp.studies import comparison
 from lgvi_warp.studies.compared import Compared, compared_in
 from lgvi_warp.studies.comparison import PRECISE
-from lgvi_warp.studies.stability.grid import Grid
+from lgvi_warp.studies.stability.grid import StabilityGrid
 
 # Number of times at which errors are measured, and energies.
 ERROR_SAMPLES, ENERGY_SAMPLES = 8, 64
@@ -111,7 +111,7 @@ def column(h: float, members: np.ndarray, error_time: float, t1: float, least: i
     return Column(h, members, errors, np.union1d(errors, more))
 
 
-def plan_of(grid: Grid, members: np.ndarray, method: str, times: TimeGrid, dtype: str) -> Plan:
+def plan_of(grid: StabilityGrid, members: np.ndarray, method: str, times: TimeGrid, dtype: str) -> Plan:
     """Make the plan of a run of some members.
 
     Args:
@@ -131,7 +131,7 @@ def plan_of(grid: Grid, members: np.ndarray, method: str, times: TimeGrid, dtype
     return Plan(grid.fleet(members), Method(method), times, FIELDS, dtype, checks=checks)
 
 
-def refusals(grid: Grid, names: Sequence[str], dtype: str) -> dict[str, str]:
+def refusals(grid: StabilityGrid, names: Sequence[str], dtype: str) -> dict[str, str]:
     """Find the methods that the scene does not take at any step.
 
     Args:
@@ -151,7 +151,7 @@ def refusals(grid: Grid, names: Sequence[str], dtype: str) -> dict[str, str]:
     return refused
 
 
-def judged(grid: Grid, names: Sequence[str]) -> str:
+def judged(grid: StabilityGrid, names: Sequence[str]) -> str:
     """Decide how energies are judged, by the forces that act.
 
     Args:
@@ -164,7 +164,7 @@ def judged(grid: Grid, names: Sequence[str]) -> str:
     Raises:
         SceneError: where noise acts.
     """
-    laws = plan_of(grid, np.arange(1), names[0], SHORTEST, "float64").model.laws
+    laws = plan_of(grid, np.arange(1), names[0], SHORTEST, "float64").kernel_choice.laws
     if any(getattr(module, "NOISE", False) for _, module in laws):
         raise SceneError(["terms: noise acts, whose path differs from step to step; leave it out for a stability map"])
     flows = [getattr(module, "FLOW", "none") for _, module in laws]
@@ -193,7 +193,7 @@ def _carried(term: Any, module: Any) -> bool:
 
 
 def make_references(
-    grid: Grid, columns: Sequence[Column], of: Any, error: float, threads: int, report: Callable[[float], None]
+    grid: StabilityGrid, columns: Sequence[Column], of: Any, error: float, threads: int, report: Callable[[float], None]
 ) -> str:
     """Give every column its reference at the error times.
 
@@ -227,7 +227,7 @@ def make_references(
     return f"{second} against {first}, steps that turn by {FINE:g} rad or less, halved until they agree"
 
 
-def _precise(grid: Grid) -> tuple[str, str]:
+def _precise(grid: StabilityGrid) -> tuple[str, str]:
     """Choose the two best methods that the scene takes; the best twice where the second is of much lower order."""
     names: list[str] = []
     for name in PRECISE:
@@ -246,7 +246,7 @@ def _precise(grid: Grid) -> tuple[str, str]:
 
 
 def _reference(
-    grid: Grid, column: Column, names: tuple[str, str], rates: np.ndarray, of: Compared, goal: float
+    grid: StabilityGrid, column: Column, names: tuple[str, str], rates: np.ndarray, of: Compared, goal: float
 ) -> None:
     """Fill in a column's reference by two methods, halving the steps of members that do not agree yet."""
     n = len(column.members)
@@ -287,7 +287,7 @@ def _joined(whole: Result | None, part: Result, at: np.ndarray) -> Result:
 
 
 def run_method(
-    grid: Grid, columns: Sequence[Column], method: str, dtype: str, of: Compared, judged: str, threads: int
+    grid: StabilityGrid, columns: Sequence[Column], method: str, dtype: str, of: Compared, judged: str, threads: int
 ) -> tuple[Found, str]:  # fmt: skip
     """Run a method over all columns.
 

@@ -20,7 +20,7 @@ class Interrupted:
 
 
 def test_an_interrupt_is_heard_though_every_block_ended():
-    work = SimpleNamespace(keepers=(), sink=None, plan=SimpleNamespace(compile=lambda: None))
+    work = SimpleNamespace(keepers=(), store=None, plan=SimpleNamespace(compile=lambda: None))
     merged = Merged()
     with pytest.raises(KeyboardInterrupt):
         run_blocks(work, BLOCKS, Interrupted(), lambda block, steps: None, merged=merged)

@@ -351,12 +351,14 @@ def test_whatever_has_quantiles_is_a_law(scene):
         np.testing.assert_array_equal(found.quantile(u, np.array([7.0])), exact)
     fleet = lw.Ensemble(scene, 4, vary={"vehicle.buoyancy": Triangle()})
     assert fleet.to_dict()["vary"] == {"vehicle.buoyancy": {"own": {"law": "Triangle()"}}}
-    with pytest.raises(lw.SceneError, match="law of your own, which a file does not hold; give the ensemble again"):
+    with pytest.raises(
+        lw.SceneError, match="distribution of your own, which a file does not hold; give the ensemble again"
+    ):
         from_dict("key", {"own": {"law": "Triangle()"}})
     for nothing in (3.0, "wide", Triangle, np.ones(3)):
         with pytest.raises(lw.SceneError, match="is not a distribution; give"):
             lw.Ensemble(scene, 4, vary={"vehicle.buoyancy": nothing})
-    with pytest.raises(lw.SceneError, match=r"law = .* gives no numbers"):
+    with pytest.raises(lw.SceneError, match=r"distribution = .* gives no numbers"):
         lw.Ensemble(scene, 4, vary={"vehicle.buoyancy": type("Bad", (), {"ppf": lambda self, u: "x"})()})
 
 

@@ -541,7 +541,7 @@ def test_a_scene_file_names_its_sampling(tmp_path):
         ({"table": {"values": {3: [1.0]}}}, None, ["has no names of columns"]),
         ({"table": {"values": {"environment.gravity": np.array([9.8, np.nan])}}}, None, ["nan", "of member 1"]),
         ({"levels": {"points": np.full((2, 16), 0.5)}}, 3, ["more than the 2 of the levels"]),
-        ({"levels": {"points": [[0.5, 1.0]]}}, None, ["leaves the open unit cube"]),
+        ({"levels": {"points": [[0.5, 1.0]]}}, None, ["has points outside the open unit cube"]),
         ({"levels": {"points": [[0.5, 0.1]]}}, None, ["has 2 columns"]),
     ],
     ids=str,

@@ -197,7 +197,12 @@ VEHICLES = [
     (BODY | {"weight": 98.0}, "vehicle.weight = 98.0", "6x6 form", "give rigid_body_mass_matrix"),
     (full(DIAGONAL + np.eye(6, k=1)), "vehicle.rigid_body_mass_matrix", "not symmetric", "give a symmetric matrix"),
     (full(-DIAGONAL), "vehicle.rigid_body_mass_matrix", "not positive definite", "[[m I, -m hat(r_g)]"),
-    (full(np.diag([1.0, 2, 3, 1, 1, 1])), "vehicle.rigid_body_mass_matrix", "no m I in its first block", "[[m I"),
+    (
+        full(np.diag([1.0, 2, 3, 1, 1, 1])),
+        "vehicle.rigid_body_mass_matrix",
+        "not have m I as its upper left block",
+        "[[m I",
+    ),
     (full(np.eye(3)), "vehicle.rigid_body_mass_matrix", "shape (3, 3)", "symmetric 6x6 matrix"),
     (full(added_mass_matrix=-2.0 * DIAGONAL), "vehicle.added_mass_matrix", "not positive definite", "X_udot"),
     (
@@ -206,7 +211,7 @@ VEHICLES = [
         "is missing",
         "beside added_mass_matrix",
     ),
-    (full(mass=10.0), "vehicle.mass = 10.0", "says again", "keep one of the two forms"),
+    (full(mass=10.0), "vehicle.mass = 10.0", "repeats what", "keep one of the two forms"),
     (full(weight=NAN), "vehicle.weight = nan", "not finite", "[N]"),
     (full(center_of_gravity=[1.0]), "vehicle.center_of_gravity = [1.0]", "shape (1,)", "(3,) [m]"),
 ]
@@ -370,9 +375,15 @@ def test_numbers_that_would_do_nothing(table, name, remedy):
 NOISE = {"type": "wrench_noise", "force": [1.0, 1.0, 1.0]}
 MATRIX = {"type": "drag_matrix", "linear": np.eye(6).tolist()}
 SETTINGS = [
-    (MATRIX, {"method": "kl6(psi_s)"}, "method = 'kl6(psi_s)'", "a damping matrix does not", "use psi_s"),
-    (MATRIX, {"method": "tj4(psi_x)"}, "method = 'tj4(psi_x)'", "keeps its order only for maps that undo", "use psi_x"),
-    (TIDE, {"method": "su4(psi_s)"}, "method = 'su4(psi_s)'", "water that varies does not", "use psi_s"),
+    (MATRIX, {"method": "kl6(psi_s)"}, "method = 'kl6(psi_s)'", "a damping matrix prevents that", "use psi_s"),
+    (
+        MATRIX,
+        {"method": "tj4(psi_x)"},
+        "method = 'tj4(psi_x)'",
+        "keeps its order only if a step of -h undoes",
+        "use psi_x",
+    ),
+    (TIDE, {"method": "su4(psi_s)"}, "method = 'su4(psi_s)'", "water that varies prevents that", "use psi_s"),
     (NOISE, {"method": "psi"}, "method = 'psi'", "noise more than once a step", "use psi_s"),
     (
         {"type": "drag", "linear": [0.0, 0.0, 3e5, 0.0, 0.0, 0.0]},
@@ -441,14 +452,14 @@ class Pull(lw.Term):
 class Packs(Pull):
     what: ClassVar[Any] = None
 
-    def packed(self, own, setting):
+    def packed(self, numbers, context):
         return self.what
 
 
 LAWS = [
     (device(law=pull_short), "pull.law = '(w, view)'", "takes 2 arguments", "write law(w, view, p)"),
     (device(law=pull_plain), "pull.law", "not a Warp function", "@wp.func"),
-    (device(), "pull.device", "has none of law, damping, flow, evolve", "add_a_law.md"),
+    (device(), "pull.device", "has none of law, damping, flow, evolve", "add_a_force.md"),
     ("pull", "pull.device = 'pull'", "not known", "give a module"),
 ]
 
@@ -470,7 +481,7 @@ class Wide(Pull):
 def test_a_law_without_a_struct_whose_numbers_make_none():
     bare = type("Bare", (Wide,), {"device": device(law=pull_law, params=None), "__annotations__": {}})
     (fault,) = refused(lw.check_law, bare(k=1.0))
-    assert all(word in fault for word in ("pull.device", "has no params(width, real)", "add_a_law.md")), fault
+    assert all(word in fault for word in ("pull.device", "has no params(width, real)", "add_a_force.md")), fault
 
 
 @pytest.mark.kernel
@@ -565,6 +576,8 @@ def test_a_law_defined_twice_as_in_a_notebook(tmp_path):
         spec = importlib.util.spec_from_file_location("cell", path)
         cell = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(cell)
-        Lift = type("Lift", (Pull,), {"device": cell, "packed": lambda self, own, setting: lw.Packed(dict(own))})
+        Lift = type(
+            "Lift", (Pull,), {"device": cell, "packed": lambda self, numbers, context: lw.Packed(dict(numbers))}
+        )
         results.append(lw.solve(lw.Scene(from_table(MATRIX).vehicle, terms=[Lift(k=1.0)]), h=0.01, t1=0.1).position)
     assert np.array_equal(*results)

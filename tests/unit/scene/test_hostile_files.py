@@ -1,6 +1,6 @@
 """Scenes, tables and coefficients from a stranger: refused in a few lines, in bounded time and memory; nothing is written.
 
-Each row of a table below is a file, or an argument, that somebody may meet. docs/what_files_can_do.md says what holds.
+Each row of a table below is a file, or an argument, that somebody may meet. docs/guide/what_files_can_do.md says what holds.
 """
 
 import io
@@ -211,7 +211,7 @@ YAML = {
     "doubled keys within": ("hull:\n  mass: 1\n  mass: 2\n", ("line 3", "line 2")),
     "a bomb of aliases": (BOMB, ("every alias", "at most 20,000")),
     "a bomb of merges": (MERGES, ("every alias",)),
-    "a list that holds itself": ("a: &a [*a]\n", ("holds itself",)),
+    "a list that holds itself": ("a: &a [*a]\n", ("contains itself",)),
     "lists in lists": (GOOD + "a: " + "[" * 10_000 + "]" * 10_000, ("nested too deep",)),
     "maps in maps": (GOOD + "a: " + "{a: " * 10_000 + "}" * 10_000, ("nested too deep",)),
     "code": ("mass: !!python/object/apply:os.system ['touch escaped']\n", ("is a type that is not read",)),
@@ -219,8 +219,8 @@ YAML = {
     "bytes": ("mass: !!binary aGVsbG8=\n", ("is a type that is not read",)),
     "a date": (GOOD.replace("30", "2001-01-01"), ("is a type that is not read",)),
     "a date that there is not": (GOOD.replace("30", "2001-99-99"), ("is a type that is not read",)),
-    "a number that is none": ("mass: !!int ''\n", ("has a value that is none",)),
-    "5,000 digits": (GOOD.replace("30", "9" * 5000), ("has a value that is none",)),
+    "a number that is none": ("mass: !!int ''\n", ("has a value that cannot be read",)),
+    "5,000 digits": (GOOD.replace("30", "9" * 5000), ("has a value that cannot be read",)),
     "infinite": (GOOD.replace("30", ".inf"), ("mass = inf", "not finite")),
     "yes": (GOOD.replace("30", "yes"), ("mass = True", "not numeric")),
     "two documents": (GOOD + "---\n" + GOOD, ("another document",)),

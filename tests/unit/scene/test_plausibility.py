@@ -273,7 +273,7 @@ def test_no_scene_of_the_benchmarks_is_odd():
 
 
 def test_every_limit_has_its_reason_and_is_on_the_page():
-    page = (ROOT / "docs" / "plausibility.md").read_text()
+    page = (ROOT / "docs" / "guide" / "plausibility.md").read_text()
     for name, limit in LIMITS.items():
         assert f"| {name} |" in page and limit.reason in page, name
 

@@ -225,7 +225,7 @@ def test_solver_settings_of_a_run():
 
 
 @pytest.mark.parametrize(("text", "fault"), [
-    ("rtol = 1e-9\natol = 1e-9", "run.rtol, atol = 'psi_s': estimates no error"), ("atol = 1e-9", "run.atol.*counterpart"),
+    ("rtol = 1e-9\natol = 1e-9", "run.rtol, atol = 'psi_s': estimates no error"), ("atol = 1e-9", "run.atol.*is given alone"),
     ('solver = "cayly"', "run.solver = 'cayly'.*cayley"), ("iterations = -1", "run.iterations = -1"),
     ("tolerance = 2.0", "run.tolerance = 2.0"), ('checks = "some"', "run.checks = 'some'.*safe"),
     ('on_failure = "panic"', "run.on_failure = 'panic'.*substep"), ("rtl = 1e-9", "run.rtl.*rtol"),

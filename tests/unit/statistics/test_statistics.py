@@ -783,7 +783,7 @@ def test_coins_are_fair_and_fixed():
     (lambda: lw.Quantiles("depth", (0.0, 0.5)), "between 0 and 1"), (lambda: lw.Quantiles("depth", size=1000), "power of two"),
     (lambda: lw.Histogram("depth"), "edges"), (lambda: lw.Histogram("depth", (1.0, 0.0)), "rise"),
     (lambda: lw.Exceedance("position", (1.0, 2.0)), "one for each component"),
-    (lambda: lw.Exceedance("depth", 2.0, 1.0), "leave nothing between"),
+    (lambda: lw.Exceedance("depth", 2.0, 1.0), "have nothing between"),
     (lambda: lw.FirstPassage("position", 1.0), "3 components"),
     (lambda: lw.MeanAttitude("depth"), "no attitude"), (lambda: lw.PathMaximum("depth", lw.Mean("speed")), "leave it out"),
     (lambda: lw.Until("mean depth", -1.0), "half_width"), (lambda: lw.Until(3, 1.0), "no name"),
@@ -795,7 +795,7 @@ def test_coins_are_fair_and_fixed():
     (lambda: lw.Quantiles("depth", size=True), "power of two"),
     (lambda: lw.Until("mean depth", 1.0, members=2.0), "whole number"),
     (lambda: lw.FirstPassage("depth", above=(1.0, 2.0)), "one for each component"),
-    (lambda: lw.PathTime("position", above=(1.0, 2.0, 3.0), below=(2.0, 2.0, 4.0)), "leave nothing between"),
+    (lambda: lw.PathTime("position", above=(1.0, 2.0, 3.0), below=(2.0, 2.0, 4.0)), "have nothing between"),
 ])  # fmt: skip
 def test_what_makes_no_sense_is_refused(make, text):
     with pytest.raises(lw.SceneError, match=text.replace("[", r"\[")):
@@ -872,6 +872,6 @@ def test_coverage_of_runs_that_stop_by_themselves():
     from benchmarks.tables.coverage import stops
 
     for law, least, _, held, _ in stops(REPETITIONS):
-        # Stopping costs some coverage where looks begin early and the distribution is skewed (docs/statistics.md).
+        # Stopping costs some coverage where looks begin early and the distribution is skewed (docs/guide/statistics.md).
         assert held >= (0.93 if least >= 1024 and law == "normal" else 0.9), (law, least, held)
         assert held <= 0.97

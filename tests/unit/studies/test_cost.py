@@ -9,7 +9,7 @@ import pytest
 
 from lgvi_warp.studies import cost
 from lgvi_warp.studies import tradeoff as tradeoffs
-from lgvi_warp.studies.comparison import Sample, Setting
+from lgvi_warp.studies.comparison import Candidate, Sample
 from lgvi_warp.studies.cost import Cost, Kind, of_steps
 from lgvi_warp.studies.tradeoff import Measurement, Tradeoff, report_text
 
@@ -136,7 +136,7 @@ def test_settings_are_priced_by_the_clock_of_the_thread(scene, monkeypatch):
 def found(spread):
     """A trade-off of one setting."""
     errors = {name: dict.fromkeys(tradeoffs.KINDS, 1e-3) for name in ("position", "attitude")}
-    one = Measurement(Setting("psi_x", 0.1), 1.0, 0.0, errors, 0.0, {}, 2, {"position": True}, spread)
+    one = Measurement(Candidate("psi_x", 0.1), 1.0, 0.0, errors, 0.0, {}, 2, {"position": True}, spread)
     doubt = cost.disagreement([("psi_x float64", Cost(1.0, spread))])
     return Tradeoff(
         (one,), "position", 1, 1.0, 1.0, "itself", {"position": 1e-9}, None, messages=(doubt,) if doubt else ()
@@ -175,4 +175,4 @@ def test_time_of_other_threads_does_not_count():
 )
 def test_which_steps_are_more_work_when_longer(scene, method, grows):
     sample = Sample(scene, 1.0, 1)
-    assert cost.work_grows(sample.plan(sample.setting(method, 4))) is grows
+    assert cost.work_grows(sample.plan(sample.candidate(method, 4))) is grows

@@ -11,14 +11,14 @@ import lgvi_warp as lw
 from lgvi_warp.common.status import Status
 from lgvi_warp.physics import vehicle
 from lgvi_warp.scene.settings import RunSettings
-from lgvi_warp.studies.stability.grid import Axis, Grid, Line
+from lgvi_warp.studies.stability.grid import Axis, Line, StabilityGrid
 from lgvi_warp.studies.stability.limits import drag_limit, drag_rate, oscillation_limit, rates, rotation_limit
 from lgvi_warp.studies.stability.map import Cell, StabilityMap, cells_of
 from lgvi_warp.studies.stability.runs import REFUSED, Found
 
 
 def grid_of(scene, x="h", y="angular_velocity", points=(3, 4), directions=2, h=None):
-    return Grid(scene, x, y, points, directions, 0, h)
+    return StabilityGrid(scene, x, y, points, directions, 0, h)
 
 
 def by_cell(grid, values):

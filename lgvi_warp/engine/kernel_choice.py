@@ -1,0 +1,347 @@
+"""The kernel's contents: the laws that act and how each enters, and the method's program for them.
+
+Decided once for a run from a survey of all members; the members' own numbers come later, block by block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.engine.survey import COUPLINGS, SHAPES_OF_MASS, UNCOUPLED, Survey, survey
+from lgvi_warp.methods.method import FORCED, Method, Program, divided, merged, simplified, with_hops
+from lgvi_warp.physics import terms, vehicle
+from lgvi_warp.physics.terms.base import Term
+from lgvi_warp.physics.terms.drag import PARTS, Drag
+from lgvi_warp.scene.ensemble import Ensemble, over_members
+from lgvi_warp.scene.oddities import Oddities
+
+
+@dataclass(frozen=True)
+class KernelChoice:
+    """What the kernel of a run must contain.
+
+    Attributes:
+        method: the integration method.
+        aligned: whether the kernel's axes are the user's but for order and sense (see `PackingContext`).
+        moved: whether the state's origin differs from the user's.
+        laws: terms with the modules of their device code; drag by its exact flow comes first.
+        events: events with the modules of their device code.
+        mass: shape of the mass matrix: "isotropic", "diagonal" or "full".
+        drag: parts of drag that are treated by its exact flow; empty for none.
+        flow: how the water moves: "none", "steady", "uniform" or "varying".
+        parts: what the inertia holds besides mass and moments of inertia.
+        coupling: (6,), which of U12, U13, U23 and of the three pitches some member has.
+        timed: whether a law or an event depends on the time.
+        memory: whether a law or the method remembers numbers from step to step.
+        program: sub-maps of one stage, as (letter, coefficient).
+        lead: sub-map that opens a step and merges with the end of the previous one; None for none.
+        averages: alpha and beta of equations (15) and (16); None for conservative sub-maps.
+        conservative: whether no force creates energy and the kernel knows the potential of every force.
+        steady: whether forces are constant in inertial axes.
+        odd: what the user should know about the members' numbers.
+    """
+
+    method: Method
+    aligned: bool
+    moved: bool
+    laws: tuple[tuple[Term, Any], ...]
+    events: tuple[tuple[Term, Any], ...]
+    mass: str
+    drag: tuple[str, ...]
+    flow: str
+    parts: tuple[str, ...]
+    coupling: tuple[bool, ...]
+    timed: bool
+    memory: bool
+    program: Program
+    lead: tuple[str, float] | None
+    averages: tuple[float, float] | None
+    conservative: bool
+    steady: bool
+    odd: Oddities
+
+
+def choose_kernel(
+    ensemble: Ensemble,
+    method: Method,
+    h: float,
+    built_in: Callable[[str, str], Any],
+    checked: bool = True,
+) -> KernelChoice:
+    """Choose what the kernel of a run must contain.
+
+    Args:
+        ensemble: the members.
+        method: the integration method.
+        h: step [s].
+        built_in: (folder, name) -> module of built-in device code in the folder "laws" or "stops", None where there is none.
+        checked: whether the run watches the energy of scenes that conserve or lose it (default True).
+
+    Returns:
+        The laws that act, how each enters, and the method's program for them.
+
+    Raises:
+        SceneError: if the method cannot do what the scene asks, or a law's device code is unusable.
+    """
+    facts = survey(ensemble, method, h)
+    explicit = method.tableau is not None
+    acting = _acting(ensemble, facts, built_in)
+    events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)
+    damping = any(hasattr(module, "damping") for term, module in acting if not isinstance(term, Drag))
+    flow = _flow([module for _, module in acting])
+    drags = [(term, module) for term, module in acting if isinstance(term, Drag)]
+    nonconservative = any(
+        not getattr(module, "POTENTIAL", False) and module is not built_in("laws", "current") for _, module in acting
+    )
+    forced = method.base in FORCED and nonconservative
+    if explicit:
+        # Along the kernel's axes drag is six numbers and no matrix.
+        exact = len(drags) == 1 and not facts.bent
+    else:
+        exact = len(drags) == 1 and not damping and flow != "varying" and not forced
+    drag: tuple[str, ...] = ()
+    if exact:
+        term = drags[0][0]
+        assert isinstance(term, Drag)
+        drag = tuple(part for part in PARTS if part in facts.drag)
+        module = built_in("laws", "drag_directions" if facts.bent else "drag")
+        acting = [(term, module), *((t, m) for t, m in acting if t is not term)]
+        _check_backward_drag(ensemble, method, term, h)
+    dense = damping or (bool(drags) and not exact) or flow == "varying"
+    memory = any(term.memory for term, _ in acting)
+    _check(method, facts, dense=dense, flow=flow, memory=memory, acting=acting)
+    mass, coupled = SHAPES_OF_MASS[facts.mass], facts.coupled
+    program = FORCED[method.base] if forced else simplified(method.program, mass == "isotropic" and not coupled)
+    if not acting:
+        program = tuple((letter, coefficient) for letter, coefficient in program if letter != "K")
+    if method.turns and coupled:
+        program = with_hops(program)
+    if method.halved and (drag or flow != "none"):
+        program = divided(program)  # K with drag or water is symmetric but no flow: each half has its own
+    lead, maps = merged(program) if program else (None, ())
+    # A kick that is no flow must not be split between two steps, nor the state at which events are evaluated.
+    undone = all(getattr(module, "POTENTIAL", False) for _, module in acting)
+    if method.two_part:
+        # B merges with that of the next step exactly, A up to the order of the method.
+        lead, maps = method.program[0], method.program[1:]
+        if events:
+            lead, maps = None, method.program
+    elif events or (lead is not None and lead[0] == "K" and not undone):
+        lead, maps = None, program
+    conservative = checked and _conservative(facts, acting, built_in)
+    # Events, water and the potential are evaluated at the user's origin, or at that of the forces.
+    elsewhere = bool(events) or flow != "none" or (conservative and facts.apart)
+    parts = {"rates": explicit,
+             "turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
+             "modified": method.two_part, "dense": dense, "water": flow in ("uniform", "varying"),
+             "origin": bool(elsewhere and (facts.moved or facts.forces_moved))}  # fmt: skip
+    return KernelChoice(
+        method=method,
+        aligned=not facts.turned,
+        moved=facts.moved,
+        laws=tuple(acting),
+        events=events,
+        mass="full" if coupled and mass == "isotropic" else mass,
+        drag=drag,
+        flow=flow,
+        parts=tuple(name for name, wanted in parts.items() if wanted),
+        coupling=tuple(i in facts.couplings for i in range(len(COUPLINGS))),
+        timed=any(term.timed for term, _ in (*acting, *events)),
+        memory=memory or method.gauss > 0,
+        program=maps,
+        lead=lead,
+        averages=(method.alpha, method.beta) if forced else None,
+        conservative=conservative,
+        odd=facts.odd,
+        steady=not drag and flow in ("none", "steady") and all(_steady(module) for _, module in acting),
+    )
+
+
+def _steady(module: Any) -> bool:
+    """Whether a law's force is constant in inertial axes."""
+    return hasattr(module, "steady_force") or not any(hasattr(module, role) for role in ("law", "damping", "evolve"))
+
+
+def _conservative(facts: Survey, acting: list[tuple[Term, Any]], built_in: Callable[[str, str], Any]) -> bool:
+    """Whether no law creates energy, and the device code of each potential computes it.
+
+    Kinetic energy is that relative to the water.
+    """
+    tethered = any(module is built_in("laws", "tether") for _, module in acting)
+    for term, module in acting:
+        if module is built_in("laws", "current"):
+            # A uniform current does work against a tether, and its vertical part against weight.
+            passive = not tethered and term.key not in facts.rising
+        else:
+            dissipates = term.dissipative or not hasattr(module, "damping")
+            bounded = hasattr(module, "supply") or hasattr(module, "push")
+            known_potential = getattr(module, "POTENTIAL", False) and hasattr(module, "energy") and bounded
+            passive = not hasattr(module, "flow") and dissipates and (known_potential or not hasattr(module, "law"))
+        if not passive:
+            return False
+    return True
+
+
+# A backward stage accelerates a damped vehicle, and at a drag number of 1 without bound.
+MOST_BACKWARD_DRAG = 0.5
+
+
+def _check_backward_drag(ensemble: Ensemble, method: Method, term: Drag, h: float) -> None:
+    """Refuse drag that is too strong for a composition's backward stages, judged by the members' starts."""
+    back = -h * min(0.0, *method.stages)
+    if back == 0.0:
+        return
+
+    def largest(first: int, stop: int) -> float:
+        members = ensemble.select(first, stop)
+        coefficients = ensemble.own(term, members.parameters)
+        speeds = np.abs(np.concatenate([members.velocity, members.angular_velocity], axis=1))
+        # Acceleration per unit force along each of the user's axes, the other axes being free.
+        mobilities = np.einsum("nii->ni", np.linalg.inv(vehicle.inertia6(members.parameters)))
+        return float((back * (coefficients["linear"] + coefficients["quadratic"] * speeds) * mobilities).max())
+
+    number = max(over_members(largest, ensemble.members))
+    if number > MOST_BACKWARD_DRAG:
+        faults = Faults()
+        problem = f"goes backward by {back:.3g} s, where {term.key} has a drag number up to {number:.3g}"
+        remedy = f"use {method.base}, or a step {number / MOST_BACKWARD_DRAG:.2g} times shorter"
+        faults.add("method", method.name, problem, remedy)
+        faults.raise_if_any()
+
+
+def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) -> Any:
+    """The module of a term's device code, checked for what a kernel needs of it.
+
+    Args:
+        term: the term.
+        device: a module, or the name of a built-in one.
+        built_in: (folder, name) -> module of built-in device code, None where there is none.
+
+    Returns:
+        The module.
+
+    Raises:
+        SceneError: if the module is not known, lacks a struct or all roles, or a role has a wrong signature.
+    """
+    folder, roles = ("laws", ROLES) if term.acts else ("stops", ("distance",))
+    module = built_in(folder, device) if isinstance(device, str) else device
+    faults = Faults()
+    if module is None:
+        faults.add(f"{term.key}.device", device, "is not known", "give a module, or the name of a built-in one")
+    elif getattr(module, "params", None) is None and term.lanes() is None:
+        faults.add(f"{term.key}.device", module, "has no params(width, real)", "see docs/develop/add_a_force.md")
+    elif not any(hasattr(module, role) for role in roles):
+        faults.add(f"{term.key}.device", module, f"has none of {', '.join(roles)}", "see docs/develop/add_a_force.md")
+    else:
+        for role in roles:
+            _check_signature(faults, term, module, role)
+        flow = getattr(module, "FLOW", "none")
+        if flow not in FLOWS:
+            faults.add(f"{term.key}.FLOW", flow, "is not known", closest(str(flow), FLOWS))
+    faults.raise_if_any()
+    return module
+
+
+def is_built_in(module: Any) -> bool:
+    """Whether device code is one of the package's own.
+
+    Args:
+        module: a module, or a user's object.
+
+    Returns:
+        True for a module of lgvi_kernels.
+    """
+    return str(getattr(module, "__name__", "")).startswith("lgvi_kernels.")
+
+
+def declared(term: Term, module: Any) -> tuple[tuple[str, int], ...]:
+    """The declared numbers of which the device struct of a term is made.
+
+    Args:
+        term: the term.
+        module: its device code.
+
+    Returns:
+        (name, length) of each number; () for a module that defines `params` itself.
+    """
+    return (getattr(module, "params", None) is None and term.lanes()) or ()
+
+
+def _check_signature(faults: Faults, term: Term, module: Any, role: str) -> None:
+    """Add a fault unless a role is a Warp function of as many arguments as the kernel passes."""
+    function = getattr(module, role, None)
+    if function is None:
+        return
+    wanted = 2 if role == "distance" else 3
+    names = list(getattr(function, "input_types", {}))
+    if not names:
+        faults.add(f"{term.key}.{role}", function, "is not a Warp function", "decorate it with @wp.func")
+    elif len(names) != wanted:
+        signature = "(view, p)" if wanted == 2 else "(w, view, p)"
+        faults.add(
+            f"{term.key}.{role}", f"({', '.join(names)})", f"takes {len(names)} arguments", f"write {role}{signature}"
+        )
+
+
+ROLES = ("law", "damping", "flow", "evolve")
+# How water may move, the most special first.
+FLOWS = ("none", "steady", "uniform", "varying")
+
+
+def _acting(ensemble: Ensemble, facts: Survey, built_in: Callable[[str, str], Any]) -> list[tuple[Term, Any]]:
+    """Terms that affect at least one member, with their device code, in a fixed order."""
+    acting = [(term, built_in("laws", term.device)) for term in terms.IMPLIED]
+    acting += [(term, device_module(term, term.device_in(not facts.turned), built_in)) for term in ensemble.scene.terms]
+    return [(term, module) for term, module in acting if term.key in facts.felt]
+
+
+def _flow(modules: list[Any]) -> str:
+    """How the water moves: the most general FLOW of the laws."""
+    return max((getattr(module, "FLOW", "none") for module in modules), key=FLOWS.index, default="none")
+
+
+def _check(
+    method: Method,
+    facts: Survey,
+    *,
+    dense: bool,
+    flow: str,
+    memory: bool,
+    acting: list[tuple[Term, Any]],
+) -> None:
+    """Raise SceneError, with the reason, where the method cannot do what the scene asks."""
+    faults = Faults()
+    if facts.left > UNCOUPLED:
+        k = f"coupling norm up to {facts.left:.3g} at the best origin"
+        remedy = "use psi_x, psi_x8 or psi_w, which take any 6x6 inertia"
+        faults.add("method", method.name, f"cannot advance an inertia that couples velocities and rates ({k})", remedy)
+    composed = len(method.stages) > 1
+    noisy = any(getattr(module, "NOISE", False) for _, module in acting)
+    if composed and not method.two_part and (dense or flow in ("uniform", "varying") or memory or noisy):
+        cause = "a damping matrix" if dense else "water that varies" if flow != "none" else "a term that remembers"
+        faults.add("method", method.name, f"keeps its order only if a step of -h undoes one of h, and {cause} prevents that",
+                   f"use {method.base}")  # fmt: skip
+    for term, module in acting:
+        if method.two_part and not getattr(module, "SEPARABLE", False):
+            faults.add("method", method.name, f"needs potentials of position plus those of attitude; {term.key} has none such",
+                       "use ss6_13(psi_x), or bm6(psi_x)")  # fmt: skip
+        if method.gauss and ("law" not in (roles := [role for role in ROLES if hasattr(module, role)]) or len(roles) > 1
+                             or isinstance(term, Drag) or getattr(module, "NOISE", False)):  # fmt: skip
+            faults.add(
+                "method", method.name, f"takes forces of position and time only, which {term.key} is not", "use psi_s"
+            )
+    if method.tableau and (memory or noisy):
+        why = "noise, which has no rate" if noisy else "a term that remembers, which is kept once a step"
+        faults.add("method", method.name, f"cannot advance {why}", "use psi_s, psi_x or psi_w")
+    kicks = sum(letter in ("K", "Phi", "Phi*") for letter, _ in method.program)
+    if noisy and not composed and not method.tableau and kicks != 1:
+        faults.add("method", method.name, "would draw noise more than once a step", "use psi_s, psi_x or psi_w")
+    if flow in ("uniform", "varying") and facts.weightless and facts.buoyant:
+        faults.add("environment.gravity", 0.0, "leaves the displaced mass unknown, on which accelerating water pushes",
+                   "give gravity, or buoyancy = 0")  # fmt: skip
+    faults.raise_if_any()

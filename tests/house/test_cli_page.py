@@ -1,0 +1,41 @@
+"""The page on the command has every verb with its options, and no other."""
+
+import argparse
+import re
+
+import pytest
+
+from lgvi_warp.cli import parser
+from tests.conftest import ROOT
+
+PAGE = (ROOT / "docs" / "start" / "cli.md").read_text()
+SECTIONS = dict(re.findall(r"^## (\w+)\n(.*?)(?=^## |\Z)", PAGE, re.DOTALL | re.MULTILINE))
+VERBS = next(action for action in parser()._actions if isinstance(action, argparse._SubParsersAction)).choices
+# Old names of verbs: their options are those of the new one.
+OLD = {"plan": "predict"}
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_has_its_options(verb):
+    section = SECTIONS[OLD.get(verb, verb)]
+    assert verb not in OLD or f"`{verb}`" in section
+    options = {name for action in VERBS[verb]._actions for name in action.option_strings} - {"-h", "--help"}
+    # Options stand in backticks, commands of the examples do not.
+    shown = set(re.findall(r"`(--[\w-]+)", section))
+    assert shown == options
+    words = {action.metavar for action in VERBS[verb]._actions if not action.option_strings}
+    assert all(f"`{word}`" in section for word in words if word)
+
+
+def test_no_other_verb_is_there():
+    assert set(SECTIONS) == {OLD.get(verb, verb) for verb in VERBS}
+
+
+def test_every_example_is_understood():
+    lines = re.findall(r"^    lgvi-warp (.*?)(?: +#.*)?$", PAGE, re.MULTILINE)
+    assert len(lines) >= len(SECTIONS)
+    for line in lines:
+        verb, *words = line.replace('"', "").split()
+        old = {new: old for old, new in OLD.items()}.get(verb, verb)
+        known = verb if verb in VERBS else old
+        assert parser().parse_args([known, *words]).verb == known

@@ -1,0 +1,28 @@
+"""The complete examples of the pages on adding a method, a statistic and a sampling run as they stand."""
+
+import re
+
+import pytest
+
+from lgvi_warp.methods import limits, method
+from tests.conftest import ROOT
+
+
+def example(page):
+    """The one Python example of a page below docs/develop."""
+    (text,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "develop" / page).read_text(), re.DOTALL)
+    return text
+
+
+@pytest.mark.parametrize("page", ["add_a_method.md", "add_a_statistic.md", "add_a_sampling.md"])
+def test_example(page, scene, monkeypatch):
+    for table in (method.PROGRAMS, method.ORDERS, limits.MUNK, limits.RESTORING):
+        monkeypatch.setitem(table, "psi_k", None)  # what the example of a method adds goes with the test
+    exec(example(page), {"scene": scene})
+
+
+def test_files_to_touch_exist():
+    for page in sorted((ROOT / "docs" / "develop").glob("add_*.md")):
+        for path in re.findall(r"`((?:lgvi_warp|kernels|tests|docs)/[\w./]+?)`", page.read_text()):
+            if "NAME" not in path:
+                assert (ROOT / path).exists(), (page.name, path)

@@ -1,0 +1,72 @@
+"""No file uses a private name of another file: `from x import _y`, `x._y`, or object.__setattr__ on another's object."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+FILES = sorted(
+    path
+    for folder in ("lgvi_warp", "lgvi_warp_command", "kernels", "tests", "benchmarks", "examples")
+    for path in (ROOT / folder).rglob("*.py")
+)
+
+# Private names of other libraries that a file of ours has as well.
+FOREIGN = {("named.py", "_histogram")}
+
+
+def is_private(name: str) -> bool:
+    return name.startswith("_") and not name.startswith("__") and name != "_"
+
+
+def own_names(tree: ast.AST) -> set[str]:
+    """Private names that a file defines: functions, classes, variables, attributes and fields."""
+    names = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            names.add(node.name)
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            names.add(node.id)
+        elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+            names.add(node.attr)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):  # object.__setattr__(self, "_name", value)
+            names.add(node.value)
+    return {name for name in names if is_private(name)}
+
+
+def taken(tree: ast.AST, own: set[str], others: set[str]) -> list[str]:
+    """Uses of private names that another file defines and this one does not."""
+    attributes = [node for node in ast.walk(tree) if isinstance(node, ast.Attribute) and is_private(node.attr)]
+    of_self = {node.attr for node in attributes if ast.unparse(node.value) == "self"}
+    uses = [f"{node.lineno}: {ast.unparse(node)}" for node in attributes if node.attr in others - own]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom):
+            uses += [f"{node.lineno}: import {alias.name}" for alias in node.names if is_private(alias.name)]
+        elif isinstance(node, ast.Call) and ast.unparse(node.func) == "object.__setattr__":
+            target, name = ast.unparse(node.args[0]), ast.unparse(node.args[1]).strip("'")
+            if is_private(name) and target != "self" and name not in of_self:
+                uses.append(f"{node.lineno}: {target}.{name}")
+    return uses
+
+
+def test_the_check_finds_each_form():
+    code = "from a import _b\nc._d\nc._e\nc._f = 1\nc._f\nobject.__setattr__(c, '_g', 1)\nobject.__setattr__(self, '_h', 1)"
+    tree = ast.parse(code)
+    assert own_names(tree) == {"_f", "_g", "_h"}
+    assert taken(tree, own_names(tree), {"_d", "_f"}) == ["2: c._d", "1: import _b", "6: c._g"]
+
+
+@pytest.fixture(scope="module")
+def trees() -> dict[Path, ast.AST]:
+    return {path: ast.parse(path.read_text()) for path in FILES}
+
+
+def test_no_private_name_is_used_across_files(trees):
+    own = {path: own_names(tree) for path, tree in trees.items()}
+    everywhere = set().union(*own.values())
+    found = []
+    for path, tree in trees.items():
+        known = own[path] | {name for file, name in FOREIGN if file == path.name}
+        found += [f"{path.relative_to(ROOT)}:{use}" for use in taken(tree, known, everywhere)]
+    assert not found, "\n".join(found)

@@ -1,0 +1,47 @@
+"""The examples of README and of the first pages print what the pages say."""
+
+import re
+import runpy
+
+import matplotlib
+import pytest
+
+import lgvi_warp as lw
+from tests.conftest import ROOT
+
+matplotlib.use("Agg")
+
+
+def code_and_output(page):
+    """The first Python snippet of a page, and the indented block that follows it: what it prints."""
+    text = (ROOT / page).read_text()
+    match = re.search(r"```python\n(.*?)```\n(?:\n((?:    [^\n]*\n)+))?", text, re.DOTALL)
+    return match[1], re.sub(r"^    ", "", match[2] or "", flags=re.MULTILINE)
+
+
+def test_readme(monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
+    code, output = code_and_output("README.md")
+    exec(code, {})
+    assert capsys.readouterr().out == output and output.count("\n") == 3
+
+
+def test_first_dive(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(ROOT / "examples" / "01_first_dive.py"), run_name="__main__")
+    printed = capsys.readouterr().out.splitlines()
+    page = (ROOT / "docs" / "start" / "first_dive.md").read_text()
+    assert len(printed) == 3 and all(f"\n    {line}\n" in page for line in printed)
+
+
+@pytest.mark.slow
+def test_a_vehicle_of_the_package():
+    code, _ = code_and_output("docs/start/first_dive.md")
+    names = {"lw": lw}
+    exec(code, names)
+    assert names["result"].status.counts() == {"ok": 1}
+
+
+def test_the_methods_of_the_guide():
+    code, _ = code_and_output("docs/guide/methods.md")
+    exec(code, {"lw": lw})

@@ -266,7 +266,7 @@ REFUSED = [
     (
         terms.CrossFlow,
         HULL | {"stations": (0, 1, 1, 2, 3)},
-        "stations = [0.0, 1.0, 1.0, 2.0, 3.0]: is not rising; sort",
+        "stations = (0, 1, 1, 2, 3): is not rising; sort",
     ),
     (terms.CrossFlow, {key: [0.1] for key in HULL}, "cross_flow.stations = [0.1]: has one station; give two or more"),
     (terms.CrossFlow, HULL | {"diameters": (-0.1,) * 5}, "-0.1): is out of bounds; give numbers from 0 [m]"),

@@ -21,10 +21,13 @@ def plays(law, role):
     return getattr(law, role, None)
 
 
-def numbers_struct(numbers, width, real):
-    """A struct of declared numbers, given by name and length: 1 for a lane, 3 for a 3-vector of lanes."""
+def numbers_struct(law, numbers, width, real):
+    """A law's struct of declared numbers, given by name and length: 1 for a lane, 3 for a 3-vector of lanes."""
+    name = getattr(law, "__name__", "").rpartition(".")[2]
+    name = f"numbers_{name}" if name.isidentifier() else "numbers"  # a user's file may have any name
     kinds = {1: lane(width, real), 3: lane3(width, real)}
-    return struct("Numbers", **{name: kinds[length] for name, length in numbers} or {"unused": wp.uint8})
+    fields = {key: kinds[length] for key, length in numbers}
+    return struct(name, **fields or {"unused": wp.uint8})
 
 
 @functools.cache
@@ -36,7 +39,7 @@ def params_of(laws, numbers, width, real):
     """
     if not laws:
         return struct("NoParams", unused=wp.uint8)
-    make = getattr(laws[0], "params", None) or functools.partial(numbers_struct, numbers[0])
+    make = getattr(laws[0], "params", None) or functools.partial(numbers_struct, laws[0], numbers[0])
     return struct("Params", own=make(width, real), rest=params_of(laws[1:], numbers[1:], width, real))
 
 

@@ -1,4 +1,4 @@
-"""One law alone, at given views: what lgvi_warp.law_check compares with finite differences."""
+"""A kernel that evaluates one law alone at chosen views: lgvi_warp.law_check compares the values with finite differences."""
 
 import functools
 from typing import Any, NamedTuple
@@ -13,7 +13,7 @@ from lgvi_kernels.maps.compose import params_of, plays, superpose
 # Numbers of a view in `views[packet, field]`: R row by row, b, nu, Om.
 VIEW_FIELDS = 18
 
-# What comes out -> (first column, numbers); a role that the law does not have leaves zeros.
+# Role of the law -> its columns of `out`, as (first, count); a role that the law does not have leaves zeros.
 COLUMNS = {"law": (0, 6), "damping": (6, 36), "flow": (42, 15), "distance": (57, 1), "energy": (58, 1)}
 OUT_FIELDS = 59
 

@@ -45,5 +45,5 @@ def energy(u: Any, view: Any, p: Any):
 
 @wp.func
 def supply(s: Any, view: Any, p: Any):
-    """All of U: down to where it is slack."""
+    """s plus U: its least value, 0, is where the tether is slack."""
     return energy(s, view, p)

@@ -9,7 +9,7 @@ from lgvi_kernels.law import add  # noqa: F401
 
 @wp.func
 def law(w: Any, view: Any, p: Any):
-    """phi = force, tau = torque."""
+    """phi = force, tau = torque, whatever the state is."""
     w.force = w.force + p.force
     w.torque = w.torque + p.torque
     return w

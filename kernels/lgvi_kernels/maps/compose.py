@@ -32,10 +32,10 @@ def numbers_struct(law, numbers, width, real):
 
 @functools.cache
 def params_of(laws, numbers, width, real):
-    """The parameters of several laws, nested as `own` and `rest`.
+    """The parameters of several laws, nested: `own`, those of the first law, and `rest`, the same struct of the others.
 
-    numbers: for each law the (name, length) of the numbers that its Term declares, of which the struct of a law without
-    `params` is made.
+    The functions of superpose nest alike: each hands `rest` on and reads `own`, without a name for each law. numbers: for each
+    law the (name, length) of the numbers that its Term declares, of which the struct of a law without `params` is made.
     """
     if not laws:
         return struct("NoParams", unused=wp.uint8)
@@ -45,7 +45,10 @@ def params_of(laws, numbers, width, real):
 
 @functools.cache
 def superpose(laws, role):
-    """Fold the functions of this role into one, (sum, view, params) -> sum. None if no law has it."""
+    """Fold the functions of this role into one, (sum, view, params) -> sum. None if no law has it.
+
+    The last law is added first; this order is part of the bits of a result.
+    """
     if not any(plays(law, role) for law in laws):
         return None
     function, rest = plays(laws[0], role), superpose(laws[1:], role)

@@ -1,1 +1,1 @@
-"""The events a scene may name, one file each: `distance(view, p)`, positive while all is well; p: the declared numbers."""
+"""The events that a scene may name, one file each: `distance(view, p)`, positive until the event; p: the declared numbers."""

@@ -9,7 +9,7 @@ from lgvi_kernels.law import least, sub  # noqa: F401
 
 @wp.func
 def distance(view: Any, p: Any):
-    """Metres to the nearest face."""
+    """Distance to the nearest face [m], negative outside the box."""
     a = view.b - p.lower
     z = p.upper - view.b
     return least(least(least(a.x, a.y), a.z), least(least(z.x, z.y), z.z))

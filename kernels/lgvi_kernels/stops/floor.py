@@ -9,5 +9,5 @@ from lgvi_kernels.law import sub  # noqa: F401
 
 @wp.func
 def distance(view: Any, p: Any):
-    """Metres to go."""
+    """Height above the floor [m]."""
     return p.depth - view.b.z

@@ -9,5 +9,5 @@ from lgvi_kernels.law import sub  # noqa: F401
 
 @wp.func
 def distance(view: Any, p: Any):
-    """Metres to go."""
+    """Distance below the depth at which the member stops [m]."""
     return view.b.z - p.depth

@@ -1,4 +1,4 @@
-"""A member's time is over."""
+"""A member reaches the time at which it stops."""
 
 from typing import Any
 
@@ -9,5 +9,5 @@ from lgvi_kernels.law import mul, ones, sub  # noqa: F401
 
 @wp.func
 def distance(view: Any, p: Any):
-    """Seconds to go."""
+    """Time left [s]."""
     return p.at - view.t * ones(p.at)

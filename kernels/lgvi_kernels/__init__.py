@@ -1,1 +1,29 @@
-"""Device code of lgvi_warp: Warp functions and kernels, written for packets of vehicles."""
+"""Device code of lgvi_warp: Warp functions and kernels that advance packets of vehicles. It imports Warp alone.
+
+The rooms; each may import from the earlier ones only:
+
+- lanes: numbers, vectors, matrices and states of a packet, and the operators and functions between them;
+- law.py: what the author of a force or of an event imports;
+- laws, stops: one file for each force, one file for each event;
+- maps: the maps that a step is made of, and the solvers of equation (24);
+- advance: the kernel. method.py makes a step from maps and laws, stepping.py loops over steps, kernel.py is launched.
+
+Equations of Nordkvist & Sanyal (2010): (12), (23) are in `Ab`, the rotation in (10), (11), (13), (14) and its adjoint
+(19)-(22) in `D`, the potential's force and moment in (13), (14), (19), (20) in `K`, their Munk moment in `Ap`, all in
+maps/submaps.py; (15), (16), and with them (10)-(16) and (19)-(23) as printed, in maps/paper.py; (24) in maps/rotation.py.
+
+To read any file: a module that writes + - * / between lanes imports `add`, `sub`, `mul`, `div`, `neg`, although no line names
+them (`noqa: F401`), since Warp looks operators up among the module's names. A function `make_...` runs on the host, once for
+each kernel. Inside it, `if wp.static(...)` is decided then: what a scene does not have is not compiled, and costs nothing.
+"""
+
+import functools
+from importlib import import_module
+from importlib.util import find_spec
+
+
+@functools.cache
+def built_in(folder, name):
+    """The device code of a name in a folder ("laws", "stops"), imported when it is asked for first; None for no such name."""
+    path = f"{__name__}.{folder}.{name}"
+    return import_module(path) if name.isidentifier() and find_spec(path) else None

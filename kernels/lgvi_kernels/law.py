@@ -1,4 +1,7 @@
-"""What the author of a law or an event needs, in one import: lanes, their functions, structs, and what a view offers."""
+"""What the author of a law or of an event imports: lanes, their functions, structs, and functions of a View.
+
+A law that writes + - * / between lanes imports `add`, `sub`, `mul`, `div`, `neg` too: Warp looks the operators up by name.
+"""
 
 from lgvi_kernels.lanes.arithmetic import (
     absolute,

@@ -1,1 +1,1 @@
-"""The one fused kernel: a packet of vehicles through all its steps, with only what the scene has."""
+"""The one fused kernel: it takes a packet of vehicles through all steps, and has only the code that the scene needs."""

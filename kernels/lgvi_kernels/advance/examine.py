@@ -1,4 +1,4 @@
-"""One law alone, at given views: what lgvi_warp.law_check compares with finite differences."""
+"""A kernel that evaluates one law alone at chosen views: lgvi_warp.law_check compares the values with finite differences."""
 
 import functools
 from typing import Any, NamedTuple
@@ -13,7 +13,7 @@ from lgvi_kernels.maps.compose import params_of, plays, superpose
 # Numbers of a view in `views[packet, field]`: R row by row, b, nu, Om.
 VIEW_FIELDS = 18
 
-# What comes out -> (first column, numbers); a role that the law does not have leaves zeros.
+# Role of the law -> its columns of `out`, as (first, count); a role that the law does not have leaves zeros.
 COLUMNS = {"law": (0, 6), "damping": (6, 36), "flow": (42, 15), "distance": (57, 1), "energy": (58, 1)}
 OUT_FIELDS = 59
 
@@ -27,9 +27,9 @@ class Examine(NamedTuple):
 
 
 @functools.cache
-def make_examine(module, width, real):
+def make_examine(module, numbers, width, real):
     """Build (without compiling) the kernel that evaluates this module's functions."""
-    Lane, View, Params = lane(width, real), view_struct(width, real), params_of((module,), width, real)
+    Lane, View, Params = lane(width, real), view_struct(width, real), params_of((module,), (numbers,), width, real)
     Wrench, Damping, Flow = (make(width, real) for make in (wrench_struct, damping_struct, flow_struct))
     law, damping, flow, evolve = (superpose((module,), role) for role in ("law", "damping", "flow", "evolve"))
     distance, energy = plays(module, "distance"), superpose((module,), "energy")

@@ -1,4 +1,8 @@
-"""The kernel: launches of so many steps, the chunks between two looks, and what is written."""
+"""The kernel: a launch makes the steps k0 to k1, in chunks between two looks at the alarms, and writes the samples due.
+
+A chunk with an alarm is made again from its start, one step at a time. So healthy steps pay one test a chunk, and a failing
+lane is frozen at its last good state; the other lanes repeat their bits.
+"""
 
 import functools
 from typing import Any, NamedTuple
@@ -17,7 +21,7 @@ from lgvi_kernels.lanes.packet import failures, renormalise, turned_too_far
 from lgvi_kernels.lanes.sums import at_rest, choose
 from lgvi_kernels.maps.compose import superpose
 
-# Where every step is a sample, steps between two looks at the energy: it is then found out so many late.
+# Where every step is a sample, steps between two looks at the energy: this is how late a failure may be seen.
 SINGLE_LOOKS = 8
 
 
@@ -68,7 +72,7 @@ def make_advance(spec):
         h: wp.float64,
         stage_h: wp.array(dtype=real),
         lead_h: wp.array(dtype=real),
-        # time: this launch makes steps k0 to k1, and writes the samples due after the steps sample_step[s0:]
+        # time: this launch makes the steps k0 to k1, and writes the samples due after the steps sample_step[s0:]
         k0: int,
         k1: int,
         s0: int,
@@ -79,7 +83,7 @@ def make_advance(spec):
         status: wp.array(dtype=Ints),
         failed_step: wp.array(dtype=Ints),
         failed_size: wp.array(dtype=Lane),
-        # what is looked at now and then
+        # limits and results of looks
         monitor: Monitor,
         # out
         out: wp.array2d(dtype=Lane),
@@ -99,10 +103,11 @@ def make_advance(spec):
         if wp.static(dragged):
             c.drag = prepare(DragFlow(), c.params.own, real(h))
         stages = lead_h.shape[0] - 1
+        # Times 1: a plain assignment would be a reference into the array, read anew in each step.
         first_h = real(1.0) * stage_h[0]
         opening = real(1.0) * lead_h[stages]
         if wp.static(not composed):
-            # From the one number that the compiler then keeps for the stage and its leads.
+            # Computed from first_h, the compiler keeps one number in a register for the stage and its leads.
             opening = real(wp.static(lead_coefficient)) * first_h
         x = read(state, i)
         unity = ones(x.b.x)
@@ -111,8 +116,10 @@ def make_advance(spec):
         any_frozen = bool(False)
         if wp.static(checked):
             for j in range(wp.static(width)):
+                # Positive in the lanes that an earlier launch froze.
                 frozen[j] = real(status[i][j])
             any_frozen = any_positive(frozen)
+        # kept: the last good state of frozen lanes, which rest at the origin meanwhile and raise no further alarm.
         kept = x
         if any_frozen:
             x = choose(frozen, at_rest(x), x)
@@ -124,9 +131,12 @@ def make_advance(spec):
         s = s0
         if wp.static(looking):
             suspects = zero
+            # sample_step ends with a step that no run reaches, which saves a test for its end.
             last = sample_step[sample_step.shape[0] - 2]
+        # singles: steps still to be made one at a time, after an alarm.
         singles = int(0)
         while k < k1:
+            # Chunks end at multiples of CHUNK whatever the launches are: looks and renormalisation do not depend on them.
             n = wp.min(wp.static(CHUNK) - k % wp.static(CHUNK), wp.min(k1, sample_step[s]) - k)
             if singles > 0:
                 n = 1
@@ -135,6 +145,7 @@ def make_advance(spec):
                 back_up(memory, i, 0, 1)
             x.alarm = Alarm()
             if wp.static(paced):
+                # A lane with a code does not count when the packet chooses its step.
                 x.alarm.code = frozen
             if wp.static(apart):
                 x = stepped(x, c, monitor, k, n, h, stage_h, lead_h, first_h, opening)
@@ -147,17 +158,17 @@ def make_advance(spec):
                     x.alarm = turned_too_far(x.alarm)
                 if wp.static(energetic):
                     if singles > 0:
-                        # Of a chunk that is made again, only those lanes are looked at that made it necessary.
+                        # In a chunk that is made again, only the lanes whose alarm made it necessary are looked at.
                         x.alarm = energy_alarm(x, c, monitor, k + n, h, opening, suspects)
                     elif n > 1 or (k + n) % wp.static(SINGLE_LOOKS) == 0 or k + n == last:
                         x.alarm = energy_alarm(x, c, monitor, k + n, h, opening, unity - frozen)
                 code = failures(x, frozen)
                 if wp.static(substepped):
                     if n == 1 and any_positive(code):
-                        was = code
-                        x, code = retried(good, x, was, c, k, h, stage_h, lead_h, opening)
+                        code_whole = code
+                        x, code = retried(good, x, code_whole, c, k, h, stage_h, lead_h, opening)
                         for j in range(wp.static(width)):
-                            if code[j] != was[j]:
+                            if code[j] != code_whole[j]:
                                 monitor.substeps[i][j] = monitor.substeps[i][j] + 1
                                 x.alarm.size[j] = real(0.0)
                 if any_positive(code):
@@ -168,7 +179,7 @@ def make_advance(spec):
                     else:
                         landed = good
                         if wp.static(watched):
-                            # The failed lanes keep their last good state, those that an event stops the state at it.
+                            # Failed lanes keep their last good state; lanes that an event stops get the state at the event.
                             begun = at_step(good, k, h)
                             landed, code, part, still = arrival(begun, x, code, c, k, h, stage_h, lead_h, opening)
                             for j in range(wp.static(width)):
@@ -180,7 +191,7 @@ def make_advance(spec):
                                         monitor.still[i, 1][j] = still.y[j]
                                         monitor.still[i, 2][j] = still.z[j]
                             if wp.static(remembers):
-                                # Laws of the other lanes are to remember the whole step.
+                                # The search left the memory of a part: make the step once more for the lanes that go on.
                                 back_up(memory, i, 1, 0)
                                 begun = one_step(begun, c, monitor, k, h, stage_h, lead_h, first_h, opening)
                         for j in range(wp.static(width)):
@@ -212,6 +223,7 @@ def make_advance(spec):
                     y = x
                     if any_frozen:
                         y = choose(frozen, kept, x)
+                    # Backward over its length, the lead of the next step is undone.
                     y = opened(at_step(y, k, h), c, -opening)
                     sample(out, i, (s - s0) * wp.static(per_sample), y, c, real(h), monitor, frozen)
                     s += 1

@@ -1,4 +1,4 @@
-"""A method's step from its sub-maps, for what the scene has: which laws act where, and how velocities follow."""
+"""A method's step, made of its sub-maps and the scene's laws: which law acts in which map, and how velocities follow."""
 
 from typing import Any, NamedTuple
 
@@ -37,10 +37,11 @@ from lgvi_kernels.maps.water import make_shear
 
 
 class Step(NamedTuple):
-    """Functions of a method: one stage without its lead, the lead, the velocities of a state, E's set-up, the current.
+    """Functions of a method.
 
-    velocities_of_forces: those at the origin of the forces.
-    momentum: p of a state that holds R p in its place, or None.
+    step: one stage without its lead; lead: the sub-map that opens a step (see Spec); velocities: (inertia, p, pi) -> (nu, Om)
+    at the origin of the state, velocities_of_forces: at that of the forces; prepare: makes the constants of E;
+    water_velocity: R^T u; momentum: p of a state that holds R p in its place, or None.
     """
 
     step: Any
@@ -54,7 +55,7 @@ class Step(NamedTuple):
 
 @wp.func
 def direct_velocity(inertia: Any, p: Any):
-    """The same for diagonal M by one product, for methods that ask many times: the compiler keeps the sums."""
+    """nu = M^-1 p for diagonal M. Methods that ask many times a step save a product: the sums leave the loop over steps."""
     A = inertia.anisotropy
     mean = inertia.mean
     return vec3((mean + A.x) * p.x, (mean + A.y) * p.y, (mean + A.z) * p.z)
@@ -68,12 +69,12 @@ def divided(inertia: Any, pi: Any):
 
 @wp.func
 def multiplied(inertia: Any, pi: Any):
-    """The same without a division, for methods that ask many times a step."""
+    """J^-1 pi without a division, for methods that ask many times a step."""
     return inertia.inverse_J * pi
 
 
 def make_velocities(velocity, turning, coupled):
-    """(inertia, p, pi) -> (nu, Om) at the origin of the state, and the same at that of the forces.
+    """Two functions (inertia, p, pi) -> (nu, Om): at the origin of the state, and at that of the forces.
 
     velocity: M^-1 p; turning: J^-1 of a vector.
     """
@@ -94,7 +95,7 @@ def make_velocities(velocity, turning, coupled):
 
     @wp.func
     def velocities_of_forces(inertia: Any, p: Any, pi: Any):
-        """The same where the forces act."""
+        """The same at the origin of the forces."""
         Om = turning(inertia, pi - transpose_times(inertia.E_forces, p))
         return velocity(inertia, p) - apply(inertia.E_forces, Om), Om
 
@@ -145,7 +146,7 @@ def make_method(spec):
 
     @wp.func
     def E(x: Any, c: Any, h: Any):
-        """Drag by its exact flow; its constants are at hand for the whole step, and made for any other."""
+        """Drag by its exact flow. c.drag has the constants for the whole step h; for another length they are made here."""
         if h == c.drag.h:
             x = exact(x, c.drag, c)
         else:
@@ -200,13 +201,15 @@ def make_method(spec):
     maps = []
     for i, (letter, coefficient) in enumerate(spec.maps):
         if letter[0] == "R":
-            axes = [int(sub_map[1]) - 1 for sub_map, _ in (*spec.maps[i:], *spec.maps[:i]) if sub_map[0] == "R"]
+            # The axes of the turns from here on, over the end of the step into the next one.
+            axes = [int(name[1]) - 1 for name, _ in (*spec.maps[i:], *spec.maps[:i]) if name[0] == "R"]
             following = next((axis for axis in axes if axis != axes[0]), axes[0])
-            watched = spec.checked and not any(letters_of[0] == "R" for letters_of, _ in spec.maps[i + 1 :])
+            watched = spec.checked and not any(name[0] == "R" for name, _ in spec.maps[i + 1 :])
             turn = turns.make_turn(axes[0], pitched[axes[0]], following, spec.compensated, watched)
             maps.append((turn, coefficient))
         else:
             maps.append((letters[letter], coefficient))
     step = fold_pair(tuple(maps)) if spec.paired else fold(tuple(maps))
+    # Without a lead, step stands in its place, and is called nowhere.
     lead = letters[spec.lead[0]] if spec.lead else step
     return Step(step, lead, velocities, prepare, water_velocity, velocities_of_forces)

@@ -1,7 +1,7 @@
-"""What is looked at now and then, beside the alarms of each step: rows of warnings, energy that must not grow, strong drag.
+"""Checks beside the alarms of each step: rows of warnings, energy that must not grow, strong drag.
 
-A look sees the state at the end of a step, once in so many steps: its code lies outside the loop over the steps. What a
-kernel is not asked for is not in it. Values are squares, as those of alarms are; the host takes the root.
+A look sees the state at the end of a step, once in so many steps: its code lies outside the loop over the steps, whose
+registers it would take. A kernel has only the checks that it is asked for. Values are squares, as those of alarms are.
 """
 
 import functools
@@ -44,21 +44,21 @@ BITS = {
     "energy": 9,
 }
 
-# Energy created, over what there was to be exchanged, beyond which the member has failed.
+# Energy created, over the energy that could be exchanged, beyond which the member has failed.
 MOST_ENERGY = 100.0
 # Drag number of the stages that go backward beyond which the member has failed: at 1 drag alone has no past.
 MOST_BACKWARD_DRAG = 0.5
 
-# T and U at the start, and what both could give from there.
+# T and U at the start, and the energy that both could give from there.
 ENERGY_FIELDS = 3
 EPSILON = {wp.float64: 2.0**-52, wp.float32: 2.0**-23}
-# Round-off of energies that cancel, in units of EPSILON: what a float32 attitude loses between two renormalisations.
+# Round-off of energies that cancel, in units of EPSILON: as large as that of a float32 attitude between two renormalisations.
 ROUND_OFF = 1e4
 
 
 @functools.cache
 def limits_struct(width, real, rows):
-    """What rows compare with. munk: (h w)^2 per |p|^2; step: h [s]; the rest are the limits, squared."""
+    """The numbers that rows compare with. munk: (h w)^2 per |p|^2; step: h [s]; the rest are the limits, squared."""
     fields = {f"{row}_limit": real for row in rows}
     if "munk_coarse" in rows:
         fields["munk"] = lane(width, real)
@@ -76,7 +76,7 @@ def seen_struct(width, real):
 
 @functools.cache
 def monitor_struct(width, real, rows, energy, backward, substep, still):
-    """The kernel's argument: limits, one entry or one a packet, and what looks leave behind, by packet.
+    """The kernel's argument: limits, one entry or one a packet, and the results of looks, by packet.
 
     warned: bits; warned_step and warned_size: steps made at the first crossing of the most serious row, and its square.
     energy: rows of ENERGY_FIELDS. backward: the part of h that stages go back at once. substeps: steps that were divided.
@@ -101,7 +101,7 @@ def monitor_struct(width, real, rows, energy, backward, substep, still):
 
 @wp.func
 def size3(v: Any):
-    """|v| on three axes."""
+    """The sizes of three components."""
     return vec3(absolute(v.x), absolute(v.y), absolute(v.z))
 
 
@@ -143,7 +143,7 @@ def make_drag_rate(by_directions, parts, velocities, factor):
 
 
 def make_matrix_rate(View, Damping, damping, velocities):
-    """The same of damping matrices, by their diagonals: at twice the velocities they hold l + 2 q|v|."""
+    """The same for damping matrices, by their diagonals: D of twice the velocities has l + 2 q|v| there."""
 
     @wp.func
     def matrix_rate(x: Any, c: Any):
@@ -161,25 +161,28 @@ def make_matrix_rate(View, Damping, damping, velocities):
     return matrix_rate
 
 
-def make_sum(first, second):
-    """Of drag along axes and of matrices beside it."""
+def make_sum(one, other):
+    """The sum of two rates: of drag along axes, and of damping matrices beside it."""
 
     @wp.func
     def rate(x: Any, c: Any):
-        return first(x, c) + second(x, c)
+        return one(x, c) + other(x, c)
 
     return rate
 
 
 def make_backward(drag_rate):
-    """The check of each step where stages go backward: what drag alone would have no past for is no solution."""
+    """The alarm of each step whose method has stages that go backward.
+
+    Backward in time drag makes a vehicle faster, and where the drag number is 1 or more, infinitely fast within the stage.
+    """
 
     @wp.func
     def backward(x: Any, c: Any, length: Any):
         n = length * drag_rate(x, c)
-        unity = ones(n)
-        over = n - length.dtype(wp.static(MOST_BACKWARD_DRAG)) * unity
-        code = positive(over, length.dtype(wp.static(float(BACKWARD_DRAG))) * unity, unity - unity)
+        one = ones(n)
+        over = n - length.dtype(wp.static(MOST_BACKWARD_DRAG)) * one
+        code = positive(over, length.dtype(wp.static(float(BACKWARD_DRAG))) * one, one - one)
         x.alarm.size = positive(x.alarm.code, x.alarm.size, positive(over, n * n, x.alarm.size))
         x.alarm.code = positive(x.alarm.code, x.alarm.code, code)
         return x
@@ -188,7 +191,9 @@ def make_backward(drag_rate):
 
 
 def make_energy(laws, real, View, velocities, shifted):
-    """(energies, supplies, growth) of states, divided by max J: T and U; what they can give; what was created over that.
+    """Functions (energies, supplies, growth) of states: T and U; what they can give; the energy created, over that.
+
+    Energies are divided by max J, as momenta are.
 
     shifted: the forces have another origin than the state.
     """
@@ -217,7 +222,7 @@ def make_energy(laws, real, View, velocities, shifted):
 
     @wp.func
     def growth(x: Any, c: Any, t: Any, T0: Any, U0: Any, S0: Any):
-        """(E - E0) / (what there was to exchange), with the round-off of U under the fraction.
+        """(E - E0) over the energy that could be exchanged. The round-off of U is added to it, and so raises no alarm.
 
         A steady force F gives in the time t no more than (F t)^2 / (2 M), whatever else acts; 3 `mean` is above all 1 / M.
         """
@@ -232,11 +237,11 @@ def make_energy(laws, real, View, velocities, shifted):
 
 
 @wp.func
-def noted(crossings: Any, excess: Any, number: Any, square: Any):
+def noted(seen: Any, excess: Any, number: Any, square: Any):
     """Add a row where its excess is positive; rows come in the order of their bits, so that the last one's value stays."""
-    crossings.bits = crossings.bits + positive(excess, number * ones(excess), ones(excess) - ones(excess))
-    crossings.size = positive(excess, square, crossings.size)
-    return crossings
+    seen.bits = seen.bits + positive(excess, number * ones(excess), ones(excess) - ones(excess))
+    seen.size = positive(excess, square, seen.size)
+    return seen
 
 
 def make_look(rows, width, real, velocities, drag_rate):
@@ -246,42 +251,37 @@ def make_look(rows, width, real, velocities, drag_rate):
 
     @wp.func
     def look_at(x: Any, c: Any, limits: Any, growth: Any):
-        crossings = Seen()
-        unity = ones(x.b.x)
-        zero = unity - unity
+        seen = Seen()
+        one = ones(x.b.x)
+        zero = one - one
         nu, Om = velocities(c.inertia, x.p, x.pi)
         if wp.static("precision" in rows):
             step = limits.step * limits.step
+            # At rest, where moved is 0, no digit of a motion is lost.
             moved = step * dot(nu, nu)
             lost = real(wp.static(EPSILON[real] ** 2)) * dot(x.b, x.b)
-            excess = positive(moved, lost - limits.precision_limit * moved, zero - unity)
-            crossings = noted(crossings, excess, real(wp.static(number["precision"])), lost / moved)
+            excess = positive(moved, lost - limits.precision_limit * moved, zero - one)
+            seen = noted(seen, excess, real(wp.static(number["precision"])), lost / moved)
         if wp.static("orthogonality" in rows):
-            d = largest(size3(vec3(dot(x.R0, x.R0) - unity, dot(x.R1, x.R1) - unity, dot(x.R2, x.R2) - unity)))
+            d = largest(size3(vec3(dot(x.R0, x.R0) - one, dot(x.R1, x.R1) - one, dot(x.R2, x.R2) - one)))
             d = greatest(d, largest(size3(vec3(dot(x.R0, x.R1), dot(x.R1, x.R2), dot(x.R2, x.R0)))))
-            excess = d * d - limits.orthogonality_limit * unity
-            crossings = noted(crossings, excess, real(wp.static(number["orthogonality"])), d * d)
+            excess = d * d - limits.orthogonality_limit * one
+            seen = noted(seen, excess, real(wp.static(number["orthogonality"])), d * d)
         if wp.static("munk_coarse" in rows):
             w = limits.munk * dot(x.p, x.p)
-            crossings = noted(
-                crossings, w - limits.munk_coarse_limit * unity, real(wp.static(number["munk_coarse"])), w
-            )
+            seen = noted(seen, w - limits.munk_coarse_limit * one, real(wp.static(number["munk_coarse"])), w)
         if wp.static("rotation" in rows):
             turn = (limits.step * limits.step) * dot(Om, Om)
-            crossings = noted(
-                crossings, turn - limits.rotation_limit * unity, real(wp.static(number["rotation"])), turn
-            )
+            seen = noted(seen, turn - limits.rotation_limit * one, real(wp.static(number["rotation"])), turn)
         if wp.static("drag" in rows):
             d = limits.step * drag_rate(x, c)
-            crossings = noted(crossings, d * d - limits.drag_limit * unity, real(wp.static(number["drag"])), d * d)
+            seen = noted(seen, d * d - limits.drag_limit * one, real(wp.static(number["drag"])), d * d)
         if wp.static("munk_unstable" in rows):
             w = limits.munk * dot(x.p, x.p)
-            crossings = noted(
-                crossings, w - limits.munk_unstable_limit * unity, real(wp.static(number["munk_unstable"])), w
-            )
+            seen = noted(seen, w - limits.munk_unstable_limit * one, real(wp.static(number["munk_unstable"])), w)
         if wp.static("energy" in rows):
             g = greatest(growth, zero)
-            crossings = noted(crossings, g * g - limits.energy_limit * unity, real(wp.static(number["energy"])), g * g)
-        return crossings
+            seen = noted(seen, g * g - limits.energy_limit * one, real(wp.static(number["energy"])), g * g)
+        return seen
 
     return look_at

@@ -1,4 +1,7 @@
-"""Steps that are made again: in equal parts where a step has no solution, and in part where an event stops a member."""
+"""Steps that are made again: in equal parts, where a step has no solution; up to an event, where it stops a member.
+
+Both are rare, so their functions are not inlined: the loop over steps keeps its registers.
+"""
 
 import functools
 from typing import Any, NamedTuple
@@ -13,12 +16,12 @@ from lgvi_kernels.lanes.arithmetic import add, any_positive, mul, neg, ones, pos
 from lgvi_kernels.lanes.packet import failures, turned_too_far
 from lgvi_kernels.lanes.sums import at_rest, choose, settled
 
-# A step without a solution is divided into at most so many.
+# A step without a solution is divided into at most so many parts.
 MOST_PARTS = 1024
 
 
 class Retry(NamedTuple):
-    """retried: a step by more and more parts, where it had no solution; arrival: the part of a step that ends at an event."""
+    """retried: makes a step without solution in more and more parts; arrival: makes a part of a step, up to an event."""
 
     retried: Any
     arrival: Any
@@ -26,7 +29,7 @@ class Retry(NamedTuple):
 
 @functools.cache
 def make_retry(spec):
-    """What makes a step again; functions that this Spec does not ask for are called nowhere."""
+    """The functions that make a step again; those that this Spec does not ask for are called nowhere."""
     types, stepping, real, width = make_types(spec), make_stepping(spec), spec.real, spec.width
     Lane, State, Alarm, Constants = types.Lane, types.State, types.Alarm, types.Constants
     method, watch, at_step, opened = stepping.method, stepping.watch, stepping.at_step, stepping.opened
@@ -39,9 +42,10 @@ def make_retry(spec):
     @wp.func(inline=False)
     def in_parts(x: State, c: Constants, k: int, h: wp.float64, part: real, parts: int, stage_h: wp.array(dtype=real),
                  lead_h: wp.array(dtype=real), opening: real, among: Lane):  # fmt: skip
-        """So many equal parts of step k, `part` of its length each, from and to a state that the lead has opened for h.
+        """Make `parts` equal parts of step k, each `part` of its length.
 
-        among: the lanes that are looked at; what a packet that chooses its steps does depends on them alone.
+        The state comes and goes with the lead of a whole step: here that lead is undone, and the lead of a part made.
+        among: the lanes that count; a packet that chooses its steps asks for the tolerance in them alone.
         """
         stages = lead_h.shape[0] - 1
         x.alarm = Alarm()
@@ -74,30 +78,35 @@ def make_retry(spec):
     def retried(good: State, x: State, code: Lane, c: Constants, k: int, h: wp.float64, stage_h: wp.array(dtype=real),
                 lead_h: wp.array(dtype=real), opening: real):  # fmt: skip
         """(state, code) after step k: where it had no solution, by 2, 4, ... equal parts, as soon as those have one."""
-        unity = ones(code)
-        zero = unity - unity
-        remaining = code + zero
+        one = ones(code)
+        zero = one - one
+        # A sum, since a plain assignment would be a second name of `code`.
+        codes = code + zero
         pending = zero
+        # 1, 2, 4: a step too large, (24) or the forces not converged: equations that are easier for a shorter step.
         for j in range(wp.static(width)):
             if code[j] == real(1.0) or code[j] == real(2.0) or code[j] == real(4.0):
                 pending[j] = real(1.0)
         parts = int(1)
         while parts < wp.static(MOST_PARTS) and any_positive(pending):
             parts = 2 * parts
+            # Lanes that need no part wait at rest.
             y = choose(pending, good, at_rest(good))
             y = in_parts(y, c, k, h, real(1.0) / real(parts), parts, stage_h, lead_h, opening, pending)
             if wp.static(watched):
                 y = to_event(y, c, real(h))
-            wrong = failures(y, unity - pending)
-            solved = unity - unity
+            new_codes = failures(y, one - pending)
+            solved = one - one
             for j in range(wp.static(width)):
-                # An event is no failure, but what becomes of the lane.
-                if pending[j] > real(0.0) and (wrong[j] <= real(0.0) or wrong[j] >= real(wp.static(float(FIRST)))):
+                # An event is no failure: the step is made, and the lane's code is the event's.
+                if pending[j] > real(0.0) and (
+                    new_codes[j] <= real(0.0) or new_codes[j] >= real(wp.static(float(FIRST)))
+                ):
                     solved[j] = real(1.0)
                     pending[j] = real(0.0)
-                    remaining[j] = wrong[j]
+                    codes[j] = new_codes[j]
             x = choose(solved, y, x)
-        return x, remaining
+        return x, codes
 
     arrival = step
     if watched:

@@ -17,7 +17,7 @@ SAMPLE_FIELDS = {"position": 3, "attitude": 9, "velocity": 3, "angular_velocity"
 
 
 def make_rows(Lane, State, paced, compensated):
-    """(read, write, back_up) of the state and of what laws remember. paced: a packet chooses its steps."""
+    """(read, write, back_up) of the state and of the laws' memory. paced: a packet chooses its steps."""
 
     @wp.func
     def read(state: wp.array2d(dtype=Lane), i: int):
@@ -66,7 +66,7 @@ def make_rows(Lane, State, paced, compensated):
 
     @wp.func
     def back_up(memory: wp.array2d(dtype=Lane), i: int, source: int, target: int):
-        """Copy the rows that laws remember."""
+        """Copy one half of the memory to the other: half 0 is in use, half 1 keeps that of the start of a chunk."""
         rows = memory.shape[1] // 2
         for j in range(rows):
             memory[i, target * rows + j] = memory[i, source * rows + j]
@@ -75,9 +75,9 @@ def make_rows(Lane, State, paced, compensated):
 
 
 def make_sample(Lane, fields, compensated, method, drifts, still):
-    """What writes one sample.
+    """The function that writes one sample.
 
-    method: its functions (see Step); drifts: the water moves; still: a frozen lane keeps the water that it was stopped in.
+    method: see Step; drifts: the water moves; still: a frozen lane keeps the velocity of the water in which it stopped.
     """
     momentum, velocities, water_velocity = method.momentum, method.velocities, method.water_velocity
 

@@ -1,4 +1,4 @@
-"""What decides the code of a kernel, and the types that its functions share."""
+"""Spec, which decides the code of a kernel, and the types that the kernel's functions share."""
 
 import functools
 from typing import Any, NamedTuple
@@ -17,19 +17,36 @@ CHUNK = 128
 
 
 class Spec(NamedTuple):
-    """Everything that decides what code a kernel holds.
+    """Everything that decides the code of a kernel, and nothing else: it is the key by which kernels are cached.
 
-    maps: the sub-maps after the leading one, as (letter, coefficient); lead: the sub-map that opens a step and merges with
-    the end of the step before, or None; laws: modules of laws, drag by its exact flow first if it is there; events: modules
-    of events; drag: the parts of drag along the axes (by its exact flow, or as rates), or none; mass: shape of M
-    ("isotropic", "diagonal", "full"); parts: what the inertia holds besides (see inertia_struct); coupling: which of U12,
-    U13, U23 and of the three pitches some member has; flow: "none", "steady" (uniform, the same for ever), "uniform",
-    "varying"; timed: whether a law looks at the time; averages: alpha and beta of (15), (16), or None for conservative
-    maps; composed: more than one stage a step, or one, whose constants then are made once for all steps; paired: a stage is
-    two halves, each with a length of its own; gauss: numbers of a collocation method, or none; lead_time: the part of a step
-    that the lead drifts for; explicit: an explicit method, which has no maps; compensated: sums of two float32 (see sums).
-    looks: rows of warnings (see monitor); energy: whether its growth is a failure; backward: whether drag is looked at for
-    stages that go backward; substep: whether a step that has no solution is divided.
+    Two scenes with equal Specs share a compiled kernel, so numbers that may differ between them are arguments, not here.
+
+    width, real: lanes of a packet, and the type of its numbers.
+    maps: the sub-maps after the leading one, as (letter, coefficient).
+    lead: the sub-map that opens a step and merges with the end of the step before, or None.
+    laws: modules of laws; drag along the axes comes first if a scene has it.
+    numbers: the declared numbers of each law, then of each event (see params_of).
+    mass: shape of M, "isotropic", "diagonal" or "full".
+    solver, iterations, adaptive, checked: of equation (24) (see make_solve); unchecked kernels have no alarms at all.
+    fields: the sampled quantities.
+    events: modules of events.
+    drag: the parts of drag along the axes (by its exact flow, or as rates) that some member has, or none.
+    parts: optional fields of the inertia (see inertia_struct).
+    coupling: which of U12, U13, U23 and of the three pitches some member has.
+    flow: "none", "steady" (uniform, the same for ever), "uniform" or "varying".
+    timed: whether a law looks at the time.
+    memory: whether a law or the method remembers numbers from step to step.
+    averages: alpha and beta of (15), (16), or None for conservative maps.
+    composed: several stages a step; False for one, whose constants are made once for all steps.
+    paired: a stage is two halves, each with a length of its own.
+    gauss: numbers of a collocation method, or none.
+    lead_time: the part of a step for which the lead drifts.
+    explicit: an explicit method, which has no maps.
+    compensated: sums of two float32 (see sums).
+    looks: rows of warnings (see monitor).
+    energy: whether its growth is a failure.
+    backward: whether drag is checked for stages that go backward.
+    substep: whether a step that has no solution is divided.
     """
 
     width: int
@@ -37,6 +54,7 @@ class Spec(NamedTuple):
     maps: tuple
     lead: tuple | None
     laws: tuple
+    numbers: tuple
     mass: str
     solver: str
     iterations: int
@@ -74,12 +92,12 @@ class Spec(NamedTuple):
 
     @property
     def turned(self) -> bool:
-        """Whether turns about the body's axes are made, whose angle has a limit."""
+        """Whether the method turns about the body's axes: the angle of these turns has a limit."""
         return any(letter[0] == "R" for letter, _ in self.maps)
 
     @property
     def paced(self) -> bool:
-        """Whether a packet chooses its steps: it goes on with them in the next launch, and waits for no frozen lane."""
+        """Whether a packet chooses its steps: it keeps its step from launch to launch, and no frozen lane decides it."""
         return self.explicit is not None and self.explicit.adaptive
 
     @property
@@ -99,7 +117,7 @@ class Spec(NamedTuple):
 
     @property
     def still(self) -> bool:
-        """Whether the water that a stopped member was in is kept: it goes on changing."""
+        """Whether the velocity of the water where a member stopped is kept: later the water there has another one."""
         return self.watched and self.flow in ("uniform", "varying")
 
     @property
@@ -109,7 +127,7 @@ class Spec(NamedTuple):
 
     @property
     def sample_fields(self) -> dict[str, int]:
-        """Field -> numbers per sample, in the order they are written; a compensated position is b and then its low part."""
+        """Field -> numbers per sample, in the order in which they are written; a compensated position is b, then b_low."""
         numbers = {name: SAMPLE_FIELDS[name] for name in self.fields}
         if self.compensated and "position" in numbers:
             numbers["position"] = 6
@@ -117,9 +135,9 @@ class Spec(NamedTuple):
 
 
 class Types(NamedTuple):
-    """The types of a kernel: lanes, what a packet carries (see state), and its arguments.
+    """The types of a kernel: lanes, the structs of lanes/state.py, and the kernel's arguments.
 
-    Constants: what is the same in all steps of a packet. DragFlow: the constants of drag by its exact flow.
+    Constants: all that is the same in every step of a packet. DragFlow: the constants of drag by its exact flow.
     """
 
     Lane: Any
@@ -142,7 +160,8 @@ def make_types(spec):
     width, real = spec.width, spec.real
     Lane = lane(width, real)
     Inertia = inertia_struct(width, real, spec.mass, spec.parts)
-    Params, Events = params_of(spec.laws, width, real), params_of(spec.events, width, real)
+    Params = params_of(spec.laws, spec.numbers, width, real)
+    Events = params_of(spec.events, spec.numbers[len(spec.laws) :], width, real)
     DragFlow = drag.flow_struct(width, real)
     Constants = struct(
         "Constants",

@@ -17,8 +17,8 @@ from lgvi_kernels.laws import drag_directions
 class Stepping(NamedTuple):
     """Functions of a kernel's steps.
 
-    method: see Step; watch: see Watch, None without events. at_step: (x, k, h) -> x that knows the number and the time of
-    step k; opened: (x, c, length) -> x with the lead made; one_step, stepped: one step, and so many.
+    method: see Step; watch: see Watch, None without events. at_step: (x, k, h) -> x with the number and the time of step k;
+    opened: (x, c, length) -> x moved by the lead; one_step, stepped: one step, and a number of steps.
     """
 
     method: Step
@@ -40,6 +40,7 @@ def make_stepping(spec):
     composed, paired, compensated = spec.composed, spec.paired, spec.compensated
     backward, watched = spec.backward, spec.watched
     watch = make_watch(spec.events, types.View, "origin" in spec.parts, real) if watched else None
+    # step stands in for functions that this Spec does not ask for; it is not called in their place.
     to_event = watch.alarm if watched else step
     drag_back = step
     if backward:
@@ -48,7 +49,7 @@ def make_stepping(spec):
 
     @wp.func
     def at_step(x: State, k: int, h: wp.float64):
-        """The number of step k and the time after its lead, exact: never summed up."""
+        """The number of step k and the time after its lead: a product, since a sum over the steps would add up round-off."""
         if wp.static(timed):
             x.time = wp.float64(k) * h + wp.float64(wp.static(lead_time)) * h
             x.step = k
@@ -64,7 +65,7 @@ def make_stepping(spec):
     @wp.func
     def one_step(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, stage_h: wp.array(dtype=real),
                  lead_h: wp.array(dtype=real), first_h: real, opening: real):  # fmt: skip
-        """Step k, and what is looked at in each."""
+        """Step k, and the checks of each step."""
         x = at_step(x, k, h)
         if wp.static(composed):
             for g in range(lead_h.shape[0] - 1):
@@ -77,6 +78,7 @@ def make_stepping(spec):
         else:
             x = step(x, c, first_h)
             if wp.static(has_lead):
+                # The lead that ends this step and the one that opens the next, in one.
                 x = lead(x, c, opening + opening)
         if wp.static(compensated):
             x = settled(x)

@@ -1,7 +1,7 @@
-"""Looks at a packet now and then: its energy, and what its motion says against the step.
+"""Looks at a packet now and then: is its energy plausible, and is the step short enough for its motion.
 
-They are rare: no part of them is to be mixed with the loop over the steps, whose schedule and registers it would spoil (a
-fifth of the speed).
+Looks are rare, so their functions are not inlined: mixed with the loop over the steps they would change its schedule and its
+registers, which costs a fifth of the speed.
 """
 
 import functools
@@ -19,7 +19,7 @@ from lgvi_kernels.maps.compose import superpose
 
 
 class Watching(NamedTuple):
-    """begin: the look at the start; note: that after k steps; energy_alarm: after k steps, of lanes whose energy explodes."""
+    """begin: looks at the start; note: looks after k steps; energy_alarm: the alarm, after k steps, where energy explodes."""
 
     begin: Any
     note: Any
@@ -45,7 +45,7 @@ def make_watching(spec):
 
     @wp.func
     def created(y: State, c: Constants, monitor: Monitor, t: real):
-        """Energy that came from nowhere since the start, over what there was to exchange."""
+        """Energy created since the start, over the energy that could be exchanged (see monitor.make_energy)."""
         e = monitor.energy
         return growth(y, c, t, e[c.packet, 0], e[c.packet, 1], e[c.packet, 2])
 
@@ -63,7 +63,8 @@ def make_watching(spec):
 
     @wp.func
     def warn(y: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, frozen: Lane):
-        """Note which rows are crossed after k steps; of the most serious one, when it was first so, and its value."""
+        """Note the rows that are crossed after k steps; for the most serious one, the first such k and its value."""
+        # Any lane: without the check of energy no row reads it.
         g = frozen
         if wp.static(energetic):
             g = created(y, c, monitor, real(wp.float64(k) * h))
@@ -101,7 +102,7 @@ def make_watching(spec):
 
 
 def _looks(spec, method):
-    """(look_at, energies, supplies, growth) of monitor.py; the step in place of what a Spec does not ask for."""
+    """(look_at, energies, supplies, growth) of monitor.py; the step stands in for those that a Spec does not ask for."""
     width, real, laws = spec.width, spec.real, spec.laws
     types = make_types(spec)
     directions = bool(laws) and laws[0] is drag_directions

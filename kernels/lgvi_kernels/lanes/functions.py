@@ -1,4 +1,4 @@
-"""Elementary functions and normal random numbers in lanes, written like the operators of lanes.py.
+"""Elementary functions and normal random numbers in lanes, written like the operators of arithmetic.py.
 
 No function calls the C library, which would go lane by lane: arguments are reduced and series summed in Clang's vector
 types. The series are Taylor's, with as many terms as the reduced argument needs: one or two more than a minimax
@@ -84,9 +84,9 @@ def _vector(width, name, type_name, size):
     return f"typedef {type_name} {name}{attribute};"
 
 
-def _converted(width, what, name):
+def _converted(width, vector, name):
     """C++ of a vector's numbers in another type."""
-    return f"({name})({what})" if width == 1 else f"__builtin_convertvector({what}, {name})"
+    return f"({name})({vector})" if width == 1 else f"__builtin_convertvector({vector}, {name})"
 
 
 def _types(width, real, arguments):
@@ -125,7 +125,7 @@ def _powers(real, x, limits):
     """C++ that declares N, R, Q with x = N ln 2 + R and Q = (e^R - 1) / R, |R| <= ln 2 / 2, x kept within limits."""
     f = FORMATS[real]
     low, high = (f"(V() + (S){limit!r})" for limit in f[limits])
-    # Not a number is neither below nor above, so it stays what it is.
+    # NaN is neither below nor above a limit, so it stays NaN.
     kept = f"V X = {x}; X = X < {low} ? {low} : X; X = X > {high} ? {high} : X;"
     Q = _series("R", [1.0 / _factorial(k + 1) for k in range(f["exponential"])])
     return f"{kept} {_rounded(real, 'X', 1.0 / LN2)} V R = {_less('X', 'T', f['ln2'])}; V Q = {Q};"
@@ -182,6 +182,7 @@ def _logarithm(real, excess="M - (S)1"):
     f = FORMATS[real]
     high, low = (f"(S){part!r}" for part in f["ln2"])
     artanh = _series("G", [2.0 / (2 * k + 1) for k in range(1, f["logarithm"] + 1)])
+    # E is K as a real: K is put into the last bits of the rounder, as _rounded reads them (see _scaled for why).
     return (
         f"V F = ({excess}) / (M + (S)1); V G = F * F;"
         f"I J = K + {f['rounder_bits']}; {_bits('V', 'E', 'J')} E -= (S){f['rounder']!r};"
@@ -190,10 +191,12 @@ def _logarithm(real, excess="M - (S)1"):
 
 
 def _positive_logarithm(real):
-    # Every comparison with what is not a number fails.
+    # Every comparison with NaN fails: R / R, which is 0 / 0, marks a <= 0 and NaN alike.
     return f"{_split(real, 'A')} {_logarithm(real)} V R = V(); R = A > (S)0 ? L : R / R;"
 
 
+# Philox makes numbers from a counter and a key, and has no state: a random number depends on the seed, the member, the step
+# and the channel alone. So threads, packets and steps that are made again do not change it.
 # Philox4x32: the multipliers of words 0 and 2, and what is added to the key from round to round.
 MULTIPLIERS = (0xD2511F53, 0xCD9E8D57)
 KEY_STEPS = (0x9E3779B9, 0xBB67AE85)
@@ -201,7 +204,7 @@ ROUNDS = 10
 
 
 def _philox(width):
-    """C++ of Philox4x32-10, Salmon et al. 2011: the words C0..C3, each in a 64-bit lane whose upper half is zero."""
+    """C++ of Philox4x32-10, Salmon et al. 2011: the words C0..C3, each in a 64-bit lane, which holds a product of two."""
     types = f"{_vector(width, 'W', 'wp::uint64', 8)} {_vector(width, 'H', 'wp::uint32', 4)}"
     counter = (
         f"H h; memcpy(&h, &member, sizeof(H)); W C0 = {_converted(width, 'h', 'W')};"
@@ -267,7 +270,7 @@ for _real in REALS:
 
         @wp.func_native(_native_here("ABC", "A < B ? B : (A > C ? C : A)"))
         def clamp(a: _L, b: _L, c: _L) -> _L:
-            """a kept between b and c; not a number stays that."""
+            """a kept between b and c; NaN stays NaN."""
             ...
 
         @wp.func_native(_native_here("A", _root(_width).format("A")))
@@ -302,7 +305,7 @@ for _real in REALS:
 
         @wp.func_native(_normals(_width, _real))
         def normals(like: _L, member: _I, step: int, channel: int, seed0: int, seed1: int) -> _4L:
-            """Four independent standard normals in each lane, side by side, keyed by all that is asked for.
+            """Four independent standard normals in each lane, side by side: a function of the arguments alone.
 
             Philox4x32-10 with counter (member, step, channel, 0) and key (seed0, seed1), then Box & Muller's map.
             """
@@ -312,7 +315,7 @@ for _real in REALS:
             f"wp::vec_t<{_width}, wp::{_real.__name__}> r; memcpy(&r, &a[k * {_width}], sizeof(r)); return r;"
         )
         def quarter(a: _4L, k: int) -> _L:
-            """The lane number k, 0 to 3, of four side by side."""
+            """Lane k, 0 to 3, of the four lanes side by side in a."""
             ...
 
         @wp.func

@@ -11,7 +11,7 @@ from lgvi_kernels.lanes.state import matrix3_struct, struct
 
 @functools.cache
 def factor_struct(width, real):
-    """What solving with a 6x6 matrix [[A, B], [C, D]] needs: A^-1, A^-1 B, C and (D - C A^-1 B)^-1."""
+    """A 6x6 matrix [[A, B], [C, D]], ready for solve6: A^-1, A^-1 B, C and (D - C A^-1 B)^-1."""
     Matrix3 = matrix3_struct(width, real)
     return struct("Factor", inverse=Matrix3, upper=Matrix3, lower=Matrix3, schur=Matrix3)
 
@@ -96,7 +96,7 @@ def inverse(m: Any):
 
 @wp.func
 def factorise(f: Any, a: Any, b: Any, c: Any, d: Any):
-    """Block elimination of [[a, b], [c, d]]. The blocks need no pivots: inertia plus damping is positive."""
+    """Block elimination of [[a, b], [c, d]], without pivots: inertia plus damping is positive, so its blocks are regular."""
     f.inverse = inverse(a)
     f.upper = product(f.inverse, b)
     f.lower = c

@@ -1,4 +1,4 @@
-"""What is done to a whole packet between steps: renormalise, choose between two states lane by lane, find failures."""
+"""Functions of a whole packet between steps: renormalise, choose between two states lane by lane, find failures."""
 
 from typing import Any
 
@@ -29,7 +29,7 @@ def renormalise(x: Any, h: Any):
 
 @wp.func
 def choose_vectors(test: Any, yes: Any, no: Any):
-    """`yes` in the lanes where test > 0: all of the state but the alarm and low parts."""
+    """The vectors of `yes` in the lanes where test > 0; all else, alarm and low parts too, is that of `no`."""
     no.R0 = positive(test, yes.R0, no.R0)
     no.R1 = positive(test, yes.R1, no.R1)
     no.R2 = positive(test, yes.R2, no.R2)
@@ -55,6 +55,7 @@ def vectors_at_rest(x: Any):
 @wp.func
 def probe(x: Any):
     """Zero in the lanes that are finite, not a number in the others."""
+    # The sum is infinite or NaN where any of its terms is; s - s is then NaN.
     s = x.R0 + x.R1 + x.R2 + x.b + x.p + x.pi
     s = s - s
     return s.x + s.y + s.z
@@ -66,20 +67,21 @@ def turned_too_far(alarm: Any):
 
     Beyond, the series of the tangent has no digit of the angle, and shears by it multiply rounding errors by its square.
     """
-    unity = ones(alarm.size)
-    over = alarm.size - unity
-    alarm.code = positive(over, unity.dtype(wp.static(float(STEP_TOO_LARGE))) * unity, alarm.code)
-    alarm.size = positive(over, alarm.size, unity - unity)
+    one = ones(alarm.size)
+    over = alarm.size - one
+    alarm.code = positive(over, one.dtype(wp.static(float(STEP_TOO_LARGE))) * one, alarm.code)
+    alarm.size = positive(over, alarm.size, one - one)
     return alarm
 
 
 @wp.func
 def failures(x: Any, frozen: Any):
     """The failure code of each lane that is not frozen yet, 0 where it is well."""
-    unity = ones(frozen)
-    zero = unity - unity
-    well = unity - probe(x)
-    code = positive(x.alarm.code, x.alarm.code, positive(well, zero, unity.dtype(wp.static(float(NON_FINITE))) * unity))
+    one = ones(frozen)
+    zero = one - one
+    # 1 where all is finite; where it is NaN, positive() takes its last argument.
+    well = one - probe(x)
+    code = positive(x.alarm.code, x.alarm.code, positive(well, zero, one.dtype(wp.static(float(NON_FINITE))) * one))
     return positive(frozen, zero, code)
 
 

@@ -18,6 +18,7 @@ def make_peak(width, real):
 
     @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": CPU_FLAGS})
     def peak(x: wp.array(dtype=Lane), loops: int):
+        # A local for each chain: an array of chains would lie in memory, not in registers.
         m = x[0]
         c = x[1]
         a0 = m * x[2]

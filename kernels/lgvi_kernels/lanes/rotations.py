@@ -33,7 +33,7 @@ def transpose_apply(F: Any, v: Any):
 
 @wp.func
 def rodrigues(F: Any, v: Any, alpha: Any, beta: Any):
-    """F = I + alpha hat(v) + beta hat(v)^2."""
+    """F = I + alpha hat(v) + beta hat(v)^2, where hat(v)^2 = v v^T - (v.v) I."""
     m = beta * v
     w = alpha * v
     xx = v.x * m.x

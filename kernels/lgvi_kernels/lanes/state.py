@@ -1,4 +1,4 @@
-"""What a packet carries through the steps: the state, the vehicle's constants, and what a law may look at.
+"""What a packet carries through the steps: the state, the vehicle's constants, and the View that laws see.
 
 Momenta and inertia are kept divided by max J (`scale`): so the quartic of equation (24) stays within float32, and only
 forces, which are not scaled, are multiplied by 1 / max J.
@@ -23,14 +23,21 @@ def struct(name, **fields):
 
 @functools.cache
 def alarm_struct(width, real):
-    """Per lane: the first failure seen (0: none) and the square of the value that crossed its limit."""
+    """Per lane: the status of the first failure (0: none) and the square of the value that crossed its limit.
+
+    Squares, here and wherever a value is compared with a limit: a sum of squares needs no root, and the host takes the root
+    of the few that it reports.
+    """
     Lane = lane(width, real)
     return struct("Alarm", code=Lane, size=Lane)
 
 
 @functools.cache
 def pace_struct(real):
-    """The next step [s], the error of the last accepted one over the tolerance (both 0 at the start), steps made and tried."""
+    """stride: the next step [s]; before: the last accepted step's error over the tolerance (both are 0 at the start).
+
+    made, tried: how many steps were accepted and attempted; reals, since they are stored in lanes beside the state.
+    """
     return struct("Pace", stride=real, before=real, made=real, tried=real)
 
 
@@ -40,7 +47,7 @@ def state_struct(width, real, compensated=False):
 
     time [s] and step are those of the sub-map in turn; they are kept only where a law looks at them.
     pace: of a packet that chooses its steps (see pace_struct).
-    compensated: each vector has a low part, what it has no digits for (see sums).
+    compensated: each vector has a low part, for the digits that it cannot hold (see sums).
     """
     Lane3, Alarm = lane3(width, real), alarm_struct(width, real)
     rows = {"R0": Lane3, "R1": Lane3, "R2": Lane3}
@@ -73,7 +80,7 @@ def damping_struct(width, real):
 
 @functools.cache
 def series_struct(width, real):
-    """Coefficients of N, H; N^2, N H, H^2; N^3, N^2 H, N H^2, H^3."""
+    """c1 to c9, the coefficients of N, H; N^2, N H, H^2; N^3, N^2 H, N H^2, H^3 (see maps/two_part.py)."""
     return struct("Series", **{f"c{i}": lane(width, real) for i in range(1, 10)})
 
 
@@ -86,7 +93,7 @@ def flow_struct(width, real):
 
 @functools.cache
 def view_struct(width, real):
-    """What a law may look at.
+    """What a law may read: the only argument that grows when laws need more, so their signatures stay.
 
     north, east, down: R^T e1, R^T e2, R^T e3, the inertial axes in body axes; b [m], inertial.
     nu [m/s], Om [rad/s]: velocities relative to the water, body axes; only damping laws see them.
@@ -107,7 +114,7 @@ def inertia_struct(width, real, mass, parts=()):
     The anisotropy, a diagonal or a symmetric matrix, is absent for M = m I. Apart from the mean it keeps its own
     precision: the Munk moment p x M^-1 p sees the anisotropy alone, which may be a small part of M^-1.
 
-    parts, each only where a scene or method needs it:
+    parts, each present only where a scene or a method needs it:
     "turns": 1 / (2 J), for the turns about the axes;
     "rates": 1 / J, for methods that ask for rates many times a step;
     "x": coupling of the turns, the pitches k and the hops U12, U13, U23 (coupled_inertia);

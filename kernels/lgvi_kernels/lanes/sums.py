@@ -1,8 +1,11 @@
-"""What is added to a state, by the type of the state: plainly, or with compensation, where each number is a sum of two.
+"""How a change is added to a state: by a plain sum, or by a compensated one, where each number is a sum v + v_low of two.
 
-Compensated (W. Kahan 1965), v + v_low: a change is added to what v had no digits for, v takes of it what it can hold, and
-v_low keeps the rest, exactly. The round-off of a step is then that of its changes, which are small, not that of the state.
-b alone is settled once a step: drifts add to b_low until then. A kernel without compensation has no trace of all this.
+Compensated (W. Kahan 1965): the change is added to v_low, v takes the digits of the result that it can hold, and v_low keeps
+the rest, exactly. The round-off of a step is then that of its changes, which are small, not that of the state. Only b is
+settled once a step, because many sub-maps move it: until then they add to b_low.
+
+Each function here has an overload for each type of state. Sub-maps call the same names for both, so a kernel without
+compensation has no trace of it.
 """
 
 from typing import Any
@@ -18,6 +21,7 @@ from lgvi_kernels.lanes.state import state_struct
 @wp.func
 def carried(v: Any, low: Any, d: Any):
     """v + low + d as (v, low): exact but for the sum low + d where |low + d| < |v|, else to the round-off of d."""
+    # t - v is what v has taken of y. By algebra the rest is 0: the compiler must not reorder these sums (see flags.py).
     y = low + d
     t = v + y
     return t, y - (t - v)
@@ -63,7 +67,7 @@ for _width in WIDTHS:
 
         @wp.func
         def place(x: _State):
-            """b, as laws see it."""
+            """The position that laws see: b, or b + b_low."""
             return x.b
 
         @wp.func
@@ -74,7 +78,7 @@ for _width in WIDTHS:
 
         @wp.func
         def moved_from(x: _State, start: _State, d: _L3):
-            """b <- b of `start` + d."""
+            """b <- b of `start` + d: two halves of a move are so rounded as one."""
             x.b = start.b + d
             return x
 
@@ -102,7 +106,7 @@ for _width in WIDTHS:
 
         @wp.func
         def choose(test: _L, yes: _State, no: _State):
-            """`yes` in the lanes where test > 0: all of the state but the alarm."""
+            """The state `yes` in the lanes where test > 0, `no` in the others; the alarm is that of `no`."""
             return choose_vectors(test, yes, no)
 
         @wp.func
@@ -128,7 +132,7 @@ for _width in WIDTHS:
 
     @wp.func
     def settled(x: _State):
-        """b takes of b_low what it can hold."""
+        """b takes the digits of b_low that it can hold."""
         b = x.b + x.b_low
         x.b_low = x.b_low - (b - x.b)
         x.b = b
@@ -171,11 +175,11 @@ for _width in WIDTHS:
     @wp.func
     def at_rest(x: _State):
         x = vectors_at_rest(x)
-        none = x.b
-        x.R0_low = none
-        x.R1_low = none
-        x.R2_low = none
-        x.b_low = none
-        x.p_low = none
-        x.pi_low = none
+        zero = x.b
+        x.R0_low = zero
+        x.R1_low = zero
+        x.R2_low = zero
+        x.b_low = zero
+        x.p_low = zero
+        x.pi_low = zero
         return x

@@ -1,4 +1,4 @@
-"""What laws do with a View: turn vectors, read rows of their table, find velocities at a point, sum damping."""
+"""What laws do with a View: turn vectors, read their table and memory, find velocities at a point, sum damping."""
 
 from typing import Any
 
@@ -48,7 +48,7 @@ def remembered(view: Any, row: int):
 
 @wp.func
 def remember(view: Any, row: int, value: Any):
-    """Keep a number for later, in this step or a following one."""
+    """Write a number that the law remembers, for later in this step or for the next ones."""
     set_element(view.memory, view.packet, row, 0, value)
 
 
@@ -64,6 +64,7 @@ def ramp(view: Any, row: int, x: Any):
 @wp.func
 def table1(view: Any, first: int, count: int, x: Any):
     """A table's value at x: row `first` holds the first value, then 3 rows a knot: knot, 1 / distance, difference."""
+    # A sum over all segments: nothing to search, and each lane may be in a segment of its own.
     value = row1(view, first)
     for i in range(count):
         at = first + 1 + 3 * i
@@ -73,7 +74,7 @@ def table1(view: Any, first: int, count: int, x: Any):
 
 @wp.func
 def table3(view: Any, first: int, count: int, x: Any):
-    """The same for vectors: 3 rows for the first value, then 5 rows a knot: knot, 1 / distance, 3 differences."""
+    """table1 for vectors: 3 rows for the first value, then 5 rows a knot: knot, 1 / distance, 3 differences."""
     value = row3(view, first)
     for i in range(count):
         at = first + 3 + 5 * i
@@ -94,7 +95,7 @@ def command(view: Any, first: int, count: int, limit: Any, t: Any):
 
 @wp.func
 def middle_of_half(view: Any):
-    """The time in the middle of this half of a kick, for laws that remember."""
+    """The time in the middle of this half of a kick, for laws that remember; view.t is the middle of the whole kick."""
     quarter = view.h.dtype(0.25) * view.h
     t = view.t - quarter
     if view.second > 0:
@@ -104,7 +105,7 @@ def middle_of_half(view: Any):
 
 @wp.func
 def add_outer(D: Any, force: Any, torque: Any, velocity: Any, rate: Any):
-    """D + (force; torque) (velocity; rate)^T: what acts along one wrench in proportion to one velocity."""
+    """D + (force; torque) (velocity; rate)^T: a wrench in proportion to one velocity, which the twist measures."""
     D.force_velocity = add_rows(D.force_velocity, force, velocity)
     D.force_rate = add_rows(D.force_rate, force, rate)
     D.torque_velocity = add_rows(D.torque_velocity, torque, velocity)

@@ -1,60 +1,17 @@
-"""The laws a scene may name, one file each: `params(width, real)`, the struct it reads, and one or more functions.
+"""The laws that a scene may name, one file each: the struct `params(width, real)`, and some functions.
 
-law(w, view, p): a force and torque from position, attitude and time, POTENTIAL if they follow from a potential,
-SEPARABLE if that is a sum of one of position, at most quadratic, and one of attitude;
-energy(u, view, p): u and that potential [J], by which energy is watched, with one of: supply(s, view, p), s and what it can
-give from here [J], where it has a least value; push(s, view, p), s and the size of a steady force [N];
-damping(D, view, p): a matrix D, from velocities as well, of the force and torque -D (nu; Om);
-steady_force(w, view, p): where the force of `law` never changes in inertial axes, what it is there;
-flow(f, view, p): how the water moves; evolve(view, view, p): what the law remembers, advanced by half a kick.
+law(w, view, p): force [N] and torque [N m] that depend on position, attitude and time;
+damping(D, view, p): the matrix D of a force and torque -D (nu; Om); D may depend on velocities as well;
+steady_force(w, view, p): the force of `law` in inertial axes, if it never changes there;
+energy(u, view, p): the potential [J] of `law`, for the check of energy, with one of two bounds of what it can give:
+    supply(s, view, p): the potential less its least value [J]; push(s, view, p): the size of a steady force [N];
+flow(f, view, p): velocity and slopes of the water;
+evolve(state, view, p): advances what the law remembers by half a kick, and returns its first argument.
+
+Each of them but the last takes the sum over other laws and returns it with its own part added: in this way laws fold into one
+function (see maps/compose.py). Constants of a file: POTENTIAL, `law` follows from a potential; SEPARABLE, that potential is a
+sum of one of position, at most quadratic, and one of attitude; FLOW, "steady", "uniform" or "varying" water (see Spec.flow);
+NOISE, the law draws random numbers.
+
+Without `params` the struct holds the numbers that the host's Term declares, as lanes and 3-vectors of lanes.
 """
-
-from lgvi_kernels.laws import (
-    control_fins,
-    cross_flow,
-    current,
-    current_harmonics,
-    current_profile,
-    drag,
-    drag_directions,
-    drag_matrix,
-    drag_matrix_turned,
-    fins,
-    gauss_markov_current,
-    lift,
-    restoring,
-    stratification,
-    tether,
-    thrusters,
-    thrusters_polynomial,
-    waves,
-    weight,
-    wrench,
-    wrench_noise,
-    wrench_schedule,
-)
-
-LAWS = {
-    "weight": weight,
-    "restoring": restoring,
-    "drag": drag,
-    "drag_directions": drag_directions,
-    "drag_matrix": drag_matrix,
-    "drag_matrix_turned": drag_matrix_turned,
-    "fins": fins,
-    "control_fins": control_fins,
-    "cross_flow": cross_flow,
-    "lift": lift,
-    "current": current,
-    "current_profile": current_profile,
-    "tether": tether,
-    "thrusters": thrusters,
-    "thrusters_polynomial": thrusters_polynomial,
-    "wrench": wrench,
-    "wrench_schedule": wrench_schedule,
-    "current_harmonics": current_harmonics,
-    "waves": waves,
-    "gauss_markov_current": gauss_markov_current,
-    "wrench_noise": wrench_noise,
-    "stratification": stratification,
-}

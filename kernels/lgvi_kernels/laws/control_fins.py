@@ -57,8 +57,8 @@ def evolve(state: Any, view: Any, p: Any):
         for i in range(p.count):
             angle = remembered(view, p.memory + i)
             change = commanded(view, p, i, t) - angle
-            most = half * row1(view, p.first + wp.static(ROWS) * i + wp.static(RATE))
-            remember(view, p.memory + i, angle + clamp(change, -most, most))
+            largest = half * row1(view, p.first + wp.static(ROWS) * i + wp.static(RATE))
+            remember(view, p.memory + i, angle + clamp(change, -largest, largest))
     return state
 
 

@@ -35,6 +35,7 @@ def damping(D: Any, view: Any, p: Any):
     # axis x a = b and axis x b = -a.
     a_by_station = dot(p.b, view.Om)
     b_by_station = -dot(p.a, view.Om)
+    # The loop sums three numbers, the moments of s over the stations: their outer products with twists follow once.
     S0 = ones(along_a) - ones(along_a)
     S1 = S0
     S2 = S0

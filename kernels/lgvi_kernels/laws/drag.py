@@ -1,7 +1,7 @@
 """Drag per axis, -(l + q|v|) v, by its exact flow E: v -> v e^-x / (1 + (h q|v|/I) (1 - e^-x)/x), x = h l / I.
 
 E is the solution of I v' = -(l + q|v|) v on one axis, exact at any h, and exact altogether where the axes of drag are
-principal axes of M and J. (Where they are not, the same drag acts as a damping matrix: terms/drag_matrix.py.)
+principal axes of M and J. (Where they are not, drag_directions.py takes its place.)
 """
 
 import functools
@@ -30,26 +30,26 @@ def flow_struct(width, real):
 
 @wp.func
 def decay3(x: Any):
-    """(1 - e^-x)/x on three axes."""
+    """(1 - e^-x)/x on each of three axes."""
     return vec3(decay(x.x), decay(x.y), decay(x.z))
 
 
 @wp.func
 def remaining(x: Any, s: Any):
     """e^-x from s = (1 - e^-x)/x; beyond x = 37, where only the round-off of the difference is left, 0."""
-    unity = ones(x)
-    return positive(x - unity.dtype(37.0) * unity, unity - unity, unity - x * s)
+    one = ones(x)
+    return positive(x - one.dtype(37.0) * one, one - one, one - x * s)
 
 
 @wp.func
 def remaining3(x: Any, s: Any):
-    """The same on three axes."""
+    """The same on each of three axes."""
     return vec3(remaining(x.x, s.x), remaining(x.y, s.y), remaining(x.z, s.z))
 
 
 @wp.func
 def size3(v: Any):
-    """|v| on three axes."""
+    """The sizes of three components."""
     return vec3(absolute(v.x), absolute(v.y), absolute(v.z))
 
 
@@ -78,14 +78,14 @@ def make_taken(linear, quadratic):
 
     @wp.func
     def taken(v: Any, gain: Any, loss: Any):
-        less = v.x.dtype(-1.0)
+        minus_one = v.x.dtype(-1.0)
         if wp.static(quadratic):
-            unity = vec3(ones(v.x), ones(v.x), ones(v.x))
+            one = vec3(ones(v.x), ones(v.x), ones(v.x))
             g = gain * size3(v)
             if wp.static(linear):
-                return less * (((g + loss) / (unity + g)) * v)
-            return less * ((g / (unity + g)) * v)
-        return less * (loss * v)
+                return minus_one * (((g + loss) / (one + g)) * v)
+            return minus_one * ((g / (one + g)) * v)
+        return minus_one * (loss * v)
 
     return taken
 
@@ -100,7 +100,7 @@ def make_E(parts, by_changes):
 
     @wp.func
     def prepare(e: Any, p: Any, h: Any):
-        """The constants of E for steps of h."""
+        """The constants of E for steps of h, made before the loop over steps: there it has no exponential."""
         e.h = h
         if wp.static(linear_force):
             x = h * p.linear_force
@@ -142,11 +142,11 @@ def make_E(parts, by_changes):
     @wp.func
     def slowed(v: Any, gain: Any):
         """v / (1 + gain |v|) per axis."""
-        unity = ones(v.x)
+        one = ones(v.x)
         return vec3(
-            v.x / (unity + gain.x * absolute(v.x)),
-            v.y / (unity + gain.y * absolute(v.y)),
-            v.z / (unity + gain.z * absolute(v.z)),
+            v.x / (one + gain.x * absolute(v.x)),
+            v.y / (one + gain.y * absolute(v.y)),
+            v.z / (one + gain.z * absolute(v.z)),
         )
 
     @wp.func

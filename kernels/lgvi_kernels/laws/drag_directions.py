@@ -18,14 +18,14 @@ from lgvi_kernels.law import absolute, add, cross, div, lane3, mul, ones, struct
 from lgvi_kernels.laws.drag import PARTS
 from lgvi_kernels.laws.drag import make_E as make_exact
 
-COLUMNS = tuple(f"{what}_{axis}" for axis in "uvwpqr" for what in ("velocity", "rate"))
+COLUMNS = tuple(f"{kind}_{axis}" for axis in "uvwpqr" for kind in ("velocity", "rate"))
 
 
 @functools.cache
 def params(width, real):
     """Params: as drag, with L l [1/s] and L q; turn and origin, from the kernel's frame to the user's; mass, 1 / L by max J.
 
-    velocity_u ... rate_r: what a unit change of the velocity along each axis does to all velocities.
+    velocity_u ... rate_r: the changes of nu and Om that go with a unit change of the velocity along one axis.
     """
     Lane3 = lane3(width, real)
     fields = {part: Lane3 for part in PARTS} | {name: Lane3 for name in COLUMNS}
@@ -39,13 +39,13 @@ def make_axis(component, linear, quadratic):
 
     @wp.func
     def changed(w: Any, decay: Any, gain: Any):
-        unity = ones(w)
-        s = w
+        one = ones(w)
+        slowed = w
         if wp.static(quadratic):
-            s = s / (unity + component(gain) * absolute(w))
+            slowed = slowed / (one + component(gain) * absolute(w))
         if wp.static(linear):
-            s = component(decay) * s
-        return s - w
+            slowed = component(decay) * slowed
+        return slowed - w
 
     return changed
 
@@ -77,6 +77,8 @@ def make_E(parts, velocities):
         nu_forces, Om_forces = velocities(c.inertia, x.p, x.pi)
         Om = apply(p.turn, Om_forces)
         nu = apply(p.turn, nu_forces) - cross(Om, p.origin)
+        # du to dr sum up each axis's changes: velocities follow at once, momenta once at the end.
+        # Written out, since each axis has fields of its own, which no loop can index.
         zero = ones(Om.x) - ones(Om.x)
         du = zero
         dv = zero

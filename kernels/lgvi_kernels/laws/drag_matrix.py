@@ -25,7 +25,7 @@ def add_three(m: Any, view: Any, row: int):
 
 @wp.func
 def add_columns(m: Any, view: Any, row: int, size: Any):
-    """The same with each column multiplied by a number of its own."""
+    """add_three, each column multiplied by its component of `size`."""
     m.row0 = m.row0 + size * row3(view, row)
     m.row1 = m.row1 + size * row3(view, row + 6)
     m.row2 = m.row2 + size * row3(view, row + 12)

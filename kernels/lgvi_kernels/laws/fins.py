@@ -25,7 +25,7 @@ from lgvi_kernels.law import (  # noqa: F401
 # Rows of one fin: the twists that measure the speed along its chord c and normal n (6 and 6, each also the wrench of a unit
 # force), then rho A / 2 times lift slope, drag coefficient and added drag coefficient; and as MATRICES say.
 ROWS = 51
-# Where in a fin's rows S = c c^T + n n^T (what drag multiplies) and W = n c^T - c n^T (what lift does) begin, by blocks:
+# Where in a fin's rows S = c c^T + n n^T (drag is d S) and W = n c^T - c n^T (lift is l W) begin, by blocks:
 # force by velocity, S's diagonal and 23, 31, 12 and W's 23, 31, 12; force by rate, S's and W's three rows; torque by rate,
 # as force by velocity. Torque by velocity follows, for S is symmetric and W antisymmetric.
 MATRICES = (15, 24, 42)
@@ -41,7 +41,7 @@ def params(width, real):
 
 @wp.func
 def speed_along(view: Any, row: int):
-    """The velocity that the twist in these rows measures."""
+    """The velocity that the twist in six rows measures."""
     return dot(row3(view, row), view.nu) + dot(row3(view, row + 3), view.Om)
 
 
@@ -50,6 +50,7 @@ def note_lift_and_drag(view: Any, at: int, along: Any, across: Any, noted: int):
     """Note l and d of a fin whose wrench is -l (along n - across c) - d (along c + across n), for add_fins.
 
     l = kl along across / V, d = kd V + kn across^2 / V; along and across are the flow along its chord c and normal n.
+    They are noted in rows of work, since add_fins goes through all fins once for each block.
     """
     speed = root(along * along + across * across)
     over = across / greatest(speed, view.h.dtype(wp.static(STILL)) * ones(speed))
@@ -108,6 +109,7 @@ def add_fins(D: Any, view: Any, first: int, stride: int, count: int, noted: int)
     D.force_rate.row0 = D.force_rate.row0 + (s0 + w0)
     D.force_rate.row1 = D.force_rate.row1 + (s1 + w1)
     D.force_rate.row2 = D.force_rate.row2 + (s2 + w2)
+    # The block torque by velocity is (S - W)^T of force by rate: S is symmetric, W antisymmetric.
     s0 = s0 - w0
     s1 = s1 - w1
     s2 = s2 - w2

@@ -29,7 +29,7 @@ NOISE = True
 def params(width, real):
     """Params: decay, e^(-h / tau), and spread, the standard deviation of one step's noise [m/s, inertial], of a step h.
 
-    member, seed0, seed1, channel: what the noise is keyed by, besides the step.
+    member, seed0, seed1, channel: with the step, the key of the random numbers.
     memory: the first of its rows: u while the kick lasts (3), u at its end (3), du/dt (3).
     """
     Lane, Lane3 = lane(width, real), lane3(width, real)
@@ -39,13 +39,13 @@ def params(width, real):
 
 @wp.func
 def recall(view: Any, row: int):
-    """Three rows of what it remembers."""
+    """Read three rows of the law's memory."""
     return vec3(remembered(view, row), remembered(view, row + 1), remembered(view, row + 2))
 
 
 @wp.func
 def keep(view: Any, row: int, v: Any):
-    """Write three rows of what it remembers."""
+    """Write three rows of the law's memory."""
     remember(view, row, v.x)
     remember(view, row + 1, v.y)
     remember(view, row + 2, v.z)
@@ -53,7 +53,10 @@ def keep(view: Any, row: int, v: Any):
 
 @wp.func
 def evolve(state: Any, view: Any, p: Any):
-    """u <- e^(-h/tau) u + spread xi, exact over a kick of h (Gillespie 1996): during the kick, the mean of old and new."""
+    """u <- e^(-h/tau) u + spread xi, exact over a kick of h (Gillespie 1996): during the kick, the mean of old and new.
+
+    All is drawn before the first half of a kick; the second half ends with the new u.
+    """
     at = p.memory
     if view.second > 0:
         keep(view, at, recall(view, at + 3))
@@ -70,7 +73,7 @@ def evolve(state: Any, view: Any, p: Any):
 
 @wp.func
 def flow(f: Any, view: Any, p: Any):
-    """u and du/dt as remembered: over a kick du/dt h is what u changes by."""
+    """u and du/dt from the memory; du/dt h is the change of u over a kick."""
     f.velocity = f.velocity + recall(view, p.memory)
     f.rate = f.rate + recall(view, p.memory + 6)
     return f

@@ -10,7 +10,7 @@ from lgvi_kernels.law import add, dot, mul, row3, struct  # noqa: F401
 
 @functools.cache
 def params(width, real):
-    """Params: first row of its table. Rows: the twist that measures the speed ahead (6), the matrix (36)."""
+    """Params: first row of its table. Rows: the twist that measures the speed ahead u (6), the matrix (36)."""
     return struct("Lift", first=wp.int32)
 
 

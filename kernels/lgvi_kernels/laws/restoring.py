@@ -38,11 +38,11 @@ def energy(u: Any, view: Any, p: Any):
 
 @wp.func
 def steady_force(w: Any, view: Any, p: Any):
-    """A moment only."""
+    """w: a moment alone has no force."""
     return w
 
 
 @wp.func
 def supply(s: Any, view: Any, p: Any):
-    """U and B |r|: down to where the vehicle hangs."""
+    """s plus U + B |r|: U is least, -B |r|, where the vehicle hangs upright."""
     return energy(s, view, p) + root(dot(p.moment, p.moment))

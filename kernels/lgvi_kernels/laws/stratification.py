@@ -30,11 +30,11 @@ def law(w: Any, view: Any, p: Any):
 @wp.func
 def energy(u: Any, view: Any, p: Any):
     """U = B gradient (d - d0)^2 / 2."""
-    deep = view.b.z + dot(view.down, p.center) - p.reference_depth
-    return u + view.t.dtype(0.5) * (p.stiffness * deep * deep)
+    deviation = view.b.z + dot(view.down, p.center) - p.reference_depth
+    return u + view.t.dtype(0.5) * (p.stiffness * deviation * deviation)
 
 
 @wp.func
 def supply(s: Any, view: Any, p: Any):
-    """All of U: down to the reference depth."""
+    """s plus U: its least value, 0, is at the reference depth."""
     return energy(s, view, p)

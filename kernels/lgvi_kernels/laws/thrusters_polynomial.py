@@ -1,4 +1,4 @@
-"""Thrusters whose thrust is a polynomial of the command, one ahead and one astern, with all else of thrusters."""
+"""Thrusters whose thrust is a polynomial of the command, one ahead and one astern; all else is as in thrusters.py."""
 
 import functools
 from typing import Any
@@ -11,9 +11,9 @@ from lgvi_kernels.laws.thrusters import ROWS, commanded, evolve  # noqa: F401
 
 @functools.cache
 def params(width, real):
-    """Params: as of thrusters; powers of the polynomials.
+    """Params: those of thrusters.py, and powers, the degree of the polynomials.
 
-    Rows: as of thrusters, then the polynomial ahead and the one astern, from the first power up.
+    Rows: those of thrusters.py, then the polynomial ahead and the one astern, from the first power up.
     """
     return struct(
         "ThrustersPolynomial",

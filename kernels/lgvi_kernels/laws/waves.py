@@ -39,7 +39,7 @@ def params(width, real):
 def flow(f: Any, view: Any, p: Any):
     """u = a omega e^(-k depth) (cos theta along the heading, -sin theta down), theta = k.x - omega t + phase; its slopes.
 
-    Above the still surface the decay is held at 1, and there is no slope by depth.
+    Above the still surface, where e^(-k depth) would grow without bound, it is held at 1 and has no slope by depth.
     """
     depth = view.b.z
     zero = ones(depth) - ones(depth)

@@ -38,12 +38,12 @@ def energy(u: Any, view: Any, p: Any):
 
 @wp.func
 def steady_force(w: Any, view: Any, p: Any):
-    """The same in inertial axes: net e3."""
+    """The force in inertial axes, which never changes: net e3."""
     w.force.z = w.force.z + p.net
     return w
 
 
 @wp.func
 def push(s: Any, view: Any, p: Any):
-    """A steady force: it gives energy for ever."""
+    """s plus |net|: the potential of a steady force has no least value, so its size bounds the energy that it gives."""
     return s + absolute(p.net)

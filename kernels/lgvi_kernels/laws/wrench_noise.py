@@ -14,11 +14,11 @@ NOISE = True
 def params(width, real):
     """Params: for each of the user's axes, the noise's force and torques, in the kernel's axes.
 
-    forceX, momentX, torqueX: the force [N s^1/2], its torque about the origin of the forces, the torque [N m s^1/2];
-    member, seed0, seed1, channel: what the noise is keyed by, besides the step; the torques have channel + 1.
+    forcex to forcez [N s^1/2]; momentx to momentz: its torque about the origin of the forces; torquex to torquez [N m s^1/2];
+    member, seed0, seed1, channel: with the step, the key of the random numbers; the torques' key has channel + 1.
     """
     Lane3 = lane3(width, real)
-    columns = {f"{row}{axis}": Lane3 for row in ("force", "moment", "torque") for axis in "xyz"}
+    columns = {f"{kind}{axis}": Lane3 for kind in ("force", "moment", "torque") for axis in "xyz"}
     key = {"member": int_lane(width), "seed0": wp.int32, "seed1": wp.int32, "channel": wp.int32}
     return struct("WrenchNoise", **columns, **key)
 
@@ -26,10 +26,10 @@ def params(width, real):
 @wp.func
 def law(w: Any, view: Any, p: Any):
     """S xi / sqrt(h): held over the kick, so that the impulse's variance is S^2 h."""
-    unity = ones(view.b.x)
-    size = unity / root(view.h * unity)
-    f = size * normals3(unity, p.member, view.step, p.channel, p.seed0, p.seed1)
-    m = size * normals3(unity, p.member, view.step, p.channel + 1, p.seed0, p.seed1)
+    one = ones(view.b.x)
+    size = one / root(view.h * one)
+    f = size * normals3(one, p.member, view.step, p.channel, p.seed0, p.seed1)
+    m = size * normals3(one, p.member, view.step, p.channel + 1, p.seed0, p.seed1)
     w.force = w.force + (f.x * p.forcex + f.y * p.forcey + f.z * p.forcez)
     w.torque = w.torque + (f.x * p.momentx + f.y * p.momenty + f.z * p.momentz)
     w.torque = w.torque + (m.x * p.torquex + m.y * p.torquey + m.z * p.torquez)

@@ -16,7 +16,7 @@ def params(width, real):
 
 @wp.func
 def law(w: Any, view: Any, p: Any):
-    """phi(t), tau(t)."""
+    """phi(t), tau(t): the tables' values at the view's time."""
     t = view.t * ones(view.b.x)
     w.force = w.force + table3(view, p.first, p.count, t)
     w.torque = w.torque + table3(view, p.first + 3 + 5 * p.count, p.count, t)

@@ -1,1 +1,1 @@
-"""What a method is made of: the maps that advance a packet, and the equations that they solve."""
+"""The maps that methods are made of, each advancing a packet, and the solvers of their equations."""

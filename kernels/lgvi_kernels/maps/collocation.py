@@ -25,7 +25,7 @@ from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
 from lgvi_kernels.maps.solve import NOT_CONVERGED
 from lgvi_kernels.maps.submaps import look, rotate
 
-# Numbers of a slope: as those of the state.
+# Numbers of a slope: one for each number of the state.
 SLOPE_FIELDS = 18
 # A fixed-point iteration that has not settled after so many rounds will not.
 MOST_ITERATIONS = 60
@@ -45,7 +45,7 @@ def slope3(c: Any, stage: int, offset: int):
 
 @wp.func
 def set_slope3(c: Any, stage: int, offset: int, v: Any):
-    """Write them."""
+    """Write three numbers of K_stage."""
     row = stage * wp.static(SLOPE_FIELDS)
     set_element(c.memory, c.packet, row, offset, v.x)
     set_element(c.memory, c.packet, row, offset + 1, v.y)
@@ -83,7 +83,7 @@ def make_G(gauss, View, Wrench, law, velocities, iterations, adaptive, checked, 
 
     @wp.func
     def extrapolate(c: Any, h: Any):
-        """K of this step from the last one's, through the rows behind them."""
+        """K of this step from the last one's. Each is a sum over all old ones, so the new ones wait in the rows behind."""
         weights = wp.static(Ahead)
         for i in range(wp.static(s)):
             for j in range(wp.static(SLOPE_FIELDS)):

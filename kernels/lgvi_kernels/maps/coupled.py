@@ -26,7 +26,7 @@ from lgvi_kernels.lanes.rotations import rodrigues, solve3
 from lgvi_kernels.lanes.sums import moved, turned, twisted
 from lgvi_kernels.maps.solve import NOT_CONVERGED
 
-# Newton's method gains digits twofold; what has not settled after so many will not.
+# Newton's method doubles the digits in each step: an iteration that has not settled after so many will not.
 MOST_ITERATIONS = 12
 # A residual may stagnate at round-off above the tolerance: more than this times it is no solution.
 STAGNATION = 100.0
@@ -91,11 +91,12 @@ def w_newton(c: Any, value: Any, a: Any, P: Any, J: Any, S: Any, sg: Any):
 
 
 def make_W(Rotation, rotate, iterations, adaptive, checked):
-    """W with a fixed number of Newton steps, or iterated to the tolerance in the lanes that need it."""
+    """W with a fixed number of Newton steps, or iterated to the tolerance in the lanes that need it (see solve.py)."""
 
     @wp.func
     def parameter(alarm: Any, a: Any, P: Any, J: Any, S: Any, tolerance: Any):
         """(c, alarm): F = cay(c)."""
+        # Sd P, which no step changes.
         sg = trace_less(S, P)
         c = w_guess(a, P, J, S, sg)
         for _ in range(wp.static(iterations)):

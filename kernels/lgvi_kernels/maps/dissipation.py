@@ -29,16 +29,17 @@ def damped_torque(D: Any, nu: Any, Om: Any):
 
 
 def make_V(damping, velocities, Damping, Factor, coupled):
-    """The step with the sum of these damping laws; `velocities` gives (nu, Om) at the origin of the forces."""
+    """The step with the sum of these damping laws; `velocities`: (inertia, p, pi) -> (nu, Om) at the origin of the forces."""
 
     @wp.func
     def implicit(D: Any, inertia: Any, h: Any):
         """I6 + h D, factorised. h is divided by max J, as the inertia is."""
-        none = Damping()
-        a = combine(symmetric(none.force_velocity, inertia.M), h, D.force_velocity)
-        d = combine(symmetric(none.torque_rate, inertia.J_forces), h, D.torque_rate)
-        b = none.force_rate
-        c = none.torque_velocity
+        # Blocks of zeros: two to write the symmetric matrices into, two that stay zero where nothing couples.
+        zeros = Damping()
+        a = combine(symmetric(zeros.force_velocity, inertia.M), h, D.force_velocity)
+        d = combine(symmetric(zeros.torque_rate, inertia.J_forces), h, D.torque_rate)
+        b = zeros.force_rate
+        c = zeros.torque_velocity
         if wp.static(coupled):
             b = inertia.C
             c = transposed(inertia.C)
@@ -46,17 +47,20 @@ def make_V(damping, velocities, Damping, Factor, coupled):
 
     @wp.func
     def V(x: Any, view: Any, water: Any, c: Any, h: Any):
+        """I6 nu' = -D nu over h, b and R fixed."""
+        # D of the velocity that half an implicit Euler step predicts for the middle: with D of the start the order is 1.
         scaled = h * c.inertia.inverse_scale
         nu, Om = velocities(c.inertia, x.p, x.pi)
         view.nu = nu
         view.Om = Om
-        start = damping(Damping(), view, water, c)
-        predictor = implicit(start, c.inertia, h.dtype(0.5) * scaled)
+        D_start = damping(Damping(), view, water, c)
+        predictor = implicit(D_start, c.inertia, h.dtype(0.5) * scaled)
         nu_half, Om_half = solve6(predictor, x.p, x.pi)
         view.nu = nu_half
         view.Om = Om_half
         D = damping(Damping(), view, water, c)
         gamma = h.dtype(wp.static(GAMMA)) * scaled
+        # Two stages with weights 1 - gamma and gamma and one matrix, which is factorised once.
         factor = implicit(D, c.inertia, gamma)
         nu_1, Om_1 = solve6(factor, x.p, x.pi)
         x = pushed(x, (gamma - scaled) * damped_force(D, nu_1, Om_1))

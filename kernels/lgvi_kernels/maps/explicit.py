@@ -25,7 +25,7 @@ TINY = {wp.float64: 1e-300, wp.float32: 1e-36}
 
 
 class Explicit(NamedTuple):
-    """What decides the code of an explicit method: a tableau, whose row i of `a` has i numbers, and how it is used.
+    """All that decides the code of an explicit method: a tableau, whose row i of `a` has i numbers, and how it is used.
 
     kind: "vector" (R as two of its rows), "inertial" (the same, and forces never change in inertial axes, so that R p is
     known for all times: it is kept in place of p), "group" (R turns by exponentials) or "munthe_kaas" (order 4 with its
@@ -69,13 +69,13 @@ def make_rates(Rates, Wrench, everything, velocities, kind, mass, coupled, drift
 
     @wp.func
     def turning(w: Any, x: Any, c: Any, nu: Any, Om: Any):
-        """p x Om and pi x Om + p x nu: what the momenta in body axes change by without any force."""
+        """p x Om and pi x Om + p x nu: the rates of the momenta in body axes without any force."""
         w.force = w.force + cross(x.p, Om)
         w.torque = w.torque + cross(x.pi, Om)
         if wp.static(coupled):
             w.torque = w.torque + cross(x.p, nu)
         elif wp.static(not isotropic):
-            # Of the mean of M^-1 it is zero.
+            # p x M^-1 p without the mean of M^-1, of which it is zero.
             w.torque = munk(w.torque, x.p, c.inertia.anisotropy)
         return w
 
@@ -88,7 +88,7 @@ def make_rates(Rates, Wrench, everything, velocities, kind, mass, coupled, drift
         nu, Om = velocities(c.inertia, x.p, x.pi)
         w = Wrench()
         if wp.static(not scaled):
-            # Laws add to what is there: fewer operations than a sum of their own.
+            # Laws add to w: begun with these terms, it saves the addition of two wrenches.
             w = turning(w, x, c, nu, Om)
         w, u = everything(w, x, c, h, nu, Om)
         if wp.static(scaled):
@@ -125,7 +125,7 @@ def make_munk(diagonal):
     @wp.func
     def munk(turned: Any, p: Any, A: Any):
         if wp.static(diagonal):
-            # The differences stay the same for all steps, and the compiler keeps them.
+            # The differences of A are the same in all steps: the compiler forms them before the loop.
             turned.x = turned.x + (A.z - A.y) * (p.y * p.z)
             turned.y = turned.y + (A.x - A.z) * (p.z * p.x)
             turned.z = turned.z + (A.y - A.x) * (p.x * p.y)
@@ -149,7 +149,7 @@ def along(x: Any, k: Any, s: Any):
 
 @wp.func
 def along_known(x: Any, k: Any, s: Any):
-    """The same where P is known for all times."""
+    """The same without p, where P is known for all times."""
     x.b = x.b + s * k.b
     x.R0 = x.R0 + s * k.R0
     x.R2 = x.R2 + s * k.R2
@@ -198,7 +198,7 @@ def make_act(turned):
     return act
 
 
-# The two functions that follow are written out for so many stages: a loop or a recursion over them would copy all the
+# The two functions that follow are written out for MOST_STAGES stages: a loop or a recursion over them would copy all the
 # slopes for each, which the compiler removes again, in three times as long.
 MOST_STAGES = 13
 
@@ -206,7 +206,7 @@ MOST_STAGES = 13
 def make_moves(move, weights, complete):
     """One function (y, slopes, h): the moves by h w_1 k_1, then h w_2 k_2, ... of all weights that are not zero.
 
-    complete: what completes a state that was moved, or None.
+    complete: the function that completes a moved state, or None (see `completed`).
     """
     w = weights + (0.0,) * (MOST_STAGES - len(weights))
 
@@ -252,6 +252,7 @@ def make_push(Wrench, View, laws):
     @wp.func
     def pushed(x: Any, c: Any, h: Any):
         if wp.static(force is not None):
+            # An empty view: such a force looks at nothing.
             x.p = x.p + h * force(Wrench(), View(), c.params).force
         return x
 
@@ -259,7 +260,7 @@ def make_push(Wrench, View, laws):
 
 
 def make_stage(moves, push, node, timed):
-    """The state of one stage. push: what changes P, where it is known, or None."""
+    """The state of one stage. push: the function that changes P where it is known (see make_push), or None."""
 
     @wp.func
     def at_node(x: Any, k: Any, c: Any, h: Any):
@@ -314,7 +315,7 @@ def make_stages(Rates, rates, move, complete, push, a, c, timed):
 
 
 def make_fixed(stages, finish, push, timed):
-    """One step of the length that is asked for. push: as of make_stage."""
+    """One step of length h. push: as in make_stage."""
 
     @wp.func
     def step(x: Any, c: Any, h: Any):
@@ -382,6 +383,7 @@ def make_explicit(spec, everything, velocities):
     if method.kind == "munthe_kaas":
         return make_munthe_kaas(rates, move, turned, timed)
     a, c = method.a, method.c
+    # An estimate of one number more asks for the slope at the end of the step, whose row of `a` is b.
     if method.adaptive and len(method.errors[0]) > len(a):
         a, c = (*a, method.b), (*c, 1.0)
     stages = make_stages(Rates, rates, move, complete, push, a, c, timed)

@@ -1,4 +1,4 @@
-"""All laws of a scene at one state, for given velocities: what acts on the vehicle and how fast the water is."""
+"""All laws of a scene at one state and its velocities: the force and torque on the vehicle, and the water's velocity."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from lgvi_kernels.maps.water import acceleration_wrench
 
 
 def make_forces(View, Wrench, Flow, Damping, force, damping, flow, flow_varies, shifted):
-    """(everything, forces, current) of these laws, each of them None where a scene has none (see make_K)."""
+    """(everything, forces, current) of these laws; an argument is None where a scene has no such law (see make_K)."""
     at_user_origin = make_at_user_origin(shifted)
 
     @wp.func
@@ -23,7 +23,7 @@ def make_forces(View, Wrench, Flow, Damping, force, damping, flow, flow_varies, 
 
     @wp.func
     def everything(w: Any, x: Any, c: Any, h: Any, nu: Any, Om: Any):
-        """Force and torque, body axes, added to w, and the water's velocity, inertial axes, whose laws are asked once."""
+        """(w plus force and torque in body axes, the water's velocity in inertial axes): laws of water are called once."""
         view = look(View(), x, c, h)
         water = water_at(view, x, c)
         view.nu = nu

@@ -99,7 +99,7 @@ def mv_value(sigma: Any, a: Any, J: Any):
 
 @wp.func
 def mv_newton(sigma: Any, value: Any, a: Any, J: Any):
-    """sigma1 less value over its derivative: so that a larger tolerance or more iterations mean what they say."""
+    """A Newton step of sigma1, so that tolerance and iterations have the same meaning as for the other solvers."""
     s1, s2, s = mv_coefficients(a, J)
     return sigma - value / (sigma * (sigma * sigma - s1) - (s + s))
 

@@ -14,7 +14,7 @@ from lgvi_kernels.maps.submaps import kicked, look
 
 FORCES_NOT_CONVERGED = 4
 
-# A contraction by less than a half each time shrinks round-off no further after so many.
+# If each round halves the change, or better, these are enough for float64; what converges more slowly counts as failed.
 MOST_ITERATIONS = 60
 
 
@@ -42,7 +42,7 @@ def sum_of(a: Any, b: Any):
 
 
 def make_phi(maps, laws, alpha, beta):
-    """(Phi, Phi*) from the sub-maps Ab, Ap, D and the laws: potential, forces, current, evolve, velocities."""
+    """(Phi, Phi*). maps: Ab, Ap, D; laws: View, Wrench, potential, forces, current, evolve, velocities."""
     Ab, Ap, D = maps
     View, Wrench, potential, forces, current, evolve, velocities = laws
     equation_15 = make_equation_15(alpha, beta)
@@ -87,7 +87,7 @@ def make_phi(maps, laws, alpha, beta):
 
     @wp.func
     def attempt(x: Any, c: Any, h: Any, w: Any, u: Any):
-        """Eq. (19)-(23) for given phi*, tau* and velocity of the water."""
+        """Eq. (19)-(23) with w for phi*, tau* and the potential's force, and u for the velocity of the water."""
         x = munk(x, c, h)
         x = kicked(x, c, h, w)
         x = D(x, c, h)
@@ -119,6 +119,7 @@ def make_phi(maps, laws, alpha, beta):
             new = equation_15(forces(y, c, h, nu_1, Om_1), forces(x, c, h, nu_1, Om_1), h)
             u_1 = current(y, c, h)
             d = u_1 - u
+            # The kick in units of the momenta, which are divided by max J.
             size = h * c.inertia.inverse_scale
             # Round-off is relative to the impulse of the forces, which may be all there is.
             impulse = (size * size) * (dot(new.force, new.force) + dot(new.torque, new.torque))

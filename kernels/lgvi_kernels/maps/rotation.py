@@ -18,7 +18,7 @@ from lgvi_kernels.lanes.rotations import rodrigues, solve3
 
 @wp.func
 def reach(a: Any, J: Any):
-    """|J^-1 a|^2: a rotation F surely exists below 1, and on the principal axes only there."""
+    """|J^-1 a|^2: where it is below 1, a rotation F exists; for a on a principal axis it exists only there."""
     return dot(a * a, inverse_square(J))
 
 
@@ -35,6 +35,7 @@ def inverse_square(J: Any):
 @wp.func
 def quartic_coefficients(a: Any, J: Any):
     """(e + A^2, d3 + d1 A, d2 + 2A, d1), the coefficients of q from the constant one up."""
+    # Each function below asks for them anew: once inlined, the compiler computes them once.
     D = J + J
     DD = vec3(D.y * D.z, D.z * D.x, D.x * D.y)
     a2 = a * a
@@ -193,7 +194,7 @@ def newton_newton(f: Any, value: Any, a: Any, J: Any):
     Jf = J * f
     k = (dalpha + dalpha) * Jf + (dbeta + dbeta) * cross(f, Jf)
     d = alpha * J
-    # beta (hat(f) J - hat(J f)): row i, column j holds -+ f_k (J_j + ... ) written out
+    # The rows of k f^T + alpha J + beta (hat(f) J - hat(J f)).
     r0 = vec3(k.x * f.x + d.x, k.x * f.y + beta * (Jf.z - f.z * J.y), k.x * f.z + beta * (f.y * J.z - Jf.y))
     r1 = vec3(k.y * f.x + beta * (f.z * J.x - Jf.z), k.y * f.y + d.y, k.y * f.z + beta * (Jf.x - f.x * J.z))
     r2 = vec3(k.z * f.x + beta * (Jf.y - f.y * J.x), k.z * f.y + beta * (f.x * J.y - Jf.x), k.z * f.z + d.z)

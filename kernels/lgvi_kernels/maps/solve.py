@@ -1,4 +1,4 @@
-"""Solving equation (24) in every lane: how many Newton steps, until when, and what to do where there is no solution."""
+"""Solving equation (24) in every lane: how many Newton steps, until when, and the alarm where there is no solution."""
 
 import functools
 from typing import Any
@@ -59,9 +59,10 @@ NOT_CONVERGED = 2
 
 @functools.cache
 def make_solve(real, solver, iterations, adaptive, checked):
-    """Two functions (F, alarm, a, J, tolerance) -> (F, alarm) that solve equation (24) in every lane.
+    """(solve, solve_within), functions that solve equation (24) in every lane.
 
-    The second takes, after J, the square of the measure of the step's size, which is to stay below 1.
+    solve: (F, alarm, a, J, tolerance) -> (F, alarm). solve_within: the same with one argument more after J, the square of a
+    measure of the step's size, which must stay below 1 (see rotation.reach).
 
     `iterations` Newton steps are made in all lanes. `adaptive` goes on, in the lanes that need it, until the residual is
     below the tolerance: a lane's bits depend on that lane alone. `checked` raises the alarm of a lane whose equation has
@@ -70,6 +71,7 @@ def make_solve(real, solver, iterations, adaptive, checked):
     """
     fixed_start, adaptive_start, value, newton, excess, residual2, rotation = SOLVERS[solver]
     start = adaptive_start if adaptive else fixed_start
+    # The largest number below 1: tests are "> 0", and so 1 itself is beyond.
     below_one = 1.0 - 2.0**-53 if real == wp.float64 else 1.0 - 2.0**-24
 
     @wp.func
@@ -79,7 +81,7 @@ def make_solve(real, solver, iterations, adaptive, checked):
 
     @wp.func
     def raise_alarm(alarm: Any, far: Any, e: Any, r2: Any, unit: Any):
-        """Note the first failure of each lane, and the square of what crossed its limit."""
+        """Note the first failure of each lane, and the square of the value that crossed its limit."""
         zero = ones(e) - ones(e)
         unconverged = unit.dtype(wp.static(float(NOT_CONVERGED))) * ones(e)
         too_large = unit.dtype(wp.static(float(STEP_TOO_LARGE))) * ones(e)
@@ -92,12 +94,14 @@ def make_solve(real, solver, iterations, adaptive, checked):
 
     @wp.func
     def solve_within(F: Any, alarm: Any, a: Any, J: Any, far: Any, tolerance: Any):
+        # u: the solver's parameter of F; v: the value of its equation; e: the excess of the residual over the tolerance.
         u = start(a, J)
         for _ in range(wp.static(iterations)):
             u = newton(u, value(u, a, J), a, J)
         if wp.static(adaptive or checked):
             v = value(u, a, J)
             e = excess(v, a, J, tolerance)
+            # One test for both alarms: it is all that a well-chosen step pays.
             suspect = e
             if wp.static(checked):
                 suspect = positive(e, e, beyond(far, tolerance))

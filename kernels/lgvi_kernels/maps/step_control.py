@@ -1,4 +1,4 @@
-"""Steps that each packet chooses for a tolerance: error norm, step control, and what has failed."""
+"""Steps that each packet chooses for a tolerance: error norm, step control, and the status of lanes that fail."""
 
 from typing import Any
 
@@ -19,7 +19,7 @@ SHRINK, GROW = 0.333, 6.0
 # Steps tried from one step of the grid to the next, and the smallest as a part of that: beyond, the member has failed.
 MOST_TRIED = 100_000
 SMALLEST = {wp.float64: 1e-12, wp.float32: 1e-6}
-# Added under a root that is divided by.
+# Added under a root that is divided by, so that 0/0 does not occur.
 TINY = 1e-36
 
 
@@ -77,6 +77,7 @@ def make_errors(Rates, moves):
 
 def make_adaptive(stages, finish, errors, estimate, width, real, timed):
     """From one step of the grid to the next, by steps that the packet's worst lane decides."""
+    # Of PI control: this exponent is that of the step's own error, BETA that of the error before.
     power = 0.75 * BETA - 1.0 / estimate
 
     @wp.func
@@ -112,6 +113,7 @@ def make_adaptive(stages, finish, errors, estimate, width, real, timed):
         """HNW II.4 with PI control: steps are shortened to end at h, and not to leave a tiny one for the end."""
         start = x.time
         done = real(0.0)
+        # 0 asks for a new start: at the beginning of a run, and for a part of a step (see advance/retry.py).
         stride = x.pace.stride
         before = x.pace.before
         if not stride > real(0.0):

@@ -1,4 +1,4 @@
-"""The sub-maps that every method is a program of (Ab, Ap, T, D, K), each advancing a packet by h.
+"""Ab, Ap, T, D, K: the sub-maps of which every method is a program; each advances a packet by h.
 
 p = M nu and pi = J Om, and M and J themselves, carry the factor 1 / max J throughout. R is kept as its rows R0, R1, R2.
 """
@@ -33,7 +33,7 @@ def anisotropic_velocity(inertia: Any, p: Any):
 
 
 def make_clock(timed):
-    """What a drift does to the time that laws see: nothing, where none looks at it."""
+    """The function by which a drift advances the laws' time; where no law looks at the time, it does nothing."""
 
     @wp.func
     def passed(x: Any, h: Any):
@@ -74,6 +74,7 @@ def make_T(timed, compensated):
             x = moved(x, rotate(x, (h * c.inertia.mean) * x.p + d))
             x = twisted(x, cross(x.p, d))
         else:
+            # Written out as in D.
             x.b = x.b + rotate(x, (h * c.inertia.mean) * x.p + d)
             x.pi = x.pi + cross(x.p, d)
         return passed(x, h)
@@ -105,7 +106,8 @@ def make_D(Rotation, solve, compensated):
 
 @wp.func
 def look(view: Any, x: Any, c: Any, h: Any):
-    """What a law sees of the state, for a kick of h."""
+    """The View of a state, for a kick of h."""
+    # The rows of R are R^T e1, R^T e2, R^T e3: nothing to compute.
     view.north = x.R0
     view.east = x.R1
     view.down = x.R2
@@ -122,17 +124,17 @@ def look(view: Any, x: Any, c: Any, h: Any):
 
 @wp.func
 def kicked(x: Any, c: Any, h: Any, w: Any):
-    """p <- p + h f, pi <- pi + h m."""
+    """p <- p + h f, pi <- pi + h m. Momenta are divided by max J, forces are not: hence inverse_scale."""
     k = h * c.inertia.inverse_scale
     return twisted(pushed(x, k * w.force), k * w.torque)
 
 
 def make_at_user_origin(shifted):
-    """Where water is taken. shifted: the origin of the forces is not the user's."""
+    """The function that moves a view to where water is taken. shifted: the origin of the forces is not the user's."""
 
     @wp.func
     def at_user_origin(view: Any, x: Any, c: Any):
-        """Water is taken where the user has his origin, whatever the method's is."""
+        """Water is taken at the user's origin, whichever origin the method has."""
         if wp.static(shifted):
             view.b = place(x) + rotate(x, c.inertia.user_origin_forces)
         return view
@@ -155,7 +157,9 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):
         """The potential's part of eq. (13), (14), (19), (20), p <- p + h f(b, R), pi <- pi + h mU(b, R), and the rest."""
         view = look(View(), x, c, h)
         half = h.dtype(0.5) * h
+        # Drag in the middle, all else half before and half after it in mirrored order: so the kick has order 2.
         if wp.static(evolve is not None):
+            # The view stands for the sum that folded laws hand on (see compose.superpose): these add nothing to it.
             view = evolve(view, view, c.params)
         if wp.static(drifts):
             start = x
@@ -163,8 +167,10 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):
             x = moved_from(x, start, half * water.velocity)
             view.b = place(x)
             if wp.static(flow_varies):
+                # The midpoint rule: where the vehicle is after half the way, the water carries it all the way.
                 water = flow(Flow(), at_user_origin(view, x, c), c.params)
         if wp.static(forced):
+            # Of both half kicks: these forces depend on b and R, which do not change between them.
             w = Wrench()
             if wp.static(law is not None):
                 w = law(w, view, c.params)
@@ -185,6 +191,7 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):
             if wp.static(forced):
                 x = kicked(x, c, half, w)
         if wp.static(drifts):
+            # From the start, not from half way: b is rounded once.
             x = moved_from(x, start, h * water.velocity)
         if wp.static(evolve is not None):
             view.second = 1
@@ -197,6 +204,7 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):
 @functools.cache
 def fold(maps):
     """One function (x, constants, h) from a sequence of (sub-map, coefficient), the first applied first."""
+    # By recursion: Warp functions are bound when they are defined, so a loop in device code cannot go through a list of them.
     (first, coefficient), rest = maps[0], maps[1:]
 
     @wp.func

@@ -2,7 +2,7 @@
 
 In axes where Js is diagonal, 1/2 (pi - E^T p).Js^-1 (pi - E^T p) with E moved to upper triangular form U by the choice of
 an origin for each axis. Without coupling U = 0: three plain turns. No equation is solved; the map exists for every step,
-but where half the angle of a turn reaches 1 rad it has no digit of the motion: a member there is marked.
+but where half the angle of a turn reaches 1 rad it has no digit of the motion: such a member gets a status.
 """
 
 from typing import Any
@@ -28,7 +28,10 @@ from lgvi_kernels.lanes.sums import carried, moved, twisted, with_turned
 
 @wp.func
 def shear_pair(a: Any, b: Any, t: Any, s: Any):
-    """(a, b) turned by the angle with tan(half) = t and sine s, as three shears: what rounding leaves is still a turn."""
+    """(a, b) turned by the angle with tan(half) = t and sine s, as three shears.
+
+    Their determinant is 1 however t and s are rounded, so that this rounding neither stretches nor shrinks what is turned.
+    """
     u = a + t * b
     v = b - s * u
     return u + t * v, v
@@ -36,14 +39,14 @@ def shear_pair(a: Any, b: Any, t: Any, s: Any):
 
 @wp.func
 def shear_pair_back(a: Any, b: Any, t: Any, s: Any):
-    """The same with the shears in the other order: here the first of the pair is ready first."""
+    """The same turn by shears that begin with b: here the first of the pair is ready first, in shear_pair the second."""
     u = b - t * a
     v = a + s * u
     return v, u - t * v
 
 
 def make_turn_of_vector(axis, early):
-    """F^T v for a turn about an axis; the component that is ready one shear sooner is the early one."""
+    """F^T v for a turn about an axis; early: the component that is wanted one shear before the other."""
     pair = shear_pair_back if early == (axis + 1) % 3 else shear_pair
 
     @wp.func
@@ -63,7 +66,7 @@ def make_turn_of_vector(axis, early):
 
 @wp.func
 def carried_pair(a: Any, a_low: Any, b: Any, b_low: Any, t: Any, s: Any):
-    """The same turn with compensation, as (a, a_low, b, b_low): what the shears change, each added once."""
+    """The same turn with compensation, as (a, a_low, b, b_low): each number's whole change is added at once."""
     v, v_low = carried(b, b_low, -(s * (a + t * b)))
     u, u_low = carried(a, a_low, t * (b + v))
     return u, u_low, v, v_low
@@ -163,8 +166,8 @@ def make_turn(axis, pitched, following, compensated, watched=False):
     about all axes (see packet.turned_too_far). Turns keep |pi|, so Y is not below half the angle of the turn about the axis of
     the largest J, nor, as J3 <= 2 J2 for a rigid body, below a half of that about the middle one.
 
-    A step is one chain of turns, each waiting for the momentum about its axis from the one before: what decides its time
-    is how soon that component is there, so all that need not wait is written apart from what must.
+    A step is one chain of turns: each waits until the turn before has computed the momentum about its axis. How soon that
+    component is ready decides the time of a step, so all that need not wait for it is written apart.
     """
     component, _ = AXES[axis]
     turn = make_turn_of_state(axis, following, compensated)
@@ -207,13 +210,13 @@ def make_turn(axis, pitched, following, compensated, watched=False):
 def make_hop(here, there, U12, U13, U23, compensated):
     """The origin moves from that of axis `here` to that of axis `there` (0, 1, 2), by the elements of U that are not 0."""
     sign = 1.0 if there > here else -1.0
-    first = (here, there) in ((0, 1), (1, 0))
+    first_two = (here, there) in ((0, 1), (1, 0))
     along_x, along_y, along_z = (make_shift(axis, compensated) for axis in range(3))
 
     @wp.func
     def hop(x: Any, c: Any, h: Any):
         """1 to 2: by U12 along z. 2 to 3: by U23 along x and -U13 along y."""
-        if wp.static(first):
+        if wp.static(first_two):
             if wp.static(U12):
                 x = along_z(x, h.dtype(wp.static(sign)) * c.inertia.U12)
         else:

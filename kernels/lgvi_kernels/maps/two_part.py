@@ -45,7 +45,7 @@ def modified(a: Any, inertia: Any):
 
 
 def make_A(Rotation, solve_within, View, Wrench, law):
-    """The free rotation and the kick of the force; law: of all forces, or None."""
+    """A. solve_within: see make_solve; law: of all forces, or None."""
 
     @wp.func
     def A(x: Any, c: Any, h: Any):
@@ -67,7 +67,7 @@ def make_A(Rotation, solve_within, View, Wrench, law):
 
 
 def make_B(drift, View, Wrench, law):
-    """The drift T (Ab for M = m I) and the kick of the torque."""
+    """B. drift: T, or Ab for M = m I; law: of all torques, or None."""
 
     @wp.func
     def B(x: Any, c: Any, h: Any):

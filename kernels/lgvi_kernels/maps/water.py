@@ -41,7 +41,7 @@ def gradient_in_body(m: Any, view: Any, water: Any):
 
 @wp.func
 def about(m: Any, r: Any):
-    """-m hat(r): what a matrix that acts on the velocity at the point r does to rates about the origin."""
+    """-m hat(r): if m acts on the velocity at the point r, this acts on the rates about the origin."""
     m.row0 = cross(r, m.row0)
     m.row1 = cross(r, m.row1)
     m.row2 = cross(r, m.row2)
@@ -49,11 +49,12 @@ def about(m: Any, r: Any):
 
 
 def make_shear(Matrix3, coupled, shifted):
-    """What the water's variation in space adds to the damping matrix. shifted: it is taken at another point."""
+    """The damping matrix of the water's variation in space. shifted: the water is taken at the user's origin."""
 
     @wp.func
     def shear(D: Any, view: Any, inertia: Any, water: Any):
         """D + I6 (R^T G R, 0): force M R^T G R nu and, where M and J are coupled, torque C^T R^T G R nu."""
+        # M and C are divided by max J, D is not.
         scale = ones(inertia.mean) / inertia.inverse_scale
         X = gradient_in_body(Matrix3(), view, water)
         MX = product(symmetric(Matrix3(), inertia.M), X)

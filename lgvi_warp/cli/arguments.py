@@ -38,7 +38,7 @@ SHARED: dict[str, dict[str, Any]] = {
     "--set": {"metavar": "KEY=VALUE", "action": "append", "default": [], "help": "replace a key of the scene file"},
     "--quiet": {"action": "store_true", "help": "no progress and no summary"},
     "--method": {"help": "as for run"},
-    "--methods": {"metavar": "A,B"},
+    "--methods": {"metavar": "A,B", "type": lambda text: [name.strip() for name in text.split(",")]},
     "--step": {"metavar": "S", "help": "time step [s]"},
     "--dtype": {"help": "as for run"},
     "--keep": {

@@ -50,11 +50,6 @@ class Cost:
     us_per_vehicle_second: float
     spread: float
 
-    @property
-    def doubtful(self) -> bool:
-        """Whether the readings of this cost disagree."""
-        return self.spread > DISAGREE
-
 
 def costs(plans: Sequence[Plan], rounds: int = 5) -> list[Cost]:
     """Measure the cost of plans, with one number for all plans that run the same kernel.
@@ -208,19 +203,19 @@ def work_grows(plan: Plan) -> bool:
     return bool(spec.gauss) or spec.averages is not None or newton or plan.method.adaptive
 
 
-def disagreement(priced: Sequence[tuple[str, Cost]]) -> str | None:
+def disagreement(spreads: Sequence[tuple[str, float]]) -> str | None:
     """Write the message about costs whose readings disagree.
 
     Args:
-        priced: (name of the setting, its cost) of each.
+        spreads: (name of the setting, median of its readings over the least) of each.
 
     Returns:
         The message; None where all readings agree.
     """
     worst: dict[str, float] = {}
-    for name, cost in priced:
-        if cost.doubtful:
-            worst[name] = max(worst.get(name, 1.0), cost.spread)
+    for name, spread in spreads:
+        if spread > DISAGREE:
+            worst[name] = max(worst.get(name, 1.0), spread)
     if not worst:
         return None
     ranked = sorted(worst, key=lambda name: -worst[name])

@@ -183,16 +183,10 @@ def suggest(
         refined(more, trial.candidate, reference, compared.name, error / SAFETY**0.5) for trial in trials[:FINALISTS]
     ]
     final = [trial for trial in final if trial.error(compared.name) <= error] or final[:1]
-    readings = cost.costs([trial.plan for trial in final], rounds=ROUNDS)
-    prices = [reading.us_per_vehicle_second for reading in readings]
-    text = cost.disagreement(
-        [
-            (f"{trial.candidate.name} {trial.candidate.dtype}", price)
-            for trial, price in zip(final, readings, strict=True)
-        ]
-    )
-    order = sorted(range(len(final)), key=prices.__getitem__)
-    best, price = final[order[0]], prices[order[0]]
+    priced = list(zip(final, cost.costs([trial.plan for trial in final], rounds=ROUNDS), strict=True))
+    text = cost.disagreement([(trial.candidate.text, price.spread) for trial, price in priced])
+    priced.sort(key=lambda pair: pair[1].us_per_vehicle_second)
+    best, price = priced[0]
     ensemble = sample.whole
     used = min(threads or machine.thread_count(), len(blocks(ensemble.members)))
     report(1.0)
@@ -203,7 +197,7 @@ def suggest(
         of=compared.name,
         unit=compared.unit,
         expected=best.error(compared.name),
-        us_per_vehicle_second=price,
+        us_per_vehicle_second=price.us_per_vehicle_second,
         run_seconds=seconds_of(ensemble, best.candidate, sample.t1) / used,
         threads=used,
         memory_bytes=memory_of(ensemble, best.candidate, sample.t1),
@@ -211,7 +205,10 @@ def suggest(
         t1=sample.t1,
         reference=reference.text,
         reference_error=reference.error(compared.name),
-        rivals=tuple((final[i].candidate, prices[i], final[i].error(compared.name)) for i in order[1:]),
+        rivals=tuple(
+            (rival.candidate, rival_price.us_per_vehicle_second, rival.error(compared.name))
+            for rival, rival_price in priced[1:]
+        ),
         worst=worst_of(best, reference, compared.name),
         asked=compared,
         messages=(text,) if text else (),

@@ -318,14 +318,12 @@ class Reference:
         result: of the finer run.
         text: the two methods and their steps, in words.
         own: quantity -> (k,), largest difference of the two runs over the members and up to each time [its unit].
-        wall_seconds: time that it took [s].
         asked: quantity of the errors, where it is none of QUANTITIES.
     """
 
     result: Result
     text: str
     own: dict[str, np.ndarray]
-    wall_seconds: float
     asked: Compared | None = None
 
     def error(self, of: str, until: int = -1) -> float:
@@ -457,7 +455,7 @@ def make_reference(
         if best is None or end < best.error(of):
             worse = worse + 1 if best and end > 0.5 * best.error(of) and end < LOST else 0
             text = f"{second} at h = {sample.h(finer):.4g} s against {first} at h = {sample.h(m):.4g} s"
-            best = Reference(runs[1], text, disagreement, time.perf_counter() - begun, compared)
+            best = Reference(runs[1], text, disagreement, compared)
         else:
             worse += best.error(of) < LOST
         begun += sum(run.compile_seconds for run in runs)
@@ -515,11 +513,12 @@ def growth(sample: Sample, candidate: Candidate) -> Growth:
     members = fleet.select(0, fleet.members)
     turn = np.random.default_rng(0).normal(size=(fleet.members, 3))
     turn *= NUDGE / np.linalg.norm(turn, axis=1, keepdims=True)
-    states = (members.position, members.velocity, members.angular_velocity)
     varied = {k: v for k, v in members.parameters.items() if len(v) == fleet.members and len(v) > 1}
     runs = []
     for R in (members.attitude, members.attitude @ notation.matrix_from_rotation_vector(turn)):
-        nudged = Ensemble.from_states(fleet.scene, states[0], R, *states[1:], varied)
+        nudged = Ensemble.from_states(
+            fleet.scene, members.position, R, members.velocity, members.angular_velocity, varied
+        )
         nudged.indices, nudged.seed = fleet.indices, fleet.seed
         runs.append(sample.run(candidate, nudged))
     apart = distances(runs[0], runs[1])

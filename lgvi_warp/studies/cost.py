@@ -110,11 +110,8 @@ def of_steps(kinds: Sequence[Kind], seconds: np.ndarray) -> list[tuple[float, fl
         bounding = _bounding(kind, kinds, seconds)
         least = float(np.nanmin(bounding))
         # Longer steps may truly cost more, so only readings of this very step can disagree.
-        alike = (
-            seconds[[candidate.kernel == kind.kernel and candidate.h == kind.h for candidate in kinds]]
-            if kind.grows
-            else bounding
-        )
+        same = [candidate.kernel == kind.kernel and candidate.h == kind.h for candidate in kinds]
+        alike = seconds[same] if kind.grows else bounding
         prices.append((least, float(np.nanmedian(alike) / np.nanmin(alike))))
     return prices
 

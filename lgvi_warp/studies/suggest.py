@@ -164,15 +164,8 @@ def suggest(
         raise SceneError([f"{problem}; use lgvi-warp tradeoff, which compares statistics"])
     reference = checked_reference(sample, compared, error, 0.4 * seconds, taken)
     report(0.3)
-    trials = search(
-        sample,
-        taken,
-        reference,
-        compared,
-        error / SAFETY,
-        time.perf_counter() + 0.6 * seconds,
-        lambda x: report(0.3 + 0.5 * x),
-    )
+    deadline = time.perf_counter() + 0.6 * seconds
+    trials = search(sample, taken, reference, compared, error / SAFETY, deadline, lambda part: report(0.3 + 0.5 * part))
     if not trials:
         problem = f"error = {error:g} {compared.unit} of {compared.name}: no step of {', '.join(taken)} kept it"
         raise SceneError([f"{problem}; ask for a larger error, a shorter t1, or give more seconds"])

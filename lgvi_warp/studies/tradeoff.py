@@ -657,14 +657,8 @@ def bias_lines(found: Tradeoff) -> list[str]:
         (measurement for measurement in double if measurement.setting.name == name),
         key=lambda measurement: -measurement.setting.h,
     )
-    columns = [
-        "position_mean",
-        "position_std",
-        "attitude_mean",
-        "velocity_mean",
-        "energy_mean",
-        "angular_momentum_mean",
-    ]
+    means = ("attitude", "velocity", "energy", "angular_momentum")
+    columns = ["position_mean", "position_std", *(f"{name}_mean" for name in means)]
     heads = [column.replace("angular_momentum", "ang.mom.").replace("_", " ") for column in columns]
     if found.of not in QUANTITIES and any(f"{found.of}_mean" in measurement.biases for measurement in chosen):
         columns, heads = [f"{found.of}_mean", *columns], [f"{found.of} mean", *heads]

@@ -94,19 +94,9 @@ class Indices:
         Returns:
             All fields and rows; numbers that are not finite are None.
         """
-        names = (
-            "name",
-            "factors",
-            "quantities",
-            "samples",
-            "members",
-            "failed",
-            "confidence",
-            "messages",
-            "mean",
-            "std",
-        )
-        content = {name: getattr(self, name) for name in names} | {"rows": list(self.rows())}
+        names = ("name", "factors", "quantities", "samples", "members", "failed", "confidence", "messages")
+        content = {name: getattr(self, name) for name in (*names, "mean", "std")}
+        content["rows"] = list(self.rows())
         return finite_or_none(content) | {"provenance": self.provenance}
 
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:

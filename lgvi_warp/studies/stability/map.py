@@ -455,8 +455,13 @@ def cells_of(one: Found, verified: np.ndarray, error: float, energy_bound: float
     unbounded = ~(one.growth / energy_bound <= 1.0)
     flagged = one.warned | failed(one.status)
     accurate = verified & (one.error <= error)
-    quiet = np.where(accurate, Cell.ACCURATE, Cell.BOUNDED)
-    return np.where(unbounded, np.where(flagged, Cell.FAILED, Cell.SILENT), np.where(flagged, Cell.FLAGGED, quiet))
+    classes = {
+        Cell.SILENT: unbounded & ~flagged,
+        Cell.FAILED: unbounded,
+        Cell.FLAGGED: flagged,
+        Cell.ACCURATE: accurate,
+    }
+    return np.select(list(classes.values()), list(classes), Cell.BOUNDED)
 
 
 def _ratios(grid: StabilityGrid, methods: Sequence[str]) -> dict[str, dict[str, np.ndarray]]:
@@ -479,14 +484,8 @@ def _provenance(
     """Describe the scene, the settings, the versions and the machine of a map."""
     content = provenance(plan_of(grid, np.arange(1), methods[0], SHORTEST, "float64"))
     content = {name: content[name] for name in ("scene", "versions", "machine", "checks")}
-    axes = {name: vars(axis) for name, axis in (("x", grid.x), ("y", grid.y))}
-    return content | {
-        "methods": list(methods),
-        "dtype": dtype,
-        "seed": seed,
-        "energy_bound": energy_bound,
-        "axes": axes,
-    }
+    content |= {"methods": list(methods), "dtype": dtype, "seed": seed, "energy_bound": energy_bound}
+    return content | {"axes": {name: vars(axis) for name, axis in (("x", grid.x), ("y", grid.y))}}
 
 
 def report_text(found: StabilityMap) -> str:

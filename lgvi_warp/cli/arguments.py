@@ -27,6 +27,44 @@ go to stdout, progress and faults to stderr.
 """
 
 
+# Arguments that several verbs have.
+SHARED: dict[str, dict[str, Any]] = {
+    "scene": {"metavar": "SCENE", "help": "scene file (TOML)"},
+    "dir": {"metavar": "DIR", "type": Path, "help": "a store, or a folder with one"},
+    "--out": {"metavar": "DIR", "type": Path},
+    "--duration": {"metavar": "S", "help": "end of the run [s]"},
+    "--members": {"metavar": "N", "help": "number of vehicles"},
+    "--seed": {"metavar": "N", "help": "seed of what varies"},
+    "--set": {"metavar": "KEY=VALUE", "action": "append", "default": [], "help": "replace a key of the scene file"},
+    "--quiet": {"action": "store_true", "help": "no progress and no summary"},
+    "--method": {"help": "as for run"},
+    "--methods": {"metavar": "A,B", "type": lambda text: [name.strip() for name in text.split(",")]},
+    "--step": {"metavar": "S", "help": "time step [s]"},
+    "--dtype": {"help": "as for run"},
+    "--keep": {
+        "help": "samples of members to keep: all (default), none, failed, or indices 3,17 (statistics are those of the scene)"
+    },
+    "--threads": {"metavar": "N", "type": int, "help": "threads (default: all cores)"},
+    "--executor": {"default": "threads", "help": "threads (default), processes or dask"},
+    "--scheduler": {"metavar": "ADDRESS", "help": "of Dask; without one, a cluster on this machine"},
+    "--store": {"choices": ["npz", "zarr"], "default": "npz", "help": "as for run"},
+    "--store-dtype": {"metavar": "D", "help": "as for run"},
+    "--overwrite": {"action": "store_true", "help": "replace a run.zarr that is there"},
+}
+# Arguments of the verbs that write files about a scene's ensemble.
+SCENE = "scene --out --duration --members --seed --set --quiet"
+EXECUTOR = "--threads --executor --scheduler"
+WORKERS = "threads, processes or workers (default: all cores)"
+FOLDER = "folder for the files, replaced if they exist (default: {})"
+
+
+def _add(verb: Any, names: str, **helps: str) -> None:
+    """Add shared arguments to a verb; helps: name without dashes -> its help for this verb."""
+    for name in names.split():
+        own_help = helps.get(name.strip("-").replace("-", "_"))
+        verb.add_argument(name, **SHARED[name] | ({"help": own_help} if own_help else {}))
+
+
 def parser() -> argparse.ArgumentParser:
     """Make the parser of the command's arguments.
 
@@ -40,8 +78,28 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
+    _add_run(verbs)
+    _add_check(verbs)
+    _add_predict(verbs)
+    _add_store_verbs(verbs)
+    _add_tradeoff(verbs)
+    _add_sensitivity(verbs)
+    _add_stability(verbs)
+    info = verbs.add_parser(
+        "info", help="what a run's folder holds; without one, the machine, versions, the core's peak"
+    )
+    info.add_argument("dir", nargs="?", **SHARED["dir"])
+    info.set_defaults(scene=None)
+    bench = verbs.add_parser("bench", help="speed of the kernel on this machine, beside the core's peak")
+    bench.add_argument("--members", type=int, default=4096, help="vehicles (default 4096)")
+    bench.add_argument("--steps", type=int, default=1000, help="steps (default 1000)")
+    return top
+
+
+def _add_run(verbs: Any) -> None:
+    """Add the verb run with its arguments."""
     run = verbs.add_parser("run", help="run a scene's ensemble: result.npz, fleet.png, fleet.rrd and a summary")
-    _add_scene(run, "runs/NAME of the scene")
+    _add(run, SCENE, out=FOLDER.format("runs/NAME of the scene"))
     run.add_argument(
         "--error",
         metavar="E",
@@ -49,9 +107,12 @@ def parser() -> argparse.ArgumentParser:
         help="choose the cheapest method, step and precision that keep this error, and check it after the run",
     )
     run.add_argument("--of", help=f"what --error is of (default: position [m]); {OF}")
-    run.add_argument("--method", help="psi_s, psi_1, psi, phi, phi_adjoint, or a composition such as kl6(psi_s)")
-    run.add_argument("--step", metavar="S", help="time step [s]")
-    run.add_argument("--dtype", help="float64, float32, or float32_compensated: sums of two float32")
+    _add(
+        run,
+        "--method --step --dtype",
+        method="psi_s, psi_1, psi, phi, phi_adjoint, or a composition such as kl6(psi_s)",
+        dtype="float64, float32, or float32_compensated: sums of two float32",
+    )
     run.add_argument("--solver", help="of equation (24): quartic, cayley, newton or moser_veselov")
     run.add_argument(
         "--iterations", metavar="N", help='of every solve: a number, or "auto" (default: to the tolerance)'
@@ -65,53 +126,36 @@ def parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--on-failure", help="freeze a member that fails (default), raise: exit code 1, or substep: divide its step"
     )
-    _add_keep(run)
+    _add(run, "--keep")
     run.add_argument("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
-    _add_executor(run)
-    run.add_argument(
-        "--store",
-        choices=["npz", "zarr"],
-        default="npz",
-        help="result.npz when the run ends (default), or run.zarr block by block, which resume can go on with",
+    _add(run, EXECUTOR, threads=WORKERS)
+    _add(
+        run,
+        "--store --store-dtype",
+        store="result.npz when the run ends (default), or run.zarr block by block, which resume can go on with",
+        store_dtype="float32: store the samples of a float64 run so",
     )
-    run.add_argument("--store-dtype", metavar="D", help="float32: store the samples of a float64 run so")
     run.add_argument(
         "--blocks",
         metavar="A:B",
         help="with --store zarr: run only these blocks, to be merged later (as many of them as there are)",
     )
     existing = run.add_mutually_exclusive_group()
-    existing.add_argument("--overwrite", action="store_true", help="replace a run.zarr that is there")
+    _add(existing, "--overwrite")
     existing.add_argument(
         "--resume", action="store_true", help="go on with a run.zarr that is there, if it is this run"
     )
-    _add_check(verbs)
-    _add_predict(verbs)
-    _add_store_verbs(verbs)
-    trade = verbs.add_parser(
+
+
+def _add_tradeoff(verbs: Any) -> None:
+    """Add the verb tradeoff with its arguments."""
+    verb = verbs.add_parser(
         "tradeoff", help="speed against accuracy of every method, step and precision: tradeoff.json, .csv and .png"
     )
-    _add_scene(trade, "runs/NAME_tradeoff")
-    trade.add_argument("--methods", metavar="A,B", help="names, such as psi_s,kl8(psi_x) (default: all that fit)")
-    trade.add_argument("--of", default="position", help=f"what errors are of (default: position); {OF}")
-    trade.add_argument(
-        "--seconds",
-        metavar="S",
-        type=float,
-        default=45.0,
-        help="about how long to measure (default 45)",
-    )
-    _add_sensitivity(verbs)
-    _add_stability(verbs)
-    info = verbs.add_parser(
-        "info", help="what a run's folder holds; without one, the machine, versions, the core's peak"
-    )
-    info.add_argument("dir", metavar="DIR", type=Path, nargs="?", help="a store, or a folder with one")
-    info.set_defaults(scene=None)
-    bench = verbs.add_parser("bench", help="speed of the kernel on this machine, beside the core's peak")
-    bench.add_argument("--members", type=int, default=4096, help="vehicles (default 4096)")
-    bench.add_argument("--steps", type=int, default=1000, help="steps (default 1000)")
-    return top
+    _add(verb, f"{SCENE} --methods", out=FOLDER.format("runs/NAME_tradeoff"),
+         methods="names, such as psi_s,kl8(psi_x) (default: all that fit)")  # fmt: skip
+    verb.add_argument("--of", default="position", help=f"what errors are of (default: position); {OF}")
+    verb.add_argument("--seconds", metavar="S", type=float, default=45.0, help="about how long to measure (default 45)")
 
 
 def _add_sensitivity(verbs: Any) -> None:
@@ -120,10 +164,10 @@ def _add_sensitivity(verbs: Any) -> None:
         "sensitivity",
         help="which of the varied parameters matter: Sobol indices or Morris screening; .txt, .csv, .json, .png",
     )
-    verb.add_argument("scene", metavar="SCENE", help="scene file (TOML) with [ensemble.vary]")
+    _add(verb, "scene", scene="scene file (TOML) with [ensemble.vary]")
     verb.add_argument("--of", metavar="Q", action="append", help='quantity of interest: "position[2]" (the default), '
                       'depth, speed, "norm(velocity)", "max(energy)" ...; may be given several times')  # fmt: skip
-    verb.add_argument("--out", metavar="DIR", type=Path, help="folder for the files (default: runs/NAME_sensitivity)")
+    _add(verb, "--out", out="folder for the files (default: runs/NAME_sensitivity)")
     verb.add_argument("--analysis", choices=("sobol", "morris"), default="sobol", help="default sobol")
     verb.add_argument("--samples", metavar="N", type=int, help="groups of the design (default: sobol 256, morris 64)")
     verb.add_argument(
@@ -131,14 +175,9 @@ def _add_sensitivity(verbs: Any) -> None:
     )
     verb.add_argument("--failed", choices=("refuse", "drop"), default="refuse",
                       help="what to do about groups with a failed member (default refuse)")  # fmt: skip
-    verb.add_argument("--method", help="integration method, as of run")
-    verb.add_argument("--step", metavar="S", help="time step [s]")
-    verb.add_argument("--dtype", help="float64, float32, or float32_compensated")
-    verb.add_argument("--duration", metavar="S", help="end of the run [s]")
-    verb.add_argument("--seed", metavar="N", help="seed of the design")
-    verb.add_argument("--threads", metavar="N", type=int, help="threads (default: all cores)")
-    verb.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="replace a key of the scene file")
-    verb.add_argument("--quiet", action="store_true", help="no progress and no table")
+    _add(verb, "--method --step --dtype --duration --seed --threads --set --quiet", seed="seed of the design",
+         method="integration method, as of run", dtype="float64, float32, or float32_compensated",
+         quiet="no progress and no table")  # fmt: skip
 
 
 def _add_stability(verbs: Any) -> None:
@@ -147,7 +186,7 @@ def _add_stability(verbs: Any) -> None:
         "stability",
         help="where methods are accurate, bounded, flagged or fail, over two parameters: .json, .csv and .png",
     )
-    _add_scene(verb, "runs/NAME_stability", ensemble=False)
+    _add(verb, "scene --out --duration --seed --set --quiet", out=FOLDER.format("runs/NAME_stability"))
     verb.add_argument(
         "--grid",
         choices=("omega", "mass", "drag", "all"),
@@ -156,23 +195,10 @@ def _add_stability(verbs: Any) -> None:
     axis = "NAME or NAME=LOW:HIGH[:linear], such as"
     verb.add_argument("--x", metavar="AXIS", help=f"instead of --grid: {axis} h=0.01:3")
     verb.add_argument("--y", metavar="AXIS", help=f"instead of --grid: {axis} angular_velocity, vehicle.mass=50:500")
-    verb.add_argument("--methods", metavar="A,B", help="names, such as psi_s,kl8(psi_x) (default: psi,psi_s,psi_x,rk4)")
+    _add(verb, "--methods", methods="names, such as psi_s,kl8(psi_x) (default: psi,psi_s,psi_x,rk4)")
     verb.add_argument("--points", metavar="N", type=int, default=24, help="cells along each axis (default 24)")
     verb.add_argument("--error", metavar="E", type=float, default=1e-2, help="an accurate cell's bound (default 0.01)")
     verb.add_argument("--of", default="attitude", help=f"what --error is of (default: attitude); {OF}")
-
-
-def _add_keep(verb: argparse.ArgumentParser) -> None:
-    """Add the argument that says whose samples are kept."""
-    kinds = "all (default), none, failed, or indices 3,17"
-    verb.add_argument("--keep", help=f"samples of members to keep: {kinds} (statistics are those of the scene)")
-
-
-def _add_executor(verb: argparse.ArgumentParser) -> None:
-    """Add the arguments that say where blocks run."""
-    verb.add_argument("--threads", metavar="N", type=int, help="threads, processes or workers (default: all cores)")
-    verb.add_argument("--executor", default="threads", help="threads (default), processes or dask")
-    verb.add_argument("--scheduler", metavar="ADDRESS", help="of Dask; without one, a cluster on this machine")
 
 
 def _add_check(verbs: Any) -> None:
@@ -180,63 +206,33 @@ def _add_check(verbs: Any) -> None:
     verb = verbs.add_parser(
         "check", help="whether a scene can run, and what is odd about it and most likely a unit; nothing runs"
     )
-    verb.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
-    verb.add_argument("--method", help="as for run")
-    verb.add_argument("--step", metavar="S", help="time step [s]")
-    verb.add_argument("--dtype", help="as for run")
-    verb.add_argument("--duration", metavar="S", help="end of the run [s]")
-    verb.add_argument("--members", metavar="N", help="number of vehicles")
-    verb.add_argument("--seed", metavar="N", help="seed of what varies")
-    verb.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="replace a key of the scene file")
-    verb.add_argument("--quiet", action="store_true", help="the exit code alone")
+    _add(verb, "scene --method --step --dtype --duration --members --seed --set --quiet", quiet="the exit code alone")
 
 
 def _add_predict(verbs: Any) -> None:
     """Add the verb predict with its arguments."""
-    predict = verbs.add_parser(
+    verb = verbs.add_parser(
         "predict",
         aliases=["plan"],
         help="time, memory and disk that a run would take, from a small one on this machine",
     )
-    _add_scene(predict, "runs/NAME of the scene")
-    predict.add_argument("--method", help="as for run")
-    predict.add_argument("--step", metavar="S", help="time step [s]")
-    predict.add_argument("--dtype", help="as for run")
-    _add_keep(predict)
-    predict.add_argument("--threads", metavar="N", type=int, help="threads (default: all cores)")
-    predict.add_argument("--store", choices=["npz", "zarr"], default="npz", help="as for run")
-    predict.add_argument("--store-dtype", metavar="D", help="as for run")
+    names = f"{SCENE} --method --step --dtype --keep --threads --store --store-dtype"
+    _add(verb, names, out=FOLDER.format("runs/NAME of the scene"))
 
 
 def _add_store_verbs(verbs: Any) -> None:
     """Add the verbs resume, merge and export with their arguments."""
     resume = verbs.add_parser("resume", help="go on with a run that was stopped, and mend what is damaged of it")
-    resume.add_argument("dir", metavar="DIR", type=Path, help="a store, or a folder with one")
-    _add_executor(resume)
+    _add(resume, f"dir {EXECUTOR}", threads=WORKERS)
     resume.add_argument("--force", action="store_true", help="even on another machine or with other versions")
-    resume.add_argument("--quiet", action="store_true", help="no progress and no summary")
+    _add(resume, "--quiet")
     merge = verbs.add_parser("merge", help="put runs of some blocks each (run --blocks) together")
     merge.add_argument("dirs", metavar="DIR", type=Path, nargs="+", help="stores, or folders with one each")
     merge.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the whole run")
-    merge.add_argument("--overwrite", action="store_true", help="replace a run.zarr that is there")
-    merge.add_argument("--quiet", action="store_true", help="no summary")
+    _add(merge, "--overwrite --quiet", quiet="no summary")
     export = verbs.add_parser("export", help="write a run as one NetCDF or Parquet file")
-    export.add_argument("dir", metavar="DIR", type=Path, help="a store, or a folder with one")
+    _add(export, "dir")
     export.add_argument("--to", required=True, help="netcdf or parquet")
     export.add_argument(
         "--out", metavar="FILE", type=Path, help="the file, replaced if it exists (default: beside the store)"
     )
-
-
-def _add_scene(verb: argparse.ArgumentParser, folder: str, ensemble: bool = True) -> None:
-    """Add the arguments that all verbs have that run a scene."""
-    verb.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
-    verb.add_argument(
-        "--out", metavar="DIR", type=Path, help=f"folder for the files, replaced if they exist (default: {folder})"
-    )
-    verb.add_argument("--duration", metavar="S", help="end of the run [s]")
-    if ensemble:
-        verb.add_argument("--members", metavar="N", help="number of vehicles")
-    verb.add_argument("--seed", metavar="N", help="seed of what varies")
-    verb.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="replace a key of the scene file")
-    verb.add_argument("--quiet", action="store_true", help="no progress and no summary")

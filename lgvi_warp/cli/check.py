@@ -6,7 +6,7 @@ import argparse
 from dataclasses import replace
 from typing import Any
 
-from lgvi_warp.cli.settings import overrides
+from lgvi_warp.cli.settings import load_scene
 
 
 def check(chosen: argparse.Namespace) -> int:
@@ -23,9 +23,8 @@ def check(chosen: argparse.Namespace) -> int:
     """
     from lgvi_warp.scene import plausibility
     from lgvi_warp.scene.ensemble import Ensemble
-    from lgvi_warp.scene.scene import Scene
 
-    scene = Scene.load(chosen.scene, overrides(chosen))
+    scene = load_scene(chosen)
     ensemble = Ensemble.from_scene(scene)
     head, messages = _settings(ensemble)
     messages += (*scene.vehicle.warnings, *plausibility.of_ensemble(ensemble).messages(ensemble.members))

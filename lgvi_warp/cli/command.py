@@ -18,20 +18,9 @@ from lgvi_warp.cli.stores import export, merge
 from lgvi_warp.cli.studies import sensitivity, stability, tradeoff
 from lgvi_warp.common.errors import SceneError
 
-VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
-    "run": run,
-    "check": check,
-    "resume": resume,
-    "predict": predict,
-    "plan": predict,  # its name before
-    "merge": merge,
-    "export": export,
-    "tradeoff": tradeoff,
-    "sensitivity": sensitivity,
-    "stability": stability,
-    "info": info,
-    "bench": bench,
-}
+_VERBS = (run, check, resume, predict, merge, export, tradeoff, sensitivity, stability, info, bench)
+VERBS: dict[str, Callable[[argparse.Namespace], int]] = {verb.__name__: verb for verb in _VERBS}
+VERBS["plan"] = predict  # its name before
 
 
 def main(arguments: list[str] | None = None) -> int:

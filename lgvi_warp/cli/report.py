@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,9 @@ def report(result: Any, out: Path, quiet: bool, begun: float) -> list[str]:
     Returns:
         One text for each file that could not be written.
     """
-    if result.store is not None and not complete(result):
+    from lgvi_warp.runs.store.folder import Folder
+
+    if result.store is not None and not Folder(result.store).complete:
         if not quiet:
             print(f"members     {result.members:,} of a run in parts, in {result.store}")
             print(f"next        lgvi-warp merge {out} ... --out DIR, with the folders of the other parts")
@@ -51,20 +53,6 @@ def print_faults(faults: list[str]) -> list[str]:
     for fault in faults:
         print(f"lgvi-warp: {fault}", file=sys.stderr)
     return faults
-
-
-def complete(result: Any) -> bool:
-    """Tell whether a store holds the whole run.
-
-    Args:
-        result: The result of a stored run.
-
-    Returns:
-        False for a run of some blocks only.
-    """
-    from lgvi_warp.runs.store.folder import Folder
-
-    return Folder(result.store).complete
 
 
 # Most numbers in pictures and drift, which then cover the first members: a store may be larger than the memory.
@@ -111,20 +99,14 @@ def write(result: Any, drawn: Any, out: Path) -> Written:
         writers |= {"fleet.png": lambda path: plot(drawn, path), "fleet.rrd": lambda path: log_rerun(drawn, path)}
     if drawable(result):
         writers["statistics.png"] = lambda path: plot_statistics(result, path)
-    with _in_turn(out):
+    with contextlib.ExitStack() as stack:
+        # Runs that end together in one folder write one after another, so that all files are of one of them.
+        with contextlib.suppress(OSError):  # a folder that cannot be written: each file reports it
+            stack.enter_context(write_lock(out / "result", wait=True))
         jobs = side_by_side({out / name: writer for name, writer in writers.items()})
     for path, job in jobs.items():
         written.take(path, job.result)
     return written
-
-
-@contextlib.contextmanager
-def _in_turn(out: Path) -> Iterator[None]:
-    """Let runs that end together in one folder write one after another, so that all files are of one of them."""
-    with contextlib.ExitStack() as stack:
-        with contextlib.suppress(OSError):  # a folder that cannot be written: each file reports it
-            stack.enter_context(write_lock(out / "result", wait=True))
-        yield
 
 
 def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
@@ -144,11 +126,9 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
     from lgvi_warp.statistics.table import table
 
     settings = result.provenance
-    steps = settings["steps"]
     lines = [
         *(f"note        {message}" for message in result.messages),
-        f"members     {result.members:,}, {settings['method']['name']}, {settings['dtype']}, "
-        f"step {settings['step']:g} s, {steps:,} steps",
+        members_line(result.members, settings),
         *_speed(result, seconds),
         "status      " + ", ".join(f"{name} {number:,}" for name, number in result.status.counts().items()),
     ]
@@ -169,8 +149,7 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
     if result.statistics:
         lines.append(f"statistics  at {result.time[-1]:g} s, with intervals")
         lines += [f"  {line}" for line in table(result.statistics)]
-    lines += [f"file        {path} ({size_of(path) / 1e6:.1f} MB)" for path in files]
-    return "\n".join(lines)
+    return "\n".join([*lines, *map(file_line, files)])
 
 
 # Quantities that may be conserved -> name in words, unit.
@@ -236,13 +215,30 @@ def _speed(result: Any, seconds: float) -> list[str]:
     ]
 
 
-def size_of(path: Path) -> int:
-    """Size of a file or of a folder's files.
+def members_line(members: int, provenance: dict[str, Any]) -> str:
+    """Say how many members were run, and how.
+
+    Args:
+        members: Number of members.
+        provenance: That of the run.
+
+    Returns:
+        One line.
+    """
+    return (
+        f"members     {members:,}, {provenance['method']['name']}, {provenance['dtype']}, step {provenance['step']:g} s, "
+        f"{provenance['steps']:,} steps"
+    )
+
+
+def file_line(path: Path) -> str:
+    """Name a file or a folder with its size.
 
     Args:
         path: The file or folder.
 
     Returns:
-        Its size [bytes].
+        One line.
     """
-    return path.stat().st_size if path.is_file() else size_below(path)
+    size = path.stat().st_size if path.is_file() else size_below(path)
+    return f"file        {path} ({size / 1e6:.1f} MB)"

@@ -10,7 +10,7 @@ from typing import Any
 
 from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.report import print_faults, report
-from lgvi_warp.cli.settings import block_range, folder, overrides, store_settings
+from lgvi_warp.cli.settings import block_range, folder, load_scene, store_settings
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.common.errors import Interrupted, MembersFailed, SceneError
 
@@ -31,10 +31,8 @@ def run(chosen: argparse.Namespace) -> int:
         SceneError: The scene or an argument is refused.
         Ended: The run was interrupted; the text says what is saved.
     """
-    from lgvi_warp.scene.scene import Scene
-
     begun = time.perf_counter()
-    scene = Scene.load(chosen.scene, overrides(chosen))
+    scene = load_scene(chosen)
     store, only = store_settings(chosen), block_range(chosen)
     out = folder(chosen)
     warm = _import_in_background()
@@ -226,8 +224,7 @@ def predict(chosen: argparse.Namespace) -> int:
         SceneError: The scene or an argument is refused.
     """
     from lgvi_warp.runs import predict as prediction
-    from lgvi_warp.scene.scene import Scene
 
-    scene = Scene.load(chosen.scene, overrides(chosen))
+    scene = load_scene(chosen)
     print(prediction.predict(scene, threads=chosen.threads, store=store_settings(chosen)))
     return 0

@@ -6,29 +6,21 @@ import argparse
 import errno
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lgvi_warp.common.errors import SceneError
+
+if TYPE_CHECKING:
+    from lgvi_warp.scene.scene import Scene
 
 # Name of the store in a run's folder.
 RUN = "run.zarr"
 # Command-line option -> key of the scene file that it replaces.
 OPTIONS = {
-    "method": "run.method",
-    "step": "run.step",
-    "duration": "run.duration",
-    "dtype": "run.dtype",
-    "solver": "run.solver",
-    "iterations": "run.iterations",
-    "tolerance": "run.tolerance",
-    "rtol": "run.rtol",
-    "atol": "run.atol",
-    "checks": "run.checks",
-    "on_failure": "run.on_failure",
-    "keep": "run.keep",
-    "members": "ensemble.members",
-    "seed": "ensemble.seed",
-}
+    name: f"run.{name}"
+    for name in ("method", "step", "duration", "dtype", "solver", "iterations", "tolerance", "rtol", "atol", "checks",
+                 "on_failure", "keep")
+} | {name: f"ensemble.{name}" for name in ("members", "seed")}  # fmt: skip
 
 
 def overrides(chosen: argparse.Namespace) -> dict[str, Any]:
@@ -54,6 +46,23 @@ def overrides(chosen: argparse.Namespace) -> dict[str, Any]:
             raise SceneError([f"--set {text}: has no value; write --set vehicle.mass=120"])
         changes[key.strip()] = value.strip()
     return changes
+
+
+def load_scene(chosen: argparse.Namespace) -> Scene:
+    """Load the scene file with the keys that the command line replaces.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The scene.
+
+    Raises:
+        SceneError: The scene or an argument is refused.
+    """
+    from lgvi_warp.scene.scene import Scene
+
+    return Scene.load(chosen.scene, overrides(chosen))
 
 
 def whole(text: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from lgvi_warp.cli.report import print_faults, size_of
+from lgvi_warp.cli.report import file_line, members_line, print_faults
 
 
 def merge(chosen: argparse.Namespace) -> int:
@@ -29,7 +29,7 @@ def merge(chosen: argparse.Namespace) -> int:
         kept = f"the members that it keeps are missing; lgvi-warp resume {folder.path} runs them, or says why not"
         print_faults([f"{folder.path}: {missing if blocks else kept}"])
     elif not chosen.quiet:
-        print(f"file        {folder.path} ({size_of(folder.path) / 1e6:.1f} MB), complete")
+        print(f"{file_line(folder.path)}, complete")
     return 0 if folder.complete else 1
 
 
@@ -48,7 +48,7 @@ def export(chosen: argparse.Namespace) -> int:
     from lgvi_warp.runs.store.export import export as write_as
 
     path = write_as(chosen.dir, chosen.to, chosen.out)
-    print(f"file        {path} ({size_of(path) / 1e6:.1f} MB)")
+    print(file_line(path))
     return 0
 
 
@@ -72,8 +72,7 @@ def info_of_run(path: Path) -> int:
     print(
         f"run         {contents['path']} ({contents['bytes'] / 1e6:.1f} MB), lgvi-warp {provenance['versions']['lgvi-warp']}"
     )
-    print(f"members     {contents['members']:,}, {provenance['method']['name']}, {provenance['dtype']}, "
-          f"step {provenance['step']:g} s, {provenance['steps']:,} steps")  # fmt: skip
+    print(members_line(contents["members"], provenance))
     fields = ", ".join(contents["fields"])
     print(f"samples     {contents['samples']} times" + (f" of {fields}" if fields else ", not of all members"))
     if contents["keepers"]:

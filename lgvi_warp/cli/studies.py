@@ -7,7 +7,7 @@ from typing import Any
 
 from lgvi_warp.cli.progress import part_of, shown
 from lgvi_warp.cli.report import print_faults
-from lgvi_warp.cli.settings import folder, overrides
+from lgvi_warp.cli.settings import folder, load_scene
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.errors import SceneError
@@ -43,17 +43,14 @@ def tradeoff(chosen: argparse.Namespace) -> int:
     Raises:
         SceneError: The scene or an argument is refused.
     """
-    from lgvi_warp.scene.scene import Scene
-
-    scene = Scene.load(chosen.scene, overrides(chosen))
+    scene = load_scene(chosen)
     out = folder(chosen, "_tradeoff")
-    methods = None if chosen.methods is None else [name.strip() for name in chosen.methods.split(",")]
     from lgvi_warp.studies.tradeoff import report_text
     from lgvi_warp.studies.tradeoff import tradeoff as measure
     from lgvi_warp.views.plots import plot_tradeoff
 
     with shown(chosen.quiet) as progress:
-        measurements = measure(scene, of=chosen.of, methods=methods, seconds=chosen.seconds, progress=progress)
+        measurements = measure(scene, of=chosen.of, methods=chosen.methods, seconds=chosen.seconds, progress=progress)
     written = Written(measurements.save(out))
     written.draw(plot_tradeoff, measurements, out / "tradeoff.png")
     return finish(written, report_text(measurements), chosen.quiet)
@@ -71,22 +68,19 @@ def sensitivity(chosen: argparse.Namespace) -> int:
     Raises:
         SceneError: The scene or an argument is refused.
     """
-    from lgvi_warp.scene.scene import Scene
     from lgvi_warp.studies import sensitivity as uq
     from lgvi_warp.views.sensitivity import plot_sensitivity
 
-    scene = Scene.load(chosen.scene, overrides(chosen))
+    scene = load_scene(chosen)
     out = folder(chosen, "_sensitivity")
-    of, options = chosen.of or ["position[2]"], {} if chosen.samples is None else {"samples": chosen.samples}
+    samples = {"sobol": 256, "morris": 64}[chosen.analysis] if chosen.samples is None else chosen.samples
+    options: dict[str, Any] = {"second_order": not chosen.first_order} if chosen.analysis == "sobol" else {}
     try:
         with shown(chosen.quiet) as progress:
-            settings: dict[str, Any] = {"failed": chosen.failed, "threads": chosen.threads, "progress": progress}
-            if chosen.analysis == "morris":
-                indices: uq.Indices = uq.morris(scene, of, **options, **settings)
-            else:
-                first = chosen.first_order
-                options = {"samples": 256} | options
-                indices = uq.sobol(scene, of, second_order=not first, **options, **settings)
+            indices: uq.Indices = getattr(uq, chosen.analysis)(
+                scene, chosen.of or ["position[2]"], samples=samples, failed=chosen.failed, threads=chosen.threads,
+                progress=progress, **options,
+            )  # fmt: skip
     except (uq.FailedMembers, ImportError) as error:
         return len(print_faults([str(error)]))
     written = Written(indices.save(out))
@@ -107,14 +101,11 @@ def stability(chosen: argparse.Namespace) -> int:
         SceneError: The scene or an argument is refused.
         Ended: The study was interrupted after a map was finished.
     """
-    from lgvi_warp.scene.scene import Scene
-
     if chosen.grid is not None and (chosen.x is not None or chosen.y is not None):
         raise SceneError(
             [f"--grid {chosen.grid}: names the same axes as --x and --y; leave out --grid, or both of them"]
         )
-    changes = overrides(chosen)
-    scene = Scene.load(chosen.scene, changes)
+    scene = load_scene(chosen)
     # Seed of the random directions, the only setting of the scene's ensemble that is used here.
     seed = scene.ensemble_settings.seed if scene.ensemble_settings else 0
     out = folder(chosen, "_stability")
@@ -125,14 +116,13 @@ def stability(chosen: argparse.Namespace) -> int:
     if chosen.grid:
         names = GRIDS if chosen.grid == "all" else (chosen.grid,)
         maps = {f"stability_{name}": GRIDS[name] for name in names}
-    methods = None if chosen.methods is None else [name.strip() for name in chosen.methods.split(",")]
     t1 = scene.run.duration if chosen.duration is not None else None
     written, texts = Written(), []
     with shown(chosen.quiet) as progress:
         for i, (name, (x, y)) in enumerate(maps.items()):
             try:
                 regions = stability_map(
-                    scene, x, y, methods, points=chosen.points, t1=t1, error=chosen.error, of=chosen.of, seed=seed,
+                    scene, x, y, chosen.methods, points=chosen.points, t1=t1, error=chosen.error, of=chosen.of, seed=seed,
                     progress=part_of(progress, i, len(maps)),
                 )  # fmt: skip
             except KeyboardInterrupt as error:

@@ -71,8 +71,7 @@ class Compared:
         Returns:
             Largest absolute value over times, members and components [unit].
         """
-        values = getattr(result, self.name) if self.functional is None else self.values(result)
-        return float(np.nanmax(np.abs(values)))
+        return float(np.nanmax(np.abs(self.values(result))))
 
 
 def compared_in(of: Any) -> Compared:

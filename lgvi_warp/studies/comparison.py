@@ -67,6 +67,11 @@ class Candidate:
             return self.method
         return f"{self.method} {self.solver}" + ("" if self.iterations is None else f" {self.iterations}")
 
+    @property
+    def text(self) -> str:
+        """Method, solver and dtype as a text, without step."""
+        return f"{self.name} {self.dtype}"
+
     def options(self) -> dict[str, Any]:
         """Convert the setting to arguments for lw.solve.
 
@@ -221,7 +226,7 @@ class Sample:
         """Sort methods into those that the scene takes and those that it refuses.
 
         Args:
-            methods: names; those that do not exist are left out.
+            methods: names of methods.
             dtype: precision. Default "float64".
 
         Returns:
@@ -229,10 +234,6 @@ class Sample:
         """
         good, refused = [], {}
         for name in methods:
-            try:
-                Method(name)
-            except SceneError:
-                continue
             try:
                 self.plan(self.candidate(name, 1, dtype))
                 good.append(name)
@@ -276,12 +277,9 @@ def distances(result: Result, reference: Result, asked: Compared | None = None) 
     Returns:
         Quantity -> distance (k, n) [its unit]; NaN from where an event stopped a member in either result.
     """
-    pairs = {name: (getattr(result, name).astype(np.float64), getattr(reference, name)) for name in FIELDS}
-    lengths = {
-        name: np.linalg.norm(a - b, axis=-1) for name, (a, b) in pairs.items() if name in ("position", "velocity")
-    }
-    lengths["angular_velocity"] = np.linalg.norm(np.subtract(*pairs["angular_velocity"]), axis=-1)
-    chord = np.linalg.norm(np.subtract(*pairs["attitude"]), axis=(-2, -1))
+    apart = {name: getattr(result, name).astype(np.float64) - getattr(reference, name) for name in FIELDS}
+    chord = np.linalg.norm(apart.pop("attitude"), axis=(-2, -1))
+    lengths = {name: np.linalg.norm(difference, axis=-1) for name, difference in apart.items()}
     lengths["attitude"] = 2.0 * np.arcsin(np.minimum(chord / math.sqrt(8.0), 1.0))
     lengths["energy"] = np.abs(result.energy - reference.energy)
     lengths = {name: lengths[name] for name in QUANTITIES}
@@ -320,14 +318,12 @@ class Reference:
         result: of the finer run.
         text: the two methods and their steps, in words.
         own: quantity -> (k,), largest difference of the two runs over the members and up to each time [its unit].
-        wall_seconds: time that it took [s].
         asked: quantity of the errors, where it is none of QUANTITIES.
     """
 
     result: Result
     text: str
     own: dict[str, np.ndarray]
-    wall_seconds: float
     asked: Compared | None = None
 
     def error(self, of: str, until: int = -1) -> float:
@@ -400,6 +396,19 @@ def agreement(a: Result, b: Result, asked: Compared | None = None) -> dict[str, 
     return running_maxima
 
 
+def paired(names: Sequence[str]) -> tuple[str, str]:
+    """Choose the two methods of a reference.
+
+    Args:
+        names: of methods, the best first.
+
+    Returns:
+        The two best; the best twice where the second is of much lower order.
+    """
+    first, second = names[0], names[min(1, len(names) - 1)]
+    return first, second if Method(second).order >= Method(first).order - 2 else first
+
+
 def make_reference(
     sample: Sample,
     of: str | Compared = "position",
@@ -433,9 +442,7 @@ def make_reference(
         raise SceneError(
             [f"method: the scene takes none of {', '.join(PRECISE)}; name one that it takes: methods=[...]"]
         )
-    if not methods and len(names) == 2 and Method(names[1]).order < Method(names[0]).order - 2:
-        names = names[:1]
-    first, second = names[0], names[-1]
+    first, second = (names[0], names[-1]) if methods else paired(names)
     begun = time.perf_counter()
     best: Reference | None = None
     worse, m = 0, sample.coarsest(0.5)
@@ -448,7 +455,7 @@ def make_reference(
         if best is None or end < best.error(of):
             worse = worse + 1 if best and end > 0.5 * best.error(of) and end < LOST else 0
             text = f"{second} at h = {sample.h(finer):.4g} s against {first} at h = {sample.h(m):.4g} s"
-            best = Reference(runs[1], text, disagreement, time.perf_counter() - begun, compared)
+            best = Reference(runs[1], text, disagreement, compared)
         else:
             worse += best.error(of) < LOST
         begun += sum(run.compile_seconds for run in runs)
@@ -506,11 +513,12 @@ def growth(sample: Sample, candidate: Candidate) -> Growth:
     members = fleet.select(0, fleet.members)
     turn = np.random.default_rng(0).normal(size=(fleet.members, 3))
     turn *= NUDGE / np.linalg.norm(turn, axis=1, keepdims=True)
-    states = (members.position, members.velocity, members.angular_velocity)
     varied = {k: v for k, v in members.parameters.items() if len(v) == fleet.members and len(v) > 1}
     runs = []
     for R in (members.attitude, members.attitude @ notation.matrix_from_rotation_vector(turn)):
-        nudged = Ensemble.from_states(fleet.scene, states[0], R, *states[1:], varied)
+        nudged = Ensemble.from_states(
+            fleet.scene, members.position, R, members.velocity, members.angular_velocity, varied
+        )
         nudged.indices, nudged.seed = fleet.indices, fleet.seed
         runs.append(sample.run(candidate, nudged))
     apart = distances(runs[0], runs[1])

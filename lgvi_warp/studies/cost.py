@@ -50,11 +50,6 @@ class Cost:
     us_per_vehicle_second: float
     spread: float
 
-    @property
-    def doubtful(self) -> bool:
-        """Whether the readings of this cost disagree."""
-        return self.spread > DISAGREE
-
 
 def costs(plans: Sequence[Plan], rounds: int = 5) -> list[Cost]:
     """Measure the cost of plans, with one number for all plans that run the same kernel.
@@ -115,11 +110,8 @@ def of_steps(kinds: Sequence[Kind], seconds: np.ndarray) -> list[tuple[float, fl
         bounding = _bounding(kind, kinds, seconds)
         least = float(np.nanmin(bounding))
         # Longer steps may truly cost more, so only readings of this very step can disagree.
-        alike = (
-            seconds[[candidate.kernel == kind.kernel and candidate.h == kind.h for candidate in kinds]]
-            if kind.grows
-            else bounding
-        )
+        same = [candidate.kernel == kind.kernel and candidate.h == kind.h for candidate in kinds]
+        alike = seconds[same] if kind.grows else bounding
         prices.append((least, float(np.nanmedian(alike) / np.nanmin(alike))))
     return prices
 
@@ -208,19 +200,19 @@ def work_grows(plan: Plan) -> bool:
     return bool(spec.gauss) or spec.averages is not None or newton or plan.method.adaptive
 
 
-def disagreement(priced: Sequence[tuple[str, Cost]]) -> str | None:
+def disagreement(spreads: Sequence[tuple[str, float]]) -> str | None:
     """Write the message about costs whose readings disagree.
 
     Args:
-        priced: (name of the setting, its cost) of each.
+        spreads: (name of the setting, median of its readings over the least) of each.
 
     Returns:
         The message; None where all readings agree.
     """
     worst: dict[str, float] = {}
-    for name, cost in priced:
-        if cost.doubtful:
-            worst[name] = max(worst.get(name, 1.0), cost.spread)
+    for name, spread in spreads:
+        if spread > DISAGREE:
+            worst[name] = max(worst.get(name, 1.0), spread)
     if not worst:
         return None
     ranked = sorted(worst, key=lambda name: -worst[name])

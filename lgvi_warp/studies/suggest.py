@@ -164,15 +164,8 @@ def suggest(
         raise SceneError([f"{problem}; use lgvi-warp tradeoff, which compares statistics"])
     reference = checked_reference(sample, compared, error, 0.4 * seconds, taken)
     report(0.3)
-    trials = search(
-        sample,
-        taken,
-        reference,
-        compared,
-        error / SAFETY,
-        time.perf_counter() + 0.6 * seconds,
-        lambda x: report(0.3 + 0.5 * x),
-    )
+    deadline = time.perf_counter() + 0.6 * seconds
+    trials = search(sample, taken, reference, compared, error / SAFETY, deadline, lambda part: report(0.3 + 0.5 * part))
     if not trials:
         problem = f"error = {error:g} {compared.unit} of {compared.name}: no step of {', '.join(taken)} kept it"
         raise SceneError([f"{problem}; ask for a larger error, a shorter t1, or give more seconds"])
@@ -183,16 +176,10 @@ def suggest(
         refined(more, trial.candidate, reference, compared.name, error / SAFETY**0.5) for trial in trials[:FINALISTS]
     ]
     final = [trial for trial in final if trial.error(compared.name) <= error] or final[:1]
-    readings = cost.costs([trial.plan for trial in final], rounds=ROUNDS)
-    prices = [reading.us_per_vehicle_second for reading in readings]
-    text = cost.disagreement(
-        [
-            (f"{trial.candidate.name} {trial.candidate.dtype}", price)
-            for trial, price in zip(final, readings, strict=True)
-        ]
-    )
-    order = sorted(range(len(final)), key=prices.__getitem__)
-    best, price = final[order[0]], prices[order[0]]
+    priced = list(zip(final, cost.costs([trial.plan for trial in final], rounds=ROUNDS), strict=True))
+    text = cost.disagreement([(trial.candidate.text, price.spread) for trial, price in priced])
+    priced.sort(key=lambda pair: pair[1].us_per_vehicle_second)
+    best, price = priced[0]
     ensemble = sample.whole
     used = min(threads or machine.thread_count(), len(blocks(ensemble.members)))
     report(1.0)
@@ -203,7 +190,7 @@ def suggest(
         of=compared.name,
         unit=compared.unit,
         expected=best.error(compared.name),
-        us_per_vehicle_second=price,
+        us_per_vehicle_second=price.us_per_vehicle_second,
         run_seconds=seconds_of(ensemble, best.candidate, sample.t1) / used,
         threads=used,
         memory_bytes=memory_of(ensemble, best.candidate, sample.t1),
@@ -211,7 +198,10 @@ def suggest(
         t1=sample.t1,
         reference=reference.text,
         reference_error=reference.error(compared.name),
-        rivals=tuple((final[i].candidate, prices[i], final[i].error(compared.name)) for i in order[1:]),
+        rivals=tuple(
+            (rival.candidate, rival_price.us_per_vehicle_second, rival.error(compared.name))
+            for rival, rival_price in priced[1:]
+        ),
         worst=worst_of(best, reference, compared.name),
         asked=compared,
         messages=(text,) if text else (),

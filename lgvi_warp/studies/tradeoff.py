@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import time
@@ -14,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError
-from lgvi_warp.common.tables import write_csv
 from lgvi_warp.engine.plan import DTYPES, Plan
 from lgvi_warp.methods.method import COMPOSITIONS, PROGRAMS, Method
 from lgvi_warp.physics import energy as invariants
@@ -24,9 +22,10 @@ from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies import comparison, cost
 from lgvi_warp.studies.compared import QUANTITIES, Compared, compared_in
 from lgvi_warp.studies.comparison import Candidate, Growth, Reference, Sample
+from lgvi_warp.studies.files import Saved, finite_or_none
 from lgvi_warp.studies.speed import void
 
-# Tried in this order; names that this version does not know, or that a scene refuses, are left out.
+# Tried in this order; those that a scene refuses are left out.
 CANDIDATES = ("kl8(psi_x)", "psi_x", "psi_s", "su4(psi_x)", "kl6(psi_x)", "rk8", "su8_15(psi_x)", "ss6_13(psi_x)",
               "rkn6_11", "rkn6_14", "bm6(psi_x)", "bm4(psi_x)", "rk5", "rk4", "psi_1", "psi", "psi_w", "kl8(psi_s)",
               "kl6(psi_s)", "su4(psi_s)", "phi")  # fmt: skip
@@ -85,7 +84,7 @@ class Measurement:
 
 
 @dataclass(frozen=True, eq=False)
-class Tradeoff:
+class Tradeoff(Saved):
     """Measurements of settings on a sample of an ensemble, from 0 to t1.
 
     Attributes:
@@ -156,20 +155,7 @@ class Tradeoff:
         Returns:
             All fields, and "front", the settings on the Pareto front; numbers that are not finite are None.
         """
-        content = asdict(replace(self, growth=None))
-        if self.growth is not None:
-            content["growth"] = {key: value.tolist() if isinstance(value, np.ndarray) else value
-                                 for key, value in vars(self.growth).items()}  # fmt: skip
-        content["front"] = [asdict(measurement.setting) for measurement in self.front()]
-        return finite_or_none(content)
-
-    def to_json(self) -> str:
-        """Convert the trade-off to a JSON text.
-
-        Returns:
-            The text of `to_dict`; numbers that are not finite are null.
-        """
-        return json.dumps(self.to_dict(), indent=1, allow_nan=False)
+        return finite_or_none(asdict(self) | {"front": [asdict(measurement.setting) for measurement in self.front()]})
 
     def rows(self) -> list[dict[str, Any]]:
         """Flatten the measurements to one record each, as the CSV file has them.
@@ -193,20 +179,6 @@ class Tradeoff:
             rows.append(row | {f"bias_{name}": value for name, value in measurement.biases.items()})
         return rows
 
-    def to_csv(self, path: str | os.PathLike[str]) -> Path:
-        """Write the rows to a CSV file.
-
-        Args:
-            path: of the file.
-
-        Returns:
-            Path of the file.
-
-        Raises:
-            OSError: where it cannot be written.
-        """
-        return write_csv(self.rows(), path)
-
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write tradeoff.json and tradeoff.csv into a folder, which is made if needed.
 
@@ -219,31 +191,10 @@ class Tradeoff:
         Raises:
             OSError: where they cannot be written.
         """
-        target = Path(folder)
-        target.mkdir(parents=True, exist_ok=True)
-        (target / "tradeoff.json").write_text(self.to_json())
-        return [target / "tradeoff.json", self.to_csv(target / "tradeoff.csv")]
+        return self._save(folder, "tradeoff")
 
 
 KINDS = ("end_max", "end_rms", "path_max", "path_rms")
-
-
-def finite_or_none(value: Any) -> Any:
-    """Replace numbers that are not finite by None, so that JSON can hold the value.
-
-    Args:
-        value: a number, a text, None, or nested dicts, lists and tuples of them.
-
-    Returns:
-        The same with plain floats, and with lists in place of tuples.
-    """
-    if isinstance(value, dict):
-        return {key: finite_or_none(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite_or_none(item) for item in value]
-    if isinstance(value, float | np.floating):
-        return float(value) if math.isfinite(value) else None
-    return value
 
 
 @dataclass(eq=False)
@@ -319,28 +270,12 @@ def costs(plans: Sequence[Plan], rounds: int = 5) -> list[float]:
     return [price.us_per_vehicle_second for price in cost.costs(plans, rounds)]
 
 
-def known(name: str) -> bool:
-    """Tell whether a method of this name exists.
-
-    Args:
-        name: of a method, such as "psi_s" or "kl8(psi_x)".
-
-    Returns:
-        True if `lw.Method` knows the name.
-    """
-    try:
-        Method(name)
-    except SceneError:
-        return False
-    return True
-
-
 def chosen_methods(methods: Sequence[str] | None, default: Sequence[str] = CANDIDATES) -> tuple[str, ...]:
     """Check the names of the methods to try.
 
     Args:
         methods: names; None for the default ones.
-        default: names used for None; those that do not exist are left out.
+        default: names used for None.
 
     Returns:
         Names of methods that exist.
@@ -349,10 +284,12 @@ def chosen_methods(methods: Sequence[str] | None, default: Sequence[str] = CANDI
         SceneError: for names that do not exist, and for an empty list.
     """
     if methods is None:
-        return tuple(name for name in default if known(name))
+        return tuple(default)
     faults = Faults()
     for name in methods:
-        if not known(name):
+        try:
+            Method(name)
+        except SceneError:
             some = ", ".join((*PROGRAMS, *(f"{composition}(psi_s)" for composition in COMPOSITIONS)))
             faults.add("methods", name, "is not known", f"known: {some}")
     if not methods:
@@ -431,14 +368,7 @@ def tradeoff(
             f"no time for {', '.join(skipped)}: run again, the kernels are compiled now, or give more seconds"
         )
     measured = measurements(sample, trials, reference, finest, until, compared)
-    prices = [
-        (
-            f"{measurement.setting.name} {measurement.setting.dtype}",
-            cost.Cost(measurement.us_per_vehicle_second, measurement.cost_spread),
-        )
-        for measurement in measured
-    ]
-    doubt = cost.disagreement(prices)
+    doubt = cost.disagreement([(measurement.setting.text, measurement.cost_spread) for measurement in measured])
     messages += [doubt] if doubt else []
     report(1.0)
     return Tradeoff(
@@ -530,13 +460,12 @@ def sweep(
     for i, (method, dtype, solver) in enumerate(ladders):
         report(i / len(ladders))
         if time.perf_counter() > latest:
-            skipped.append(f"{sample.candidate(method, 1, dtype, solver).name} {dtype}")
+            skipped.append(sample.candidate(method, 1, dtype, solver).text)
             continue
         m, best, worse = sample.coarsest(1.0), math.inf, 0
         for k in range(20 if reference else 5):
             if time.perf_counter() > deadline:
-                name = sample.candidate(method, m, dtype, solver).name
-                skipped.append(f"{name} {dtype}" + (" at fine steps" if k else ""))
+                skipped.append(sample.candidate(method, m, dtype, solver).text + (" at fine steps" if k else ""))
                 break
             trial = tried(sample, sample.candidate(method, m, dtype, solver), reference, until)
             trials.append(trial)
@@ -728,15 +657,9 @@ def bias_lines(found: Tradeoff) -> list[str]:
         (measurement for measurement in double if measurement.setting.name == name),
         key=lambda measurement: -measurement.setting.h,
     )
-    columns = [
-        "position_mean",
-        "position_std",
-        "attitude_mean",
-        "velocity_mean",
-        "energy_mean",
-        "angular_momentum_mean",
-    ]
-    heads = ["position mean", "position std", "attitude mean", "velocity mean", "energy mean", "ang.mom. mean"]
+    means = ("attitude", "velocity", "energy", "angular_momentum")
+    columns = ["position_mean", "position_std", *(f"{name}_mean" for name in means)]
+    heads = [column.replace("angular_momentum", "ang.mom.").replace("_", " ") for column in columns]
     if found.of not in QUANTITIES and any(f"{found.of}_mean" in measurement.biases for measurement in chosen):
         columns, heads = [f"{found.of}_mean", *columns], [f"{found.of} mean", *heads]
     title = f"Bias of statistics up to {found.t1:g} s by {name}, in standard errors of {found.members} members"

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from lgvi_warp.statistics.estimate import Estimate
     from lgvi_warp.studies.stability.grid import Line
     from lgvi_warp.studies.stability.map import StabilityMap
-    from lgvi_warp.studies.tradeoff import Tradeoff
+    from lgvi_warp.studies.tradeoff import Measurement, Tradeoff
 
 # Bands of the fan, outermost first: lower quantile, upper quantile, opacity.
 BANDS = ((0.0, 1.0, 0.15), (0.05, 0.95, 0.25), (0.25, 0.75, 0.4))
@@ -262,16 +262,9 @@ def _histogram_panel(axes: Any, one: Estimate) -> None:
     axes.figure.colorbar(drawn, ax=axes, label="fraction of members")
 
 
-_PANEL = {
-    "quantiles": _levels_panel,
-    "mean": _lines_panel,
-    "circular_mean": _lines_panel,
-    "exceedance": _lines_panel,
-    "first_passage": _lines_panel,
-    "outcome": _lines_panel,
-    "extremes": _extremes_panel,
-    "histogram": _histogram_panel,
-}
+_LINES = ("mean", "circular_mean", "exceedance", "first_passage", "outcome")
+_PANEL = {"quantiles": _levels_panel, "extremes": _extremes_panel, "histogram": _histogram_panel}
+_PANEL |= dict.fromkeys(_LINES, _lines_panel)
 
 
 def _paths(axes: Any, result: Result) -> None:
@@ -325,33 +318,30 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None 
     cost_axes, bias_axes = figure.subplots(1, 2)
     figure.subplots_adjust(left=0.055, right=0.83, bottom=0.09, top=0.88, wspace=0.2)
     shown = found.shown(of)
-    groups: dict[tuple[str, str], list[Any]] = {}
+    groups: dict[tuple[str, str], list[Measurement]] = {}
     for point in found.measurements:
         groups.setdefault((point.setting.name, point.setting.dtype), []).append(point)
     names = list(dict.fromkeys(name for name, _ in groups))
     for (name, dtype), members in groups.items():
         i = names.index(name)
-        single = dtype != "float64"
         style = {
             "color": COLORS[i % len(COLORS)],
             "marker": MARKERS[i % len(MARKERS)],
             "markersize": 4.5,
             "linewidth": 1.0,
         }
-        style |= {"linestyle": "--", "markerfacecolor": "white"} if single else {}
-        line = sorted((point for point in members if point in shown), key=lambda point: point.setting.h)
-        costs = [point.us_per_vehicle_second for point in line]
-        cost_axes.plot(
-            [point.error(of) for point in line], costs, label=f"{name}, {dtype}" if single else name, **style
-        )
-        biased = sorted((point for point in members if point.biases), key=lambda point: point.setting.h)
-        key = f"{of}_mean" if of != "energy" else "energy_mean"
-        bias_axes.plot(
-            [point.setting.h for point in biased], [point.biases.get(key, np.nan) for point in biased], **style
-        )
-    front = found.front(of)
-    cost_axes.plot([point.error(of) for point in front], [point.us_per_vehicle_second for point in front], color="black",
-                   linewidth=5, alpha=0.2, solid_capstyle="round", label="cheapest for each error", zorder=0)  # fmt: skip
+        label = name
+        if dtype != "float64":
+            style |= {"linestyle": "--", "markerfacecolor": "white"}
+            label = f"{name}, {dtype}"
+        members.sort(key=lambda point: point.setting.h)
+        line = [point for point in members if point in shown]
+        cost_axes.plot(*_errors_and_costs(line, of), label=label, **style)
+        biased = [point for point in members if point.biases]
+        biases = [point.biases.get(f"{of}_mean", np.nan) for point in biased]
+        bias_axes.plot([point.setting.h for point in biased], biases, **style)
+    cost_axes.plot(*_errors_and_costs(found.front(of), of), color="black", linewidth=5, alpha=0.2, solid_capstyle="round",
+                   label="cheapest for each error", zorder=0)  # fmt: skip
     cost_axes.set(xlabel=f"largest error of {of} [{found.units[of]}], up to {found.until:g} s",
                   ylabel="microseconds of one core per vehicle and simulated second", title="Cost of accuracy")  # fmt: skip
     bias_axes.set(xlabel="step [s]", ylabel=f"bias / standard error of {found.members} members",
@@ -370,18 +360,16 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None 
     bias_axes.text(0.01, 1.6, "chance", fontsize="small", transform=bias_axes.get_yaxis_transform())
     for axes in (cost_axes, bias_axes):
         axes.grid(True, alpha=0.3)
-    figure.legend(
-        *cost_axes.get_legend_handles_labels(),
-        loc="center left",
-        bbox_to_anchor=(0.838, 0.5),
-        fontsize="x-small",
-        ncols=2,
-    )
-    title = (
-        f"{found.members} members, 0 to {found.t1:g} s; reference {found.reference}; better is to the right and down"
-    )
-    figure.suptitle(title, fontsize="medium")
+    handles, labels = cost_axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="center left", bbox_to_anchor=(0.838, 0.5), fontsize="x-small", ncols=2)
+    sample = f"{found.members} members, 0 to {found.t1:g} s"
+    figure.suptitle(f"{sample}; reference {found.reference}; better is to the right and down", fontsize="medium")
     return save_figure(figure, path, 100)
+
+
+def _errors_and_costs(points: list[Measurement], of: str) -> tuple[list[float], list[float]]:
+    """Coordinates of settings in the picture of costs."""
+    return [point.error(of) for point in points], [point.us_per_vehicle_second for point in points]
 
 
 # Colours of stability_map's classes, distinct for every kind of colour vision and in grey; silent failures are hatched.

@@ -26,11 +26,7 @@ TRAILS = 40
 FRAMES = 20
 TIMELINE = "sim_time"
 # Name, quantile and colour of each curve.
-CURVES = (
-    ("smallest", 0.0, (120, 150, 190)),
-    ("median", 0.5, (255, 200, 60)),
-    ("largest", 1.0, (190, 120, 120)),
-)
+CURVES = (("smallest", 0.0, (120, 150, 190)), ("median", 0.5, (255, 200, 60)), ("largest", 1.0, (190, 120, 120)))
 
 
 def log_rerun(result: Result, path: str | os.PathLike[str]) -> Path:
@@ -96,10 +92,8 @@ def _world(
     recording.log("world", rr.ViewCoordinates.FRD, static=True, strict=True)
     quaternion = notation.quaternion_from_matrix(result.attitude[:, shown])[..., [1, 2, 3, 0]].astype(np.float32)
     size = max(_extent(position)) * 0.02
-    status = np.asarray(result.status)[shown]
-    groups = {"fleet": (Status.OK, counted)}
-    groups |= {code.name.lower(): (code, ~counted & (status == code)) for code in outcomes(result) if code}
-    for name, (code, visible) in groups.items():
+    for code, visible in _groups(result, np.asarray(result.status)[shown], counted):
+        name = code.name.lower() if code else "fleet"
         if visible.any():
             recording.log(f"world/{name}", _body(rr, size, LOOKS[code].rgb), static=True, strict=True)
             _poses(recording, rr, f"world/{name}", result.time, position, quaternion, visible)
@@ -144,18 +138,8 @@ def _body(rr: Any, size: float, color: tuple[int, int, int]) -> Any:
     """A spindle along the body's x axis, with a bright nose and a fin on its upper side, which show its attitude."""
     s = 0.18 * size
     points = [(size, 0, 0), (0, s, 0), (0, 0, s), (0, -s, 0), (0, 0, -s), (-size, 0, 0), (-size, 0, -2.5 * s)]
-    faces = [
-        (0, 1, 2),
-        (0, 2, 3),
-        (0, 3, 4),
-        (0, 4, 1),
-        (5, 2, 1),
-        (5, 3, 2),
-        (5, 4, 3),
-        (5, 1, 4),
-        (4, 6, 5),
-        (4, 5, 6),
-    ]
+    ring = [(i, i % 4 + 1) for i in range(1, 5)]
+    faces = [(0, i, j) for i, j in ring] + [(5, j, i) for i, j in ring] + [(4, 6, 5), (4, 5, 6)]
     colors = [(255, 255, 255)] + [color] * 5 + [(255, 200, 60)]
     return rr.Mesh3D(vertex_positions=points, triangle_indices=faces, vertex_colors=colors)
 
@@ -181,13 +165,16 @@ def _fan(recording: Any, rr: Any, time: np.ndarray, name: str, values: np.ndarra
 
 def _members(recording: Any, rr: Any, result: Result, counted: np.ndarray) -> None:
     """Log how many members are under way at each time, and how many ended, by outcome."""
-    status = np.asarray(result.status)
-    numbers = {"under way": (Status.OK, counted.sum(axis=1))}
-    for code in outcomes(result):
-        if code:
-            numbers[code.name.lower()] = code, (~counted & (status == code)).sum(axis=1)
-    for name, (code, row) in numbers.items():
-        _series(recording, rr, f"members/{name.replace(' ', '_')}", result.time, row, name, LOOKS[code].rgb)
+    for code, group in _groups(result, np.asarray(result.status), counted):
+        name = code.name.lower() if code else "under way"
+        entity = f"members/{name.replace(' ', '_')}"
+        _series(recording, rr, entity, result.time, group.sum(axis=1), name, LOOKS[code].rgb)
+
+
+def _groups(result: Result, status: np.ndarray, counted: np.ndarray) -> list[tuple[Status, np.ndarray]]:
+    """Masks (k, m) of the members under way, as OK, and of those that ended, by outcome."""
+    ended = ((code, ~counted & (status == code)) for code in outcomes(result) if code)
+    return [(Status.OK, counted), *ended]
 
 
 def _series(

@@ -99,12 +99,7 @@ class ScalarModel:
             for distribution in self._single_distributions(variation):
                 described = _salib_distribution(*distribution)
                 if described is None:
-                    faults.add(
-                        f'"{variation.key}"',
-                        variation.distribution,
-                        "is unknown to SALib",
-                        "use levels=True",
-                    )
+                    faults.add(f'"{variation.key}"', variation.distribution, "is unknown to SALib", "use levels=True")
                     break
                 kinds.append(described[0])
                 bounds.append(described[1])
@@ -252,10 +247,9 @@ def _salib_distribution(distribution: Any, base: Any, numbers: Mapping[str, Any]
     if distribution.kind == "normal":
         return "norm", [mean, float(numbers["std"] if "std" in numbers else abs(base) * numbers["relative"])]
     if distribution.kind == "uniform":
-        scalar = np.ndim(distribution.high) == 0
-        low, high = (float(distribution.quantile(np.array([u]), np.array(base)).reshape(-1)[0]) if scalar else None
-                     for u in (0.0, 1.0))  # fmt: skip
-        if low is None or high is None:
+        if np.ndim(distribution.high) == 0:
+            low, high = (float(distribution.quantile(np.array([u]), np.array(base)).reshape(-1)[0]) for u in (0.0, 1.0))
+        else:
             low, high = float(numbers["low"]), float(numbers["high"])
         return "unif", [low, high]
     if distribution.kind == "lognormal" and float(numbers.get("median", base)) > 0.0:

@@ -62,7 +62,7 @@ def sobol(
         SceneError: for faulty arguments, all in one message.
         FailedMembers: where members failed and the indices cannot be computed from the others.
     """
-    _check(samples, 2, confidence, resamples, failed)
+    _check(samples, confidence, resamples, failed)
     design = Saltelli(second_order)
     fleet = _designed(scene, vary, seed, design, samples)
     outputs = evaluate(fleet, of, **settings)
@@ -149,7 +149,7 @@ def morris(
         SceneError: for faulty arguments, all in one message.
         FailedMembers: where members failed and the effects cannot be computed from the others.
     """
-    _check(samples, 2, confidence, resamples, failed)
+    _check(samples, confidence, resamples, failed)
     fleet = _designed(scene, vary, seed, Morris(levels), samples)
     outputs = evaluate(fleet, of, **settings)
     return morris_of(fleet, outputs, confidence=confidence, resamples=resamples, failed=failed)
@@ -223,11 +223,11 @@ def _common(
     }
 
 
-def _check(samples: Any, least: int, confidence: Any, resamples: Any, failed: Any) -> None:
+def _check(samples: Any, confidence: Any, resamples: Any, failed: Any) -> None:
     faults = Faults()
-    for name, value, low in (("samples", samples, least), ("resamples", resamples, 2)):
-        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < low:
-            faults.add(name, value, f"is not a whole number from {low}", f"give {low} or more")
+    for name, value in (("samples", samples), ("resamples", resamples)):
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 2:
+            faults.add(name, value, "is not a whole number from 2", "give 2 or more")
     number = faults.number("confidence", confidence)
     if number is not None and not 0.0 < number < 1.0:
         faults.add("confidence", confidence, "is not between 0 and 1", "give a level, such as 0.95")

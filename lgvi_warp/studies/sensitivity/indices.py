@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.tables import write_csv
+from lgvi_warp.studies.files import finite_or_none
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,10 +95,9 @@ class Indices:
             All fields and rows; numbers that are not finite are None.
         """
         names = ("name", "factors", "quantities", "samples", "members", "failed", "confidence", "messages")
-        numbers = {name: _plain(getattr(self, name)) for name in ("mean", "std")}
-        return {name: _plain(getattr(self, name)) for name in names} | numbers | {
-            "rows": [{key: _plain(value) for key, value in row.items()} for row in self.rows()], "provenance": self.provenance
-        }  # fmt: skip
+        content = {name: getattr(self, name) for name in (*names, "mean", "std")}
+        content["rows"] = list(self.rows())
+        return finite_or_none(content) | {"provenance": self.provenance}
 
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write sensitivity.txt, .csv and .json into a folder, which is made if needed.
@@ -118,14 +118,6 @@ class Indices:
         write_csv(list(self.rows()), paths[1])
         paths[2].write_text(json.dumps(self.to_dict(), indent=1), encoding="utf-8")
         return paths
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray | list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else None
-    return value
 
 
 @dataclass(frozen=True, eq=False)

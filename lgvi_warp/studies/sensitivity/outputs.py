@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.status import Status, failed
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.physics.fields import FIELDS
@@ -127,13 +127,7 @@ def _samples(scene: SceneLike, asked: Sequence[OfResult], save: SaveAt | None) -
     fields = tuple(name for name in FIELDS if any(name in interest.fields for interest in asked))
     paths = [interest.label for interest in asked if interest.over_path]
     if paths and scene.run.save_every is None:
-        faults = Faults()
-        faults.add(
-            "save",
-            None,
-            f"is missing, and {paths[0]} looks over the path",
-            "give save=lw.SaveAt(every=...) or [run] save_every",
-        )
-        faults.raise_if_any()
+        problem = f"save = None: is missing, and {paths[0]} looks over the path"
+        raise SceneError([f"{problem}; give save=lw.SaveAt(every=...) or [run] save_every"])
     has_function = any(interest.is_function for interest in asked)
     return SaveAt(every=scene.run.save_every if paths or has_function else None, fields=fields)

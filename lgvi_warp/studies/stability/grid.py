@@ -13,6 +13,7 @@ from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.physics import notation, vehicle
 from lgvi_warp.physics.fields import FIELDS, TABLE
 from lgvi_warp.physics.terms.drag import Drag
+from lgvi_warp.runs.store.layout import parameter_units
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.stability import limits as stability_limits
@@ -25,6 +26,8 @@ SPECIAL = {
     "added_mass_ratio": ("1", "largest added mass / mass"),
     "drag_number": ("1/s", "largest drag rate (l + 2 q |v|) / I"),
 }
+# Their units in pictures; stores write them another way.
+ENVIRONMENT = {"environment.gravity": "m/s2", "environment.water_density": "kg/m3"}
 ALIASES = {"start.angular_velocity": "angular_velocity", "start.velocity": "speed", "omega": "angular_velocity"}
 # Largest number of starts of all cells: some gigabytes.
 MOST_MEMBERS = 10_000_000
@@ -302,18 +305,8 @@ class StabilityGrid:
         elif self.scaled(axis):
             unit, label = "1", f"{axis.key} / the scene's"
         else:
-            unit, label = self._unit(axis.key), axis.key
+            unit, label = ENVIRONMENT.get(axis.key) or parameter_units(self.scene)[axis.key], axis.key
         return Line(axis.key, label, unit, axis.log, values)
-
-    def _unit(self, key: str) -> str:
-        section, name = key.rsplit(".", 1)
-        if section == "vehicle":
-            return vehicle.UNITS.get(name, "")
-        if section == "environment":
-            return {"gravity": "m/s2", "water_density": "kg/m3"}[name]
-        terms = (term for term in (*self.scene.terms, *self.scene.events) if term.key == section)
-        units = {field.name: str(field.metadata["unit"]) for term in terms for field in term.number_fields()}
-        return units.get(name, "")
 
     @property
     def lines(self) -> tuple[Line, Line]:
@@ -442,8 +435,7 @@ def _rotations(rng: np.random.Generator, n: int) -> np.ndarray:
 def _prepared(scene: Scene, names: Sequence[str]) -> Scene:
     """Copy the scene without its ensemble; add drag on every axis where the map varies drag and there is none."""
     terms = list(scene.terms)
-    plain = Scene.parameters(scene)
-    if "drag_number" in names and not stability_limits.drag_keys({key: value[None] for key, value in plain.items()}):
-        I6 = vehicle.inertia6({key: np.asarray(value)[None] for key, value in plain.items()})
-        terms.append(Drag(linear=np.diag(I6[0])))
+    parameters = {key: np.asarray(value)[None] for key, value in scene.parameters().items()}
+    if "drag_number" in names and not stability_limits.drag_keys(parameters):
+        terms.append(Drag(linear=np.diag(vehicle.inertia6(parameters)[0])))
     return replace(scene, ensemble_settings=None, terms=terms)

@@ -26,7 +26,6 @@ STEP, MOST = 1e-3, 30.0
 # the three axes follow one another; only that about the oscillation's own axis, R1 or R3 (twice a step), counts.
 TURNS = ("D", "W", "R1", "A")
 MOMENTS = {"munk": ("T", "Ap", "B"), "restoring": ("K", "B")}
-OSCILLATIONS = tuple(MOMENTS)
 
 
 def _oscillator(method: Method, moments: tuple[str, ...]) -> list[tuple[bool, float]]:

@@ -17,11 +17,11 @@ import numpy as np
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.status import Status, failed, stopped
-from lgvi_warp.common.tables import write_csv
 from lgvi_warp.engine import plan
 from lgvi_warp.runs.provenance import provenance
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.compared import QUANTITIES, compared_in
+from lgvi_warp.studies.files import Saved, finite_or_none
 from lgvi_warp.studies.speed import void
 from lgvi_warp.studies.stability.grid import Line, StabilityGrid
 from lgvi_warp.studies.stability.limits import LIMITS
@@ -37,7 +37,7 @@ from lgvi_warp.studies.stability.runs import (
     refusals,
     run_method,
 )
-from lgvi_warp.studies.tradeoff import chosen_methods, finite_or_none
+from lgvi_warp.studies.tradeoff import chosen_methods
 
 METHODS = ("psi", "psi_s", "psi_x", "rk4")
 # Name of a map -> its two axes.
@@ -73,7 +73,7 @@ TEXTS = {
 
 
 @dataclass(frozen=True, eq=False)
-class StabilityMap:
+class StabilityMap(Saved):
     """Classes of cells over two axes, for each method.
 
     Attributes:
@@ -189,12 +189,9 @@ class StabilityMap:
         Returns:
             All fields, with "limits" and "legend"; numbers that are not finite are None.
         """
-        content = {name: value for name, value in vars(self).items() if name not in ("x", "y", *ARRAYS, "ratios")}
-        content |= {"x": self.x.to_dict(), "y": self.y.to_dict(), "messages": list(self.messages)}
-        for name in ARRAYS:
-            content[name] = {method: values.tolist() for method, values in getattr(self, name).items()}
-        content["ratios"] = {method: {limit: values.tolist() for limit, values in by_limit.items()}
-                             for method, by_limit in self.ratios.items()}  # fmt: skip
+        last = {"x": self.x.to_dict(), "y": self.y.to_dict()}
+        last |= {name: getattr(self, name) for name in (*ARRAYS, "ratios")}
+        content = {name: value for name, value in vars(self).items() if name not in last} | last
         content["limits"] = {method: self.limit(method).tolist() for method in self.methods}
         content["legend"] = {str(int(cell)): f"{cell.name.lower()}: {cell.text}" for cell in Cell}
         return dict(finite_or_none(content))
@@ -242,33 +239,18 @@ class StabilityMap:
         rows = []
         for method in self.methods:
             for i, j in np.ndindex(self.classes[method].shape):
-                row = {"method": method, self.x.name: self.x.values[j], self.y.name: self.y.values[i]}
-                row |= {
+                row = {
+                    "method": method,
+                    self.x.name: self.x.values[j],
+                    self.y.name: self.y.values[i],
                     "class": Cell(int(self.classes[method][i, j])).name.lower(),
                     f"error_{self.of}": self.errors[method][i, j],
-                }
-                row |= {
                     "energy_growth": self.energies[method][i, j],
                     "status": status_name(int(self.statuses[method][i, j])),
                 }
-                rows.append(
-                    row | {f"h_over_{name}_limit": values[i, j] for name, values in self.ratios[method].items()}
-                )
+                ratios = {f"h_over_{name}_limit": values[i, j] for name, values in self.ratios[method].items()}
+                rows.append(row | ratios)
         return rows
-
-    def to_csv(self, path: str | os.PathLike[str]) -> Path:
-        """Write the rows to a CSV file.
-
-        Args:
-            path: of the file.
-
-        Returns:
-            Path of the file.
-
-        Raises:
-            OSError: where it cannot be written.
-        """
-        return write_csv(self.rows(), path)
 
     def save(self, folder: str | os.PathLike[str], name: str = "stability") -> list[Path]:
         """Write NAME.json and NAME.csv into a folder, which is made if needed.
@@ -283,10 +265,7 @@ class StabilityMap:
         Raises:
             OSError: where they cannot be written.
         """
-        target = Path(folder)
-        target.mkdir(parents=True, exist_ok=True)
-        (target / f"{name}.json").write_text(json.dumps(self.to_dict(), indent=1, allow_nan=False))
-        return [target / f"{name}.json", self.to_csv(target / f"{name}.csv")]
+        return self._save(folder, name)
 
 
 # Fields that hold an array (ny, nx) for each method, and its type.
@@ -476,8 +455,13 @@ def cells_of(one: Found, verified: np.ndarray, error: float, energy_bound: float
     unbounded = ~(one.growth / energy_bound <= 1.0)
     flagged = one.warned | failed(one.status)
     accurate = verified & (one.error <= error)
-    quiet = np.where(accurate, Cell.ACCURATE, Cell.BOUNDED)
-    return np.where(unbounded, np.where(flagged, Cell.FAILED, Cell.SILENT), np.where(flagged, Cell.FLAGGED, quiet))
+    classes = {
+        Cell.SILENT: unbounded & ~flagged,
+        Cell.FAILED: unbounded,
+        Cell.FLAGGED: flagged,
+        Cell.ACCURATE: accurate,
+    }
+    return np.select(list(classes.values()), list(classes), Cell.BOUNDED)
 
 
 def _ratios(grid: StabilityGrid, methods: Sequence[str]) -> dict[str, dict[str, np.ndarray]]:
@@ -500,14 +484,8 @@ def _provenance(
     """Describe the scene, the settings, the versions and the machine of a map."""
     content = provenance(plan_of(grid, np.arange(1), methods[0], SHORTEST, "float64"))
     content = {name: content[name] for name in ("scene", "versions", "machine", "checks")}
-    axes = {name: vars(axis) for name, axis in (("x", grid.x), ("y", grid.y))}
-    return content | {
-        "methods": list(methods),
-        "dtype": dtype,
-        "seed": seed,
-        "energy_bound": energy_bound,
-        "axes": axes,
-    }
+    content |= {"methods": list(methods), "dtype": dtype, "seed": seed, "energy_bound": energy_bound}
+    return content | {"axes": {name: vars(axis) for name, axis in (("x", grid.x), ("y", grid.y))}}
 
 
 def report_text(found: StabilityMap) -> str:

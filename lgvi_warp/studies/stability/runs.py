@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -22,7 +23,7 @@ from lgvi_warp.runs.result import Result
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.studies import comparison
 from lgvi_warp.studies.compared import Compared, compared_in
-from lgvi_warp.studies.comparison import PRECISE
+from lgvi_warp.studies.comparison import PRECISE, paired
 from lgvi_warp.studies.stability.grid import StabilityGrid
 
 # Number of times at which errors are measured, and energies.
@@ -228,21 +229,11 @@ def make_references(
 
 
 def _precise(grid: StabilityGrid) -> tuple[str, str]:
-    """Choose the two best methods that the scene takes; the best twice where the second is of much lower order."""
-    names: list[str] = []
-    for name in PRECISE:
-        try:
-            Method(name)
-            plan_of(grid, np.arange(len(grid.h)), name, SHORTEST, "float64")
-        except SceneError:
-            continue
-        names.append(name)
-        if len(names) == 2:
-            break
+    """Choose the two best methods that the scene takes."""
+    names = list(itertools.islice((name for name in PRECISE if not refusals(grid, [name], "float64")), 2))
     if not names:
         raise SceneError([f"method: the scene takes none of {', '.join(PRECISE)} for a reference"])
-    close = len(names) == 2 and Method(names[1]).order >= Method(names[0]).order - 2
-    return names[0], names[1] if close else names[0]
+    return paired(names)
 
 
 def _reference(

@@ -10,7 +10,7 @@ import pytest
 from lgvi_warp.studies import cost
 from lgvi_warp.studies import tradeoff as tradeoffs
 from lgvi_warp.studies.comparison import Candidate, Sample
-from lgvi_warp.studies.cost import Cost, Kind, of_steps
+from lgvi_warp.studies.cost import Kind, of_steps
 from lgvi_warp.studies.tradeoff import Measurement, Tradeoff, report_text
 
 STEPS = [1.0, 0.5, 0.25, 0.125]
@@ -62,9 +62,8 @@ def test_where_longer_steps_are_more_work_they_cost_no_less():
 def test_readings_that_disagree_are_told(noise, told):
     seconds = np.array([[1.0, noise, noise, noise, 1.0], [1.0, noise, 1.0, noise, noise]])
     (_, spread), _ = of_steps([Kind("a", 1.0), Kind("a", 0.5)], seconds)
-    price = Cost(1.0, spread)
-    text = cost.disagreement([("psi_x float64", price), ("rk4 float64", Cost(1.0, 1.0))])
-    assert price.doubtful is told and spread == noise
+    text = cost.disagreement([("psi_x float64", spread), ("rk4 float64", 1.0)])
+    assert spread == noise
     if told:
         assert f"psi_x float64 ({noise:.2g} times)" in text and "rk4" not in text and "idle machine" in text
     else:
@@ -80,7 +79,7 @@ def test_a_least_reading_is_met_again():
 
 
 def test_many_are_told_few_by_name():
-    text = cost.disagreement([(f"m{i}", Cost(1.0, 2.0 + i)) for i in range(9)])
+    text = cost.disagreement([(f"m{i}", 2.0 + i) for i in range(9)])
     assert "m8 (10 times), m7 (9 times)" in text and "and 3 more" in text and "m0" not in text
 
 
@@ -129,7 +128,7 @@ def test_settings_are_priced_by_the_clock_of_the_thread(scene, monkeypatch):
     prices = cost.costs(plans)
     for one, price in zip(plans, prices, strict=True):
         assert price.us_per_vehicle_second * one.grid.h == pytest.approx(1e6 * TRUE[one.spec.name], rel=1e-9)
-        assert price.doubtful
+        assert price.spread > cost.DISAGREE
     assert tradeoffs.costs(plans)[0] == pytest.approx(prices[0].us_per_vehicle_second)
 
 
@@ -137,7 +136,7 @@ def found(spread):
     """A trade-off of one setting."""
     errors = {name: dict.fromkeys(tradeoffs.KINDS, 1e-3) for name in ("position", "attitude")}
     one = Measurement(Candidate("psi_x", 0.1), 1.0, 0.0, errors, 0.0, {}, 2, {"position": True}, spread)
-    doubt = cost.disagreement([("psi_x float64", Cost(1.0, spread))])
+    doubt = cost.disagreement([("psi_x float64", spread)])
     return Tradeoff(
         (one,), "position", 1, 1.0, 1.0, "itself", {"position": 1e-9}, None, messages=(doubt,) if doubt else ()
     )

@@ -1,0 +1,83 @@
+"""Write what a study found as files for other programs."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from abc import ABC, abstractmethod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.tables import write_csv
+
+
+def finite_or_none(value: Any) -> Any:
+    """Replace numbers that are not finite by None, so that JSON can hold the value.
+
+    Args:
+        value: a number, a text, None, or nested dicts, lists, tuples and arrays of them.
+
+    Returns:
+        The same with plain floats, and with lists in place of tuples and arrays.
+    """
+    if isinstance(value, dict):
+        return {key: finite_or_none(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [finite_or_none(item) for item in value]
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    return value
+
+
+class Saved(ABC):
+    """What a study found, as content of a JSON file and as records of a CSV file."""
+
+    @abstractmethod
+    def to_dict(self) -> dict[str, Any]:
+        """Convert it to plain types for JSON.
+
+        Returns:
+            Its content; numbers that are not finite are None.
+        """
+
+    @abstractmethod
+    def rows(self) -> list[dict[str, Any]]:
+        """Flatten it to records.
+
+        Returns:
+            One record for each line of the CSV file.
+        """
+
+    def to_json(self) -> str:
+        """Convert it to a JSON text.
+
+        Returns:
+            The text of `to_dict`; numbers that are not finite are null.
+        """
+        return json.dumps(self.to_dict(), indent=1, allow_nan=False)
+
+    def to_csv(self, path: str | os.PathLike[str]) -> Path:
+        """Write the rows to a CSV file.
+
+        Args:
+            path: of the file.
+
+        Returns:
+            Path of the file.
+
+        Raises:
+            OSError: where it cannot be written.
+        """
+        return write_csv(self.rows(), path)
+
+    def _save(self, folder: str | os.PathLike[str], name: str) -> list[Path]:
+        """Write NAME.json and NAME.csv into a folder, which is made if needed; return their paths."""
+        target = Path(folder)
+        target.mkdir(parents=True, exist_ok=True)
+        (target / f"{name}.json").write_text(self.to_json())
+        return [target / f"{name}.json", self.to_csv(target / f"{name}.csv")]

@@ -26,7 +26,6 @@ class KernelChoice:
     """What the kernel of a run must contain.
 
     Attributes:
-        method: the integration method.
         aligned: whether the kernel's axes are the user's but for order and sense (see `PackingContext`).
         moved: whether the state's origin differs from the user's.
         laws: terms with the modules of their device code; drag by its exact flow comes first.
@@ -46,7 +45,6 @@ class KernelChoice:
         odd: what the user should know about the members' numbers.
     """
 
-    method: Method
     aligned: bool
     moved: bool
     laws: tuple[tuple[Term, Any], ...]
@@ -135,7 +133,6 @@ def choose_kernel(
              "modified": method.two_part, "dense": dense, "water": flow in ("uniform", "varying"),
              "origin": bool(elsewhere and (facts.moved or facts.forces_moved))}  # fmt: skip
     return KernelChoice(
-        method=method,
         aligned=not facts.turned,
         moved=facts.moved,
         laws=tuple(acting),

@@ -280,9 +280,8 @@ class Plan:
     def dtypes(self) -> tuple[np.dtype, ...]:
         """NumPy dtypes of the kernel's structs Inertia, Params, Events and Limits, in this order."""
         types = self.advance.types
-        return tuple(
-            np.dtype(struct.numpy_dtype()) for struct in (types.Inertia, types.Params, types.Events, types.Limits)
-        )
+        structs = (types.Inertia, types.Params, types.Events, types.Limits)
+        return tuple(np.dtype(struct.numpy_dtype()) for struct in structs)
 
     @functools.cached_property
     def lengths(self) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -213,9 +213,8 @@ def layout_of(content: Mapping[str, Any], members: int) -> Layout:
             groups.append(name)
         else:
             arrays[name] = _array(name, metadata)
-    if any(name != "explicit" for name in groups) or any(
-        "/" in name and not (name.startswith("explicit/") and "explicit" in groups) for name in arrays
-    ):
+    parents = {name.partition("/")[0] for name in arrays if "/" in name}
+    if not parents <= set(groups) <= {"explicit"}:
         raise NotOursError("it has groups that no run has")
     return _checked(arrays, tuple(groups), members)
 

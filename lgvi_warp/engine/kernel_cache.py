@@ -122,7 +122,7 @@ def compile_module(module: Any, cache: Path, code: Path) -> None:
     Raises:
         OSError: The cache has no room, or cannot be written.
     """
-    with _explained(cache):
+    try:
         sweep(cache, code.parent)
         seek_room(cache)
         with scratch_folder(cache) as scratch, _clang_headers(scratch):
@@ -135,6 +135,8 @@ def compile_module(module: Any, cache: Path, code: Path) -> None:
             finally:
                 wp.config.kernel_cache_dir = str(cache)
             _move(scratch / code.parent.name, code)
+    except OSError as error:
+        raise warp_setup.unusable(cache, error) from error
 
 
 def _move(compiled: Path, code: Path) -> None:
@@ -257,11 +259,3 @@ def _is_abandoned(path: Path) -> bool:
     finally:
         os.close(descriptor)
     return True
-
-
-@contextlib.contextmanager
-def _explained(cache: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise warp_setup.unusable(cache, error) from error

@@ -26,7 +26,6 @@ class KernelChoice:
     """What the kernel of a run must contain.
 
     Attributes:
-        method: the integration method.
         aligned: whether the kernel's axes are the user's but for order and sense (see `PackingContext`).
         moved: whether the state's origin differs from the user's.
         laws: terms with the modules of their device code; drag by its exact flow comes first.
@@ -46,7 +45,6 @@ class KernelChoice:
         odd: what the user should know about the members' numbers.
     """
 
-    method: Method
     aligned: bool
     moved: bool
     laws: tuple[tuple[Term, Any], ...]
@@ -67,11 +65,7 @@ class KernelChoice:
 
 
 def choose_kernel(
-    ensemble: Ensemble,
-    method: Method,
-    h: float,
-    built_in: Callable[[str, str], Any],
-    checked: bool = True,
+    ensemble: Ensemble, method: Method, h: float, built_in: Callable[[str, str], Any], checked: bool = True
 ) -> KernelChoice:
     """Choose what the kernel of a run must contain.
 
@@ -93,12 +87,10 @@ def choose_kernel(
     acting = _acting(ensemble, facts, built_in)
     events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)
     damping = any(hasattr(module, "damping") for term, module in acting if not isinstance(term, Drag))
-    flow = _flow([module for _, module in acting])
+    flow = max((getattr(module, "FLOW", "none") for _, module in acting), key=FLOWS.index, default="none")
     drags = [(term, module) for term, module in acting if isinstance(term, Drag)]
-    nonconservative = any(
-        not getattr(module, "POTENTIAL", False) and module is not built_in("laws", "current") for _, module in acting
-    )
-    forced = method.base in FORCED and nonconservative
+    others = [module for _, module in acting if module is not built_in("laws", "current")]
+    forced = method.base in FORCED and not all(getattr(module, "POTENTIAL", False) for module in others)
     if explicit:
         # Along the kernel's axes drag is six numbers and no matrix.
         exact = len(drags) == 1 and not facts.bent
@@ -141,7 +133,6 @@ def choose_kernel(
              "modified": method.two_part, "dense": dense, "water": flow in ("uniform", "varying"),
              "origin": bool(elsewhere and (facts.moved or facts.forces_moved))}  # fmt: skip
     return KernelChoice(
-        method=method,
         aligned=not facts.turned,
         moved=facts.moved,
         laws=tuple(acting),
@@ -282,10 +273,8 @@ def _check_signature(faults: Faults, term: Term, module: Any, role: str) -> None
     if not names:
         faults.add(f"{term.key}.{role}", function, "is not a Warp function", "decorate it with @wp.func")
     elif len(names) != wanted:
-        signature = "(view, p)" if wanted == 2 else "(w, view, p)"
-        faults.add(
-            f"{term.key}.{role}", f"({', '.join(names)})", f"takes {len(names)} arguments", f"write {role}{signature}"
-        )
+        remedy = f"write {role}{'(view, p)' if wanted == 2 else '(w, view, p)'}"
+        faults.add(f"{term.key}.{role}", f"({', '.join(names)})", f"takes {len(names)} arguments", remedy)
 
 
 ROLES = ("law", "damping", "flow", "evolve")
@@ -306,13 +295,7 @@ def _flow(modules: list[Any]) -> str:
 
 
 def _check(
-    method: Method,
-    facts: Survey,
-    *,
-    dense: bool,
-    flow: str,
-    memory: bool,
-    acting: list[tuple[Term, Any]],
+    method: Method, facts: Survey, *, dense: bool, flow: str, memory: bool, acting: list[tuple[Term, Any]]
 ) -> None:
     """Raise SceneError, with the reason, where the method cannot do what the scene asks."""
     faults = Faults()
@@ -332,9 +315,8 @@ def _check(
                        "use ss6_13(psi_x), or bm6(psi_x)")  # fmt: skip
         if method.gauss and ("law" not in (roles := [role for role in ROLES if hasattr(module, role)]) or len(roles) > 1
                              or isinstance(term, Drag) or getattr(module, "NOISE", False)):  # fmt: skip
-            faults.add(
-                "method", method.name, f"takes forces of position and time only, which {term.key} is not", "use psi_s"
-            )
+            problem = f"takes forces of position and time only, which {term.key} is not"
+            faults.add("method", method.name, problem, "use psi_s")
     if method.tableau and (memory or noisy):
         why = "noise, which has no rate" if noisy else "a term that remembers, which is kept once a step"
         faults.add("method", method.name, f"cannot advance {why}", "use psi_s, psi_x or psi_w")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -86,7 +85,7 @@ def run_blocks(
             merged.begun = block.stop
             # Results from the store may not be this run's own: errors in them are reported as faults of the store.
             source = work.store if left is not None and block not in fresh else None
-            with source.understood(block) if source else nullcontext():
+            with source.understood(block) if source else contextlib.nullcontext():
                 for keeper, result in zip(work.keepers, results, strict=True):
                     keeper.merge(block, result)
             merged.done = block.stop

@@ -76,27 +76,26 @@ class Packets:
         self.scale = self.frame.J.max(axis=1)
         if not plan.spec.scaled:
             self.scale = np.ones_like(self.scale)
-        width, Lane = plan.spec.width, plan.advance.types.Lane
+        width, types = plan.spec.width, plan.advance.types
         self.count = -(-members.count // width)
-        Inertia, Params, Events = plan.advance.types.Inertia, plan.advance.types.Params, plan.advance.types.Events
         context = PackingContext(
             members.parameters, self.frame, members.indices, members.seed, plan.grid.h, plan.kernel_choice.aligned
         )
         params, table, memory = self.packed_laws(context)
-        self.inertia = _structs(self._inertia(), Inertia)
-        self.params = _structs(params, Params)
-        self.events = _structs(self._events(context), Events)
-        self.table = _rows(table, Lane)
-        self.memory = _rows(memory, Lane)
+        self.inertia = _structs(self._inertia(), types.Inertia)
+        self.params = _structs(params, types.Params)
+        self.events = _structs(self._events(context), types.Events)
+        self.table = _rows(table, types.Lane)
+        self.memory = _rows(memory, types.Lane)
         state = self._state()
-        self.state = _rows(self._lanes_each(state), Lane)
+        self.state = _rows(self._lanes_each(state), types.Lane)
         self.warned = np.zeros(members.count, np.uint16), np.zeros(0)
         if plan.checks != "none":
             momentum = state[:, 12:15] * self.scale[:, None]
             self.warned = at_start(plan, members, self.frame, momentum)
         self.status = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
         self.failed_step = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
-        self.failed_size = wp.zeros(self.count, dtype=Lane, device="cpu")
+        self.failed_size = wp.zeros(self.count, dtype=types.Lane, device="cpu")
         self.out: wp.array | None = None
         self.monitor = self._monitor()
 
@@ -219,36 +218,24 @@ class Packets:
         packed: list[Packed] = []
         for i, (term, module) in enumerate(self.plan.kernel_choice.laws):
             parameters = Ensemble.own(term, context.parameters)
-            if i == 0 and self.plan.spec.drag:
-                assert isinstance(term, Drag)
-                by_axes = module is built_in("laws", "drag")
-                exact = (
-                    term.packed_exact(parameters, self.frame, self.scale)
-                    if by_axes
-                    else term.packed_directions(parameters, context)
-                )
-                packed.append(exact)
-            else:
+            if i > 0 or not self.plan.spec.drag:
                 packed.append(term.packed(parameters, context))
-        dtype = self.plan.dtypes[1]
-        varied = any(len(leaf) > 1 for numbers in packed for leaf in _leaves(numbers.values))
-        data = np.zeros(self.count if varied else 1, dtype)
-        rows, memory = [np.zeros((1, 1))], [np.zeros((1, 0))]
-        node: Any = data
+                continue
+            assert isinstance(term, Drag)
+            if module is built_in("laws", "drag"):
+                packed.append(term.packed_exact(parameters, self.frame, self.scale))
+            else:
+                packed.append(term.packed_directions(parameters, context))
+        rows, memory, laws = [np.zeros((1, 1))], [np.zeros((1, 0))], []
         for numbers in packed:
-            values = dict(numbers.values)
-            if numbers.rows is not None:
-                values["first"] = sum(part.shape[1] for part in rows)
-                rows.append(numbers.rows)
-            if numbers.memory is not None:
-                values["memory"] = sum(part.shape[1] for part in memory)
-                memory.append(numbers.memory)
-            if numbers.work:
-                values["work"] = sum(part.shape[1] for part in memory)
-                memory.append(np.zeros((1, numbers.work)))
-            for key, value in values.items():
-                self._fill(node["own"][key], value)
-            node = node["rest"]
+            laws.append(dict(numbers.values))
+            work = np.zeros((1, numbers.work)) if numbers.work else None
+            wanted = (("first", rows, numbers.rows), ("memory", memory, numbers.memory), ("work", memory, work))
+            for name, parts, part in wanted:
+                if part is not None:
+                    laws[-1][name] = sum(before.shape[1] for before in parts)
+                    parts.append(part)
+        data = self._filled(self.plan.dtypes[1], _nested(laws))
         if self.plan.spec.gauss:
             # The slopes of the last step, and room for their extrapolation.
             memory.append(np.zeros((1, 2 * len(self.plan.spec.gauss[1]) * SLOPE_FIELDS)))
@@ -262,18 +249,9 @@ class Packets:
         return pack(values, self.plan.spec.width).astype(DTYPES[self.plan.dtype])
 
     def _events(self, context: PackingContext) -> np.ndarray:
-        packed = [
-            event.packed(Ensemble.own(event, context.parameters), context)
-            for event, _ in self.plan.kernel_choice.events
-        ]
-        varied = any(len(leaf) > 1 for numbers in packed for leaf in _leaves(numbers.values))
-        data = np.zeros(self.count if varied else 1, self.plan.dtypes[2])
-        node: Any = data
-        for numbers in packed:
-            for key, value in numbers.values.items():
-                self._fill(node["own"][key], value)
-            node = node["rest"]
-        return data
+        events = (event for event, _ in self.plan.kernel_choice.events)
+        packed = [event.packed(Ensemble.own(event, context.parameters), context) for event in events]
+        return self._filled(self.plan.dtypes[2], _nested([numbers.values for numbers in packed]))
 
     def _state(self) -> np.ndarray:
         m, frame = self.members, self.frame
@@ -281,9 +259,7 @@ class Packets:
         R = m.attitude @ frame.Q
         nu = m.velocity + np.cross(m.angular_velocity, np.broadcast_to(frame.origin, (n, 3)))
         nu = nu - self._water_at_start()
-        twist = np.concatenate(
-            [notation.rotate_into(frame.Q, nu), notation.rotate_into(frame.Q, m.angular_velocity)], 1
-        )
+        twist = np.concatenate([notation.rotate_into(frame.Q, v) for v in (nu, m.angular_velocity)], axis=1)
         momenta = np.einsum("nij,nj->ni", np.broadcast_to(frame.inertia_at(frame.E), (n, 6, 6)), twist)
         rows = np.zeros((n, self.plan.spec.state_fields))
         rows[:, :9] = R.reshape(-1, 9)
@@ -403,6 +379,14 @@ class Packets:
         step = np.where(later, self._of_members(monitor.warned_step, np.int64), 0)
         value = np.where(later, np.sqrt(self._of_members(monitor.warned_size, np.float64)), value)
         return bits | noted, step, value
+
+
+def _nested(each: list[dict[str, Any]]) -> dict[str, Any]:
+    """Numbers of several laws or events as the kernel's struct holds them: those of the first, and the rest."""
+    nested: dict[str, Any] = {}
+    for numbers in reversed(each):
+        nested = {"own": numbers, "rest": nested}
+    return nested
 
 
 def _leaves(fields: dict[str, Any]) -> list[np.ndarray]:

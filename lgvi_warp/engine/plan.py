@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import copy
+import dataclasses
 import functools
 import time
 from collections.abc import Iterator, Sequence
@@ -225,8 +226,7 @@ class Plan:
         kind = KINDS.get(self.method.name, "vector")
         if kind == "vector" and self.kernel_choice.steady and not self.method.adaptive:
             kind = "inertial"
-        return Explicit(kind, tableau.a, tableau.b, tableau.c, *estimate,
-                        self.method.adaptive)  # fmt: skip
+        return Explicit(kind, tableau.a, tableau.b, tableau.c, *estimate, self.method.adaptive)
 
     @contextlib.contextmanager
     def _laws_compile(self) -> Iterator[None]:
@@ -241,28 +241,15 @@ class Plan:
             if not user_laws:
                 raise
             problem = f"one of them does not compile ({type(error).__name__}: {error})"
-            raise SceneError(
-                [
-                    f"law {', '.join(user_laws)}: {problem}; lw.check_law(term) says where, docs/develop/add_a_force.md how"
-                ]
-            ) from error
+            remedy = "lw.check_law(term) says where, docs/develop/add_a_force.md how"
+            raise SceneError([f"law {', '.join(user_laws)}: {problem}; {remedy}"]) from error
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the settings alone: a kernel cannot be pickled, and the other process finds it in Warp's cache."""
         if self._whole:
             # Made anew from these members alone, the plan might choose another kernel.
             return Plan.subplan, self._whole
-        settings = (
-            self.ensemble,
-            self.method,
-            self.grid,
-            self.fields,
-            self.dtype,
-            self.width,
-            self.checks,
-            self.on_failure,
-        )
-        return Plan, settings
+        return Plan, tuple(getattr(self, item.name) for item in dataclasses.fields(self) if item.init)
 
     @property
     def kernel_hash(self) -> str:
@@ -292,13 +279,9 @@ class Plan:
     @functools.cached_property
     def dtypes(self) -> tuple[np.dtype, ...]:
         """NumPy dtypes of the kernel's structs Inertia, Params, Events and Limits, in this order."""
-        types = (
-            self.advance.types.Inertia,
-            self.advance.types.Params,
-            self.advance.types.Events,
-            self.advance.types.Limits,
-        )
-        return tuple(np.dtype(struct.numpy_dtype()) for struct in types)
+        types = self.advance.types
+        structs = (types.Inertia, types.Params, types.Events, types.Limits)
+        return tuple(np.dtype(struct.numpy_dtype()) for struct in structs)
 
     @functools.cached_property
     def lengths(self) -> tuple[tuple[float, ...], tuple[float, ...]]:

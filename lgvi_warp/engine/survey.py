@@ -154,7 +154,7 @@ def _look(ensemble: Ensemble, method: Method, h: float, first: int, stop: int) -
     frame, U, coupling = frame_of(method, p)
     context = PackingContext(p, frame, ensemble.indices_of(first, stop), ensemble.seed, h, frame.aligned)
     implied = {t.key for t in terms.IMPLIED if any(np.any(v) for v in t.packed({}, context).values.values())}
-    terms_and_numbers = {term.key: (term, ensemble.own(term, p)) for term in ensemble.scene.terms}
+    numbered = [(term, ensemble.own(term, p)) for term in ensemble.scene.terms]
     return Survey(
         turned=not frame.aligned,
         bent=not has_exact_flow(frame),
@@ -165,17 +165,10 @@ def _look(ensemble: Ensemble, method: Method, h: float, first: int, stop: int) -
         apart=bool(np.any(frame.origin != frame.forces)),
         couplings=frozenset(i for i, at in enumerate(COUPLINGS) if np.any(U[:, *at])),
         left=float(coupling.max()),
-        felt=frozenset(implied | {key for key, (term, numbers) in terms_and_numbers.items() if term.present(numbers)}),
-        drag=frozenset(
-            part
-            for term, numbers in terms_and_numbers.values()
-            if isinstance(term, Drag)
-            for part in term.parts(numbers)
-        ),
+        felt=frozenset(implied | {term.key for term, numbers in numbered if term.present(numbers)}),
+        drag=frozenset(part for term, numbers in numbered if isinstance(term, Drag) for part in term.parts(numbers)),
         rising=frozenset(
-            key
-            for key, (term, numbers) in terms_and_numbers.items()
-            if term.type == "current" and np.any(numbers["velocity"][:, 2])
+            term.key for term, numbers in numbered if term.type == "current" and np.any(numbers["velocity"][:, 2])
         ),
         weightless=bool(np.any(p["environment.gravity"] == 0.0)),
         buoyant=bool(np.any(p["vehicle.buoyancy"])),

@@ -69,7 +69,8 @@ WARNINGS = {
     "flag_masks": [int(bit) for bit in Warnings],
     "flag_meanings": " ".join(str(bit.name).lower() for bit in Warnings),
 }
-FIELDS = (
+# Fields of every run.
+EVERY = (
     MemberField("status", "|u1", STATUS, lambda plan, outcome: outcome.status),
     MemberField("failure_time", "<f8", {"long_name": "time of the last good state of a member that failed or of its event",
                                         "units": "s"}, _failure_time),
@@ -80,6 +81,9 @@ FIELDS = (
     MemberField("warning_value", "<f8", {"long_name": "value at that crossing", "units": "1"}, _warning_value),
     MemberField("substeps", "<i8", {"long_name": "steps that were divided", "units": "1"},
                 lambda plan, outcome: outcome.substeps),
+)  # fmt: skip
+FIELDS = (
+    *EVERY,
     MemberField("steps_made", "<i8", {"long_name": "steps made", "units": "1"},
                 lambda plan, outcome: outcome.chosen[:, 0], _adaptive),
     MemberField("steps_tried", "<i8", {"long_name": "steps tried", "units": "1"},
@@ -99,6 +103,18 @@ def present(plan: Plan) -> tuple[MemberField, ...]:
     return tuple(member_field for member_field in FIELDS if member_field.when(plan))
 
 
+def size(plan: Plan) -> int:
+    """Compute the size of a member's fields.
+
+    Args:
+        plan: Plan of the run.
+
+    Returns:
+        Size [bytes].
+    """
+    return sum(np.dtype(item.dtype).itemsize for item in present(plan))
+
+
 def of(plan: Plan, outcome: Outcome) -> dict[str, np.ndarray]:
     """Compute the fields of an outcome's members.
 
@@ -109,7 +125,4 @@ def of(plan: Plan, outcome: Outcome) -> dict[str, np.ndarray]:
     Returns:
         Arrays of shape (n,), by name.
     """
-    return {
-        member_field.name: member_field.of(plan, outcome).astype(member_field.dtype, copy=False)
-        for member_field in present(plan)
-    }
+    return {item.name: item.of(plan, outcome).astype(item.dtype, copy=False) for item in present(plan)}

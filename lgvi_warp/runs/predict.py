@@ -31,7 +31,7 @@ from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.runs import member_fields
 from lgvi_warp.runs.sizes import Sizes, sizes
 from lgvi_warp.runs.store.block_files import BlockFiles, marker
-from lgvi_warp.runs.store.create import create
+from lgvi_warp.runs.store.create import create, nearest_folder
 from lgvi_warp.runs.store.folder import Folder
 from lgvi_warp.runs.store.kept import group_of
 from lgvi_warp.runs.store.layout import columns, size
@@ -95,9 +95,8 @@ class Prediction:
         if self.free_memory and self.memory > 0.8 * self.free_memory:
             lines.append("note        more than the memory holds: use --store zarr, save less often or fewer fields")
         if self.free_disk is not None and self.disk > self.free_disk:
-            lines.append(
-                "note        more than the disk holds: save less often, fewer fields, or --store-dtype float32"
-            )
+            remedy = "save less often, fewer fields, or --store-dtype float32"
+            lines.append(f"note        more than the disk holds: {remedy}")
         return "\n".join(lines)
 
 
@@ -150,7 +149,7 @@ def predict(
     set_up, step = costs(plan, count, observed)
     asked_store = store if isinstance(store, Store) or store is None else Store(store)
     into = settled(asked_store, plan, observed, fields) if asked_store else None
-    place = _existing(into.folder) if into else Path.cwd()
+    place = nearest_folder(into.folder) if into else Path.cwd()
     runs = [Sized(plan, into, fields if observed.samples else (), sizes(plan, observed.watch(plan.grid.times)[0]))]
     runs += again(plan, observed, asked_store, fields)
     write, metadata = writing(runs, place, count) if into else (0.0, 0)
@@ -235,7 +234,7 @@ def result_bytes(plan: Plan, fields: Sequence[str] | None = None) -> int:
         rows["position"] = 24
     first = plan.ensemble.parameters(0, 1)
     varied = sum(first[name].nbytes for name in plan.ensemble.varied())
-    return n * (k * sum(rows.values()) + varied + sum(np.dtype(f.dtype).itemsize for f in member_fields.present(plan)))
+    return n * (k * sum(rows.values()) + varied + member_fields.size(plan))
 
 
 NO_STATISTICS = Sizes()
@@ -279,8 +278,7 @@ class Sized:
         held = self.statistics.joined + self.statistics.estimates
         if self.store is None:
             return held + result_bytes(self.plan, self.fields)
-        each = sum(np.dtype(member_field.dtype).itemsize for member_field in member_fields.present(self.plan))
-        return held + each * self.plan.ensemble.members
+        return held + member_fields.size(self.plan) * self.plan.ensemble.members
 
     def working(self, threads: int) -> int:
         """Compute the memory of the blocks at work.
@@ -394,14 +392,6 @@ def disk_speed(folder: Path, threads: int) -> float:
         start = time.perf_counter()
         list(pool.map(write, range(threads)))
         return len(data) * threads / (time.perf_counter() - start)
-
-
-def _existing(folder: Path) -> Path:
-    """The nearest folder above that exists."""
-    folder = folder.absolute()
-    while not folder.is_dir():
-        folder = folder.parent
-    return folder
 
 
 def _resident() -> int:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
+
+import numpy as np
 
 from lgvi_warp.common import machine
 from lgvi_warp.engine.keepers.observation import Observation
@@ -58,10 +60,25 @@ def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence
         "machine": machine.describe(),
     }
     if observed is not None and observed != Observation():
-        content["observed"] = observed.to_dict() | (
-            {} if observed.samples else {"fields": list(plan.fields if fields is None else fields)}
-        )
+        kept = {} if observed.samples else {"fields": list(plan.fields if fields is None else fields)}
+        content["observed"] = observed.to_dict() | kept
     return content
+
+
+def at_end(content: dict[str, Any], values: Mapping[str, np.ndarray], members: int, planned: int) -> dict[str, Any]:
+    """Add to the provenance of a run what its end tells.
+
+    Args:
+        content: Provenance from the start of the run.
+        values: Fields of the members that ran, by name, each of shape (n,).
+        members: Number of members that ran, n.
+        planned: Number of members of the ensemble.
+
+    Returns:
+        The provenance with the mean numbers of steps if these were chosen, and with n if the run ended early.
+    """
+    means = {name: float(values[name].mean()) for name in ("steps_made", "steps_tried") if name in values}
+    return content | means | ({"members": members} if members < planned else {})
 
 
 def odd_before(plan: Plan) -> tuple[str, ...]:

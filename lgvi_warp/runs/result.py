@@ -6,7 +6,7 @@ import functools
 import json
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from lgvi_warp.scene.ensemble import Ensemble
 
+TIME = {"units": "s", "long_name": "time since the start"}
 END_TIME = {"units": "s", "long_name": "time of the event or of the failure of a member, or the end of the run"}
 
 
@@ -87,9 +88,8 @@ class Result:
 
     def _kept(self, name: str) -> np.ndarray:
         if not self.samples:
-            raise AttributeError(
-                f"{name} was not kept: give keep='all', or indices of members, which are result.kept then"
-            )
+            remedy = "give keep='all', or indices of members, which are result.kept then"
+            raise AttributeError(f"{name} was not kept: {remedy}")
         if name not in self.samples:
             raise AttributeError(f"{name} was not kept: add {name!r} to SaveAt(fields=...)")
         return self.samples[name]
@@ -154,15 +154,8 @@ class Result:
         """
         parameters = {name: values[places] if len(values) > 1 else values for name, values in self.parameters.items()}
         samples = {name: values[:, places] for name, values in self.samples.items()}
-        of_members = {
-            member_field.name: getattr(self, member_field.name)[places] for member_field in self._member_fields()
-        }
+        of_members = {item.name: getattr(self, item.name)[places] for item in member_fields.EVERY}
         return replace(self, samples=samples, parameters=parameters, **of_members)
-
-    def _member_fields(self) -> list[member_fields.MemberField]:
-        """The member fields that are attributes of a result."""
-        attributes = {item.name for item in fields(self)}
-        return [item for item in member_fields.FIELDS if item.name in attributes]
 
     @property
     def members(self) -> int:
@@ -191,14 +184,10 @@ class Result:
         for name in names:
             values = getattr(self, name)
             data[name] = (("time", "realization", *dims.get(values.ndim - 2, ())), values, TABLE[name].attributes)
-        for member_field in self._member_fields():
-            data[member_field.name] = (
-                ("realization",),
-                np.asarray(getattr(self, member_field.name)),
-                member_field.attributes,
-            )
+        for item in member_fields.EVERY:
+            data[item.name] = (("realization",), np.asarray(getattr(self, item.name)), item.attributes)
         data["end_time"] = (("realization",), self.end_time, END_TIME)
-        coordinates = {"time": ("time", self.time, {"units": "s", "long_name": "time since the start"})}
+        coordinates = {"time": ("time", self.time, TIME)}
         attributes = {"Conventions": "CF-1.11", "provenance": json.dumps(self.provenance)}
         return xr.Dataset(data, coordinates, attributes)
 
@@ -217,9 +206,7 @@ class Result:
             OSError: If the file cannot be written.
         """
         arrays = {"time": self.time, **self.samples}
-        arrays |= {
-            member_field.name: np.asarray(getattr(self, member_field.name)) for member_field in self._member_fields()
-        }
+        arrays |= {item.name: np.asarray(getattr(self, item.name)) for item in member_fields.EVERY}
         if self.samples:
             arrays |= {f"parameters/{name}": value for name, value in self.parameters.items()}
         texts = {"messages": json.dumps(self.messages), "provenance": json.dumps(self.provenance)}
@@ -244,14 +231,9 @@ class Result:
         Returns:
             Arguments of Result, by name.
         """
-        attributes = {item.name for item in fields(cls)}
-        values: dict[str, Any] = {
-            f.name: arrays[f.name] for f in member_fields.FIELDS if f.name in attributes & arrays.keys()
-        }
-        return values | {
-            "status": values["status"].view(StatusArray),
-            "warnings": values["warnings"].view(WarningArray),
-        }
+        values: dict[str, Any] = {item.name: arrays[item.name] for item in member_fields.EVERY if item.name in arrays}
+        status, warnings = values["status"].view(StatusArray), values["warnings"].view(WarningArray)
+        return values | {"status": status, "warnings": warnings}
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Result:

@@ -20,7 +20,7 @@ from lgvi_warp.engine.plan import Plan
 from lgvi_warp.engine.work import Work
 from lgvi_warp.runs import member_fields
 from lgvi_warp.runs.outcomes import failure_text
-from lgvi_warp.runs.provenance import messages, provenance
+from lgvi_warp.runs.provenance import at_end, messages, provenance
 from lgvi_warp.runs.result import Drawn, Result
 from lgvi_warp.scene import plausibility
 from lgvi_warp.statistics.estimate import Estimates
@@ -90,10 +90,9 @@ def run_plan(
     merged = Merged()
 
     def ended(n: int, whole: bool = True) -> Result:
-        return _in_memory(
-            plan, n, observed, outcomes, samples, observing if whole else None, fields,
-            compile_seconds, time.perf_counter() - start,
-        )  # fmt: skip
+        run_seconds = time.perf_counter() - start
+        result = _in_memory(plan, n, observed, outcomes, samples, observing if whole else None, fields)
+        return replace(result, compile_seconds=compile_seconds, run_seconds=run_seconds)
 
     try:
         n = run_blocks(Work(plan, keepers), blocks(total), executor or Threads(threads), overall.at, enough=observing.enough,
@@ -140,8 +139,6 @@ def _in_memory(
     samples: Samples | None,
     observing: Observing | None,
     fields: Sequence[str] | None,
-    compile_seconds: float,
-    run_seconds: float,
 ) -> Result:
     """The result of the first n members; observing: their statistics, None if these include other members."""
     content = provenance(plan, observed, fields)
@@ -159,11 +156,7 @@ def _in_memory(
         **Result.per_member(of_members),
         parameters=dict(parameters) if samples is not None else parameters,
         messages=messages(plan) + remarks + plausibility.on_the_way(plan.ensemble.scene, histories).messages(n),
-        provenance=content
-        | {name: float(of_members[name].mean()) for name in ("steps_made", "steps_tried") if name in of_members}
-        | ({"members": n} if n < plan.ensemble.members else {}),
+        provenance=at_end(content, of_members, n, plan.ensemble.members),
         terms=tuple(plan.ensemble.scene.terms),
         statistics=estimates,
-        compile_seconds=compile_seconds,
-        run_seconds=run_seconds,
     )

@@ -36,9 +36,8 @@ def blocks_there(only: range | None, plan: Plan) -> range | None:
         return None
     present = range(only.start, min(only.stop, count))
     if only.step != 1 or only.start < 0 or not present:
-        raise SceneError(
-            [f"blocks {only.start}:{only.stop}: are not within the {count} of this run; give 0:{count} or less"]
-        )
+        problem = f"are not within the {count} of this run"
+        raise SceneError([f"blocks {only.start}:{only.stop}: {problem}; give 0:{count} or less"])
     return present
 
 

@@ -88,9 +88,8 @@ def solve(
             were finished.
     """
     if not isinstance(fleet, Ensemble | Scene):
-        raise SceneError(
-            [f"fleet = {shown(fleet)}: is neither an Ensemble nor a Scene; give lw.Scene(...) or lw.Ensemble(...)"]
-        )
+        problem = "is neither an Ensemble nor a Scene"
+        raise SceneError([f"fleet = {shown(fleet)}: {problem}; give lw.Scene(...) or lw.Ensemble(...)"])
     ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
     faults = Faults()
     observed, runner = Observation(), None

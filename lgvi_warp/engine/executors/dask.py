@@ -103,9 +103,8 @@ class Dask:
                 client = distributed.Client(self.scheduler, timeout=TIMEOUT)
             except (OSError, ValueError, MemoryError) as error:  # memory: what answers is no scheduler
                 problem = f"does not answer ({type(error).__name__}: {error})"
-                raise SceneError(
-                    [f"scheduler = {self.scheduler!r}: {problem}; give the address that dask scheduler prints"]
-                ) from error
+                remedy = "give the address that dask scheduler prints"
+                raise SceneError([f"scheduler = {self.scheduler!r}: {problem}; {remedy}"]) from error
             with client:
                 yield client
             return

@@ -71,9 +71,8 @@ class Processes:
         # Steps made of each block, and a flag that halts all. No lock: a killed process could hold it for ever.
         steps_made = context.RawArray("q", max(unfinished) + 2)
         with deaf():  # Python's tracker of resources is a process too
-            pool = ProcessPoolExecutor(
-                min(self.workers, len(unfinished)), mp_context=context, initializer=_begin, initargs=(data, steps_made)
-            )
+            count = min(self.workers, len(unfinished))
+            pool = ProcessPoolExecutor(count, context, initializer=_begin, initargs=(data, steps_made))
         waiting: dict[Future[Any], int] = {}
         try:
             with deaf():

@@ -18,15 +18,10 @@ from lgvi_warp.sampling.members import Members
 from lgvi_warp.statistics.samples import Fields
 
 
-class _Unsent:
-    """A keeper that is pickled without its contents: what it gathers stays in the run's own process."""
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {}
-
-
-class Outcomes(_Unsent):
+class Outcomes:
     """Keeps the outcome of every member.
+
+    It is pickled without its contents: what it gathers stays in the run's own process.
 
     Args:
         plan: the plan of the run.
@@ -37,6 +32,9 @@ class Outcomes(_Unsent):
 
     def __init__(self, plan: Plan):
         self.all = Outcome.clear(plan.ensemble.members, 2 if plan.method.adaptive else 0)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {}
 
     def open(self, plan: Plan, block: Block, members: Members) -> _BlockOutcome:
         """The keeper of a block's outcome.
@@ -75,7 +73,7 @@ class _BlockOutcome:
         return outcome
 
 
-class Samples(_Unsent):
+class Samples:
     """Keeps every sample of every member; threads of this process write into it directly.
 
     From other processes a block's samples come as its result.

@@ -148,17 +148,15 @@ def observation_of(told: Mapping[str, Any] | None, statistics: Any = None) -> Ob
         return Observation()
     if statistics is None and told.get("functions"):
         names = ", ".join(told["functions"])
-        raise SceneError(
-            [f"statistics: {names}: are of functions that a store does not hold; give statistics=[...] again"]
-        )
+        problem = "are of functions that a store does not hold"
+        raise SceneError([f"statistics: {names}: {problem}; give statistics=[...] again"])
     keep = told["keep"] if isinstance(told["keep"], str) else tuple(told["keep"])
     until = from_dict(told["until"]) if "until" in told else None
     observation = Observation(from_list(told.get("statistics", ()) if statistics is None else statistics), keep, until)
     table, expected = observation.to_dict(), {name: value for name, value in told.items() if name != "fields"}
     if table != expected:
-        raise SceneError(
-            [f"statistics = {table.get('statistics')}: are not the run's, {expected.get('statistics')}; give those"]
-        )
+        asked, known = table.get("statistics"), expected.get("statistics")
+        raise SceneError([f"statistics = {asked}: are not the run's, {known}; give those"])
     return observation
 
 
@@ -297,14 +295,12 @@ def notes(
         if kind == "sobol" and points & (points - 1):
             low = 1 << (points.bit_length() - 1)
             text = f"each of {R} replicates has {points} points of a Sobol sequence, which is balanced at powers of two"
-            messages += (
-                f"{text}: {low * R} or {2 * low * R} members would have narrower intervals for what they cost",
-            )
+            better = f"{low * R} or {2 * low * R} members would have narrower intervals for what they cost"
+            messages += (f"{text}: {better}",)
     elif kind in EVENLY_SPREAD:
         text = f"intervals are those of independent members, wider than need be for sampling {kind!r}"
-        messages += (
-            f"{text}: with replicates, {{ {kind} = {{ replicates = 16 }} }}, they are those of its own spread",
-        )
+        better = f"with replicates, {{ {kind} = {{ replicates = 16 }} }}, they are those of its own spread"
+        messages += (f"{text}: {better}",)
     elif kind != "random":
         text = f"intervals are those of independent members, which a {kind} does not give"
         messages += (f"{text}: do not rely on them",)
@@ -317,12 +313,11 @@ def _left_out(estimates: Mapping[str, Estimate], status: np.ndarray, apart: Coll
     apart: names of estimates that leave members out on purpose.
     """
     members = len(status)
-    of_all = (
-        estimate
+    count = {
+        estimate: int(estimate.count.min())
         for estimate in estimates.values()
         if estimate.name not in apart and estimate.settings["type"] != "first_passage"
-    )
-    count = {estimate: int(estimate.count.min()) for estimate in of_all}
+    }
     fewer = [estimate for estimate, number in count.items() if number < members]
     if not fewer:
         return ()

@@ -35,13 +35,14 @@ class Gathered:
     Attributes:
         statistics: those that blocks gather: of paths, where one looks over them.
         time: (k,) [s], sample times.
+        replicates: R, number of independent replicates.
     """
 
     # Name of its results in a store.
     name = "statistics"
 
     def __init__(self, time: np.ndarray, members: int, statistics: Sequence[Statistic], replicates: int = 1):
-        self._asked, self.time, self._replicates = tuple(statistics), time, replicates
+        self._asked, self.time, self.replicates = tuple(statistics), time, replicates
         self.statistics = tuple(map(followed, statistics))
         self._size = blocks(members)[0].count
         self.trees = [Tree(statistic.join) for statistic in self.statistics]
@@ -58,7 +59,7 @@ class Gathered:
             A keeper that closes with one part for each statistic.
         """
         place = (block.first, block.first // self._size, self._size)
-        return _BlockStatistics(self.statistics, plan, members, place, self.time, self._replicates)
+        return _BlockStatistics(self, plan, members, place)
 
     def merge(self, block: Block, part: list[Part]) -> None:
         """Add a block's parts to the trees.
@@ -98,10 +99,21 @@ class Gathered:
         Returns:
             The estimates of the statistic.
         """
-        time = self.time if statistic.at is None else self.time[-1:]
-        if self._replicates > 1:
-            return statistic.estimates_of_replicates(parts, time, self._replicates)
+        time = self.times_of(statistic)
+        if self.replicates > 1:
+            return statistic.estimates_of_replicates(parts, time, self.replicates)
         return statistic.estimates(parts, time)
+
+    def times_of(self, statistic: Statistic) -> np.ndarray:
+        """The times of a statistic's values: all sample times, or the end alone.
+
+        Args:
+            statistic: the statistic.
+
+        Returns:
+            (k,) or (1,) [s].
+        """
+        return self.time if statistic.at is None else self.time[-1:]
 
     def result(self) -> Estimates:
         """All estimates by name.
@@ -130,9 +142,8 @@ class Gathered:
         Returns:
             (arrays, number): arrays by name, and the number of statistics.
         """
-        return {
-            f"{i}/{name}": array for i, statistic_part in enumerate(part) for name, array in statistic_part.items()
-        }, len(part)
+        arrays = {f"{i}/{name}": array for i, entry in enumerate(part) for name, array in entry.items()}
+        return arrays, len(part)
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, np.ndarray], content: Any) -> list[Part]:
@@ -145,30 +156,17 @@ class Gathered:
         Returns:
             For each statistic, arrays by name.
         """
-        prefixes = [f"{i}/" for i in range(content)]
-        return [
-            {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
-            for prefix in prefixes
-        ]
+        prefixes = (f"{i}/" for i in range(content))
+        return [{name.removeprefix(p): array for name, array in arrays.items() if name.startswith(p)} for p in prefixes]
 
 
 class _BlockStatistics:
-    def __init__(
-        self,
-        statistics: Sequence[Statistic],
-        plan: Plan,
-        members: Members,
-        place: tuple[int, int, int],
-        time: np.ndarray,
-        replicates: int,
-    ):
-        self._statistics, self._members, self._place = statistics, members, place
-        self._plan, self._replicates, self._times = plan, replicates, len(time)
+    def __init__(self, run: Gathered, plan: Plan, members: Members, place: tuple[int, int, int]):
+        self._statistics, self._members, self._place = run.statistics, members, place
+        self._plan, self._replicates, self._times = plan, run.replicates, len(run.time)
         # For statistics of members' ends: the quantity at the last sample.
         self._last: dict[Statistic, np.ndarray] = {}
-        self._open = [
-            statistic.open(time if statistic.at is None else time[-1:], members.count) for statistic in statistics
-        ]
+        self._open = [statistic.open(run.times_of(statistic), members.count) for statistic in run.statistics]
 
     def take(self, when: slice, samples: Fields) -> None:
         """Pass to each statistic the values of its quantity; statistics of the same quantity share them."""

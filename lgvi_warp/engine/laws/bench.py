@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -50,17 +50,6 @@ class Views:
     rate: np.ndarray
     time: np.ndarray
 
-    def changed(self, **new: Any) -> Views:
-        """A copy with some of the fields replaced.
-
-        Args:
-            **new: the new values, by field.
-
-        Returns:
-            The views with the new values.
-        """
-        return Views(**(vars(self) | new))
-
     def moved(self, axis: int, by: float) -> Views:
         """The views with every position displaced along an inertial axis.
 
@@ -71,7 +60,7 @@ class Views:
         Returns:
             The displaced views.
         """
-        return self.changed(position=self.position + by * np.eye(3)[axis])
+        return replace(self, position=self.position + by * np.eye(3)[axis])
 
     def turned(self, axis: int, by: float) -> Views:
         """The views with every attitude turned about one of its body axes.
@@ -83,7 +72,7 @@ class Views:
         Returns:
             The turned views.
         """
-        return self.changed(attitude=self.attitude @ notation.matrix_from_rotation_vector(by * np.eye(3)[axis]))
+        return replace(self, attitude=self.attitude @ notation.matrix_from_rotation_vector(by * np.eye(3)[axis]))
 
     def elsewhere(self) -> Views:
         """The same states, expressed in the body axes TURN about the origin ORIGIN.

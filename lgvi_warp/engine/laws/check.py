@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -60,16 +60,12 @@ class LawReport:
 
     def __str__(self) -> str:
         head = f"{type(self.term).__name__} ({self.term.key}): {'ok' if self.ok else 'WRONG'}"
-        rows = [
-            (check.name, f"{check.worst:.2e}", f"{check.allowed:.2e}", "ok" if check.ok else "WRONG", check.text)
-            for check in self.checks
-        ]
-        rows = [("check", "worst", "allowed", "", ""), *rows]
+        rows = [("check", "worst", "allowed", "", "")]
+        for name, worst, allowed, ok, text in self.checks:
+            rows.append((name, f"{worst:.2e}", f"{allowed:.2e}", "ok" if ok else "WRONG", text))
         widths = [max(len(row[i]) for row in rows) for i in range(4)]
-        lines = (
-            "  ".join([*(text.ljust(n) for text, n in zip(row, widths, strict=False)), row[4]]).rstrip() for row in rows
-        )
-        return "\n  ".join([head, *lines])
+        padded = ([*(text.ljust(n) for text, n in zip(row, widths, strict=False)), row[4]] for row in rows)
+        return "\n  ".join([head, *("  ".join(row).rstrip() for row in padded)])
 
 
 def check_law(
@@ -120,9 +116,8 @@ def _judged(name: str, difference: np.ndarray, allowed: np.ndarray | float, view
     worst = np.abs(difference).reshape(k, -1)
     limit = np.broadcast_to(np.reshape(allowed, (-1, 1)) if np.ndim(allowed) == 1 else allowed, worst.shape)
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(
-            np.isfinite(worst), np.where(worst <= limit, worst / np.maximum(limit, 1e-300), 1.0 + worst), np.inf
-        )
+        ratio = np.where(worst <= limit, worst / np.maximum(limit, 1e-300), 1.0 + worst)
+        ratio = np.where(np.isfinite(worst), ratio, np.inf)
     i, j = np.unravel_index(ratio.argmax(), ratio.shape)
     good = bool(np.all(worst <= limit) and np.isfinite(limit).all())
     text = "" if good else f"{views.description(int(i))}; {remedy}"
@@ -141,12 +136,11 @@ def _numbers(bench: Bench, step: float) -> Iterator[Check]:
         remedy = "write packed(self, numbers, context) that returns lw.Packed({name: numbers}), names as in params()"
         yield Check("packed", 1.0, 0.0, False, f"packed() {text}; {remedy}")
         return
-    filled = set(packed.values) | ({"first"} if packed.rows is not None else set())
-    filled |= {"memory"} if packed.memory is not None else set()
-    filled |= {"work"} if packed.work else set()
+    places = {"first": packed.rows is not None, "memory": packed.memory is not None, "work": packed.work}
+    filled = set(packed.values) | {name for name, present in places.items() if present}
     wanted = set(bench.Params["own"].names or ()) - {"unused"}
     wrong = [f"{name} is not in packed().values" for name in sorted(wanted - filled)]
-    wrong += [f"{name} is no field of params()" for name in sorted(filled - wanted - {"first", "memory", "work"})]
+    wrong += [f"{name} is no field of params()" for name in sorted(filled - wanted - places.keys())]
     yield Check("numbers", len(wrong), 0.0, not wrong, "; ".join(wrong))
     remembers = packed.memory is not None and packed.memory.size > 0
     good = remembers == bool(term.memory)
@@ -155,9 +149,8 @@ def _numbers(bench: Bench, step: float) -> Iterator[Check]:
     if good and not wrong:
         packets = _attempt(lambda: Bank(bench, context, bench.views), "with shared numbers")
         if isinstance(packets, str):
-            yield Check(
-                "packed", 1.0, 0.0, False, f"{packets}; give arrays (1,), (1, 3) or (n,), (n, 3), and whole numbers"
-            )
+            text = f"{packets}; give arrays (1,), (1, 3) or (n,), (n, 3), and whole numbers"
+            yield Check("packed", 1.0, 0.0, False, text)
         else:
             bench.packets = packets
 
@@ -185,8 +178,8 @@ def _all_finite(name: str, values: dict[str, np.ndarray], views: Views) -> Check
 def _whole(bench: Bench, step: float) -> Iterator[Check]:
     """What holds for every law: blind to what it must not look at, lanes apart, varied as shared."""
     views, kind, here = bench.views, type(bench.term).__name__, bench.at(bench.views)
-    faster = bench.at(views.changed(velocity=2.0 * views.velocity + 1.0, rate=1.0 - views.rate))
-    later = bench.at(views.changed(time=views.time + 3.7))
+    faster = bench.at(replace(views, velocity=2.0 * views.velocity + 1.0, rate=1.0 - views.rate))
+    later = bench.at(replace(views, time=views.time + 3.7))
     for role, value in here.items():
         if role != "damping":
             remedy = "only damping(D, view, p) may look at view.nu and view.Om"
@@ -244,9 +237,8 @@ def _axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
         torque = turned_wrench[:, 3:] @ TURN.T + np.cross(ORIGIN, force)
         difference = np.concatenate([force, torque], axis=1) - wrench
         # Moving the origin and turning add up numbers as large as these.
-        limit = (
-            ROUNDINGS * EPS * max(np.abs(here[role]).max(), np.abs(turned[role]).max(), np.abs(wrench).max()) * 100.0
-        )
+        largest = max(np.abs(values).max() for values in (here[role], turned[role], wrench))
+        limit = ROUNDINGS * EPS * largest * 100.0
         remedy = "turn vectors by context.frame.vector(), points by .point(), torques by .torque() in packed()"
         yield _judged(f"{role}: any axes", difference, limit, views, remedy)
 
@@ -320,7 +312,7 @@ def _damping(bench: Bench, step: float) -> Iterator[Check]:
     views = bench.views
     D = bench.at(views)["damping"].reshape(-1, 6, 6)
     weakest = np.linalg.eigh(D + np.swapaxes(D, 1, 2))[1][:, :, 0]
-    trials = [views, *(views.changed(velocity=s * weakest[:, :3], rate=s * weakest[:, 3:]) for s in (1.0, -1.0))]
+    trials = [views, *(replace(views, velocity=s * weakest[:, :3], rate=s * weakest[:, 3:]) for s in (1.0, -1.0))]
     power, allowed, twist = (np.concatenate(x) for x in zip(*(_power(bench, trial) for trial in trials), strict=True))
     endless = ~(np.isfinite(power) & np.isfinite(allowed))
     if endless.any():
@@ -359,13 +351,12 @@ def _flow(bench: Bench, step: float) -> Iterator[Check]:
 
     reach = np.linalg.norm(views.position, axis=1) + 1.0
     moves = [_slope(lambda by, i=i: u(views.moved(i, by)), step, reach) for i in range(3)]
-    passes = _slope(lambda by: u(views.changed(time=views.time + by)), step, views.time + 1.0)
+    passes = _slope(lambda by: u(replace(views, time=views.time + by)), step, views.time + 1.0)
     yield _judged("flow: rate = du/dt", flow[:, 3:6] - passes.value, passes.allowed, views, "add it to f.rate")
     for i, name in enumerate(("by_north", "by_east", "by_depth")):
         gradient = flow[:, 6 + 3 * i : 9 + 3 * i]
-        yield _judged(
-            f"flow: {name} = du/db{i + 1}", gradient - moves[i].value, moves[i].allowed, views, f"add it to f.{name}"
-        )
+        difference, allowed = gradient - moves[i].value, moves[i].allowed
+        yield _judged(f"flow: {name} = du/db{i + 1}", difference, allowed, views, f"add it to f.{name}")
     yield _flow_kind(kind, moves, passes)
     yield _water(bench, u, sum(reach * np.abs(slope.value).max(axis=1) for slope in moves))
 
@@ -378,7 +369,7 @@ def _water(bench: Bench, u: Callable[[Views], np.ndarray], rounded: np.ndarray) 
         text = f"write water(numbers, position, time, parameters) in {type(term).__name__}: start and energy need it"
         return Check("flow: water()", np.inf, 0.0, False, text)
     if velocity is None:
-        views = views.changed(time=0.0 * views.time)
+        views = replace(views, time=0.0 * views.time)
         host = term.water_at_start(bench.own, views.position, bench.context(bench.parameters))
     else:
         host = velocity[:, 0]
@@ -392,6 +383,5 @@ def _flow_kind(kind: Any, moves: list[Slope], passes: Slope) -> Check:
     changes = bool(np.any(np.abs(passes.value) > passes.allowed))
     least = "varying" if varies else "uniform" if changes else "steady"
     good = kind in FLOWS and FLOWS.index(kind) >= FLOWS.index(least)
-    return Check(
-        "flow: FLOW", float(not good), 0.0, good, f"FLOW = {kind!r}" + ("" if good else f": write FLOW = {least!r}")
-    )
+    text = f"FLOW = {kind!r}" + ("" if good else f": write FLOW = {least!r}")
+    return Check("flow: FLOW", float(not good), 0.0, good, text)

@@ -177,11 +177,7 @@ class BlockFiles:
             return ["is not finished"]
         if unfit := self.unfit(block, sums, samples, keepers):
             return unfit
-        return [
-            f"{key} {text}"
-            for key, size_and_sum in sums.items()
-            if (text := durable.fault(self.root, key, *size_and_sum))
-        ]
+        return [f"{key} {text}" for key, text in damaged(self.root, sums).items()]
 
     def unfit(self, block: Block, sums: Mapping[str, Sequence[int]], samples: int, keepers: Sequence[Any]) -> list[str]:
         """Check the names and sizes in a block's marker: only the block's own chunks and parts may be there.
@@ -275,6 +271,20 @@ def marker(sums: Mapping[str, list[int]]) -> bytes:
     """
     text = json.dumps(dict(sorted(sums.items())), indent=0).encode()
     return text + b"\n%08x\n" % durable.checksum(text)
+
+
+def damaged(root: Path, sums: Mapping[str, Sequence[int]]) -> dict[str, str]:
+    """Find the files that are not as their marker says.
+
+    Args:
+        root: Folder of the store.
+        sums: [size, checksum] by path of the file.
+
+    Returns:
+        What is wrong, by path of the file.
+    """
+    faults = ((key, durable.fault(root, key, *size_and_sum)) for key, size_and_sum in sums.items())
+    return {key: text for key, text in faults if text}
 
 
 def read_marker(root: Path, key: str) -> dict[str, list[int]] | None:

@@ -14,6 +14,7 @@ from lgvi_warp.common import files as durable
 from lgvi_warp.common import scratch
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.engine.keepers.protocol import Keeper, PartKeeper
+from lgvi_warp.runs.result import TIME
 from lgvi_warp.runs.store.arrays import array, whole_array
 from lgvi_warp.runs.store.block_files import marker
 from lgvi_warp.runs.store.folder import CREATED, FORMAT, ROOT, check_names, checksum_of
@@ -69,6 +70,21 @@ def names_of(keepers: Sequence[Keeper]) -> list[str]:
     return [keeper.name for keeper in keepers if isinstance(keeper, PartKeeper)]
 
 
+def nearest_folder(path: Path) -> Path:
+    """Find the folder that exists on the way to a path.
+
+    Args:
+        path: The path, which need not exist.
+
+    Returns:
+        The folder itself, or the nearest one above it.
+    """
+    path = path.absolute()
+    while not path.is_dir():
+        path = path.parent
+    return path
+
+
 def free_enough(path: Path, wanted: int) -> None:
     """Raise SceneError if a disk has less room than a run needs.
 
@@ -76,10 +92,7 @@ def free_enough(path: Path, wanted: int) -> None:
         path: Where the run will be written; need not exist.
         wanted: Size of the run [bytes].
     """
-    existing = path.absolute()
-    while not existing.exists():
-        existing = existing.parent
-    free = shutil.disk_usage(existing).free
+    free = shutil.disk_usage(nearest_folder(path)).free
     if wanted + SPARE_BYTES > free:
         shortage = f"needs {wanted / 1e9:.2f} GB, and the disk has {free / 1e9:.2f} GB left"
         remedy = "save less often or fewer fields (SaveAt), store float32 (--store-dtype float32), or use another disk"
@@ -107,11 +120,8 @@ def skeleton(
     import zarr
     from zarr.storage import MemoryStore
 
-    shared = {
-        name: values.tolist()
-        for name, values in plan.ensemble.parameters(0, 1).items()
-        if name not in plan.ensemble.varied()
-    }
+    varied, first = plan.ensemble.varied(), plan.ensemble.parameters(0, 1)
+    shared = {name: values.tolist() for name, values in first.items() if name not in varied}
     content = recipe(plan) | {"store": store.layout(), "keepers": names_of(keepers)}
     texts = [json.dumps(item) for item in (provenance, content, list(messages), shared)]
     # zarr writes into memory, and `files` writes to disk and syncs together: file by file it would take several times as long.
@@ -119,9 +129,7 @@ def skeleton(
     memory = MemoryStore(inside)
     group = zarr.create_group(memory, zarr_format=3, attributes=_attributes(texts, provenance))
     k, n = len(plan.grid.times), plan.ensemble.members
-    whole_array(
-        group, "time", plan.grid.times, ("time",), {"units": "s", "long_name": "time since the start", "axis": "T"}
-    )
+    whole_array(group, "time", plan.grid.times, ("time",), TIME | {"axis": "T"})
     whole_array(group, "step", plan.grid.sample_steps, ("time",), {"units": "1", "long_name": "steps made until then"})
     for column in columns(plan, store):
         array(group, column.name, column.shape(k, n), column.chunk, column.dtype, column.fill, column.dims,

@@ -81,9 +81,8 @@ def check_whole(folder: Folder) -> None:
     """
     content = state(folder.path)
     if not content["complete"]:
-        damage = content["damage"][:5] or [
-            f"{content['blocks'] - content['finished']} blocks are not marked as finished"
-        ]
+        unfinished = content["blocks"] - content["finished"]
+        damage = content["damage"][:5] or [f"{unfinished} blocks are not marked as finished"]
         raise SceneError(f"{folder.path}: {text}; `lgvi-warp resume {folder.path}` mends it" for text in damage)
 
 

@@ -28,7 +28,7 @@ from lgvi_warp.common.write_lock import write_lock
 from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.runs.store import layout_check as store_check
 from lgvi_warp.runs.store import texts as store_texts
-from lgvi_warp.runs.store.block_files import BlockFiles, name_of, read_marker
+from lgvi_warp.runs.store.block_files import BlockFiles, damaged, name_of, read_marker
 from lgvi_warp.runs.store.layout import StoreArray
 from lgvi_warp.runs.store.layout_check import understood
 from lgvi_warp.runs.store.recipe import ensemble_of, plan_of
@@ -79,9 +79,8 @@ class Folder:
         except (ValueError, KeyError, TypeError, AttributeError):
             good = False
         if not good:
-            raise SceneError(
-                [f"{path / ROOT}: is damaged, or of another version of the format; run again (--overwrite)"]
-            )
+            problem = "is damaged, or of another version of the format"
+            raise SceneError([f"{path / ROOT}: {problem}; run again (--overwrite)"])
         with understood(path / ROOT):
             self.provenance, self.recipe, messages, self.shared = (parsed(text) for text in texts)
             store_texts.check(self.attributes, self.provenance, self.recipe, messages, self.shared)
@@ -146,17 +145,14 @@ class Folder:
         each = sum(column.bytes for column in self.layout.columns if not column.times) * len(self.runs)
         memory = machine.memory_bytes() or 2**40
         if each > memory:
-            size = f"has {self.members:,} members, of which {each / 1e9:.0f} GB are read at once, and the memory is"
-            raise SceneError(
-                [f"{self.path}: {size} {memory / 1e9:.0f} GB; read it on a larger machine, or run it again"]
-            )
+            size = f"has {self.members:,} members, of which {each / 1e9:.0f} GB are read at once"
+            remedy = f"the memory is {memory / 1e9:.0f} GB; read it on a larger machine, or run it again"
+            raise SceneError([f"{self.path}: {size}, and {remedy}"])
 
     def unfinished(self) -> list[Block]:
         """List the blocks that have no valid marker."""
-        block_files, marked = self.block_files, safe_files.names(self.path, "blocks")
-        return [
-            block for block in self.runs if f"{name_of(block)}.json" not in marked or block_files.sums(block) is None
-        ]
+        files, marked = self.block_files, safe_files.names(self.path, "blocks")
+        return [b for b in self.runs if f"{name_of(b)}.json" not in marked or files.sums(b) is None]
 
     def plan(self, ensemble: Ensemble | None = None) -> Plan:
         """Build the plan of the run again.
@@ -183,10 +179,8 @@ class Folder:
             raise SceneError([f"{self.path}: {'; '.join(self.damage()) or error}; {remedy}"]) from error
         with understood(self.path / ROOT):
             if ensemble is None:
-                noise = explicit.pop("indices", None)
-                ensemble = ensemble_of(
-                    self.provenance["scene"], self.provenance["ensemble"], explicit, noise, self.path
-                )
+                noise, content = explicit.pop("indices", None), self.provenance
+                ensemble = ensemble_of(content["scene"], content["ensemble"], explicit, noise, self.path)
             return plan_of(self.recipe, ensemble, steps, times)
 
     def damage(self) -> list[str]:
@@ -196,9 +190,7 @@ class Folder:
             return [f"{CREATED} is damaged"]
         if sums.keys() != wanted.keys() or any(size not in (None, sums[key][0]) for key, size in wanted.items()):
             return [f"{CREATED} does not fit the arrays in {ROOT}"]
-        faults = {
-            key: text for key, size_and_sum in sums.items() if (text := durable.fault(self.path, key, *size_and_sum))
-        }
+        faults = damaged(self.path, sums)
         return [f"{key} {text}" for key, text in faults.items()] + self._unlike(faults)
 
     def _unlike(self, damaged: Container[str]) -> list[str]:
@@ -333,11 +325,7 @@ def foreign(path: Path) -> str | None:
         if not folder and not (entry.is_file(follow_symlinks=False) and store_check.is_file_of_store(name)):
             return f"holds {name}, which no run wrote"
         names += [] if folder else [name]
-    if (
-        names
-        and not {ROOT, CREATED} & set(names)
-        and not any(scratch.is_unfinished(folder_name) for folder_name in names)
-    ):
+    if names and not any(name in (ROOT, CREATED) or scratch.is_unfinished(name) for name in names):
         return f"holds {names[0]}, and nothing that says that it is a run"
     return None
 

@@ -135,11 +135,10 @@ def columns(plan: Plan, store: Chunking) -> tuple[StoreArray, ...]:
         The arrays: samples, member's index, fields of members, varied parameters.
     """
     length = blocks(plan.ensemble.members)[0].count
+    index = {"standard_name": "realization", "long_name": "member of the ensemble"}
     arrays = (
         *_samples(plan, length, store),
-        StoreArray(
-            MEMBER, (), "<i8", length, 0, {"standard_name": "realization", "long_name": "member of the ensemble"}
-        ),
+        StoreArray(MEMBER, (), "<i8", length, 0, index),
         *(StoreArray(item.name, (), item.dtype, length, 0, item.attributes) for item in member_fields.present(plan)),
         *_parameters(plan, length),
     )
@@ -166,12 +165,11 @@ def _parameters(plan: Plan, length: int) -> list[StoreArray]:
     ensemble = plan.ensemble
     first = ensemble.parameters(0, 1)
     units = parameter_units(ensemble.scene)
-    return [
-        StoreArray(
-            name, first[name].shape[1:], "<f8", length, 0, {"long_name": f"parameter {name}", "units": units[name]}
-        )
-        for name in ensemble.varied()
-    ]
+    arrays = []
+    for name in ensemble.varied():
+        attributes = {"long_name": f"parameter {name}", "units": units[name]}
+        arrays.append(StoreArray(name, first[name].shape[1:], "<f8", length, 0, attributes))
+    return arrays
 
 
 def parameter_units(scene: Any) -> dict[str, str]:
@@ -185,14 +183,10 @@ def parameter_units(scene: Any) -> dict[str, str]:
     """
     from lgvi_warp.physics import vehicle
 
-    known = {f"vehicle.{name}": unit for name, unit in vehicle.UNITS.items()}
+    known: dict[str, str | None] = {f"vehicle.{name}": unit for name, unit in vehicle.UNITS.items()}
     known |= {"environment.gravity": "m s-2", "environment.water_density": "kg m-3"}
     for term in (*scene.terms, *scene.events):
-        known |= {
-            f"{term.key}.{item.name}": item.metadata["unit"]
-            for item in dataclasses.fields(term)
-            if "unit" in item.metadata
-        }
+        known |= {f"{term.key}.{item.name}": item.metadata.get("unit") for item in dataclasses.fields(term)}
     return {name: known.get(name) or "1" for name in scene.parameters()}
 
 

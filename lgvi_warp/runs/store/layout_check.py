@@ -26,12 +26,10 @@ from lgvi_warp.runs.store.layout import KEPT_MEMBER, MEMBER, StoreArray
 
 # Types of arrays: NumPy's type strings by zarr's names.
 TYPES = {"float64": "<f8", "float32": "<f4", "int64": "<i8", "uint16": "<u2", "uint8": "|u1"}
-CODECS = ("bytes", "crc32c")
 ARRAY_KEYS = {
     "shape", "data_type", "chunk_grid", "chunk_key_encoding", "fill_value", "codecs", "attributes", "dimension_names",
     "zarr_format", "node_type", "storage_transformers",
 }  # fmt: skip
-GROUP_KEYS = {"attributes", "zarr_format", "node_type", "consolidated_metadata"}
 # Size of the file of a chunk [bytes].
 MOST_CHUNK_BYTES = 1_000_000_000
 MOST_DIMENSIONS, MOST_NAME = 8, 200
@@ -40,7 +38,7 @@ MOST_CHUNKS = 1_000_000
 KEPT = "kept"
 # Characters that some file system takes for a path, a drive or a pattern, and those that control a terminal.
 UNFIT = re.compile(r"""[/\\:*?"<>|]|[^ -~\w]|^[. ]|[. ]$""")
-REQUIRED = (MEMBER, *(field.name for field in member_fields.FIELDS if not field.name.startswith("steps_")))
+REQUIRED = (MEMBER, *(field.name for field in member_fields.EVERY))
 FILE = re.compile(
     r"(?:kept(?:\.[^/]+)?/)?(?:zarr\.json|created\.json|blocks/\d{9,12}\.json|parts/\d{9,12}\.npy"
     r"|(?:explicit/)?(?:[^/]+/)?(?:zarr\.json|c(?:\.\d{1,12})*))"
@@ -74,12 +72,9 @@ def is_file_of_store(name: str) -> bool:
     """
     folder, _, last = name.rpartition("/")
     if scratch.is_unfinished(last):
-        return any(bool(FILE.fullmatch(f"{folder}/{last[:place]}".lstrip("/"))) for place in _dots(last))
+        ends = (dot.start() for dot in re.finditer(r"\.", last))
+        return any(FILE.fullmatch(f"{folder}/{last[:end]}".lstrip("/")) for end in ends)
     return bool(FILE.fullmatch(name))
-
-
-def _dots(text: str) -> list[int]:
-    return [place for place, letter in enumerate(text) if letter == "."]
 
 
 @dataclass(frozen=True)
@@ -218,9 +213,8 @@ def layout_of(content: Mapping[str, Any], members: int) -> Layout:
             groups.append(name)
         else:
             arrays[name] = _array(name, metadata)
-    if any(name != "explicit" for name in groups) or any(
-        "/" in name and not (name.startswith("explicit/") and "explicit" in groups) for name in arrays
-    ):
+    parents = {name.partition("/")[0] for name in arrays if "/" in name}
+    if not parents <= set(groups) <= {"explicit"}:
         raise NotOursError("it has groups that no run has")
     return _checked(arrays, tuple(groups), members)
 
@@ -284,17 +278,12 @@ def is_text(value: Any) -> bool:
 
 def _checked(arrays: dict[str, StoredArray], groups: tuple[str, ...], members: int) -> Layout:
     """The layout of arrays, which must fit each other and the run. Raises NotOursError."""
-    missing = [name for name in ("time", "step", *REQUIRED) if name not in arrays]
-    if missing:
+    if missing := [name for name in ("time", "step", *REQUIRED) if name not in arrays]:
         raise NotOursError(f"it has no {', '.join(missing)}")
     k, length = arrays["time"].shape[0], min(block_size(members), members)
     along = KEPT_MEMBER if KEPT_MEMBER in arrays else MEMBER
-    fixed = {
-        "time": ("<f8", (k,)),
-        "step": ("<i8", (k,)),
-        KEPT_MEMBER: ("<i8", (members,)),
-        "chosen": ("|u1", (members,)),
-    }
+    fixed = {"time": ("<f8", (k,)), "step": ("<i8", (k,))}
+    fixed |= {KEPT_MEMBER: ("<i8", (members,)), "chosen": ("|u1", (members,))}
     of_members = {member_field.name: member_field.dtype for member_field in member_fields.FIELDS} | {MEMBER: "<i8"}
     columns = []
     for name, array in arrays.items():
@@ -304,10 +293,8 @@ def _checked(arrays: dict[str, StoredArray], groups: tuple[str, ...], members: i
         elif name in fixed:
             good = array.whole and (array.dtype, array.shape) == fixed[name]
         elif timed:
-            good = (
-                array.dtype[1] == "f" and array.shape == (k, members, *TABLE[name].shape) and array.chunk[1] == length
-            )
-            good = good and array.chunk[2:] == array.shape[2:] and -(-k // array.chunk[0]) <= MOST_CHUNKS
+            good = array.dtype[1] == "f" and array.shape == (k, members, *TABLE[name].shape)
+            good = good and array.chunk[1:] == (length, *array.shape[2:]) and -(-k // array.chunk[0]) <= MOST_CHUNKS
         else:
             good = array.dtype == of_members.get(name, "<f8" if "." in name else "")
             good = good and array.shape[0] == members and array.chunk == (length, *array.shape[1:])
@@ -340,9 +327,8 @@ def understood(path: Path) -> Iterator[None]:
     except (ValueError, KeyError, TypeError, AttributeError, IndexError, ArithmeticError, RecursionError) as error:
         text = " ".join(str(error).split())[:200] or type(error).__name__
         reason = text if isinstance(error, NotOursError) else f"cannot be used ({type(error).__name__}: {text})"
-        raise SceneError(
-            [f"{path}: is not what lgvi-warp writes: {reason}; ask for the run anew, or run it again"]
-        ) from error
+        remedy = "ask for the run anew, or run it again"
+        raise SceneError([f"{path}: is not what lgvi-warp writes: {reason}; {remedy}"]) from error
 
 
 def is_sum(value: Any) -> bool:

@@ -45,20 +45,15 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
     for further in parts[1:]:
         mismatches = same_run(further.provenance, first.provenance, str(further.path), str(first.path))
         if mismatches or further.recipe != first.recipe:
-            mismatches = mismatches or ["another recipe"]
-            raise SceneError(
-                f"{text}: these are parts of different runs; merge parts of one run" for text in mismatches
-            )
+            remedy = "these are parts of different runs; merge parts of one run"
+            raise SceneError(f"{text}: {remedy}" for text in mismatches or ["another recipe"])
     target = Path(out)
     target = target if target.suffix == ".zarr" else target / first.path.name
-    try:
-        with held(target):
-            if os.path.lexists(target) and not overwrite:
-                raise SceneError([f"{target}: holds a run already; give --overwrite, or another folder"])
-            refuse_foreign(target)
-            again = _put_together(parts, Path(os.path.realpath(target)))
-    except OSError as error:
-        raise explained(error, target) from error
+    with explained(target), held(target):
+        if os.path.lexists(target) and not overwrite:
+            raise SceneError([f"{target}: holds a run already; give --overwrite, or another folder"])
+        refuse_foreign(target)
+        again = _put_together(parts, Path(os.path.realpath(target)))
     if again:
         # On another machine, or with a user's own distributions, this is refused: the run then waits for lw.resume.
         with contextlib.suppress(SceneError, MembersFailed):

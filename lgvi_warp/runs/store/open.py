@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp.common import files as durable
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.status import Status
 from lgvi_warp.engine.block import Block
@@ -18,8 +17,9 @@ from lgvi_warp.engine.keepers.observation import Observation, Observing, observa
 from lgvi_warp.physics.fields import IN_FILES
 from lgvi_warp.physics.terms import from_list
 from lgvi_warp.physics.terms.base import Term
+from lgvi_warp.runs.provenance import at_end
 from lgvi_warp.runs.result import END_TIME, Result
-from lgvi_warp.runs.store.block_files import name_of
+from lgvi_warp.runs.store.block_files import damaged, name_of
 from lgvi_warp.runs.store.folder import KEPT, ROOT, Folder
 from lgvi_warp.runs.store.kept import keep_of, members_kept
 from lgvi_warp.runs.store.layout import KEPT_MEMBER, MEMBER
@@ -100,12 +100,11 @@ def folder_of(path: str | os.PathLike[str]) -> Path:
         raise SceneError([f"{stores[0]}: is a link; name the store that it leads to: {stores[0].resolve()}"])
     if len(stores) == 1:
         return stores[0]
-    fault = "is not there" if not location.exists() else "is a file" if location.is_file() else "holds no store"
     if stores:
-        fault = f"holds {len(stores)} stores"
-    remedy = (
-        f"name one: {', '.join(map(str, stores[:5]))}" if stores else "give the folder of a run made with --store zarr"
-    )
+        fault, remedy = f"holds {len(stores)} stores", f"name one: {', '.join(map(str, stores[:5]))}"
+    else:
+        fault = "is not there" if not location.exists() else "is a file" if location.is_file() else "holds no store"
+        remedy = "give the folder of a run made with --store zarr"
     raise SceneError([f"{location}: {fault}; {remedy}"])
 
 
@@ -136,12 +135,8 @@ def open_run(
     folder = Folder(folder_of(path))
     messages = folder.messages
     if not folder.complete:
-        unfinished_blocks = len(folder.unfinished())
-        missing = (
-            f"{unfinished_blocks} blocks are missing"
-            if unfinished_blocks
-            else "the members that it keeps have not been run again yet"
-        )
+        blocks = len(folder.unfinished())
+        missing = f"{blocks} blocks are missing" if blocks else "the members that it keeps have not been run again yet"
         text = f"{folder.path}: is not complete: {missing}"
         if not incomplete:
             raise SceneError([f"{text}; go on with `lgvi-warp resume {folder.path.parent}`, or give incomplete=True"])
@@ -205,12 +200,10 @@ def _check_parts(folder: Folder, sums: Mapping[str, Sequence[int]] | None, block
     key = folder.block_files.parts_key(block)
     if sums is None:
         faults = [f"blocks/{name_of(block)}.json is missing or damaged"]
-    elif key not in sums and not folder.recipe["keepers"]:
-        faults = []
-    elif key not in sums:
-        faults = [f"{key} is not in the marker of its block"]
+    elif key in sums:
+        faults = [f"{key} {text}" for key, text in damaged(folder.path, {key: sums[key]}).items()]
     else:
-        faults = [f"{key} {text}" for text in [durable.fault(folder.path, key, *sums[key])] if text]
+        faults = [f"{key} is not in the marker of its block"] if folder.recipe["keepers"] else []
     if faults:
         raise SceneError(f"{folder.path}: {text}; `lgvi-warp resume {folder.path}` mends it" for text in faults)
 
@@ -240,7 +233,7 @@ def result_of(
     """
     folder.refuse_too_large()
     group, time = folder.group(), times_of(folder)
-    n, planned = folder.members, int(folder.recipe["members"])
+    n = folder.members
     at = _places(members, n)
     arrays = {name: array for name, array in group.arrays()}
     fields = tuple(name for name in arrays if name in IN_FILES)
@@ -251,12 +244,7 @@ def result_of(
     strange = np.setdiff1d(small["status"], np.array([int(code) for code in Status]))
     if len(strange):
         raise SceneError([f"{folder.path}: has the status {strange[0]}, which no member ends with; run it again"])
-    provenance = dict(folder.provenance)
-    for name in ("steps_made", "steps_tried"):
-        if name in arrays:
-            provenance[name] = float(small[name].mean())
-    if n < planned:
-        provenance["members"] = n
+    provenance = at_end(folder.provenance, small, n, int(folder.recipe["members"]))
     estimates, remarks = Estimates(), tuple[str, ...]()
     if observing is not None:
         estimates, remarks = observing.read(provenance["ensemble"], small["status"])
@@ -300,9 +288,8 @@ def kept_of(folder: Folder, terms: Sequence[Term]) -> tuple[np.ndarray, Result |
     kept = result_of(group, _chosen_places(group.group()), group.messages, terms)
     ensemble = kept.provenance["ensemble"]
     if kept.members != len(wanted):
-        raise SceneError(
-            [f"{group.path}: holds {kept.members} members, not {len(wanted)}; `lgvi-warp resume` mends it"]
-        )
+        count = f"holds {kept.members} members, not {len(wanted)}"
+        raise SceneError([f"{group.path}: {count}; `lgvi-warp resume` mends it"])
     with understood(folder.path / ROOT):
         places = np.asarray(ensemble.get("indices", range(folder.members)))[wanted]
     return wanted, replace(kept, provenance=kept.provenance | {"ensemble": ensemble | {"indices": places.tolist()}})

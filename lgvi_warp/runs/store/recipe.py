@@ -125,7 +125,7 @@ def ensemble_of(
     Raises:
         SceneError: If the tables are at fault, or a file of a table is missing or changed.
     """
-    _check_table(settings.get("sampling"))
+    _check_table(_table_in(settings))
     settings = {key: value for key, value in settings.items() if key != ARRAYS}
     table = _table(settings, explicit, store)
     if table is not None:
@@ -151,10 +151,16 @@ def ensemble_of(
     return ensemble
 
 
-def _check_table(sampling: Any) -> None:
-    """Require a checksum for a table's file that a store names. Raises SceneError."""
+def _table_in(ensemble: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The settings of an ensemble's table; empty if its members come from elsewhere."""
+    sampling = ensemble.get("sampling")
     table = sampling.get("table") if isinstance(sampling, Mapping) else None
-    if isinstance(table, Mapping) and "file" in table and not isinstance(table.get("sha256"), str):
+    return table if isinstance(table, Mapping) else {}
+
+
+def _check_table(table: Mapping[str, Any]) -> None:
+    """Require a checksum for a table's file that a store names. Raises SceneError."""
+    if "file" in table and not isinstance(table.get("sha256"), str):
         faults = Faults("ensemble.sampling.table.")
         faults.add("sha256", table.get("sha256"), "is missing beside the file", "run the scene again")
         faults.raise_if_any()
@@ -162,9 +168,8 @@ def _check_table(sampling: Any) -> None:
 
 def _table(settings: Mapping[str, Any], explicit: Mapping[str, np.ndarray], store: Path) -> Any:
     """The table of a file that an ensemble was drawn from: its numbers in the store, else the file; None without a file."""
-    sampling = settings.get("sampling")
-    table = sampling.get("table") if isinstance(sampling, Mapping) else None
-    if not isinstance(table, Mapping) or "file" not in table:
+    table = _table_in(settings)
+    if "file" not in table:
         return None
     if explicit:
         return Table.kept(table, explicit)
@@ -193,19 +198,17 @@ def same_run(
 
 def _comparable(provenance: Mapping[str, Any]) -> dict[str, Any]:
     """Provenance without what changes no bit: threads, Python's version, the scene's [ensemble] and [run], a file's place."""
-    content = dict(provenance)
-    content["scene"] = {key: value for key, value in content["scene"].items() if key not in ("ensemble", "run")}
-    content["machine"] = {key: value for key, value in content["machine"].items() if key in ("cpu", "simd")}
-    content["versions"] = {key: value for key, value in content["versions"].items() if key != "python"}
-    content["ensemble"] = _without_place(content["ensemble"])
-    return content
+    scene = {key: value for key, value in provenance["scene"].items() if key not in ("ensemble", "run")}
+    machine = {key: value for key, value in provenance["machine"].items() if key in ("cpu", "simd")}
+    versions = {key: value for key, value in provenance["versions"].items() if key != "python"}
+    ensemble = _without_place(provenance["ensemble"])
+    return {**provenance, "scene": scene, "machine": machine, "versions": versions, "ensemble": ensemble}
 
 
 def _without_place(ensemble: Mapping[str, Any]) -> dict[str, Any]:
     """Ensemble whose table of a file has its checksum, but not the file's path."""
-    sampling = ensemble.get("sampling")
-    table = sampling.get("table") if isinstance(sampling, Mapping) else None
-    if not isinstance(table, Mapping) or table.get("sha256") is None:
+    table = _table_in(ensemble)
+    if table.get("sha256") is None:
         return dict(ensemble)
     return {**ensemble, "sampling": {"table": {key: value for key, value in table.items() if key != "file"}}}
 
@@ -248,10 +251,9 @@ def refuse_another(path: Any, stored: Mapping[str, Any], now: Mapping[str, Any],
     mismatches = same_run(stored, json.loads(json.dumps(now)))
     machine = [text for text in mismatches if text.startswith(("machine.", "versions.", "kernel"))]
     if mismatches and (not force or len(machine) < len(mismatches)):
-        remedy = "is another run; give --overwrite, or another folder"
+        problem, remedy = "is another run", "give --overwrite, or another folder"
         if len(machine) == len(mismatches):
-            remedy = (
-                "the same bits cannot be promised; go on where it began, or give --force and take it that some differ"
-            )
-        raise SceneError(f"{path}: {text}: {remedy}" for text in mismatches)
+            problem = "the same bits cannot be promised"
+            remedy = "go on where it began, or give --force and take it that some differ"
+        raise SceneError(f"{path}: {text}: {problem}; {remedy}" for text in mismatches)
     return tuple(f"continued although {text}" for text in mismatches)

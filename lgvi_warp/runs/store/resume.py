@@ -67,9 +67,8 @@ def resume(
     with understood(folder.path / ROOT):
         observed = observation_of(observed_content, statistics)
     observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
-    now = of_store(provenance(plan), plan.ensemble) | (
-        {} if observed_content is None else {"observed": observed_content}
-    )
+    now = of_store(provenance(plan), plan.ensemble)
+    now |= {} if observed_content is None else {"observed": observed_content}
     messages = refuse_another(folder.path, folder.provenance, now, force)
     runner = executor_of(executor, threads, scheduler)
     # Provenance and messages stay those of the start of the run, on whatever machine it goes on.

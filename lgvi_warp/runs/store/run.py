@@ -78,10 +78,8 @@ class StoredRun:
             self._mend()
             missing = self._left(block_files)
             try:
-                with block_files.commits:
+                with explained(self.store.whole), block_files.commits:
                     members = self._blocks(block_files, missing, executor, progress)
-            except OSError as error:
-                raise explained(error, self.store.whole) from error
             finally:
                 block_files.remove_unfinished()
             folder = Folder(path, self.store.whole)
@@ -103,10 +101,8 @@ class StoredRun:
             yield
             return
         with contextlib.ExitStack() as stack:
-            try:
+            with explained(self.store.whole):
                 stack.enter_context(held(self.store.folder))
-            except OSError as error:
-                raise explained(error, self.store.whole) from error
             yield
 
     def _runs(self) -> list[Block]:
@@ -127,19 +123,14 @@ class StoredRun:
             safe_files.refuse_links(path)
             folder = Folder(path, store.whole)
             refuse_another(path, folder.provenance, self.provenance, store.force)
-            stored, requested = (
-                (folder.recipe["store"], folder.recipe["keepers"]),
-                (store.layout(), names_of(self.keepers)),
-            )
-            for present, wanted in zip(stored, requested, strict=True):
+            recipe = folder.recipe
+            for present, wanted in ((recipe["store"], store.layout()), (recipe["keepers"], names_of(self.keepers))):
                 if present != wanted:
                     raise SceneError([f"{path}: stores {present}, not {wanted}; ask for the same, or overwrite"])
             return
         refuse_foreign(path)
-        try:
+        with explained(store.whole):
             create(store, self.plan, self.provenance, self.messages, self.keepers)
-        except OSError as error:
-            raise explained(error, self.store.whole) from error
 
     def _mend(self) -> None:
         """Write those files anew that belong to no block and are damaged."""
@@ -207,20 +198,26 @@ def check_keepers(keepers: Sequence[Keeper]) -> None:
     faults.raise_if_any()
 
 
-def explained(error: OSError, path: os.PathLike[str]) -> OSError:
-    """Add to an error of the disk what it means for the run.
+@contextlib.contextmanager
+def explained(path: os.PathLike[str]) -> Iterator[None]:
+    """Add to errors of the disk what they mean for the run.
 
     Args:
-        error: The error.
         path: The store.
 
-    Returns:
-        The same error with a longer text, or itself.
+    Yields:
+        Nothing; files are written in this context.
+
+    Raises:
+        OSError: If the disk cannot be written.
     """
-    if error.errno in FULL:
-        text = f"{error.strerror}: the blocks that were finished are kept; make room, then `lgvi-warp resume {path}`"
-    elif error.errno in (errno.EROFS, errno.EACCES, errno.EPERM):
-        text = f"{error.strerror}: choose a folder that can be written"
-    else:
-        return error
-    return OSError(error.errno, text, error.filename or str(path))
+    try:
+        yield
+    except OSError as error:
+        if error.errno in FULL:
+            remedy = f"the blocks that were finished are kept; make room, then `lgvi-warp resume {path}`"
+        elif error.errno in (errno.EROFS, errno.EACCES, errno.EPERM):
+            remedy = "choose a folder that can be written"
+        else:
+            raise
+        raise OSError(error.errno, f"{error.strerror}: {remedy}", error.filename or str(path)) from error

@@ -90,10 +90,8 @@ class Store:
         arrays, units = plan.ensemble.explicit(), parameter_units(plan.ensemble.scene)
         explicit = group.create_group("explicit")
         for name, values in arrays.items():
-            dims = (
-                f"{MEMBER}_given" if name != "indices" else MEMBER,
-                *(f"{name}_{i}" for i in range(values.ndim - 1)),
-            )
+            along = MEMBER if name == "indices" else f"{MEMBER}_given"
+            dims = (along, *(f"{name}_{i}" for i in range(values.ndim - 1)))
             whole_array(explicit, name, values, dims, {"units": units.get(name, "1")})
 
 

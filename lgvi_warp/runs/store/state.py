@@ -43,10 +43,10 @@ def state(path: str | os.PathLike[str]) -> dict[str, Any]:
         SceneError: If there is no run.
     """
     folder = Folder(folder_of(path))
-    runs = folder.runs
-    damage = folder.damage()
+    runs, recipe = folder.runs, folder.recipe
+    fields, damage = recipe["store"]["fields"], folder.damage()
     samples, finished = folder.layout.times, 0
-    for _, faults in check(folder.block_files, runs, samples, folder.recipe["keepers"]):
+    for _, faults in check(folder.block_files, runs, samples, recipe["keepers"]):
         if faults != ["is not finished"]:
             finished += not faults
             damage += faults
@@ -56,10 +56,8 @@ def state(path: str | os.PathLike[str]) -> dict[str, Any]:
         "path": folder.path,
         "members": folder.members,
         "samples": samples,
-        "fields": list(
-            folder.recipe["fields"] if (stored_fields := folder.recipe["store"]["fields"]) is None else stored_fields
-        ),
-        "keepers": list(folder.recipe["keepers"]),
+        "fields": list(recipe["fields"] if fields is None else fields),
+        "keepers": list(recipe["keepers"]),
         "blocks": len(runs),
         "finished": finished,
         "kept": kept,

@@ -25,18 +25,6 @@ class Room(list[dict[str, np.ndarray]]):
         """Each process has its own pool: it is pickled empty."""
         return Room, ()
 
-    @staticmethod
-    def empty_chunks(columns: tuple[StoreArray, ...]) -> dict[str, np.ndarray]:
-        """Allocate a chunk for each array that has times.
-
-        Args:
-            columns: The arrays of a store.
-
-        Returns:
-            Chunks by name, with undefined content.
-        """
-        return {column.name: np.empty(column.chunk, column.dtype) for column in columns if column.times}
-
 
 class BlockWriter:
     """Writer of one block into a store.
@@ -54,18 +42,18 @@ class BlockWriter:
         self, root: Path, columns: tuple[StoreArray, ...], room: Room, plan: Plan, block: Block, members: Members
     ):
         self._plan, self._block, self._members = plan, block, members
-        self._columns = columns
+        self._timed = [column for column in columns if column.times]
+        self._of_members = [column for column in columns if not column.times]
         self._samples = len(plan.grid.times)
         self._files = Files(root)
         self._room = room
         try:
             self._chunks = room.pop()
         except IndexError:
-            self._chunks = room.empty_chunks(columns)
+            self._chunks = {column.name: np.empty(column.chunk, column.dtype) for column in self._timed}
         if block.count < columns[0].length:
-            for column in columns:
-                if column.times:
-                    self._chunks[column.name][:, block.count :] = column.fill
+            for column in self._timed:
+                self._chunks[column.name][:, block.count :] = column.fill
 
     def take(self, when: slice, samples: dict[str, np.ndarray]) -> None:
         """Put samples into their chunks, and write the chunks that are full.
@@ -74,9 +62,8 @@ class BlockWriter:
             when: Which sample times.
             samples: Arrays (times, members of the block, ...), by name.
         """
-        for column in self._columns:
-            if column.times:
-                self._take(column, when, samples[column.name])
+        for column in self._timed:
+            self._take(column, when, samples[column.name])
 
     def _take(self, column: StoreArray, when: slice, values: np.ndarray) -> None:
         chunk = self._chunks[column.name]
@@ -105,14 +92,9 @@ class BlockWriter:
         """
         values = {MEMBER: self._members.indices} | self._members.parameters
         values |= member_fields.of(self._plan, outcome)
-        for column in self._columns:
-            if not column.times:
-                chunk = _empty(column)
-                chunk[: self._block.count] = values[column.name]
-                self._write(column, 0, chunk)
+        for column in self._of_members:
+            chunk = np.full(column.chunk, column.fill, column.dtype)
+            chunk[: self._block.count] = values[column.name]
+            self._write(column, 0, chunk)
         self._room.append(self._chunks)
         return self._files
-
-
-def _empty(column: StoreArray) -> np.ndarray:
-    return np.full(column.chunk, column.fill, column.dtype)

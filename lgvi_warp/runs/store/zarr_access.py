@@ -186,12 +186,9 @@ def _class() -> Any:
             Yields:
                 Their names, sorted.
             """
-            names: set[Any] = set()
             head = f"{prefix.rstrip('/')}/" if prefix else ""
-            for name in (*self.layout.arrays, *self.layout.groups):
-                if name.startswith(head):
-                    names.add(name.removeprefix(head).partition("/")[0])
-            for name in sorted(names):
+            inside = (name for name in (*self.layout.arrays, *self.layout.groups) if name.startswith(head))
+            for name in sorted({name.removeprefix(head).partition("/")[0] for name in inside}):
                 yield name
 
     return CheckedStore

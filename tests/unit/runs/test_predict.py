@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from lgvi_warp.runs import predict
+from lgvi_warp.runs.store.create import nearest_folder
 
 
 def test_the_memory_of_this_process(monkeypatch):
@@ -18,4 +19,4 @@ def test_the_memory_of_this_process(monkeypatch):
 def test_the_nearest_folder_that_exists(tmp_path):
     (tmp_path / "file").touch()
     for name in (".", "a", "a/b/c", "file/x"):
-        assert predict._existing(tmp_path / name) == tmp_path
+        assert nearest_folder(tmp_path / name) == tmp_path

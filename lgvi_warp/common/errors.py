@@ -57,6 +57,21 @@ class SceneError(ValueError):
         return SceneError((prefix + fault for fault in self.faults), self.more)
 
 
+def refusal(key: str, value: Any, what: str, remedy: str) -> SceneError:
+    """Make the error of a single fault.
+
+    Args:
+        key: Name of the setting at fault.
+        value: Its value.
+        what: What is wrong with it.
+        remedy: How to mend it.
+
+    Returns:
+        The error, to raise.
+    """
+    return SceneError([f"{cut(key)} = {shown(value)}: {what}; {remedy}"])
+
+
 class MembersFailed(RuntimeError):  # noqa: N818
     """Members failed in a run with on_failure="raise"; nothing of the run is lost.
 

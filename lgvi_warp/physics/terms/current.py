@@ -20,12 +20,9 @@ class Current(Term):
 
     type: ClassVar[str] = "current"
     device: ClassVar[str] = "current"
+    strengths: ClassVar[tuple[str, ...]] = ("velocity",)
 
     velocity: Any = number((3,), "m/s")
-
-    def present(self, numbers: Numbers) -> bool:
-        """Whether the current of some member is not zero."""
-        return bool(np.any(numbers["velocity"]))
 
     def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
         return np.broadcast_to(numbers["velocity"], position.shape)

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from lgvi_warp.physics import vehicle
-from lgvi_warp.physics.terms.base import CONSERVED, Numbers, Packed, PackingContext, Term
+from lgvi_warp.physics.terms.base import CONSERVED, Array, Numbers, Packed, PackingContext, Term
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -27,9 +27,7 @@ class Weight(Term):
         """The net force (m - rho V) g, formed here in float64 since it cancels, whatever the kernel's precision."""
         return Packed({"net": net(context.parameters)})
 
-    def potential(
-        self, numbers: Numbers, position: np.ndarray, attitude: np.ndarray, parameters: Numbers
-    ) -> np.ndarray:
+    def potential(self, numbers: Numbers, position: Array, attitude: Array, parameters: Numbers) -> Array:
         # Energy U = -net b3, (k, n) [J], b3 the depth.
         return -net(parameters) * position[..., 2]
 
@@ -51,9 +49,7 @@ class Restoring(Term):
         p, origin = context.parameters, context.frame.forces
         return Packed({"moment": context.frame.vector(moment(p) + net(p)[:, None] * origin)})
 
-    def potential(
-        self, numbers: Numbers, position: np.ndarray, attitude: np.ndarray, parameters: Numbers
-    ) -> np.ndarray:
+    def potential(self, numbers: Numbers, position: Array, attitude: Array, parameters: Numbers) -> Array:
         # Energy U = (B r_b - W r_g).R^T e3, (k, n) [J].
         return np.sum(moment(parameters) * attitude[..., 2, :], axis=-1)
 

@@ -433,7 +433,7 @@ class PhysicalInertia(PositiveDefinite):
             return [drawn]
         with np.errstate(over="ignore"):
             m = mass * np.exp((self.mass_sigma or 0.0) * normals(u[:, moments]))
-        H = inertia.hat(center)
+        H = notation.hat(center)
         C = -m[:, None, None] * H
         return [inertia.joined(m[:, None, None] * np.eye(3), C, drawn + C @ H)]
 
@@ -460,5 +460,5 @@ def _about_center(base: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
         return base, 0.0, np.zeros(3)
     mass = float(base[0, 0])
     center = -inertia.vee(base[:3, 3:]) / mass
-    H = inertia.hat(center)
+    H = notation.hat(center)
     return base[3:, 3:] + mass * H @ H, mass, center

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import re
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
@@ -21,6 +20,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError, closest
 from lgvi_warp.common.reading import MOST_BYTES, MOST_OTHERS, file_text
+from lgvi_warp.physics.notation import hat
 from lgvi_warp.physics.vehicle import LITTLE, ROUND_OFF, shortage
 
 FORCES, VELOCITIES = "XYZKMN", "uvwpqr"
@@ -59,21 +59,6 @@ def vehicle_file(name: str) -> Path:
     if name not in (known := vehicles()):
         raise SceneError([f"vehicle file {name!r}: is not known; {closest(name, known)}"])
     return Path(str(resources.files("lgvi_warp.scene") / "vehicles" / f"{name}.toml"))
-
-
-def vehicle_source(name: str) -> dict[str, str]:
-    """Return where a vehicle's numbers come from: the table [source] of its file.
-
-    Args:
-        name: One of the names that `vehicles()` lists.
-
-    Returns:
-        Title, reference, what the numbers were checked against, and what is missing.
-
-    Raises:
-        SceneError: If no vehicle has that name.
-    """
-    return tomllib.loads(vehicle_file(name).read_text(encoding="utf-8"))["source"]
 
 
 # What every form becomes --------------------------------------------------------------------------------------------
@@ -203,19 +188,6 @@ def plain(value: Any) -> Any:
     return (np.asarray(value) + 0.0).tolist()
 
 
-def cross(r: np.ndarray) -> np.ndarray:
-    """Return the matrix of a cross product.
-
-    Args:
-        r: A vector (3,).
-
-    Returns:
-        The matrix (3, 3) with cross(r) @ v = r x v.
-    """
-    x, y, z = r
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
 def rigid_body_matrix(mass: float, inertia: np.ndarray, center: np.ndarray) -> np.ndarray:
     """Return the rigid body's mass matrix about the body origin.
 
@@ -227,7 +199,7 @@ def rigid_body_matrix(mass: float, inertia: np.ndarray, center: np.ndarray) -> n
     Returns:
         M_RB (6, 6) [kg, kg m, kg m2].
     """
-    S = cross(center)
+    S = hat(center)
     return np.block([[mass * np.eye(3), -mass * S], [mass * S, inertia - mass * S @ S]])
 
 
@@ -402,7 +374,7 @@ def about_gravity(faults: Faults, body: Coefficients, inertia_about: str) -> Non
     if not known or inertia_about == "gravity" or body.mass is None or body.inertia is None:
         return
     if body.center_of_gravity is not None:
-        S = cross(body.center_of_gravity)
+        S = hat(body.center_of_gravity)
         body.inertia = body.inertia + body.mass * S @ S
 
 

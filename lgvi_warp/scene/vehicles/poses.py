@@ -10,6 +10,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.physics.notation import hat
 from lgvi_warp.scene.vehicles.robot_xml import is_true, numbers_in, text_of
 
 # Most frames of which each is given relative to the next.
@@ -78,8 +79,8 @@ def rotation_from_xyzw(quaternion: np.ndarray) -> np.ndarray:
     Returns:
         The matrix (3, 3).
     """
-    x, y, z, w = quaternion / (np.linalg.norm(quaternion) or 1.0)
-    S = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    *v, w = quaternion / (np.linalg.norm(quaternion) or 1.0)
+    S = hat(np.array(v))
     return np.asarray(np.eye(3) + 2.0 * w * S + 2.0 * S @ S)
 
 

@@ -160,9 +160,8 @@ class _Brief(reprlib.Repr):
 
     def repr_int(self, x: int, level: int) -> str:
         """Show a whole number, or its length: Python refuses to write one of several thousand digits."""
-        return (
-            repr(x) if x.bit_length() < 1000 else f"<a whole number of about {round(x.bit_length() * 0.30103)} digits>"
-        )
+        digits = round(x.bit_length() * 0.30103)
+        return repr(x) if x.bit_length() < 1000 else f"<a whole number of about {digits} digits>"
 
 
 _brief = _Brief()

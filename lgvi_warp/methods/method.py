@@ -40,29 +40,19 @@ FORCED: dict[str, Program] = {
 # Explicit methods have no sub-maps. KINDS: those that keep R on the group (see lgvi_kernels.maps.explicit).
 EXPLICIT: dict[str, Tableau] = {"rk4": RK4, "rk5": DOPRI5, "rk8": DOP853, "cg3": CG3, "rkmk4": RK4}
 KINDS = {"cg3": "group", "rkmk4": "munthe_kaas"}
-ORDERS = {"phi": 1, "phi_adjoint": 1, "psi": 2, "psi_s": 2, "psi_1": 2, "psi_x": 2, "psi_x8": 2, "psi_w": 2} | {
-    name: tableau.order for name, tableau in EXPLICIT.items()
-}
+ORDERS = dict.fromkeys(PROGRAMS, 2) | {"phi": 1, "phi_adjoint": 1}
+ORDERS |= {name: tableau.order for name, tableau in EXPLICIT.items()}
 
 # Two-part splittings: A = free rotation (modified Moser-Veselov, order 8) and the kick of U_b(b), B = T and the kick of
 # U_R(R). Blanes & Moan (2002), J. Comput. Appl. Math. 142, 313, table 3: SRKN_6^b, SRKN_11^b, SRKN_14^a, whose printed
 # coefficients are given here: name -> (order, first part, half of the palindrome without its last number of each part).
 TWO_PART: dict[str, tuple[int, str, tuple[float, ...]]] = {
-    "rkn4_6": (
-        4, "B",
-        (0.0829844064174052, 0.245298957184271, 0.396309801498368, 0.604872665711080, -0.0390563049223486),
-    ),
-    "rkn6_11": (
-        6, "B",
-        (0.0414649985182624, 0.123229775946271, 0.198128671918067, 0.290553797799558, -0.0400061921041533,
-         -0.127049212625417, 0.0752539843015807, -0.246331761062075, -0.0115113874206879, 0.357208872795928),
-    ),
-    "rkn6_14": (
-        6, "A",
-        (0.03785931984061157, 0.09171915262446165, 0.102635633102435, 0.183983170005006, -0.02586788826655869,
+    "rkn4_6": (4, "B", (0.0829844064174052, 0.245298957184271, 0.396309801498368, 0.604872665711080, -0.0390563049223486)),
+    "rkn6_11": (6, "B", (0.0414649985182624, 0.123229775946271, 0.198128671918067, 0.290553797799558, -0.0400061921041533,
+         -0.127049212625417, 0.0752539843015807, -0.246331761062075, -0.0115113874206879, 0.357208872795928)),
+    "rkn6_14": (6, "A", (0.03785931984061157, 0.09171915262446165, 0.102635633102435, 0.183983170005006, -0.02586788826655869,
          -0.05653436583288827, 0.314241403071447, 0.004914688774712854, -0.130144459517415, 0.143761127168358,
-         0.106417700369543, 0.328567693746804, -0.008794243128510581),
-    ),
+         0.106417700369543, 0.328567693746804, -0.008794243128510581)),
 }  # fmt: skip
 PARTS: dict[str, Program] = {"A": (("A", 1.0), ("B", 1.0)), "B": (("B", 1.0), ("A", 1.0))}
 
@@ -114,16 +104,10 @@ COMPOSITIONS: dict[str, tuple[int, tuple[float, ...]]] = {
 # name -> (order, first half of a palindrome a_1, a_2, ...). A base Psi_h = chi*_{h/2} after chi_{h/2} gives way to its
 # halves: chi over a_1 h, its adjoint chi* over a_2 h, chi over a_3 h, ... Blanes & Moan (2002), table 2: S_6 and S_10.
 HALVES: dict[str, tuple[int, tuple[float, ...]]] = {
-    "bm4": (
-        4,
-        (0.0792036964311957, 0.1303114101821663, 0.2228614958676077, -0.3667132690474257, 0.3246481886897062,
-         0.1096884778767498),
-    ),
-    "bm6": (
-        6,
-        (0.0502627644003922, 0.0985536835006498, 0.3149606169276942, -0.4473464826954782, 0.4924263724898759,
-         -0.4251187677976909, 0.2370639139781219, 0.1956024886000531, 0.3463581898507269, -0.3627627792543449),
-    ),
+    "bm4": (4, (0.0792036964311957, 0.1303114101821663, 0.2228614958676077, -0.3667132690474257, 0.3246481886897062,
+         0.1096884778767498)),
+    "bm6": (6, (0.0502627644003922, 0.0985536835006498, 0.3149606169276942, -0.4473464826954782, 0.4924263724898759,
+         -0.4251187677976909, 0.2370639139781219, 0.1956024886000531, 0.3463581898507269, -0.3627627792543449)),
 }  # fmt: skip
 
 
@@ -180,12 +164,8 @@ class Method:
             if ORDERS.get(base) == 1 or base in EXPLICIT:
                 faults.add("method", self.name, "is a composition of a method that is not symmetric", "compose psi_s")
             elif base in TWO_PART or base in GAUSS:
-                faults.add(
-                    "method",
-                    self.name,
-                    "is a composition of a method that is not of order 2",
-                    f"use {base}, or compose psi_s",
-                )
+                fault = "is a composition of a method that is not of order 2"
+                faults.add("method", self.name, fault, f"use {base}, or compose psi_s")
             elif composition in HALVES and base in PROGRAMS and not divisible(PROGRAMS[base]):
                 middle = PROGRAMS[base][len(PROGRAMS[base]) // 2][0]
                 faults.add("method", self.name, f"would divide {middle}, and only exact flows can be divided",

@@ -19,7 +19,7 @@ from lgvi_warp.physics import notation
 from lgvi_warp.physics import vehicle as vehicles
 from lgvi_warp.sampling.designs.space import Space
 from lgvi_warp.sampling.distributions.basic import Distribution, varies_nothing
-from lgvi_warp.sampling.distributions.joint import PhysicalInertia, PositiveDefinite, RotationNormal, UniformRotation
+from lgvi_warp.sampling.distributions.joint import AttitudeDistribution, PhysicalInertia, PositiveDefinite
 
 # Parameters that are symmetric matrices, and stay so when they vary.
 MATRICES = tuple(f"vehicle.{name}" for name in vehicles.SYMMETRIC)
@@ -298,7 +298,7 @@ def variation(faults: Faults, key: str, distribution: Any, known: Mapping[str, n
 def _misfit(found: Variation) -> tuple[str, str] | None:
     """Return what is wrong with a distribution and its targets, and the remedy; None if they fit."""
     distribution, named = found.distribution, found.targets
-    turns = isinstance(distribution, RotationNormal | UniformRotation)
+    turns = isinstance(distribution, AttitudeDistribution)
     chosen = distribution.kind == "choice" and distribution.joint
     if len(named) > 1 and distribution.kind != "correlated_normal":
         return "draws one quantity, several are named", "give lw.CorrelatedNormal, or a distribution to each"

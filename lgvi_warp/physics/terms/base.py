@@ -106,8 +106,9 @@ class Term:
     Fields declared by `number` are arrays after construction.
 
     Class attributes: `type` is the name in a scene file, which knows the class as soon as it is made; `device` is the module
-    of lgvi_kernels.laws by name, or any object with the same functions; `timed` says whether the law depends on time;
-    `dissipative`, whether its damping never creates energy. docs/develop/add_a_force.md shows how to write one.
+    of lgvi_kernels.laws by name (by default the type), or any object with the same functions; `timed` says whether the law
+    depends on time; `dissipative`, whether its damping never creates energy; `strengths` names the numbers without which it
+    does nothing. docs/develop/add_a_force.md shows how to write one.
 
     Args:
         name: Name of the term in parameters ("name.field"), which tells two terms of one type apart; by default the type.
@@ -131,6 +132,7 @@ class Term:
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
+        cls.device = cls.device or cls.type
         registry.add(cls.kinds, cls)
 
     def __post_init__(self) -> None:

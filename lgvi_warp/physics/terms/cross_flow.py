@@ -32,7 +32,6 @@ class CrossFlow(Term):
     """
 
     type: ClassVar[str] = "cross_flow"
-    device: ClassVar[str] = "cross_flow"
 
     stations: Any = number(("k",), "m", rising=True)
     diameters: Any = number(("k",), "m", least=0.0)

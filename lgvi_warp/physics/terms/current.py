@@ -19,7 +19,6 @@ class Current(Term):
     """
 
     type: ClassVar[str] = "current"
-    device: ClassVar[str] = "current"
     strengths: ClassVar[tuple[str, ...]] = ("velocity",)
 
     velocity: Any = number((3,), "m/s")
@@ -41,7 +40,6 @@ class CurrentProfile(Term):
     """
 
     type: ClassVar[str] = "current_profile"
-    device: ClassVar[str] = "current_profile"
 
     depths: Any = number(("k",), "m", rising=True)
     velocities: Any = number(("k", 3), "m/s")

@@ -46,7 +46,6 @@ class CurrentHarmonics(Harmonics):
     """
 
     type: ClassVar[str] = "current_harmonics"
-    device: ClassVar[str] = "current_harmonics"
 
     amplitudes: Any = number(("k", 3), "m/s")
 

@@ -144,7 +144,6 @@ class DragMatrix(Term):
     """
 
     type: ClassVar[str] = "drag_matrix"
-    device: ClassVar[str] = "drag_matrix"
     strengths: ClassVar[tuple[str, ...]] = ("linear", "quadratic")
 
     linear: Any = number((6, 6), "N s/m, N s, N m s", ((0.0,) * 6,) * 6)

@@ -38,7 +38,6 @@ class Surface(Event):
     """
 
     type: ClassVar[str] = "surface"
-    device: ClassVar[str] = "surface"
     status: ClassVar[Status] = Status.SURFACE
 
     depth: Any = number((), "m", 0.0)
@@ -53,7 +52,6 @@ class Floor(Event):
     """
 
     type: ClassVar[str] = "floor"
-    device: ClassVar[str] = "floor"
     status: ClassVar[Status] = Status.FLOOR
 
     depth: Any = number((), "m")
@@ -69,7 +67,6 @@ class Box(Event):
     """
 
     type: ClassVar[str] = "box"
-    device: ClassVar[str] = "box"
     status: ClassVar[Status] = Status.BOX
 
     lower: Any = number((3,), "m")
@@ -97,7 +94,6 @@ class StopTime(Event):
     """
 
     type: ClassVar[str] = "time"
-    device: ClassVar[str] = "time"
     status: ClassVar[Status] = Status.TIME
     timed: ClassVar[bool] = True
 

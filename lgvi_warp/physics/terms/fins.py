@@ -36,7 +36,6 @@ class Fins(Term):
     """
 
     type: ClassVar[str] = "fins"
-    device: ClassVar[str] = "fins"
 
     position: Any = number(("n", 3), "m")
     chord: Any = number(("n", 3), "1")

@@ -29,7 +29,6 @@ class GaussMarkovCurrent(Term):
     """
 
     type: ClassVar[str] = "gauss_markov_current"
-    device: ClassVar[str] = "gauss_markov_current"
     strengths: ClassVar[tuple[str, ...]] = ("standard_deviation",)
     timed: ClassVar[bool] = True
 

@@ -16,7 +16,6 @@ class Weight(Term):
     """Weight less buoyancy, along the vertical (section IV of Nordkvist & Sanyal 2010). It takes no numbers."""
 
     type: ClassVar[str] = "weight"
-    device: ClassVar[str] = "weight"
 
     @property
     def conserves(self) -> frozenset[str]:
@@ -37,7 +36,6 @@ class Restoring(Term):
     """Moment of buoyancy and weight about the body's origin (section IV of Nordkvist & Sanyal 2010). It takes no numbers."""
 
     type: ClassVar[str] = "restoring"
-    device: ClassVar[str] = "restoring"
 
     @property
     def conserves(self) -> frozenset[str]:

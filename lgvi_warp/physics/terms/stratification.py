@@ -23,7 +23,6 @@ class Stratification(Term):
     """
 
     type: ClassVar[str] = "stratification"
-    device: ClassVar[str] = "stratification"
     strengths: ClassVar[tuple[str, ...]] = ("gradient",)
 
     gradient: Any = number((), "1/m")

@@ -22,7 +22,6 @@ class Tether(Term):
     """
 
     type: ClassVar[str] = "tether"
-    device: ClassVar[str] = "tether"
 
     anchor: Any = number((3,), "m")
     stiffness: Any = number((), "N/m", least=0.0)

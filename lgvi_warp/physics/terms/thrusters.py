@@ -39,7 +39,6 @@ class Thrusters(Term):
     """
 
     type: ClassVar[str] = "thrusters"
-    device: ClassVar[str] = "thrusters"
     timed: ClassVar[bool] = True
 
     position: Any = number(("n", 3), "m")

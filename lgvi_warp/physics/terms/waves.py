@@ -26,7 +26,6 @@ class Waves(Harmonics):
     """
 
     type: ClassVar[str] = "waves"
-    device: ClassVar[str] = "waves"
 
     amplitudes: Any = number(("k",), "m", least=0.0)
     headings_deg: Any = number(("k",), "deg")

@@ -24,7 +24,6 @@ class Wrench(Term):
     """
 
     type: ClassVar[str] = "wrench"
-    device: ClassVar[str] = "wrench"
     strengths: ClassVar[tuple[str, ...]] = ("force", "torque")
 
     force: Any = number((3,), "N", (0.0, 0.0, 0.0))
@@ -53,7 +52,6 @@ class WrenchSchedule(Term):
     """
 
     type: ClassVar[str] = "wrench_schedule"
-    device: ClassVar[str] = "wrench_schedule"
     timed: ClassVar[bool] = True
 
     times: Any = number(("k",), "s", rising=True)

@@ -60,7 +60,6 @@ class WrenchNoise(Term):
     """
 
     type: ClassVar[str] = "wrench_noise"
-    device: ClassVar[str] = "wrench_noise"
     strengths: ClassVar[tuple[str, ...]] = ("force", "torque")
     timed: ClassVar[bool] = True
 

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from tests.house.graph import MODULES, arrows_up, circle, imports, module_of
+from tests.house.graph import MODULES, arrows_up, circle, closure, imports
 
 # What pyproject.toml declares, by import name; the optional ones take long to import, or may be absent.
 OPTIONAL = {"SALib", "matplotlib", "rerun", "xarray", "zarr", "google_crc32c", "distributed", "netCDF4", "pyarrow"}
@@ -41,21 +41,6 @@ def importers(package, lazy=True):
         if within(found.name, package) and not within(module, package)
         if found.kind == "top" or (lazy and found.kind == "lazy")
     }
-
-
-def loaded_by(module):
-    """Modules of ours that importing this one names at once, without those named inside functions."""
-    return {module_of(found.name) for found in MODULES[module] if found.kind == "top"} - {None, module}
-
-
-def closure(module):
-    """A module and all of ours that importing it brings in, parent packages included."""
-    seen, waiting = set(), {module}
-    while waiting:
-        one = waiting.pop()
-        seen.add(one)
-        waiting |= (loaded_by(one) | ({one.rpartition(".")[0]} & MODULES.keys())) - seen
-    return seen
 
 
 def test_the_reader_finds_both_packages():

@@ -122,13 +122,9 @@ class Coefficients:
                 remedy = "check mass, inertia (and about which point it is given), centre of gravity and added mass"
                 faults.add(key, matrix, "is not positive definite", remedy)
         faults.raise_if_any()
-        vehicle = {
-            "rigid_body_mass_matrix": rigid,
-            "added_mass_matrix": self.added_mass,
-            "weight": self.weight,
-            "center_of_gravity": self.center_of_gravity,
-            "buoyancy": self.buoyancy,
-            "center_of_buoyancy": self.center_of_buoyancy,
+        vehicle = {"rigid_body_mass_matrix": rigid, "added_mass_matrix": self.added_mass}
+        vehicle |= {
+            name: getattr(self, name) for name in ("weight", "center_of_gravity", "buoyancy", "center_of_buoyancy")
         }
         tables: dict[str, Any] = {"vehicle": {key: plain(value) for key, value in vehicle.items()}}
         water = {"gravity": self.gravity, "water_density": self.water_density}
@@ -215,9 +211,8 @@ def symmetric(faults: Faults, key: str, matrix: np.ndarray) -> np.ndarray:
         The mean of the matrix and its transpose.
     """
     if np.abs(matrix - matrix.T).max() > RELATIVE * np.abs(matrix).max():
-        faults.add(
-            key, matrix, "is not symmetric", "added mass of a body in unbounded water is symmetric: mend the pair"
-        )
+        remedy = "added mass of a body in unbounded water is symmetric: mend the pair"
+        faults.add(key, matrix, "is not symmetric", remedy)
     return 0.5 * (matrix + matrix.T)
 
 
@@ -248,16 +243,14 @@ def rigid_body(
     """
     mass, gravity = faults.positive("mass", mass, "kg"), faults.number("gravity", gravity, "m/s2", least=0.0)
     inertia = faults.symmetric("inertia", inertia, "kg m2")
-    centers = [
-        faults.finite(key, value, (3,), "m")
-        for key, value in (("center_of_gravity", center_of_gravity), ("center_of_buoyancy", center_of_buoyancy))
-    ]
+    center_of_gravity = faults.finite("center_of_gravity", center_of_gravity, (3,), "m")
+    center_of_buoyancy = faults.finite("center_of_buoyancy", center_of_buoyancy, (3,), "m")
     if weight is not None:
         weight = faults.number("weight", weight, "N", least=0.0)
     elif mass is not None and gravity is not None:
         weight = mass * gravity
     buoyancy = weight if buoyancy is None else faults.number("buoyancy", buoyancy, "N", least=0.0)
-    return Coefficients(mass, inertia, centers[0], centers[1], weight, buoyancy, gravity=gravity)
+    return Coefficients(mass, inertia, center_of_gravity, center_of_buoyancy, weight, buoyancy, gravity=gravity)
 
 
 # Fossen's names -----------------------------------------------------------------------------------------------------
@@ -429,9 +422,8 @@ def refuse_name(faults: Faults, key: str, value: Any, name: Name | None) -> None
         faults.add(key, value, "is the same for either sign of the velocity, so it is no drag", remedy)
     elif name.kind == "modulus":
         problem = "is the product of one velocity and the modulus of another, drag of the flow across the hull"
-        faults.add(
-            key, value, problem, "give the hull's cross-flow drag as a term cross_flow, and leave it out (ignore=)"
-        )
+        remedy = "give the hull's cross-flow drag as a term cross_flow, and leave it out (ignore=)"
+        faults.add(key, value, problem, remedy)
     else:
         remedy = "leave it out (ignore=) if it comes from the added mass, which implies it"
         lift = "; lift with the speed ahead is a term body_lift, lift of fins a term fins" if 0 in name.columns else ""

@@ -94,10 +94,7 @@ SHAPES: dict[str, tuple[dict[str, str], Callable[..., float]]] = {
     "box": ({"size": "1 1 1"}, lambda size: float(np.prod(size))),
     "sphere": ({"radius": "1"}, lambda r: 4.0 / 3.0 * np.pi * r[0] ** 3),
     "cylinder": ({"radius": "1", "length": "1"}, lambda r, length: np.pi * r[0] ** 2 * length[0]),
-    "capsule": (
-        {"radius": "0.5", "length": "1"},
-        lambda r, length: np.pi * r[0] ** 2 * (length[0] + 4.0 / 3.0 * r[0]),
-    ),
+    "capsule": ({"radius": "0.5", "length": "1"}, lambda r, length: np.pi * r[0] ** 2 * (length[0] + 4.0 / 3.0 * r[0])),
     "ellipsoid": ({"radii": "1 1 1"}, lambda radii: 4.0 / 3.0 * np.pi * float(np.prod(radii))),
     "cone": ({"radius": "0.5", "length": "1"}, lambda r, length: np.pi / 3.0 * r[0] ** 2 * length[0]),
 }

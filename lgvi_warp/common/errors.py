@@ -57,6 +57,21 @@ class SceneError(ValueError):
         return SceneError((prefix + fault for fault in self.faults), self.more)
 
 
+def refusal(key: str, value: Any, what: str, remedy: str) -> SceneError:
+    """Make the error of a single fault.
+
+    Args:
+        key: Name of the setting at fault.
+        value: Its value.
+        what: What is wrong with it.
+        remedy: How to mend it.
+
+    Returns:
+        The error, to raise.
+    """
+    return SceneError([f"{cut(key)} = {shown(value)}: {what}; {remedy}"])
+
+
 class MembersFailed(RuntimeError):  # noqa: N818
     """Members failed in a run with on_failure="raise"; nothing of the run is lost.
 
@@ -145,9 +160,8 @@ class _Brief(reprlib.Repr):
 
     def repr_int(self, x: int, level: int) -> str:
         """Show a whole number, or its length: Python refuses to write one of several thousand digits."""
-        return (
-            repr(x) if x.bit_length() < 1000 else f"<a whole number of about {round(x.bit_length() * 0.30103)} digits>"
-        )
+        digits = round(x.bit_length() * 0.30103)
+        return repr(x) if x.bit_length() < 1000 else f"<a whole number of about {digits} digits>"
 
 
 _brief = _Brief()

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common import safe_files, scratch
+from lgvi_warp.common.safe_files import named
 from lgvi_warp.common.scratch import UNFINISHED
 
 # Files of at least this size are synced as soon as they are written, so that the disk works while others are made [bytes].
@@ -240,23 +241,6 @@ def write_all(file: Any, view: memoryview) -> None:
         if not written:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         view = view[written:]
-
-
-@contextlib.contextmanager
-def named(path: Path) -> Iterator[None]:
-    """Give an OSError raised inside the `with` block the name of this file.
-
-    Args:
-        path: The file.
-
-    Raises:
-        OSError: That error.
-    """
-    try:
-        yield
-    except OSError as error:
-        error.filename = str(path)
-        raise
 
 
 def write_whole(path: Path, data: bytes) -> None:

@@ -42,9 +42,8 @@ def columns_by_name(faults: Faults, key: str, value: Any) -> dict[str, Any]:
     odd = [label for label in labels if not isinstance(label, str)]
     if odd:
         problem = f"has no names of columns: they are called {', '.join(map(repr, odd[:6]))}{', ...' * (len(odd) > 6)}"
-        faults.add(
-            key, "...", problem, "name the columns: table.columns = [...], or give .to_numpy() in the right order"
-        )
+        remedy = "name the columns: table.columns = [...], or give .to_numpy() in the right order"
+        faults.add(key, "...", problem, remedy)
         return {}
     doubled = sorted({label for label in labels if labels.count(label) > 1})
     if doubled:

@@ -149,9 +149,8 @@ def _arrays(archive: zipfile.ZipFile, file: _Careful, size: int) -> dict[str, np
         raise ValueError(f"has {len(members):,} arrays")
     if any(member.compress_type != zipfile.ZIP_STORED for member in members):
         raise ValueError("is compressed, which no result is")
-    if sum(member.file_size for member in members) > size or any(
-        member.file_size != member.compress_size for member in members
-    ):
+    stored = all(member.file_size == member.compress_size for member in members)
+    if not stored or sum(member.file_size for member in members) > size:
         raise ValueError("promises more bytes than it has")
     file.most = max(size, MOST_LIST)
     arrays = {}

@@ -27,6 +27,20 @@ def seed_words(seed: int, name: str) -> tuple[int, ...]:
     return (int(seed), *(int(word) for word in np.frombuffer(hashlib.sha256(name.encode()).digest(), dtype="<u4")))
 
 
+def generator(seed: int, name: str, *more: int) -> np.random.Generator:
+    """A random generator that depends on a seed and a name only.
+
+    Args:
+        seed: A whole number >= 0.
+        name: Name of what is drawn.
+        more: Further words of entropy, such as the number of a group.
+
+    Returns:
+        A Philox generator.
+    """
+    return np.random.Generator(np.random.Philox(np.random.SeedSequence([*seed_words(seed, name), *more])))
+
+
 @functools.lru_cache(maxsize=1024)
 def _philox_key(seed: int, name: str) -> np.ndarray:
     return np.random.SeedSequence(seed_words(seed, name)).generate_state(2, np.uint64)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -87,6 +88,20 @@ def holds_words(value: Any) -> bool:
         True where one is a truth value or a text.
     """
     return any(_is_word(leaf) for leaf in _parts(value))
+
+
+def is_whole(value: Any, least: int, most: float = math.inf) -> bool:
+    """Tell whether a value is a whole number within bounds; true and false are none.
+
+    Args:
+        value: What a user gave.
+        least: The smallest number allowed.
+        most: The largest number allowed; default none.
+
+    Returns:
+        Whether it is one.
+    """
+    return isinstance(value, Integral) and not isinstance(value, bool) and least <= int(value) <= most
 
 
 def column_names(value: Any) -> list[Any] | None:

@@ -50,6 +50,23 @@ def kind(mode: int) -> str:
 
 
 @contextlib.contextmanager
+def named(path: Path) -> Iterator[None]:
+    """Give an OSError raised inside the `with` block the name of this file.
+
+    Args:
+        path: The file.
+
+    Raises:
+        OSError: That error.
+    """
+    try:
+        yield
+    except OSError as error:
+        error.filename = str(path)
+        raise
+
+
+@contextlib.contextmanager
 def folder(root: Path, inner: Path) -> Iterator[int | None]:
     """Open a folder below a root, without following links; the root itself may be one.
 
@@ -118,11 +135,8 @@ def opened(root: Path, key: str) -> Iterator[BinaryIO]:
         where: Any = path if inside is None else path.name
         # A device is not even opened, since that may have effects.
         _check_file(os.stat(where, dir_fd=inside, follow_symlinks=False).st_mode, path)
-        try:
+        with named(path):
             descriptor = os.open(where, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | _PLAIN, dir_fd=inside)
-        except OSError as error:
-            error.filename = str(path)
-            raise
     with open(descriptor, "rb", buffering=0) as file:
         _check_file(os.fstat(descriptor).st_mode, path)
         yield file

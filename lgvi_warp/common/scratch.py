@@ -89,11 +89,7 @@ def is_unfinished(name: str) -> bool:
         True for a name that `beside` gives with its default ending.
     """
     head, ending = os.path.splitext(name)
-    return ending == UNFINISHED and any(MARK.fullmatch(head[dot + 1 :]) for dot in _dots(head))
-
-
-def _dots(text: str) -> list[int]:
-    return [place for place, letter in enumerate(text) if letter == "." and place]
+    return ending == UNFINISHED and any(MARK.fullmatch(head[dot.end() :]) for dot in re.finditer(r"(?<!^)\.", head))
 
 
 def left_behind(target: Path) -> list[Path]:

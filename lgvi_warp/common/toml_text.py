@@ -46,9 +46,8 @@ def parsed(text: str, name: str) -> dict[str, Any]:
     except RecursionError:
         raise SceneError([_deep(name)]) from None
     except ValueError:  # Python refuses whole numbers of several thousand digits
-        raise SceneError(
-            [f"{name}: has a whole number of thousands of digits; write it with a point: 1.0e20"]
-        ) from None
+        text = f"{name}: has a whole number of thousands of digits; write it with a point: 1.0e20"
+        raise SceneError([text]) from None
     _check(content, name)
     return content
 

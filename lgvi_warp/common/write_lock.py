@@ -81,9 +81,8 @@ def _taken(path: Path, target: Path, wait: bool) -> int:
         descriptor = _opened(path)
         try:
             if not _locked(descriptor, wait):
-                raise SceneError(
-                    [f"{target}: another run is writing into it{_told(descriptor)}; wait for it, or end it"]
-                )
+                text = f"{target}: another run is writing into it{_told(descriptor)}; wait for it, or end it"
+                raise SceneError([text])
             # The previous holder may have removed the file that was opened here.
             if _is_still(path, descriptor):
                 _sign(descriptor)

@@ -56,9 +56,8 @@ def parsed(text: str) -> Any:
     except yaml.YAMLError as error:
         raise SceneError([f"YAML: {' '.join(str(error).split())}; mend that line"]) from None
     except Exception as error:  # PyYAML passes on what int(), float() and dates raise
-        raise SceneError(
-            [f"YAML: has a value that cannot be read ({type(error).__name__}: {error}); mend it"]
-        ) from None
+        text = f"YAML: has a value that cannot be read ({type(error).__name__}: {error}); mend it"
+        raise SceneError([text]) from None
 
 
 def _depth(text: str) -> int:

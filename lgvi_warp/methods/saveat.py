@@ -111,9 +111,8 @@ def time_grid(h: float, t1: float, save: SaveAt) -> TimeGrid:
     if save.every is not None and t1 > 0 and save.every > t1 * (1 + 1e-12):
         faults.add("save.every", save.every, f"is longer than the run, {t1} s", "save more often or run longer")
     if save.every is not None and t1 > 0 and 0 < save.every < t1 / MOST_SAMPLES:
-        faults.add(
-            "save.every", save.every, f"asks for more than {MOST_SAMPLES} samples", "save less often, or run in parts"
-        )
+        fault = f"asks for more than {MOST_SAMPLES} samples"
+        faults.add("save.every", save.every, fault, "save less often, or run in parts")
     faults.raise_if_any()
     end, meant = exact(t1), exact(h)
     every = end if save.every is None else exact(save.every)
@@ -121,22 +120,15 @@ def time_grid(h: float, t1: float, save: SaveAt) -> TimeGrid:
     sample_times = sorted({exact(t) for t in save.at or ()} | {Fraction(0), end})
     spacing = every
     for t in sample_times:
-        spacing = Fraction(
-            math.gcd(spacing.numerator * t.denominator, t.numerator * spacing.denominator),
-            spacing.denominator * t.denominator,
-        )
+        shared = math.gcd(spacing.numerator * t.denominator, t.numerator * spacing.denominator)
+        spacing = Fraction(shared, spacing.denominator * t.denominator)
     step = spacing / math.ceil(spacing / meant)
     if meant / step > MOST_SHORTENING:
-        faults.add(
-            "step",
-            h,
-            f"would have to shrink to {float(step):.3g} s to meet every sample time and the end",
-            "choose sample times and a duration that are multiples of the step",
-        )
+        fault = f"would have to shrink to {float(step):.3g} s to meet every sample time and the end"
+        faults.add("step", h, fault, "choose sample times and a duration that are multiples of the step")
     if end / step >= 2**31 - 1:
-        faults.add(
-            "step", h, f"needs {int(end / step)} steps", "at most 2,147,483,646 steps can be made: use a longer step"
-        )
+        remedy = "at most 2,147,483,646 steps can be made: use a longer step"
+        faults.add("step", h, f"needs {int(end / step)} steps", remedy)
     faults.raise_if_any()
     messages: tuple[str, ...] = ()
     if step != meant:

@@ -11,23 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from lgvi_warp.physics import notation
+from lgvi_warp.physics.notation import hat
 
 # A coupling below this fraction of its possible size is round-off of turned axes and shifted origins.
 ROUND_OFF = 1e-12
-
-
-def hat(a: np.ndarray) -> np.ndarray:
-    """Skew matrices of vectors, with hat(a) x = a x x.
-
-    Args:
-        a: Vectors (..., 3).
-
-    Returns:
-        Matrices (..., 3, 3).
-    """
-    zero = np.zeros(a.shape[:-1])
-    rows = [[zero, -a[..., 2], a[..., 1]], [a[..., 2], zero, -a[..., 0]], [-a[..., 1], a[..., 0], zero]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def vee(A: np.ndarray) -> np.ndarray:
@@ -39,9 +26,7 @@ def vee(A: np.ndarray) -> np.ndarray:
     Returns:
         Vectors (..., 3).
     """
-    return 0.5 * np.stack(
-        [A[..., 2, 1] - A[..., 1, 2], A[..., 0, 2] - A[..., 2, 0], A[..., 1, 0] - A[..., 0, 1]], axis=-1
-    )
+    return 0.5 * np.stack([A[..., i, j] - A[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=-1)
 
 
 def blocks(I6: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -176,7 +161,7 @@ class Frame:
         Returns:
             Vectors (n, ..., 3).
         """
-        return np.einsum("nji,n...j->n...i", *_broadcast(self.Q, v))
+        return np.einsum("nji,n...j->n...i", *notation.repeated(self.Q, v))
 
     def point(self, r: np.ndarray) -> np.ndarray:
         """Points relative to the origin of the forces, in these axes.
@@ -208,11 +193,6 @@ class Frame:
 def _expanded(origin: np.ndarray, like: np.ndarray) -> np.ndarray:
     """Origins (n, 3) with the number of dimensions of (n, ..., 3)."""
     return origin.reshape(len(origin), *(1,) * (like.ndim - 2), 3)
-
-
-def _broadcast(Q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    n = max(len(Q), len(v))
-    return np.broadcast_to(Q, (n, 3, 3)), np.broadcast_to(v, (n, *v.shape[1:]))
 
 
 def schur(I6: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -290,12 +270,9 @@ def turns_frame(I6: np.ndarray, middle: int = 3) -> tuple[Frame, np.ndarray]:
     d = np.stack([-EQ[:, 2, 1], EQ[:, 2, 0], -EQ[:, 1, 0]], axis=-1)
     U = np.triu(EQ + hat(d))
     U = np.where(np.abs(U) > ROUND_OFF * size, U, 0.0)
-    zero = np.zeros(len(U))
-    lines = {
-        2: np.stack([zero, zero, U[:, 0, 1]], axis=-1),
-        3: np.stack([U[:, 1, 2], -U[:, 0, 2], U[:, 0, 1]], axis=-1),
-    }
-    a = lines[middle]
+    a = np.stack([U[:, 1, 2], -U[:, 0, 2], U[:, 0, 1]], axis=-1)
+    if middle == 2:
+        a[:, :2] = 0.0
     M = turned @ M @ Q
     return Frame(Q, notation.rotate_out(Q, d), notation.rotate_out(Q, d + a), M, J, U, U + hat(a)), U
 

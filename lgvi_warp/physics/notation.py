@@ -14,6 +14,33 @@ DIAGONAL = 1e-14
 ORTHOGONAL = 1e-9
 
 
+def repeated(*arrays: np.ndarray) -> list[np.ndarray]:
+    """Repeat what all members share, so that all arrays have as many rows.
+
+    Args:
+        arrays: Arrays (1 or n, ...).
+
+    Returns:
+        Views (n, ...) of the arrays.
+    """
+    n = max(len(array) for array in arrays)
+    return [np.broadcast_to(array, (n, *array.shape[1:])) for array in arrays]
+
+
+def hat(a: np.ndarray) -> np.ndarray:
+    """Skew matrices of vectors, with hat(a) x = a x x.
+
+    Args:
+        a: Vectors (..., 3).
+
+    Returns:
+        Matrices (..., 3, 3).
+    """
+    zero = np.zeros(a.shape[:-1])
+    rows = [[zero, -a[..., 2], a[..., 1]], [a[..., 2], zero, -a[..., 0]], [-a[..., 1], a[..., 0], zero]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
 def to_momenta(M: np.ndarray, J: np.ndarray, nu: np.ndarray, Om: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Momenta of velocities, p = M nu and pi = J Om.
 
@@ -27,21 +54,6 @@ def to_momenta(M: np.ndarray, J: np.ndarray, nu: np.ndarray, Om: np.ndarray) -> 
         p (..., 3) [N s] and pi (..., 3) [N m s].
     """
     return (M @ nu[..., None])[..., 0], (J @ Om[..., None])[..., 0]
-
-
-def from_momenta(M: np.ndarray, J: np.ndarray, p: np.ndarray, pi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Velocities of momenta, nu = M^-1 p and Om = J^-1 pi.
-
-    Args:
-        M: Mass, (..., 3, 3) [kg].
-        J: Inertia, (..., 3, 3) [kg m2].
-        p: Linear momentum, (..., 3) [N s], body axes.
-        pi: Angular momentum, (..., 3) [N m s], body axes.
-
-    Returns:
-        nu (..., 3) [m/s] and Om (..., 3) [rad/s].
-    """
-    return np.linalg.solve(M, p[..., None])[..., 0], np.linalg.solve(J, pi[..., None])[..., 0]
 
 
 def principal_axes(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -116,10 +128,8 @@ def matrix_from_rotation_vector(f: np.ndarray) -> np.ndarray:
     angle = np.linalg.norm(f, axis=-1)[..., None, None]
     a = np.sinc(angle / np.pi)
     b = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
-    hat = np.zeros((*f.shape[:-1], 3, 3))
-    hat[..., 0, 1], hat[..., 0, 2], hat[..., 1, 2] = -f[..., 2], f[..., 1], -f[..., 0]
-    hat -= np.swapaxes(hat, -1, -2)
-    return np.eye(3) + a * hat + b * (hat @ hat)
+    H = hat(f)
+    return np.eye(3) + a * H + b * (H @ H)
 
 
 def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
@@ -135,10 +145,8 @@ def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
     q = q / np.abs(q).max(axis=-1, keepdims=True)  # so that its square neither overflows nor vanishes
     w, v = q[..., :1, None], q[..., 1:]
     norm = np.sum(q * q, axis=-1)[..., None, None]
-    hat = np.zeros((*v.shape[:-1], 3, 3))
-    hat[..., 0, 1], hat[..., 0, 2], hat[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
-    hat -= np.swapaxes(hat, -1, -2)
-    return np.eye(3) + 2.0 * (w * hat + hat @ hat) / norm
+    H = hat(v)
+    return np.eye(3) + 2.0 * (w * H + H @ H) / norm
 
 
 def quaternion_from_matrix(R: np.ndarray) -> np.ndarray:
@@ -156,17 +164,11 @@ def quaternion_from_matrix(R: np.ndarray) -> np.ndarray:
     four = np.stack([1 + trace, 1 + 2 * xx - trace, 1 + 2 * yy - trace, 1 + 2 * zz - trace], axis=-1)
     x, y, z = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
     xy, xz, yz = R[..., 0, 1] + R[..., 1, 0], R[..., 0, 2] + R[..., 2, 0], R[..., 1, 2] + R[..., 2, 1]
-    rows = np.stack(
-        [
-            np.stack([four[..., 0], x, y, z], axis=-1),
-            np.stack([x, four[..., 1], xy, xz], axis=-1),
-            np.stack([y, xy, four[..., 2], yz], axis=-1),
-            np.stack([z, xz, yz, four[..., 3]], axis=-1),
-        ],
-        axis=-2,
-    )
+    w2, x2, y2, z2 = np.moveaxis(four, -1, 0)
+    rows = [[w2, x, y, z], [x, x2, xy, xz], [y, xy, y2, yz], [z, xz, yz, z2]]
+    matrix = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
     best = np.argmax(np.where(np.isnan(four), -1.0, four), axis=-1)
-    q = np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
+    q = np.take_along_axis(matrix, best[..., None, None], axis=-2)[..., 0, :]
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return np.where(q[..., :1] < 0.0, -q, q)
 

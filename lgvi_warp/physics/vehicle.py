@@ -10,30 +10,21 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics import inertia as inertias
+from lgvi_warp.physics import notation
 
 Numbers = Mapping[str, np.ndarray]
 
 # The two forms of a vehicle: uncoupled about the centre of gravity, or 6x6 about any origin.
-SIMPLE = {"mass": (), "added_mass": (3, 3), "inertia": (3, 3), "buoyancy": (), "center_of_buoyancy": (3,)}
+SIMPLE = {"mass": "kg", "added_mass": "kg", "inertia": "kg m2", "buoyancy": "N", "center_of_buoyancy": "m"}
 FULL = {
-    "rigid_body_mass_matrix": (6, 6),
-    "added_mass_matrix": (6, 6),
-    "weight": (),
-    "center_of_gravity": (3,),
-    "buoyancy": (),
-    "center_of_buoyancy": (3,),
-}
-UNITS = {
-    "mass": "kg",
-    "added_mass": "kg",
-    "inertia": "kg m2",
     "rigid_body_mass_matrix": "kg, kg m, kg m2",
     "added_mass_matrix": "kg, kg m, kg m2",
     "weight": "N",
-    "buoyancy": "N",
     "center_of_gravity": "m",
+    "buoyancy": "N",
     "center_of_buoyancy": "m",
 }
+UNITS = SIMPLE | FULL
 # The smallest mass or inertia that has an inverse in float64.
 LEAST = float(np.finfo(np.float64).tiny)
 # The fraction of the third principal inertia by which the other two may sum to less than it: by round-off, and as
@@ -135,17 +126,15 @@ class Vehicle:
             if getattr(self, name) is not None:
                 faults.add(name, getattr(self, name), "repeats what the 6x6 matrices say", "keep one of the two forms")
         unit = UNITS["rigid_body_mass_matrix"]
-        rigid: np.ndarray | None = None
+        rigid = center = None
+        warnings: tuple[str, ...] = ()
         if self.rigid_body_mass_matrix is None:
             faults.add("rigid_body_mass_matrix", None, "is missing", f"give it beside added_mass_matrix [{unit}]")
         else:
             rigid = faults.symmetric("rigid_body_mass_matrix", self.rigid_body_mass_matrix, unit, 6)
-        zeros = np.zeros((6, 6))
-        added_as_given = zeros if self.added_mass_matrix is None else self.added_mass_matrix
+        added_as_given = np.zeros((6, 6)) if self.added_mass_matrix is None else self.added_mass_matrix
         added = faults.symmetric("added_mass_matrix", added_as_given, unit, 6)
         weight = None if self.weight is None else faults.number("weight", self.weight, "N", least=0.0)
-        center: np.ndarray | None = None
-        warnings: tuple[str, ...] = ()
         if self.center_of_gravity is not None:
             center = faults.finite("center_of_gravity", self.center_of_gravity, (3,), "m")
         if rigid is not None:
@@ -169,9 +158,8 @@ class Vehicle:
             return (f"vehicle.rigid_body_mass_matrix: {fault}, {amount}: no rigid body has; taken as it is",)
         remedy = "give the rigid body's own inertia here, and added inertia in added_mass_matrix"
         remedy += f"; or allow it: inertia_tolerance = {short * 1.01:.2g}" if short <= LITTLE else ""
-        faults.add(
-            "rigid_body_mass_matrix", rigid[3:, 3:], f"{fault}: no rigid body has", f"it misses {amount}; {remedy}"
-        )
+        remedy = f"it misses {amount}; {remedy}"
+        faults.add("rigid_body_mass_matrix", rigid[3:, 3:], f"{fault}: no rigid body has", remedy)
         return ()
 
     def _rigid(self, faults: Faults, rigid: np.ndarray, center: Any) -> tuple[np.ndarray | None, tuple[str, ...]]:
@@ -185,17 +173,14 @@ class Vehicle:
         size = np.abs(rigid).max()
         if np.abs(rigid[:3, :3] - m * np.eye(3)).max() > 1e-6 * size:
             faults.add("rigid_body_mass_matrix", rigid[:3, :3], "does not have m I as its upper left block", remedy)
-        if np.abs(rigid[:3, 3:] + m * inertias.hat(implied)).max() > 1e-6 * size:
-            faults.add(
-                "rigid_body_mass_matrix", rigid[:3, 3:], "does not have -m hat(r_g) as its upper right block", remedy
-            )
+        if np.abs(rigid[:3, 3:] + m * notation.hat(implied)).max() > 1e-6 * size:
+            fault = "does not have -m hat(r_g) as its upper right block"
+            faults.add("rigid_body_mass_matrix", rigid[:3, 3:], fault, remedy)
         if center is None:
             return implied, ()
         if np.abs(center - implied).max() > 1e-3 * max(np.abs(center).max(), np.sqrt(np.trace(rigid[3:, 3:]) / m)):
-            text = (
-                f"center_of_gravity {center.tolist()} m, where the rigid body's matrix has it at {implied.tolist()} m"
-            )
-            return center, (f"vehicle.{text}: weight acts at the first, inertia at the second",)
+            places = f"{center.tolist()} m, where the rigid body's matrix has it at {implied.tolist()} m"
+            return center, (f"vehicle.center_of_gravity {places}: weight acts at the first, inertia at the second",)
         return center, ()
 
     @property
@@ -288,7 +273,7 @@ def about_center(rigid: np.ndarray) -> np.ndarray:
         Inertia (n, 3, 3) [kg m2].
     """
     m = rigid[:, :1, :1]
-    H = inertias.hat(-inertias.vee(rigid[:, :3, 3:]) / m[:, 0])
+    H = notation.hat(-inertias.vee(rigid[:, :3, 3:]) / m[:, 0])
     return np.asarray(rigid[:, 3:, 3:] + m * (H @ H))
 
 
@@ -331,9 +316,8 @@ def inertia6(p: Numbers) -> np.ndarray:
         return np.asarray(p["vehicle.rigid_body_mass_matrix"] + p["vehicle.added_mass_matrix"])
     M = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
     J = p["vehicle.inertia"]
-    n = max(len(M), len(J))
-    M, J = np.broadcast_to(M, (n, 3, 3)), np.broadcast_to(J, (n, 3, 3))
-    return inertias.joined(M, np.zeros((n, 3, 3)), J)
+    M, J = notation.repeated(M, J)
+    return inertias.joined(M, np.zeros_like(M), J)
 
 
 def dry_mass(p: Numbers) -> np.ndarray:

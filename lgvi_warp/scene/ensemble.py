@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from lgvi_warp.common import machine
-from lgvi_warp.common.errors import Faults, closest, cut, shown
+from lgvi_warp.common.errors import Faults, closest, cut, refusal, shown
 from lgvi_warp.common.labelled import columns_by_name, is_labelled, match
 from lgvi_warp.common.real_numbers import column_names
 from lgvi_warp.physics import notation
@@ -99,9 +99,8 @@ class Ensemble:
             return ensemble
         most = int(np.max(settings.indices))
         if most >= ensemble.members:
-            faults = Faults("ensemble.")
-            faults.add("indices", most, f"is no member of {ensemble.members}", f"give 0 to {ensemble.members - 1}")
-            faults.raise_if_any()
+            fault = f"is no member of {ensemble.members}"
+            raise refusal("ensemble.indices", most, fault, f"give 0 to {ensemble.members - 1}")
         return ensemble.subset(settings.indices)
 
     @classmethod
@@ -201,35 +200,25 @@ class Ensemble:
         known = {**self._base, **({} if self._explicit else self._start)}
         distributions = {**self.sampling.distributions(), **self.vary}
         for key in self.sampling.distributions().keys() & self.vary.keys():
-            faults.add(
-                f'"{key}"', self.vary[key], f"varies what the {self.sampling.kind} gives values", "drop one of them"
-            )
-        described = [
-            variations.variation(faults, key, distribution, known)
-            for key, distribution in sorted(distributions.items())
-        ]
+            fault = f"varies what the {self.sampling.kind} gives values"
+            faults.add(f'"{key}"', self.vary[key], fault, "drop one of them")
+        described = [variations.variation(faults, *item, known) for item in sorted(distributions.items())]
         named = [(variation.key, variation.targets) for variation in described if variation]
         self._columns: list[tuple[Target, np.ndarray]] = []
         tables = Faults("ensemble.sampling.table.")
         for key, column in columns.items():
-            (target, *more) = variations.targets(key)
+            (target, *more), also = variations.targets(key), f'; or leave it out: ignore = ["{cut(key)}"]'
             if more:
                 tables.add(f'"{key}"', "...", "names several numbers", "give each a column of its own")
-            elif variations.known_target(
-                tables, key, "...", target, known, f'; or leave it out: ignore = ["{cut(key)}"]'
-            ):
+            elif variations.known_target(tables, key, "...", target, known, also):
                 named.append((key, (target,)))
                 shape = (len(column), *target.of(known[target.name]).shape)
                 name = target.name if target.index is None else key
                 self._columns.append((target, _explicit_parameter(tables, name, column, shape)))
-                if (
-                    target.name == variations.ATTITUDE
-                    and column.shape == shape
-                    and not notation.rotations(column).all()
-                ):
-                    tables.add(
-                        f'"{key}"', "...", "holds a matrix that is no rotation to 1e-9", "give R^T R = I, det R = 1"
-                    )
+                attitudes = target.name == variations.ATTITUDE and column.shape == shape
+                if attitudes and not notation.rotations(column).all():
+                    fault = "holds a matrix that is no rotation to 1e-9"
+                    tables.add(f'"{key}"', "...", fault, "give R^T R = I, det R = 1")
         variations.clashes(faults, named)
         with faults.including():
             tables.raise_if_any()
@@ -288,8 +277,8 @@ class Ensemble:
 
     def _check_physical(self) -> None:
         """Refuse unphysical members: all are checked, so few at a time that memory stays small."""
-        targets = [target for v in self.variations for target in v.targets] + [target for target, _ in self._columns]
-        varied = {name for name in (*(target.name for target in targets), *self._explicit) if name in self._base}
+        drawn = {target.name for variation in self.variations for target in variation.targets}
+        varied = self._varied_names & self._base.keys()
         findings: dict[str, _Unphysical] = {}
         for block_findings in over_members(functools.partial(self._look_at, varied), self.members if varied else 0):
             for key, finding in block_findings.items():
@@ -299,8 +288,10 @@ class Ensemble:
                     findings[key].count += finding.count
         faults = Faults()
         for key, finding in findings.items():
-            drawn = any(name in {t.name for v in self.variations for t in v.targets} for name in key.split(" + "))
-            remedy = "use a smaller spread, TruncatedNormal or LogNormal" if drawn else "give finite, physical values"
+            is_drawn = not drawn.isdisjoint(key.split(" + "))
+            remedy = (
+                "use a smaller spread, TruncatedNormal or LogNormal" if is_drawn else "give finite, physical values"
+            )
             problem = f"is unphysical ({finding.count} of {finding.of if finding.shared else self.members} members)"
             faults.add(f"{key} of member {finding.first}", finding.value, problem, remedy)
         faults.raise_if_any()
@@ -347,11 +338,7 @@ class Ensemble:
         if self._explicit:
             rows = slice(first, stop) if self._places is None else self._places[first:stop]
             values |= {name: column[rows] for name, column in self._explicit.items() if start or name in self._base}
-        wanted = [
-            variation
-            for variation in self.variations
-            if start or any(target.name in self._base for target in variation.targets)
-        ]
+        wanted = [v for v in self.variations if start or any(target.name in self._base for target in v.targets)]
         if not (wanted or self._columns):
             return values
         members = np.arange(first, stop) if self._places is None else self._places[first:stop]
@@ -412,15 +399,19 @@ class Ensemble:
         Returns:
             Names in the order of `scene.parameters()`; those of the start are not among them.
         """
-        drawn = {target.name for variation in self.variations for target in variation.targets}
-        varied = drawn | {target.name for target, _ in self._columns} | self._explicit.keys()
+        varied = self._varied_names
         return [name for name in self._base if name in varied]
+
+    @property
+    def _varied_names(self) -> set[str]:
+        """Names of what members have of their own: drawn, from columns or explicit."""
+        targets = [target for variation in self.variations for target in variation.targets]
+        return {target.name for target in (*targets, *(target for target, _ in self._columns))} | self._explicit.keys()
 
     @property
     def starts_vary(self) -> bool:
         """Whether the initial state differs from member to member."""
-        names = {target.name for variation in self.variations for target in variation.targets}
-        return not {*names, *(target.name for target, _ in self._columns), *self._explicit} <= self._base.keys()
+        return not self._varied_names <= self._base.keys()
 
     def subset(self, indices: Sequence[int] | np.ndarray) -> Ensemble:
         """Return some members as an ensemble of their own, with the same numbers.
@@ -549,9 +540,8 @@ def _vehicle_checks(p: Mapping[str, np.ndarray], varied: set[str], tolerance: fl
     for key in ("vehicle.buoyancy", "vehicle.weight", "environment.gravity"):
         if key in p:
             checks[key] = ~(np.isfinite(p[key]) & (p[key] >= 0.0))
-    checks["environment.water_density"] = ~(
-        np.isfinite(p["environment.water_density"]) & (p["environment.water_density"] > 0)
-    )
+    density = p["environment.water_density"]
+    checks["environment.water_density"] = ~(np.isfinite(density) & (density > 0))
     return {key: bad for key, bad in checks.items() if any(name in varied for name in key.split(" + "))}
 
 
@@ -566,9 +556,13 @@ def _state(faults: Faults, key: str, value: Any) -> np.ndarray:
         entries = [f"{key}[{i}]" for i in range(3)]
         if not columns or not match(faults, key, list(columns), entries):
             return np.empty(0)
-        value = [columns[entry] for entry in entries]
-        array = faults.real(key, value, "give an array of numbers")
-        return np.empty(0) if array is None else np.ascontiguousarray(array.T)
+        value = _numbers(faults, key, [columns[entry] for entry in entries])
+        return np.ascontiguousarray(value.T)
+    return _numbers(faults, key, value)
+
+
+def _numbers(faults: Faults, key: str, value: Any) -> np.ndarray:
+    """Numbers of an array; none after a fault."""
     array = faults.real(key, value, "give an array of numbers")
     return np.empty(0) if array is None else array
 
@@ -578,9 +572,8 @@ def _given_parameters(faults: Faults, base: Mapping[str, np.ndarray], given: Any
     if given is None or (isinstance(given, Mapping) and not given):
         return {}
     if not is_labelled(given):
-        faults.add(
-            "parameters", given, "has no names", 'give {"vehicle.mass": array, ...} or a DataFrame with such names'
-        )
+        remedy = 'give {"vehicle.mass": array, ...} or a DataFrame with such names'
+        faults.add("parameters", given, "has no names", remedy)
         return {}
     parameters: dict[str, np.ndarray] = {}
     named = []

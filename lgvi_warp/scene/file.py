@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from lgvi_warp.common.errors import SceneError, shown
+from lgvi_warp.common.errors import SceneError, refusal
 from lgvi_warp.common.reading import file_text
 from lgvi_warp.common.toml_text import parsed
 
@@ -103,9 +103,7 @@ def _value_of(key: str, text: str) -> Any:
             return text
         content = {}
     if len(content) != 1:
-        raise SceneError(
-            [f"{key} = {shown(text)}: is not one value; write one value on one line, and --set once for each key"]
-        )
+        raise refusal(key, text, "is not one value", "write one value on one line, and --set once for each key")
     return content["value"]
 
 
@@ -133,9 +131,8 @@ def with_named_vehicle(content: Mapping[str, Any]) -> Mapping[str, Any]:
     for section in ("vehicle", "environment"):
         section_table = content.get(section, {})
         if isinstance(section_table, Mapping):
-            merged[section] = known.get(section, {}) | {
-                key: value for key, value in section_table.items() if key != "name"
-            }
+            merged[section] = known.get(section, {}) | section_table
+            merged[section].pop("name", None)
     terms = content.get("terms", [])
     if isinstance(terms, list | tuple):
         names = {_name_of(term) for term in terms}

@@ -39,6 +39,7 @@ class Limit(NamedTuple):
     reason: str
 
 
+ABOVE = "depth is positive down; above the surface there is no water, which this model does not know"
 LIMITS = {
     "net weight": Limit(0.5, "of the weight", "vehicles are trimmed to some per cent; drop weights make some tens"),
     "light water": Limit(100.0, "kg/m3", "water has 1,000 or a little more; 1.025 would be in g/cm3"),
@@ -46,9 +47,7 @@ LIMITS = {
     "current": Limit(5.0, "m/s", "the strongest tides through straits; knots are half of m/s"),
     "fin angle": Limit(math.pi / 2.0, "rad", "a fin across the flow; 20 would be in degrees"),
     "speed": Limit(30.0, "m/s", "the fastest torpedoes without a cavity; km/h or mm/s would be more"),
-    "depth": Limit(
-        0.0, "m", "depth is positive down; above the surface there is no water, which this model does not know"
-    ),
+    "depth": Limit(0.0, "m", ABOVE),
 }
 # Fields of terms that hold velocities of water [m/s].
 CURRENTS = {
@@ -96,11 +95,8 @@ def density(scene: SceneLike, p: Numbers) -> Iterator[Look]:
     """
     rho = p["environment.water_density"]
     odd = (rho < LIMITS["light water"].value) | (rho > LIMITS["heavy water"].value)
-    yield (
-        "environment.water_density",
-        odd,
-        lambda i: f"{rho[i]:.6g} kg/m3 is not water, which has 1,000 or more: a unit?",
-    )
+    text = "{:.6g} kg/m3 is not water, which has 1,000 or more: a unit?"
+    yield "environment.water_density", odd, lambda i: text.format(rho[i])
 
 
 def currents(scene: SceneLike, p: Numbers) -> Iterator[Look]:
@@ -166,11 +162,10 @@ def depths(scene: SceneLike, p: Numbers) -> Iterator[Look]:
     for term in (*scene.terms, *scene.events):
         field = DEPTHS.get(term.type)
         if field is not None:
-            values = p[f"{term.key}.{field}"]
-            deepest = values.reshape(len(values), -1).max(axis=1)
-            highest = values.reshape(len(values), -1).min(axis=1)
-            odd = (highest < LIMITS["depth"].value) & (deepest <= LIMITS["depth"].value)
-            yield f"{term.key}.{field}", odd, _too_high(highest)
+            values, surface = p[f"{term.key}.{field}"], LIMITS["depth"].value
+            values = values.reshape(len(values), -1)
+            odd = (values.min(axis=1) < surface) & (values.max(axis=1) <= surface)
+            yield f"{term.key}.{field}", odd, _too_high(values.min(axis=1))
 
 
 def _too_high(depth: np.ndarray) -> Callable[[int], str]:

@@ -22,6 +22,9 @@ from lgvi_warp.scene.file import tables_of_file, tables_of_text, with_named_vehi
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
 from lgvi_warp.scene.start import Environment, Start
 
+# Sections of a scene that are one object each.
+KINDS = {"vehicle": Vehicle, "environment": Environment, "start": Start, "run": RunSettings}
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:
@@ -64,7 +67,7 @@ class Scene:
         if self.controller is not None:
             remedy = "leave it out; a held or scheduled wrench and thrusters' commands are terms"
             faults.add("controller", self.controller, "is not known to this version", remedy)
-        for name, kind in (("vehicle", Vehicle), ("environment", Environment), ("start", Start), ("run", RunSettings)):
+        for name, kind in KINDS.items():
             if not isinstance(getattr(self, name), kind):
                 faults.add(name, getattr(self, name), f"is no {kind.__name__}", f"give lw.{kind.__name__}(...)")
         faults.raise_if_any()
@@ -210,30 +213,26 @@ def from_dict(content: Mapping[str, Any]) -> Scene:
             tables[name] = {}
     if not tables["vehicle"] and isinstance(content.get("vehicle", {}), Mapping):
         faults.add("vehicle", "", "is missing", "write [vehicle] with mass and inertia")
-    vehicle = _build(faults, "vehicle", Vehicle, tables["vehicle"]) if tables["vehicle"] else None
-    environment = _build(faults, "environment", Environment, tables["environment"])
-    start = _build(faults, "start", Start, tables["start"])
-    run = _build(faults, "run", RunSettings, tables["run"])
+    sections = {name: kind for name, kind in KINDS.items() if name != "vehicle" or tables["vehicle"]}
+    built = {name: _build(faults, name, kind, tables[name]) for name, kind in sections.items()}
+    sound = {name: section for name, section in built.items() if section is not None}
     distributions = _distributions(faults, tables["ensemble"].get("vary", {}))
     settings = _build(faults, "ensemble", EnsembleSettings, {**tables["ensemble"], "vary": distributions})
     scene = None
     with faults.including():
         # A default replaces each section that failed, so that the faults of the other sections are found as well.
-        scene = Scene(
-            vehicle or Vehicle(**_STAND_INS), environment or Environment(), content.get("terms", ()), start or Start(),
-            content.get("controller"), run or RunSettings(), settings if tables["ensemble"] else None,
-            content.get("events", ()),
-        )  # fmt: skip
+        lists = {name: content.get(name, ()) for name in ("terms", "events")}
+        settings_given = settings if tables["ensemble"] else None
+        scene = Scene(**{"vehicle": Vehicle(**_STAND_INS)} | sound | lists, controller=content.get("controller"),
+                      ensemble_settings=settings_given)  # fmt: skip
     with faults.including():
         if scene is None:
             # Names of a faulty term's parameters are unknown: only names of the other sections can be checked.
-            sections = ("vehicle.", "environment.", "start.")
-            distributions = {
-                name: distribution for name, distribution in distributions.items() if str(name).startswith(sections)
-            }
+            heads = ("vehicle.", "environment.", "start.")
+            distributions = {name: value for name, value in distributions.items() if str(name).startswith(heads)}
             settings = EnsembleSettings(vary=distributions)
-        sound_scene = scene if vehicle and environment and start else None
-        names = (scene or Scene(vehicle or Vehicle(**_STAND_INS))).parameters()
+        sound_scene = scene if {"vehicle", "environment", "start"} <= sound.keys() else None
+        names = (scene or Scene(built.get("vehicle") or Vehicle(**_STAND_INS))).parameters()
         _check_ensemble(settings or EnsembleSettings(vary=distributions), sound_scene, tuple(names))
     faults.raise_if_any()
     assert scene is not None
@@ -253,7 +252,7 @@ def _check_ensemble(settings: EnsembleSettings, scene: Scene | None, parameters:
 
 def _build(faults: Faults, name: str, kind: Callable[..., Any], table: Mapping[str, Any]) -> Any:
     """Construct a section's object from its table; on failure note the faults and return None."""
-    signature = [key for key in inspect.signature(kind).parameters]
+    signature = list(inspect.signature(kind).parameters)
     faults.keys(name, table, signature)
     known = {key: value for key, value in table.items() if key in signature}
     with faults.including():
@@ -266,10 +265,10 @@ _STAND_INS: dict[str, Any] = {"mass": 1.0, "inertia": (1.0, 1.0, 1.0)}
 
 def _distributions(faults: Faults, vary: Any) -> dict[str, Any]:
     """Build the distributions of the table [ensemble.vary], by name."""
-    distributions = {}
+    distributions: dict[str, Any] = {}
     if not isinstance(vary, Mapping):
         faults.add("ensemble.vary", vary, "is not a table", 'write [ensemble.vary] and "vehicle.mass" = {...} below')
-        vary = {}
+        return distributions
     for key, value in vary.items():
         with faults.including():
             distributions[key] = distribution_from_dict(f'ensemble.vary."{key}"', value)

@@ -10,7 +10,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.machine import DTYPES
-from lgvi_warp.common.real_numbers import holds_words
+from lgvi_warp.common.real_numbers import holds_words, is_whole
 from lgvi_warp.common.status import CHECKS, ON_FAILURE
 from lgvi_warp.methods.method import Method
 from lgvi_warp.sampling.designs import sampling_of
@@ -40,9 +40,8 @@ def check_keep(faults: Faults, key: str, keep: Any, members: int | None = None) 
     if not is_list or np.any(indices < 0):
         faults.add(key, keep, "names no members", f"give {', '.join(map(repr, KEEP))}, or a list of indices from 0")
     elif members is not None and np.any(indices >= members):
-        faults.add(
-            key, int(indices.max()), f"is beyond the last of {members} members", f"give indices up to {members - 1}"
-        )
+        fault = f"is beyond the last of {members} members"
+        faults.add(key, int(indices.max()), fault, f"give indices up to {members - 1}")
 
 
 @dataclass(frozen=True)
@@ -180,7 +179,7 @@ class EnsembleSettings:
             value = getattr(self, name)
             if name == "members" and value is None:
                 continue
-            if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+            if not is_whole(value, least):
                 faults.add(name, value, f"is not a whole number from {least}", f"give {least} or more")
             elif name == "members" and value > MOST_MEMBERS:
                 problem = f"are more members than the {MOST_MEMBERS} that there can be"
@@ -188,10 +187,7 @@ class EnsembleSettings:
         if self.indices is not None and not _whole_numbers(self.indices):
             faults.add("indices", self.indices, "is no list of whole numbers from 0", "give members: indices = [17]")
         if isinstance(self.vary, Mapping):
-            named = {
-                ", ".join(key) if isinstance(key, tuple) else key: distribution
-                for key, distribution in self.vary.items()
-            }
+            named = {", ".join(key) if isinstance(key, tuple) else key: value for key, value in self.vary.items()}
             for key, distribution in named.items():
                 with faults.including():
                     named[key] = distributions.as_distribution(f'vary."{key}"', distribution)

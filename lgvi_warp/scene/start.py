@@ -94,12 +94,8 @@ class Start:
     def _check_attitude(self, faults: Faults) -> None:
         R, q = self.attitude, self.quaternion_wxyz
         if R is not None and not notation.rotations(R):
-            faults.add(
-                "attitude",
-                R,
-                "is not a rotation (R^T R = I, det R = 1, to 1e-9)",
-                "give more digits, or quaternion_wxyz",
-            )
+            fault = "is not a rotation (R^T R = I, det R = 1, to 1e-9)"
+            faults.add("attitude", R, fault, "give more digits, or quaternion_wxyz")
         if q is not None and not np.any(q):
             faults.add("quaternion_wxyz", q, "is zero", "give a quaternion that is not")
 
@@ -110,10 +106,10 @@ class Start:
             Values by name: position (3,) [m], one attitude, one velocity (3,) [m/s] and angular_velocity (3,) [rad/s].
         """
         chosen = {name: getattr(self, name) for name in NAMES if getattr(self, name) is not None}
-        for names in (("position",), ATTITUDES[1:], VELOCITIES, ("angular_velocity",)):
-            alternatives = ATTITUDES if names == ATTITUDES[1:] else names
-            if not any(name in chosen for name in alternatives):
-                chosen[names[0]] = np.zeros(TABLE[names[0]].shape)
+        alternatives = {"rotation_vector": ATTITUDES, "velocity": VELOCITIES}
+        for name in ("position", "rotation_vector", "velocity", "angular_velocity"):
+            if chosen.keys().isdisjoint(alternatives.get(name, (name,))):
+                chosen[name] = np.zeros(TABLE[name].shape)
         return chosen
 
     def to_dict(self) -> dict[str, Any]:

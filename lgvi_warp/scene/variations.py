@@ -19,7 +19,7 @@ from lgvi_warp.physics import notation
 from lgvi_warp.physics import vehicle as vehicles
 from lgvi_warp.sampling.designs.space import Space
 from lgvi_warp.sampling.distributions.basic import Distribution, varies_nothing
-from lgvi_warp.sampling.distributions.joint import PhysicalInertia, PositiveDefinite, RotationNormal, UniformRotation
+from lgvi_warp.sampling.distributions.joint import AttitudeDistribution, PhysicalInertia, PositiveDefinite
 
 # Parameters that are symmetric matrices, and stay so when they vary.
 MATRICES = tuple(f"vehicle.{name}" for name in vehicles.SYMMETRIC)
@@ -107,9 +107,8 @@ class Variation:
 
     @property
     def _takes_matrices(self) -> bool:
-        return isinstance(self.distribution, PositiveDefinite) or (
-            self.distribution.joint and self.distribution.kind == "choice"
-        )
+        chosen = self.distribution.joint and self.distribution.kind == "choice"
+        return chosen or isinstance(self.distribution, PositiveDefinite)
 
     @property
     def size(self) -> int:
@@ -207,10 +206,7 @@ def put(values: dict[str, np.ndarray], target: Target, drawn: np.ndarray) -> Non
         values[target.name] = drawn
         return
     array = values[target.name]
-    if len(array) != len(drawn) or not array.flags.writeable:
-        array = np.array(np.broadcast_to(array, (len(drawn), *array.shape[1:])))
-    else:
-        array = array.copy()
+    array = np.array(np.broadcast_to(array, (len(drawn), *array.shape[1:])))
     every: tuple[Any, ...] = (slice(None),)
     array[every + target.index] = drawn
     if target.name in MATRICES:
@@ -253,12 +249,8 @@ def known_target(
             return False
         if len(target.index) != len(shape) or any(i >= n for i, n in zip(target.index, shape, strict=True)):
             problem = f"is no entry of {target.name}, of shape {shape}"
-            faults.add(
-                f'"{key}"',
-                distribution,
-                problem,
-                f"give {len(shape)} numbers from 0" if shape else f'write "{target.name}"',
-            )
+            form = f"give {len(shape)} numbers from 0" if shape else f'write "{target.name}"'
+            faults.add(f'"{key}"', distribution, problem, form)
             return False
     return True
 
@@ -298,7 +290,7 @@ def variation(faults: Faults, key: str, distribution: Any, known: Mapping[str, n
 def _misfit(found: Variation) -> tuple[str, str] | None:
     """Return what is wrong with a distribution and its targets, and the remedy; None if they fit."""
     distribution, named = found.distribution, found.targets
-    turns = isinstance(distribution, RotationNormal | UniformRotation)
+    turns = isinstance(distribution, AttitudeDistribution)
     chosen = distribution.kind == "choice" and distribution.joint
     if len(named) > 1 and distribution.kind != "correlated_normal":
         return "draws one quantity, several are named", "give lw.CorrelatedNormal, or a distribution to each"
@@ -373,6 +365,5 @@ def space(seed: int, found: Sequence[Variation]) -> Space:
         else:
             factors.append((labels[0], tuple(range(first, first + size))))
         first += size
-    return Space(
-        seed, tuple(varied.key for varied in ordered), tuple(varied.size for varied in ordered), tuple(factors)
-    )
+    keys, sizes = (tuple(getattr(varied, name) for varied in ordered) for name in ("key", "size"))
+    return Space(seed, keys, sizes, tuple(factors))

@@ -9,12 +9,16 @@ from typing import ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.physics import notation
 from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.estimate import Estimate, along
 from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate, joined_means, sums
 from lgvi_warp.statistics.tree import Part
 from lgvi_warp.statistics.values import Values
+
+# The skew matrices of the axes; + 0.0 leaves no -0.
+HATS = notation.hat(np.eye(3)) + 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,11 +180,8 @@ class MeanAttitude(Statistic):
         # Where attitudes spread over all of SO(3) the mean leaves some turns undetermined: their error is infinite.
         known = np.linalg.eigvalsh(spread)[:, 0] > 1e-9
         inverse = np.linalg.inv(np.where(known[:, None, None], spread, np.eye(3)))
-        vee = np.zeros((3, 3, 3))
-        for i, (j, k) in enumerate(((2, 1), (0, 2), (1, 0))):
-            vee[i, j, k], vee[i, k, j] = 1.0, -1.0
         # q_i = sum of vee[i, j, k] (R^T X)_jk for an attitude X; `inverse` converts q to angles about the axes.
-        to_angle = (inverse @ np.einsum("ijk,tlj->tilk", vee, R).reshape(-1, 3, 9)).reshape(-1, 3, 9)
+        to_angle = (inverse @ np.einsum("ijk,tlj->tilk", HATS, R).reshape(-1, 3, 9)).reshape(-1, 3, 9)
         n = np.maximum(count - 1, 1)[:, None, None]
         covariance = to_angle @ (part["m11"] / n) @ np.swapaxes(to_angle, 1, 2)
         # |R - X|^2 = 6 - 2 tr(R^T X), and the mean of X is M.
@@ -222,9 +223,6 @@ class MeanAttitude(Statistic):
     @staticmethod
     def _entries(R: np.ndarray, turn: np.ndarray) -> np.ndarray:
         """Standard error of each entry of R; `turn` (k, 3, 3) [rad^2] is the covariance of v in the change R hat(v)."""
-        hats = np.zeros((3, 3, 3))
-        for i, (j, k) in enumerate(((2, 1), (0, 2), (1, 0))):
-            hats[i, j, k], hats[i, k, j] = 1.0, -1.0
-        moves = np.einsum("tij,ajk->taik", R, hats)
+        moves = np.einsum("tij,ajk->taik", R, HATS)
         variance = np.einsum("taik,tab,tbik->tik", moves, turn, moves)
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))

@@ -10,13 +10,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
-from functools import reduce
+from functools import partial, reduce
 from typing import Any, ClassVar
 
 import numpy as np
 
 from lgvi_warp.common import registry
-from lgvi_warp.common.errors import Faults, SceneError, closest, shown
+from lgvi_warp.common.errors import Faults, SceneError, closest, refusal
 from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.ends import Ends
 from lgvi_warp.statistics.estimate import Estimate
@@ -70,9 +70,8 @@ class RowGatherer(Gatherer):
         """Return the rows of all sample times, joined along the first axis."""
         first = self._rows[0]
         shared = self._statistic.shared
-        return {
-            key: first[key] if key in shared else np.concatenate([rows[key] for rows in self._rows]) for key in first
-        }
+        joined = {key: np.concatenate([rows[key] for rows in self._rows]) for key in first.keys() - shared}
+        return {key: joined.get(key, first[key]) for key in first}
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,9 +128,8 @@ class Statistic:
         if self.at is not None and (not isinstance(self.at, str) or not self.at):
             faults.add("at", self.at, "is no outcome", 'give "floor", the name of an event, or "stopped"')
         elif self.at is not None and not self.of_numbers:
-            faults.add(
-                "at", self.at, "is one moment, and this statistic is of all times", "leave it out, or ask for a mean"
-            )
+            fault = "is one moment, and this statistic is of all times"
+            faults.add("at", self.at, fault, "leave it out, or ask for a mean")
         if self.of is not None:
             with faults.including():
                 object.__setattr__(self, "_quantity", self.meant())
@@ -142,7 +140,7 @@ class Statistic:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the arguments alone: the other process makes the statistic anew, and finds functions by name."""
-        return _made, (type(self), {argument.name: getattr(self, argument.name) for argument in fields(self)})
+        return partial(type(self), **{argument.name: getattr(self, argument.name) for argument in fields(self)}), ()
 
     def check(self, faults: Faults) -> None:
         """Note faults in the arguments that the class adds to these.
@@ -168,9 +166,8 @@ class Statistic:
         """
         meaning: Quantity | None = getattr(self, "_quantity", None)
         if meaning is None:
-            raise SceneError(
-                [f"{self.type}.of = None: is missing; say what it is of: lw.{type(self).__name__}('depth')"]
-            )
+            remedy = f"say what it is of: lw.{type(self).__name__}('depth')"
+            raise refusal(f"{self.type}.of", None, "is missing", remedy)
         return meaning
 
     @property
@@ -365,10 +362,6 @@ def together(each: Sequence[Sequence[Part]]) -> list[Part]:
     return [part for parts in zip(*each, strict=True) for part in parts]
 
 
-def _made(kind: type[Statistic], given: dict[str, Any]) -> Statistic:
-    return kind(**given)
-
-
 def plain(value: Any) -> Any:
     """Return a value as TOML and JSON can hold it: lists for arrays, tables for statistics, names for functions.
 
@@ -399,7 +392,7 @@ def from_list(given: Any, key: str = "statistics", *, whole: bool = True) -> tup
     """
     if isinstance(given, str | Mapping | Statistic) or not isinstance(given, Sequence):
         example = 'write [[run.statistics]] and type = "mean" below, or statistics=[lw.Mean("position")]'
-        raise SceneError([f"{key} = {shown(given)}: is no list; {example}"])
+        raise refusal(key, given, "is no list", example)
     faults, statistics = Faults(), list[Statistic]()
     for i, entry in enumerate(given):
         with faults.including():
@@ -410,9 +403,8 @@ def from_list(given: Any, key: str = "statistics", *, whole: bool = True) -> tup
             with faults.including():
                 names += [inner.key for inner in statistic.parts()]
         for name in sorted({name for name in names if names.count(name) > 1}):
-            faults.add(
-                key, name, f"is the name of {names.count(name)} statistics", "give each a name of its own: name=..."
-            )
+            fault = f"is the name of {names.count(name)} statistics"
+            faults.add(key, name, fault, "give each a name of its own: name=...")
     faults.raise_if_any()
     return tuple(statistics)
 
@@ -426,13 +418,11 @@ def _from_table(where: str, given: Any) -> Statistic:
     if isinstance(given, Statistic):
         return given
     if not isinstance(given, Mapping):
-        raise SceneError(
-            [f'{where} = {shown(given)}: is no statistic; write type = "mean", or give lw.Mean("position")']
-        )
+        raise refusal(where, given, "is no statistic", 'write type = "mean", or give lw.Mean("position")')
     word = given.get("type", "")
     kind = TYPES.get(word) if isinstance(word, str) else None
     if kind is None:
-        raise SceneError([f"{where}.type = {shown(word)}: is not known; {closest(str(word), TYPES)}"])
+        raise refusal(f"{where}.type", word, "is not known", closest(str(word), TYPES))
     faults = Faults()
     table = {name: value for name, value in given.items() if name != "type"}
     faults.keys(where, table, [argument.name for argument in dataclasses.fields(kind)])

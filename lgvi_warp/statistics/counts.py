@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from numbers import Integral
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.base import Gatherer, Statistic, together
 from lgvi_warp.statistics.ends import STOPPED, Ends
@@ -84,7 +85,7 @@ class Histogram(Counted):
             return
         if self.edges is None:
             limits, bins = np.array([0.0, 1.0]) if run else faults.finite("limits", self.limits, (2,)), self.bins
-            if isinstance(bins, bool) or not isinstance(bins, Integral) or bins < 1:
+            if bins is None or not is_whole(bins, 1):
                 faults.add("bins", bins, "is no whole number above 0", "give 50")
                 return
             object.__setattr__(self, "bins", int(bins))
@@ -109,14 +110,10 @@ class Histogram(Counted):
         at = np.searchsorted(edges, values.x, side="right")
         at = np.where(values.x == edges[-1], len(edges) - 1, at)
         stream = np.arange(k * d).reshape(k, d, 1) * (len(edges) + 1)
-        keep = (at + stream).ravel() if values.good is None else (at + stream)[self._kept(values, d)]
-        counts = np.bincount(keep, minlength=k * d * (len(edges) + 1)).reshape(k, d, len(edges) + 1)
+        bin_of = at + stream
+        kept = bin_of.ravel() if values.good is None else bin_of[np.repeat(values.good[:, None], d, axis=1)]
+        counts = np.bincount(kept, minlength=k * d * (len(edges) + 1)).reshape(k, d, len(edges) + 1)
         return {"count": values.count, "counts": counts}
-
-    @staticmethod
-    def _kept(values: Values, d: int) -> np.ndarray:
-        assert values.good is not None
-        return np.repeat(values.good[:, None], d, axis=1)
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         """Return the fractions of the members that count, with their intervals."""
@@ -372,19 +369,14 @@ class FirstPassage(Condition, Counted):
         curve = Curve.of(overall)
         curves = np.stack([Curve.of(self.whole(replicate_parts)).value for replicate_parts in each])
         ends = curve.ends(*intervals.probability_of_replicates(curve.value, curves, curve.members, self.confidence))
-        arrays = {name: end[:, -1] for name, end in zip(("lower", "upper"), ends, strict=True)}
-        arrays |= self._times(curve.value, *ends, time)
+        arrays = {"lower": ends[0][:, -1], "upper": ends[1][:, -1]} | self._times(curve.value, *ends, time)
         return [self.read(overall, time).with_interval(by_replicates(replicates), arrays)]
 
-    def _times(
-        self, value: np.ndarray, lower: np.ndarray, upper: np.ndarray, time: np.ndarray
-    ) -> dict[str, np.ndarray]:
+    def _times(self, value: np.ndarray, lower: np.ndarray, upper: np.ndarray, time: np.ndarray) -> Part:
         """Times at which the curves (k, pieces) reach each level."""
         curves = {"passage_time": value, "passage_time_lower": upper, "passage_time_upper": lower}
-        return {
-            name: np.array([self._reached(curve, level, time) for level in self.levels])
-            for name, curve in curves.items()
-        }
+        reached = partial(self._reached, time=time)
+        return {name: np.array([reached(curve, level) for level in self.levels]) for name, curve in curves.items()}
 
     def _reached(self, curve: np.ndarray, level: float, time: np.ndarray) -> float:
         """Time [s] at which a rising curve reaches a level: linear within a piece; without limits a sample time."""

@@ -11,12 +11,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.statistics.naming import canonical, free
+from lgvi_warp.statistics.tree import below
 
 if TYPE_CHECKING:
     import xarray
 
 
 Dims = dict[str, tuple[str, ...]]
+
+
+# What an estimate holds beside its arrays.
+WORDS = ("name", "settings", "unit", "confidence", "interval", "dims")
 
 
 def along(names: Iterable[str], *dims: str) -> Dims:
@@ -115,9 +120,8 @@ class Estimate:
             name: (self.dims[name], values, {"units": self.unit} if name in ("value", "lower", "upper") else {})
             for name, values in self.arrays.items()
         }
-        known = {
-            name: values for name, values in self.coordinates.items() if any(name in d for d in self.dims.values())
-        }
+        used = {dim for dims in self.dims.values() for dim in dims}
+        known = {name: values for name, values in self.coordinates.items() if name in used}
         attributes = {"long_name": self.name, "confidence": self.confidence, "interval": self.interval}
         return xr.Dataset(data, known, attributes | {"settings": json.dumps(self.settings)})
 
@@ -172,9 +176,7 @@ class Estimates(Mapping[str, Estimate]):
         for i, estimate in enumerate(self.values()):
             arrays |= {f"{i}/{name}": values for name, values in estimate.arrays.items()}
             arrays |= {f"{i}/coordinates/{name}": values for name, values in estimate.coordinates.items()}
-            words.append(
-                {key: getattr(estimate, key) for key in ("name", "settings", "unit", "confidence", "interval", "dims")}
-            )
+            words.append({key: getattr(estimate, key) for key in WORDS})
         return arrays, json.dumps(words)
 
     @classmethod
@@ -187,15 +189,10 @@ class Estimates(Mapping[str, Estimate]):
         """
         estimates = []
         for i, words in enumerate(json.loads(text)):
-            estimate_arrays = {
-                name.removeprefix(f"{i}/"): values for name, values in arrays.items() if name.startswith(f"{i}/")
-            }
-            head = "coordinates/"
-            coordinates = {
-                name.removeprefix(head): values for name, values in estimate_arrays.items() if name.startswith(head)
-            }
+            estimate_arrays = below(arrays, f"{i}/")
+            coordinates = below(estimate_arrays, "coordinates/")
             words["dims"] = {name: tuple(dims) for name, dims in words["dims"].items()}
-            values = {name: values for name, values in estimate_arrays.items() if not name.startswith(head)}
+            values = {name: array for name, array in estimate_arrays.items() if not name.startswith("coordinates/")}
             estimates.append(Estimate(**words, arrays=values, coordinates=coordinates))
         return cls(estimates)
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, SceneError, closest, shown
+from lgvi_warp.common.errors import Faults, closest, refusal
 from lgvi_warp.statistics import reductions
 from lgvi_warp.statistics.quantity import KNOWN, Quantity, joined, named
 from lgvi_warp.statistics.reductions import Reduction
@@ -103,9 +103,9 @@ class Functional:
         """Names of the components; each is an expression for that component."""
         if self.size == 1:
             return (self.label,)
-        plain = not self.functions
-        return tuple(label.replace(" ", "") if plain else f"{self.label}[{i}]"
-                     for i, label in enumerate(self.quantity.labels))  # fmt: skip
+        if not self.functions:
+            return tuple(label.replace(" ", "") for label in self.quantity.labels)
+        return tuple(f"{self.label}[{i}]" for i in range(self.quantity.size))
 
     def __call__(self, samples: Fields, members: Members) -> np.ndarray:
         """Evaluate the expression.
@@ -159,11 +159,11 @@ def functional(key: str, of: Any) -> Functional:
     faults.raise_if_any()
     if not re.fullmatch(r"\w+(\[[\d,]+\])?", inner):
         form = 'write "position[2]", "depth", "norm(velocity)" or "max(depth)"'
-        raise SceneError([f"{key} = {shown(of)}: is no quantity; {form}, of {', '.join(KNOWN)}"])
+        raise refusal(key, of, "is no quantity", f"{form}, of {', '.join(KNOWN)}")
     base = Functional(text, named(key, of, inner), tuple(reversed(names)))
     if entry is not None and (base.size == 1 or entry >= base.size):
-        raise SceneError([f"{key} = {shown(of)}: {outer} has {base.size} component{'s' * (base.size > 1)}; "
-                          f"give one of them from 0, or {outer} alone"])  # fmt: skip
+        fault = f"{outer} has {base.size} component{'s' * (base.size > 1)}"
+        raise refusal(key, of, fault, f"give one of them from 0, or {outer} alone")
     return replace(base, entry=entry)
 
 
@@ -197,11 +197,11 @@ def quantity(key: str, of: Any) -> Quantity:
         parts = [quantity(f"{key}[{i}]", item) for i, item in enumerate(of)]
         for i, (part, item) in enumerate(zip(parts, of, strict=True)):
             if len(of) > 1 and over_path(part):
-                remark = "looks over the path, and a list is of numbers at each time; ask for it alone"
-                raise SceneError([f"{key}[{i}] = {shown(item)}: {remark}"])
+                fault = "looks over the path, and a list is of numbers at each time"
+                raise refusal(f"{key}[{i}]", item, fault, "ask for it alone")
         return joined(parts)
     remedy = f"give one of {', '.join(KNOWN)}, one component as in 'position[2]', or a function of (samples, members)"
-    raise SceneError([f"{key} = {shown(of)}: is no quantity; {remedy}"])
+    raise refusal(key, of, "is no quantity", remedy)
 
 
 def over_path(quantity: Quantity) -> Functional | None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from numbers import Integral
 from typing import Any, ClassVar
 
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.statistics import intervals, sketch
 from lgvi_warp.statistics.base import Statistic, together
 from lgvi_warp.statistics.estimate import Estimate, along
@@ -19,6 +19,10 @@ from lgvi_warp.statistics.values import Values
 
 # Values of sketches that are sorted together; each takes some 50 bytes.
 SORTED_AT_ONCE = 2_000_000
+
+
+# Of a value: the ends of its interval, as ranks.
+EndsOf = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,13 +57,11 @@ class Extremes(Statistic):
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
         # Keep the more extreme value; of equal ones, that of the first member.
         both: Part = {"count": left["count"] + right["count"]}
-        for name, better in (
-            ("minimum", right["minimum"] < left["minimum"]),
-            ("maximum", right["maximum"] > left["maximum"]),
-        ):
+        for name, beats in (("minimum", np.less), ("maximum", np.greater)):
             member = f"{name}_member"
+            better = beats(right[name], left[name])
             better |= (right[name] == left[name]) & (right[member] < left[member])
-            for key in (name, f"{name}_member"):
+            for key in (name, member):
                 both[key] = np.where(better, right[key], left[key])
         return both
 
@@ -112,7 +114,7 @@ class Quantiles(Statistic):
                 faults.add("levels", self.levels, "are no numbers between 0 and 1", "give (0.05, 0.5, 0.95)")
             object.__setattr__(self, "levels", tuple(np.unique(levels).tolist()))
         n = self.size
-        if isinstance(n, bool) or not isinstance(n, Integral) or n < 64 or int(n) & (int(n) - 1):
+        if not is_whole(n, 64) or int(n) & (int(n) - 1):
             faults.add("size", n, "is no power of two from 64", "give 2048")
         else:
             object.__setattr__(self, "size", int(n))
@@ -182,13 +184,7 @@ class Quantiles(Statistic):
 
         return self._read(overall, time, ends, f"order statistics: ranks by Student's t of {len(each)} replicates")
 
-    def _read(
-        self,
-        part: Part,
-        time: np.ndarray,
-        ends: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
-        interval: str,
-    ) -> Estimate:
+    def _read(self, part: Part, time: np.ndarray, ends: EndsOf, interval: str) -> Estimate:
         """Return the quantiles, with the interval between two ranks.
 
         Args:
@@ -204,9 +200,8 @@ class Quantiles(Statistic):
         finite = np.isfinite(values)
 
         def at(rank: np.ndarray) -> np.ndarray:
-            return sketch.at_rank(
-                values, middles, finite, np.broadcast_to(rank, (len(values), len(level[0]), values.shape[1]))
-            )
+            shape = len(values), len(level[0]), values.shape[1]
+            return sketch.at_rank(values, middles, finite, np.broadcast_to(rank, shape))
 
         value = empty_as_nan(at((n - 1) * level[:, :, None]), count)
         low, high = ends(value)

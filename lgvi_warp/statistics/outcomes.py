@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, SceneError, shown
+from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.base import Gatherer, Statistic
 from lgvi_warp.statistics.counts import Curve, Histogram, by_replicates, check_levels
@@ -51,7 +51,7 @@ class OfEnds(Statistic):
         """
         if not isinstance(self.of, str) or not self.of:
             remedy = 'give "floor", the name of an event of the scene, "stopped" or "failed"'
-            raise SceneError([f"{self.type}.of = {shown(self.of)}: is no outcome; {remedy}"])
+            raise refusal(f"{self.type}.of", self.of, "is no outcome", remedy)
         return Quantity(self.of, _nothing, "s", (), (self.of,), needs_limit=True)
 
     @property
@@ -123,9 +123,8 @@ class Outcome(OfEnds):
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
         # Join the ends of both sets of members, one after the other.
-        return {"members": left["members"] + right["members"]} | {
-            name: np.concatenate([left[name], right[name]]) for name in ("time", "so", "replicate")
-        }
+        ends = {name: np.concatenate([left[name], right[name]]) for name in ("time", "so", "replicate")}
+        return {"members": left["members"] + right["members"]} | ends
 
     def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
         # The ends of the members of one replicate.
@@ -157,7 +156,8 @@ class Outcome(OfEnds):
         lower, upper = (end[:, 0] for end in curve.ends(*ends))
         rows = np.searchsorted(at, time)
         members = int(part["members"].sum())
-        ended, otherwise = (np.searchsorted(np.sort(part["time"][kind]), time, "right") for kind in _kinds(part))
+        kinds = part["so"], ~part["so"]
+        ended, otherwise = (np.searchsorted(np.sort(part["time"][kind]), time, "right") for kind in kinds)
         fraction = ended / max(members, 1)
         # If no member ended otherwise before, the product equals this fraction except for round-off.
         value = np.where(otherwise == 0, fraction, curve.value[rows, 0]) if members else curve.value[rows, 0]
@@ -171,11 +171,6 @@ class Outcome(OfEnds):
         arrays |= (times := {name: _reached(values, levels, at) for name, values in curves.items()})
         text = "Wilson with the variance of the beta product"
         return estimate(self, text, dims | along(times, "level"), arrays, time, {"level": levels}, "1", labels=())
-
-
-def _kinds(part: Part) -> tuple[np.ndarray, np.ndarray]:
-    """Masks of the ends by the outcome asked for, and of those otherwise."""
-    return part["so"], ~part["so"]
 
 
 def _curve(part: Part, at: np.ndarray) -> Curve:

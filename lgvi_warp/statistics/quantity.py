@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import SceneError, closest, shown
+from lgvi_warp.common.errors import closest, refusal
 from lgvi_warp.common.real_numbers import NotReal, real_results
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
@@ -154,17 +154,15 @@ def named(key: str, of: str, text: str) -> Quantity:
         SceneError: the name or the component is not known.
     """
     match = re.fullmatch(r"(\w+)(\[[\d, ]+\])?", text.strip())
-    base = KNOWN.get(match[1]) if match else None
-    if base is None:
-        raise SceneError([f"{key} = {shown(of)}: is not known; {closest(text, KNOWN)}"])
-    assert match is not None
+    if match is None or (base := KNOWN.get(match[1])) is None:
+        raise refusal(key, of, "is not known", closest(text, KNOWN))
     if match[2] is None:
         return base
     label = f"{base.name}[{', '.join(match[2][1:-1].replace(' ', '').split(','))}]"
     if label not in base.labels:
-        one = f"has one component; give {base.name!r}"
-        remark = one if base.size == 1 else f"has the components {', '.join(base.labels)}; give one of them"
-        raise SceneError([f"{key} = {shown(of)}: {base.name} {remark}"])
+        if base.size == 1:
+            raise refusal(key, of, f"{base.name} has one component", f"give {base.name!r}")
+        raise refusal(key, of, f"{base.name} has the components {', '.join(base.labels)}", "give one of them")
     return component(base, base.labels.index(label))
 
 

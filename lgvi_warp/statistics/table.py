@@ -67,9 +67,7 @@ def _extremes(one: Estimate) -> Iterator[Line]:
 
 def _passage(one: Estimate) -> Iterator[Line]:
     yield one.name, one.value[-1], one.lower[-1], one.upper[-1]
-    for j, level in enumerate(one.coordinates["level"]):
-        lower, upper = (float(one[f"passage_time_{name}"][j]) for name in ("lower", "upper"))
-        yield f"{one.name}: time [s] of {level:g}", float(one["passage_time"][j]), lower, upper
+    yield from _times(one, "passage_time")
 
 
 def _outcome(one: Estimate) -> Iterator[Line]:
@@ -77,9 +75,14 @@ def _outcome(one: Estimate) -> Iterator[Line]:
     if one["otherwise"][-1]:
         lower, upper = (float(one[f"fraction_{end}"][-1]) for end in ("lower", "upper"))
         yield f"{one.name}: of all members", float(one["fraction"][-1]), lower, upper
+    yield from _times(one, "end_time")
+
+
+def _times(one: Estimate, name: str) -> Iterator[Line]:
+    """A line for the time by which each level is reached."""
     for j, level in enumerate(one.coordinates["level"]):
-        lower, upper = (float(one[f"end_time_{end}"][j]) for end in ("lower", "upper"))
-        yield f"{one.name}: time [s] of {level:g}", float(one["end_time"][j]), lower, upper
+        value, lower, upper = (float(one[f"{name}{end}"][j]) for end in ("", "_lower", "_upper"))
+        yield f"{one.name}: time [s] of {level:g}", value, lower, upper
 
 
 def _attitude(one: Estimate) -> Iterator[Line]:
@@ -90,14 +93,9 @@ def _attitude(one: Estimate) -> Iterator[Line]:
 
 def _histogram(one: Estimate) -> Iterator[Line]:
     for i, label in enumerate(_labels(one)):
-        best = int(np.argmax(one["counts"][-1, i]))
-        middle = one.coordinates["bin"][best]
-        yield (
-            f"{label}: fullest bin, at {middle:g}",
-            one.value[-1, i, best],
-            one.lower[-1, i, best],
-            one.upper[-1, i, best],
-        )
+        at = -1, i, int(np.argmax(one["counts"][-1, i]))
+        middle = one.coordinates["bin"][at[2]]
+        yield f"{label}: fullest bin, at {middle:g}", one.value[at], one.lower[at], one.upper[at]
 
 
 _LINES: dict[str, Callable[[Estimate], Iterator[Line]]] = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,7 +13,7 @@ from lgvi_warp.statistics.base import Statistic, from_list
 from lgvi_warp.statistics.estimate import Estimate
 from lgvi_warp.statistics.moments import Mean
 from lgvi_warp.statistics.quantity import Quantity
-from lgvi_warp.statistics.tree import Part
+from lgvi_warp.statistics.tree import Part, below
 from lgvi_warp.statistics.values import Values
 
 
@@ -87,47 +87,35 @@ class Then(Statistic):
             values: the numbers of the block's members, as of one time.
             time: (k,) [s], all sample times of the run.
         """
-        part: Part = {}
-        for i, statistic in enumerate(self.then_of(time)):
-            gathers = statistic.open(time[-1:], values.x.shape[2])
-            gathers.take(values, slice(0, 1))
-            part |= {f"{i}/{key}": array for key, array in gathers.close().items()}
-        return part
+        gatherers = [statistic.open(time[-1:], values.x.shape[2]) for statistic in self.then_of(time)]
+        for gatherer in gatherers:
+            gatherer.take(values, slice(0, 1))
+        return _numbered(gatherer.close() for gatherer in gatherers)
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        both: Part = {}
-        for i, statistic in enumerate(self.then):
-            both |= {f"{i}/{key}": a for key, a in statistic.join(part_of(left, i), part_of(right, i), place).items()}
-        return both
+        pairs = ((below(left, f"{i}/"), below(right, f"{i}/")) for i in range(len(self.then)))
+        return _numbered(statistic.join(*pair, place) for statistic, pair in zip(self.then, pairs, strict=True))
 
     def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
         """Return the estimates of each statistic, at the end."""
         estimates: list[Estimate] = []
         for i, statistic in enumerate(self.then_of(time)):
-            estimates += statistic.estimates([part_of(part, i) for part in parts], time[-1:])
+            estimates += statistic.estimates([below(part, f"{i}/") for part in parts], time[-1:])
         return estimates
 
     def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
-        replicate_part: Part = {}
-        for i, statistic in enumerate(self.then):
-            replicate_part |= {
-                f"{i}/{key}": a for key, a in statistic.of_replicate(part_of(part, i), replicate, replicates).items()
-            }
-        return replicate_part
+        each = enumerate(self.then)
+        return _numbered(statistic.of_replicate(below(part, f"{i}/"), replicate, replicates) for i, statistic in each)
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
         # The estimates of each statistic from its replicates, at the end.
         estimates: list[Estimate] = []
         for i, statistic in enumerate(self.then_of(time)):
-            estimates += statistic.estimates_of_replicates([part_of(part, i) for part in parts], time[-1:], replicates)
+            inner = [below(part, f"{i}/") for part in parts]
+            estimates += statistic.estimates_of_replicates(inner, time[-1:], replicates)
         return estimates
 
 
-def part_of(part: Part, i: int) -> Part:
-    """Return the arrays of one of the statistics of `then`.
-
-    Args:
-        part: a part with numbered keys, such as "0/count".
-        i: index of the statistic.
-    """
-    return {key.removeprefix(f"{i}/"): array for key, array in part.items() if key.startswith(f"{i}/")}
+def _numbered(parts: Iterable[Part]) -> Part:
+    """Parts of several statistics as one: the number of the statistic stands before each name."""
+    return {f"{i}/{key}": array for i, part in enumerate(parts) for key, array in part.items()}

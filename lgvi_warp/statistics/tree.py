@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 # Named arrays that summarise some members for a statistic.
 Part = dict[str, np.ndarray]
 Join = Callable[[Part, Part, tuple[int, int]], Part]
+
+
+def below(arrays: Mapping[str, np.ndarray], head: str) -> Part:
+    """The arrays whose names begin with a head, named without it.
+
+    Args:
+        arrays: Arrays by name.
+        head: The beginning of the names, such as "0/".
+
+    Returns:
+        The arrays that have it.
+    """
+    return {name.removeprefix(head): array for name, array in arrays.items() if name.startswith(head)}
 
 
 class Tree:

@@ -6,12 +6,12 @@ import itertools
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from numbers import Integral
 from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, SceneError, closest, shown
+from lgvi_warp.common.errors import Faults, SceneError, closest, refusal
+from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.estimate import Estimate
 from lgvi_warp.statistics.functional import quantity
@@ -57,7 +57,7 @@ class Until:
         faults.positive("half_width", self.half_width, "in the unit of the statistic")
         if self.at is not None and self.at != "all":
             faults.number("at", self.at, "s", least=0.0)
-        if isinstance(self.members, bool) or not isinstance(self.members, Integral) or self.members < 2:
+        if not is_whole(self.members, 2):
             faults.add("members", self.members, "is no whole number from 2", "give 1024")
         faults.raise_if_any()
         object.__setattr__(self, "members", int(self.members))
@@ -79,15 +79,14 @@ def from_dict(given: Any) -> Until:
     """
     if isinstance(given, Until):
         return given
-    faults = Faults()
     example = 'write [run.until] and statistic = "mean position[2]", half_width = 0.01'
     if not isinstance(given, dict):
-        faults.add("until", given, "is no table", example)
-    else:
-        faults.keys("until", given, Until.__dataclass_fields__)
-        for name in ("statistic", "half_width"):
-            if name not in given:
-                faults.add(f"until.{name}", "", "is missing", example)
+        raise refusal("until", given, "is no table", example)
+    faults = Faults()
+    faults.keys("until", given, Until.__dataclass_fields__)
+    for name in ("statistic", "half_width"):
+        if name not in given:
+            faults.add(f"until.{name}", "", "is missing", example)
     faults.raise_if_any()
     return Until(**given)
 
@@ -191,8 +190,7 @@ def watch(until: Until, statistics: Sequence[Statistic], times: np.ndarray) -> W
     faults.raise_if_any()
     assert target is not None
     if target[0].type == "extremes":
-        faults.add("statistic", until.statistic, "has no interval", "watch a quantile")
-    faults.raise_if_any()
+        raise refusal("until.statistic", until.statistic, "has no interval", "watch a quantile")
     return Watch(until, *target, rows)
 
 
@@ -214,10 +212,8 @@ def _entries(one: Statistic) -> dict[str, dict[str, int]]:
     entries: dict[str, dict[str, int]] = {one.key: {}}
     for i, label in enumerate(one.quantity.labels):
         index = re.search(r"\[[^\]]*\]", label)
-        entries[f"{one.key}{index[0] if index else f'[{i}]'}"] = entries[f"{one.type} {label}{one.at_text}"] = {
-            "component": i,
-            "component_2": i,
-        }
+        entry = {"component": i, "component_2": i}
+        entries[f"{one.key}{index[0] if index else f'[{i}]'}"] = entries[f"{one.type} {label}{one.at_text}"] = entry
     if isinstance(one, Quantiles):
         for name, entry in list(entries.items()):
             for j, level in enumerate(one.levels):
@@ -250,4 +246,4 @@ def _target(name: str, known: Mapping[str, Named]) -> Named:
     if not hint.startswith("did you mean"):  # list the statistics alone, not their components
         estimates = dict.fromkeys(estimate for _, estimate, _ in known.values())
         hint = closest(name, estimates) if known else 'give a mean, such as "mean depth", or statistics'
-    raise SceneError([f"until.statistic = {shown(name)}: is none of the run's statistics; {hint}"])
+    raise refusal("until.statistic", name, "is none of the run's statistics", hint)

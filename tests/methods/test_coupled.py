@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.physics.inertia import hat
+from lgvi_warp.physics.notation import hat
 from lgvi_warp.reference import coupled
 from lgvi_warp.reference.submaps import Body, K, State, look, start, water
 from lgvi_warp.reference.terms.restoring import Restoring

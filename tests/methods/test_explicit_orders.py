@@ -6,7 +6,7 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
 from lgvi_warp.methods.method import ORDERS
-from lgvi_warp.physics.inertia import hat
+from lgvi_warp.physics.notation import hat
 from tests.laws import test_parity as test_terms
 from tests.laws.cases import CASES
 from tests.support.tools import difference, expected, last, one, slope

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from lgvi_warp.common import registry
-from lgvi_warp.common.errors import Faults, SceneError, closest, shown
+from lgvi_warp.common.errors import Faults, closest, refusal
 from lgvi_warp.common.names import folded
-from lgvi_warp.physics.terms.base import AnyTerm, Term, build, few_enough
+from lgvi_warp.physics.terms.base import AnyTerm, Term, build, check_list
 from lgvi_warp.physics.terms.hydrostatics import Restoring, Weight
 
 # Classes of terms by their type in a scene file, each also an attribute of this package.
@@ -56,25 +56,18 @@ def from_list(given: Any) -> tuple[Term, ...]:
     Raises:
         SceneError: Where an entry is no term, is an event, or shares its name with another. The message lists every fault.
     """
-    faults = Faults()
-    if not isinstance(given, Sequence) or isinstance(given, str):
-        raise SceneError(
-            [f"terms = {shown(given)}: is no list; write [[terms]] and type = ... below, or terms=[lw.Drag(...)]"]
-        )
-    few_enough("terms", given)
-    terms: list[Term] = []
+    check_list("terms", given, "write [[terms]] and type = ... below, or terms=[lw.Drag(...)]")
+    faults, terms = Faults(), list[Term]()
     for i, entry in enumerate(given):
         with faults.including():
-            terms.append(
-                _allowed(f"terms[{i}]", entry) if isinstance(entry, Term) else _from_table(f"terms[{i}]", entry)
-            )
+            build_entry = _allowed if isinstance(entry, Term) else _from_table
+            terms.append(build_entry(f"terms[{i}]", entry))
     counts = Counter(term.key for term in terms)
     for key in sorted(key for key in counts if folded(key) in RESERVED):
         faults.add("terms", key, "is the name of a section of the scene", f'give another name: name = "{key}_term"')
     for key in sorted(key for key, count in counts.items() if count > 1):
-        faults.add(
-            "terms", key, f"is the name of {counts[key]} terms", f'give each a name of its own: name = "{key}_2"'
-        )
+        remedy = f'give each a name of its own: name = "{key}_2"'
+        faults.add("terms", key, f"is the name of {counts[key]} terms", remedy)
     faults.raise_if_any()
     return tuple(terms)
 
@@ -82,16 +75,16 @@ def from_list(given: Any) -> tuple[Term, ...]:
 def _allowed(where: str, one: Term) -> Term:
     """The term, unless it is an event or follows from the vehicle: then SceneError."""
     if not one.acts:
-        raise SceneError([f"{where} = {one.type!r}: is an event; give it in events=[...]"])
+        raise refusal(where, one.type, "is an event", "give it in events=[...]")
     if type(one) in (Weight, Restoring):
-        raise SceneError([f"{where} = {one.type!r}: acts already; leave it out: it follows from the vehicle"])
+        raise refusal(where, one.type, "acts already", "leave it out: it follows from the vehicle")
     return one
 
 
 def _from_table(where: str, table: Any) -> Term:
     if not isinstance(table, Mapping):
         remedy = "write a table with type = ..., or give a term such as lw.Drag(quadratic=...)"
-        raise SceneError([f"{where} = {shown(table)}: is no term; {remedy}"])
+        raise refusal(where, table, "is no term", remedy)
     word = table.get("type", "")
     implied = [one.type for one in IMPLIED]
     kind = TYPES.get(word) if isinstance(word, str) else None
@@ -99,5 +92,5 @@ def _from_table(where: str, table: Any) -> Term:
         follows = word in (*implied, "buoyancy")
         known = sorted(TYPES.keys() - implied)
         remedy = "leave it out: it follows from the vehicle" if follows else closest(word, known)
-        raise SceneError([f"{where}.type = {shown(word)}: is not known; {remedy}"])
+        raise refusal(f"{where}.type", word, "is not known", remedy)
     return build(where, kind, table)

@@ -10,11 +10,13 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 import numpy as np
 
 from lgvi_warp.common import names, registry
-from lgvi_warp.common.errors import Faults, SceneError, ragged
+from lgvi_warp.common.errors import Faults, SceneError, ragged, refusal
 from lgvi_warp.physics.inertia import Frame
+from lgvi_warp.physics.notation import repeated
 
 # A term's own numbers, or all parameters of a scene, by name; leading dimension 1 (shared) or n (one per member).
-Numbers = Mapping[str, np.ndarray]
+Array = np.ndarray
+Numbers = Mapping[str, Array]
 
 # What a motion can conserve: energy [J], horizontal linear momentum [N s], vertical angular momentum [N m s].
 CONSERVED = frozenset({"energy", "horizontal_momentum", "vertical_angular_momentum"})
@@ -94,8 +96,6 @@ def number(
     if axes not in ("vector", "point", None):
         raise ValueError(f"axes = {axes!r}: is not known; give 'vector', 'point' or None")
     meta = dict(shape=shape, unit=unit, least=least, most=most, above=above, rising=rising, axes=axes)
-    if default is dataclasses.MISSING:
-        return field(metadata=meta)
     return field(default=default, metadata=meta)
 
 
@@ -106,8 +106,9 @@ class Term:
     Fields declared by `number` are arrays after construction.
 
     Class attributes: `type` is the name in a scene file, which knows the class as soon as it is made; `device` is the module
-    of lgvi_kernels.laws by name, or any object with the same functions; `timed` says whether the law depends on time;
-    `dissipative`, whether its damping never creates energy. docs/develop/add_a_force.md shows how to write one.
+    of lgvi_kernels.laws by name (by default the type), or any object with the same functions; `timed` says whether the law
+    depends on time; `dissipative`, whether its damping never creates energy; `strengths` names the numbers without which it
+    does nothing. docs/develop/add_a_force.md shows how to write one.
 
     Args:
         name: Name of the term in parameters ("name.field"), which tells two terms of one type apart; by default the type.
@@ -124,11 +125,14 @@ class Term:
     device: ClassVar[Any] = ""
     timed: ClassVar[bool] = False
     dissipative: ClassVar[bool] = True
+    # Numbers without which it does nothing: it is absent where all of them are zero. None named: it always acts.
+    strengths: ClassVar[tuple[str, ...]] = ()
 
     name: str = ""
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
+        cls.device = cls.device or cls.type
         registry.add(cls.kinds, cls)
 
     def __post_init__(self) -> None:
@@ -171,6 +175,18 @@ class Term:
         """The name by which parameters refer to this term: its `name`, or its `type` where it has none."""
         return self.name if isinstance(self.name, str) and self.name else self.type
 
+    def repeat(self, count: int, *names: str) -> None:
+        """Give every row of a field the value that was given once; for use before the fields are checked.
+
+        Args:
+            count: Number of rows.
+            names: Fields with one number for each row.
+        """
+        for name in names:
+            value = getattr(self, name)
+            if value is not None and np.ndim(np.asarray(value, dtype=object)) == 0:
+                object.__setattr__(self, name, np.array([value] * count))
+
     def check(self, faults: Faults) -> None:
         """Add a fault for each number that is wrong for reasons beyond its shape and its bounds; by default there is none.
 
@@ -202,7 +218,7 @@ class Term:
         return bad
 
     def present(self, numbers: Numbers) -> bool:
-        """Whether any member feels the term; by default always, since the scene names it.
+        """Whether any member feels the term; by default where one of its `strengths`, if it names any, is not zero.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
@@ -210,7 +226,7 @@ class Term:
         Returns:
             False where the term has no effect, so that the kernel leaves its code out.
         """
-        return True
+        return not self.strengths or any(np.any(numbers[name]) for name in self.strengths)
 
     @property
     def memory(self) -> bool:
@@ -257,9 +273,8 @@ class Term:
             NotImplementedError: Where the term does not define it, and has a number of another shape than () and (3,).
         """
         if self.lanes() is None:
-            raise NotImplementedError(
-                f"{type(self).__name__} must define packed(numbers, context): see docs/develop/add_a_force.md"
-            )
+            name = type(self).__name__
+            raise NotImplementedError(f"{name} must define packed(numbers, context): see docs/develop/add_a_force.md")
         frame = context.frame
         turned: dict[str | None, Any] = {"vector": frame.vector, "point": frame.point, None: np.asarray}
         return Packed({item.name: turned[item.metadata["axes"]](numbers[item.name]) for item in self.number_fields()})
@@ -293,9 +308,7 @@ class Term:
         still = self.water(numbers, position[None], np.zeros(1), context.parameters)
         return np.zeros_like(position) if still is None else still[0]
 
-    def potential(
-        self, numbers: Numbers, position: np.ndarray, attitude: np.ndarray, parameters: Numbers
-    ) -> np.ndarray | float:
+    def potential(self, numbers: Numbers, position: Array, attitude: Array, parameters: Numbers) -> Array | float:
         """Potential energy of the law at sampled states.
 
         Args:
@@ -332,9 +345,8 @@ def _checked(faults: Faults, one: dataclasses.Field[Any], value: Any, lengths: d
         if array is None:
             return None
         wanted = tuple(lengths.get(size, size) if isinstance(size, str) else size for size in shape)
-        fits = array.ndim == len(shape) and all(
-            isinstance(w, str) or w == g for w, g in zip(wanted, array.shape, strict=True)
-        )
+        pairs = zip(wanted, array.shape, strict=False)
+        fits = array.ndim == len(shape) and all(isinstance(want, str) or want == size for want, size in pairs)
         if not fits or 0 in array.shape:
             text = " x ".join(str(size) for size in wanted)
             faults.add(one.name, value, f"has shape {array.shape}", f"give {text} numbers [{unit}]")
@@ -384,9 +396,8 @@ def knots(at: np.ndarray, values: np.ndarray, steps: bool = False) -> np.ndarray
     Returns:
         Rows (n, d + (k - 1) (2 + d)); n is the larger of the two leading dimensions.
     """
-    n = max(len(at), len(values))
-    at, values = np.broadcast_to(at, (n, at.shape[1])), np.broadcast_to(values, (n, *values.shape[1:]))
-    inverse = np.full((n, at.shape[1] - 1), STEEP) if steps else 1.0 / np.diff(at, axis=1)
+    at, values = repeated(at, values)
+    inverse = np.full((len(at), at.shape[1] - 1), STEEP) if steps else 1.0 / np.diff(at, axis=1)
     place = at[:, 1:] if steps else at[:, :-1]
     rows = [values[:, 0]]
     for i in range(at.shape[1] - 1):
@@ -394,11 +405,35 @@ def knots(at: np.ndarray, values: np.ndarray, steps: bool = False) -> np.ndarray
     return np.concatenate(rows, axis=1)
 
 
+def side_by_side(*parts: np.ndarray) -> np.ndarray:
+    """Join arrays along the last dimension; a leading dimension of 1 is repeated.
+
+    Args:
+        parts: Arrays (1 or n, ..., d).
+
+    Returns:
+        One array (n, ..., sum of d).
+    """
+    return np.concatenate(repeated(*parts), axis=-1)
+
+
 # 1 / distance of a jump between knots: steeper than any step resolves, and within float32.
 STEEP = 1e20
 
 
 AnyTerm = TypeVar("AnyTerm", bound=Term)
+
+
+def rows_of(value: Any) -> int:
+    """Count the rows of a field that is not checked yet.
+
+    Args:
+        value: What the user gave.
+
+    Returns:
+        Its length; 1 of a single number.
+    """
+    return len(np.atleast_1d(np.asarray(value, dtype=object)))
 
 
 def build(where: str, kind: type[AnyTerm], table: Mapping[str, Any]) -> AnyTerm:
@@ -438,15 +473,18 @@ def build(where: str, kind: type[AnyTerm], table: Mapping[str, Any]) -> AnyTerm:
 MOST_TERMS = 1000
 
 
-def few_enough(what: str, given: Sequence[Any]) -> None:
-    """Refuse a list of more terms or events than a scene may have.
+def check_list(what: str, given: Any, example: str) -> None:
+    """Refuse what is no list, or a list of more terms or events than a scene may have.
 
     Args:
         what: Name of the list, "terms" or "events".
         given: The list.
+        example: How to give one.
 
     Raises:
-        SceneError: Where it has more than `MOST_TERMS` entries.
+        SceneError: Where it is no list, or has more than `MOST_TERMS` entries.
     """
+    if not isinstance(given, Sequence) or isinstance(given, str):
+        raise refusal(what, given, "is no list", example)
     if len(given) > MOST_TERMS:
         raise SceneError([f"{what}: are {len(given):,}; give at most {MOST_TERMS:,}"])

@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number
-from lgvi_warp.physics.terms.fins import Fins, fin_rows, side_by_side
-from lgvi_warp.physics.terms.wrench import commands, first_row, refuse_idle
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number, rows_of, side_by_side
+from lgvi_warp.physics.terms.fins import Fins, fin_rows
+from lgvi_warp.physics.terms.wrench import at_start, commands, first_row, refuse_idle
 
 # From this rate on [rad/s] a limit counts as none.
 UNLIMITED = 1e6
@@ -51,7 +51,7 @@ class ControlFins(Fins):
         object.__setattr__(self, "_both", twice and not np.array_equal(first, self.command))
         if self.command is None:
             object.__setattr__(self, "command", first)
-        self.repeat("limit", "rate_limit", "command")
+        self.repeat(rows_of(self.position), "limit", "rate_limit", "command")
         if self.command_schedule is None:
             object.__setattr__(self, "command_schedule", [self.command])
             object.__setattr__(self, "times", [0.0] if self.times is None else self.times)
@@ -76,22 +76,13 @@ class ControlFins(Fins):
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The device rows: those of each fin, then the command table of each fin."""
-        fins = side_by_side([fin_rows(numbers, context), numbers["limit"][..., None], numbers["rate_limit"][..., None]])
+        fins = side_by_side(fin_rows(numbers, context), numbers["limit"][..., None], numbers["rate_limit"][..., None])
         times, schedule = commands(numbers)
         count = schedule.shape[2]
         tables = [knots(times, schedule[:, :, i : i + 1]) for i in range(count)]
-        rows = side_by_side([fins.reshape(len(fins), -1), *tables])
+        rows = side_by_side(fins.reshape(len(fins), -1), *tables)
         values = {"count": count, "knots": times.shape[1] - 1, "limited": int(self.memory), "memory": 0}
         if not self.memory:
             return Packed(values, rows, work=2 * count)
-        start = np.clip(_at_start(times, schedule), -numbers["limit"], numbers["limit"])
+        start = np.clip(at_start(times, schedule), -numbers["limit"], numbers["limit"])
         return Packed(values, rows, start, 2 * count)
-
-
-def _at_start(times: np.ndarray, schedule: np.ndarray) -> np.ndarray:
-    """The commands (n, fins) [rad] at t = 0."""
-    n = max(len(times), len(schedule))
-    times, schedule = (np.broadcast_to(table, (n, *table.shape[1:])) for table in (times, schedule))
-    return np.array(
-        [[np.interp(0.0, t, column) for column in commands.T] for t, commands in zip(times, schedule, strict=True)]
-    )

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
-from lgvi_warp.physics.terms.fins import side_by_side, twist
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number, rows_of, side_by_side
+from lgvi_warp.physics.terms.fins import twist
 
 # The two Gauss points of a segment from 0 to 1.
 GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
@@ -32,16 +32,13 @@ class CrossFlow(Term):
     """
 
     type: ClassVar[str] = "cross_flow"
-    device: ClassVar[str] = "cross_flow"
 
     stations: Any = number(("k",), "m", rising=True)
     diameters: Any = number(("k",), "m", least=0.0)
     drag_coefficient: Any = number(("k",), "1", least=0.0)
 
     def __post_init__(self) -> None:
-        if np.ndim(np.asarray(self.drag_coefficient, dtype=object)) == 0:
-            count = len(np.atleast_1d(np.asarray(self.stations, dtype=object)))
-            object.__setattr__(self, "drag_coefficient", np.array([self.drag_coefficient] * count))
+        self.repeat(rows_of(self.stations), "drag_coefficient")
         super().__post_init__()
 
     def check(self, faults: Faults) -> None:
@@ -63,6 +60,6 @@ class CrossFlow(Term):
         strips = []
         for place in GAUSS:
             x, c = (table[:, :-1] + place * np.diff(table) for table in (stations, strength))
-            strips.append(side_by_side([x[..., None], (half_density * half_length * c)[..., None]]))
-        rows = side_by_side(strips)
+            strips.append(side_by_side(x[..., None], (half_density * half_length * c)[..., None]))
+        rows = side_by_side(*strips)
         return Packed(values | {"count": 2 * half_length.shape[1]}, rows.reshape(len(rows), -1))

@@ -19,13 +19,9 @@ class Current(Term):
     """
 
     type: ClassVar[str] = "current"
-    device: ClassVar[str] = "current"
+    strengths: ClassVar[tuple[str, ...]] = ("velocity",)
 
     velocity: Any = number((3,), "m/s")
-
-    def present(self, numbers: Numbers) -> bool:
-        """Whether the current of some member is not zero."""
-        return bool(np.any(numbers["velocity"]))
 
     def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
         return np.broadcast_to(numbers["velocity"], position.shape)
@@ -44,7 +40,6 @@ class CurrentProfile(Term):
     """
 
     type: ClassVar[str] = "current_profile"
-    device: ClassVar[str] = "current_profile"
 
     depths: Any = number(("k",), "m", rising=True)
     velocities: Any = number(("k", 3), "m/s")

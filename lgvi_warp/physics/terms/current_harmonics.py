@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number, rows_of, side_by_side
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -20,6 +20,7 @@ class Harmonics(Term):
         phases: Phases at t = 0, (k,) [rad]; 0 by default.
     """
 
+    strengths: ClassVar[tuple[str, ...]] = ("amplitudes",)
     timed: ClassVar[bool] = True
 
     amplitudes: Any = number(("k",), "1")
@@ -28,13 +29,8 @@ class Harmonics(Term):
 
     def __post_init__(self) -> None:
         if self.phases is None:
-            count = len(np.atleast_1d(np.asarray(self.amplitudes, dtype=object)))
-            object.__setattr__(self, "phases", np.zeros(count))
+            object.__setattr__(self, "phases", np.zeros(rows_of(self.amplitudes)))
         super().__post_init__()
-
-    def present(self, numbers: Numbers) -> bool:
-        """Whether some amplitude of some member is not zero."""
-        return bool(np.any(numbers["amplitudes"]))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -50,16 +46,14 @@ class CurrentHarmonics(Harmonics):
     """
 
     type: ClassVar[str] = "current_harmonics"
-    device: ClassVar[str] = "current_harmonics"
 
     amplitudes: Any = number(("k", 3), "m/s")
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Device rows of each harmonic: amplitude, angular frequency [rad/s], phase."""
         columns = [numbers["amplitudes"], 2.0 * np.pi / numbers["periods"][..., None], numbers["phases"][..., None]]
-        n = max(len(column) for column in columns)
-        rows = np.concatenate([np.broadcast_to(column, (n, *column.shape[1:])) for column in columns], axis=2)
-        return Packed({"count": rows.shape[1]}, rows.reshape(n, -1))
+        rows = side_by_side(*columns)
+        return Packed({"count": rows.shape[1]}, rows.reshape(len(rows), -1))
 
     def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
         # Velocity (k, n, 3) [m/s] at each time, the same at all positions.

@@ -37,13 +37,10 @@ class Drag(Term):
 
     type: ClassVar[str] = "drag"
     device: ClassVar[str] = "drag_matrix"
+    strengths: ClassVar[tuple[str, ...]] = ("linear", "quadratic")
 
     linear: Any = number((6,), "N s/m, N m s", ZEROS, least=0.0)
     quadratic: Any = number((6,), "N s2/m2, N m s2", ZEROS, least=0.0)
-
-    def present(self, numbers: Numbers) -> bool:
-        """Whether some coefficient is not zero."""
-        return bool(np.any(numbers["linear"]) or np.any(numbers["quadratic"]))
 
     def parts(self, numbers: Numbers) -> tuple[str, ...]:
         """Which parts of the exact flow some member has.
@@ -147,7 +144,7 @@ class DragMatrix(Term):
     """
 
     type: ClassVar[str] = "drag_matrix"
-    device: ClassVar[str] = "drag_matrix"
+    strengths: ClassVar[tuple[str, ...]] = ("linear", "quadratic")
 
     linear: Any = number((6, 6), "N s/m, N s, N m s", ((0.0,) * 6,) * 6)
     quadratic: Any = number((6, 6), "N s2/m2, N s2, N m s2", ((0.0,) * 6,) * 6)
@@ -167,10 +164,6 @@ class DragMatrix(Term):
         for kind in ("linear", "quadratic"):
             bad[kind] = bad[kind] | _creates_energy(np.nan_to_num(numbers[kind]), kind == "quadratic")[0]
         return bad
-
-    def present(self, numbers: Numbers) -> bool:
-        """Whether some coefficient is not zero."""
-        return bool(np.any(numbers["linear"]) or np.any(numbers["quadratic"]))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The matrices in the axes and about the origin of the forces."""

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, SceneError, closest, shown
+from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.common.status import Status
-from lgvi_warp.physics.terms.base import Numbers, Term, build, few_enough, number
+from lgvi_warp.physics.terms.base import Numbers, Term, build, check_list, number
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -38,7 +38,6 @@ class Surface(Event):
     """
 
     type: ClassVar[str] = "surface"
-    device: ClassVar[str] = "surface"
     status: ClassVar[Status] = Status.SURFACE
 
     depth: Any = number((), "m", 0.0)
@@ -53,7 +52,6 @@ class Floor(Event):
     """
 
     type: ClassVar[str] = "floor"
-    device: ClassVar[str] = "floor"
     status: ClassVar[Status] = Status.FLOOR
 
     depth: Any = number((), "m")
@@ -69,7 +67,6 @@ class Box(Event):
     """
 
     type: ClassVar[str] = "box"
-    device: ClassVar[str] = "box"
     status: ClassVar[Status] = Status.BOX
 
     lower: Any = number((3,), "m")
@@ -84,9 +81,8 @@ class Box(Event):
     def check(self, faults: Faults) -> None:
         """Adds a fault where the corners span no box."""
         if np.any(self.upper <= self.lower):
-            faults.add(
-                "upper", self.upper, f"is not above lower = {self.lower.tolist()}", "give upper > lower on each axis"
-            )
+            fault = f"is not above lower = {self.lower.tolist()}"
+            faults.add("upper", self.upper, fault, "give upper > lower on each axis")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -98,7 +94,6 @@ class StopTime(Event):
     """
 
     type: ClassVar[str] = "time"
-    device: ClassVar[str] = "time"
     status: ClassVar[Status] = Status.TIME
     timed: ClassVar[bool] = True
 
@@ -120,11 +115,7 @@ def from_list(given: Any) -> tuple[Event, ...]:
     Raises:
         SceneError: Where an entry is no event. The message lists every fault.
     """
-    if not isinstance(given, Sequence) or isinstance(given, str):
-        raise SceneError(
-            [f"events = {shown(given)}: is no list; write [[events]] and type = ... below, or events=[lw.Surface()]"]
-        )
-    few_enough("events", given)
+    check_list("events", given, "write [[events]] and type = ... below, or events=[lw.Surface()]")
     faults, events = Faults(), list[Event]()
     for i, entry in enumerate(given):
         with faults.including():

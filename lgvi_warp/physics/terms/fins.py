@@ -9,7 +9,8 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.inertia import Frame
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
+from lgvi_warp.physics.notation import repeated
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number, rows_of, side_by_side
 
 # Below this sine of the angle between them, chord and normal count as parallel.
 PARALLEL = 1e-6
@@ -35,7 +36,6 @@ class Fins(Term):
     """
 
     type: ClassVar[str] = "fins"
-    device: ClassVar[str] = "fins"
 
     position: Any = number(("n", 3), "m")
     chord: Any = number(("n", 3), "1")
@@ -46,20 +46,8 @@ class Fins(Term):
     drag_normal: Any = number(("n",), "1", 0.0, least=0.0)
 
     def __post_init__(self) -> None:
-        self.repeat("area", "lift_slope", "drag", "drag_normal")
+        self.repeat(rows_of(self.position), "area", "lift_slope", "drag", "drag_normal")
         super().__post_init__()
-
-    def repeat(self, *names: str) -> None:
-        """Replace one number by n equal ones, where one is given for all fins.
-
-        Args:
-            names: Names of the fields.
-        """
-        count = len(np.atleast_1d(np.asarray(self.position, dtype=object)))
-        for name in names:
-            value = getattr(self, name)
-            if value is not None and np.ndim(np.asarray(value, dtype=object)) == 0:
-                object.__setattr__(self, name, np.array([value] * count))
 
     def check(self, faults: Faults) -> None:
         """Adds a fault where chord and normal of a fin span no plane."""
@@ -119,7 +107,7 @@ def fin_rows(numbers: Numbers, context: PackingContext) -> np.ndarray:
         s, w = S[..., half_twist, half_twist], W[..., half_twist, half_twist]
         blocks.append(np.concatenate([np.diagonal(s, axis1=-2, axis2=-1), s[..., *off], w[..., *off]], axis=-1))
     between = [matrix[..., :3, 3:].reshape(*matrix.shape[:-2], 9) for matrix in (S, W)]
-    return side_by_side([c, n, *(size[..., None] for size in sizes), blocks[0], *between, blocks[1]])
+    return side_by_side(c, n, *(size[..., None] for size in sizes), blocks[0], *between, blocks[1])
 
 
 def twist(frame: Frame, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
@@ -133,19 +121,5 @@ def twist(frame: Frame, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
     Returns:
         Twists (n, ..., 6), linear part first, in the kernel's axes about the origin of the forces.
     """
-    n = max(len(frame.Q), len(frame.forces), len(point), len(direction))
-    point, direction = (np.broadcast_to(vectors, (n, *vectors.shape[1:])) for vectors in (point, direction))
+    *_, point, direction = repeated(frame.Q, frame.forces, point, direction)
     return np.concatenate([frame.vector(direction), frame.torque(np.cross(point, direction), direction)], axis=-1)
-
-
-def side_by_side(parts: list[np.ndarray]) -> np.ndarray:
-    """Join arrays along the last dimension; a leading dimension of 1 is repeated.
-
-    Args:
-        parts: Arrays (1 or n, k, d).
-
-    Returns:
-        One array (n, k, sum of d).
-    """
-    n = max(len(block) for block in parts)
-    return np.concatenate([np.broadcast_to(block, (n, *block.shape[1:])) for block in parts], axis=-1)

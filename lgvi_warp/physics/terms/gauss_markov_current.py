@@ -29,7 +29,7 @@ class GaussMarkovCurrent(Term):
     """
 
     type: ClassVar[str] = "gauss_markov_current"
-    device: ClassVar[str] = "gauss_markov_current"
+    strengths: ClassVar[tuple[str, ...]] = ("standard_deviation",)
     timed: ClassVar[bool] = True
 
     standard_deviation: Any = number((3,), "m/s", least=0.0)
@@ -39,10 +39,6 @@ class GaussMarkovCurrent(Term):
     def check(self, faults: Faults) -> None:
         """Adds a fault where `start` is unknown."""
         faults.choice("start", self.start, STARTS)
-
-    def present(self, numbers: Numbers) -> bool:
-        """Whether some standard deviation is not zero."""
-        return bool(np.any(numbers["standard_deviation"]))
 
     @property
     def memory(self) -> bool:
@@ -66,6 +62,5 @@ class GaussMarkovCurrent(Term):
 
         if self.start == "zero":
             return np.zeros((1, 3))
-        name, members = f"{self.key}.start", context.members
-        u = uniforms_of(context.seed, name, members, 3)
+        u = uniforms_of(context.seed, f"{self.key}.start", context.members, 3)
         return np.asarray(numbers["standard_deviation"] * ndtri(u))

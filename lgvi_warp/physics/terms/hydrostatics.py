@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from lgvi_warp.physics import vehicle
-from lgvi_warp.physics.terms.base import CONSERVED, Numbers, Packed, PackingContext, Term
+from lgvi_warp.physics.terms.base import CONSERVED, Array, Numbers, Packed, PackingContext, Term
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -16,7 +16,6 @@ class Weight(Term):
     """Weight less buoyancy, along the vertical (section IV of Nordkvist & Sanyal 2010). It takes no numbers."""
 
     type: ClassVar[str] = "weight"
-    device: ClassVar[str] = "weight"
 
     @property
     def conserves(self) -> frozenset[str]:
@@ -27,9 +26,7 @@ class Weight(Term):
         """The net force (m - rho V) g, formed here in float64 since it cancels, whatever the kernel's precision."""
         return Packed({"net": net(context.parameters)})
 
-    def potential(
-        self, numbers: Numbers, position: np.ndarray, attitude: np.ndarray, parameters: Numbers
-    ) -> np.ndarray:
+    def potential(self, numbers: Numbers, position: Array, attitude: Array, parameters: Numbers) -> Array:
         # Energy U = -net b3, (k, n) [J], b3 the depth.
         return -net(parameters) * position[..., 2]
 
@@ -39,7 +36,6 @@ class Restoring(Term):
     """Moment of buoyancy and weight about the body's origin (section IV of Nordkvist & Sanyal 2010). It takes no numbers."""
 
     type: ClassVar[str] = "restoring"
-    device: ClassVar[str] = "restoring"
 
     @property
     def conserves(self) -> frozenset[str]:
@@ -51,9 +47,7 @@ class Restoring(Term):
         p, origin = context.parameters, context.frame.forces
         return Packed({"moment": context.frame.vector(moment(p) + net(p)[:, None] * origin)})
 
-    def potential(
-        self, numbers: Numbers, position: np.ndarray, attitude: np.ndarray, parameters: Numbers
-    ) -> np.ndarray:
+    def potential(self, numbers: Numbers, position: Array, attitude: Array, parameters: Numbers) -> Array:
         # Energy U = (B r_b - W r_g).R^T e3, (k, n) [J].
         return np.sum(moment(parameters) * attitude[..., 2, :], axis=-1)
 

@@ -24,13 +24,10 @@ class BodyLift(Term):
 
     type: ClassVar[str] = "body_lift"
     device: ClassVar[str] = "lift"
+    strengths: ClassVar[tuple[str, ...]] = ("matrix",)
     dissipative: ClassVar[bool] = False
 
     matrix: Any = number((6, 6), "kg/m, kg, kg m")
-
-    def present(self, numbers: Numbers) -> bool:
-        """Whether some coefficient is not zero."""
-        return bool(np.any(numbers["matrix"]))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Rows that measure u (6), and the matrix (36), in the axes and about the origin of the forces."""

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.physics.terms.base import CONSERVED, Numbers, Packed, PackingContext, Term, number
+from lgvi_warp.physics.terms.base import CONSERVED, Array, Numbers, Packed, PackingContext, Term, number
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -23,14 +23,10 @@ class Stratification(Term):
     """
 
     type: ClassVar[str] = "stratification"
-    device: ClassVar[str] = "stratification"
+    strengths: ClassVar[tuple[str, ...]] = ("gradient",)
 
     gradient: Any = number((), "1/m")
     reference_depth: Any = number((), "m", 0.0)
-
-    def present(self, numbers: Numbers) -> bool:
-        """Whether the gradient of some member is not zero."""
-        return bool(np.any(numbers["gradient"]))
 
     @property
     def conserves(self) -> frozenset[str]:
@@ -43,9 +39,7 @@ class Stratification(Term):
         stiffness = context.parameters["vehicle.buoyancy"] * numbers["gradient"]
         return Packed({"stiffness": stiffness, "center": center, "reference_depth": numbers["reference_depth"]})
 
-    def potential(
-        self, numbers: Numbers, position: np.ndarray, attitude: np.ndarray, parameters: Numbers
-    ) -> np.ndarray:
+    def potential(self, numbers: Numbers, position: Array, attitude: Array, parameters: Numbers) -> Array:
         # Energy U = B gradient (d - reference_depth)^2 / 2, (k, n) [J].
         center = np.sum(parameters["vehicle.center_of_buoyancy"] * attitude[..., 2, :], axis=-1)
         depth = position[..., 2] + center - numbers["reference_depth"]

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.physics.terms.base import Numbers, Term, number
+from lgvi_warp.physics.terms.base import Array, Numbers, Term, number
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -22,7 +22,6 @@ class Tether(Term):
     """
 
     type: ClassVar[str] = "tether"
-    device: ClassVar[str] = "tether"
 
     anchor: Any = number((3,), "m")
     stiffness: Any = number((), "N/m", least=0.0)
@@ -34,9 +33,7 @@ class Tether(Term):
         """Energy only: the anchor takes up momentum."""
         return frozenset({"energy"})
 
-    def potential(
-        self, numbers: Numbers, position: np.ndarray, attitude: np.ndarray, parameters: Numbers
-    ) -> np.ndarray:
+    def potential(self, numbers: Numbers, position: Array, attitude: Array, parameters: Numbers) -> Array:
         # Energy U = stiffness max(length - rest_length, 0)^2 / 2, (k, n) [J].
         end = position + np.einsum("knij,nj->kni", attitude, np.broadcast_to(numbers["attachment"], position.shape[1:]))
         stretch = np.maximum(np.linalg.norm(end - numbers["anchor"], axis=-1) - numbers["rest_length"], 0.0)

@@ -7,9 +7,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number
-from lgvi_warp.physics.terms.wrench import commands, first_row, refuse_idle
+from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number, rows_of, side_by_side
+from lgvi_warp.physics.terms.wrench import at_start, commands, first_row, refuse_idle
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -39,7 +39,6 @@ class Thrusters(Term):
     """
 
     type: ClassVar[str] = "thrusters"
-    device: ClassVar[str] = "thrusters"
     timed: ClassVar[bool] = True
 
     position: Any = number(("n", 3), "m")
@@ -57,14 +56,14 @@ class Thrusters(Term):
 
     def __post_init__(self) -> None:
         if self.coefficient is None:
-            self._check_polynomial_given()
-            object.__setattr__(
-                self, "coefficient", np.ones(len(np.atleast_1d(np.asarray(self.position, dtype=object))))
-            )
+            if self.polynomial is None:
+                fault, remedy = "is missing", "give (n,) [N per unit^2], or a polynomial [N]"
+                raise refusal(f"{self.key}.coefficient", None, fault, remedy)
+            object.__setattr__(self, "coefficient", np.ones(rows_of(self.position)))
         for name, value in (("polynomial", SQUARE), ("polynomial_astern", self.polynomial)):
             if getattr(self, name) is None:
                 object.__setattr__(self, name, SQUARE if value is None else value)
-        n = len(np.atleast_1d(np.asarray(self.coefficient, dtype=object)))
+        n = rows_of(self.coefficient)
         defaults = {"coefficient_astern": self.coefficient, "dead_band": np.zeros(n), "limit": np.full(n, 1e6),
                     "time_constant": np.zeros(n)}  # fmt: skip
         scheduled = self.command_schedule is not None
@@ -78,19 +77,10 @@ class Thrusters(Term):
             defaults |= {"command": held, "times": [0.0], "command_schedule": [held]}
         for name, value in defaults.items():
             if getattr(self, name) is None:
-                alone = np.ndim(np.asarray(value, dtype=object)) == 0
-                object.__setattr__(self, name, np.full(n, value) if alone else value)
-            elif np.ndim(np.asarray(getattr(self, name), dtype=object)) == 0 and name != "command_schedule":
-                object.__setattr__(self, name, np.full(n, getattr(self, name)))
+                object.__setattr__(self, name, value)
+        self.repeat(n, *(defaults.keys() - {"command_schedule"}))
         object.__setattr__(self, "_both", both)
         super().__post_init__()
-
-    def _check_polynomial_given(self) -> None:
-        """Raise SceneError where neither a coefficient nor a polynomial is given."""
-        if self.polynomial is None:
-            faults = Faults(f"{self.key}.")
-            faults.add("coefficient", None, "is missing", "give (n,) [N per unit^2], or a polynomial [N]")
-            faults.raise_if_any()
 
     @property
     def is_square(self) -> bool:
@@ -132,9 +122,8 @@ class Thrusters(Term):
         least_commands = np.zeros(len(self.coefficient))
         for i, wanted in enumerate(np.broadcast_to(np.asarray(thrust, dtype=np.float64), least_commands.shape)):
             side = 1.0 if wanted > 0.0 else -1.0
-            curve, gain = (
-                (self.polynomial, self.coefficient) if side > 0.0 else (self.polynomial_astern, self.coefficient_astern)
-            )
+            curve = self.polynomial if side > 0.0 else self.polynomial_astern
+            gain = self.coefficient if side > 0.0 else self.coefficient_astern
             if wanted and gain[i] > 0.0:
                 reach = max(self.limit[i] - self.dead_band[i], 0.0)
                 least_commands[i] = side * (self.dead_band[i] + solve(curve, abs(wanted) / gain[i], reach))
@@ -185,26 +174,18 @@ class Thrusters(Term):
         settings = [numbers[key] for key in ("coefficient", "coefficient_astern", "dead_band", "limit")]
         blocks = [force, torque, *(x[..., None] for x in (*settings, rate))]
         times, schedule = commands(numbers)
-        n = max(*(len(block) for block in blocks), len(times), len(schedule))
-        columns = [np.broadcast_to(block, (n, *block.shape[1:])) for block in blocks]
-        rows = [np.concatenate(columns, axis=2).reshape(n, -1)]
-        for i in range(schedule.shape[2]):
-            table = knots(times, schedule[:, :, i : i + 1])
-            rows.append(np.broadcast_to(table, (n, table.shape[1])))
-        count = schedule.shape[2]
-        powers = 0
-        if not self.is_square:
-            curves, powers = side_by_side(numbers["polynomial"], numbers["polynomial_astern"])
-            rows.append(curves)
-            n = max(len(block) for block in rows)
-            rows = [np.broadcast_to(block, (n, block.shape[1])) for block in rows]
+        thrusters, count = side_by_side(*blocks), schedule.shape[2]
+        rows = [thrusters.reshape(len(thrusters), -1)]
+        rows += [knots(times, schedule[:, :, i : i + 1]) for i in range(count)]
         values = {"count": count, "knots": times.shape[1] - 1, "lagged": int(self.memory)}
-        values |= {} if self.is_square else {"powers": powers}
+        if not self.is_square:
+            ahead, astern = numbers["polynomial"], numbers["polynomial_astern"]
+            values["powers"] = max(ahead.shape[1], astern.shape[1])
+            rows += [np.pad(curve, ((0, 0), (0, values["powers"] - curve.shape[1]))) for curve in (ahead, astern)]
         if not self.memory:
-            return Packed(values | {"memory": 0}, np.concatenate(rows, axis=1))
-        first = np.stack([np.interp(0.0, t, c) for t, c in _columns(times, schedule)])
-        start = np.clip(first.reshape(-1, count), -numbers["limit"], numbers["limit"])
-        return Packed(values, np.concatenate(rows, axis=1), start)
+            return Packed(values | {"memory": 0}, side_by_side(*rows))
+        start = np.clip(at_start(times, schedule), -numbers["limit"], numbers["limit"])
+        return Packed(values, side_by_side(*rows), start)
 
 
 # 1 / time constant of a thruster without lag beside others with one: faster than any step, and within float32.
@@ -265,24 +246,3 @@ def _within(roots: np.ndarray, reach: float) -> np.ndarray:
     """The real roots strictly between 0 and reach, sorted."""
     real = roots.real[np.abs(roots.imag) <= 1e-9 * (1.0 + np.abs(roots))]
     return np.sort(real[(real > 0.0) & (real < reach)])
-
-
-def side_by_side(ahead: np.ndarray, astern: np.ndarray) -> tuple[np.ndarray, int]:
-    """Two polynomials as device rows of one length.
-
-    Args:
-        ahead: Coefficients (n, p), from the first power up.
-        astern: Coefficients (n, q), from the first power up.
-
-    Returns:
-        Rows (n, 2 powers), padded with zeros, and the number of powers.
-    """
-    powers, n = max(ahead.shape[1], astern.shape[1]), max(len(ahead), len(astern))
-    padded = [np.pad(curve, ((0, 0), (0, powers - curve.shape[1]))) for curve in (ahead, astern)]
-    return np.concatenate([np.broadcast_to(curve, (n, powers)) for curve in padded], axis=1), powers
-
-
-def _columns(times: np.ndarray, schedule: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """The times and commands of each thruster of each member."""
-    n = max(len(times), len(schedule))
-    return [(times[i % len(times)], column) for i in range(n) for column in schedule[i % len(schedule)].T]

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.errors import refusal
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 from lgvi_warp.physics.terms.current_harmonics import Harmonics
 
@@ -26,7 +26,6 @@ class Waves(Harmonics):
     """
 
     type: ClassVar[str] = "waves"
-    device: ClassVar[str] = "waves"
 
     amplitudes: Any = number(("k",), "m", least=0.0)
     headings_deg: Any = number(("k",), "deg")
@@ -35,10 +34,9 @@ class Waves(Harmonics):
         """Device rows of each component; raises SceneError where there is no gravity, hence no wavenumber."""
         g = context.parameters["environment.gravity"]
         if np.any(g <= 0.0):
-            faults = Faults()
             fault = f"leaves the length of {self.key} unknown (wavenumber = omega^2 / gravity)"
-            faults.add("environment.gravity", float(g.min()), fault, f"give gravity above 0, or leave {self.key} out")
-            faults.raise_if_any()
+            remedy = f"give gravity above 0, or leave {self.key} out"
+            raise refusal("environment.gravity", float(g.min()), fault, remedy)
         rows = np.stack(np.broadcast_arrays(*_components(numbers, g)), axis=-1)
         return Packed({"count": rows.shape[1]}, rows.reshape(len(rows), -1))
 

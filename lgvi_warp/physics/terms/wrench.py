@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number
+from lgvi_warp.physics.notation import repeated
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number, side_by_side
 
 SHAPES = ("linear", "steps")
 
@@ -23,14 +24,10 @@ class Wrench(Term):
     """
 
     type: ClassVar[str] = "wrench"
-    device: ClassVar[str] = "wrench"
+    strengths: ClassVar[tuple[str, ...]] = ("force", "torque")
 
     force: Any = number((3,), "N", (0.0, 0.0, 0.0))
     torque: Any = number((3,), "N m", (0.0, 0.0, 0.0))
-
-    def present(self, numbers: Numbers) -> bool:
-        """Whether force or torque of some member is not zero."""
-        return bool(np.any(numbers["force"]) or np.any(numbers["torque"]))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Force and torque about the origin of the forces, in the kernel's axes."""
@@ -55,7 +52,6 @@ class WrenchSchedule(Term):
     """
 
     type: ClassVar[str] = "wrench_schedule"
-    device: ClassVar[str] = "wrench_schedule"
     timed: ClassVar[bool] = True
 
     times: Any = number(("k",), "s", rising=True)
@@ -75,13 +71,9 @@ class WrenchSchedule(Term):
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Two tables: the force, and the torque about the origin of the forces."""
         force = context.frame.vector(numbers["force"])
-        torque = context.frame.torque(
-            numbers["torque"] + 0.0 * numbers["force"], numbers["force"] + 0.0 * numbers["torque"]
-        )
+        torque = context.frame.torque(*repeated(numbers["torque"], numbers["force"]))
         tables = [knots(numbers["times"], values, self.interpolation == "steps") for values in (force, torque)]
-        n = max(len(table) for table in tables)
-        rows = np.concatenate([np.broadcast_to(table, (n, table.shape[1])) for table in tables], axis=1)
-        return Packed({"count": numbers["times"].shape[1] - 1}, rows)
+        return Packed({"count": numbers["times"].shape[1] - 1}, side_by_side(*tables))
 
 
 def first_row(schedule: Any) -> Any:
@@ -112,6 +104,20 @@ def commands(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
     return numbers["times"], numbers["command"][:, None, :] if schedule.shape[1] == 1 else schedule
 
 
+def at_start(times: np.ndarray, schedule: np.ndarray) -> np.ndarray:
+    """Commands at t = 0.
+
+    Args:
+        times: Times of the schedule (1 or n, k) [s].
+        schedule: Commands (1 or n, k, columns).
+
+    Returns:
+        Commands (n, columns).
+    """
+    members = zip(*repeated(times, schedule), strict=True)
+    return np.array([[np.interp(0.0, at, column) for column in commands.T] for at, commands in members])
+
+
 def refuse_idle(term: Any, numbers: Numbers, rate: str, remembers: np.ndarray, remedy: str) -> None:
     """Refuse members' numbers that would have no effect, since the scene's kernel does not read them.
 
@@ -136,7 +142,6 @@ def refuse_idle(term: Any, numbers: Numbers, rate: str, remembers: np.ndarray, r
     for name, (bad, alternative, what_to_do) in unread.items():
         if np.any(bad):
             i = int(bad.reshape(len(bad), -1).any(axis=1).argmax())
-            faults.add(
-                f"{name} of member {i}", numbers[name][i], f"does not act: the scene has {alternative}", what_to_do
-            )
+            fault = f"does not act: the scene has {alternative}"
+            faults.add(f"{name} of member {i}", numbers[name][i], fault, what_to_do)
     faults.raise_if_any()

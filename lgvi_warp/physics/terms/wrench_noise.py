@@ -60,15 +60,11 @@ class WrenchNoise(Term):
     """
 
     type: ClassVar[str] = "wrench_noise"
-    device: ClassVar[str] = "wrench_noise"
+    strengths: ClassVar[tuple[str, ...]] = ("force", "torque")
     timed: ClassVar[bool] = True
 
     force: Any = number((3,), "N s^1/2", (0.0, 0.0, 0.0), least=0.0)
     torque: Any = number((3,), "N m s^1/2", (0.0, 0.0, 0.0), least=0.0)
-
-    def present(self, numbers: Numbers) -> bool:
-        """Whether some strength of some member is not zero."""
-        return bool(np.any(numbers["force"]) or np.any(numbers["torque"]))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The force and moment of each of the user's axes: drawn there, the numbers do not depend on the kernel's axes."""
@@ -76,10 +72,7 @@ class WrenchNoise(Term):
         values = noise_key(self.key, context)
         for i, axis in enumerate("xyz"):
             force, torque = (numbers[name] * np.eye(3)[i] for name in ("force", "torque"))
-            moment = frame.torque(none + 0.0 * force, force)
-            values |= {
-                f"force{axis}": frame.vector(force),
-                f"moment{axis}": moment,
-                f"torque{axis}": frame.vector(torque),
-            }
+            values[f"force{axis}"] = frame.vector(force)
+            values[f"moment{axis}"] = frame.torque(none + 0.0 * force, force)
+            values[f"torque{axis}"] = frame.vector(torque)
         return Packed(values)

@@ -13,7 +13,7 @@ from dataclasses import fields
 from typing import Any
 
 from lgvi_warp.common import registry
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.sampling.designs.base import Sampling
 
 # Classes of samplings by their kind in a scene file, each also an attribute of this package.
@@ -36,13 +36,12 @@ def sampling_of(content: Any) -> Sampling:
     """
     if isinstance(content, Sampling):
         return content
-    faults = Faults("ensemble.")
     if isinstance(content, str):
         content = {content: {}}
     if not isinstance(content, Mapping) or len(content) != 1:
         remedy = 'write "sobol", or { latin_hypercube = { group = 256 } }'
-        faults.add("sampling", content, "is not a sampling", remedy)
-        faults.raise_if_any()
+        raise refusal("ensemble.sampling", content, "is not a sampling", remedy)
+    faults = Faults("ensemble.")
     kind, values = next(iter(content.items()))
     if kind not in KINDS:
         faults.choice("sampling", kind, KINDS)

@@ -10,7 +10,7 @@ import numpy as np
 
 from lgvi_warp.common import registry
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.common.random import seed_words
+from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.sampling.designs.space import Space
 
 # A block's members are a multiple of this, so that it has equally many points of each replicate.
@@ -122,9 +122,8 @@ class Sampling:
             fault = f"are more than the {fixed} of the {self.kind}"
             faults.add("members", members, fault, f"give {fixed} or less, or leave members out")
         elif fixed is not None and not self.fewer and members != fixed:
-            faults.add(
-                "members", members, f"is not the {fixed} of the {self.kind}", f"give {fixed}, or leave members out"
-            )
+            remedy = f"give {fixed}, or leave members out"
+            faults.add("members", members, f"is not the {fixed} of the {self.kind}", remedy)
         elif members % group:
             low = members // group * group
             near = f"{low} or {low + group}" if low else f"{group}"
@@ -137,23 +136,9 @@ class Sampling:
         Returns:
             The name, or { name: settings } where a setting differs from its default.
         """
-        values = {
-            item.name: getattr(self, item.name) for item in fields(self) if getattr(self, item.name) != item.default
-        }
-        return {self.kind: values} if values else self.kind
-
-
-def generator(space: Space, name: str) -> np.random.Generator:
-    """A random generator that depends on the seed and a name only.
-
-    Args:
-        space: The cube, which holds the seed.
-        name: Name of the stream.
-
-    Returns:
-        A Philox generator.
-    """
-    return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed_words(space.seed, name))))
+        values = {item.name: (getattr(self, item.name), item.default) for item in fields(self)}
+        changed = {name: value for name, (value, default) in values.items() if value != default}
+        return {self.kind: changed} if changed else self.kind
 
 
 def inside(cube: np.ndarray) -> np.ndarray:
@@ -189,8 +174,7 @@ class Replicated(Sampling):
     def __post_init__(self) -> None:
         R = self.replicates
         faults = Faults(f"ensemble.sampling.{self.kind}.")
-        is_integer = isinstance(R, int | np.integer) and not isinstance(R, bool)
-        if not is_integer or not 1 <= R <= MOST_REPLICATES or R & (R - 1):
+        if not is_whole(R, 1, MOST_REPLICATES) or R & (R - 1):
             faults.add("replicates", R, f"is no power of two from 1 to {MOST_REPLICATES}", "give 8, 16, 32 or 64")
         self.check_own(faults)
         faults.raise_if_any()

@@ -72,9 +72,8 @@ def _lines(content: bytes) -> Iterator[str]:
 def _check_names(faults: Faults, path: str, line: int, names: Sequence[str], delimiter: str) -> None:
     """Add a fault for a first line that does not hold names."""
     if not names:
-        faults.add(
-            "file", path, "is empty", "write the names in its first line, then a line of numbers for each member"
-        )
+        remedy = "write the names in its first line, then a line of numbers for each member"
+        faults.add("file", path, "is empty", remedy)
     elif all(_number(name) is not None for name in names):
         fault = f"has numbers where the names should be (line {line})"
         faults.add("file", path, fault, 'write the names above them, without # (numpy.savetxt: comments="")')

@@ -8,8 +8,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
-from lgvi_warp.sampling.designs.base import Drawn, Sampling, generator
+from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.common.random import generator
+from lgvi_warp.common.real_numbers import is_whole
+from lgvi_warp.sampling.designs.base import Drawn, Sampling
 from lgvi_warp.sampling.designs.sequences import sobol_points
 from lgvi_warp.sampling.designs.space import Space
 
@@ -92,10 +94,8 @@ class Morris(Sampling):
 
     def __post_init__(self) -> None:
         levels = self.levels
-        faults = Faults("ensemble.sampling.morris.")
-        if isinstance(levels, bool) or not isinstance(levels, int | np.integer) or levels < 4 or levels % 2:
-            faults.add("levels", levels, "is not an even number from 4", "give 4, 6, 8 ...")
-        faults.raise_if_any()
+        if not is_whole(levels, 4) or levels % 2:
+            raise refusal("ensemble.sampling.morris.levels", levels, "is not an even number from 4", "give 4, 6, 8 ...")
         object.__setattr__(self, "levels", int(levels))
 
     def group_size(self, space: Space) -> int:
@@ -105,9 +105,8 @@ class Morris(Sampling):
     def check(self, faults: Faults, space: Space, members: int) -> None:
         # Also a fault where fewer than two factors vary.
         if len(space.factors) < 2:
-            faults.add(
-                "sampling", self.kind, f"needs two or more factors, and has {len(space.factors)}", "vary two or more"
-            )
+            fault = f"needs two or more factors, and has {len(space.factors)}"
+            faults.add("sampling", self.kind, fault, "vary two or more")
             return
         super().check(faults, space, members)
 
@@ -140,7 +139,7 @@ def _morris(space: Space, levels: int, paths: int) -> np.ndarray:
         from SALib.sample import morris
     except ImportError as error:
         raise ImportError("Morris' screening needs SALib: pip install 'lgvi-warp[uq]'") from error
-    x = np.asarray(morris.sample(salib_problem(space), paths, num_levels=levels, seed=generator(space, "morris")))
+    x = np.asarray(morris.sample(salib_problem(space), paths, num_levels=levels, seed=generator(space.seed, "morris")))
     x.setflags(write=False)
     return x
 
@@ -154,9 +153,9 @@ def salib_problem(space: Space) -> dict[str, Any]:
     Returns:
         "num_vars", "names" and "bounds" of the columns, and "groups" where a factor has several columns.
     """
-    names = [
-        label if len(columns) == 1 else f"{label} {i}" for label, columns in space.factors for i in range(len(columns))
-    ]
+    names: list[str] = []
+    for label, columns in space.factors:
+        names += [label] if len(columns) == 1 else [f"{label} {i}" for i in range(len(columns))]
     problem: dict[str, Any] = {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
     if len(space.factors) < len(names):
         problem["groups"] = [label for label, columns in space.factors for _ in columns]

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.sampling.designs.base import Drawn, Sampling
 from lgvi_warp.sampling.designs.random import Random
 from lgvi_warp.sampling.designs.space import Space
@@ -34,10 +34,10 @@ class Grid(Sampling):
     kind: ClassVar[str] = "grid"
 
     def __post_init__(self) -> None:
-        faults = Faults("ensemble.sampling.grid.")
         if not isinstance(self.axes, Mapping) or not self.axes:
-            faults.add("axes", self.axes, "names nothing", 'write grid = { "vehicle.mass" = [100.0, 110.0] }')
-            faults.raise_if_any()
+            remedy = 'write grid = { "vehicle.mass" = [100.0, 110.0] }'
+            raise refusal("ensemble.sampling.grid.axes", self.axes, "names nothing", remedy)
+        faults = Faults("ensemble.sampling.grid.")
         for name, axis in self.axes.items():
             if isinstance(axis, int | np.integer) and not isinstance(axis, bool):
                 if axis < 1:

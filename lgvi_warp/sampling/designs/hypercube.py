@@ -9,7 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.common.random import seed_words
+from lgvi_warp.common.random import generator
+from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.sampling.designs.base import Drawn, Replicated, inside
 from lgvi_warp.sampling.designs.space import Space
 
@@ -36,7 +37,7 @@ class LatinHypercube(Replicated):
     def check_own(self, faults: Faults) -> None:
         """Adds a fault where the group is missing or out of bounds."""
         group = self.group
-        if isinstance(group, bool) or not isinstance(group, int | np.integer) or not 2 <= group <= LARGEST_GROUP:
+        if not is_whole(group, 2, LARGEST_GROUP):
             faults.add("group", group, f"is not a whole number from 2 to {LARGEST_GROUP}",
                        "give how many members make a hypercube: group = 256")  # fmt: skip
         else:
@@ -68,7 +69,5 @@ def _hypercubes(seed: int, key: str, first: int, number: int, size: int, columns
 
     cubes = np.empty((size, number, columns))
     for i in range(number):
-        words = [*seed_words(seed, f"latin {key}"), first + i]
-        rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(words)))
-        cubes[:, i] = qmc.LatinHypercube(columns, rng=rng).random(size)
+        cubes[:, i] = qmc.LatinHypercube(columns, rng=generator(seed, f"latin {key}", first + i)).random(size)
     return inside(cubes.reshape(size * number, columns))

@@ -20,6 +20,5 @@ class Random(Sampling):
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
         """Levels from Philox counters keyed by seed and name, at the member's place."""
-        return {
-            key: uniforms_of(space.seed, key, members, size) for key, size in zip(space.keys, space.sizes, strict=True)
-        }
+        sizes = zip(space.keys, space.sizes, strict=True)
+        return {key: uniforms_of(space.seed, key, members, size) for key, size in sizes}

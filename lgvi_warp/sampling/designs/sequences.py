@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.random import seed_words
+from lgvi_warp.common.random import generator
 from lgvi_warp.sampling.designs.base import MOST_REPLICATES, Drawn, Replicated, inside
 from lgvi_warp.sampling.designs.space import Space
 
@@ -70,8 +70,7 @@ def _sobol_basis(seed: int, name: str, dimensions: int, bits: int, scramble: boo
     """Point 0, and the bits that each bit of an index changes in it: (bits + 1, dimensions), as integers."""
     from scipy.stats import qmc
 
-    rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed_words(seed, name))))
-    engine = qmc.Sobol(dimensions, scramble=scramble, bits=SOBOL_BITS, rng=rng)
+    engine = qmc.Sobol(dimensions, scramble=scramble, bits=SOBOL_BITS, rng=generator(seed, name))
     points, position = [], 0
     for index in (0, *(1 << bit for bit in range(bits))):
         if index > position:
@@ -117,5 +116,4 @@ class Halton(Replicated):
 def _halton(seed: int, name: str, dimensions: int) -> Any:
     from scipy.stats import qmc
 
-    rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed_words(seed, name))))
-    return qmc.Halton(dimensions, scramble=True, rng=rng)
+    return qmc.Halton(dimensions, scramble=True, rng=generator(seed, name))

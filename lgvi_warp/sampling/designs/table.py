@@ -95,11 +95,8 @@ class Table(Sampling):
             chosen = getattr(self, name)
             if chosen is None:
                 continue
-            if (
-                not isinstance(chosen, list | tuple)
-                or not chosen
-                or not all(isinstance(entry, str) for entry in chosen)
-            ):
+            is_list = isinstance(chosen, list | tuple) and len(chosen) > 0
+            if not is_list or not all(isinstance(entry, str) for entry in chosen):
                 faults.add(name, chosen, "is no list of names", f'write {name} = ["vehicle.mass"]')
             else:
                 object.__setattr__(self, name, list(chosen))
@@ -121,18 +118,15 @@ class Table(Sampling):
         return chosen
 
     def _from_values(self, faults: Faults) -> dict[str, np.ndarray]:
-        read: dict[str, np.ndarray] = {}
         if not is_labelled(self.values):
             remedy = 'give a file, {"vehicle.mass": array, ...} or a DataFrame with such names'
             faults.add("values", self.values, "has no names of columns", remedy)
-            return read
+            return {}
         table = columns_by_name(faults, "values", self.values)
         if not table:
-            return read
-        for name in self._chosen(faults, list(table)):
-            array = _column(faults, f'"{name}"', table[name])
-            if array is not None:
-                read[name] = array
+            return {}
+        columns = {name: _column(faults, f'"{name}"', table[name]) for name in self._chosen(faults, list(table))}
+        read = {name: column for name, column in columns.items() if column is not None}
         object.__setattr__(self, "values", read)
         return read
 
@@ -145,9 +139,8 @@ class Table(Sampling):
             faults.add("file", path, f"cannot be read ({error.what})", error.remedy)
             return {}
         if content.startswith(BINARY):
-            faults.add(
-                "file", path, "is a file of NumPy, or an archive", "give a CSV file, or arrays: lw.Table({name: array})"
-            )
+            remedy = "give a CSV file, or arrays: lw.Table({name: array})"
+            faults.add("file", path, "is a file of NumPy, or an archive", remedy)
             return {}
         checksum = hashlib.sha256(content).hexdigest()
         if self.sha256 not in (None, checksum):

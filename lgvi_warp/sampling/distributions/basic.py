@@ -315,9 +315,8 @@ class Choice(Distribution):
         if values.ndim == 0 or not len(values):
             faults.add("values", self.values, "is no list of values", "give one value or more")
         elif weights.shape != values.shape[:1] or not weights.sum() > 0.0:
-            faults.add(
-                "weights", self.weights, f"does not weigh {len(values)} values", "give one from 0 for each value"
-            )
+            fault = f"does not weigh {len(values)} values"
+            faults.add("weights", self.weights, fault, "give one from 0 for each value")
 
     def numbers(self) -> list[Any]:
         """Always []: the values need not fit the components."""

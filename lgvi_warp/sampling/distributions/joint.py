@@ -106,9 +106,8 @@ def _covariance(faults: Faults, distribution: Any, size: int | None) -> np.ndarr
     matrix = np.asarray(faults.finite(name, getattr(distribution, name)), dtype=np.float64)
     if matrix.dtype == object or np.any(np.isnan(matrix)):
         return None
-    if name != "std" and not (
-        matrix.ndim == 2 and matrix.shape[0] == matrix.shape[1] and np.allclose(matrix, matrix.T)
-    ):
+    square = matrix.ndim == 2 and matrix.shape[0] == matrix.shape[1]
+    if name != "std" and not (square and np.allclose(matrix, matrix.T)):
         faults.add(name, matrix, "is no symmetric matrix", "give n x n numbers, the same on both sides of the diagonal")
         return None
     if name != "covariance":
@@ -127,9 +126,8 @@ def _covariance(faults: Faults, distribution: Any, size: int | None) -> np.ndarr
         matrix = np.outer(std, std) * (correlation(matrix)[1] if name == "correlation" else np.eye(n))
     matrix = 0.5 * (matrix + matrix.T)
     if np.any(np.diag(matrix) < 0.0):
-        faults.add(
-            name, getattr(distribution, name), "has a negative variance on its diagonal", "give variances from 0"
-        )
+        fault = "has a negative variance on its diagonal"
+        faults.add(name, getattr(distribution, name), fault, "give variances from 0")
         return None
     std, C = correlation(matrix)
     least = -np.inf if np.any(matrix[std == 0.0]) else float(np.linalg.eigvalsh(C)[0])
@@ -243,15 +241,25 @@ class CorrelatedNormal(JointLaw):
             L = L[0, 0] * np.eye(u.shape[1])
         scene = np.concatenate([np.reshape(base, -1) for base in bases])
         drawn = (scene if self.mean is None else np.asarray(self.mean)) + combined(L, normals(u))
-        ends = np.cumsum([base.size for base in bases])[:-1]
-        return [
-            entries.reshape(len(u), *base.shape)
-            for entries, base in zip(np.split(drawn, ends, axis=1), bases, strict=True)
-        ]
+        parts = np.split(drawn, np.cumsum([base.size for base in bases])[:-1], axis=1)
+        return [entries.reshape(len(u), *base.shape) for entries, base in zip(parts, bases, strict=True)]
 
 
 @dataclass(frozen=True)
-class RotationNormal(JointLaw):
+class AttitudeDistribution(JointLaw):
+    """A distribution of attitudes; abstract. The ensemble gives it attitudes only."""
+
+    def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
+        """Always None: the ensemble gives it attitudes only."""
+        return None
+
+    def size(self, bases: Sequence[np.ndarray]) -> int:
+        """Always 3: one uniform number for each degree of freedom."""
+        return 3
+
+
+@dataclass(frozen=True)
+class RotationNormal(AttitudeDistribution):
     """Concentrated normal distribution of an attitude, R = R0 exp(hat(v)); for "start.attitude".
 
     R0 is the scene's attitude, and v is normal about 0, in body axes. Barfoot & Furgale (2014), Associating uncertainty
@@ -278,14 +286,6 @@ class RotationNormal(JointLaw):
         assert matrix is not None
         object.__setattr__(self, "_root", root_of_covariance(matrix))
 
-    def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
-        """Always None: the ensemble gives it attitudes only."""
-        return None
-
-    def size(self, bases: Sequence[np.ndarray]) -> int:
-        """Always 3: one uniform number per axis."""
-        return 3
-
     def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Attitudes R0 exp(hat(L Phi^-1(u))), L L^T the covariance."""
         v = combined(self._root, normals(u))  # type: ignore[attr-defined]
@@ -293,21 +293,13 @@ class RotationNormal(JointLaw):
 
 
 @dataclass(frozen=True)
-class UniformRotation(JointLaw):
+class UniformRotation(AttitudeDistribution):
     """Uniform distribution of an attitude: Haar's measure on SO(3), whatever the scene's attitude; for "start.attitude".
 
     Shoemake (1992), Uniform random rotations, in Graphics Gems III.
     """
 
     kind: ClassVar[str] = "uniform_rotation"
-
-    def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
-        """Always None: the ensemble gives it attitudes only."""
-        return None
-
-    def size(self, bases: Sequence[np.ndarray]) -> int:
-        """Always 3: a length and two angles."""
-        return 3
 
     def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Attitudes of unit quaternions that are uniform on their sphere."""
@@ -433,7 +425,7 @@ class PhysicalInertia(PositiveDefinite):
             return [drawn]
         with np.errstate(over="ignore"):
             m = mass * np.exp((self.mass_sigma or 0.0) * normals(u[:, moments]))
-        H = inertia.hat(center)
+        H = notation.hat(center)
         C = -m[:, None, None] * H
         return [inertia.joined(m[:, None, None] * np.eye(3), C, drawn + C @ H)]
 
@@ -460,5 +452,5 @@ def _about_center(base: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
         return base, 0.0, np.zeros(3)
     mass = float(base[0, 0])
     center = -inertia.vee(base[:3, 3:]) / mass
-    H = inertia.hat(center)
+    H = notation.hat(center)
     return base[3:, 3:] + mass * H @ H, mass, center

@@ -10,12 +10,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.common.real_numbers import real_results
 from lgvi_warp.sampling.distributions.basic import Distribution
-from lgvi_warp.sampling.distributions.joint import (
-    CorrelatedNormal,
-)
+from lgvi_warp.sampling.distributions.joint import CorrelatedNormal
 
 # Name in a scene file -> name in scipy.stats; shape parameters, loc and scale are named as there.
 SCIPY = {
@@ -55,9 +53,8 @@ class ScipyDistribution(Distribution):
         elif not all([faults.finite(name, value) is not None for name, value in self.numbers_by_name().items()]):
             pass
         elif not np.all(np.isfinite(self.distribution.ppf(0.5))):
-            faults.add(
-                self.name, self._numbers(), "are numbers that scipy.stats refuses", "see its page for their limits"
-            )
+            fault = "are numbers that scipy.stats refuses"
+            faults.add(self.name, self._numbers(), fault, "see its page for their limits")
         faults.raise_if_any()
 
     def __eq__(self, other: object) -> bool:
@@ -113,23 +110,18 @@ class ScipyDistribution(Distribution):
         """
         from scipy import stats
 
-        faults = Faults()
         name = SCIPY.get(kind, values.get("name"))
         distribution = getattr(stats, name, None) if isinstance(name, str) else None
         if not isinstance(distribution, stats.rv_continuous | stats.rv_discrete):
-            faults.add(
-                f"{key}.{kind}.name", name, "is no distribution of scipy.stats", 'give its name, such as "gamma"'
-            )
-            faults.raise_if_any()
-        assert distribution is not None
-        shapes, known = _shapes(distribution), _numbers_of(distribution)
+            fault = "is no distribution of scipy.stats"
+            raise refusal(f"{key}.{kind}.name", name, fault, 'give its name, such as "gamma"')
+        faults, shapes, known = Faults(), _shapes(distribution), _numbers_of(distribution)
         parameters = {parameter: value for parameter, value in values.items() if kind in SCIPY or parameter != "name"}
         faults.keys(f"{key}.{kind}", parameters, known)
         for parameter in shapes:
             if parameter not in parameters:
-                faults.add(
-                    f"{key}.{kind}.{parameter}", None, "is missing", f"scipy.stats.{name} takes {', '.join(known)}"
-                )
+                remedy = f"scipy.stats.{name} takes {', '.join(known)}"
+                faults.add(f"{key}.{kind}.{parameter}", None, "is missing", remedy)
         if not parameters and not shapes:
             faults.add(f"{key}.{kind}", dict(values), "has no numbers", f"give one or more of {', '.join(known)}")
         for parameter, value in parameters.items():
@@ -194,19 +186,15 @@ class UserDistribution(Distribution):
     kind: ClassVar[str] = "own"
 
     def __post_init__(self) -> None:
-        faults = Faults()
-        unfrozen = name_of_unfrozen(self.distribution)
-        if unfrozen is not None:
-            faults.add("distribution", f"scipy.stats.{unfrozen}", *without_numbers(self.distribution))
-            faults.raise_if_any()
+        if (unfrozen := name_of_unfrozen(self.distribution)) is not None:
+            raise refusal("distribution", f"scipy.stats.{unfrozen}", *without_numbers(self.distribution))
         try:
             usable = bool(np.all(np.isfinite(self._quantiles(np.array([0.25, 0.75])))))
         except Exception:  # whatever a user's object raises
             usable = False
         if not usable:
             fault = "gives no numbers at the levels 0.25 and 0.75"
-            faults.add("distribution", self.distribution, fault, "give an object with ppf(u)")
-        faults.raise_if_any()
+            raise refusal("distribution", self.distribution, fault, "give an object with ppf(u)")
 
     def numbers(self) -> list[Any]:
         """Always []: the object's numbers are not known."""
@@ -276,10 +264,8 @@ def without_numbers(value: Any) -> tuple[str, str]:
         The fault and its remedy.
     """
     numbers = ", ".join(f"{name}=..." for name in _numbers_of(value))
-    return (
-        "is no frozen distribution of scipy.stats: it has no numbers",
-        f"give them: scipy.stats.{value.name}({numbers})",
-    )
+    remedy = f"give them: scipy.stats.{value.name}({numbers})"
+    return "is no frozen distribution of scipy.stats: it has no numbers", remedy
 
 
 def _shapes(distribution: Any) -> list[str]:
@@ -321,7 +307,7 @@ def as_distribution(key: str, value: Any) -> Any:
     try:
         return UserDistribution(value) if quantiles_of(value) else value
     except SceneError as error:
-        raise SceneError(f"{key}: {fault}" for fault in error.faults) from None
+        raise error.prefixed(f"{key}: ") from None
 
 
 def from_dict(key: str, content: Any) -> Distribution:
@@ -337,10 +323,9 @@ def from_dict(key: str, content: Any) -> Distribution:
     Raises:
         SceneError: Where the name or a number is wrong. The message lists every fault.
     """
-    faults = Faults()
     if not isinstance(content, Mapping) or len(content) != 1:
-        faults.add(key, content, "is not a distribution", "write { normal = { std = 1.0 } }")
-        faults.raise_if_any()
+        raise refusal(key, content, "is not a distribution", "write { normal = { std = 1.0 } }")
+    faults = Faults()
     kind, values = next(iter(content.items()))
     foreign = kind in SCIPY or kind == ScipyDistribution.kind
     if kind == UserDistribution.kind:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import re
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
@@ -21,6 +20,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError, closest
 from lgvi_warp.common.reading import MOST_BYTES, MOST_OTHERS, file_text
+from lgvi_warp.physics.notation import hat
 from lgvi_warp.physics.vehicle import LITTLE, ROUND_OFF, shortage
 
 FORCES, VELOCITIES = "XYZKMN", "uvwpqr"
@@ -59,21 +59,6 @@ def vehicle_file(name: str) -> Path:
     if name not in (known := vehicles()):
         raise SceneError([f"vehicle file {name!r}: is not known; {closest(name, known)}"])
     return Path(str(resources.files("lgvi_warp.scene") / "vehicles" / f"{name}.toml"))
-
-
-def vehicle_source(name: str) -> dict[str, str]:
-    """Return where a vehicle's numbers come from: the table [source] of its file.
-
-    Args:
-        name: One of the names that `vehicles()` lists.
-
-    Returns:
-        Title, reference, what the numbers were checked against, and what is missing.
-
-    Raises:
-        SceneError: If no vehicle has that name.
-    """
-    return tomllib.loads(vehicle_file(name).read_text(encoding="utf-8"))["source"]
 
 
 # What every form becomes --------------------------------------------------------------------------------------------
@@ -137,13 +122,9 @@ class Coefficients:
                 remedy = "check mass, inertia (and about which point it is given), centre of gravity and added mass"
                 faults.add(key, matrix, "is not positive definite", remedy)
         faults.raise_if_any()
-        vehicle = {
-            "rigid_body_mass_matrix": rigid,
-            "added_mass_matrix": self.added_mass,
-            "weight": self.weight,
-            "center_of_gravity": self.center_of_gravity,
-            "buoyancy": self.buoyancy,
-            "center_of_buoyancy": self.center_of_buoyancy,
+        vehicle = {"rigid_body_mass_matrix": rigid, "added_mass_matrix": self.added_mass}
+        vehicle |= {
+            name: getattr(self, name) for name in ("weight", "center_of_gravity", "buoyancy", "center_of_buoyancy")
         }
         tables: dict[str, Any] = {"vehicle": {key: plain(value) for key, value in vehicle.items()}}
         water = {"gravity": self.gravity, "water_density": self.water_density}
@@ -203,19 +184,6 @@ def plain(value: Any) -> Any:
     return (np.asarray(value) + 0.0).tolist()
 
 
-def cross(r: np.ndarray) -> np.ndarray:
-    """Return the matrix of a cross product.
-
-    Args:
-        r: A vector (3,).
-
-    Returns:
-        The matrix (3, 3) with cross(r) @ v = r x v.
-    """
-    x, y, z = r
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
 def rigid_body_matrix(mass: float, inertia: np.ndarray, center: np.ndarray) -> np.ndarray:
     """Return the rigid body's mass matrix about the body origin.
 
@@ -227,7 +195,7 @@ def rigid_body_matrix(mass: float, inertia: np.ndarray, center: np.ndarray) -> n
     Returns:
         M_RB (6, 6) [kg, kg m, kg m2].
     """
-    S = cross(center)
+    S = hat(center)
     return np.block([[mass * np.eye(3), -mass * S], [mass * S, inertia - mass * S @ S]])
 
 
@@ -243,9 +211,8 @@ def symmetric(faults: Faults, key: str, matrix: np.ndarray) -> np.ndarray:
         The mean of the matrix and its transpose.
     """
     if np.abs(matrix - matrix.T).max() > RELATIVE * np.abs(matrix).max():
-        faults.add(
-            key, matrix, "is not symmetric", "added mass of a body in unbounded water is symmetric: mend the pair"
-        )
+        remedy = "added mass of a body in unbounded water is symmetric: mend the pair"
+        faults.add(key, matrix, "is not symmetric", remedy)
     return 0.5 * (matrix + matrix.T)
 
 
@@ -276,16 +243,14 @@ def rigid_body(
     """
     mass, gravity = faults.positive("mass", mass, "kg"), faults.number("gravity", gravity, "m/s2", least=0.0)
     inertia = faults.symmetric("inertia", inertia, "kg m2")
-    centers = [
-        faults.finite(key, value, (3,), "m")
-        for key, value in (("center_of_gravity", center_of_gravity), ("center_of_buoyancy", center_of_buoyancy))
-    ]
+    center_of_gravity = faults.finite("center_of_gravity", center_of_gravity, (3,), "m")
+    center_of_buoyancy = faults.finite("center_of_buoyancy", center_of_buoyancy, (3,), "m")
     if weight is not None:
         weight = faults.number("weight", weight, "N", least=0.0)
     elif mass is not None and gravity is not None:
         weight = mass * gravity
     buoyancy = weight if buoyancy is None else faults.number("buoyancy", buoyancy, "N", least=0.0)
-    return Coefficients(mass, inertia, centers[0], centers[1], weight, buoyancy, gravity=gravity)
+    return Coefficients(mass, inertia, center_of_gravity, center_of_buoyancy, weight, buoyancy, gravity=gravity)
 
 
 # Fossen's names -----------------------------------------------------------------------------------------------------
@@ -402,7 +367,7 @@ def about_gravity(faults: Faults, body: Coefficients, inertia_about: str) -> Non
     if not known or inertia_about == "gravity" or body.mass is None or body.inertia is None:
         return
     if body.center_of_gravity is not None:
-        S = cross(body.center_of_gravity)
+        S = hat(body.center_of_gravity)
         body.inertia = body.inertia + body.mass * S @ S
 
 
@@ -457,9 +422,8 @@ def refuse_name(faults: Faults, key: str, value: Any, name: Name | None) -> None
         faults.add(key, value, "is the same for either sign of the velocity, so it is no drag", remedy)
     elif name.kind == "modulus":
         problem = "is the product of one velocity and the modulus of another, drag of the flow across the hull"
-        faults.add(
-            key, value, problem, "give the hull's cross-flow drag as a term cross_flow, and leave it out (ignore=)"
-        )
+        remedy = "give the hull's cross-flow drag as a term cross_flow, and leave it out (ignore=)"
+        faults.add(key, value, problem, remedy)
     else:
         remedy = "leave it out (ignore=) if it comes from the added mass, which implies it"
         lift = "; lift with the speed ahead is a term body_lift, lift of fins a term fins" if 0 in name.columns else ""

@@ -9,7 +9,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError, closest
-from lgvi_warp.scene.vehicles.fossen import PAIRS, cross, inertia_from_names
+from lgvi_warp.physics.notation import hat
+from lgvi_warp.scene.vehicles.fossen import PAIRS, inertia_from_names
 from lgvi_warp.scene.vehicles.poses import HERE, Pose
 from lgvi_warp.scene.vehicles.robot_xml import number, numbers, numbers_in, text_of
 
@@ -93,10 +94,7 @@ SHAPES: dict[str, tuple[dict[str, str], Callable[..., float]]] = {
     "box": ({"size": "1 1 1"}, lambda size: float(np.prod(size))),
     "sphere": ({"radius": "1"}, lambda r: 4.0 / 3.0 * np.pi * r[0] ** 3),
     "cylinder": ({"radius": "1", "length": "1"}, lambda r, length: np.pi * r[0] ** 2 * length[0]),
-    "capsule": (
-        {"radius": "0.5", "length": "1"},
-        lambda r, length: np.pi * r[0] ** 2 * (length[0] + 4.0 / 3.0 * r[0]),
-    ),
+    "capsule": ({"radius": "0.5", "length": "1"}, lambda r, length: np.pi * r[0] ** 2 * (length[0] + 4.0 / 3.0 * r[0])),
     "ellipsoid": ({"radii": "1 1 1"}, lambda radii: 4.0 / 3.0 * np.pi * float(np.prod(radii))),
     "cone": ({"radius": "0.5", "length": "1"}, lambda r, length: np.pi / 3.0 * r[0] ** 2 * length[0]),
 }
@@ -264,7 +262,7 @@ def carried(pose: Pose) -> np.ndarray:
         X (6, 6): the link has the velocity X v, in its own axes, where the body has v.
     """
     R, p = pose.rotation, pose.position
-    return np.block([[R.T, -R.T @ cross(p)], [np.zeros((3, 3)), R.T]])
+    return np.block([[R.T, -R.T @ hat(p)], [np.zeros((3, 3)), R.T]])
 
 
 def lumped(links: Iterable[Link], main: Link) -> Lump:
@@ -285,7 +283,7 @@ def lumped(links: Iterable[Link], main: Link) -> Lump:
     center = _mean([link.mass for link, _ in placed], centers)
     inertia, added = np.zeros((3, 3)), np.zeros((6, 6))
     for (link, pose), at in zip(placed, centers, strict=True):
-        arm = cross(at - center)
+        arm = hat(at - center)
         inertia = inertia + pose.rotation @ link.inertia @ pose.rotation.T - link.mass * arm @ arm
         added = added + carried(pose).T @ link.added_mass @ carried(pose)
     return Lump(mass, center, inertia, volume, _mean([link.volume for link, _ in placed], volume_centers), added)

@@ -147,9 +147,8 @@ def read_hydrodynamics(faults: Faults, warnings: list[str], plugin: Element, lin
             faults.add(f"<{child.tag}>", value, "is a product of velocities", remedy)
     if even:
         tags = ", ".join(f"<{tag}>" for tag in even)
-        warnings.append(
-            f"{tags}: read as |v| v, as older versions of Gazebo do; newer ones take v v, which drives astern"
-        )
+        reading = "read as |v| v, as older versions of Gazebo do; newer ones take v v, which drives astern"
+        warnings.append(f"{tags}: {reading}")
     if is_true(plugin.findtext("disable_added_mass")):
         matrices["added mass"] = np.zeros((6, 6))
     elif is_true(plugin.findtext("disable_coriolis")) and np.any(matrices["added mass"]):
@@ -160,8 +159,8 @@ def read_hydrodynamics(faults: Faults, warnings: list[str], plugin: Element, lin
     ]
     hydrodynamics.added_mass = symmetric(faults, "plugin's added mass", frd[0])
     hydrodynamics.linear, hydrodynamics.quadratic = frd[1], frd[2]
-    if text_of(plugin.find("default_current")):
-        east, north, up = numbers_in(faults, "<default_current>", text_of(plugin.find("default_current")), 3)
+    if text := text_of(plugin.find("default_current")):
+        east, north, up = numbers_in(faults, "<default_current>", text, 3)
         hydrodynamics.current = np.array([north, east, -up])
     if any(child.tag.startswith("lookup_current") for child in plugin):
         warnings.append("lookup_current is not read: give the water's velocity as a term current_profile")
@@ -218,10 +217,8 @@ def read_underwater_link(faults: Faults, warnings: list[str], link: Element, den
     name = link.get("name", "")
     hydrodynamics = Hydrodynamics(name, density=density, neutral=is_true(link.findtext("neutrally_buoyant")))
     hydrodynamics.volume = number(faults, f"{name} ", link, "volume", "0")
-    if text_of(link.find("center_of_buoyancy")):
-        hydrodynamics.volume_center = numbers_in(
-            faults, f"{name} <center_of_buoyancy>", text_of(link.find("center_of_buoyancy")), 3
-        )
+    if text := text_of(link.find("center_of_buoyancy")):
+        hydrodynamics.volume_center = numbers_in(faults, f"{name} <center_of_buoyancy>", text, 3)
     model = link.find("hydrodynamic_model")
     if model is None:
         return hydrodynamics
@@ -230,16 +227,12 @@ def read_underwater_link(faults: Faults, warnings: list[str], link: Element, den
         remedy = 'its numbers follow from shape and speed: give added mass and damping as type "fossen"'
         faults.add(f"{name} <type>", kind, "is not read", remedy)
         return hydrodynamics
-    matrices = {
-        tag: block_matrix(faults, f"{name} <{tag}>", text_of(model.find(tag)))
+    added_mass, *damping = (
+        (f"{name} <{tag}>", block_matrix(faults, f"{name} <{tag}>", text_of(model.find(tag))))
         for tag in ("added_mass", "linear_damping", "linear_damping_forward_speed", "quadratic_damping")
-    }
-    hydrodynamics.added_mass = symmetric(faults, f"{name} <added_mass>", matrices["added_mass"])
-    hydrodynamics.linear = as_positive(faults, f"{name} <linear_damping>", matrices["linear_damping"])
-    hydrodynamics.forward = as_positive(
-        faults, f"{name} <linear_damping_forward_speed>", matrices["linear_damping_forward_speed"]
     )
-    quadratic = as_positive(faults, f"{name} <quadratic_damping>", matrices["quadratic_damping"])
+    hydrodynamics.added_mass = symmetric(faults, *added_mass)
+    hydrodynamics.linear, hydrodynamics.forward, quadratic = (as_positive(faults, *matrix) for matrix in damping)
     hydrodynamics.quadratic = by_diagonal(warnings, quadratic)
     return hydrodynamics
 

@@ -10,7 +10,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, closest
-from lgvi_warp.scene.vehicles.robot_xml import is_true, numbers_in, text_of
+from lgvi_warp.physics.notation import hat
+from lgvi_warp.scene.vehicles.robot_xml import child_of, is_true, numbers_in, text_of
 
 # Most frames of which each is given relative to the next.
 LONGEST_CHAIN = 200
@@ -60,13 +61,9 @@ def rotation_from_rpy(angles: np.ndarray) -> np.ndarray:
         Rz(yaw) Ry(pitch) Rx(roll), (3, 3).
     """
     (sr, sp, sy), (cr, cp, cy) = np.sin(angles), np.cos(angles)
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
+    first = [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr]
+    second = [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr]
+    return np.array([first, second, [-sp, cp * sr, cp * cr]])
 
 
 def rotation_from_xyzw(quaternion: np.ndarray) -> np.ndarray:
@@ -78,8 +75,8 @@ def rotation_from_xyzw(quaternion: np.ndarray) -> np.ndarray:
     Returns:
         The matrix (3, 3).
     """
-    x, y, z, w = quaternion / (np.linalg.norm(quaternion) or 1.0)
-    S = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    *v, w = quaternion / (np.linalg.norm(quaternion) or 1.0)
+    S = hat(np.array(v))
     return np.asarray(np.eye(3) + 2.0 * w * S + 2.0 * S @ S)
 
 
@@ -115,7 +112,7 @@ def read_origin(faults: Faults, where: str, parent: Element | None) -> Pose:
     Returns:
         The pose; without offset where <origin> is missing.
     """
-    origin = None if parent is None else parent.find("origin")
+    origin = child_of(parent, "origin")
     if origin is None:
         return HERE
     values = [numbers_in(faults, f"{where}<origin {key}>", origin.get(key, "0 0 0"), 3) for key in ("xyz", "rpy")]
@@ -280,10 +277,7 @@ class Poses:
         try:
             return scope.find(name)
         except KeyError:
-            remedy = (
-                closest(name, [*scope.named, "__model__"])
-                if name not in ("world", "__root__")
-                else "name a frame of it"
-            )
+            outside = name in ("world", "__root__")
+            remedy = "name a frame of it" if outside else closest(name, [*scope.named, "__model__"])
             self.faults.add("relative_to", name, f"is no frame of the model {scope.model.get('name')!r}", remedy)
             return scope, "__model__"

@@ -21,7 +21,7 @@ from lgvi_warp.scene.vehicles.plugins import (
     unread,
 )
 from lgvi_warp.scene.vehicles.poses import Poses, Scope, read_pose
-from lgvi_warp.scene.vehicles.robot_xml import is_true, number, numbers, plugin_name, plugins_of, text_of
+from lgvi_warp.scene.vehicles.robot_xml import child_of, is_true, number, numbers, plugin_name, plugins_of, text_of
 from lgvi_warp.scene.vehicles.urdf import read_urdf
 
 GAZEBO_GRAVITY = 9.8  # m/s2: of a <world> that gives none
@@ -249,9 +249,8 @@ def read_water(faults: Faults, warnings: list[str], world: Element) -> Water:
         faults.add("<gravity>", vector, "does not point down", "turn the world so that it is along -z")
     plugin = next((p for p in world.findall("plugin") if is_buoyancy(p)), None)
     if plugin is None:
-        warnings.append(
-            f"the world has no Buoyancy plugin, without which all sinks in Gazebo: water of {GAZEBO_DENSITY:g} kg/m3"
-        )
+        missing = "the world has no Buoyancy plugin, without which all sinks in Gazebo"
+        warnings.append(f"{missing}: water of {GAZEBO_DENSITY:g} kg/m3")
         return Water(abs(vector[2]))
     graded = plugin.find("graded_buoyancy")
     if text_of(plugin.find("uniform_fluid_density")) or graded is None:
@@ -261,9 +260,8 @@ def read_water(faults: Faults, warnings: list[str], world: Element) -> Water:
         for layer in graded.findall("density_change"):
             above = number(faults, "", layer, "above_depth", "0")
             if above < 0.0:
-                warnings.append(
-                    f"the water's density changes at {-above:g} m of depth: taken as {density:g} kg/m3 everywhere"
-                )
+                change = f"the water's density changes at {-above:g} m of depth"
+                warnings.append(f"{change}: taken as {density:g} kg/m3 everywhere")
     return Water(abs(vector[2]), density, tuple(text_of(child) for child in plugin.findall("enable")))
 
 
@@ -304,16 +302,14 @@ def read_link(faults: Faults, warnings: list[str], poses: Poses, scope: Scope, n
     link.mass = number(faults, where, inertial, "mass", "1")
     if link.mass < 0.0:
         faults.add(f"{where}<mass>", link.mass, "is negative", "give the mass of the link [kg]")
-    pose = None if inertial is None else inertial.find("pose")
+    pose = child_of(inertial, "pose")
     if pose is not None and pose.get("relative_to"):
         faults.add(f"{where}<pose>", pose.get("relative_to"), "is relative to another frame", "give it in the link's")
     center = read_pose(faults, where, pose)
     link.center = center.position
-    inertia = read_inertia(faults, where, None if inertial is None else inertial.find("inertia"))
+    inertia = read_inertia(faults, where, child_of(inertial, "inertia"))
     link.inertia = center.rotation @ inertia @ center.rotation.T
-    link.added_mass = read_fluid_added_mass(
-        faults, where, None if inertial is None else inertial.find("fluid_added_mass")
-    )
+    link.added_mass = read_fluid_added_mass(faults, where, child_of(inertial, "fluid_added_mass"))
     if text_of(element.find("gravity")) and not is_true(element.findtext("gravity")):
         warnings.append(f"link {link.name}: <gravity> false is not followed; its weight acts")
     shapes = []
@@ -339,10 +335,8 @@ def joints_of(root: Scope, scope: Scope) -> list[Joint]:
     joints = []
     for element in scope.named.values():
         if element.tag == "joint":
-            ends = [
-                scope.link_of(text_of(element.find(tag))) or text_of(element.find(tag)) for tag in ("parent", "child")
-            ]
-            joints.append(Joint(element.get("type", ""), *ends))
+            ends = (text_of(element.find(tag)) for tag in ("parent", "child"))
+            joints.append(Joint(element.get("type", ""), *(scope.link_of(end) or end for end in ends)))
     for plugin in scope.model.findall("plugin"):
         if "detachable" in plugin_name(plugin):
             parent, child = (scope.link_of(text_of(plugin.find(tag))) for tag in ("parent_link", "child_link"))

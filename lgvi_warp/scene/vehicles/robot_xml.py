@@ -155,6 +155,19 @@ def text_of(element: Element | None) -> str:
     return (element.text or "").strip() if element is not None else ""
 
 
+def child_of(parent: Element | None, tag: str) -> Element | None:
+    """The first child of an element that may be missing.
+
+    Args:
+        parent: The element, or None.
+        tag: Tag of the child.
+
+    Returns:
+        The child; None where either is missing.
+    """
+    return None if parent is None else parent.find(tag)
+
+
 def is_true(text: str | None) -> bool:
     """Return the truth value that a text stands for in SDF.
 
@@ -200,9 +213,8 @@ def numbers_in(faults: Faults, key: str, text: str, count: int) -> np.ndarray:
     mark = next((mark for mark in TEMPLATES if mark in text), None)
     wanted = f"{count} finite numbers" if count > 1 else "a finite number"
     if values is None and mark is not None:
-        faults.add(
-            key, text, f"is not {wanted} but a placeholder of a template, which is not executed", TEMPLATES[mark]
-        )
+        problem = f"is not {wanted} but a placeholder of a template, which is not executed"
+        faults.add(key, text, problem, TEMPLATES[mark])
     else:
         faults.add(key, text, f"does not hold {count} finite numbers", f"write {wanted}")
     return np.zeros(count)
@@ -221,8 +233,7 @@ def numbers(faults: Faults, where: str, parent: Element | None, tag: str, defaul
     Returns:
         As many numbers as the default holds; zeros after noting a fault.
     """
-    child = None if parent is None else parent.find(tag)
-    return numbers_in(faults, f"{where}<{tag}>", text_of(child) or default, len(default.split()))
+    return numbers_in(faults, f"{where}<{tag}>", text_of(child_of(parent, tag)) or default, len(default.split()))
 
 
 def number(faults: Faults, where: str, parent: Element | None, tag: str, default: str) -> float:

@@ -250,15 +250,11 @@ def displaced_by(
     by_plugin = [hydrodynamics for hydrodynamics in own if hydrodynamics.volume is not None]
     for hydrodynamics in by_plugin:
         body_link = read.links[hydrodynamics.link]
-        body_link.volume = (
-            body_link.mass / (hydrodynamics.density or 1.0)
-            if hydrodynamics.neutral
-            else float(hydrodynamics.volume or 0.0)
-        )
+        neutral_volume = body_link.mass / (hydrodynamics.density or 1.0)
+        body_link.volume = neutral_volume if hydrodynamics.neutral else float(hydrodynamics.volume or 0.0)
         body_link.volume_center = hydrodynamics.volume_center
-    floating = [read.links[hydrodynamics.link] for hydrodynamics in by_plugin] or [
-        body_link for body_link in parts if has_buoyancy(read, body_link.name)
-    ]
+    floating = [read.links[hydrodynamics.link] for hydrodynamics in by_plugin]
+    floating = floating or [body_link for body_link in parts if has_buoyancy(read, body_link.name)]
     if not by_plugin and len(floating) < len(parts):
         read.warnings.append(f"the Buoyancy plugin is enabled for {listed(read.water.enabled)} alone")
     lump = lumped(floating, main)
@@ -275,10 +271,8 @@ def has_buoyancy(read: RobotModel, name: str) -> bool:
     Returns:
         True if no element <enable> restricts it, or one names the link or a model that holds it.
     """
-    scoped = f"{read.name}::{name}"
-    return not read.water.enabled or any(
-        scoped == enabled or scoped.startswith(f"{enabled}::") for enabled in read.water.enabled
-    )
+    scoped = f"{read.name}::{name}::"
+    return not read.water.enabled or any(scoped.startswith(f"{enabled}::") for enabled in read.water.enabled)
 
 
 def refuse_shapeless(faults: Faults, read: RobotModel, parts: Sequence[Link], own: Sequence[Hydrodynamics]) -> None:
@@ -295,9 +289,5 @@ def refuse_shapeless(faults: Faults, read: RobotModel, parts: Sequence[Link], ow
     for body_link in parts:
         if body_link.shapeless and has_buoyancy(read, body_link.name):
             remedy = "give volume= [m3] or buoyancy= [N], and center_of_buoyancy=, of the whole vehicle"
-            faults.add(
-                f"{body_link.name} <collision>",
-                listed(body_link.shapeless),
-                "is no shape whose volume is known",
-                remedy,
-            )
+            shapes, problem = listed(body_link.shapeless), "is no shape whose volume is known"
+            faults.add(f"{body_link.name} <collision>", shapes, problem, remedy)

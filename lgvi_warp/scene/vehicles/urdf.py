@@ -43,9 +43,8 @@ def read_urdf(faults: Faults, root: Element) -> tuple[dict[str, Link], list[Join
     links = {link.name: link for link in (read_link(faults, element) for element in root.findall("link"))}
     joints, origins = [], {}
     for element in root.findall("joint"):
-        parent, child = (
-            end.get("link", "") if (end := element.find(tag)) is not None else "" for tag in ("parent", "child")
-        )
+        ends = (element.find(tag) for tag in ("parent", "child"))
+        parent, child = ("" if end is None else end.get("link", "") for end in ends)
         joints.append(Joint(element.get("type", ""), parent, child))
         origins[child] = (parent, read_origin(faults, f"{element.get('name', '')} ", element))
     place(faults, links, origins)

@@ -245,9 +245,7 @@ def matrix_6(faults: Faults, key: str, value: Any) -> np.ndarray:
     Returns:
         The matrix (6, 6); zeros if it is not given or at fault.
     """
-    if value is None:
-        return np.zeros((6, 6))
-    array = faults.finite(key, value)
+    array = None if value is None else faults.finite(key, value)
     if array is None:
         return np.zeros((6, 6))
     if array.shape not in ((6,), (36,), (6, 6)):

@@ -10,7 +10,7 @@ import warp as wp
 from lgvi_kernels.lanes.arithmetic import lane, symmetric3, vec3
 from lgvi_kernels.lanes.flags import CPU_FLAGS
 from lgvi_kernels.maps import coupled, rotation
-from lgvi_warp.physics.inertia import hat
+from lgvi_warp.physics.notation import hat
 
 pytestmark = pytest.mark.kernel
 

@@ -104,7 +104,7 @@ def test_a_quaternion_of_nan_is_nan():
     assert np.isnan(notation.quaternion_from_matrix(np.full((1, 3, 3), np.nan))).all()
 
 
-def test_momenta_there_and_back():
+def test_momenta():
     rng = np.random.default_rng(1)
     A, B = rng.normal(size=(2, 50, 3, 3))
     M, J = A @ np.swapaxes(A, 1, 2) + 3.0 * EYE, B @ np.swapaxes(B, 1, 2) + 3.0 * EYE
@@ -112,9 +112,6 @@ def test_momenta_there_and_back():
     p, pi = notation.to_momenta(M, J, nu, Om)
     np.testing.assert_allclose(p[7], M[7] @ nu[7], rtol=1e-14)  # p = M nu
     np.testing.assert_allclose(pi[7], J[7] @ Om[7], rtol=1e-14)  # pi = J Om
-    # Condition numbers are below 30 here: 30 * 2.2e-16 * a few.
-    for x, y in zip(notation.from_momenta(M, J, p, pi), (nu, Om), strict=True):
-        np.testing.assert_allclose(x, y, rtol=0, atol=5e-14)
 
 
 def test_momenta_with_shared_matrices():

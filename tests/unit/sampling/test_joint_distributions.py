@@ -247,7 +247,7 @@ def test_a_rigid_body_of_six_dimensions_keeps_its_centre():
 
 
 def notation_hat(r):
-    from lgvi_warp.physics.inertia import hat
+    from lgvi_warp.physics.notation import hat
 
     return hat(r)
 

@@ -41,8 +41,8 @@ def test_every_line_with_a_number_names_its_unit_and_source(name):
 def test_tables(name):
     tables = content(name)
     assert set(tables) <= {"vehicle", "environment", "terms", "source"}
-    source = co.vehicle_source(name)
-    assert source == tables["source"] and {"title", "reference", "missing"} <= set(source)
+    source = tables["source"]
+    assert {"title", "reference", "missing"} <= set(source)
     assert all(isinstance(text, str) and text for text in source.values())
 
 

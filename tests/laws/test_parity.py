@@ -1,4 +1,9 @@
-"""Every term alone, and all together: the kernel against its twin, in several methods and both precisions."""
+"""Steps with every term alone, and with all together: the kernel against its twin, in several methods and both precisions.
+
+A kernel with one law alone shows no more than one with all, beside test_device_code.py: it is left to test-long.
+"""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +15,7 @@ from lgvi_warp.reference.submaps import Body, look, start, water
 from lgvi_warp.reference.terms.current import Current
 from lgvi_warp.reference.terms.restoring import Restoring
 from lgvi_warp.reference.terms.weight import Weight
-from tests.laws.cases import CASES
+from tests.laws.cases import CASES, together
 from tests.support.tools import difference, from_state, last, one, slope
 
 GRAVITY = 9.8
@@ -48,14 +53,15 @@ def both(case, method, h, steps, dtype="float64", **named):
     return last(result), (b, R, nu + R.T @ water(look(x, body, h), body).velocity, Om)
 
 
-@pytest.mark.slow_for("control fins", "two wrench*")
+# Drag along the axes, which has no matrix beside it, and one law of each type at once.
+@pytest.mark.slow_but("quadratic drag", "drag", "all together")
 @pytest.mark.parametrize("name", CASES)
 def test_one_step(name):
     kernel, twin = both(CASES[name], "psi_s", 0.02, 1)
     assert difference(kernel, twin) < 1e-13
 
 
-@pytest.mark.slow_for("control fins", "two wrench*")
+@pytest.mark.slow_but("quadratic drag", "drag", "all together")
 @pytest.mark.parametrize("name", CASES)
 def test_a_hundred_steps(name):
     # 100 steps of round-off 1e-15 and little growth.
@@ -63,33 +69,41 @@ def test_a_hundred_steps(name):
     assert difference(kernel, twin) < 2e-12
 
 
-# psi, which holds both of its halves, with every law; the halves alone in test-long.
-@pytest.mark.slow_for(
-    "body lift*",
-    "control fins*",
-    "cross-flow*",
-    "current harmonics*",
-    "current-*",
-    "stratification*",
-    "waves*",
-    "wrench-*",
-)
-@pytest.mark.parametrize(
-    "method", ["psi", *(pytest.param(name, marks=pytest.mark.slow) for name in ("phi", "phi_adjoint"))]
-)
-@pytest.mark.parametrize(
-    "name", [name for name in CASES if not any(word in name for word in ("noise", "Gauss", "all"))]
-)
+# Each of the two wants that no law draws noise; drag, water that varies, tables, memory and a potential.
+FORCED_CASES = {"several": together("drag matrix", "current profile", "wrench schedule", "thrusters", "tether")} | {
+    name: case for name, case in CASES.items() if not any(word in name for word in ("noise", "Gauss", "all"))
+}
+
+
+# psi holds both of its halves, phi and phi_adjoint.
+@pytest.mark.slow_but("several-psi")
+@pytest.mark.parametrize("method", ["psi", "phi", "phi_adjoint"])
+@pytest.mark.parametrize("name", FORCED_CASES)
 def test_the_papers_forces(name, method):
     # Phi* is iterated to 1e-14 of the momenta; a contraction by 1/10 or better leaves about 1e-15 of that, each step.
-    kernel, twin = both(CASES[name], method, 0.01, 5)
+    kernel, twin = both(FORCED_CASES[name], method, 0.01, 5)
     assert difference(kernel, twin) < 2e-13
 
 
-@pytest.mark.parametrize("name", [name for name, case in CASES.items() if case.smooth])
+# Numbers for which nothing of "all together" jumps: schedules that stay, noise too small to be seen.
+HELD = {
+    "wrench_schedule": {"force": ((5.0, -2.0, 1.0),) * 4, "torque": ((0.2, -0.2, 0.1),) * 4},
+    "thrusters": {"command": None, "command_schedule": ((0.3, 0.8, -0.7),) * 3},
+    "control_fins": {"command": None, "command_schedule": ((0.1, 0.15, -0.2),) * 4},
+    "wrench_noise": {"force": (1e-30,) * 3, "torque": (1e-30,) * 3},
+    "gauss_markov_current": {"standard_deviation": (1e-30,) * 3},
+}
+SMOOTH = {name: case.terms for name, case in CASES.items() if case.smooth} | {
+    "all together": tuple(replace(term, **HELD.get(term.type, {})) for term in CASES["all together"].terms)
+}
+
+
+@pytest.mark.slow_but("drag", "all together")
+@pytest.mark.parametrize("name", SMOOTH)
 def test_order_two(name):
     # Against the same kernel at a step 8 times shorter: an error of order 2 there is 1/64 of the shortest one's here.
-    fleet = one(scene_of(CASES[name]), **STATE)
+    scene = lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), terms=list(SMOOTH[name]))
+    fleet = one(scene, **STATE)
     steps = np.array([0.04, 0.02, 0.01])
     truth = last(lw.solve(fleet, "psi_s", h=0.00125, t1=0.8))
     errors = [difference(last(lw.solve(fleet, "psi_s", h=h, t1=0.8)), truth) for h in steps]
@@ -97,9 +111,12 @@ def test_order_two(name):
     assert slope(steps, errors) == pytest.approx(2.0, abs=0.12)
 
 
-@pytest.mark.slow_but("current profile", "drag", "wrench")
-@pytest.mark.parametrize("name", CASES)
+SINGLE = {"several": together("drag matrix", "current profile", "wrench", "fins")} | CASES
+
+
+@pytest.mark.slow_but("several")
+@pytest.mark.parametrize("name", SINGLE)
 def test_float32(name):
     # Round-off 6e-8 of each of 20 steps' few operations on numbers of order 1 to 10, added up as a random walk.
-    kernel, twin = both(CASES[name], "psi_s", 0.02, 20, "float32")
+    kernel, twin = both(SINGLE[name], "psi_s", 0.02, 20, "float32")
     assert difference(kernel, twin) < 5e-6

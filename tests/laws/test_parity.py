@@ -15,6 +15,7 @@ from lgvi_warp.reference.submaps import Body, look, start, water
 from lgvi_warp.reference.terms.current import Current
 from lgvi_warp.reference.terms.restoring import Restoring
 from lgvi_warp.reference.terms.weight import Weight
+from tests.laws.case import Case
 from tests.laws.cases import CASES, together
 from tests.support.tools import difference, from_state, last, one, slope
 
@@ -67,6 +68,41 @@ def test_a_hundred_steps(name):
     # 100 steps of round-off 1e-15 and little growth.
     kernel, twin = both(CASES[name], "psi_s", 0.02, 100)
     assert difference(kernel, twin) < 2e-12
+
+
+def scaled(term, by):
+    """Numbers times a factor, and the term with them; not a command, the first of its schedule, nor polynomials."""
+    numbers = {key: by * value for key, value in term.parameters().items() if key not in FIXED}
+    return numbers, replace(term, **numbers, **({"command": None} if "command" in term.parameters() else {}))
+
+
+FIXED = ("command", "polynomial", "polynomial_astern")
+# Packed the same for one member as for many, to the bit.
+EXACT = ("current harmonics", "waves", "Gauss-Markov current", "wrench noise", "stratification")
+
+
+@pytest.mark.slow_but("all together")
+@pytest.mark.parametrize("name", [name for name in CASES if name != "control fins"])
+def test_every_number_may_vary(name):
+    # Members with numbers of their own, in packets, go where a scene with their numbers takes them.
+    scales, varied, scenes = (1.0, 0.7, 1.3), {}, []
+    for by in scales:
+        terms = []
+        for term in CASES[name].terms:
+            numbers, other = scaled(term, by)
+            terms.append(other)
+            for key, value in numbers.items():
+                varied.setdefault(f"{term.key}.{key}", []).append(value)
+        scenes.append(scene_of(Case(tuple(terms), ())))
+    states = [np.broadcast_to(value, (3, *np.shape(value))) for value in STATE.values()]
+    fleet = lw.Ensemble.from_states(
+        scenes[0], *states, parameters={key: np.array(each) for key, each in varied.items()}
+    )
+    whole = lw.solve(fleet, "psi_s", h=0.02, t1=1.0)
+    assert whole.status.counts() == {"ok": 3}
+    for i, scene in enumerate(scenes):
+        alone = lw.solve(lw.Ensemble.from_states(scene, *states).subset([i]), "psi_s", h=0.02, t1=1.0)
+        assert difference(last(alone), last(whole, i)) <= (0.0 if name in EXACT else 1e-14)
 
 
 # Each of the two wants that no law draws noise; drag, water that varies, tables, memory and a potential.

@@ -54,6 +54,11 @@ def both(case, method, h, steps, dtype="float64", **named):
     return last(result), (b, R, nu + R.T @ water(look(x, body, h), body).velocity, Om)
 
 
+def test_all_together_has_every_type():
+    types = {type(term) for case in CASES.values() for term in case.terms}
+    assert {type(term) for term in CASES["all together"].terms} == types - {lw.Drag}
+
+
 # Drag along the axes, which has no matrix beside it, and one law of each type at once.
 @pytest.mark.slow_but("quadratic drag", "drag", "all together")
 @pytest.mark.parametrize("name", CASES)

@@ -80,10 +80,10 @@ LOW = ("psi_s", "psi_x", "psi", "psi_1", "psi_w")
 
 SETTINGS = [
     ("psi_s", {"dragged": True}, ()),
-    ("psi_x", {"dragged": True}, ()),
+    ("psi_x", {"dragged": True}, SLOW),
     ("psi", {}, ()),
     ("psi_1", {}, SLOW),
-    ("psi_x", {}, SLOW),
+    ("psi_x", {}, ()),
     ("psi_s", {"laws": (LAGGING,)}, SLOW),
     ("psi_x", {"laws": (LAGGING,)}, SLOW),
     ("su4(psi_s)", {}, SLOW),

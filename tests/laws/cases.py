@@ -85,12 +85,20 @@ CASES = {
 
 CASES |= cases_water.CASES | cases_lift.CASES
 
+
+def together(*names):
+    """A Case with the laws of several."""
+    cases = [CASES[name] for name in names]
+    return Case(
+        sum((case.terms for case in cases), ()),
+        sum((case.laws for case in cases), ()),
+        all(case.smooth for case in cases),
+    )
+
+
 # One of each type.
-_ALL = (
+CASES["all together"] = together(
     "drag matrix", "current", "current profile", "current harmonics", "waves", "Gauss-Markov current", "tether", "wrench",
     "wrench schedule", "wrench noise", "thrusters", "fins", "control fins with rates", "cross-flow", "body lift",
     "stratification",
 )  # fmt: skip
-CASES["all together"] = Case(
-    sum((CASES[name].terms for name in _ALL), ()), sum((CASES[name].laws for name in _ALL), ()), False
-)

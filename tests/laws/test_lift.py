@@ -36,6 +36,13 @@ def velocities(n=200):
     return np.concatenate([rng.normal(size=(n, 6)) * 10.0 ** rng.uniform(-12, 1, (n, 1)), np.eye(6), -np.eye(6)])
 
 
+# Beside fins, without effect: the tests of this file share two kernels.
+UNFELT = (
+    terms.CrossFlow(**HULL | {"drag_coefficient": (1e-30,) * len(HULL["stations"])}),
+    terms.BodyLift(matrix=1e-30 * LIFT),
+)
+
+
 # Fins ----------------------------------------------------------------------------------------------------------------
 
 
@@ -43,7 +50,7 @@ def velocities(n=200):
 def test_a_small_angle_is_a_thin_wing(angle, incidence):
     # Lift rho/2 A V^2 slope (deflection + incidence) along the normal, here up: to 2/3 angle^2 = 1e-6, and the step's
     # h times the rate at which the fin slows the vehicle, 1e-3 of 15/1000 1/s.
-    fins = terms.ControlFins(**WING, drag=0.0, command=[angle])
+    fins = terms.ControlFins(**WING, drag=0.0, rate_limit=0.5, command=[angle])
     start = {"nu": (2.0, 0.0, 2.0 * incidence)}
     found = last(lw.solve(one(scene(fins), **start), "psi_s", h=1e-3, t1=1e-3))[2]
     lift = 0.5 * DENSITY * 0.01 * 3.0 * 2.0**2 * (angle + incidence)
@@ -53,7 +60,7 @@ def test_a_small_angle_is_a_thin_wing(angle, incidence):
 def test_a_fin_across_the_flow_stops_as_a_plate():
     # m v' = -rho/2 A (drag + drag_normal) v^2: v = v0 / (1 + k v0 t); order 2 in h k v0 = 0.01.
     fins = terms.Fins(**(WING | {"area": 1.0}), drag=0.1, drag_normal=1.1)
-    found = last(lw.solve(one(scene(fins), nu=(0.0, 0.0, 2.0)), "psi_s", h=0.01, t1=2.0))[2]
+    found = last(lw.solve(one(scene(fins, *UNFELT), nu=(0.0, 0.0, 2.0)), "psi_s", h=0.01, t1=2.0))[2]
     rate = 0.5 * DENSITY * 1.2 / 1000.0
     np.testing.assert_allclose(found, [0.0, 0.0, 2.0 / (1.0 + rate * 2.0 * 2.0)], rtol=1e-4, atol=1e-15)
 
@@ -66,7 +73,7 @@ def test_lift_does_no_work():
         assert abs(velocity @ D @ velocity) <= 1e-14 * np.abs(D).max() * (velocity @ velocity)
     fins = terms.Fins(**(FINS | {"drag": 0.0, "drag_normal": 0.0}))
     ball = lw.Vehicle(20.0, (2.0, 2.0, 2.0), (0.0, 0.0, 0.0), 20.0 * 9.8, (0.0, 0.0, 0.0))
-    fleet = one(scene(fins, vehicle=ball), *random_states(4, 8))
+    fleet = one(scene(fins, *UNFELT, vehicle=ball), *random_states(4, 8))
     result = lw.solve(fleet, "psi_s", h=0.01, t1=5.0, save=lw.SaveAt(at=list(np.linspace(0.0, 5.0, 51))))
     energy = 10.0 * np.sum(result.velocity**2, axis=2) + np.sum(result.angular_velocity**2, axis=2)
     # The linearly implicit step loses (h w)^4 of it, w the rate at which lift turns the velocity, about 5 1/s.
@@ -179,7 +186,7 @@ def test_two_points_a_segment_are_enough(velocity, bound):
 # All of them ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow_but("fins*")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_float32(name):
     # 100 steps of round-off 6e-8 and growth by a few.

@@ -1,4 +1,9 @@
-"""Every term alone, and all together: the kernel against its twin, in several methods and both precisions."""
+"""Steps with every term alone, and with all together: the kernel against its twin, in several methods and both precisions.
+
+A kernel with one law alone shows no more than one with all, beside test_device_code.py: it is left to test-long.
+"""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +15,8 @@ from lgvi_warp.reference.submaps import Body, look, start, water
 from lgvi_warp.reference.terms.current import Current
 from lgvi_warp.reference.terms.restoring import Restoring
 from lgvi_warp.reference.terms.weight import Weight
-from tests.laws.cases import CASES
+from tests.laws.case import Case
+from tests.laws.cases import CASES, together
 from tests.support.tools import difference, from_state, last, one, slope
 
 GRAVITY = 9.8
@@ -48,14 +54,20 @@ def both(case, method, h, steps, dtype="float64", **named):
     return last(result), (b, R, nu + R.T @ water(look(x, body, h), body).velocity, Om)
 
 
-@pytest.mark.slow_for("control fins", "two wrench*")
+def test_all_together_has_every_type():
+    types = {type(term) for case in CASES.values() for term in case.terms}
+    assert {type(term) for term in CASES["all together"].terms} == types - {lw.Drag}
+
+
+# Drag along the axes, which has no matrix beside it, and one law of each type at once.
+@pytest.mark.slow_but("quadratic drag", "drag", "all together")
 @pytest.mark.parametrize("name", CASES)
 def test_one_step(name):
     kernel, twin = both(CASES[name], "psi_s", 0.02, 1)
     assert difference(kernel, twin) < 1e-13
 
 
-@pytest.mark.slow_for("control fins", "two wrench*")
+@pytest.mark.slow_but("quadratic drag", "drag", "all together")
 @pytest.mark.parametrize("name", CASES)
 def test_a_hundred_steps(name):
     # 100 steps of round-off 1e-15 and little growth.
@@ -63,33 +75,76 @@ def test_a_hundred_steps(name):
     assert difference(kernel, twin) < 2e-12
 
 
-# psi, which holds both of its halves, with every law; the halves alone in test-long.
-@pytest.mark.slow_for(
-    "body lift*",
-    "control fins*",
-    "cross-flow*",
-    "current harmonics*",
-    "current-*",
-    "stratification*",
-    "waves*",
-    "wrench-*",
-)
-@pytest.mark.parametrize(
-    "method", ["psi", *(pytest.param(name, marks=pytest.mark.slow) for name in ("phi", "phi_adjoint"))]
-)
-@pytest.mark.parametrize(
-    "name", [name for name in CASES if not any(word in name for word in ("noise", "Gauss", "all"))]
-)
+def scaled(term, by):
+    """Numbers times a factor, and the term with them; not a command, the first of its schedule, nor polynomials."""
+    numbers = {key: by * value for key, value in term.parameters().items() if key not in FIXED}
+    return numbers, replace(term, **numbers, **({"command": None} if "command" in term.parameters() else {}))
+
+
+FIXED = ("command", "polynomial", "polynomial_astern")
+# Packed the same for one member as for many, to the bit.
+EXACT = ("current harmonics", "waves", "Gauss-Markov current", "wrench noise", "stratification")
+
+
+@pytest.mark.slow_but("all together")
+@pytest.mark.parametrize("name", [name for name in CASES if name != "control fins"])
+def test_every_number_may_vary(name):
+    # Members with numbers of their own, in packets, go where a scene with their numbers takes them.
+    scales, varied, scenes = (1.0, 0.7, 1.3), {}, []
+    for by in scales:
+        terms = []
+        for term in CASES[name].terms:
+            numbers, other = scaled(term, by)
+            terms.append(other)
+            for key, value in numbers.items():
+                varied.setdefault(f"{term.key}.{key}", []).append(value)
+        scenes.append(scene_of(Case(tuple(terms), ())))
+    states = [np.broadcast_to(value, (3, *np.shape(value))) for value in STATE.values()]
+    fleet = lw.Ensemble.from_states(
+        scenes[0], *states, parameters={key: np.array(each) for key, each in varied.items()}
+    )
+    whole = lw.solve(fleet, "psi_s", h=0.02, t1=1.0)
+    assert whole.status.counts() == {"ok": 3}
+    for i, scene in enumerate(scenes):
+        alone = lw.solve(lw.Ensemble.from_states(scene, *states).subset([i]), "psi_s", h=0.02, t1=1.0)
+        assert difference(last(alone), last(whole, i)) <= (0.0 if name in EXACT else 1e-14)
+
+
+# Each of the two wants that no law draws noise; drag, water that varies, tables, memory and a potential.
+FORCED_CASES = {"several": together("drag matrix", "current profile", "wrench schedule", "thrusters", "tether")} | {
+    name: case for name, case in CASES.items() if not any(word in name for word in ("noise", "Gauss", "all"))
+}
+
+
+# psi holds both of its halves, phi and phi_adjoint.
+@pytest.mark.slow_but("several-psi")
+@pytest.mark.parametrize("method", ["psi", "phi", "phi_adjoint"])
+@pytest.mark.parametrize("name", FORCED_CASES)
 def test_the_papers_forces(name, method):
     # Phi* is iterated to 1e-14 of the momenta; a contraction by 1/10 or better leaves about 1e-15 of that, each step.
-    kernel, twin = both(CASES[name], method, 0.01, 5)
+    kernel, twin = both(FORCED_CASES[name], method, 0.01, 5)
     assert difference(kernel, twin) < 2e-13
 
 
-@pytest.mark.parametrize("name", [name for name, case in CASES.items() if case.smooth])
+# Numbers for which nothing of "all together" jumps: schedules that stay, noise too small to be seen.
+HELD = {
+    "wrench_schedule": {"force": ((5.0, -2.0, 1.0),) * 4, "torque": ((0.2, -0.2, 0.1),) * 4},
+    "thrusters": {"command": None, "command_schedule": ((0.3, 0.8, -0.7),) * 3},
+    "control_fins": {"command": None, "command_schedule": ((0.1, 0.15, -0.2),) * 4},
+    "wrench_noise": {"force": (1e-30,) * 3, "torque": (1e-30,) * 3},
+    "gauss_markov_current": {"standard_deviation": (1e-30,) * 3},
+}
+SMOOTH = {name: case.terms for name, case in CASES.items() if case.smooth} | {
+    "all together": tuple(replace(term, **HELD.get(term.type, {})) for term in CASES["all together"].terms)
+}
+
+
+@pytest.mark.slow_but("drag", "all together")
+@pytest.mark.parametrize("name", SMOOTH)
 def test_order_two(name):
     # Against the same kernel at a step 8 times shorter: an error of order 2 there is 1/64 of the shortest one's here.
-    fleet = one(scene_of(CASES[name]), **STATE)
+    scene = lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), terms=list(SMOOTH[name]))
+    fleet = one(scene, **STATE)
     steps = np.array([0.04, 0.02, 0.01])
     truth = last(lw.solve(fleet, "psi_s", h=0.00125, t1=0.8))
     errors = [difference(last(lw.solve(fleet, "psi_s", h=h, t1=0.8)), truth) for h in steps]
@@ -97,9 +152,12 @@ def test_order_two(name):
     assert slope(steps, errors) == pytest.approx(2.0, abs=0.12)
 
 
-@pytest.mark.slow_but("current profile", "drag", "wrench")
-@pytest.mark.parametrize("name", CASES)
+SINGLE = {"several": together("drag matrix", "current profile", "wrench", "fins")} | CASES
+
+
+@pytest.mark.slow_but("several")
+@pytest.mark.parametrize("name", SINGLE)
 def test_float32(name):
     # Round-off 6e-8 of each of 20 steps' few operations on numbers of order 1 to 10, added up as a random walk.
-    kernel, twin = both(CASES[name], "psi_s", 0.02, 20, "float32")
+    kernel, twin = both(SINGLE[name], "psi_s", 0.02, 20, "float32")
     assert difference(kernel, twin) < 5e-6

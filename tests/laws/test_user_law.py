@@ -34,6 +34,8 @@ def load(path, code=None):
 own_law = load(EXAMPLE)
 DOCK = dict(position=(2.0, 1.0, 3.0), nose=(0.6, 0.1, 0.0), energy=40.0, reach=2.0)
 MUD = dict(floor=5.0, height=2.0, linear=30.0, angular=8.0)
+# Without effect: the runs with a dock share a kernel with those with both.
+UNFELT = own_law.Mud(**MUD | {"linear": 1e-30, "angular": 1e-30})
 START = {"b": (0.0, 0.0, 2.0), "nu": (0.5, 0.2, 0.1), "Om": (0.1, 0.3, -0.2)}
 
 
@@ -63,7 +65,7 @@ def test_the_dock_draws_and_the_mud_brakes():
 def test_the_energy_is_kept_to_second_order():
     drifts = []
     for h in STEPS:
-        energy = solve([own_law.Dock(**DOCK)], h=h, save=lw.SaveAt(every=0.1)).energy[:, 0]
+        energy = solve([own_law.Dock(**DOCK), UNFELT], h=h, save=lw.SaveAt(every=0.1)).energy[:, 0]
         drifts.append(np.abs(energy - energy[0]).max())
     assert 1e-6 < drifts[-1] < 0.05
     assert abs(np.polyfit(np.log(STEPS), np.log(drifts), 1)[0] - 2.0) < 0.2
@@ -93,7 +95,7 @@ def test_axes_do_not_matter():
 
 
 def test_numbers_vary_by_member():
-    fleet = own_law.fleet([own_law.dock], members=20)
+    fleet = own_law.fleet([own_law.dock, own_law.mud], members=20)
     alone = fleet.subset([7])
     both = (lw.solve(ensemble, h=0.05, t1=5.0) for ensemble in (fleet, alone))
     whole, single = (run.position[-1] for run in both)

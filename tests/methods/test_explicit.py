@@ -13,7 +13,7 @@ from lgvi_warp.reference import explicit, munthe_kaas
 from lgvi_warp.reference.submaps import look, start, water
 from lgvi_warp.runs.settle import make_plan
 from tests.laws import test_parity as test_terms
-from tests.laws.cases import CASES, Case
+from tests.laws.cases import CASES, Case, together
 from tests.laws.test_parity import STATE
 from tests.methods import test_coupled
 from tests.support.tools import difference, last, one
@@ -77,12 +77,6 @@ def test_float32(method):
     scene, body = test_terms.scene_of(PLAIN), test_terms.body_of(PLAIN)
     # Round-off 6e-8 in each of 25 steps.
     assert difference(*both(scene, body, method, 0.02, 25, dtype="float32")) < 1e-5
-
-
-def together(*names):
-    """A case with the laws of several."""
-    cases = [CASES[name] for name in names]
-    return Case(sum((case.terms for case in cases), ()), sum((case.laws for case in cases), ()))
 
 
 # What depends on velocity, place and time, at once.

@@ -1,0 +1,125 @@
+"""Each law's device code alone, beside its twin: all that it adds to a step, at random views; and the distance of each event.
+
+A stepping kernel with all laws at once, in test_parity.py, shows that steps use them as the twin does.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_kernels.laws import LAWS
+from lgvi_kernels.stops import STOPS
+from lgvi_warp.engine.laws.bench import KICK, ORIGIN, STEP, TURN, Bank, Bench
+from lgvi_warp.reference.terms import View
+from lgvi_warp.reference.terms.restoring import Restoring
+from lgvi_warp.reference.terms.weight import Weight
+from tests.laws.case import Case
+from tests.laws.cases import CASES
+from tests.laws.test_parity import GRAVITY, STATE, VEHICLE
+
+PACKETS, SEED = 16, 12 + (34 << 32)
+# A hundred roundings of the largest number.
+ROUND_OFF = 100.0 * np.finfo(float).eps
+SCENE = lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), start=lw.Start(position=STATE["b"]))
+IMPLIED = {
+    "weight": Case((lw.Weight(),), (Weight(VEHICLE.mass * GRAVITY - VEHICLE.buoyancy),)),
+    "restoring": Case((lw.Restoring(),), (Restoring(VEHICLE.buoyancy * np.array(VEHICLE.center_of_buoyancy)),)),
+}
+ALONE = IMPLIED | {name: case for name, case in CASES.items() if len(case.terms) == 1}
+
+
+def bench_of(term, known, aligned=False):
+    """The law at views in the time of the cases' schedules."""
+    bench = Bench(term, known[term.device_in(aligned)], SCENE, PACKETS, SEED)
+    bench.views = bench.views.changed(time=np.repeat(np.linspace(0.05, 1.6, PACKETS), bench.width))
+    return bench
+
+
+def measured(bench, elsewhere):
+    """By role (k, numbers) between the halves of a kick, in the user's axes, and the memory after either half."""
+    views = bench.views.elsewhere() if elsewhere else bench.views
+    context = replace(bench.context(bench.parameters, elsewhere), aligned=not elsewhere)
+    bank = Bank(bench, context, views)
+    values = bank.evaluate(views)
+    kept = [lanes_apart(bank.memory)]
+    bank._launch(views, 1)
+    kept.append(lanes_apart(bank.memory))
+    if "damping" in values:
+        twist = np.concatenate([views.velocity, views.rate], axis=1)
+        values["damping"] = -np.einsum("kij,kj->ki", values["damping"].reshape(-1, 6, 6), twist)
+    if elsewhere:
+        # Water and potentials are asked for at the user's origin only.
+        values = {role: value for role, value in values.items() if role in ("law", "damping")}
+        for role, value in values.items():
+            force, torque = value[:, :3] @ TURN.T, value[:, 3:] @ TURN.T
+            values[role] = np.concatenate([force, torque + np.cross(ORIGIN, force)], axis=1)
+    return values, kept
+
+
+def lanes_apart(memory):
+    """(k, rows) of a memory (packets, rows) of lanes."""
+    rows = memory.numpy()
+    return rows.transpose(0, 2, 1).reshape(len(rows) * rows.shape[2], rows.shape[1])
+
+
+def expected(law, views):
+    """The same of the twin: by role (k, numbers), and the memory after either half of the kick."""
+    if hasattr(law, "seed0"):
+        law = replace(law, seed0=SEED & 0xFFFFFFFF, seed1=SEED >> 32)
+    values = {role: [] for role in ("law", "damping", "flow", "energy")}
+    kept = [], []
+    for i, (R, b, nu, Om, t) in enumerate(zip(*vars(views).values(), strict=True)):
+        view = View(R, b, nu, Om, t, KICK, STEP, i, law.start())
+        view = replace(view, memory=law.evolve(view, False))
+        flow = law.flow(view)
+        values["law"].append(np.concatenate(law.wrench(view)))
+        values["damping"].append(-law.damping(view) @ np.concatenate([nu, Om]))
+        values["flow"].append(np.concatenate([flow.velocity, flow.rate, flow.gradient.T.reshape(9)]))
+        values["energy"].append([law.potential(view)])
+        kept[0].append(view.memory)
+        kept[1].append(law.evolve(view, True))
+    return {role: np.array(value) for role, value in values.items()}, [np.array(memory) for memory in kept]
+
+
+# In other axes weight and restoring moment are the same together, not each.
+@pytest.mark.parametrize(
+    ("name", "elsewhere"),
+    [*((name, False) for name in ALONE), *((name, True) for name in ALONE if name not in IMPLIED)],
+)
+def test_a_law_gives_what_its_twin_gives(name, elsewhere):
+    (term,), (law,) = ALONE[name].terms, ALONE[name].laws
+    bench = bench_of(term, LAWS, aligned=not elsewhere)
+    (values, kept), (twin_values, twin_kept) = measured(bench, elsewhere), expected(law, bench.views)
+    if not elsewhere:
+        assert {role for role, value in twin_values.items() if np.any(value)} - {"energy"} <= values.keys()
+    if "energy" in values:
+        # Constants of the potential are left out.
+        values["energy"], twin_values["energy"] = (x["energy"] - x["energy"][0] for x in (values, twin_values))
+    for role, value in values.items():
+        assert_close(value, twin_values[role])
+    for memory, twin_memory in zip(kept, twin_kept, strict=True):
+        assert_close(memory[:, : twin_memory.shape[1]], twin_memory)
+
+
+def assert_close(actual, desired):
+    np.testing.assert_allclose(actual, desired, rtol=0.0, atol=ROUND_OFF * np.abs(desired).max(initial=0.0))
+
+
+LOWER, UPPER = np.array((-3.0, -4.0, 6.0)), np.array((4.0, 3.0, 11.0))
+EVENTS = {
+    lw.Surface(depth=1.5): lambda b, t: b[:, 2] - 1.5,
+    lw.Floor(depth=9.0): lambda b, t: 9.0 - b[:, 2],
+    lw.Box(lower=LOWER, upper=UPPER): lambda b, t: np.minimum(b - LOWER, UPPER - b).min(axis=1),
+    lw.StopTime(at=0.7): lambda b, t: 0.7 - t,
+}
+
+
+@pytest.mark.parametrize("event", EVENTS, ids=lambda event: event.type)
+def test_the_distance_of_an_event(event):
+    bench = bench_of(event, STOPS)
+    values, _ = measured(bench, False)
+    distance = EVENTS[event](bench.views.position, bench.views.time)
+    np.testing.assert_allclose(values["distance"][:, 0], distance, rtol=0.0, atol=1e-14)
+    assert np.any(distance > 0.0) and np.any(distance < 0.0)

@@ -88,13 +88,6 @@ class Dock(lw.Term):
 # 2. A damping law: force -c v at the centre of drag, which moves at v, and torque -angular Om, both times e^(depth / height).
 
 
-@functools.cache
-def mud_params(width, real):
-    """Params: center [m, body axes]; floor, height [m]; linear [N s/m]; angular [N m s]."""
-    numbers = {name: lane(width, real) for name in ("floor", "height", "linear", "angular")}
-    return struct("Mud", center=lane3(width, real), **numbers)
-
-
 @wp.func
 def along(D: Any, c: Any, angular: Any, r: Any, e: Any):
     """Drag along one body axis e at the point r, and about it."""
@@ -117,9 +110,8 @@ def mud_damping(D: Any, view: Any, p: Any):
 
 
 class MudOnDevice:
-    """The same for the second law."""
+    """The same for the second law. Its struct follows from the numbers that Mud declares."""
 
-    params = staticmethod(mud_params)
     damping = mud_damping
 
 
@@ -134,11 +126,8 @@ class Mud(lw.Term):
     height: Any = lw.number((), "m", least=1e-3)
     linear: Any = lw.number((), "N s/m", 0.0, least=0.0)
     angular: Any = lw.number((), "N m s", 0.0, least=0.0)
-    center: Any = lw.number((3,), "m", (0.0, 0.0, 0.0))
-
-    def packed(self, numbers, context):
-        """The centre from the origin of the forces; the rest as it is."""
-        return lw.Packed(dict(numbers) | {"center": context.frame.point(numbers["center"])})
+    # A point of the body, which the device gets from the origin of the forces and in the kernel's axes.
+    center: Any = lw.number((3,), "m", (0.0, 0.0, 0.0), axes="point")
 
 
 # 3. A fleet that feels both.

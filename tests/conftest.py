@@ -62,7 +62,7 @@ def scene():
 def body(example):
     """The paper's vehicle for the reference."""
     p = example["params"]
-    terms = (Weight(p["m"] * p["g"] - p["rhoVg"]), Restoring(p["rhoVg"] * np.array(p["r"])))
+    terms = (Weight(net=p["m"] * p["g"] - p["rhoVg"]), Restoring(moment=p["rhoVg"] * np.array(p["r"])))
     return Body(np.diag(p["M"]), np.diag(p["J"]), terms)
 
 

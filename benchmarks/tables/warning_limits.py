@@ -1,5 +1,7 @@
 """The fastest oscillation that each method bears, by h w: of the Munk moment and of a restoring moment.
 
+They are printed as JSON lines and written into lgvi_warp/methods/stable_steps.csv, which warnings read.
+
 Members of one run differ in w, at h = 1 s; the run is repeated between the last w that was stable and the first that was
 not. Stable: the member ran to the end and its angle, 0.3 rad at the start, stayed below 1 rad. Resonances below the limit
 that are narrower than a twentieth of w are passed over: at h w = 1.41 (four steps a period) many methods have one.
@@ -9,6 +11,7 @@ import numpy as np
 
 import lgvi_warp as lw
 from benchmarks.pages import show
+from lgvi_warp.methods import limits
 from lgvi_warp.methods.method import COMPOSITIONS, EXPLICIT, GAUSS, HALVES, PROGRAMS, TWO_PART
 from lgvi_warp.physics import notation
 
@@ -74,9 +77,15 @@ def names():
 
 
 def add_options(parser):
-    parser.add_argument("methods", nargs="*", metavar="METHOD", help="default: all; printed as JSON lines")
+    parser.add_argument("methods", nargs="*", metavar="METHOD", help="default: all; other rows stay as they are")
 
 
 def main(methods):
+    rows = {name: (limits.MUNK[name], limits.RESTORING[name]) for name in limits.MUNK}
     for name in methods or names():
-        show({"method": name} | {make.__name__: round(limit(make, name), 3) for make in (munk, restoring)})
+        measured = limit(munk, name), limit(restoring, name)
+        show({"method": name, "munk": round(measured[0], 3), "restoring": round(measured[1], 3)})
+        if name not in GAUSS:
+            rows[name] = measured
+    lines = [f"{name},{one:.2f},{other:.2f}" for name, (one, other) in rows.items()]
+    limits.STABLE_STEPS.write_text("\n".join(["method,munk,restoring", *lines]) + "\n")

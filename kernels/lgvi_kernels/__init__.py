@@ -16,3 +16,14 @@ To read any file: a module that writes + - * / between lanes imports `add`, `sub
 them (`noqa: F401`), since Warp looks operators up among the module's names. A function `make_...` runs on the host, once for
 each kernel. Inside it, `if wp.static(...)` is decided then: what a scene does not have is not compiled, and costs nothing.
 """
+
+import functools
+from importlib import import_module
+from importlib.util import find_spec
+
+
+@functools.cache
+def built_in(folder, name):
+    """The device code of a name in a folder ("laws", "stops"), imported when it is asked for first; None for no such name."""
+    path = f"{__name__}.{folder}.{name}"
+    return import_module(path) if name.isidentifier() and find_spec(path) else None

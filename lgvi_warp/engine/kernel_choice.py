@@ -5,7 +5,7 @@ Decided once for a run from a survey of all members; the members' own numbers co
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -70,8 +70,7 @@ def choose_kernel(
     ensemble: Ensemble,
     method: Method,
     h: float,
-    laws: Mapping[str, Any],
-    stops: Mapping[str, Any],
+    built_in: Callable[[str, str], Any],
     checked: bool = True,
 ) -> KernelChoice:
     """Choose what the kernel of a run must contain.
@@ -80,8 +79,7 @@ def choose_kernel(
         ensemble: the members.
         method: the integration method.
         h: step [s].
-        laws: modules of the laws' device code, by name.
-        stops: modules of the events' device code, by name.
+        built_in: (folder, name) -> module of built-in device code in the folder "laws" or "stops", None where there is none.
         checked: whether the run watches the energy of scenes that conserve or lose it (default True).
 
     Returns:
@@ -92,13 +90,13 @@ def choose_kernel(
     """
     facts = survey(ensemble, method, h)
     explicit = method.tableau is not None
-    acting = _acting(ensemble, facts, laws)
-    events = tuple((event, device_module(event, event.device, stops, "distance")) for event in ensemble.scene.events)
+    acting = _acting(ensemble, facts, built_in)
+    events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)
     damping = any(hasattr(module, "damping") for term, module in acting if not isinstance(term, Drag))
     flow = _flow([module for _, module in acting])
     drags = [(term, module) for term, module in acting if isinstance(term, Drag)]
     nonconservative = any(
-        not getattr(module, "POTENTIAL", False) and module is not laws["current"] for _, module in acting
+        not getattr(module, "POTENTIAL", False) and module is not built_in("laws", "current") for _, module in acting
     )
     forced = method.base in FORCED and nonconservative
     if explicit:
@@ -111,7 +109,7 @@ def choose_kernel(
         term = drags[0][0]
         assert isinstance(term, Drag)
         drag = tuple(part for part in PARTS if part in facts.drag)
-        module = laws["drag_directions" if facts.bent else "drag"]
+        module = built_in("laws", "drag_directions" if facts.bent else "drag")
         acting = [(term, module), *((t, m) for t, m in acting if t is not term)]
         _check_backward_drag(ensemble, method, term, h)
     dense = damping or (bool(drags) and not exact) or flow == "varying"
@@ -135,7 +133,7 @@ def choose_kernel(
             lead, maps = None, method.program
     elif events or (lead is not None and lead[0] == "K" and not undone):
         lead, maps = None, program
-    conservative = checked and _conservative(facts, acting, laws)
+    conservative = checked and _conservative(facts, acting, built_in)
     # Events, water and the potential are evaluated at the user's origin, or at that of the forces.
     elsewhere = bool(events) or flow != "none" or (conservative and facts.apart)
     parts = {"rates": explicit,
@@ -169,14 +167,14 @@ def _steady(module: Any) -> bool:
     return hasattr(module, "steady_force") or not any(hasattr(module, role) for role in ("law", "damping", "evolve"))
 
 
-def _conservative(facts: Survey, acting: list[tuple[Term, Any]], laws: Mapping[str, Any]) -> bool:
+def _conservative(facts: Survey, acting: list[tuple[Term, Any]], built_in: Callable[[str, str], Any]) -> bool:
     """Whether no law creates energy, and the device code of each potential computes it.
 
     Kinetic energy is that relative to the water.
     """
-    tethered = any(module is laws["tether"] for _, module in acting)
+    tethered = any(module is built_in("laws", "tether") for _, module in acting)
     for term, module in acting:
-        if module is laws["current"]:
+        if module is built_in("laws", "current"):
             # A uniform current does work against a tether, and its vertical part against weight.
             passive = not tethered and term.key not in facts.rising
         else:
@@ -216,26 +214,26 @@ def _check_backward_drag(ensemble: Ensemble, method: Method, term: Drag, h: floa
         faults.raise_if_any()
 
 
-def device_module(term: Term, device: Any, known: Mapping[str, Any], *roles: str) -> Any:
+def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) -> Any:
     """The module of a term's device code, checked for what a kernel needs of it.
 
     Args:
         term: the term.
         device: a module, or the name of a built-in one.
-        known: built-in modules by name.
-        *roles: functions of which the module must have at least one.
+        built_in: (folder, name) -> module of built-in device code, None where there is none.
 
     Returns:
         The module.
 
     Raises:
-        SceneError: if the module is not known, lacks params() or all roles, or a role has a wrong signature.
+        SceneError: if the module is not known, lacks a struct or all roles, or a role has a wrong signature.
     """
-    module = known.get(device) if isinstance(device, str) else device
+    folder, roles = ("laws", ROLES) if term.acts else ("stops", ("distance",))
+    module = built_in(folder, device) if isinstance(device, str) else device
     faults = Faults()
     if module is None:
         faults.add(f"{term.key}.device", device, "is not known", "give a module, or the name of a built-in one")
-    elif not callable(getattr(module, "params", None)):
+    elif getattr(module, "params", None) is None and term.lanes() is None:
         faults.add(f"{term.key}.device", module, "has no params(width, real)", "see docs/develop/add_a_force.md")
     elif not any(hasattr(module, role) for role in roles):
         faults.add(f"{term.key}.device", module, f"has none of {', '.join(roles)}", "see docs/develop/add_a_force.md")
@@ -247,6 +245,31 @@ def device_module(term: Term, device: Any, known: Mapping[str, Any], *roles: str
             faults.add(f"{term.key}.FLOW", flow, "is not known", closest(str(flow), FLOWS))
     faults.raise_if_any()
     return module
+
+
+def is_built_in(module: Any) -> bool:
+    """Whether device code is one of the package's own.
+
+    Args:
+        module: a module, or a user's object.
+
+    Returns:
+        True for a module of lgvi_kernels.
+    """
+    return str(getattr(module, "__name__", "")).startswith("lgvi_kernels.")
+
+
+def declared(term: Term, module: Any) -> tuple[tuple[str, int], ...]:
+    """The declared numbers of which the device struct of a term is made.
+
+    Args:
+        term: the term.
+        module: its device code.
+
+    Returns:
+        (name, length) of each number; () for a module that defines `params` itself.
+    """
+    return (getattr(module, "params", None) is None and term.lanes()) or ()
 
 
 def _check_signature(faults: Faults, term: Term, module: Any, role: str) -> None:
@@ -270,12 +293,10 @@ ROLES = ("law", "damping", "flow", "evolve")
 FLOWS = ("none", "steady", "uniform", "varying")
 
 
-def _acting(ensemble: Ensemble, facts: Survey, laws: Mapping[str, Any]) -> list[tuple[Term, Any]]:
+def _acting(ensemble: Ensemble, facts: Survey, built_in: Callable[[str, str], Any]) -> list[tuple[Term, Any]]:
     """Terms that affect at least one member, with their device code, in a fixed order."""
-    acting = [(term, laws[term.device]) for term in terms.IMPLIED]
-    acting += [
-        (term, device_module(term, term.device_in(not facts.turned), laws, *ROLES)) for term in ensemble.scene.terms
-    ]
+    acting = [(term, built_in("laws", term.device)) for term in terms.IMPLIED]
+    acting += [(term, device_module(term, term.device_in(not facts.turned), built_in)) for term in ensemble.scene.terms]
     return [(term, module) for term, module in acting if term.key in facts.felt]
 
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from lgvi_kernels import built_in
 from lgvi_kernels.advance.events import FIRST
 from lgvi_kernels.advance.monitor import ENERGY_FIELDS
 from lgvi_kernels.advance.rows import PACE_FIELDS, STATE_FIELDS
 from lgvi_kernels.lanes.arithmetic import int_lane
-from lgvi_kernels.laws import LAWS
 from lgvi_kernels.maps.collocation import SLOPE_FIELDS
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.warp_setup import build_lock
@@ -221,7 +221,7 @@ class Packets:
             parameters = Ensemble.own(term, context.parameters)
             if i == 0 and self.plan.spec.drag:
                 assert isinstance(term, Drag)
-                by_axes = module is LAWS["drag"]
+                by_axes = module is built_in("laws", "drag")
                 exact = (
                     term.packed_exact(parameters, self.frame, self.scale)
                     if by_axes

@@ -13,19 +13,18 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from lgvi_kernels import built_in
 from lgvi_kernels.advance.kernel import Advance, make_advance
 from lgvi_kernels.advance.rows import SAMPLE_FIELDS
 from lgvi_kernels.advance.spec import CHUNK, Spec
 from lgvi_kernels.lanes.arithmetic import WIDTHS
-from lgvi_kernels.laws import LAWS
 from lgvi_kernels.maps.explicit import Explicit
-from lgvi_kernels.stops import STOPS
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.machine import DTYPES, default_width
 from lgvi_warp.common.status import CHECKS, ON_FAILURE
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
-from lgvi_warp.engine.kernel_choice import KernelChoice, choose_kernel
+from lgvi_warp.engine.kernel_choice import KernelChoice, choose_kernel, declared, is_built_in
 from lgvi_warp.engine.step_warnings import watched
 from lgvi_warp.methods.gauss import gauss
 from lgvi_warp.methods.method import KINDS, Method
@@ -96,7 +95,7 @@ class Plan:
             faults.add("checks", self.checks, problem, 'use checks="safe", or on_failure="freeze"')
         faults.raise_if_any()
         checked = self.checks != "none"
-        choice = choose_kernel(self.ensemble, self.method, self.grid.h, LAWS, STOPS, checked)
+        choice = choose_kernel(self.ensemble, self.method, self.grid.h, built_in, checked)
         object.__setattr__(self, "kernel_choice", choice)
         self._check_substep()
         if self.width is None:
@@ -190,6 +189,7 @@ class Plan:
             maps=choice.program,
             lead=choice.lead,
             laws=tuple(module for _, module in choice.laws),
+            numbers=tuple(declared(term, module) for term, module in (*choice.laws, *choice.events)),
             mass=choice.mass,
             solver=self.method.solver,
             iterations=int(self.method.iterations or 0),
@@ -236,9 +236,8 @@ class Plan:
         except OSError:  # of the kernel cache
             raise
         except Exception as error:
-            known = (*LAWS.values(), *STOPS.values())
-            pairs = (*self.kernel_choice.laws, *self.kernel_choice.events)
-            user_laws = [term.key for term, module in pairs if module not in known]
+            acting = (*self.kernel_choice.laws, *self.kernel_choice.events)
+            user_laws = [term.key for term, module in acting if not is_built_in(module)]
             if not user_laws:
                 raise
             problem = f"one of them does not compile ({type(error).__name__}: {error})"

@@ -19,7 +19,8 @@ from lgvi_warp.common.status import StatusArray, WarningArray
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import IN_FILES, TABLE
-from lgvi_warp.physics.terms import Term, from_list
+from lgvi_warp.physics.terms import from_list
+from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.runs import member_fields, result_file
 from lgvi_warp.statistics.estimate import Estimates
 

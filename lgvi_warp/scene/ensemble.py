@@ -19,7 +19,7 @@ from lgvi_warp.common.real_numbers import column_names
 from lgvi_warp.physics import notation
 from lgvi_warp.physics import vehicle as vehicles
 from lgvi_warp.physics.fields import FIELDS
-from lgvi_warp.sampling.designs import Sampling
+from lgvi_warp.sampling.designs.base import Sampling
 from lgvi_warp.sampling.designs.space import Space
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene import variations

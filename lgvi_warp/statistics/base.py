@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common import registry
 from lgvi_warp.common.errors import Faults, SceneError, closest, shown
 from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.ends import Ends
@@ -113,8 +114,7 @@ class Statistic:
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
-        if cls.type and cls.__module__.startswith(__package__):
-            TYPES[cls.type] = cls
+        registry.add(TYPES, cls)
 
     def __post_init__(self) -> None:
         faults = Faults(f"{self.type}.")

@@ -17,7 +17,7 @@ from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS, TABLE
 
 if TYPE_CHECKING:
-    from lgvi_warp.physics.terms import Term
+    from lgvi_warp.physics.terms.base import Term
     from lgvi_warp.sampling.members import Members
     from lgvi_warp.statistics.samples import Fields
 

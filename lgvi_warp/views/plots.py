@@ -16,7 +16,7 @@ from lgvi_warp.views.fleet import LOOKS, energy_curve, evenly, quantiles, title
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
-    from lgvi_warp.statistics import Estimate
+    from lgvi_warp.statistics.estimate import Estimate
     from lgvi_warp.studies.stability.grid import Line
     from lgvi_warp.studies.stability.map import StabilityMap
     from lgvi_warp.studies.tradeoff import Tradeoff

@@ -5,7 +5,8 @@ An import is read as "top" (made when its module is), "lazy" (inside a function)
 
 import ast
 import graphlib
-from collections import Counter
+import sys
+from collections import Counter, defaultdict
 from pathlib import Path
 from typing import NamedTuple
 
@@ -101,6 +102,36 @@ def arrows_up():
     return [arrow for arrow in arrows if None not in map(room, arrow) and room(arrow[0]) < room(arrow[1])]
 
 
+def loaded_by(module):
+    """Modules of ours that importing this one names at once, without those named inside functions."""
+    return {module_of(found.name) for found in MODULES[module] if found.kind == "top"} - {None, module}
+
+
+def closure(module):
+    """A module and all of ours that importing it brings in, parent packages included."""
+    seen, waiting = set(), {module}
+    while waiting:
+        one = waiting.pop()
+        seen.add(one)
+        waiting |= (loaded_by(one) | ({one.rpartition(".")[0]} & MODULES.keys())) - seen
+    return seen
+
+
+def reason(module, name):
+    """Why a module imports this name inside a function."""
+    package = name.split(".")[0]
+    if module.startswith("lgvi_warp.cli"):
+        return "a verb of the command loads only what it uses"
+    if package in sys.stdlib_module_names or package == "numpy":
+        return "rarely needed, or not on every system"
+    if package not in (*SOURCE_ROOTS, "warp"):
+        return "takes long to load, or may be absent"
+    below = closure(module_of(name)) if package == "lgvi_warp" else ()
+    if package != "lgvi_warp" or any(found.name.split(".")[0] == "warp" for lower in below for found in MODULES[lower]):
+        return "leads to Warp, which takes long to load"
+    return "needed by some scenes or runs only"
+
+
 def report():
     """Lines on the rooms and their imports."""
     modules = Counter(module.split(".")[1] for module in MODULES if room(module) is not None)
@@ -108,14 +139,14 @@ def report():
         yield f"floor {floor}: " + ", ".join(f"{name} ({modules[name]} modules)" for name in rooms)
     yield f"circle of modules, all imports counted: {circle('top', 'lazy', 'typing') or 'none'}"
     yield f"arrows up: {arrows_up() or 'none'}"
-    late = Counter(
-        found.name.split(".")[0] if module_of(found.name) is None else module_of(found.name)
-        for all_of_it in MODULES.values()
-        for found in all_of_it
-        if found.kind == "lazy"
-    )
-    yield f"imports inside functions: {sum(late.values())}"
-    yield from (f"  {count:3d}  {name}" for name, count in late.most_common())
+    late = defaultdict(Counter)
+    for module, all_of_it in MODULES.items():
+        for found in all_of_it:
+            if found.kind == "lazy":
+                late[reason(module, found.name)][module_of(found.name) or found.name.split(".")[0]] += 1
+    yield f"imports inside functions: {sum(map(Counter.total, late.values()))}"
+    for why, names in sorted(late.items()):
+        yield f"  {names.total():3d}  {why}: " + ", ".join(f"{name} ({count})" for name, count in names.most_common())
 
 
 if __name__ == "__main__":

@@ -54,6 +54,12 @@ def test_only_tables_have_pages():
     assert set(pages.PAGES) == set(TABLES) - {"coverage", "warning_limits"}  # these two are printed only
 
 
+@pytest.mark.parametrize(("name", "page"), pages.PAGES.items())
+def test_every_page_has_the_marks_of_its_table(name, page):
+    before, after = pages.parts(name, pages.ROOT / page)
+    assert before.endswith(f"<!-- {name}: begin -->") and after.startswith(f"<!-- {name}: end -->")
+
+
 def test_a_text_goes_between_its_marks(tmp_path):
     page = tmp_path / "page.md"
     page.write_text(TEXT)

@@ -5,6 +5,8 @@ import re
 import pytest
 
 from lgvi_warp.methods import limits, method
+from lgvi_warp.sampling.designs.base import Sampling
+from lgvi_warp.statistics import base
 from tests.conftest import ROOT
 
 
@@ -18,6 +20,8 @@ def example(page):
 def test_example(page, scene, monkeypatch):
     for table in (method.PROGRAMS, method.ORDERS, limits.MUNK, limits.RESTORING):
         monkeypatch.setitem(table, "psi_k", None)  # what the example of a method adds goes with the test
+    for owner, name in ((base, "TYPES"), (Sampling, "kinds")):
+        monkeypatch.setattr(owner, name, dict(getattr(owner, name)))
     exec(example(page), {"scene": scene})
 
 

@@ -39,4 +39,6 @@ def test_methods_and_their_orders():
 def test_every_public_name_has_a_line():
     page = (FOLDER / "api.md").read_text().partition("## Old names")[0]
     names = re.findall(r"^\| `lw\.(\w+)` \|", page, re.MULTILINE)
+    in_table = re.findall(r"^\| \[(\w+)\]", (FOLDER.parent / "guide" / "terms" / "README.md").read_text(), re.MULTILINE)
+    names += [lw.Term.kinds[name].__name__ for name in in_table]
     assert sorted(names) == sorted(lw.__all__)

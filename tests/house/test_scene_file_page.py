@@ -1,4 +1,7 @@
-"""The page on the scene file has every key of every section, with its default, and no other."""
+"""The page on the scene file has every key of every section, with its default, and no other.
+
+python -m tests.house.test_scene_file_page writes its tables of types.
+"""
 
 import dataclasses
 import json
@@ -40,6 +43,9 @@ KINDS = {
     "Types and their further keys": (STATISTICS, Statistic),
 }
 
+# Types that the page treats in its text, and those that no file may name.
+IN_WORDS = ("scipy", "own", "weight", "restoring")
+
 
 def rows(start):
     """The cells of the first table after a text of the page."""
@@ -78,8 +84,9 @@ def table(kinds, base):
     shared = {field.name for field in dataclasses.fields(base)} if base else set()
     keys = {
         name: "; ".join(key(field) for field in dataclasses.fields(kind) if field.name not in shared)
-        for name, kind in kinds.items()
-        if kind.__module__.startswith("lgvi_warp.")  # other tests register terms of their own
+        for name, kind in sorted(kinds.items())
+        # Other tests have classes of their own.
+        if kind.__module__.startswith("lgvi_warp.") and name not in IN_WORDS
     }
     return [[f"`{name}`", text or "none"] for name, text in keys.items()]
 
@@ -107,3 +114,20 @@ def test_every_section_and_every_distribution_of_scipy():
     sections = {name.split(".")[0] for name in re.findall(r"^##+ `\[+([\w.]+)\]+`", PAGE, re.MULTILINE)}
     assert sections == set(SECTIONS) - {"controller"} and "`controller`" in PAGE
     assert all(f"`{name}`" in PAGE for name in SCIPY)
+
+
+def write():
+    """Write the tables of types into the page."""
+    text = PAGE
+    for start, kinds in KINDS.items():
+        before, found, rest = text.partition(start)
+        first = rest.index("\n|") + 1
+        end = rest.index("\n\n", first)
+        head = rest[first:end].splitlines()[:2]
+        lines = head + [f"| {name} | {keys} |" for name, keys in table(*kinds)]
+        text = before + found + rest[:first] + "\n".join(lines) + rest[end:]
+    (ROOT / "docs" / "start" / "scene_file.md").write_text(text)
+
+
+if __name__ == "__main__":
+    write()

@@ -1,5 +1,6 @@
 """What a case of a law is: its term beside its twin."""
 
+from importlib import import_module
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ def matrix(seed, size=1.0):
     return size * (A @ A.T / 6.0 + np.eye(6))
 
 
-def case(host, twin, **numbers):
-    """A Case of one term whose fields have the same names on both sides."""
+def case(host, **numbers):
+    """A Case of one term and its twin of the same name, whose numbers have the same names."""
+    twin = getattr(import_module(host.__module__.replace("physics", "reference")), host.__name__)
     return Case((host(**numbers),), (twin(**{key: np.asarray(value) for key, value in numbers.items()}),))

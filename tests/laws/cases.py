@@ -3,11 +3,8 @@
 import numpy as np
 
 from lgvi_warp.physics import terms
-from lgvi_warp.reference.terms.current import Current, CurrentProfile
-from lgvi_warp.reference.terms.drag import Drag, DragMatrix
-from lgvi_warp.reference.terms.tether import Tether
 from lgvi_warp.reference.terms.thrusters import Thrusters
-from lgvi_warp.reference.terms.wrench import Wrench, WrenchSchedule
+from lgvi_warp.reference.terms.wrench import WrenchSchedule
 from tests.laws import cases_lift, cases_water
 from tests.laws.case import Case, case, matrix
 
@@ -28,24 +25,23 @@ THRUSTERS = dict(
 COMMANDS = dict(times=(0.0, 0.5, 1.5), command_schedule=((0.3, 0.8, -0.7), (0.7, -0.9, 0.9), (0.5, 0.5, -1.5)))
 
 CASES = {
-    "linear drag": case(terms.Drag, Drag, linear=LINEAR, quadratic=(0.0,) * 6),
-    "quadratic drag": case(terms.Drag, Drag, linear=(0.0,) * 6, quadratic=QUADRATIC),
-    "drag": case(terms.Drag, Drag, linear=LINEAR, quadratic=QUADRATIC),
-    "drag matrix": case(terms.DragMatrix, DragMatrix, linear=matrix(1, 3.0), quadratic=0.1 * matrix(2) + np.diag(QUADRATIC)),
-    "current": case(terms.Current, Current, velocity=(0.3, -0.2, 0.1)),
+    "linear drag": case(terms.Drag, linear=LINEAR, quadratic=(0.0,) * 6),
+    "quadratic drag": case(terms.Drag, linear=(0.0,) * 6, quadratic=QUADRATIC),
+    "drag": case(terms.Drag, linear=LINEAR, quadratic=QUADRATIC),
+    "drag matrix": case(terms.DragMatrix, linear=matrix(1, 3.0), quadratic=0.1 * matrix(2) + np.diag(QUADRATIC)),
+    "current": case(terms.Current, velocity=(0.3, -0.2, 0.1)),
     "current profile": case(
         terms.CurrentProfile,
-        CurrentProfile,
         depths=(-100.0, 100.0),
         velocities=((-30.0, 20.0, -10.0), (30.0, -20.0, 10.0)),
     ),
     "tether": case(
-        terms.Tether, Tether, anchor=(1.0, 2.0, 3.0), stiffness=5.0, attachment=(0.5, -0.1, 0.2), rest_length=2.0
+        terms.Tether, anchor=(1.0, 2.0, 3.0), stiffness=5.0, attachment=(0.5, -0.1, 0.2), rest_length=2.0
     ),
     "slack tether": case(
-        terms.Tether, Tether, anchor=(0.0, 0.0, 10.0), stiffness=5.0, attachment=(0.1, 0.0, 0.0), rest_length=50.0
+        terms.Tether, anchor=(0.0, 0.0, 10.0), stiffness=5.0, attachment=(0.1, 0.0, 0.0), rest_length=50.0
     ),
-    "wrench": case(terms.Wrench, Wrench, force=(1.0, -2.0, 0.5), torque=(0.1, 0.2, -0.3)),
+    "wrench": case(terms.Wrench, force=(1.0, -2.0, 0.5), torque=(0.1, 0.2, -0.3)),
     "wrench schedule": Case((terms.WrenchSchedule(**TABLE),), (WrenchSchedule(**TWIN_TABLE),), False),
     "wrench in steps": Case(
         (terms.WrenchSchedule(**TABLE, interpolation="steps"),),

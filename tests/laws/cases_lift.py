@@ -54,5 +54,5 @@ CASES = {
     "control fins": steered(None),
     "control fins with rates": steered(RATES),
     "cross-flow": Case((terms.CrossFlow(**HULL),), (CrossFlow(**arrays(HULL), density=DENSITY),)),
-    "body lift": Case((terms.BodyLift(matrix=LIFT),), (BodyLift(LIFT),)),
+    "body lift": Case((terms.BodyLift(matrix=LIFT),), (BodyLift(matrix=LIFT),)),
 }

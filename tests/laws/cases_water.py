@@ -4,7 +4,6 @@ import numpy as np
 
 from lgvi_warp.physics import terms
 from lgvi_warp.physics.terms.wrench_noise import channel
-from lgvi_warp.reference.terms.current_harmonics import CurrentHarmonics
 from lgvi_warp.reference.terms.gauss_markov_current import GaussMarkovCurrent
 from lgvi_warp.reference.terms.stratification import Stratification
 from lgvi_warp.reference.terms.waves import Waves
@@ -39,7 +38,7 @@ def noisy(host, twin, numbers, name=""):
 
 
 CASES = {
-    "current harmonics": case(terms.CurrentHarmonics, CurrentHarmonics, **HARMONICS),
+    "current harmonics": case(terms.CurrentHarmonics, **HARMONICS),
     "waves": Case((terms.Waves(**WAVES),), (Waves(**arrays(WAVES), gravity=GRAVITY),)),
     "Gauss-Markov current": noisy(terms.GaussMarkovCurrent, GaussMarkovCurrent, GAUSS_MARKOV),
     "wrench noise": noisy(terms.WrenchNoise, WrenchNoise, WRENCH_NOISE),

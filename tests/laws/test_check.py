@@ -325,13 +325,12 @@ def plain_law(w, view, p):
     [
         (type("Short", (), {"params": staticmethod(stirred_params), "law": short_law}), "write law(w, view, p)"),
         (type("Plain", (), {"params": staticmethod(stirred_params), "law": plain_law}), "decorate it with @wp.func"),
-        (type("Bare", (), {"law": hasty_law}), "add_a_force.md"),
         (type("Roleless", (), {"params": staticmethod(stirred_params)}), "has none of law, damping"),
         (type("Unknown", (), {"params": staticmethod(stirred_params), "law": unknown_law}), "does not compile"),
         (SimpleNamespace(params=stirred_params, law=hasty_law), "give a module, or a class"),
         ("hasty", "name of a built-in one"),
     ],
-    ids=["signature", "no Warp function", "no params", "no role", "no such field", "no key", "no such name"],
+    ids=["signature", "no Warp function", "no role", "no such field", "no key", "no such name"],
 )
 def test_a_law_that_cannot_be_built(device, words, capfd):
     term = type("Bad", (Stirred,), {"device": device, "__annotations__": {}})(strength=0.3)
@@ -362,7 +361,6 @@ def energy_of_nothing(u: Any, view: Any, p: Any):
 class Spring:
     """A tether whose energy is not its potential."""
 
-    params = staticmethod(tether.params)
     law, energy, POTENTIAL = tether.law, energy_of_nothing, True
 
 

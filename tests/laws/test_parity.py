@@ -27,7 +27,7 @@ def scene_of(case):
 def body_of(case):
     """The same for the twin."""
     v = VEHICLE
-    laws = (Weight(v.mass * GRAVITY - v.buoyancy), Restoring(v.buoyancy * v.center_of_buoyancy), *case.laws)
+    laws = (Weight(net=v.mass * GRAVITY - v.buoyancy), Restoring(moment=v.buoyancy * v.center_of_buoyancy), *case.laws)
     excess = v.buoyancy / GRAVITY - v.mass
     lever = v.buoyancy / GRAVITY * v.center_of_buoyancy
     return Body(v.mass_matrix, v.inertia, laws, excess, lever)

@@ -29,7 +29,7 @@ class Spring(Law):
         return 0.5 * self.k * view.b[2] ** 2
 
 
-LAWS = {"weight": Weight(-2.56), "restoring": Restoring(np.array([0.3, -0.2, -8.5])), "spring": Spring(1.7)}
+LAWS = {"weight": Weight(net=-2.56), "restoring": Restoring(moment=np.array([0.3, -0.2, -8.5])), "spring": Spring(1.7)}
 
 
 @pytest.mark.parametrize("law", [*LAWS, "all"])
@@ -51,7 +51,7 @@ def test_signs_of_the_paper():
     # Section IV: U = -(m - rho V) g b3 + B r.R^T e3, b3 down. A buoyant body (net < 0) is pushed up, and a centre of
     # buoyancy above that of gravity (r3 < 0) rights a body that rolled by +90 degrees about e1 (z = e2).
     R = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-    body = Body(np.eye(3), np.eye(3), (Weight(-2.0), Restoring(np.array([0.0, 0.0, -8.0]))))
+    body = Body(np.eye(3), np.eye(3), (Weight(net=-2.0), Restoring(moment=np.array([0.0, 0.0, -8.0]))))
     force, torque = body.wrench(np.zeros(3), R)
     np.testing.assert_allclose(R @ force, [0.0, 0.0, -2.0])
     np.testing.assert_allclose(torque, [-8.0, 0.0, 0.0])
@@ -65,7 +65,7 @@ def test_energy_and_momenta():
     # Eq. (2): <M nu, nu>/2 + <J Om, Om>/2 + U
     kinetic = 0.5 * nu @ M @ nu + 0.5 * Om @ J @ Om
     assert energy.energy(x, Body(M, J)) == pytest.approx(kinetic, rel=1e-14)
-    assert energy.energy(x, Body(M, J, (Weight(2.0),))) == pytest.approx(kinetic - 6.0, rel=1e-14)
+    assert energy.energy(x, Body(M, J, (Weight(net=2.0),))) == pytest.approx(kinetic - 6.0, rel=1e-14)
     np.testing.assert_allclose(energy.linear_momentum(x), TURN.T @ M @ nu, rtol=1e-14)
     spatial = TURN.T @ J @ Om + np.cross(b, TURN.T @ M @ nu)
     np.testing.assert_allclose(energy.angular_momentum(x), spatial, rtol=1e-13)
@@ -73,7 +73,7 @@ def test_energy_and_momenta():
 
 def test_programs_stages_and_trajectories():
     # K alone: p grows by h f for each step, whatever palindrome of stages with sum 1 divides it.
-    body = Body(np.eye(3), np.eye(3), (Weight(2.0),))
+    body = Body(np.eye(3), np.eye(3), (Weight(net=2.0),))
     x = State(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
     states = advance.trajectory(x, body, (("K", 0.25), ("K", 0.75)), 0.5, 6, every=2, stages=(1.5, -2.0, 1.5))
     np.testing.assert_allclose([s.p[2] for s in states], [0.0, 2.0, 4.0, 6.0], rtol=1e-14)

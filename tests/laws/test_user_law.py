@@ -37,16 +37,6 @@ MUD = dict(floor=5.0, height=2.0, linear=30.0, angular=8.0)
 START = {"b": (0.0, 0.0, 2.0), "nu": (0.5, 0.2, 0.1), "Om": (0.1, 0.3, -0.2)}
 
 
-@pytest.fixture
-def registered():
-    """The example's types, known to scene files for one test."""
-    for kind in (own_law.Dock, own_law.Mud):
-        terms.register_term(kind)
-    yield
-    for kind in (own_law.Dock, own_law.Mud):
-        terms.TYPES.pop(kind.type)
-
-
 def solve(laws, h=0.05, t1=5.0, vehicle=own_law.vehicle, **named):
     scene = lw.Scene(vehicle, lw.Environment(gravity=9.8), terms=laws)
     return lw.solve(one(scene, **START), h=h, t1=t1, **named)
@@ -145,7 +135,7 @@ members = 3
 """
 
 
-def test_a_scene_file_may_name_them(registered):
+def test_a_scene_file_may_name_them():
     scene = scenes.loads(SCENE)
     assert [type(term) for term in scene.terms] == [own_law.Dock, own_law.Mud]
     assert scene.terms[1].key == "silt" and {"dock.reach", "silt.height"} <= scene.parameters().keys()
@@ -153,14 +143,28 @@ def test_a_scene_file_may_name_them(registered):
     assert result.status.counts() == {"ok": 3}
 
 
-def test_a_scene_file_without_them_is_refused():
+def test_a_scene_file_without_them_is_refused(monkeypatch):
+    for kind in (own_law.Dock, own_law.Mud):
+        monkeypatch.delitem(terms.TYPES, kind.type)
     with pytest.raises(lw.SceneError, match="is not known"):
         scenes.loads(SCENE)
 
 
-def test_a_type_is_taken_once(registered):
-    with pytest.raises(ValueError, match="no other term has"):
-        terms.register_term(own_law.Dock)
+def test_a_type_is_taken_once(monkeypatch):
+    monkeypatch.setattr(lw.Term, "kinds", dict(lw.Term.kinds))
+    taken = type("Harbour", (lw.Term,), {"type": "dock"})
+    assert lw.Term.kinds["dock"] is own_law.Dock and lw.register_term(own_law.Dock) is own_law.Dock
+    for kind in (taken, type("Nameless", (own_law.Dock,), {}), type("Heavy", (lw.Term,), {"type": "weight"})):
+        with pytest.raises(ValueError, match="no other term has"):
+            lw.register_term(kind)
+
+
+def test_a_class_made_again_replaces_the_former(monkeypatch):
+    monkeypatch.setattr(lw.Term, "kinds", dict(lw.Term.kinds))
+    first, second = (type("Cell", (lw.Term,), {"type": "cell"}) for _ in range(2))
+    assert first is not second and lw.Term.kinds["cell"] is second
+    # A subclass without a type of its own replaces nothing.
+    assert type("Mine", (lw.Drag,), {}).type == "drag" and lw.Term.kinds["drag"] is lw.Drag
 
 
 def test_the_law_on_the_page_is_right(tmp_path):

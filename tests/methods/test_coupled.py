@@ -44,8 +44,8 @@ def body_of(laws):
     M, C, J = coupled.blocks(INERTIA)
     # This law's numbers are partly the vehicle's.
     own = {"buoyancy": BUOYANCY, "center_of_buoyancy": LIFT}
-    laws = tuple(replace(law, **own) if isinstance(law, Stratification) else law for law in laws)
-    laws = (Weight(WEIGHT - BUOYANCY), Restoring(moment), *laws)
+    laws = tuple(Stratification(**vars(law) | own) if isinstance(law, Stratification) else law for law in laws)
+    laws = (Weight(net=WEIGHT - BUOYANCY), Restoring(moment=moment), *laws)
     return Body(M, J, laws, displaced - MASS, displaced * LIFT - MASS * CENTER, C=C)
 
 

@@ -48,7 +48,7 @@ def test_float32():
 
 def test_forces_of_position_and_time():
     force, torque = [3.0, -2.0, 1.0], [0.3, 0.1, -0.2]
-    term, law = lw.terms.Wrench(force=force, torque=torque), Wrench(np.array(force), np.array(torque))
+    term, law = lw.terms.Wrench(force=force, torque=torque), Wrench(force=np.array(force), torque=np.array(torque))
     assert difference(*both("gauss6", 0.1, terms=[term], laws=[law])) < 2e-13
 
 

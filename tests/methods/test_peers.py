@@ -41,7 +41,7 @@ def truth():
 
 def twin(one):
     """The problem's body for the reference."""
-    return Body(np.diag(one.M), np.diag(one.J), (Weight(one.net), Restoring(one.d)))
+    return Body(np.diag(one.M), np.diag(one.J), (Weight(net=one.net), Restoring(moment=one.d)))
 
 
 def test_rates(small):

@@ -23,14 +23,14 @@ from tests.support.tools import TURN, difference, expected, from_state, slope
 
 M = TURN @ np.diag([1.0, 2.0, 3.0]) @ TURN.T
 J = np.diag([1.0, 2.0, 2.5])
-CONSERVATIVE = (Weight(-0.7), Restoring(np.array([0.1, -0.2, -0.5])))
+CONSERVATIVE = (Weight(net=-0.7), Restoring(moment=np.array([0.1, -0.2, -0.5])))
 WATER = (
-    CurrentProfile(np.array([-100.0, 100.0]), np.array([[1.0, 0.5, 0.0], [-1.0, 0.8, 0.2]])),
-    CurrentHarmonics(np.array([[0.2, -0.1, 0.05]]), np.array([3.0]), np.array([0.4])),
+    CurrentProfile(depths=np.array([-100.0, 100.0]), velocities=np.array([[1.0, 0.5, 0.0], [-1.0, 0.8, 0.2]])),
+    CurrentHarmonics(amplitudes=np.array([[0.2, -0.1, 0.05]]), periods=np.array([3.0]), phases=np.array([0.4])),
 )
 DISSIPATIVE = (
-    Drag(np.array([0.3, 0.2, 0.4, 0.1, 0.2, 0.3]), np.zeros(6)),
-    Wrench(np.array([0.5, -0.3, 0.2]), np.array([0.1, 0.2, -0.1])),
+    Drag(linear=np.array([0.3, 0.2, 0.4, 0.1, 0.2, 0.3]), quadratic=np.zeros(6)),
+    Wrench(force=np.array([0.5, -0.3, 0.2]), torque=np.array([0.1, 0.2, -0.1])),
 )
 EXPLICIT = {"rk4": tableaux.RK4, "rk5": tableaux.DOPRI5, "rk8": tableaux.DOP853}
 
@@ -217,7 +217,7 @@ def test_splitting_tends_to_the_same_solution():
 
 def test_what_laws_remember_is_advanced_as_in_K():
     # The same noise, keyed by the step: the paths of the current agree to the last digit, the states to O(h^2).
-    current = GaussMarkovCurrent(np.array([0.1, 0.2, 0.1]), 2.0, seed0=7)
+    current = GaussMarkovCurrent(standard_deviation=np.array([0.1, 0.2, 0.1]), time_constant=2.0, seed0=7)
     body = body_of(*CONSERVATIVE, current)
     x = begin(body)
     y = explicit.advance(explicit.stepper(tableaux.RK4), x, body, 0.02, 50)
@@ -264,7 +264,7 @@ def test_adaptive(name, body, start, example):
 
 def test_adaptive_follows_time_scales():
     # Fast at first: more steps in the first 0.1 s than in the last 2 s; the sampled state is that of a fixed small step.
-    body = body_of(*CONSERVATIVE, Drag(np.full(6, 2.0), np.full(6, 4.0)))
+    body = body_of(*CONSERVATIVE, Drag(linear=np.full(6, 2.0), quadratic=np.full(6, 4.0)))
     x = begin(body, speed=20.0)
     states = explicit.adaptive(x, body, [0.1, 2.0, 4.0], 1e-9, 1e-9, tableaux.DOP853)
     assert states[0].step > states[2].step - states[1].step
@@ -273,7 +273,7 @@ def test_adaptive_follows_time_scales():
 
 
 def test_adaptive_refuses_too_small_steps():
-    body = replace(body_of(), terms=(Wrench(np.array([np.nan, 0.0, 0.0]), np.zeros(3)),))
+    body = replace(body_of(), terms=(Wrench(force=np.array([np.nan, 0.0, 0.0]), torque=np.zeros(3)),))
     with pytest.raises(ValueError, match="too small"):
         explicit.adaptive(begin(body), body, [1.0], 1e-9, 1e-9, tableaux.DOP853, h=0.1)
 

@@ -16,7 +16,7 @@ SYMMETRIC = ("psi", "psi_s", "psi_1")
 SYMPLECTIC = ("psi_s", "psi_1")
 FULL = TURN @ np.diag([1.0, 2.0, 3.0]) @ TURN.T
 J = np.diag([1.0, 2.0, 2.5])
-TERMS = (Weight(-0.7), Restoring(np.array([0.1, -0.2, -0.5])))
+TERMS = (Weight(net=-0.7), Restoring(moment=np.array([0.1, -0.2, -0.5])))
 SHAPES = {"general": 0.5 * (FULL + FULL.T), "isotropic": 2.0 * np.eye(3)}
 
 
@@ -202,7 +202,7 @@ def test_vertical_fall(method):
     # R = I, force along b3: symplectic Euler under Phi (old velocity moves) and Phi* (new one), Verlet, which is exact
     # for a constant force, under Psi, PsiS, Psi1.
     h, k, net, m = 0.1, 20, -0.7, 2.0
-    body = Body(m * np.eye(3), J, (Weight(net),))
+    body = Body(m * np.eye(3), J, (Weight(net=net),))
     x = State(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
     end = walk(method, body, x, h, k)[-1]
     count = {"phi": k * (k - 1), "phi_adjoint": k * (k + 1)}.get(method, k * k)

@@ -67,7 +67,11 @@ def symmetric(seed, low, high):
 @pytest.mark.parametrize("method", PRINTED)
 def test_program_is_the_printed_map(method, solver):
     # The sub-maps' program and the equations as printed are one map: some 300 operations apart, 1e-13.
-    body = Body(symmetric(1, 2.0, 9.0), symmetric(2, 1.1, 2.0), (Weight(-3.0), Restoring(np.array([0.3, -0.2, -1.5]))))
+    body = Body(
+        symmetric(1, 2.0, 9.0),
+        symmetric(2, 1.1, 2.0),
+        (Weight(net=-3.0), Restoring(moment=np.array([0.3, -0.2, -1.5]))),
+    )
     y = (np.array([1.0, -2.0, 3.0]), TURN, np.array([0.6, -0.4, 0.5]), np.array([0.7, 0.5, -0.9]))
     solve = rotation.SOLVERS[solver]
     x = advance.advance(to_state(body, *y), body, PROGRAMS[method], 0.2, 3, solve=solve)
@@ -130,7 +134,7 @@ class Bench:
 def bench(example):
     """Truth by kl8(psi_s), h = .05: within 3e-12 of RKMK4 with h = .002."""
     p, x = example["params"], example["params"]["x0"]
-    terms = (Weight(p["m"] * p["g"] - p["rhoVg"]), Restoring(p["rhoVg"] * np.array(p["r"])))
+    terms = (Weight(net=p["m"] * p["g"] - p["rhoVg"]), Restoring(moment=p["rhoVg"] * np.array(p["r"])))
     body = Body(np.diag(p["M"]), np.diag(p["J"]), terms)
     return Bench(body, to_state(body, *(np.array(x[key]) for key in ("b", "R", "nu", "Omega"))))
 

@@ -15,7 +15,7 @@ from tests.support.tools import generated, one
 # What the generated source holds if a scene has this term, and only then.
 MARKS = {
     "drag": r"make_E__locals__slowed", "drag matrix": r"add_three", "current": r"\bflow_0\(", "tether": r"rest_length",
-    "wrench": r"HeldWrench", "thrusters": r"commanded", "waves": r"Waves", "fins": r"Fins",
+    "wrench": r"numbers_wrench", "thrusters": r"commanded", "waves": r"Waves", "fins": r"Fins",
 }  # fmt: skip
 # Functions that some scenes need, and a bare one does not.
 NOT_THERE = (

@@ -230,10 +230,10 @@ def test_energy_error_only_where_energy_is_conserved(mixed, monkeypatch, name):
 
 @pytest.mark.parametrize("name", cases.CASES)
 def test_terms_say_of_energy_what_their_device_code_does(name):
-    from lgvi_kernels.laws import LAWS
+    from lgvi_kernels import built_in
 
     for term in cases.CASES[name].terms:
-        module = LAWS[term.device]
+        module = built_in("laws", term.device)
         follows = getattr(module, "POTENTIAL", False) and not hasattr(module, "damping") and not hasattr(module, "flow")
         assert ("energy" in term.conserves) == follows
 

@@ -330,6 +330,7 @@ class Slot:
         self.server = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment, start_new_session=True
         )
+        self.server.stdout.readline()  # it is ready: no fault waits for its imports
 
     def close(self):
         """End its process."""
@@ -434,7 +435,9 @@ def try_room(name, count, seed, limit, jobs, only):
                 slots.append(slot)
             outcomes[i] = outcome
             caught, seconds, ran = outcome
-            verdict = f"found by {caught[0]} ({caught[1]})" if caught else f"SURVIVED {ran} of {len(tests[i])} tests"
+            verdict = (
+                f"found by {caught[0]} ({caught[1]})" if caught else f"SURVIVED {ran} of {len(tests[i])} tests begun"
+            )
             before, after = mutant.shown(sources[path])
             where = f"{path.relative_to(ROOT)}:{mutant.line}"
             print(f"{name} {i} {where} {mutant.kind}: {before} -> {after}: {verdict} in {seconds:.0f} s", flush=True)

@@ -47,7 +47,7 @@ def in_time(child, seconds):
 
 
 def main():
-    """Run a task for each line of stdin, and answer with a line whether it ended in time."""
+    """Say that it is ready; then run a task for each line of stdin, and answer with a line whether it ended in time."""
     import hypothesis  # noqa: F401
     import numpy  # noqa: F401
     import pytest  # noqa: F401
@@ -55,6 +55,7 @@ def main():
     import scipy.stats  # noqa: F401
     import warp  # noqa: F401
 
+    print("ready", flush=True)
     for line in sys.stdin:
         task = json.loads(line)
         child = os.fork()

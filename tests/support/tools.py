@@ -53,7 +53,7 @@ def scene_of(*arguments, **named):
 def body_of(scene):
     """The reference's body for a scene."""
     v, g = scene.vehicle, scene.environment.gravity
-    terms = (Weight(v.mass * g - v.buoyancy), Restoring(v.buoyancy * v.center_of_buoyancy))
+    terms = (Weight(net=v.mass * g - v.buoyancy), Restoring(moment=v.buoyancy * v.center_of_buoyancy))
     return Body(v.mass_matrix, v.inertia, terms)
 
 

@@ -27,9 +27,9 @@ class Examine(NamedTuple):
 
 
 @functools.cache
-def make_examine(module, width, real):
+def make_examine(module, numbers, width, real):
     """Build (without compiling) the kernel that evaluates this module's functions."""
-    Lane, View, Params = lane(width, real), view_struct(width, real), params_of((module,), width, real)
+    Lane, View, Params = lane(width, real), view_struct(width, real), params_of((module,), (numbers,), width, real)
     Wrench, Damping, Flow = (make(width, real) for make in (wrench_struct, damping_struct, flow_struct))
     law, damping, flow, evolve = (superpose((module,), role) for role in ("law", "damping", "flow", "evolve"))
     distance, energy = plays(module, "distance"), superpose((module,), "energy")

@@ -25,6 +25,7 @@ class Spec(NamedTuple):
     maps: the sub-maps after the leading one, as (letter, coefficient).
     lead: the sub-map that opens a step and merges with the end of the step before, or None.
     laws: modules of laws; drag along the axes comes first if a scene has it.
+    numbers: the declared numbers of each law, then of each event (see params_of).
     mass: shape of M, "isotropic", "diagonal" or "full".
     solver, iterations, adaptive, checked: of equation (24) (see make_solve); unchecked kernels have no alarms at all.
     fields: the sampled quantities.
@@ -53,6 +54,7 @@ class Spec(NamedTuple):
     maps: tuple
     lead: tuple | None
     laws: tuple
+    numbers: tuple
     mass: str
     solver: str
     iterations: int
@@ -158,7 +160,8 @@ def make_types(spec):
     width, real = spec.width, spec.real
     Lane = lane(width, real)
     Inertia = inertia_struct(width, real, spec.mass, spec.parts)
-    Params, Events = params_of(spec.laws, width, real), params_of(spec.events, width, real)
+    Params = params_of(spec.laws, spec.numbers, width, real)
+    Events = params_of(spec.events, spec.numbers[len(spec.laws) :], width, real)
     DragFlow = drag.flow_struct(width, real)
     Constants = struct(
         "Constants",

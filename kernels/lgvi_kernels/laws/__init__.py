@@ -1,4 +1,4 @@
-"""The laws that a scene may name, one file each: `params(width, real)`, the struct of its numbers, and some functions.
+"""The laws that a scene may name, one file each: the struct `params(width, real)`, and some functions.
 
 law(w, view, p): force [N] and torque [N m] that depend on position, attitude and time;
 damping(D, view, p): the matrix D of a force and torque -D (nu; Om); D may depend on velocities as well;
@@ -12,54 +12,6 @@ Each of them but the last takes the sum over other laws and returns it with its 
 function (see maps/compose.py). Constants of a file: POTENTIAL, `law` follows from a potential; SEPARABLE, that potential is a
 sum of one of position, at most quadratic, and one of attitude; FLOW, "steady", "uniform" or "varying" water (see Spec.flow);
 NOISE, the law draws random numbers.
+
+Without `params` the struct holds the numbers that the host's Term declares, as lanes and 3-vectors of lanes.
 """
-
-from lgvi_kernels.laws import (
-    control_fins,
-    cross_flow,
-    current,
-    current_harmonics,
-    current_profile,
-    drag,
-    drag_directions,
-    drag_matrix,
-    drag_matrix_turned,
-    fins,
-    gauss_markov_current,
-    lift,
-    restoring,
-    stratification,
-    tether,
-    thrusters,
-    thrusters_polynomial,
-    waves,
-    weight,
-    wrench,
-    wrench_noise,
-    wrench_schedule,
-)
-
-LAWS = {
-    "weight": weight,
-    "restoring": restoring,
-    "drag": drag,
-    "drag_directions": drag_directions,
-    "drag_matrix": drag_matrix,
-    "drag_matrix_turned": drag_matrix_turned,
-    "fins": fins,
-    "control_fins": control_fins,
-    "cross_flow": cross_flow,
-    "lift": lift,
-    "current": current,
-    "current_profile": current_profile,
-    "tether": tether,
-    "thrusters": thrusters,
-    "thrusters_polynomial": thrusters_polynomial,
-    "wrench": wrench,
-    "wrench_schedule": wrench_schedule,
-    "current_harmonics": current_harmonics,
-    "waves": waves,
-    "gauss_markov_current": gauss_markov_current,
-    "wrench_noise": wrench_noise,
-    "stratification": stratification,
-}

@@ -1,6 +1,5 @@
 """Tether: a spring from a fixed anchor to a point of the vehicle, slack below its rest length."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -11,8 +10,6 @@ from lgvi_kernels.law import (  # noqa: F401
     div,
     dot,
     greatest,
-    lane,
-    lane3,
     mul,
     ones,
     root,
@@ -23,21 +20,6 @@ from lgvi_kernels.law import (  # noqa: F401
 )
 
 POTENTIAL = True
-
-
-@functools.cache
-def params(width, real):
-    """Params: anchor [m, inertial], attachment [m, body axes], stiffness [N/m], rest_length [m]."""
-    Lane, Lane3 = lane(width, real), lane3(width, real)
-
-    @wp.struct
-    class Tether:
-        anchor: Lane3
-        attachment: Lane3
-        stiffness: Lane
-        rest_length: Lane
-
-    return Tether
 
 
 @wp.func

@@ -1,17 +1,10 @@
 """A constant wrench in body axes."""
 
-import functools
 from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import add, lane3, struct  # noqa: F401
-
-
-@functools.cache
-def params(width, real):
-    """Params: force [N] and torque [N m] about the origin of the forces."""
-    return struct("HeldWrench", force=lane3(width, real), torque=lane3(width, real))
+from lgvi_kernels.law import add  # noqa: F401
 
 
 @wp.func

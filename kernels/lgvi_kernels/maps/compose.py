@@ -5,6 +5,7 @@ from typing import Any
 
 import warp as wp
 
+from lgvi_kernels.lanes.arithmetic import lane, lane3
 from lgvi_kernels.lanes.state import struct
 
 
@@ -20,15 +21,26 @@ def plays(law, role):
     return getattr(law, role, None)
 
 
+def numbers_struct(law, numbers, width, real):
+    """A law's struct of declared numbers, given by name and length: 1 for a lane, 3 for a 3-vector of lanes."""
+    name = getattr(law, "__name__", "").rpartition(".")[2]
+    name = f"numbers_{name}" if name.isidentifier() else "numbers"  # a user's file may have any name
+    kinds = {1: lane(width, real), 3: lane3(width, real)}
+    fields = {key: kinds[length] for key, length in numbers}
+    return struct(name, **fields or {"unused": wp.uint8})
+
+
 @functools.cache
-def params_of(laws, width, real):
+def params_of(laws, numbers, width, real):
     """The parameters of several laws, nested: `own`, those of the first law, and `rest`, the same struct of the others.
 
-    The functions of superpose nest alike: each hands `rest` on and reads `own`, without a name for each law.
+    The functions of superpose nest alike: each hands `rest` on and reads `own`, without a name for each law. numbers: for each
+    law the (name, length) of the numbers that its Term declares, of which the struct of a law without `params` is made.
     """
     if not laws:
         return struct("NoParams", unused=wp.uint8)
-    return struct("Params", own=laws[0].params(width, real), rest=params_of(laws[1:], width, real))
+    make = getattr(laws[0], "params", None) or functools.partial(numbers_struct, laws[0], numbers[0])
+    return struct("Params", own=make(width, real), rest=params_of(laws[1:], numbers[1:], width, real))
 
 
 @functools.cache

@@ -1,17 +1,10 @@
 """A member reaches the time at which it stops."""
 
-import functools
 from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import lane, mul, ones, struct, sub  # noqa: F401
-
-
-@functools.cache
-def params(width, real):
-    """Params: at [s]."""
-    return struct("StopTime", at=lane(width, real))
+from lgvi_kernels.law import mul, ones, sub  # noqa: F401
 
 
 @wp.func

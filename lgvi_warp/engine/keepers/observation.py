@@ -14,9 +14,10 @@ from lgvi_warp.engine.keepers.statistics import Gathered
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.events import Event
 from lgvi_warp.scene.settings import check_keep
-from lgvi_warp.statistics import Estimate, Estimates, Quantity, Statistic
-from lgvi_warp.statistics.base import from_list
+from lgvi_warp.statistics.base import Statistic, from_list
 from lgvi_warp.statistics.ends import check_outcomes, outcomes
+from lgvi_warp.statistics.estimate import Estimate, Estimates
+from lgvi_warp.statistics.quantity import Quantity
 from lgvi_warp.statistics.until import Until, Watch, from_dict, watch
 
 # Samplings whose means are at least as close as those of independent members.

@@ -16,6 +16,7 @@ from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.machine import default_width
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
+from lgvi_warp.engine.kernel_choice import declared
 from lgvi_warp.engine.packets import Packets, pack
 from lgvi_warp.physics import inertia, notation, vehicle
 from lgvi_warp.physics.inertia import Frame
@@ -256,7 +257,7 @@ def _built(term: Term, module: Any, width: int) -> Any:
         "lanes that are used; no `if` on a lane, no plain number times a lane: docs/develop/add_a_force.md"
     )
     try:
-        examine = make_examine(module, width, wp.float64)
+        examine = make_examine(module, declared(term, module), width, wp.float64)
         kernel_cache.load(examine.kernel.module)
     except OSError:  # of the kernel cache
         raise

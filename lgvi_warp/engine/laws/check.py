@@ -8,15 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lgvi_kernels.laws import LAWS
-from lgvi_kernels.stops import STOPS
+from lgvi_kernels import built_in
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.machine import default_width
 from lgvi_warp.engine import kernel_choice
 from lgvi_warp.engine.laws.bench import ORIGIN, TURN, Bank, Bench, Views, short, simple_scene, sizes
 from lgvi_warp.physics import notation, terms
 from lgvi_warp.physics.terms.base import Packed, PackingContext, Term
-from lgvi_warp.physics.terms.events import Event
 from lgvi_warp.scene.scene import Scene
 
 EPS = float(np.finfo(np.float64).eps)
@@ -105,8 +103,7 @@ def check_law(
     """
     if not isinstance(term, Term):
         raise SceneError([f"term = {term!r}: is no term; give an object such as lw.Drag(...), not its class"])
-    known, roles = (STOPS, ("distance",)) if isinstance(term, Event) else (LAWS, kernel_choice.ROLES)
-    module = kernel_choice.device_module(term, term.device_in(False), known, *roles)
+    module = kernel_choice.device_module(term, term.device_in(False), built_in)
     bench = Bench(term, module, scene or simple_scene(), max(1, -(-samples // default_width("float64"))), seed)
     checks: list[Check] = []
     for examine in (_numbers, _finite, _whole, _potential, _damping, _flow):

@@ -2,31 +2,21 @@
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from lgvi_warp.common import registry
 from lgvi_warp.common.errors import Faults, SceneError, closest, shown
 from lgvi_warp.common.names import folded
-from lgvi_warp.physics.terms.base import AnyTerm, Packed, PackingContext, Term, build, few_enough, number
-from lgvi_warp.physics.terms.control_fins import ControlFins
-from lgvi_warp.physics.terms.cross_flow import CrossFlow
-from lgvi_warp.physics.terms.current import Current, CurrentProfile
-from lgvi_warp.physics.terms.current_harmonics import CurrentHarmonics
-from lgvi_warp.physics.terms.drag import Drag, DragMatrix
-from lgvi_warp.physics.terms.fins import Fins
-from lgvi_warp.physics.terms.gauss_markov_current import GaussMarkovCurrent
+from lgvi_warp.physics.terms.base import AnyTerm, Term, build, few_enough
 from lgvi_warp.physics.terms.hydrostatics import Restoring, Weight
-from lgvi_warp.physics.terms.lift import BodyLift
-from lgvi_warp.physics.terms.stratification import Stratification
-from lgvi_warp.physics.terms.tether import Tether
-from lgvi_warp.physics.terms.thrusters import Thrusters
-from lgvi_warp.physics.terms.waves import Waves
-from lgvi_warp.physics.terms.wrench import Wrench, WrenchSchedule
-from lgvi_warp.physics.terms.wrench_noise import WrenchNoise
 
-# Classes of terms by their type in a scene file.
+# Classes of terms by their type in a scene file, each also an attribute of this package.
+registry.load_modules(sys.modules[__name__])
 TYPES = Term.kinds
+globals().update({kind.__name__: kind for kind in TYPES.values()})
 
 # Names that no term may have: its parameters would be mixed with those of the scene.
 RESERVED = ("vehicle", "environment", "start")
@@ -36,7 +26,9 @@ IMPLIED: tuple[Term, ...] = (Weight(), Restoring())
 
 
 def register_term(kind: type[AnyTerm]) -> type[AnyTerm]:
-    """Make a user's term or event known to scene files by its `type`. It may be used as a decorator of the class.
+    """Check that scene files know a user's term or event by its `type`. It may be used as a decorator of the class.
+
+    A class is known as soon as it is made, if its `type` is not taken; this function says so where it is.
 
     Args:
         kind: Subclass of `Term` or `Event` with a `type` of its own.
@@ -45,35 +37,11 @@ def register_term(kind: type[AnyTerm]) -> type[AnyTerm]:
         The same class.
 
     Raises:
-        ValueError: Where `type` is empty or taken.
+        ValueError: Where `type` is empty or taken by another class.
     """
-    known: dict[str, Any] = kind.kinds
-    if not kind.type or kind.type in known or kind.type in ("weight", "restoring"):
+    if not registry.add(kind.kinds, kind):
         raise ValueError(f"{kind.__name__}.type = {kind.type!r}: give a type that no other term has")
-    known[kind.type] = kind
     return kind
-
-
-for _kind in (
-    Drag,
-    DragMatrix,
-    Current,
-    CurrentProfile,
-    Tether,
-    Thrusters,
-    Wrench,
-    WrenchSchedule,
-    CurrentHarmonics,
-    Waves,
-    GaussMarkovCurrent,
-    WrenchNoise,
-    Stratification,
-    Fins,
-    ControlFins,
-    CrossFlow,
-    BodyLift,
-):
-    TYPES[_kind.type] = _kind
 
 
 def from_list(given: Any) -> tuple[Term, ...]:
@@ -125,41 +93,11 @@ def _from_table(where: str, table: Any) -> Term:
         remedy = "write a table with type = ..., or give a term such as lw.Drag(quadratic=...)"
         raise SceneError([f"{where} = {shown(table)}: is no term; {remedy}"])
     word = table.get("type", "")
+    implied = [one.type for one in IMPLIED]
     kind = TYPES.get(word) if isinstance(word, str) else None
-    if kind is None:
-        implied = word in ("weight", "restoring", "buoyancy")
-        remedy = "leave it out: it follows from the vehicle" if implied else closest(word, TYPES)
+    if kind is None or word in implied:
+        follows = word in (*implied, "buoyancy")
+        known = sorted(TYPES.keys() - implied)
+        remedy = "leave it out: it follows from the vehicle" if follows else closest(word, known)
         raise SceneError([f"{where}.type = {shown(word)}: is not known; {remedy}"])
     return build(where, kind, table)
-
-
-__all__ = [
-    "IMPLIED",
-    "TYPES",
-    "BodyLift",
-    "ControlFins",
-    "CrossFlow",
-    "Current",
-    "CurrentHarmonics",
-    "CurrentProfile",
-    "Drag",
-    "DragMatrix",
-    "Fins",
-    "GaussMarkovCurrent",
-    "Packed",
-    "PackingContext",
-    "Restoring",
-    "Stratification",
-    "Term",
-    "Tether",
-    "Thrusters",
-    "Waves",
-    "Weight",
-    "Wrench",
-    "WrenchNoise",
-    "WrenchSchedule",
-    "build",
-    "from_list",
-    "number",
-    "register_term",
-]

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
-from lgvi_warp.common import names
+from lgvi_warp.common import names, registry
 from lgvi_warp.common.errors import Faults, SceneError, ragged
 from lgvi_warp.physics.inertia import Frame
 
@@ -60,7 +60,15 @@ class Packed(NamedTuple):
 
 
 def number(
-    shape: tuple[Any, ...], unit: str, default: Any = dataclasses.MISSING, least: float = -np.inf, most: float = np.inf
+    shape: tuple[Any, ...],
+    unit: str,
+    default: Any = dataclasses.MISSING,
+    least: float = -np.inf,
+    most: float = np.inf,
+    *,
+    above: float = -np.inf,
+    rising: bool = False,
+    axes: str | None = None,
 ) -> Any:
     """Declare a numeric field of a term.
 
@@ -71,11 +79,21 @@ def number(
         default: Value where the user gives none; without it the field must be given.
         least: Smallest value that is allowed, in the field's unit.
         most: Largest value that is allowed, in the field's unit.
+        above: Bound that every value must exceed, in the field's unit.
+        rising: Whether the values must rise, as places of a table do; False by default.
+        axes: How `Term.packed` turns the field for the device: "vector" of the body, into the kernel's axes; "point" of the
+            body, in these axes from the origin of the forces; None, the default, not at all: a number without axes, or
+            inertial ones.
 
     Returns:
-        A dataclass field with shape, unit and bounds in its metadata.
+        A dataclass field with shape, unit, bounds and axes in its metadata.
+
+    Raises:
+        ValueError: Where `axes` is none of these.
     """
-    meta = {"shape": shape, "unit": unit, "least": least, "most": most}
+    if axes not in ("vector", "point", None):
+        raise ValueError(f"axes = {axes!r}: is not known; give 'vector', 'point' or None")
+    meta = dict(shape=shape, unit=unit, least=least, most=most, above=above, rising=rising, axes=axes)
     if default is dataclasses.MISSING:
         return field(metadata=meta)
     return field(default=default, metadata=meta)
@@ -87,9 +105,9 @@ class Term:
 
     Fields declared by `number` are arrays after construction.
 
-    Class attributes: `type` is the name in a scene file; `device` is the module of lgvi_kernels.laws by name, or any object
-    with the same functions; `timed` says whether the law depends on time; `dissipative`, whether its damping never creates
-    energy. docs/develop/add_a_force.md shows how to write one.
+    Class attributes: `type` is the name in a scene file, which knows the class as soon as it is made; `device` is the module
+    of lgvi_kernels.laws by name, or any object with the same functions; `timed` says whether the law depends on time;
+    `dissipative`, whether its damping never creates energy. docs/develop/add_a_force.md shows how to write one.
 
     Args:
         name: Name of the term in parameters ("name.field"), which tells two terms of one type apart; by default the type.
@@ -108,6 +126,10 @@ class Term:
     dissipative: ClassVar[bool] = True
 
     name: str = ""
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        registry.add(cls.kinds, cls)
 
     def __post_init__(self) -> None:
         faults = Faults(f"{self.key}.")
@@ -131,6 +153,18 @@ class Term:
             The dataclass fields declared by `number`, in the order of the class.
         """
         return tuple(item for item in dataclasses.fields(cls) if "shape" in item.metadata)
+
+    @classmethod
+    def lanes(cls) -> tuple[tuple[str, int], ...] | None:
+        """The numbers as fields of a device struct that follows from them.
+
+        Returns:
+            (name, length) of each number, with length 1 for the shape () and 3 for (3,). None where one has another shape.
+        """
+        lengths = {(): 1, (3,): 3}
+        shapes = {item.name: item.metadata["shape"] for item in cls.number_fields()}
+        simple = all(shape in lengths for shape in shapes.values())
+        return tuple((name, lengths[shape]) for name, shape in shapes.items()) if simple else None
 
     @property
     def key(self) -> str:
@@ -163,10 +197,8 @@ class Term:
         """
         bad = {}
         for item in self.number_fields():
-            value = numbers[item.name].reshape(len(numbers[item.name]), -1)
-            low, high = item.metadata["least"], item.metadata["most"]
-            with np.errstate(invalid="ignore"):
-                bad[item.name] = ~np.all(np.isfinite(value) & (value >= low) & (value <= high), axis=1)
+            value = numbers[item.name]
+            bad[item.name] = _outside(item, value) | _falling(item, value)
         return bad
 
     def present(self, numbers: Numbers) -> bool:
@@ -210,7 +242,9 @@ class Term:
         return self.device
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """Pack the term's numbers for its device code, in the kernel's axes. Every term must define this.
+        """Pack the term's numbers for its device code, in the kernel's axes.
+
+        By default each number is a field of the struct, turned as its `axes` say.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...), n = 1 where members share them.
@@ -220,11 +254,15 @@ class Term:
             The fields of the device struct, and the rows, memory and scratch rows that the device code needs.
 
         Raises:
-            NotImplementedError: Where the term does not define it.
+            NotImplementedError: Where the term does not define it, and has a number of another shape than () and (3,).
         """
-        raise NotImplementedError(
-            f"{type(self).__name__} must define packed(numbers, context): see docs/develop/add_a_force.md"
-        )
+        if self.lanes() is None:
+            raise NotImplementedError(
+                f"{type(self).__name__} must define packed(numbers, context): see docs/develop/add_a_force.md"
+            )
+        frame = context.frame
+        turned: dict[str | None, Any] = {"vector": frame.vector, "point": frame.point, None: np.asarray}
+        return Packed({item.name: turned[item.metadata["axes"]](numbers[item.name]) for item in self.number_fields()})
 
     def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray | None:
         """Velocity of the water that this term moves; by default it moves none.
@@ -304,14 +342,33 @@ def _checked(faults: Faults, one: dataclasses.Field[Any], value: Any, lengths: d
         lengths |= {size: got for size, got in zip(shape, array.shape, strict=True) if isinstance(size, str)}
     else:
         array = faults.finite(one.name, value, shape, unit)
-    if array is not None and (np.any(array < meta["least"]) or np.any(array > meta["most"])):
-        low, high = meta["least"], meta["most"]
-        bounds = (
-            f"from {low:g}" + (f" to {high:g}" if np.isfinite(high) else "") if np.isfinite(low) else f"to {high:g}"
-        )
-        faults.add(one.name, value, "is out of bounds", f"give numbers {bounds} [{unit}]")
+    if array is None:
         return None
-    return array
+    if _outside(one, array[None]).any():
+        words = ((meta["above"], "above"), (meta["least"], "from"), (meta["most"], "to"))
+        bounds = " ".join(f"{word} {bound:g}" for bound, word in words if np.isfinite(bound))
+        problem = "is not positive" if meta["above"] == 0.0 and np.any(array <= 0.0) else "is out of bounds"
+        faults.add(one.name, value, problem, f"give numbers {bounds} [{unit}]")
+    elif _falling(one, array[None]).any():
+        faults.add(one.name, value, "is not rising", "sort the table and drop repetitions")
+    else:
+        return array
+    return None
+
+
+def _outside(one: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
+    """Mask (n,) of the members whose values (n, ...) of a field are not finite, or out of its bounds."""
+    flat, meta = values.reshape(len(values), -1), one.metadata
+    with np.errstate(invalid="ignore"):
+        inside = (flat >= meta["least"]) & (flat <= meta["most"]) & (flat > meta["above"])
+    return ~np.all(np.isfinite(flat) & inside, axis=1)
+
+
+def _falling(one: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
+    """Mask (n,) of the members whose values (n, k) of a field do not rise, though they must."""
+    if not one.metadata["rising"]:
+        return np.zeros(len(values), bool)
+    return np.any(np.diff(np.nan_to_num(values)) <= 0.0, axis=1)
 
 
 def knots(at: np.ndarray, values: np.ndarray, steps: bool = False) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number
 from lgvi_warp.physics.terms.fins import Fins, fin_rows, side_by_side
-from lgvi_warp.physics.terms.wrench import commands, first_row, not_rising, refuse_idle, rising
+from lgvi_warp.physics.terms.wrench import commands, first_row, refuse_idle
 
 # From this rate on [rad/s] a limit counts as none.
 UNLIMITED = 1e6
@@ -42,7 +42,7 @@ class ControlFins(Fins):
     limit: Any = number(("n",), "rad", 0.35, least=0.0)
     rate_limit: Any = number(("n",), "rad/s", UNLIMITED, least=0.0)
     command: Any = number(("n",), "rad", None)
-    times: Any = number(("k",), "s", None)
+    times: Any = number(("k",), "s", None, rising=True)
     command_schedule: Any = number(("k", "n"), "rad", None)
 
     def __post_init__(self) -> None:
@@ -58,19 +58,16 @@ class ControlFins(Fins):
         super().__post_init__()
 
     def check(self, faults: Faults) -> None:
-        """In addition, adds a fault where times do not rise or the command is given twice."""
+        """In addition, adds a fault where the command is given twice."""
         super().check(faults)
-        rising(faults, "times", self.times)
         if self.__dict__["_both"]:
             faults.add("command", self.command, "is given beside command_schedule", "keep one of them")
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, refuses times that do not rise; raises SceneError for members' numbers that would have no effect."""
-        bad = super().unphysical(numbers)
-        bad["times"] = bad["times"] | not_rising(numbers["times"])
+        """In addition, raises SceneError for members' numbers that would have no effect."""
         remedy = f"give {self.key}.rate_limit below {UNLIMITED:g} rad/s in the scene as well"
         refuse_idle(self, numbers, "rate_limit", numbers["rate_limit"] < UNLIMITED, remedy)
-        return bad
+        return super().unphysical(numbers)
 
     @property
     def memory(self) -> bool:

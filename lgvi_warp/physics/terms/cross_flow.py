@@ -10,7 +10,6 @@ import numpy as np
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 from lgvi_warp.physics.terms.fins import side_by_side, twist
-from lgvi_warp.physics.terms.wrench import not_rising, rising
 
 # The two Gauss points of a segment from 0 to 1.
 GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
@@ -35,7 +34,7 @@ class CrossFlow(Term):
     type: ClassVar[str] = "cross_flow"
     device: ClassVar[str] = "cross_flow"
 
-    stations: Any = number(("k",), "m")
+    stations: Any = number(("k",), "m", rising=True)
     diameters: Any = number(("k",), "m", least=0.0)
     drag_coefficient: Any = number(("k",), "1", least=0.0)
 
@@ -46,16 +45,9 @@ class CrossFlow(Term):
         super().__post_init__()
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where stations do not rise or are fewer than two."""
-        rising(faults, "stations", self.stations)
+        """Adds a fault where stations are fewer than two."""
         if len(self.stations) < 2:
             faults.add("stations", self.stations, "has one station", "give two or more, from stern to bow")
-
-    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, refuses members whose stations do not rise."""
-        bad = super().unphysical(numbers)
-        bad["stations"] = bad["stations"] | not_rising(numbers["stations"])
-        return bad
 
     def present(self, numbers: Numbers) -> bool:
         """Whether some member has a diameter and a drag coefficient above 0."""

@@ -7,9 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number
-from lgvi_warp.physics.terms.wrench import not_rising, rising
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -28,10 +26,6 @@ class Current(Term):
     def present(self, numbers: Numbers) -> bool:
         """Whether the current of some member is not zero."""
         return bool(np.any(numbers["velocity"]))
-
-    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The velocity unchanged: the kernel's inertial axes are the user's."""
-        return Packed({"velocity": numbers["velocity"]})
 
     def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
         return np.broadcast_to(numbers["velocity"], position.shape)
@@ -52,17 +46,8 @@ class CurrentProfile(Term):
     type: ClassVar[str] = "current_profile"
     device: ClassVar[str] = "current_profile"
 
-    depths: Any = number(("k",), "m")
+    depths: Any = number(("k",), "m", rising=True)
     velocities: Any = number(("k", 3), "m/s")
-
-    def check(self, faults: Faults) -> None:
-        """Adds a fault where depths do not rise."""
-        rising(faults, "depths", self.depths)
-
-    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, refuses members whose depths do not rise."""
-        bad = super().unphysical(numbers)
-        return bad | {"depths": bad["depths"] | not_rising(numbers["depths"])}
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The table as device rows, knot by knot."""

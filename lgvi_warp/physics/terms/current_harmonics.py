@@ -7,56 +7,43 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 
 
-def above_zero(faults: Faults, key: str, values: np.ndarray, unit: str) -> None:
-    """Add a fault where some number is not above 0.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Harmonics(Term):
+    """A sum of components in time, each with an amplitude, a period and a phase. Abstract.
 
     Args:
-        faults: Collects the faults.
-        key: Name of the field.
-        values: Numbers of any shape.
-        unit: Unit of the numbers, for the message.
+        amplitudes: Amplitudes, k of them.
+        periods: Periods, (k,) [s], above 0.
+        phases: Phases at t = 0, (k,) [rad]; 0 by default.
     """
-    if np.any(values <= 0.0):
-        faults.add(key, values, "is not positive", f"give numbers above 0 [{unit}]")
 
+    timed: ClassVar[bool] = True
 
-def not_above_zero(values: np.ndarray) -> np.ndarray:
-    """Which members have a number that is not above 0.
+    amplitudes: Any = number(("k",), "1")
+    periods: Any = number(("k",), "s", above=0.0)
+    phases: Any = number(("k",), "rad", None)
 
-    Args:
-        values: Numbers (n, ...).
+    def __post_init__(self) -> None:
+        if self.phases is None:
+            count = len(np.atleast_1d(np.asarray(self.amplitudes, dtype=object)))
+            object.__setattr__(self, "phases", np.zeros(count))
+        super().__post_init__()
 
-    Returns:
-        Mask (n,), True also where a number is NaN.
-    """
-    with np.errstate(invalid="ignore"):
-        return ~np.all(values.reshape(len(values), -1) > 0.0, axis=1)
-
-
-def zeros_like_first(values: Any) -> np.ndarray:
-    """Default phases: one zero for each component.
-
-    Args:
-        values: The components, a sequence of length k or one number.
-
-    Returns:
-        Zeros (k,).
-    """
-    return np.zeros(len(np.atleast_1d(np.asarray(values, dtype=object))))
+    def present(self, numbers: Numbers) -> bool:
+        """Whether some amplitude of some member is not zero."""
+        return bool(np.any(numbers["amplitudes"]))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class CurrentHarmonics(Term):
+class CurrentHarmonics(Harmonics):
     """A uniform current that is a sum of harmonics, u(t) = sum of amplitude cos(2 pi t / period + phase).
 
     Args:
         amplitudes: Amplitudes, (k, 3) [m/s], in inertial axes.
-        periods: Periods, (k,) [s], above 0.
-        phases: Phases at t = 0, (k,) [rad]; 0 by default.
+        periods, phases: As of `Harmonics`.
 
     Raises:
         SceneError: Where a period is not above 0, and as `Term`.
@@ -64,29 +51,8 @@ class CurrentHarmonics(Term):
 
     type: ClassVar[str] = "current_harmonics"
     device: ClassVar[str] = "current_harmonics"
-    timed: ClassVar[bool] = True
 
     amplitudes: Any = number(("k", 3), "m/s")
-    periods: Any = number(("k",), "s")
-    phases: Any = number(("k",), "rad", None)
-
-    def __post_init__(self) -> None:
-        if self.phases is None:
-            object.__setattr__(self, "phases", zeros_like_first(self.amplitudes))
-        super().__post_init__()
-
-    def check(self, faults: Faults) -> None:
-        """Adds a fault where a period is not above 0."""
-        above_zero(faults, "periods", self.periods, "s")
-
-    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, refuses members with a period that is not above 0."""
-        bad = super().unphysical(numbers)
-        return bad | {"periods": bad["periods"] | not_above_zero(numbers["periods"])}
-
-    def present(self, numbers: Numbers) -> bool:
-        """Whether some amplitude of some member is not zero."""
-        return bool(np.any(numbers["amplitudes"]))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Device rows of each harmonic: amplitude, angular frequency [rad/s], phase."""

@@ -10,15 +10,15 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError, closest, shown
 from lgvi_warp.common.status import Status
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, build, few_enough, number
+from lgvi_warp.physics.terms.base import Numbers, Term, build, few_enough, number
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Event(Term):
     """A condition that stops a member as soon as its distance, positive while the member goes on, is 0 or below.
 
-    Class attributes: `device` is the name of a module of lgvi_kernels.stops, or any object with `params(width, real)` and
-    `distance(view, p)`; `status` is the status of a member that it stopped.
+    Class attributes: `device` is the name of a module of lgvi_kernels.stops, or any object with `distance(view, p)`;
+    `status` is the status of a member that it stopped. Distances look at the position of the body's origin, in inertial axes.
 
     Args:
         name: Name of the event in parameters ("name.field"); by default its type.
@@ -27,10 +27,6 @@ class Event(Term):
     status: ClassVar[Status] = Status.CONDITION
     kinds: ClassVar[dict[str, Any]] = {}
     acts: ClassVar[bool] = False
-
-    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The numbers unchanged: events look at the position of the body's origin, in inertial axes."""
-        return Packed(dict(numbers))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -110,7 +106,6 @@ class StopTime(Event):
 
 
 TYPES = Event.kinds
-TYPES.update({kind.type: kind for kind in (Surface, Floor, Box, StopTime)})
 
 
 def from_list(given: Any) -> tuple[Event, ...]:

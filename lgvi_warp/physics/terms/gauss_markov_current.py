@@ -10,7 +10,6 @@ import numpy as np
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.random import uniforms_of
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
-from lgvi_warp.physics.terms.current_harmonics import above_zero, not_above_zero
 from lgvi_warp.physics.terms.wrench_noise import noise_key
 
 STARTS = ("zero", "stationary")
@@ -34,18 +33,12 @@ class GaussMarkovCurrent(Term):
     timed: ClassVar[bool] = True
 
     standard_deviation: Any = number((3,), "m/s", least=0.0)
-    time_constant: Any = number((), "s")
+    time_constant: Any = number((), "s", above=0.0)
     start: str = "zero"
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where the time constant is not above 0, or `start` is unknown."""
-        above_zero(faults, "time_constant", self.time_constant, "s")
+        """Adds a fault where `start` is unknown."""
         faults.choice("start", self.start, STARTS)
-
-    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, refuses members whose time constant is not above 0."""
-        bad = super().unphysical(numbers)
-        return bad | {"time_constant": bad["time_constant"] | not_above_zero(numbers["time_constant"])}
 
     def present(self, numbers: Numbers) -> bool:
         """Whether some standard deviation is not zero."""

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
+from lgvi_warp.physics.terms.base import Numbers, Term, number
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -26,18 +26,13 @@ class Tether(Term):
 
     anchor: Any = number((3,), "m")
     stiffness: Any = number((), "N/m", least=0.0)
-    attachment: Any = number((3,), "m", (0.0, 0.0, 0.0))
+    attachment: Any = number((3,), "m", (0.0, 0.0, 0.0), axes="point")
     rest_length: Any = number((), "m", 0.0, least=0.0)
 
     @property
     def conserves(self) -> frozenset[str]:
         """Energy only: the anchor takes up momentum."""
         return frozenset({"energy"})
-
-    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The numbers, with the attachment from the origin of the forces in the kernel's axes."""
-        values = {key: numbers[key] for key in ("anchor", "stiffness", "rest_length")}
-        return Packed(values | {"attachment": context.frame.point(numbers["attachment"])})
 
     def potential(
         self, numbers: Numbers, position: np.ndarray, attitude: np.ndarray, parameters: Numbers

@@ -9,7 +9,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number
-from lgvi_warp.physics.terms.wrench import commands, first_row, not_rising, refuse_idle, rising
+from lgvi_warp.physics.terms.wrench import commands, first_row, refuse_idle
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -52,7 +52,7 @@ class Thrusters(Term):
     limit: Any = number(("n",), "unit", None, least=0.0)
     time_constant: Any = number(("n",), "s", None, least=0.0)
     command: Any = number(("n",), "unit", None)
-    times: Any = number(("k",), "s", None)
+    times: Any = number(("k",), "s", None, rising=True)
     command_schedule: Any = number(("k", "n"), "unit", None)
 
     def __post_init__(self) -> None:
@@ -141,23 +141,21 @@ class Thrusters(Term):
         return np.clip(least_commands, -self.limit, self.limit)
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where a direction has no length, times do not rise, or the command is given twice."""
+        """Adds a fault where a direction has no length, or the command is given twice."""
         zero = np.flatnonzero(np.linalg.norm(self.direction, axis=1) == 0.0)
         if len(zero):
             remedy = "give the direction that the thrust pushes the vehicle, such as [1, 0, 0]"
             faults.add(f"direction[{zero[0]}]", self.direction[zero[0]], "has zero length", remedy)
-        rising(faults, "times", self.times)
         if self.__dict__["_both"]:
             faults.add("command", self.command, "differs from the first of command_schedule", "keep one of them")
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, refuses directions without length and times that do not rise.
+        """In addition, refuses directions without length.
 
         Raises SceneError for members' numbers that would have no effect.
         """
         bad = super().unphysical(numbers)
         bad["direction"] = bad["direction"] | np.any(~np.any(numbers["direction"], axis=-1), axis=-1)
-        bad["times"] = bad["times"] | not_rising(numbers["times"])
         remedy = f"give {self.key}.time_constant above 0 [s] in the scene as well"
         refuse_idle(self, numbers, "time_constant", numbers["time_constant"] > 0.0, remedy)
         self._refuse_idle_polynomial(numbers)

@@ -8,19 +8,18 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
-from lgvi_warp.physics.terms.current_harmonics import above_zero, not_above_zero, zeros_like_first
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
+from lgvi_warp.physics.terms.current_harmonics import Harmonics
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Waves(Term):
+class Waves(Harmonics):
     """A sum of linear waves in deep water, of wavenumber (2 pi / period)^2 / environment.gravity.
 
     Args:
         amplitudes: Amplitudes of the surface, (k,) [m].
-        periods: Periods, (k,) [s], above 0.
+        periods, phases: As of `Harmonics`, the phases at the inertial origin.
         headings_deg: Directions in which the waves travel, (k,) [deg] from north.
-        phases: Phases at the inertial origin and t = 0, (k,) [rad]; 0 by default.
 
     Raises:
         SceneError: Where a period is not above 0, and as `Term`.
@@ -28,30 +27,9 @@ class Waves(Term):
 
     type: ClassVar[str] = "waves"
     device: ClassVar[str] = "waves"
-    timed: ClassVar[bool] = True
 
     amplitudes: Any = number(("k",), "m", least=0.0)
-    periods: Any = number(("k",), "s")
     headings_deg: Any = number(("k",), "deg")
-    phases: Any = number(("k",), "rad", None)
-
-    def __post_init__(self) -> None:
-        if self.phases is None:
-            object.__setattr__(self, "phases", zeros_like_first(self.amplitudes))
-        super().__post_init__()
-
-    def check(self, faults: Faults) -> None:
-        """Adds a fault where a period is not above 0."""
-        above_zero(faults, "periods", self.periods, "s")
-
-    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, refuses members with a period that is not above 0."""
-        bad = super().unphysical(numbers)
-        return bad | {"periods": bad["periods"] | not_above_zero(numbers["periods"])}
-
-    def present(self, numbers: Numbers) -> bool:
-        """Whether some amplitude of some member is not zero."""
-        return bool(np.any(numbers["amplitudes"]))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Device rows of each component; raises SceneError where there is no gravity, hence no wavenumber."""

@@ -58,7 +58,7 @@ class WrenchSchedule(Term):
     device: ClassVar[str] = "wrench_schedule"
     timed: ClassVar[bool] = True
 
-    times: Any = number(("k",), "s")
+    times: Any = number(("k",), "s", rising=True)
     force: Any = number(("k", 3), "N")
     torque: Any = number(("k", 3), "N m", None)
     interpolation: str = "linear"
@@ -69,14 +69,8 @@ class WrenchSchedule(Term):
         super().__post_init__()
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where times do not rise, or the interpolation is unknown."""
-        rising(faults, "times", self.times)
+        """Adds a fault where the interpolation is unknown."""
         faults.choice("interpolation", self.interpolation, SHAPES)
-
-    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, refuses members whose times do not rise."""
-        bad = super().unphysical(numbers)
-        return bad | {"times": bad["times"] | not_rising(numbers["times"])}
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Two tables: the force, and the torque about the origin of the forces."""
@@ -88,18 +82,6 @@ class WrenchSchedule(Term):
         n = max(len(table) for table in tables)
         rows = np.concatenate([np.broadcast_to(table, (n, table.shape[1])) for table in tables], axis=1)
         return Packed({"count": numbers["times"].shape[1] - 1}, rows)
-
-
-def not_rising(values: np.ndarray) -> np.ndarray:
-    """Which members have a table whose places do not rise.
-
-    Args:
-        values: Places (n, k).
-
-    Returns:
-        Mask (n,).
-    """
-    return np.any(np.diff(np.nan_to_num(values)) <= 0.0, axis=1)
 
 
 def first_row(schedule: Any) -> Any:
@@ -158,15 +140,3 @@ def refuse_idle(term: Any, numbers: Numbers, rate: str, remembers: np.ndarray, r
                 f"{name} of member {i}", numbers[name][i], f"does not act: the scene has {alternative}", what_to_do
             )
     faults.raise_if_any()
-
-
-def rising(faults: Faults, key: str, values: np.ndarray) -> None:
-    """Add a fault where the places of a table do not rise.
-
-    Args:
-        faults: Collects the faults.
-        key: Name of the field.
-        values: Places (k,).
-    """
-    if np.any(np.diff(values) <= 0.0):
-        faults.add(key, values, "is not rising", "sort the table and drop repetitions")

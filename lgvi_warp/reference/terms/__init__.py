@@ -1,6 +1,7 @@
-"""Laws of one vehicle, in the user's body axes and about his origin: frozen parameters and the methods of `Law`."""
+"""Laws of one vehicle, in the user's body axes and about his origin: numbers and the methods of `Law`."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -48,9 +49,15 @@ STILL = Flow(np.zeros(3), np.zeros(3), np.zeros((3, 3)))
 
 
 class Law:
-    """A law that does nothing; each overrides what it does."""
+    """A law that does nothing; each overrides what it does. Its numbers have the names and units of the term in lgvi_warp."""
 
     potential_force = False  # whether `wrench` follows from `potential`
+
+    def __init__(self, **numbers: Any) -> None:
+        vars(self).update(numbers)
+
+    def __getattr__(self, name: str) -> Any:
+        raise AttributeError(f"{type(self).__name__} has no number {name!r}")
 
     def wrench(self, view: View) -> tuple[Array, Array]:
         """Force [N] and torque [N m] from position, attitude and time, body axes."""

@@ -1,7 +1,5 @@
 """Control fins: fins whose deflection follows a command, within a limit and no faster than a rate."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from lgvi_warp.reference.rotation import Array
@@ -10,14 +8,8 @@ from lgvi_warp.reference.terms.fins import Fins
 from lgvi_warp.reference.terms.wrench import at_time
 
 
-@dataclass(frozen=True)
 class ControlFins(Fins):
-    """As Fins; limit (n,) [rad]; rate_limit (n,) [rad/s], inf for none; times (k,) [s] and command (k, n) [rad]."""
-
-    limit: Array
-    rate_limit: Array
-    times: Array
-    command: Array
+    """Numbers as those of `lw.ControlFins`, but rate_limit inf for none; times (k,) [s] and command (k, n) [rad]."""
 
     @property
     def limited(self) -> bool:

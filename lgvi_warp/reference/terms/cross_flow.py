@@ -1,7 +1,6 @@
 """Cross-flow drag of a slender hull along the body's x axis, by two Gauss points a segment."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,14 +8,8 @@ from lgvi_warp.reference.rotation import Array
 from lgvi_warp.reference.terms import Law, View
 
 
-@dataclass(frozen=True)
 class CrossFlow(Law):
-    """stations, diameters (k,) [m]; drag_coefficient (k,); density [kg/m3]."""
-
-    stations: Array
-    diameters: Array
-    drag_coefficient: Array
-    density: float
+    """Numbers as those of `lw.CrossFlow`; density [kg/m3]."""
 
     def points(self) -> list[tuple[float, float]]:
         """(x, weight times Cd D) of each Gauss point, Cd D linear in each segment."""

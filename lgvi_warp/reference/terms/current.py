@@ -1,30 +1,20 @@
 """Currents: steady and uniform, or by depth."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from lgvi_warp.reference.rotation import Array
 from lgvi_warp.reference.terms import Flow, Law, View
 
 
-@dataclass(frozen=True)
 class Current(Law):
-    """velocity (3,) [m/s], inertial."""
-
-    velocity: Array
+    """Numbers as those of `lw.Current`."""
 
     def flow(self, view: View) -> Flow:
         """The constant velocity, without derivatives."""
         return Flow(np.asarray(self.velocity), np.zeros(3), np.zeros((3, 3)))
 
 
-@dataclass(frozen=True)
 class CurrentProfile(Law):
-    """depths (k,) [m], rising; velocities (k, 3) [m/s], inertial: linear between, constant outside."""
-
-    depths: Array
-    velocities: Array
+    """Numbers as those of `lw.CurrentProfile`."""
 
     def flow(self, view: View) -> Flow:
         """u(b3), and its slope within the segment."""

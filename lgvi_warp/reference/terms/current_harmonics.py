@@ -1,20 +1,12 @@
 """A uniform current that is a sum of harmonics in time."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from lgvi_warp.reference.rotation import Array
 from lgvi_warp.reference.terms import Flow, Law, View
 
 
-@dataclass(frozen=True)
 class CurrentHarmonics(Law):
-    """amplitudes (k, 3) [m/s], inertial; periods (k,) [s]; phases (k,) [rad]."""
-
-    amplitudes: Array
-    periods: Array
-    phases: Array
+    """Numbers as those of `lw.CurrentHarmonics`."""
 
     def flow(self, view: View) -> Flow:
         """u = sum a cos(omega t + phase) and its derivative."""

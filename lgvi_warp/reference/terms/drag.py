@@ -1,19 +1,13 @@
 """Drag per axis, and by 6x6 matrices."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from lgvi_warp.reference.rotation import Array
 from lgvi_warp.reference.terms import Law, View
 
 
-@dataclass(frozen=True)
 class Drag(Law):
-    """linear (6,) [N s/m, N m s]; quadratic (6,) [N s2/m2, N m s2]: -(l + q|v|) v on each axis."""
-
-    linear: Array
-    quadratic: Array
+    """Numbers as those of `lw.Drag`: -(l + q|v|) v on each axis."""
 
     def damping(self, view: View) -> Array:
         """The diagonal matrix l + q|v|."""
@@ -48,12 +42,8 @@ class Drag(Law):
         return nu
 
 
-@dataclass(frozen=True)
 class DragMatrix(Law):
-    """linear (6, 6), quadratic (6, 6): force_i = -sum_j (linear_ij + quadratic_ij |v_j|) v_j."""
-
-    linear: Array
-    quadratic: Array
+    """Numbers as those of `lw.DragMatrix`: force_i = -sum_j (linear_ij + quadratic_ij |v_j|) v_j."""
 
     def damping(self, view: View) -> Array:
         """Each column of the quadratic matrix by its own speed."""

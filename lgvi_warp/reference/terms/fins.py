@@ -1,7 +1,6 @@
 """Fins, fixed and turned by a command: each seen from its own chord and normal."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,18 +8,8 @@ from lgvi_warp.reference.rotation import Array, cross
 from lgvi_warp.reference.terms import Law, View
 
 
-@dataclass(frozen=True)
 class Fins(Law):
-    """position, chord, normal (n, 3) [m, 1, 1]; area (n,) [m2]; lift_slope, drag, drag_normal (n,); density [kg/m3]."""
-
-    position: Array
-    chord: Array
-    normal: Array
-    area: Array
-    lift_slope: Array
-    drag: Array
-    drag_normal: Array
-    density: float
+    """Numbers as those of `lw.Fins`; density [kg/m3]."""
 
     def deflection(self, view: View) -> Array:
         """Angles (n,) [rad]: 0, since these fins do not turn."""

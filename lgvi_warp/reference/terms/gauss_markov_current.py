@@ -1,7 +1,6 @@
 """A uniform current that wanders: a first-order Gauss-Markov process."""
 
 import math
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -10,16 +9,13 @@ from lgvi_warp.reference.rotation import Array
 from lgvi_warp.reference.terms import Flow, Law, View
 
 
-@dataclass(frozen=True)
 class GaussMarkovCurrent(Law):
-    """standard_deviation (3,) [m/s], inertial; time_constant [s]; the key of its noise; initial (3,) [m/s]."""
+    """Numbers as those of `lw.GaussMarkovCurrent`; the key of its noise; initial (3,) [m/s]."""
 
-    standard_deviation: Array
-    time_constant: float
-    channel: int = 0
-    seed0: int = 0
-    seed1: int = 0
-    initial: Array = field(default_factory=lambda: np.zeros(3))
+    channel = 0
+    seed0 = 0
+    seed1 = 0
+    initial = np.zeros(3)
 
     def start(self) -> Array:
         """u during a kick, u at its end, du/dt."""

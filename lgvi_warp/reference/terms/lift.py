@@ -1,18 +1,13 @@
 """Lift of a hull in proportion to its speed ahead."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from lgvi_warp.reference.rotation import Array
 from lgvi_warp.reference.terms import Law, View
 
 
-@dataclass(frozen=True)
 class BodyLift(Law):
-    """matrix (6, 6): force_i = -u sum_j matrix_ij v_j."""
-
-    matrix: Array
+    """Numbers as those of `lw.BodyLift`: force_i = -u sum_j matrix_ij v_j."""
 
     def damping(self, view: View) -> Array:
         """D (6, 6): the speed ahead times the matrix."""

@@ -1,18 +1,14 @@
 """Restoring moment of buoyancy (section IV of Nordkvist & Sanyal 2010)."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from lgvi_warp.reference.rotation import Array, cross
 from lgvi_warp.reference.terms import Law, View
 
 
-@dataclass(frozen=True)
 class Restoring(Law):
     """moment: buoyancy times the lever B r (less weight times its own), (3,) [N m], from the body's origin."""
 
-    moment: Array
     potential_force = True
 
     def wrench(self, view: View) -> tuple[Array, Array]:

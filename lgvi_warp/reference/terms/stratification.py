@@ -1,21 +1,14 @@
 """Buoyancy that varies with depth: its deviation from the constant."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from lgvi_warp.reference.rotation import Array, cross
 from lgvi_warp.reference.terms import Law, View
 
 
-@dataclass(frozen=True)
 class Stratification(Law):
-    """gradient [1/m], reference_depth [m], buoyancy [N], center_of_buoyancy (3,) [m, body]."""
+    """Numbers as those of `lw.Stratification`; buoyancy [N], center_of_buoyancy (3,) [m, body]."""
 
-    gradient: float
-    reference_depth: float
-    buoyancy: float
-    center_of_buoyancy: Array
     potential_force = True
 
     def excess_depth(self, view: View) -> float:

@@ -1,21 +1,15 @@
 """Tether: a spring from an anchor to a point of the vehicle, slack below its rest length."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from lgvi_warp.reference.rotation import Array, cross, norm
 from lgvi_warp.reference.terms import Law, View
 
 
-@dataclass(frozen=True)
 class Tether(Law):
-    """anchor (3,) [m, inertial]; stiffness [N/m]; attachment (3,) [m, body]; rest_length [m]."""
+    """Numbers as those of `lw.Tether`."""
 
-    anchor: Array
-    stiffness: float
-    attachment: Array
-    rest_length: float = 0.0
+    rest_length = 0.0
     potential_force = True
 
     def span(self, view: View) -> Array:

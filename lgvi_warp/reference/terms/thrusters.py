@@ -1,7 +1,6 @@
 """Thrusters: a thrust curve with dead band and saturation, after a first-order lag."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,26 +9,11 @@ from lgvi_warp.reference.terms import Law, View
 from lgvi_warp.reference.terms.wrench import at_time
 
 
-@dataclass(frozen=True)
 class Thrusters(Law):
-    """Thrusters that follow a command.
+    """Numbers as those of `lw.Thrusters`, with coefficients forward, backward (n,); times (k,) [s], command (k, n)."""
 
-    position, direction (n, 3) [m, 1]; forward, backward (n,) [N per command squared]; dead_band, limit (n,);
-    time_constant (n,) [s], 0 for none; times (k,) [s] and command (k, n); polynomial, polynomial_astern (p,): of the
-    command beyond the dead band, from the first power up, w^2 by default.
-    """
-
-    position: Array
-    direction: Array
-    forward: Array
-    backward: Array
-    dead_band: Array
-    limit: Array
-    time_constant: Array
-    times: Array
-    command: Array
-    polynomial: tuple[float, ...] = (0.0, 1.0)
-    polynomial_astern: tuple[float, ...] = (0.0, 1.0)
+    polynomial = (0.0, 1.0)
+    polynomial_astern = (0.0, 1.0)
 
     @property
     def lagged(self) -> bool:

@@ -1,23 +1,14 @@
 """Linear waves in deep water."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
-from lgvi_warp.reference.rotation import Array
 from lgvi_warp.reference.terms import STILL, Flow, Law, View
 
 
-@dataclass(frozen=True)
 class Waves(Law):
-    """amplitudes (k,) [m]; periods (k,) [s]; headings_deg (k,) [deg]; phases (k,) [rad]; gravity [m/s2]."""
-
-    amplitudes: Array
-    periods: Array
-    headings_deg: Array
-    phases: Array
-    gravity: float
+    """Numbers as those of `lw.Waves`; gravity [m/s2]."""
 
     def flow(self, view: View) -> Flow:
         """The sum of the components (Faltinsen 1990, table 2.1)."""

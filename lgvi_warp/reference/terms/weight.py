@@ -1,18 +1,14 @@
 """Weight less buoyancy (section IV of Nordkvist & Sanyal 2010)."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from lgvi_warp.reference.rotation import Array
 from lgvi_warp.reference.terms import Law, View
 
 
-@dataclass(frozen=True)
 class Weight(Law):
     """net: weight less buoyancy (m - rho V) g [N]."""
 
-    net: float
     potential_force = True
 
     def wrench(self, view: View) -> tuple[Array, Array]:

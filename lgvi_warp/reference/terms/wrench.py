@@ -1,33 +1,23 @@
 """A wrench in body axes, held or by a schedule."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from lgvi_warp.reference.rotation import Array
 from lgvi_warp.reference.terms import Law, View
 
 
-@dataclass(frozen=True)
 class Wrench(Law):
-    """force (3,) [N], torque (3,) [N m]."""
-
-    force: Array
-    torque: Array
+    """Numbers as those of `lw.Wrench`."""
 
     def wrench(self, view: View) -> tuple[Array, Array]:
         """The constant force [N] and torque [N m]."""
         return np.asarray(self.force), np.asarray(self.torque)
 
 
-@dataclass(frozen=True)
 class WrenchSchedule(Law):
-    """times (k,) [s], rising; force (k, 3) [N]; torque (k, 3) [N m]; steps: held from each time to the next."""
+    """Numbers as those of `lw.WrenchSchedule`; steps: whether each value is held until the next time."""
 
-    times: Array
-    force: Array
-    torque: Array
-    steps: bool = False
+    steps = False
 
     def wrench(self, view: View) -> tuple[Array, Array]:
         """Force [N] and torque [N m] of the tables at view.t."""

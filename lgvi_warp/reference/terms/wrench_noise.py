@@ -1,7 +1,5 @@
 """White noise of force and torque in body axes."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from lgvi_warp.reference.random import normals
@@ -9,15 +7,12 @@ from lgvi_warp.reference.rotation import Array
 from lgvi_warp.reference.terms import Law, View
 
 
-@dataclass(frozen=True)
 class WrenchNoise(Law):
-    """force (3,) [N s^1/2], torque (3,) [N m s^1/2], the key of its noise."""
+    """Numbers as those of `lw.WrenchNoise`; the key of its noise."""
 
-    force: Array
-    torque: Array
-    channel: int = 0
-    seed0: int = 0
-    seed1: int = 0
+    channel = 0
+    seed0 = 0
+    seed1 = 0
 
     def wrench(self, view: View) -> tuple[Array, Array]:
         """Force and torque S xi / sqrt(h), held over the step."""

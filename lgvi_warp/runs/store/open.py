@@ -16,7 +16,8 @@ from lgvi_warp.common.status import Status
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.keepers.observation import Observation, Observing, observation_of, replicates_of
 from lgvi_warp.physics.fields import IN_FILES
-from lgvi_warp.physics.terms import Term, from_list
+from lgvi_warp.physics.terms import from_list
+from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.runs.result import END_TIME, Result
 from lgvi_warp.runs.store.block_files import name_of
 from lgvi_warp.runs.store.folder import KEPT, ROOT, Folder

@@ -7,24 +7,19 @@ the cube's levels into values (sampling/distributions). The cube's columns are i
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
+from lgvi_warp.common import registry
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.sampling.designs.base import Drawn, Replicated, Sampling
-from lgvi_warp.sampling.designs.designs import Morris, Saltelli, salib_problem
-from lgvi_warp.sampling.designs.grid import Grid
-from lgvi_warp.sampling.designs.hypercube import LatinHypercube
-from lgvi_warp.sampling.designs.levels import UnitCubePoints
-from lgvi_warp.sampling.designs.random import Random
-from lgvi_warp.sampling.designs.sequences import Halton, Sobol, sobol_points
-from lgvi_warp.sampling.designs.table import Table
+from lgvi_warp.sampling.designs.base import Sampling
 
-KINDS: dict[str, type[Sampling]] = {
-    design.kind: design
-    for design in (Random, LatinHypercube, Sobol, Halton, Saltelli, Morris, Grid, Table, UnitCubePoints)
-}
+# Classes of samplings by their kind in a scene file, each also an attribute of this package.
+registry.load_modules(sys.modules[__name__])
+KINDS = Sampling.kinds
+globals().update({kind.__name__: kind for kind in KINDS.values()})
 
 
 def sampling_of(content: Any) -> Sampling:
@@ -56,24 +51,5 @@ def sampling_of(content: Any) -> Sampling:
     elif kind != "grid":
         faults.keys(f"sampling.{kind}", values, [item.name for item in fields(KINDS[kind])])
     faults.raise_if_any()
-    return KINDS[kind](values) if kind == "grid" else KINDS[kind](**values)  # type: ignore[call-arg]
-
-
-__all__ = [
-    "KINDS",
-    "Drawn",
-    "Grid",
-    "Halton",
-    "LatinHypercube",
-    "Morris",
-    "Random",
-    "Replicated",
-    "Saltelli",
-    "Sampling",
-    "Sobol",
-    "Table",
-    "UnitCubePoints",
-    "salib_problem",
-    "sampling_of",
-    "sobol_points",
-]
+    sampling: Sampling = KINDS[kind](values) if kind == "grid" else KINDS[kind](**values)
+    return sampling

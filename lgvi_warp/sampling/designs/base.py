@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common import registry
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.random import seed_words
 from lgvi_warp.sampling.designs.space import Space
@@ -30,8 +31,14 @@ class Sampling:
     """
 
     kind: ClassVar[str] = ""
+    # Classes by their kind in a scene file.
+    kinds: ClassVar[dict[str, Any]] = {}
     # Whether a run may take only the first of the members that the sampling has.
     fewer: ClassVar[bool] = False
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        registry.add(cls.kinds, cls, "kind")
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
         """Levels of members in the unit cube. Every sampling must define this.

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common import registry
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.random import FAR
 
@@ -30,8 +31,14 @@ class Distribution:
     """
 
     kind: ClassVar[str] = ""
+    # Classes by their kind in a scene file.
+    kinds: ClassVar[dict[str, Any]] = {}
     # Arguments of which exactly one sets the width.
     widths: ClassVar[tuple[str, ...]] = ()
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        registry.add(cls.kinds, cls, "kind")
 
     def __post_init__(self) -> None:
         faults = Faults(f"{self.kind}.")

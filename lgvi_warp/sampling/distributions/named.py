@@ -12,13 +12,9 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.real_numbers import real_results
-from lgvi_warp.sampling.distributions.basic import Choice, Distribution, LogNormal, Normal, TruncatedNormal, Uniform
+from lgvi_warp.sampling.distributions.basic import Distribution
 from lgvi_warp.sampling.distributions.joint import (
     CorrelatedNormal,
-    PhysicalInertia,
-    PositiveDefinite,
-    RotationNormal,
-    UniformRotation,
 )
 
 # Name in a scene file -> name in scipy.stats; shape parameters, loc and scale are named as there.
@@ -241,11 +237,7 @@ def quantiles_of(distribution: Any) -> Any:
     return function if callable(function) else None
 
 
-KINDS: dict[str, type[Distribution]] = {
-    kind.kind: kind
-    for kind in (Normal, Uniform, LogNormal, TruncatedNormal, Choice, BinnedDistribution, CorrelatedNormal, RotationNormal,
-                 UniformRotation, PositiveDefinite, PhysicalInertia)
-}  # fmt: skip
+KINDS = Distribution.kinds
 
 
 def is_frozen(value: Any) -> bool:
@@ -354,7 +346,7 @@ def from_dict(key: str, content: Any) -> Distribution:
     if kind == UserDistribution.kind:
         faults.add(key, values, "is a distribution of your own, which a file does not hold", "give the ensemble again")
     elif not foreign and kind not in KINDS:
-        faults.keys(key, [kind], [*KINDS, *SCIPY, ScipyDistribution.kind])
+        faults.keys(key, [kind], [*(other for other in KINDS if other != UserDistribution.kind), *SCIPY])
     elif not isinstance(values, Mapping):
         faults.add(f"{key}.{kind}", values, "is not a table", "write { normal = { std = 1.0 } }")
     elif not foreign:
@@ -363,6 +355,7 @@ def from_dict(key: str, content: Any) -> Distribution:
     if foreign:
         return ScipyDistribution.from_table(key, kind, values)
     try:
-        return KINDS[kind](**values)
+        distribution: Distribution = KINDS[kind](**values)
+        return distribution
     except SceneError as error:
         raise error.prefixed(f"{key}: ") from None

@@ -11,7 +11,9 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.labelled import columns_by_name, is_labelled
 from lgvi_warp.runs.quantities import OfInterest, quantities
-from lgvi_warp.sampling import designs as samplings
+from lgvi_warp.sampling.designs.designs import salib_problem
+from lgvi_warp.sampling.designs.levels import UnitCubePoints
+from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
@@ -65,7 +67,7 @@ class ScalarModel:
             self.names = names
             self._run(np.array([[float(self._scene_value(name)) for name in names]]), dry=True)
         else:
-            cube = samplings.salib_problem(self._fleet.space)
+            cube = salib_problem(self._fleet.space)
             self.names = tuple(cube["names"][column] for column in self._columns)
 
     def _scene_value(self, name: str) -> Any:
@@ -87,7 +89,7 @@ class ScalarModel:
             SceneError: for distributions that SALib does not have, and for names alone.
         """
         if self.levels:
-            cube = samplings.salib_problem(self._fleet.space)
+            cube = salib_problem(self._fleet.space)
             by_column = {key: [cube[key][column] for column in self._columns] for key in ("names", "bounds", "groups")
                          if key in cube}  # fmt: skip
             return cube | by_column
@@ -198,9 +200,9 @@ class ScalarModel:
         if self.levels:
             inside = np.empty_like(X)
             inside[:, self._columns] = np.clip(X, 2.0**-53, 1.0 - 2.0**-53)
-            fleet = Ensemble(self.scene, None, 0, self.vary, samplings.UnitCubePoints(inside))
+            fleet = Ensemble(self.scene, None, 0, self.vary, UnitCubePoints(inside))
         else:
-            fleet = Ensemble(self.scene, None, 0, None, samplings.Table(values=dict(zip(self.names, X.T, strict=True))))
+            fleet = Ensemble(self.scene, None, 0, None, Table(values=dict(zip(self.names, X.T, strict=True))))
         if dry:
             return X
         outputs = evaluate(fleet, self.of, **self._settings)

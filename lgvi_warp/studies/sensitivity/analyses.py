@@ -10,7 +10,8 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.status import Status
 from lgvi_warp.runs.quantities import OfInterest
-from lgvi_warp.sampling import designs as samplings
+from lgvi_warp.sampling.designs.base import Sampling
+from lgvi_warp.sampling.designs.designs import Morris, Saltelli, salib_problem
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.settings import EnsembleSettings
@@ -62,7 +63,7 @@ def sobol(
         FailedMembers: where members failed and the indices cannot be computed from the others.
     """
     _check(samples, 2, confidence, resamples, failed)
-    design = samplings.Saltelli(second_order)
+    design = Saltelli(second_order)
     fleet = _designed(scene, vary, seed, design, samples)
     outputs = evaluate(fleet, of, **settings)
     return sobol_of(fleet, outputs, confidence=confidence, resamples=resamples, failed=failed)
@@ -89,7 +90,7 @@ def sobol_of(
     """
     analyze = _salib("sobol")
     design = fleet.sampling
-    assert isinstance(design, samplings.Saltelli)
+    assert isinstance(design, Saltelli)
     factors = tuple(label for label, _ in fleet.space.factors)
     Y, messages = _whole_groups(outputs, design.group_size(fleet.space), failed)
     m, d = Y.shape[1], len(factors)
@@ -149,7 +150,7 @@ def morris(
         FailedMembers: where members failed and the effects cannot be computed from the others.
     """
     _check(samples, 2, confidence, resamples, failed)
-    fleet = _designed(scene, vary, seed, samplings.Morris(levels), samples)
+    fleet = _designed(scene, vary, seed, Morris(levels), samples)
     outputs = evaluate(fleet, of, **settings)
     return morris_of(fleet, outputs, confidence=confidence, resamples=resamples, failed=failed)
 
@@ -175,7 +176,7 @@ def morris_of(
     """
     analyze = _salib("morris")
     design, space = fleet.sampling, fleet.space
-    assert isinstance(design, samplings.Morris)
+    assert isinstance(design, Morris)
     group = design.group_size(space)
     kept = _good_rows(outputs, group, failed)
     Y, messages = _whole_groups(outputs, group, failed)
@@ -187,7 +188,7 @@ def morris_of(
         name: np.full((Y.shape[1], len(factors)), np.nan) for name in ("mu", "mu_star", "sigma", "mu_star_conf")
     }
     for q in _varying(Y, outputs.labels, messages):
-        S = analyze(samplings.salib_problem(space), X, Y[:, q].copy(), num_resamples=resamples, conf_level=confidence,
+        S = analyze(salib_problem(space), X, Y[:, q].copy(), num_resamples=resamples, conf_level=confidence,
                     num_levels=design.levels, seed=fleet.seed)  # fmt: skip
         order = [list(S["names"]).index(label) for label, _ in space.factors]
         for name, values in estimates.items():
@@ -234,7 +235,7 @@ def _check(samples: Any, least: int, confidence: Any, resamples: Any, failed: An
     faults.raise_if_any()
 
 
-def _designed(scene: Any, vary: Any, seed: int | None, design: samplings.Sampling, samples: int) -> Ensemble:
+def _designed(scene: Any, vary: Any, seed: int | None, design: Sampling, samples: int) -> Ensemble:
     """Build the ensemble of a design with this number of groups."""
     if isinstance(scene, Ensemble):
         scene, known, known_seed = scene.scene, scene.vary, scene.seed

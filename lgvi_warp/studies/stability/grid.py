@@ -12,7 +12,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.physics import notation, vehicle
 from lgvi_warp.physics.fields import FIELDS, TABLE
-from lgvi_warp.physics.terms import Drag
+from lgvi_warp.physics.terms.drag import Drag
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.stability import limits as stability_limits

@@ -10,7 +10,7 @@ from scipy import stats
 
 import lgvi_warp as lw
 from lgvi_warp.common.random import uniforms
-from lgvi_warp.sampling.distributions.named import as_law, from_dict
+from lgvi_warp.sampling.distributions.named import as_distribution, from_dict
 
 LEVELS = np.array([1e-12, 1e-6, 0.02, 0.3, 0.5, 0.77, 0.999, 1.0 - 1e-9])
 N = 200_000
@@ -255,5 +255,5 @@ def test_a_histogram_of_scipy_keeps_its_shift(shift):
     shifted = plain(**shift) if isinstance(shift, dict) else plain(shift)
     levels = np.linspace(0.05, 0.95, 10)
     for given in (plain, shifted):
-        own = as_law("x", given)
+        own = as_distribution("x", given)
         np.testing.assert_allclose(own.quantile(levels[:, None], np.zeros(1)).ravel(), given.ppf(levels), rtol=1e-12)

@@ -12,6 +12,7 @@ from scipy.stats import qmc
 
 import lgvi_warp as lw
 from lgvi_warp.sampling import designs as sampling
+from lgvi_warp.sampling.designs.sequences import sobol_points
 from lgvi_warp.sampling.designs.space import Space
 from lgvi_warp.scene.settings import MOST_MEMBERS
 from lgvi_warp.scene.variations import targets
@@ -183,11 +184,11 @@ def test_discrepancy_is_below_that_of_random_points(content):
 
 
 def test_sobol_points_are_balanced_and_those_of_scipy():
-    u = sampling.sobol_points(1, "x", 4, np.arange(256))
+    u = sobol_points(1, "x", 4, np.arange(256))
     for column in u.T:
         np.testing.assert_array_equal(np.sort(np.floor(column * 256)), np.arange(256))
     engine = qmc.Sobol(4, scramble=False, bits=32)
-    got = sampling.sobol_points(1, "x", 4, np.arange(300), scramble=False)
+    got = sobol_points(1, "x", 4, np.arange(300), scramble=False)
     with pytest.warns(UserWarning):
         expected = engine.random(300)
     np.testing.assert_array_equal(got, expected + 2.0**-33)
@@ -262,13 +263,13 @@ def test_saltellis_design_is_that_of_salib(second_order):
     problem = {"num_vars": d, "names": ["x", "y", "z"], "bounds": [[0.0, 1.0]] * d}
     expected = sobol.sample(problem, N, calc_second_order=second_order, scramble=False)
     design = sampling.Saltelli(second_order)
-    AB = sampling.sobol_points(0, "x", 2 * d, np.arange(N), scramble=False)
+    AB = sobol_points(0, "x", 2 * d, np.arange(N), scramble=False)
     rows = design.rows(SPACE)
     got = np.concatenate([np.where(rows, one[d:], one[:d]) for one in AB])
     np.testing.assert_allclose(got, expected, rtol=0, atol=2.0**-32)
     assert design.group_size(SPACE) == len(rows) == len(expected) // N
     # The design itself is these rows of its own scrambled points.
-    own = sampling.sobol_points(3, "saltelli", 2 * d, np.arange(N))
+    own = sobol_points(3, "saltelli", 2 * d, np.arange(N))
     np.testing.assert_array_equal(cube(design, np.arange(len(expected))),
                                   np.concatenate([np.where(rows, one[d:], one[:d]) for one in own]))  # fmt: skip
 

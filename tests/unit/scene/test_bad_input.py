@@ -115,7 +115,7 @@ TERMS = [
     # names and types
     ({"type": "dragg"}, "terms[0].type = 'dragg'", "not known", "did you mean 'drag'?"),
     ({"type": ["drag"]}, "terms[0].type = ['drag']", "not known", "did you mean 'drag'?"),
-    ({"linear": [1.0] * 6}, "terms[0].type = ''", "known: drag"),
+    ({"linear": [1.0] * 6}, "terms[0].type = ''", "known: ", "body_lift, "),
     ({"type": "weight"}, "terms[0].type = 'weight'", "follows from the vehicle"),
     ({"type": "drag", "quad": 1.0}, "terms[0].quad = 1.0", "unknown key", "did you mean 'quadratic'?"),
     ({"type": "tether"}, "terms[0].anchor", "is missing", "give it [m]"),
@@ -459,7 +459,6 @@ class Packs(Pull):
 LAWS = [
     (device(law=pull_short), "pull.law = '(w, view)'", "takes 2 arguments", "write law(w, view, p)"),
     (device(law=pull_plain), "pull.law", "not a Warp function", "@wp.func"),
-    (device(law=pull_law, params=None), "pull.device", "has no params(width, real)", "add_a_force.md"),
     (device(), "pull.device", "has none of law, damping, flow, evolve", "add_a_force.md"),
     ("pull", "pull.device = 'pull'", "not known", "give a module"),
 ]
@@ -472,6 +471,17 @@ def test_a_users_law(made, words):
     for check in (lambda: lw.check_law(term), lambda: make_plan(fleet, h=0.01, t1=0.1)):
         (fault,) = refused(check)
         assert all(word in fault for word in words), fault
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Wide(Pull):
+    row: Any = lw.number((6,), "N", (1.0,) * 6)
+
+
+def test_a_law_without_a_struct_whose_numbers_make_none():
+    bare = type("Bare", (Wide,), {"device": device(law=pull_law, params=None), "__annotations__": {}})
+    (fault,) = refused(lw.check_law, bare(k=1.0))
+    assert all(word in fault for word in ("pull.device", "has no params(width, real)", "add_a_force.md")), fault
 
 
 @pytest.mark.kernel
@@ -490,7 +500,9 @@ def test_packed_that_returns_something_else(given):
 
 @pytest.mark.kernel
 def test_packed_left_out():
-    report = lw.check_law(Pull(k=1.0))
+    # Numbers and vectors are packed as they are declared; a number of another shape is not.
+    assert next(check for check in lw.check_law(Pull(k=1.0)).checks if check.name == "numbers").ok
+    report = lw.check_law(Wide(k=1.0))
     assert (
         not report.ok and "NotImplementedError" in str(report) and "write packed(self, numbers, context)" in str(report)
     )

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.statistics import TYPES, Estimate, Estimates, intervals, sketch
+from lgvi_warp.statistics import TYPES, intervals, sketch
+from lgvi_warp.statistics.estimate import Estimate, Estimates
 from lgvi_warp.statistics.tree import Tree
 from lgvi_warp.statistics.until import watch
 from lgvi_warp.statistics.values import Values, dealt

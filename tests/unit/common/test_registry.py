@@ -1,0 +1,53 @@
+"""Classes add themselves to the table of their kind, under the word of their own body."""
+
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp.common import registry
+from lgvi_warp.physics.terms import events
+from lgvi_warp.sampling.designs import KINDS as SAMPLINGS
+from lgvi_warp.sampling.distributions.named import KINDS as DISTRIBUTIONS
+from lgvi_warp.statistics import TYPES as STATISTICS
+
+
+def kind(name, word=None, module=__name__):
+    return type(name, (), {"__module__": module} | ({} if word is None else {"type": word}))
+
+
+def test_the_first_class_keeps_its_word():
+    known, first = {}, kind("First", "wave")
+    assert registry.add(known, first) and registry.add(known, first)
+    assert not registry.add(known, kind("Second", "wave")) and not registry.add(known, kind("First", "wave", "other"))
+    assert known == {"wave": first}
+
+
+def test_a_class_made_again_replaces_the_former():
+    known, again = {}, kind("First", "wave")
+    registry.add(known, kind("First", "wave"))
+    assert registry.add(known, again) and known == {"wave": again}
+
+
+@pytest.mark.parametrize("word", ["", None])
+def test_a_class_without_a_word_is_not_added(word):
+    known = {}
+    assert not registry.add(known, kind("First", word)) and known == {}
+    inherits = type("Second", (kind("First", "wave"),), {})
+    assert not registry.add(known, inherits) and known == {}
+
+
+def test_each_family_knows_its_classes():
+    tables = (lw.Term.kinds, events.TYPES, STATISTICS, SAMPLINGS, DISTRIBUTIONS)
+    some = (lw.Waves, lw.StopTime, lw.PathTime, lw.UnitCubePoints, lw.PhysicalInertia)
+    assert all(one in known.values() for known, one in zip(tables, some, strict=True))
+
+
+def test_all_modules_of_a_package_are_imported(tmp_path, monkeypatch):
+    (tmp_path / "crowd").mkdir()
+    for name in ("__init__", "one", "two"):
+        (tmp_path / "crowd" / f"{name}.py").write_text("")
+    monkeypatch.syspath_prepend(tmp_path)
+    registry.load_modules(SimpleNamespace(__name__="crowd", __path__=[str(tmp_path / "crowd")]))
+    assert {"crowd.one", "crowd.two"} <= sys.modules.keys()

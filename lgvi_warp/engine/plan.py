@@ -57,7 +57,6 @@ class Plan:
     Attributes:
         kernel_choice: the laws that act and the method's program for them.
         spec: all that decides the kernel's source.
-        advance: the kernel and its types.
 
     Raises:
         SceneError: if dtype, width, checks or on_failure is none of these, or the method cannot do what the scene asks.
@@ -73,7 +72,6 @@ class Plan:
     on_failure: str = "freeze"
     kernel_choice: KernelChoice = field(init=False)
     spec: Spec = field(init=False)
-    advance: Advance = field(init=False)
     # Of a plan made by part(): the whole plan, the members and the fields.
     _whole: tuple[Plan, Sequence[int], Sequence[str]] | None = field(
         default=None, init=False, compare=False, repr=False
@@ -106,12 +104,13 @@ class Plan:
             chained = self.method.turns and not full
             object.__setattr__(self, "width", default_width(self.dtype, chained=chained))
         object.__setattr__(self, "fields", tuple(name for name in SAMPLE_FIELDS if name in self.fields))
-        self._choose_kernel()
-
-    def _choose_kernel(self) -> None:
         object.__setattr__(self, "spec", self._spec())
+
+    @functools.cached_property
+    def advance(self) -> Advance:
+        """The kernel and its types, made when first asked for: many plans are never run."""
         with build_lock, self._laws_compile():
-            object.__setattr__(self, "advance", make_advance(self.spec))
+            return make_advance(self.spec)
 
     def _check_substep(self) -> None:
         """Refuse to divide the steps of a method or of laws that cannot be divided, with the reason."""
@@ -165,11 +164,11 @@ class Plan:
             A plan for m members.
         """
         subplan = copy.copy(self)
-        for name in ("dtypes", "times"):
+        for name in ("advance", "dtypes", "times"):
             subplan.__dict__.pop(name, None)
         object.__setattr__(subplan, "ensemble", self.ensemble.subset(indices))
         object.__setattr__(subplan, "fields", tuple(name for name in SAMPLE_FIELDS if name in fields))
-        subplan._choose_kernel()
+        object.__setattr__(subplan, "spec", subplan._spec())
         object.__setattr__(subplan, "_whole", (self, indices, fields))
         return subplan
 
@@ -271,8 +270,9 @@ class Plan:
             OSError: if the kernel cache cannot be written.
         """
         start = time.perf_counter()
+        module = self.advance.kernel.module
         with self._laws_compile():
-            kernel_cache.load(self.advance.kernel.module)
+            kernel_cache.load(module)
         _ = self.dtypes, self.times  # made here, before threads ask for them
         return time.perf_counter() - start
 

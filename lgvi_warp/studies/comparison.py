@@ -222,18 +222,23 @@ class Sample:
         """
         return run_plan(self.plan(candidate, ensemble), 1)
 
-    def accepted(self, methods: Sequence[str], dtype: str = "float64") -> tuple[list[str], dict[str, str]]:
+    def accepted(
+        self, methods: Sequence[str], dtype: str = "float64", most: int | None = None
+    ) -> tuple[list[str], dict[str, str]]:
         """Sort methods into those that the scene takes and those that it refuses.
 
         Args:
             methods: names of methods.
             dtype: precision. Default "float64".
+            most: number of accepted methods after which no more are looked at. Default: all are.
 
         Returns:
             (accepted, refused): names of the first, and name -> reason of the others.
         """
         good, refused = [], {}
         for name in methods:
+            if len(good) == most:
+                break
             try:
                 self.plan(self.candidate(name, 1, dtype))
                 good.append(name)
@@ -437,7 +442,7 @@ def make_reference(
     """
     compared = compared_in(of)
     of = compared.name
-    names = list(methods or sample.accepted(PRECISE)[0][:2])
+    names = list(methods or sample.accepted(PRECISE, most=2)[0])
     if not names:
         raise SceneError(
             [f"method: the scene takes none of {', '.join(PRECISE)}; name one that it takes: methods=[...]"]

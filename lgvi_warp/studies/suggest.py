@@ -14,6 +14,7 @@ from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.executors import check_threads
+from lgvi_warp.engine.executors.threads import ThisThread
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import TimeGrid
@@ -403,7 +404,7 @@ def seconds_of(fleet: Ensemble, candidate: Candidate, t1: float, members: int = 
     n = min(members, fleet.members)
     plan = make_plan(fleet.subset(range(n)), candidate.resolved(), candidate.h, t1, dtype=candidate.dtype)
     plan.compile()
-    return float(cost.timed([lambda: run_plan(plan, 1)], 2).min()) * fleet.members / n
+    return float(cost.timed([lambda: run_plan(plan, 1, executor=ThisThread())], 2).min()) * fleet.members / n
 
 
 def memory_of(fleet: Ensemble, candidate: Candidate, t1: float) -> int:

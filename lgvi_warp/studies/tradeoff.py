@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.engine.executors.threads import ThisThread
 from lgvi_warp.engine.plan import DTYPES, Plan
 from lgvi_warp.methods.method import COMPOSITIONS, PROGRAMS, Method
 from lgvi_warp.physics import energy as invariants
@@ -246,7 +247,7 @@ def tried(sample: Sample, candidate: Candidate, reference: Reference | None, unt
     compile_seconds = plan.compile()
     with np.errstate(all="ignore"):
         begun = cost.thread_seconds()
-        result = replace(comparison.run_plan(plan, 1), compile_seconds=compile_seconds)
+        result = replace(comparison.run_plan(plan, 1, executor=ThisThread()), compile_seconds=compile_seconds)
         cpu_seconds = cost.thread_seconds() - begun
         errors: dict[str, dict[str, float]] = {}
         if reference is not None and not comparison.failed(result):

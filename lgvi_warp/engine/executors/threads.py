@@ -18,6 +18,24 @@ from lgvi_warp.engine.work import Work
 PERIOD = 0.2
 
 
+class ThisThread:
+    """Runs blocks in the thread that asks: its CPU time is theirs, and it hears an interrupt between two launches."""
+
+    def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
+        """Run all blocks and yield each with its result.
+
+        Args:
+            work: what is done with each block.
+            blocks: the blocks.
+            advanced: called with a block and the vehicle-steps made of it so far.
+
+        Yields:
+            Each block and its result, in order.
+        """
+        for block in blocks:
+            yield block, work(block, lambda: False, functools.partial(advanced, block))
+
+
 @dataclass(frozen=True)
 class Threads:
     """Runs blocks in threads of this process.
@@ -42,16 +60,15 @@ class Threads:
         Yields:
             Each block and its result, as it finishes.
         """
+        # The main thread waits, so that it hears an interrupt at once.
+        if self.threads == 1 and threading.current_thread() is not threading.main_thread():
+            yield from ThisThread().run(work, blocks, advanced)
+            return
         stop = threading.Event()
 
         def run_one(block: Block) -> Any:
             return work(block, stop.is_set, functools.partial(advanced, block))
 
-        # The main thread waits, so that it hears an interrupt at once.
-        if self.threads == 1 and threading.current_thread() is not threading.main_thread():
-            for block in blocks:
-                yield block, run_one(block)
-            return
         with ThreadPoolExecutor(self.threads, thread_name_prefix="lgvi_warp") as pool:
             futures: dict[Future[Any], Block] = {}
             done: queue.SimpleQueue[Future[Any]] = queue.SimpleQueue()

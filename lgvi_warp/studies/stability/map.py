@@ -482,7 +482,7 @@ def _provenance(
     grid: StabilityGrid, methods: Sequence[str], dtype: str, seed: int, energy_bound: float
 ) -> dict[str, Any]:
     """Describe the scene, the settings, the versions and the machine of a map."""
-    content = provenance(plan_of(grid, np.arange(1), methods[0], SHORTEST, "float64"))
+    content = provenance(plan_of(grid, np.arange(1), methods[0], SHORTEST, "float64", "all"))
     content = {name: content[name] for name in ("scene", "versions", "machine", "checks")}
     content |= {"methods": list(methods), "dtype": dtype, "seed": seed, "energy_bound": energy_bound}
     return content | {"axes": {name: vars(axis) for name, axis in (("x", grid.x), ("y", grid.y))}}

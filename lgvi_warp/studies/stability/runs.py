@@ -13,7 +13,6 @@ import numpy as np
 
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.status import Status, failed, stop_time
-from lgvi_warp.engine import plan
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import TimeGrid
@@ -112,7 +111,9 @@ def column(h: float, members: np.ndarray, error_time: float, t1: float, least: i
     return Column(h, members, errors, np.union1d(errors, more))
 
 
-def plan_of(grid: StabilityGrid, members: np.ndarray, method: str, times: TimeGrid, dtype: str) -> Plan:
+def plan_of(
+    grid: StabilityGrid, members: np.ndarray, method: str, times: TimeGrid, dtype: str, checks: str = "safe"
+) -> Plan:
     """Make the plan of a run of some members.
 
     Args:
@@ -121,14 +122,14 @@ def plan_of(grid: StabilityGrid, members: np.ndarray, method: str, times: TimeGr
         method: name of the method.
         times: steps and sample times.
         dtype: precision.
+        checks: "safe" (default), or "all" for warnings as well.
 
     Returns:
-        The plan, with all checks where they are available.
+        The plan.
 
     Raises:
         SceneError: where the method cannot make the run.
     """
-    checks = "all" if "all" in plan.CHECKS else "safe"
     return Plan(grid.fleet(members), Method(method), times, FIELDS, dtype, checks=checks)
 
 
@@ -298,12 +299,12 @@ def run_method(
     findings = Found(np.full(n, np.inf), np.zeros(n), np.full(n, REFUSED), np.zeros(n, bool))
     why: list[str] = []
     rows = grid.shape[2]
-    plan_of(grid, np.arange(n), method, SHORTEST, dtype).compile()
+    plan_of(grid, np.arange(n), method, SHORTEST, dtype, "all").compile()
 
     def column_of(column: Column, at: np.ndarray) -> None:
         members = column.members[at]
         try:
-            run = plan_of(grid, members, method, column.grid(), dtype)
+            run = plan_of(grid, members, method, column.grid(), dtype, "all")
         except SceneError as error:
             why.append(str(error))
             if len(at) > rows:

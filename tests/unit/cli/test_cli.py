@@ -80,23 +80,12 @@ def test_quiet_says_nothing(tmp_path, capfd):
 
 @pytest.mark.kernel
 def test_options_reach_the_run(tmp_path, capsys):
-    options = [
-        "--method",
-        "psi",
-        "--step",
-        "0.02",
-        "--dtype",
-        "float32_compensated",
-        "--threads",
-        "1",
-        "--width",
-        "4",
-        "--seed",
-        "9",
-    ]
+    # A kernel that other tests load as well.
+    options = ["--method", "psi_s", "--step", "0.02", "--dtype", "float32_compensated", "--width", "16"]
+    options += ["--threads", "1", "--seed", "9"]
     assert cli.main(["run", PAPER, "--out", str(tmp_path), *SMALL, *options, "--set", "vehicle.mass=124"]) == 0
     p = lw.Result.load(tmp_path / "result.npz").provenance
-    assert (p["method"]["name"], p["step"], p["dtype"], p["width"]) == ("psi", 0.02, "float32_compensated", 4)
+    assert (p["method"]["name"], p["step"], p["dtype"], p["width"]) == ("psi_s", 0.02, "float32_compensated", 16)
     assert p["ensemble"]["seed"] == 9 and p["scene"]["vehicle"]["mass"] == 124
 
 

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -389,8 +390,8 @@ def test_a_scene_whose_name_means_another_folder_writes_below_runs():
     assert str(out_of(Chosen())) == "runs/scene" and str(out_of(Chosen(), "_x")) == "runs/scene_x"
 
 
-# The command as a process: exit code, a line, no traceback.
-PROCESSES = {
+# The command, here and as a process: exit code, a line, no traceback.
+COMMANDS = {
     "device": (["run", "/dev/zero"], "is a device"),
     "pipe": (["check", "pipe"], "is a named pipe"),
     "deep": (["run", "deep.toml"], "nested"),
@@ -398,15 +399,24 @@ PROCESSES = {
 }
 
 
-@pytest.mark.parametrize("name", PROCESSES)
-def test_the_command_refuses_in_a_line(name, tmp_path):
-    os.mkfifo(tmp_path / "pipe")
-    (tmp_path / "deep.toml").write_text("a = " + "[" * 100_000)
-    arguments, words = PROCESSES[name]
+def in_a_process(arguments):
+    """Exit code, output and errors of the command in a process of its own."""
     command = [sys.executable, "-m", "lgvi_warp.cli", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=60)
-    assert done.returncode == 2 and words in done.stderr and done.stdout == ""
-    assert len(done.stderr.splitlines()) == 1 and "Traceback" not in done.stderr
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    return done.returncode, done.stdout, done.stderr
+
+
+@pytest.mark.slow_for("process-device", "process-deep", "process-seconds")
+@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("where", ["here", "process"])
+def test_the_command_refuses_in_a_line(where, name, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("pipe")
+    Path("deep.toml").write_text("a = " + "[" * 100_000)
+    arguments, words = COMMANDS[name]
+    code, out, error = (main(arguments), *capsys.readouterr()) if where == "here" else in_a_process(arguments)
+    assert code == 2 and words in error and out == ""
+    assert len(error.splitlines()) == 1 and "Traceback" not in error
 
 
 # Faults are counted.

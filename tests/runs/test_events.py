@@ -1,21 +1,14 @@
 """Events stop a member with status and time, and leave its packet alone."""
 
-import functools
-from dataclasses import dataclass
-from typing import Any, ClassVar
-
 import numpy as np
 import pytest
-import warp as wp
 from scipy.integrate import solve_ivp
 
 import lgvi_warp as lw
-from lgvi_kernels.lanes.arithmetic import lane, sub  # noqa: F401
-from lgvi_kernels.lanes.state import struct
 from lgvi_warp.methods.method import PROGRAMS
 from lgvi_warp.physics.inertia import moved
-from lgvi_warp.physics.terms import events
 from lgvi_warp.reference import advance, explicit
+from tests.support.stops import stops
 from tests.support.tools import (
     TURN,
     body_of,
@@ -37,37 +30,10 @@ HEAVY = vehicle(M=(18.0, 20.0, 25.0), J=(1.0, 1.2, 1.4), net=9.0, moment=(0.0, 0
 FIELDS = ("position", "attitude", "velocity", "angular_velocity")
 
 
-class FarFromHome:
-    """A user's event: more than `radius` metres north of the start."""
-
-    @staticmethod
-    @functools.cache
-    def params(width, real):
-        return struct("Far", radius=lane(width, real))
-
-    @staticmethod
-    @wp.func
-    def distance(view: Any, p: Any):
-        return p.radius - view.b.x
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class FarAway(events.Event):
-    type: ClassVar[str] = "far"
-    device: ClassVar[Any] = FarFromHome
-    radius: Any = lw.number((), "m")
-
-
-def stops(floor=1e6, surface=-1e6, lower=(-1e6,) * 3, upper=(1e6,) * 3, at=1e6, radius=1e6):
-    """Every kind of event, those not asked for far away: all tests of a method share its kernel."""
-    return [lw.Surface(depth=surface), lw.Floor(depth=floor), lw.Box(lower=lower, upper=upper), lw.StopTime(at=at),
-            FarAway(radius=radius)]  # fmt: skip
-
-
-def fleet(n, stops, vehicle=VEHICLE, parameters=None, speed=1.0):
+def fleet(n, events, vehicle=VEHICLE, parameters=None, speed=1.0):
     """n members about depth 5 with random velocities."""
     b, R, nu, Om = random_states(2, n, speed=speed)
-    scene = lw.Scene(vehicle, lw.Environment(gravity=GRAVITY), events=stops)
+    scene = lw.Scene(vehicle, lw.Environment(gravity=GRAVITY), events=events)
     return lw.Ensemble.from_states(scene, b + np.array([0.0, 0.0, 5.0]), R, nu, Om, parameters)
 
 

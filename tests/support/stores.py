@@ -9,7 +9,7 @@ from lgvi_warp.studies import speed
 # 4 blocks of 256 members, the last one ragged; 31 samples.
 MEMBERS, SETTINGS = 1003, {"method": "psi_s", "h": 0.01, "t1": 3.0, "save": lw.SaveAt(every=0.1)}
 STATISTICS = [lw.Mean("position"), lw.Quantiles("depth"), lw.PathMaximum("speed"), lw.Covariance("angular_velocity"),
-              lw.Quantiles("max(norm(velocity))")]  # fmt: skip
+              lw.Quantiles("max(norm(velocity))"), lw.MeanAttitude()]  # fmt: skip
 # Reached with 512 members.
 UNTIL = lw.Until("mean angular_velocity[0]", 3.7e-3, members=256)
 

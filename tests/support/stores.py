@@ -1,6 +1,7 @@
 """What the tests of stores need: a small run, and whether two folders hold the same bytes."""
 
 import contextlib
+import multiprocessing
 from pathlib import Path
 
 import lgvi_warp as lw
@@ -44,3 +45,10 @@ def markers(path):
         with contextlib.suppress(FileNotFoundError):
             found[one.name] = one.stat().st_mtime_ns
     return found
+
+
+def forked(work, *arguments):
+    """A process at this work: a fork, which has all imports and kernels of the tests."""
+    process = multiprocessing.get_context("fork").Process(target=work, args=arguments)
+    process.start()
+    return process

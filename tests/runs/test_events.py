@@ -1,20 +1,14 @@
 """Events stop a member with status and time, and leave its packet alone."""
 
-import functools
-from dataclasses import dataclass
-from typing import Any, ClassVar
-
 import numpy as np
 import pytest
-import warp as wp
+from scipy.integrate import solve_ivp
 
 import lgvi_warp as lw
-from lgvi_kernels.lanes.arithmetic import lane, sub  # noqa: F401
-from lgvi_kernels.lanes.state import struct
 from lgvi_warp.methods.method import PROGRAMS
 from lgvi_warp.physics.inertia import moved
-from lgvi_warp.physics.terms import events
-from lgvi_warp.reference import advance
+from lgvi_warp.reference import advance, explicit
+from tests.support.stops import stops
 from tests.support.tools import (
     TURN,
     body_of,
@@ -31,19 +25,21 @@ from tests.support.tools import (
 
 GRAVITY = 10.0
 VEHICLE = lw.Vehicle(20.0, (1.0, 1.2, 1.4), (10.0, 10.0, 10.0), 20.0 * GRAVITY)
+# Gravity and a righting moment, so that paths are curved.
+HEAVY = vehicle(M=(18.0, 20.0, 25.0), J=(1.0, 1.2, 1.4), net=9.0, moment=(0.0, 0.0, -3.0))
 FIELDS = ("position", "attitude", "velocity", "angular_velocity")
 
 
-def fleet(n, stops, vehicle=VEHICLE, parameters=None, speed=1.0):
+def fleet(n, events, vehicle=VEHICLE, parameters=None, speed=1.0):
     """n members about depth 5 with random velocities."""
     b, R, nu, Om = random_states(2, n, speed=speed)
-    scene = lw.Scene(vehicle, lw.Environment(gravity=GRAVITY), events=stops)
+    scene = lw.Scene(vehicle, lw.Environment(gravity=GRAVITY), events=events)
     return lw.Ensemble.from_states(scene, b + np.array([0.0, 0.0, 5.0]), R, nu, Om, parameters)
 
 
 def test_surface_and_floor_at_the_crossing():
     # Neutrally buoyant with M = m I: straight lines, so that the crossing is known, and the interpolation exact.
-    ensemble = fleet(200, [lw.Surface(), lw.Floor(depth=8.0)])
+    ensemble = fleet(200, stops(surface=0.0, floor=8.0))
     r = lw.solve(ensemble, h=0.1, t1=20.0)
     start = ensemble.select(0, 200)
     sink = np.einsum("nij,nj->ni", start.attitude, start.velocity)[:, 2]
@@ -65,13 +61,17 @@ def test_surface_and_floor_at_the_crossing():
     assert (r.end_time[r.status == lw.Status.OK] == 20.0).all()
 
 
-@pytest.mark.slow_but("float32-psi_x", "float64-kl6(psi_s)", "float64-psi_s")
+@pytest.mark.slow_but("float32-psi_s", "float64-kl6(psi_s)", "float64-psi_s")
 @pytest.mark.parametrize("method", ["psi_s", "psi_1", "psi", "psi_x", "kl6(psi_s)"])
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 def test_the_others_do_not_change_by_a_bit(method, dtype):
     # Those that are never stopped make the same steps as in a scene whose event is far away.
-    near = lw.solve(fleet(100, [lw.Box(lower=(-3, -3, 0), upper=(3, 3, 9))]), method, h=0.05, t1=3.0, dtype=dtype)
-    far = lw.solve(fleet(100, [lw.Box(lower=(-1e6,) * 3, upper=(1e6,) * 3)]), method, h=0.05, t1=3.0, dtype=dtype)
+    # Each with the kernel of another test.
+    vehicle = VEHICLE if dtype == "float32" else HEAVY
+    near, far = (
+        lw.solve(fleet(100, events, vehicle), method, h=0.05, t1=3.0, dtype=dtype)
+        for events in (stops(lower=(-3, -3, 0), upper=(3, 3, 9)), stops())
+    )
     well = np.asarray(near.status) == 0
     assert 10 < well.sum() < 90
     for name in FIELDS:
@@ -80,7 +80,7 @@ def test_the_others_do_not_change_by_a_bit(method, dtype):
 
 def test_the_time_may_vary_by_member():
     at = np.linspace(0.02, 1.5, 64)
-    ensemble = fleet(64, [lw.StopTime(at=9.0)], parameters={"time.at": at})
+    ensemble = fleet(64, stops(at=9.0), parameters={"time.at": at})
     r = lw.solve(ensemble, h=0.05, t1=1.0, save=lw.SaveAt(every=0.25))
     stopped = at <= 1.0
     np.testing.assert_array_equal(r.status == lw.Status.TIME, stopped)
@@ -88,7 +88,9 @@ def test_the_time_may_vary_by_member():
     assert np.isnan(r.failure_time[~stopped]).all()
 
 
-def test_events_look_at_the_users_origin():
+@pytest.mark.slow_but("psi_s")
+@pytest.mark.parametrize("method", ["psi_s", "psi_x", "psi_w"])
+def test_events_look_at_the_users_origin(method):
     # The same vehicle told about an origin 2 m above: the same path of that origin stops it.
     rigid = np.diag([20.0, 20, 20, 1, 1.2, 1.4])
     d = np.array([0.0, 0.0, 2.0])
@@ -100,34 +102,12 @@ def test_events_look_at_the_users_origin():
         events=[lw.Surface()],
         start=lw.Start(position=(0, 0, 1.0), velocity=(0, 0, -1.0)),
     )
-    for method in ("psi_s", "psi_x", "psi_w"):
-        r = lw.solve(scene, method, h=0.03, t1=3.0)
-        assert r.status[0] == lw.Status.SURFACE and r.failure_time[0] == pytest.approx(1.0, abs=1e-9)
-
-
-class FarFromHome:
-    """A user's event: more than `radius` metres north of the start."""
-
-    @staticmethod
-    @functools.cache
-    def params(width, real):
-        return struct("Far", radius=lane(width, real))
-
-    @staticmethod
-    @wp.func
-    def distance(view: Any, p: Any):
-        return p.radius - view.b.x
+    r = lw.solve(scene, method, h=0.03, t1=3.0)
+    assert r.status[0] == lw.Status.SURFACE and r.failure_time[0] == pytest.approx(1.0, abs=1e-9)
 
 
 def test_a_users_condition():
-
-    @dataclass(frozen=True, eq=False, kw_only=True)
-    class FarAway(events.Event):
-        type: ClassVar[str] = "far"
-        device: ClassVar[Any] = FarFromHome
-        radius: Any = lw.number((), "m")
-
-    r = lw.solve(fleet(50, [FarAway(radius=2.0)]), h=0.05, t1=5.0)
+    r = lw.solve(fleet(50, stops(radius=2.0)), h=0.05, t1=5.0)
     assert r.status.counts().keys() == {"ok", "condition"}
     away = r.position[0, :, 0] < 2.0
     hit = away & (r.status == lw.Status.CONDITION)
@@ -137,24 +117,48 @@ def test_a_users_condition():
     np.testing.assert_array_equal(r.position[-1, ~away], r.position[0, ~away])
 
 
-# Gravity and a righting moment, so that paths are curved; a floor 1.5 m below the start.
-HEAVY = vehicle(M=(18.0, 20.0, 25.0), J=(1.0, 1.2, 1.4), net=9.0, moment=(0.0, 0.0, -3.0))
+# A floor 1.5 m below the start.
 FALL = {"b": (0.0, 0.0, 5.0), "R": TURN, "nu": (0.3, 0.1, 0.5), "Om": (0.4, -0.3, 0.2)}
-FALLING = lw.Scene(HEAVY, lw.Environment(gravity=9.8), events=[lw.Floor(depth=6.5)])
+FALLING = lw.Scene(HEAVY, lw.Environment(gravity=9.8), events=stops(floor=6.5))
+BODY = body_of(FALLING)
+START = to_state(BODY, *(np.array(value) for value in FALL.values()))
 
 
-def test_the_twin_arrives_where_the_kernel_does():
+@pytest.mark.slow_but("psi_s")
+@pytest.mark.parametrize("method", ["psi_s", "psi"])
+def test_the_twin_arrives_where_the_kernel_does(method):
     h = 0.05
-    for method in ("psi_s", "psi"):
-        r = lw.solve(one(FALLING, **FALL), method, h=h, t1=4.0)
-        body = body_of(FALLING)
-        x = to_state(body, *(np.array(value) for value in FALL.values()))
-        steps = int(r.end_time[0] / h)
-        x = advance.advance(x, body, PROGRAMS[method], h, steps)
-        x, part = advance.arrival(x, body, PROGRAMS[method], h, lambda x: 6.5 - x.b[2])
-        # As parity after 5 s (tests/methods/test_kernel_and_twin.py).
-        assert difference(last(r), from_state(body, x)) < 1e-11
-        assert r.end_time[0] == pytest.approx((steps + part) * h, abs=1e-12)
+    r = lw.solve(one(FALLING, **FALL), method, h=h, t1=4.0)
+    steps = int(r.end_time[0] / h)
+    x = advance.advance(START, BODY, PROGRAMS[method], h, steps)
+    x, part = advance.arrival(x, BODY, PROGRAMS[method], h, lambda x: 6.5 - x.b[2])
+    # As parity after 5 s (tests/methods/test_kernel_and_twin.py).
+    assert difference(last(r), from_state(BODY, x)) < 1e-11
+    assert r.end_time[0] == pytest.approx((steps + part) * h, abs=1e-12)
+
+
+@pytest.fixture(scope="module")
+def true():
+    """b, R, nu, Om at the true arrival, and its time: SciPy on the twin's rates."""
+
+    def height(t, y):
+        return 6.5 - y[2]
+
+    def rates(t, y):
+        return explicit.rates(explicit.unpack(y, START, t), BODY, 1.0)
+
+    height.terminal = True
+    found = solve_ivp(
+        rates, (0.0, 2.0), explicit.pack(START), "DOP853", rtol=1e-13, atol=1e-14, max_step=0.02, events=height
+    )
+    assert found.status == 1
+    return from_state(BODY, explicit.unpack(found.y[:, -1], START, found.t[-1])), found.t[-1]
+
+
+def error(result, true):
+    """How far a member's arrival is from the true one, in place and in time."""
+    assert result.status[0] == lw.Status.FLOOR and abs(result.position[-1, 0, 2] - 6.5) < 1e-13
+    return max(difference(last(result), true[0]), abs(result.end_time[0] - true[1]))
 
 
 @pytest.mark.parametrize(
@@ -178,31 +182,24 @@ def test_the_twin_arrives_where_the_kernel_does():
             ("rkmk4", 4, (20, 40, 80)),
             ("rk8", 8, (4, 6, 8)),
         ],
-        lambda method, order, steps: method in ("psi_s", "psi_x", "kl6(psi_s)", "rk4"),
+        lambda method, order, steps: method in ("psi_s", "kl6(psi_s)", "rk4"),
     ),
 )
-def test_the_order_holds_up_to_the_event(method, order, steps):
-    # The true arrival, by a method whose error is far below those compared.
-    true = lw.solve(one(FALLING, **FALL), "rk8", h=0.01, t1=2.0)
-    assert true.status[0] == lw.Status.FLOOR
-    errors = []
-    for n in steps:
-        r = lw.solve(one(FALLING, **FALL), method, h=2.0 / n, t1=2.0)
-        assert abs(r.position[-1, 0, 2] - 6.5) < 1e-13
-        errors.append(max(difference(last(r), last(true)), abs(r.end_time[0] - true.end_time[0])))
+def test_the_order_holds_up_to_the_event(method, order, steps, true):
+    errors = [error(lw.solve(one(FALLING, **FALL), method, h=2.0 / n, t1=2.0), true) for n in steps]
     # At least the order: at these steps some methods still gain on it (rkn6_11, rk8), and none may fall a third of one behind.
     assert slope([2.0 / n for n in steps], errors) > order - 0.35
 
 
-def test_an_adaptive_method_arrives_within_its_tolerance():
-    true = lw.solve(one(FALLING, **FALL), "rk8", h=0.01, t1=2.0)
-    r = lw.solve(one(FALLING, **FALL), lw.Method("rk8", rtol=1e-10, atol=1e-12), h=0.5, t1=2.0)
-    assert difference(last(r), last(true)) < 1e-9 and abs(r.end_time[0] - true.end_time[0]) < 1e-9
+@pytest.mark.slow_for("rk8")
+@pytest.mark.parametrize("method", ["rk5", "rk8"])
+def test_an_adaptive_method_arrives_within_its_tolerance(method, true):
+    assert error(lw.solve(one(FALLING, **FALL), lw.Method(method, rtol=1e-10, atol=1e-12), h=0.5, t1=2.0), true) < 1e-9
 
 
 @pytest.mark.parametrize("dtype", ["float32", "float32_compensated"])
 def test_single_precision_stands_at_the_event(dtype):
-    ensemble = fleet(200, [lw.Floor(depth=8.0), lw.Surface()])
+    ensemble = fleet(200, stops(floor=8.0, surface=0.0))
     statistics = [lw.Exceedance("depth", above=8.0, name="deep"), lw.Exceedance("depth", below=0.0, name="out")]
     r = lw.solve(ensemble, h=0.1, t1=20.0, dtype=dtype, statistics=statistics)
     counts = r.status.counts()
@@ -219,7 +216,7 @@ def test_the_first_of_two_events_in_a_step():
         scene = lw.Scene(
             VEHICLE,
             lw.Environment(gravity=GRAVITY),
-            events=[lw.Box(lower=(-9, -9, -9), upper=(9, east, 9)), lw.Floor(depth=depth)],
+            events=stops(lower=(-9, -9, -9), upper=(9, east, 9), floor=depth),
             start=lw.Start(position=(0, 0, 5.0), velocity=(0, 1.0, 1.0)),
         )
         r = lw.solve(scene, h=0.3, t1=3.0)
@@ -230,19 +227,21 @@ def test_the_first_of_two_events_in_a_step():
 def test_what_is_no_number_is_no_event():
     b, R, nu, Om = random_states(2, 8)
     Om[3] = 1e200
-    scene = lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), events=[lw.Floor(depth=1e9)])
+    scene = lw.Scene(HEAVY, lw.Environment(gravity=GRAVITY), events=stops())
     r = lw.solve(lw.Ensemble.from_states(scene, b, R, nu, Om), "rk4", h=0.05, t1=1.0)
     assert r.status.counts() == {"ok": 7, "non_finite": 1}
 
 
-# A tidal current, thrusters with a lag, and noise: water that changes, and laws that remember.
+# A tidal current, one that wanders, and noise: water that changes, and laws that remember.
 TERMS = {
     "water": [{"type": "current_harmonics", "amplitudes": [[0.3, 0.1, 0.0]], "periods": [8.0]}],
     "wandering": [{"type": "gauss_markov_current", "standard_deviation": [0.2, 0.2, 0.0], "time_constant": 5.0}],
     "noise": [{"type": "wrench_noise", "force": [2.0, 2.0, 2.0], "torque": [0.1, 0.1, 0.1]}],
 }
+TERMS["all"] = [table for tables in TERMS.values() for table in tables]
 
 
+@pytest.mark.slow_but("all")
 @pytest.mark.parametrize("terms", TERMS)
 def test_a_stopped_member_stays_and_the_others_do_not_notice(terms):
     b, R, nu, Om = random_states(2, 40)

@@ -316,7 +316,7 @@ def test_an_interrupted_command_ends_in_a_line_and_goes_on(executor, tmp_path, c
     """From the keyboard: every process of the terminal hears it."""
     env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     scene, out = str(ROOT / "examples" / "paper.toml"), str(tmp_path)
-    arguments = ["run", scene, "--members", "4096", "--duration", "500", "--store", "zarr", "--out", out,
+    arguments = ["run", scene, "--members", "4096", "--duration", "200", "--store", "zarr", "--out", out,
                  "--executor", executor, "--threads", "1", "--quiet"]  # fmt: skip
     process = subprocess.Popen([sys.executable, "-c", INTERRUPTED, *arguments], env=env, start_new_session=True,
                                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)  # fmt: skip

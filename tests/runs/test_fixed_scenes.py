@@ -4,8 +4,8 @@ import pytest
 
 from tests.support.fixed_scenes import RUNS, machine, recorded
 
-# Of each kind of run one; each takes a kernel or two of its own.
-QUICK = ("term all together", "method psi_s float32", "statistics, sobol", "events", "store with statistics")
+# Of each kind of run one; other quick tests need the same kernels, but for that of kl6.
+QUICK = ("method psi_s float32", "method rk4", "method kl6(psi_s)", "statistics, sobol", "store with statistics")
 
 
 @pytest.mark.parametrize(

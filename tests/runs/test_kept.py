@@ -1,11 +1,8 @@
 """Members that are kept after all lie in the store: the bits of a run in memory, killed, damaged, merged and exported."""
 
 import json
-import os
 import pickle
 import shutil
-import subprocess
-import sys
 import time
 
 import numpy as np
@@ -19,7 +16,7 @@ from lgvi_warp.runs.store import open as stored
 from lgvi_warp.runs.store.folder import Folder
 from lgvi_warp.runs.store.state import state
 from tests.runs.test_store import FIELDS, flip, remove, tear
-from tests.support.stores import MEMBERS, SETTINGS, differing, fleet, tree
+from tests.support.stores import MEMBERS, SETTINGS, differing, fleet, forked, tree
 
 # Some members turn too fast for the step: |J^-1 a| reaches 1.
 VARY = {"start.angular_velocity": lw.Normal(std=115.0), "vehicle.mass": lw.Normal(relative=0.001)}
@@ -180,25 +177,20 @@ def test_other_members_than_those_that_failed_are_run_anew(whole, tmp_path):
     assert differing(whole, path) == []
 
 
-CODE = """
-import sys
-import lgvi_warp as lw
-from tests.runs.test_kept import failing
-from tests.support.stores import SETTINGS
-lw.solve(failing(), **SETTINGS, keep="failed", threads=1, store=lw.Store(sys.argv[1], chunk_bytes=20_000))
-"""
+def kept_run(path):
+    lw.solve(failing(), **SETTINGS, keep="failed", threads=1, store=lw.Store(path, chunk_bytes=20_000))
 
 
 @pytest.mark.parametrize("wanted", ["zarr.json", pytest.param("blocks/000000000.json", marks=pytest.mark.slow)])
 def test_killed_among_its_kept_members(wanted, tmp_path):
-    env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     path, other = tmp_path / "run.zarr", tmp_path / "other.zarr"
     lw.solve(failing(), **SETTINGS, keep="failed", store=lw.Store(other, chunk_bytes=20_000))
-    process = subprocess.Popen([sys.executable, "-c", CODE, str(path)], env=env)
-    while not (path / "kept" / wanted).exists() and process.poll() is None:
+    process = forked(kept_run, path)
+    while not (path / "kept" / wanted).exists() and process.is_alive():
         time.sleep(0.0005)
     process.kill()
-    assert process.wait() != 0
+    process.join()
+    assert process.exitcode != 0
     lw.resume(path)
     assert differing(other, path) == []
 

@@ -1,25 +1,25 @@
 """What members ended by, in runs: counted alike by status, outcome, exceedance and passage, in memory and in stores."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp.physics.terms import events
+from tests.support.stops import FarAway, stops
 
 STATISTICS = [
     lw.Outcome("floor"), lw.EndTime("floor"), lw.Exceedance("depth", above=26.0), lw.FirstPassage("depth", above=26.0),
     lw.Mean("position", at="floor"), lw.Extremes("depth", at="floor"), lw.PathMaximum("depth", lw.Exceedance(above=26.0)),
 ]  # fmt: skip
-SETTINGS = {"method": "psi_x", "h": 0.04, "t1": 40.0, "save": lw.SaveAt(every=4.0), "statistics": STATISTICS}
+SETTINGS = {"method": "psi_s", "h": 0.04, "t1": 40.0, "save": lw.SaveAt(every=4.0), "statistics": STATISTICS}
 
 
-def remus(members, events=({"type": "floor", "depth": 26.0},), **ensemble):
-    """REMUS 100 that are a little too heavy or too light, from a depth of 20 m."""
-    scene = lw.Scene.named(
-        "remus_100",
-        start={"position": [0, 0, 20.0], "velocity": [1.5, 0, 0]},
-        vehicle={"buoyancy": 299.0},
-        events=list(events),
-    )
+def fleet(members, ends=None, **ensemble):
+    """The paper's vehicle a little too heavy or too light, from a depth of 20 m."""
+    scene = lw.Scene.named("nordkvist_sanyal", start={"position": [0, 0, 20.0], "velocity": [0.1, 0, 0]},
+                           vehicle={"buoyancy": 1212.0}, events=ends or stops(floor=26.0))  # fmt: skip
     vary = {"vehicle.buoyancy": lw.Normal(std=3.0), "start.angular_velocity": lw.Normal(std=(0.02, 0.05, 0.02))}
     return lw.Ensemble(scene, members, 1, vary, **ensemble)
 
@@ -41,7 +41,7 @@ def agree(result, members):
 
 
 def test_counts_agree():
-    result = lw.solve(remus(2000), **SETTINGS)
+    result = lw.solve(fleet(2000), **SETTINGS)
     floor = agree(result, 2000)
     s = result.statistics
     np.testing.assert_allclose(
@@ -58,12 +58,13 @@ def test_counts_agree():
 
 @pytest.mark.slow
 def test_counts_agree_of_100_000():
-    agree(lw.solve(remus(100_000), **SETTINGS, keep="none"), 100_000)
+    agree(lw.solve(fleet(100_000), **SETTINGS, keep="none"), 100_000)
 
 
-def test_in_a_store_and_after_a_resume(tmp_path):
-    fleet, whole = remus(1000), lw.solve(remus(1000), **SETTINGS)
-    stored = lw.solve(fleet, **SETTINGS, store=tmp_path / "run.zarr", only=range(0, 2))
+def test_in_a_store_and_after_a_resume(tmp_path, monkeypatch):
+    monkeypatch.setitem(events.TYPES, FarAway.type, FarAway)
+    members, whole = fleet(1000), lw.solve(fleet(1000), **SETTINGS)
+    stored = lw.solve(members, **SETTINGS, store=tmp_path / "run.zarr", only=range(0, 2))
     assert len(stored.status) == 512
     lw.resume(tmp_path / "run.zarr")
     back = lw.open_run(tmp_path / "run.zarr")
@@ -84,15 +85,16 @@ def test_in_a_store_and_after_a_resume(tmp_path):
 @pytest.mark.slow
 def test_processes_give_the_same(tmp_path):
     asked = SETTINGS | {"keep": "none"}
-    whole, apart = lw.solve(remus(600), **asked), lw.solve(remus(600), **asked, executor="processes", threads=2)
+    whole, apart = lw.solve(fleet(600), **asked), lw.solve(fleet(600), **asked, executor="processes", threads=2)
     for name, one in whole.statistics.items():
         assert all(one[key].tobytes() == apart.statistics[name][key].tobytes() for key in one.arrays)
 
 
 def test_several_events_by_their_names():
-    events = [{"type": "floor", "depth": 26.0, "name": "sea floor"}, {"type": "surface", "depth": 17.0}]
+    surface, floor, *others = stops(surface=17.0, floor=26.0)
+    ends = [surface, dataclasses.replace(floor, name="sea floor"), *others]
     asked = [lw.Outcome("sea floor"), lw.Outcome("surface"), lw.Outcome("stopped"), lw.Mean("depth", at="surface")]
-    result = lw.solve(remus(1000, events), **SETTINGS | {"statistics": asked}, keep="none")
+    result = lw.solve(fleet(1000, ends), **SETTINGS | {"statistics": asked})
     counts, s = result.status.counts(), result.statistics
     assert (
         s["outcome sea floor"]["ended"][-1] == counts["floor"]
@@ -105,7 +107,7 @@ def test_several_events_by_their_names():
 
 
 def test_replicates_of_a_design():
-    result = lw.solve(remus(512, sampling=lw.Sobol(replicates=4)), **SETTINGS, keep="none")
+    result = lw.solve(fleet(512, sampling=lw.Sobol(replicates=4)), **SETTINGS)
     hits = (np.asarray(result.status) == lw.Status.FLOOR).sum()
     for name in ("outcome floor", "exceedance depth above 26", "first_passage depth above 26"):
         assert round(float(np.ravel(result.statistics[name].value)[-1]) * 512) == hits
@@ -113,7 +115,13 @@ def test_replicates_of_a_design():
 
 def test_an_outcome_that_no_member_can_have_is_refused():
     with pytest.raises(lw.SceneError) as error:
-        lw.solve(remus(10), "psi_x", h=0.04, t1=1.0, statistics=[lw.Outcome("surface"), lw.Mean("depth", at="flor")])
+        lw.solve(
+            fleet(10, [lw.Floor(depth=26.0)]),
+            "psi_s",
+            h=0.04,
+            t1=1.0,
+            statistics=[lw.Outcome("surface"), lw.Mean("depth", at="flor")],
+        )
     text = str(error.value)
     assert "outcome.of = 'surface': is no outcome of this scene" in text and "did you mean 'floor'" in text
 
@@ -121,6 +129,6 @@ def test_an_outcome_that_no_member_can_have_is_refused():
 def test_until_an_outcome_is_sure_enough():
     asked = SETTINGS | {"statistics": [lw.Outcome("floor"), lw.EndTime("floor", lw.Mean())]}
     for watched, half in (("outcome floor", 0.03), ("mean end_time floor", 1.0)):
-        result = lw.solve(remus(4000), **asked, keep="none", until=lw.Until(watched, half, members=512))
+        result = lw.solve(fleet(4000), **asked, until=lw.Until(watched, half, members=512))
         assert len(result.status) < 4000 and "reached" in result.messages[-1]
         assert result.statistics[watched].half_width[-1] <= half

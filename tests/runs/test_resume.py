@@ -1,36 +1,29 @@
 """Killed at any moment (SIGKILL), a run goes on and leaves the bytes of one that was never stopped."""
 
-import os
 import random
 import shutil
-import subprocess
-import sys
 import time
 
 import pytest
 
 import lgvi_warp as lw
-from tests.support.stores import differing, fleet
+from tests.support.stores import differing, fleet, forked
+
 
 # Blocks on one thread, chunks of about 50 samples: long enough to be hit in the middle of all that happens.
-CODE = """
-import sys
-import lgvi_warp as lw
-from tests.support.stores import fleet
-lw.solve(fleet(int(sys.argv[3])), "psi_s", h=0.01, t1=60.0, save=lw.SaveAt(every=0.5), threads=int(sys.argv[2]),
-         store=lw.Store(sys.argv[1], existing="resume", chunk_bytes=500_000))
-"""
+def run(path, threads, members):
+    settings = {"h": 0.01, "t1": 60.0, "save": lw.SaveAt(every=0.5), "threads": threads}
+    lw.solve(fleet(members), "psi_s", **settings, store=lw.Store(path, existing="resume", chunk_bytes=500_000))
 
 
 def start(path, threads=1, members=2048):
     """The run in a process of its own, begun or gone on with; 256 members a block."""
-    env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    return subprocess.Popen([sys.executable, "-c", CODE, str(path), str(threads), str(members)], env=env)
+    return forked(run, path, threads, members)
 
 
 def wait_for(path, process):
     """Until the store is there."""
-    while not path.exists() and process.poll() is None:
+    while not path.exists() and process.is_alive():
         time.sleep(0.002)
 
 
@@ -41,7 +34,8 @@ def undisturbed(path, members):
     process = start(path, members=members)
     wait_for(path, process)
     there = time.perf_counter()
-    assert process.wait() == 0
+    process.join()
+    assert process.exitcode == 0
     return path, there - begun, time.perf_counter() - there
 
 
@@ -60,13 +54,10 @@ def whole(tmp_path_factory):
 def killed(path, seconds):
     """Start the run and kill it so many seconds after its start. Whether it was hit."""
     process = start(path, members=4096)
-    try:
-        process.wait(seconds)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
-        return True
-    return False
+    process.join(seconds)
+    process.kill()
+    process.join()
+    return process.exitcode != 0
 
 
 def finished(path):
@@ -79,7 +70,9 @@ def goes_on(path, whole, members=4096):
     if path.exists():
         lw.resume(path)
     else:
-        assert start(path, members=members).wait() == 0
+        process = start(path, members=members)
+        process.join()
+        assert process.exitcode == 0
     assert differing(whole, path) == []
     assert sorted(one.name for one in path.parent.iterdir()) == ["run.zarr"]
     shutil.rmtree(path)
@@ -88,11 +81,12 @@ def goes_on(path, whole, members=4096):
 def killed_after(path, blocks, delay, members):
     """Start the run and kill it a moment after so many blocks are marked. Whether it was hit before its end."""
     process = start(path, members=members)
-    while finished(path) < blocks and process.poll() is None:
+    while finished(path) < blocks and process.is_alive():
         time.sleep(0.002)
     time.sleep(delay)
     process.kill()
-    return process.wait() != 0
+    process.join()
+    return process.exitcode != 0
 
 
 def test_three_kills(short, tmp_path):

@@ -22,8 +22,8 @@ from tests.conftest import ROOT
 from tests.support.stores import SETTINGS, bits, differing, fleet
 
 PAPER = str(ROOT / "examples" / "paper.toml")
-# 16 blocks of 256 members, a second each or less.
-LONG = ["run", PAPER, "--members", "4096", "--duration", "300", "--threads", "1"]
+# 16 blocks of 256 members, half a second each or less.
+LONG = ["run", PAPER, "--members", "4096", "--duration", "150", "--threads", "1"]
 CODES = {"SIGINT": 130, "SIGTERM": 143, "SIGHUP": 129}
 SECONDS = 60.0
 

@@ -20,6 +20,7 @@ from lgvi_warp.scene import scene as scenes
 from lgvi_warp.scene.scene import from_dict
 from lgvi_warp.statistics import TYPES
 from tests.conftest import ROOT
+from tests.support.stops import stops
 from tests.support.tools import one, random_states, scene_of
 
 EVERY = [
@@ -284,7 +285,7 @@ def test_members_that_fail_are_left_out_from_then_on(spinning):
     np.testing.assert_allclose(found.value[:, 0], expected, rtol=1e-14)
     assert r.statistics["mean path_maximum depth"].count.tolist() == [(~failed).sum()]
     assert any(f"{found.count.min()} of 600" in message or "of 600 count" in message for message in r.messages)
-    lean = lw.solve(spinning, **settings, keep="failed")
+    lean = lw.solve(spinning, **settings, keep="failed", statistics=[lw.Mean(name) for name in FIELDS])
     np.testing.assert_array_equal(lean.kept_members, np.flatnonzero(failed))
     assert all(lean.kept.samples[f].tobytes() == r.samples[f][:, failed].tobytes() for f in FIELDS)
     np.testing.assert_array_equal(lean.kept.failure_time, r.failure_time[failed])
@@ -328,9 +329,9 @@ def test_what_is_left_out_is_said_with_its_reason(spinning):
 def grounding(n=300):
     """Members that sink, some of them to the sea floor."""
     scene = lw.Scene(
-        lw.Vehicle(10.0, (1.0, 2.0, 2.5), (20.0, 20.0, 20.0), 50.0),
+        lw.Vehicle(10.0, (1.0, 2.0, 2.5), (20.0, 20.0, 21.0), 50.0, (0.0, 0.0, -1e-9)),
         lw.Environment(gravity=9.8),
-        events=[lw.Floor(depth=1.0)],
+        events=stops(floor=1.0),
     )
     b = np.zeros((n, 3))
     b[:, 2] = np.linspace(-3.0, 0.9, n)
@@ -350,7 +351,8 @@ def test_members_that_stop_are_held_or_left_out():
     np.testing.assert_allclose(r.statistics["held"].value[:, 0], r.position[..., 2].mean(axis=1), rtol=0, atol=1e-14)
     expected = [r.position[t, ~stopped[t], 2].mean() for t in range(5)]
     np.testing.assert_allclose(r.statistics["left out"].value[:, 0], expected, rtol=0, atol=1e-14)
-    assert lw.solve(fleet, h=0.1, t1=2.0, keep="failed").kept is None  # a stop is no failure
+    # A stop is no failure.
+    assert lw.solve(fleet, h=0.1, t1=2.0, keep="failed", statistics=[lw.Mean(name) for name in FIELDS]).kept is None
 
 
 def test_a_linear_gaussian_case_has_its_exact_moments():
@@ -410,7 +412,7 @@ def test_a_linear_gaussian_case_has_its_exact_moments():
 
 
 def falling(n=20_000):
-    base = scene_of((2.0, 2.0, 2.0), net=1.0)
+    base = scene_of((2.0, 2.0, 3.0), net=1.0, moment=(0.0, 0.0, -1e-9))
     vary = {"start.position": lw.Normal(std=1.0)}
     return lw.Ensemble(lw.Scene(base.vehicle, base.environment, start=lw.Start(position=[0, 0, 10])), n, 1, vary)
 
@@ -471,6 +473,7 @@ REPLICATED = [
     lw.Mean("position"), lw.Quantiles("depth", (0.05, 0.5, 0.95), size=64), lw.Extremes("depth"), lw.MeanAttitude(),
     lw.Exceedance("depth", above=12.0), lw.FirstPassage("depth", above=12.0), lw.CircularMean("euler"),
     lw.PathMaximum("speed", then=[lw.Mean(), lw.Quantiles(levels=(0.5,), size=64)]), lw.PathMean("depth"),
+    lw.Mean("angular_velocity"),
 ]  # fmt: skip
 STARTS = {
     "start.position": lw.Normal(std=0.1),

@@ -1,10 +1,7 @@
 """Statistics in a store: the bits of a run in memory, of any executor, killed and gone on with."""
 
-import os
 import pickle
 import shutil
-import subprocess
-import sys
 import time
 
 import numpy as np
@@ -19,7 +16,7 @@ from lgvi_warp.runs.store.create import create
 from lgvi_warp.runs.store.folder import Folder
 from lgvi_warp.runs.store.state import state
 from tests.conftest import ROOT
-from tests.support.stores import SETTINGS, STATISTICS, UNTIL, bits, differing, fleet, markers, tree
+from tests.support.stores import SETTINGS, STATISTICS, UNTIL, bits, differing, fleet, forked, markers, tree
 
 
 @pytest.fixture(scope="module")
@@ -144,30 +141,21 @@ def test_until_stops_a_resumed_store_at_the_same_block(stopped, tmp_path):
     assert lw.resume(path, threads=2).members == 512 and tree(path) == before
 
 
-CODE = """
-import sys
-import lgvi_warp as lw
-from tests.support.stores import STATISTICS, fleet
-lw.solve(fleet(2048), "psi_s", h=0.01, t1=60.0, save=lw.SaveAt(every=0.5), threads=1, statistics=STATISTICS,
-         keep=sys.argv[2], store=sys.argv[1])
-"""
-
-
-def start(path, keep):
-    env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    return subprocess.Popen([sys.executable, "-c", CODE, str(path), keep], env=env)
+def lasting_run(path, keep, threads=None):
+    settings = {"h": 0.01, "t1": 60.0, "save": lw.SaveAt(every=0.5), "threads": threads}
+    return lw.solve(fleet(2048), "psi_s", **settings, statistics=STATISTICS, keep=keep, store=path)
 
 
 @pytest.mark.parametrize("keep", ["none", pytest.param("all", marks=pytest.mark.slow)])
 def test_killed_and_gone_on_with(keep, tmp_path):
-    lasting = {"h": 0.01, "t1": 60.0, "save": lw.SaveAt(every=0.5)}
     path, other = tmp_path / "run.zarr", tmp_path / "other.zarr"
-    undisturbed = lw.solve(fleet(2048), "psi_s", **lasting, statistics=STATISTICS, keep=keep, store=other)
-    process = start(path, keep)
-    while len(list(path.glob("blocks/*.json"))) < 2 and process.poll() is None:
+    undisturbed = lasting_run(other, keep)
+    process = forked(lasting_run, path, keep, 1)
+    while len(list(path.glob("blocks/*.json"))) < 2 and process.is_alive():
         time.sleep(0.002)
     process.kill()
-    assert process.wait() != 0 and 0 < len(list(path.glob("blocks/*.json"))) < 8
+    process.join()
+    assert process.exitcode != 0 and 0 < len(list(path.glob("blocks/*.json"))) < 8
     assert bits(lw.resume(path)) == bits(undisturbed) and differing(other, path) == []
 
 

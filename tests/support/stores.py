@@ -1,6 +1,7 @@
 """What the tests of stores need: a small run, and whether two folders hold the same bytes."""
 
 import contextlib
+import multiprocessing
 from pathlib import Path
 
 import lgvi_warp as lw
@@ -9,7 +10,7 @@ from lgvi_warp.studies import speed
 # 4 blocks of 256 members, the last one ragged; 31 samples.
 MEMBERS, SETTINGS = 1003, {"method": "psi_s", "h": 0.01, "t1": 3.0, "save": lw.SaveAt(every=0.1)}
 STATISTICS = [lw.Mean("position"), lw.Quantiles("depth"), lw.PathMaximum("speed"), lw.Covariance("angular_velocity"),
-              lw.Quantiles("max(norm(velocity))")]  # fmt: skip
+              lw.Quantiles("max(norm(velocity))"), lw.MeanAttitude()]  # fmt: skip
 # Reached with 512 members.
 UNTIL = lw.Until("mean angular_velocity[0]", 3.7e-3, members=256)
 
@@ -44,3 +45,10 @@ def markers(path):
         with contextlib.suppress(FileNotFoundError):
             found[one.name] = one.stat().st_mtime_ns
     return found
+
+
+def forked(work, *arguments):
+    """A process at this work: a fork, which has all imports and kernels of the tests."""
+    process = multiprocessing.get_context("fork").Process(target=work, args=arguments)
+    process.start()
+    return process

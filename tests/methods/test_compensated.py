@@ -94,7 +94,7 @@ def test_energy_is_kept():
 LAWS = {
     "current": [terms.Current(velocity=(0.3, -0.2, 0.1))],
     "tether": [terms.Tether(anchor=(2.0, 0.0, -3.0), stiffness=4.0, rest_length=1.0)],
-    "drag": [terms.Drag(linear=(0.3, 0.4, 0.5, 0.03, 0.04, 0.05))],
+    "drag": [terms.Drag(linear=(0.3, 0.4, 0.5, 0.03, 0.04, 0.05), quadratic=(1e-30,) * 6)],
     "shear": [terms.CurrentProfile(depths=(-100.0, 100.0), velocities=((-3.0, 2.0, -1.0), (3.0, -2.0, 1.0)))],
     "noise": [terms.GaussMarkovCurrent(standard_deviation=(0.1, 0.1, 0.1), time_constant=5.0)],
 }
@@ -134,7 +134,8 @@ def test_events_stop_where_they_do():
     n = 40
     nu = np.stack([np.ones(n), np.zeros(n), -np.linspace(0.4, 2.0, n)], axis=1)
     fleet = one(scene, np.array([1e7, 0.0, 5.0]), nu=nu)
-    result = run(fleet, h=1e-3, t1=6.0)
+    # One lane: sixteen take 8 s to compile.
+    result = run(fleet, h=1e-3, t1=6.0, width=1)
     time = -5.0 / nu[:, 2]
     stopped = time < 6.0
     assert 10 < stopped.sum() < n
@@ -146,7 +147,7 @@ def test_events_stop_where_they_do():
     np.testing.assert_allclose(result.position[-1, stopped, 2], 0.0, atol=1e-6)
     # Those that go on make the same steps as where the event is far away.
     far = lw.Scene(STRAIGHT.vehicle, STRAIGHT.environment, events=[lw.Surface(depth=-1e6)])
-    alone = run(one(far, np.array([1e7, 0.0, 5.0]), nu=nu), h=1e-3, t1=6.0)
+    alone = run(one(far, np.array([1e7, 0.0, 5.0]), nu=nu), h=1e-3, t1=6.0, width=1)
     for name in FIELDS:
         assert getattr(result, name)[:, ~stopped].tobytes() == getattr(alone, name)[:, ~stopped].tobytes()
 
@@ -177,7 +178,7 @@ def test_launches_and_samples_do_not_change_the_path(method, monkeypatch):
 
 def test_types_of_the_result():
     b = np.array([1e7 + 0.123456789, 0.1, -1e-3])
-    result = run(one(STRAIGHT, b), t1=0.1)
+    result = run(one(GENERAL, b), t1=0.1)
     assert result.provenance["dtype"] == COMPENSATED
     assert [getattr(result, name).dtype for name in FIELDS] == [np.float64] + 3 * [np.float32]
     # Both parts together hold twice float32's digits, and leave the packet unharmed.

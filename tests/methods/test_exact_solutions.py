@@ -24,7 +24,7 @@ def drag_of(linear=DRAG, quadratic=DRAG):
 
 
 def run(vehicle, terms, state, h, t1, method="psi_s", **named):
-    """The result of one member."""
+    """The result of one member; kernels of width 1 are sooner compiled, and of no use to other tests."""
     scene = lw.Scene(vehicle, lw.Environment(gravity=GRAVITY), terms=terms)
     return lw.solve(one(scene, **state), method, h=h, t1=t1, **named)
 
@@ -38,7 +38,7 @@ def test_terminal_fall(method):
     steps = np.array([0.08, 0.04, 0.02])
     errors = []
     for h in steps:
-        w = run(sphere(net), drag, {}, h, 0.8, method).velocity[-1, 0, 2]
+        w = run(sphere(net), drag, {}, h, 0.8, method, width=1 if method == "psi_x" else None).velocity[-1, 0, 2]
         errors.append(abs(w - np.sqrt(net / q) * np.tanh(0.8 * np.sqrt(net * q) / M)))
     # Second order; the next term of the error moves a slope between such steps by a few hundredths.
     assert slope(steps, errors) == pytest.approx(2.0, abs=0.1)
@@ -90,7 +90,7 @@ def test_equilibrium_pitch_of_a_trim_moment(method):
     # nothing, so the equilibrium of the equations is that of every method, whatever the step.
     lever, torque = 0.02, 1.5
     held = [terms.Wrench(torque=(0.0, torque, 0.0)), drag_of((10.0, 10.0, 10.0, 1.0, 1.0, 1.0)), CURRENT]
-    r = run(sphere(center=(0.0, 0.0, -lever)), held, {}, 0.05, 100.0, method)
+    r = run(sphere(center=(0.0, 0.0, -lever)), held, {}, 0.05, 100.0, method, width=1)
     pitch = -np.arcsin(r.attitude[-1, 0, 2, 0])
     assert pitch == pytest.approx(np.arcsin(torque / (200.0 * lever)), abs=1e-12)
     assert np.abs(r.velocity[-1]).max() < 1e-12 and np.abs(r.angular_velocity[-1]).max() < 1e-12
@@ -107,7 +107,7 @@ def test_a_steady_current_only_carries(method):
     nu, Om = np.array([1.2, 0.3, -0.2]), (0.3, -0.4, 0.5)
     still = run(vehicle, [drag], {"R": R, "nu": nu, "Om": Om}, 0.02, 4.0, method)
     current = [drag, WRENCH, terms.Current(velocity=u)]
-    moving = run(vehicle, current, {"R": R, "nu": nu + R.T @ u, "Om": Om}, 0.02, 4.0, method)
+    moving = run(vehicle, current, {"R": R, "nu": nu + R.T @ u, "Om": Om}, 0.02, 4.0, method, width=1)
     # 200 steps of round-off. In psi the current is a part of the iteration of Phi*, to 1e-14 of the momenta each.
     bound = 2e-12
     assert np.abs(moving.position[-1] - still.position[-1] - 4.0 * u).max() < bound
@@ -119,7 +119,7 @@ def test_a_neutral_body_at_rest_goes_with_accelerating_water():
     # rho V = m: the water's acceleration pushes the body as it pushes the water. R = I, M anisotropic: no relative motion.
     schedule = terms.CurrentProfile(depths=(0.0, 100.0), velocities=((0.5, 0.0, 0.0), (0.5, 0.0, 0.0)))
     vehicle = lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 20.0 * GRAVITY - NET, ARM)
-    r = run(vehicle, [schedule], {"b": (0.0, 0.0, 10.0), "nu": (0.5, 0.0, 0.0)}, 0.05, 10.0)
+    r = run(vehicle, [schedule], {"b": (0.0, 0.0, 10.0), "nu": (0.5, 0.0, 0.0)}, 0.05, 10.0, width=1)
     assert np.abs(r.position[-1, 0] - (5.0, 0.0, 10.0)).max() < 1e-12
 
 
@@ -128,6 +128,6 @@ def test_shear_turns_into_relative_speed():
     # M nu_r' = -M 0.1 w with isotropic M, so nu_r = -0.1 w t: over ground it keeps the speed that it had.
     w = 0.5
     profile = terms.CurrentProfile(depths=(-1000.0, 1000.0), velocities=((-100.0, 0.0, 0.0), (100.0, 0.0, 0.0)))
-    r = run(sphere(), [profile], {"nu": (0.0, 0.0, w)}, 0.05, 10.0)
+    r = run(sphere(), [profile], {"nu": (0.0, 0.0, w)}, 0.05, 10.0, width=1)
     assert r.velocity[-1, 0] == pytest.approx((0.0, 0.0, w), abs=1e-12)
     assert r.position[-1, 0] == pytest.approx((0.0, 0.0, w * 10.0), abs=1e-11)

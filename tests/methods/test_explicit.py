@@ -164,5 +164,7 @@ def test_chosen_steps(method):
     times = (0.5, 1.0, 1.5)
     states = explicit.adaptive(begun(body), body, times, 1e-7, 1e-7 * scale, TABLEAUX[method], h=0.5)
     chosen = lw.Method(method, rtol=1e-7, atol=1e-7)
-    result = lw.solve(one(test_terms.scene_of(PLAIN), **STATE), chosen, h=0.5, t1=1.5, save=lw.SaveAt(every=0.5))
+    result = lw.solve(
+        one(test_terms.scene_of(PLAIN), **STATE), chosen, h=0.5, t1=1.5, save=lw.SaveAt(every=0.5), width=1
+    )
     assert difference(last(result), ended(states[-1], body)) < 1e-11

@@ -37,7 +37,7 @@ def test_raise_is_quiet_without_failures_and_about_events(scene):
     # The kernel of test_compositions.py, test_events_change_round_off_only. Up to 5 mm in about 0.6 s.
     box = lw.Box(lower=[-9.0, -9.0, -0.005], upper=[9.0, 9.0, 9.0])
     result = lw.solve(one(lw.Scene(scene.vehicle, scene.environment, events=[box])), "bm4(psi_x)", h=0.1, t1=1.0,
-                      on_failure="raise")  # fmt: skip
+                      on_failure="raise", width=1)  # fmt: skip
     assert result.status.counts() == {"box": 1}
 
 
@@ -152,7 +152,7 @@ def test_events_stop_a_divided_step():
     scene = pushed_to_the_wall(1e-30)
     fleet = one(scene, R=lw.notation.matrix_from_rotation_vector(np.array([0.0, np.pi / 2, 0.0])), b=[[0.0] * 3] * 2,
                 nu=[[0.0, 0.0, 2.0]] * 2, Om=[[0.0, 0.0, 30.0], [0.0, 0.0, 1.0]])  # fmt: skip
-    result = lw.solve(fleet, "psi_s", h=0.1, t1=2.0, on_failure="substep")
+    result = lw.solve(fleet, "psi_s", h=0.1, t1=2.0, on_failure="substep", width=2)
     # Both go north at 2 m/s, one of them by divided steps.
     assert list(result.status) == [Status.BOX, Status.BOX] and result.substeps[0] == 5 and result.substeps[1] == 0
     np.testing.assert_allclose(result.failure_time, 0.5, atol=1e-9)
@@ -160,7 +160,9 @@ def test_events_stop_a_divided_step():
 
 def test_times_of_laws_pass_in_divided_steps():
     # Divided steps see their own times.
-    result = lw.solve(one(pushed_to_the_wall(2.0), Om=[0.0, 0.0, 30.0]), "psi_s", h=0.1, t1=2.0, on_failure="substep")
+    result = lw.solve(
+        one(pushed_to_the_wall(2.0), Om=[0.0, 0.0, 30.0]), "psi_s", h=0.1, t1=2.0, on_failure="substep", width=2
+    )
     # M v = t^2 / 2: exact for a kick in the middle of each part, as the law is linear in time.
     assert result.substeps[0] == 20
     np.testing.assert_allclose(result.velocity[-1, 0, 2], 1.0, rtol=1e-12)

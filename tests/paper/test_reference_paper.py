@@ -85,6 +85,7 @@ def test_states_of_the_example(method, time, steps, bound, example, body, start)
     assert difference(end, expected(example[f"{KEYS[method]}_h0.01"][time])) < bound
 
 
+@pytest.mark.slow_but("newton*")
 @pytest.mark.parametrize(("solver", "bound"), [("newton", 1e-11), ("cayley", 1e-11), ("riccati", 1e-11),
                                                ("moser_veselov", 1e-10)])  # fmt: skip
 def test_psi_with_every_solver(solver, bound, example, body, start):
@@ -94,6 +95,7 @@ def test_psi_with_every_solver(solver, bound, example, body, start):
     assert difference(from_state(body, x), expected(example["Psi_h0.01"]["5"])) < bound
 
 
+@pytest.mark.slow
 def test_truth_at_five_seconds(example, body, start):
     # RKMK4's error at h = .0125, t = 2 is 4e-9: at h = .002, t = 5 it is some 4e-12 times the growth of errors, 10.
     state = run("rkmk4", start, body, 0.002, 2500)[-1]

@@ -47,7 +47,7 @@ def restoring(w):
 def stable(make, method, w, steps):
     """(n,): which members stay bounded."""
     fleet, axis = make(w)
-    run = lw.solve(fleet, method, h=1.0, t1=float(steps), save=lw.SaveAt(every=1.0, fields=("attitude",)))
+    run = lw.solve(fleet, method, h=1.0, t1=float(steps), save=lw.SaveAt(every=1.0))
     with np.errstate(invalid="ignore"):
         angle = np.arccos(np.clip(run.attitude[..., axis, axis], -1.0, 1.0))
         return (run.status == lw.Status.OK) & (np.nanmax(angle, axis=0) < LARGEST)

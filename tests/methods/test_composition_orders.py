@@ -9,7 +9,7 @@ import lgvi_warp as lw
 from lgvi_warp.common.status import Status
 from lgvi_warp.methods.method import COMPOSITIONS, HALVES, TWO_PART
 from tests.methods.test_coupled import scene_of as coupled_scene_of
-from tests.support.tools import difference, expected, last, one, scene_of, slope
+from tests.support.tools import difference, expected, free_scene, last, one, slope
 
 ORDERS = {
     "yo6(psi_s)": (6, (0.2, 0.125, 0.1)),
@@ -67,6 +67,8 @@ def test_coefficients_of_two_parts(name):
     assert [sum(numbers[0::2]), sum(numbers[1::2])] == pytest.approx([1.0, 1.0], abs=1e-15)
 
 
+# The kernels of every kind: compositions of psi_s, halves of psi_x, and both orders of two parts.
+@pytest.mark.slow_for("ss6_13(psi_x)", "su8_15(psi_x)", "ss8_21(psi_x)", "bm?(psi_s)")
 @pytest.mark.parametrize("name", ORDERS)
 def test_order(name, scene, example):
     order, steps = ORDERS[name]
@@ -76,6 +78,7 @@ def test_order(name, scene, example):
     assert lw.Method(name).order == order
 
 
+@pytest.mark.slow_for("kl8(psi_x)*", "su8_15(psi_x)*", "ss8_21(psi_x)*")
 @pytest.mark.parametrize(("method", "h", "at_most"), [
     ("kl8(psi_x)", 0.05, 1e-12), ("su8_15(psi_x)", 0.05, 1e-12), ("ss8_21(psi_x)", 0.1, 1e-12), ("ss8_21(psi_s)", 0.1, 2e-12),
     ("rkn6_14", 0.125, 1e-11), ("rkn6_14", 0.0625, 1e-12), ("bm6(psi_x)", 0.03125, 1e-10),
@@ -84,6 +87,7 @@ def test_errors_at_five_seconds(method, h, at_most, scene, example):
     assert error(scene, method, h, example) < at_most
 
 
+@pytest.mark.slow_but("bm6(psi_x)")
 @pytest.mark.parametrize("method", ["ss6_13(psi_x)", "bm6(psi_x)", "rkn6_11"])
 def test_float32_reaches_its_round_off(method, scene, example):
     truth = expected(example["truth"]["5"])
@@ -125,7 +129,7 @@ def test_coupled_inertia_does_not_fit():
 
 def test_a_quarter_turn_is_too_large():
     # Spin about the second axis: the step's longest rotation by part A, over c h, below or above a quarter turn.
-    scene = scene_of()
+    scene = free_scene()
     longest = max(abs(c) for c in lw.Method("rkn6_11").stages[1::2])
     below, above = (f * 0.5 * math.pi / longest for f in (0.95, 1.05))
     spins = [[0.0, below, 0.0], [0.0, above, 0.0], [0.0, 0.1, 0.0]]

@@ -22,11 +22,11 @@ SINGLE = 5e-6
 BOX = lw.Box(lower=[-1e4] * 3, upper=[1e4] * 3)
 
 
-def kernel(method, shape="both full", h=0.1, dtype="float64", steps=STEPS, events=()):
+def kernel(method, shape="diagonal", h=0.1, dtype="float64", steps=STEPS, events=(), width=None):
     """The kernel's state after some steps, and the twin's body and start."""
     scene = scene_of(*SHAPES[shape], net=-2.56, moment=(0.3, -0.2, -8.5))
     scene = lw.Scene(scene.vehicle, scene.environment, events=list(events))
-    result = lw.solve(one(scene, **STATE), method, h=h, t1=steps * h, dtype=dtype)
+    result = lw.solve(one(scene, **STATE), method, h=h, t1=steps * h, dtype=dtype, width=width)
     assert result.status.counts() == {"ok": 1}
     body = body_of(scene)
     return last(result), body, to_state(body, *(np.array(value) for value in STATE.values()))
@@ -51,6 +51,7 @@ def merged_parts(name):
     return (part, first), (*program[1:-1], (part, final + first)), (part, -first)
 
 
+@pytest.mark.slow_for("*-float32")
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 @pytest.mark.parametrize("name", COMPOSITIONS)
 def test_compositions(name, dtype):
@@ -59,6 +60,7 @@ def test_compositions(name, dtype):
     assert difference(end, from_state(body, x)) < (ROUND_OFF if dtype == "float64" else SINGLE)
 
 
+@pytest.mark.slow_but("bm6(psi)-*")
 @pytest.mark.parametrize(("method", "dtype"), [("bm4(psi_s)", "float64"), ("bm6(psi_s)", "float64"),
                                                ("bm6(psi)", "float64"), ("bm6(psi_s)", "float32")])  # fmt: skip
 def test_halves(method, dtype):
@@ -106,9 +108,10 @@ def test_halves_with_drag():
     assert difference(last(result), reduced.from_reduced(x)) < ROUND_OFF
 
 
-@pytest.mark.slow_for("rkn4_6-both*")
+@pytest.mark.slow_but("*-diagonal-*", "rkn6_14-both full-float32")
 @pytest.mark.parametrize(
-    ("shape", "dtype"), [("isotropic mass", "float64"), ("both full", "float64"), ("both full", "float32")]
+    ("shape", "dtype"),
+    [("diagonal", "float64"), ("isotropic mass", "float64"), ("both full", "float64"), ("both full", "float32")],
 )
 @pytest.mark.parametrize("name", TWO_PART)
 def test_two_parts(name, shape, dtype):
@@ -120,10 +123,12 @@ def test_two_parts(name, shape, dtype):
     assert difference(end, from_state(body, x)) < (ROUND_OFF if dtype == "float64" else SINGLE)
 
 
-@pytest.mark.parametrize("method", ["bm4(psi_s)", "rkn6_11", "rkn6_14"])
+@pytest.mark.slow_for("rkn6_11")
+@pytest.mark.parametrize("method", ["bm4(psi_x)", "rkn6_11", "rkn6_14"])
 def test_events_change_round_off_only(method):
+    # One lane, which is sooner compiled.
     # With an event no map is joined to the next step's; A joins to its order, 8: at h |Om| = 0.1 that is 1e-10 of a turn.
-    plain, watched = kernel(method)[0], kernel(method, events=[BOX])[0]
+    plain, watched = kernel(method)[0], kernel(method, events=[BOX], width=1)[0]
     assert difference(plain, watched) < (1e-10 if method == "rkn6_14" else 1e-13)
 
 

@@ -70,24 +70,23 @@ def twin(laws, method, h, steps):
     return b, R, nu + R.T @ water(look(at_end, body, h), body).velocity, Om
 
 
-# Each method with one law of each type at once; psi_x also with what these leave out: drag along axes, and water that is
-# the same everywhere. Each law alone: test-long.
-SHORT = {(method, name) for method in PROGRAMS for name in (None, "all together")} | {
-    ("psi_x", name) for name in ("drag", "current harmonics")
+# Each method once: psi_x with drag along axes and water that is the same everywhere, psi_w with one law of each other kind
+# (damping, water, of place, of time, that remembers). Each law alone, and all together: test-long.
+SEVERAL = {
+    "in harmonics": ("drag", "current harmonics"),
+    "in a profile": ("drag matrix", "current profile", "tether", "wrench schedule", "Gauss-Markov current"),
 }
+SHORT = ("psi_x-in harmonics", "psi_x8-None", "psi_w-in a profile")
 
 
-@pytest.mark.parametrize(
-    ("method", "name"),
-    [
-        pytest.param(method, name, marks=() if (method, name) in SHORT else pytest.mark.slow)
-        for method in PROGRAMS
-        for name in [None, *CASES]
-    ],
-)
+@pytest.mark.slow_but(*SHORT)
+@pytest.mark.parametrize("name", [None, *SEVERAL, *CASES])
+@pytest.mark.parametrize("method", PROGRAMS)
 def test_a_few_steps(method, name):
-    terms, laws = (CASES[name].terms, CASES[name].laws) if name else ((), ())
-    result = lw.solve(one(scene_of(terms), **STATE), method, h=0.02, t1=0.1)
+    cases = [CASES[one_of] for one_of in SEVERAL.get(name, (name,)) if one_of]
+    terms, laws = (sum((getattr(case, kind) for case in cases), ()) for kind in ("terms", "laws"))
+    # One lane: more take long to compile.
+    result = lw.solve(one(scene_of(terms), **STATE), method, h=0.02, t1=0.1, width=1)
     assert result.status.counts() == {"ok": 1}
     # Five steps of a few hundred operations.
     assert difference(last(result), twin(laws, method, 0.02, 5)) < 5e-13
@@ -95,5 +94,5 @@ def test_a_few_steps(method, name):
 
 def test_turns_at_a_large_step():
     # Turns by 0.1 rad and more, where every digit of the series of the tangent counts.
-    result = lw.solve(one(scene_of(()), **STATE), "psi_x", h=0.2, t1=1.0)
-    assert difference(last(result), twin((), "psi_x", 0.2, 5)) < 5e-14
+    result = lw.solve(one(scene_of(()), **STATE), "psi_x8", h=0.2, t1=1.0, width=1)
+    assert difference(last(result), twin((), "psi_x8", 0.2, 5)) < 5e-14

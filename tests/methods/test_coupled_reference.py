@@ -508,7 +508,7 @@ def energies(name, I6, h, steps, newtons=None):
     return np.array(E) - coupled.energy(*NEAR, I6, tethered_potential)
 
 
-@pytest.mark.slow_for("psi_w*")
+@pytest.mark.slow_but("x6")
 @pytest.mark.parametrize("name", ["x6", "x8", "psi_w"])
 def test_tether_energy_has_no_slope(name):
     # 600 s, 6000 steps: the halves' means agree to a few percent of the largest error, which does not grow.
@@ -520,6 +520,7 @@ def test_tether_energy_has_no_slope(name):
     assert ratio == pytest.approx(4.0, rel=0.35)
 
 
+@pytest.mark.slow
 def test_tether_energy_of_the_guess_alone_has_a_slope():
     # W without its Newton step is not symplectic: the test above can fail.
     E = energies("psi_w", with_coupling(0.6), 0.1, 6000, newtons=0)

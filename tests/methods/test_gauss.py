@@ -10,14 +10,25 @@ from lgvi_warp.methods.method import GAUSS
 from lgvi_warp.reference import collocation
 from lgvi_warp.reference.terms.wrench import Wrench
 from tests.methods.test_kernel_and_twin import SHAPES, STATE
-from tests.support.tools import body_of, difference, expected, from_state, last, one, scene_of, slope, to_state
+from tests.support.tools import (
+    body_of,
+    difference,
+    expected,
+    free_scene,
+    from_state,
+    last,
+    one,
+    scene_of,
+    slope,
+    to_state,
+)
 
 STEPS = 10
 
 
-def both(name, h, dtype="float64", terms=(), laws=()):
+def both(name, h, dtype="float64", terms=(), laws=(), shape="diagonal"):
     """The state after some steps by the kernel and by the twin."""
-    scene = scene_of(*SHAPES["both full"], net=-2.56, moment=(0.3, -0.2, -8.5))
+    scene = scene_of(*SHAPES[shape], net=-2.56, moment=(0.3, -0.2, -8.5))
     body = body_of(scene)
     body = type(body)(body.M, body.J, (*body.terms, *laws))
     scene = lw.Scene(scene.vehicle, scene.environment, terms=list(terms))
@@ -35,7 +46,7 @@ def test_coefficients(s):
         np.testing.assert_allclose(mine, printed, atol=1e-13)
 
 
-@pytest.mark.slow_for("gauss10*", "gauss8*")
+@pytest.mark.slow_but("gauss6")
 @pytest.mark.parametrize("name", GAUSS)
 def test_some_steps(name):
     # Both stop where a change is below 1e-14 of the state, a factor above what is left.
@@ -49,13 +60,14 @@ def test_float32():
 def test_forces_of_position_and_time():
     force, torque = [3.0, -2.0, 1.0], [0.3, 0.1, -0.2]
     term, law = lw.terms.Wrench(force=force, torque=torque), Wrench(force=np.array(force), torque=np.array(torque))
-    assert difference(*both("gauss6", 0.1, terms=[term], laws=[law])) < 2e-13
+    assert difference(*both("gauss6", 0.1, terms=[term], laws=[law], shape="both full")) < 2e-13
 
 
 def run(scene, name, h, **named):
     return lw.solve(lw.Ensemble(scene, members=1), name, h=h, t1=5.0, save=lw.SaveAt(every=5.0), **named)
 
 
+@pytest.mark.slow_but("gauss6*")
 @pytest.mark.parametrize(("name", "steps"), [("gauss4", (0.1, 0.05, 0.025)), ("gauss6", (0.25, 0.2, 0.1)),
                                              ("gauss12", (1.0, 0.5))])  # fmt: skip
 def test_order(name, steps, scene, example):
@@ -66,6 +78,7 @@ def test_order(name, steps, scene, example):
     assert lw.Method(name).order == order
 
 
+@pytest.mark.slow
 def test_gauss_12_reaches_the_truth(scene, example):
     assert difference(last(run(scene, "gauss12", 0.25)), expected(example["truth"]["5"])) < 1e-12
 
@@ -82,8 +95,8 @@ def test_a_fixed_number_of_iterations(scene, example):
 def test_steps_that_do_not_contract(scene):
     # One member spins so fast that its iteration diverges; the other's bits do not change.
     spins = np.array([[0.3, 0.2, 0.1], [30.0, 20.0, 10.0]])
-    alone = lw.solve(one(scene_of(), Om=spins[:1]), "gauss6", h=0.2, t1=2.0)
-    beside = lw.solve(one(scene_of(), Om=spins), "gauss6", h=0.2, t1=2.0)
+    alone = lw.solve(one(free_scene(), Om=spins[:1]), "gauss6", h=0.2, t1=2.0)
+    beside = lw.solve(one(free_scene(), Om=spins), "gauss6", h=0.2, t1=2.0)
     assert beside.status.tolist() == [Status.OK, Status.NOT_CONVERGED]
     assert np.array_equal(alone.attitude[-1, 0], beside.attitude[-1, 0])
 

@@ -7,6 +7,7 @@ from benchmarks.cases.ordinary.kernel import command
 from tests.support.tools import difference, expected
 
 
+@pytest.mark.slow_for("*-psi-*")
 @pytest.mark.parametrize(("method", "key"), [("psi", "Psi_h0.01"), ("psi_s", "PsiS_h0.01")])
 @pytest.mark.parametrize(("steps", "when", "bound"), [(1, "one_step", 1e-13), (500, "5", 1e-11)])
 def test_ordinary_kernel(method, key, steps, when, bound, example, body):

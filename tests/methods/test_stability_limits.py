@@ -17,14 +17,15 @@ from lgvi_warp.studies.stability.limits import LIMITS
 # method -> (limit, whether stable windows above the first loss count).
 KNOWN = {"phi": (1.41, False), "psi": (1.50, False), "psi_s": (2.13, False), "psi_1": (2.00, True), "cg3": (1.69, False),
          "rkmk4": (2.43, False)}  # fmt: skip
-FAST, WITHIN = ("psi", "psi_s"), 0.05
+WITHIN = 0.05
 
 
 def close(x, y, within=WITHIN):
     return x == y or abs(x / y - 1.0) < within
 
 
-@pytest.mark.parametrize("method", [pytest.param(m, marks=() if m in FAST else pytest.mark.slow) for m in KNOWN])
+@pytest.mark.slow_but("psi_s")
+@pytest.mark.parametrize("method", KNOWN)
 def test_munk_oscillation_of_a_large_angle(method):
     first, last = measured("munk", method, LARGE, high=4.0)
     limit, windows = KNOWN[method]
@@ -69,7 +70,8 @@ def test_explicit_methods_gain_momentum_up_to_the_linear_limit():
 SOLVED = [m for m in METHODS if not m.startswith("gauss")]
 
 
-@pytest.mark.parametrize("method", [pytest.param(m, marks=() if m in FAST else pytest.mark.slow) for m in SOLVED])
+@pytest.mark.slow_but("munk-psi_s")
+@pytest.mark.parametrize("method", SOLVED)
 @pytest.mark.parametrize("motion", ["munk", "restoring"])
 def test_small_oscillations_end_at_linear_theory(motion, method):
     limit = LIMITS[motion](method)
@@ -77,14 +79,14 @@ def test_small_oscillations_end_at_linear_theory(motion, method):
     assert close(first, limit) if limit < 8.0 else first == math.inf
 
 
-@pytest.mark.parametrize(
-    "method", [pytest.param(m, marks=() if m in ("rk4", "psi") else pytest.mark.slow) for m in EXPLICIT_DRAG]
-)
+@pytest.mark.slow_but("psi")
+@pytest.mark.parametrize("method", EXPLICIT_DRAG)
 def test_explicit_drag_ends_at_linear_theory(method):
     assert close(measured("drag", method)[0], LIMITS["drag"](method))
 
 
-@pytest.mark.parametrize("method", [pytest.param(m, marks=() if m in FAST else pytest.mark.slow) for m in SOLVED])
+@pytest.mark.slow
+@pytest.mark.parametrize("method", SOLVED)
 def test_spin_ends_where_the_rotation_does(method):
     # |J^-1 a| = 1 in the longest stage: h |Om| = 1 of D over h, 2 over h / 2; of rk* where |R(i h |Om|)| = 1.
     limit = LIMITS["rotation"](method)

@@ -80,17 +80,16 @@ def test_program_is_the_printed_map(method, solver):
     assert difference(from_state(body, x), y) < 1e-13
 
 
-@pytest.mark.slow_for("phi*", "psi_1*")
+# Growth of round-off (mathematics, section 4): 1e-13 after a step, 1e-11 at t = 5, 1e-9 at t = 50.
+@pytest.mark.slow_for("*-50-*")
+@pytest.mark.parametrize(("time", "steps", "bound"), [("one_step", 1, 1e-13), ("5", 500, 1e-11), ("50", 5000, 1e-9)])
 @pytest.mark.parametrize("method", KEYS)
-def test_states_of_the_example(method, example, body, start):
-    # Growth of round-off (mathematics, section 4): 1e-13 after a step, 1e-11 at t = 5, 1e-9 at t = 50.
-    entry = example[f"{KEYS[method]}_h0.01"]
-    assert difference(run(method, start, body, 0.01, 1)[-1], expected(entry["one_step"])) < 1e-13
-    states = run(method, start, body, 0.01, 5000, 500)
-    assert difference(states[1], expected(entry["5"])) < 1e-11
-    assert difference(states[10], expected(entry["50"])) < 1e-9
+def test_states_of_the_example(method, time, steps, bound, example, body, start):
+    end = run(method, start, body, 0.01, steps)[-1]
+    assert difference(end, expected(example[f"{KEYS[method]}_h0.01"][time])) < bound
 
 
+@pytest.mark.slow_but("newton*")
 @pytest.mark.parametrize(("solver", "bound"), [("newton", 1e-11), ("cayley", 1e-11), ("riccati", 1e-11),
                                                ("moser_veselov", 1e-10)])  # fmt: skip
 def test_psi_with_every_solver(solver, bound, example, body, start):
@@ -100,6 +99,7 @@ def test_psi_with_every_solver(solver, bound, example, body, start):
     assert difference(from_state(body, x), expected(example["Psi_h0.01"]["5"])) < bound
 
 
+@pytest.mark.slow
 def test_truth_at_five_seconds(example, body, start):
     # RKMK4's error at h = .0125, t = 2 is 4e-9: at h = .002, t = 5 it is some 4e-12 times the growth of errors, 10.
     state = run("rkmk4", start, body, 0.002, 2500)[-1]
@@ -145,6 +145,7 @@ def test_errors_at_two_seconds(method, bench):
         assert abs(value - float(printed)) <= 1.01 * half_digit(printed)
 
 
+@pytest.mark.slow_for("phi_adjoint")
 @pytest.mark.parametrize("method", ORDERS)
 def test_order(method, bench):
     # Errors from 1e-2 down to 4e-9, far above the truth's 3e-12. The next term of the error is h times the first, or

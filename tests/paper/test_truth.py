@@ -63,6 +63,7 @@ def test_order(method, order, run, example):
         assert slope(steps, measured[:, quantity]) == pytest.approx(order, abs=0.03 * order + 0.05)
 
 
+@pytest.mark.slow_for("su4(psi_1)*")
 @pytest.mark.parametrize(("method", "order", "steps"), [
     ("tj4(psi_s)", 4, (0.05, 0.025, 0.0125)), ("su4(psi_s)", 4, (0.1, 0.05, 0.025)), ("su4(psi_1)", 4, (0.1, 0.05, 0.025)),
     ("kl6(psi_s)", 6, (0.25, 0.125, 0.0625)), ("kl8(psi_s)", 8, (0.25, 0.2, 0.125)),

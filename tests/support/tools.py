@@ -32,6 +32,9 @@ PAIRS = chosen(
 )
 GRAVITY = 9.8
 
+# Equal masses but for the last digit: as a kernel for masses that differ has them.
+EQUAL = (2.0, 2.0, 2.0 + 2.0**-50)
+
 # A turn of the body axes that is no symmetry of anything.
 TURN = lw.notation.matrix_from_rotation_vector(np.array([0.4, -0.7, 0.2]))
 
@@ -48,6 +51,13 @@ def vehicle(M=(1.0, 2.0, 3.0), J=(1.0, 2.0, 2.5), net=0.0, moment=(0.0, 0.0, 0.0
 def scene_of(*arguments, **named):
     """A scene with that vehicle."""
     return lw.Scene(vehicle(*arguments, **named), lw.Environment(gravity=GRAVITY))
+
+
+def free_scene(M=(1.0, 2.0, 3.0), J=(1.0, 2.0, 2.5)):
+    """A scene with forces far below round-off: the body moves freely, by the same kernel as that of `scene_of`."""
+    heavy = vehicle(M, J)
+    free = lw.Vehicle(heavy.mass, J, heavy.added_mass, 3e-30 * heavy.mass, (0.0, 0.0, -1e-3))
+    return lw.Scene(free, lw.Environment(gravity=1e-30))
 
 
 def body_of(scene):

@@ -306,14 +306,14 @@ def test_all_faults_of_a_scene_file_at_once():
     type = "drag"
     linear = [-1, 0, 0, 0, 0, 0]
     [[terms]]
-    type = "spring"
+    type = "harpoon"
     [[events]]
     type = "box"
     lower = [1, 1, 1]
     upper = [0, 0, 0]
     """
     found = refused(scenes.loads, text)
-    keys = ("vehicle.mass = -10", "run.method = 'psi_q'", "drag.linear", "terms[1].type = 'spring'", "box.upper")
+    keys = ("vehicle.mass = -10", "run.method = 'psi_q'", "drag.linear", "terms[1].type = 'harpoon'", "box.upper")
     assert len(found) == len(keys)
     assert all(any(one.startswith(key) for one in found) for key in keys)
 

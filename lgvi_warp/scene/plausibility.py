@@ -62,6 +62,19 @@ DEPTHS = {"floor": "depth", "current_profile": "depths", "stratification": "refe
 MOST_SAMPLES = 30_000_000
 
 
+# Texts of oddities, for the numbers of a member.
+FAST = f"a current of {{:.4g}} m/s is beyond the {LIMITS['current'].value:g} m/s of the strongest tides: a unit?"
+FAR = "an angle of {:.4g} rad is beyond 90 degrees: is it given in degrees?"
+HIGH = "a depth of {:.4g} m is above the surface: depth is positive down"
+LARGE = ("an inertia of {:.4g} kg m2 is beyond the {:.4g} kg m2 that the mass allows within the {:.4g} m of the hull's "
+         "stations: a unit?")  # fmt: skip
+
+
+def _text(template: str, *numbers: np.ndarray) -> Callable[[int], str]:
+    """The text of each member, from its numbers."""
+    return lambda i: template.format(*(values[i] for values in numbers))
+
+
 def net_weight(scene: SceneLike, p: Numbers) -> Iterator[Look]:
     """Look for a net weight that hardly any vehicle has.
 
@@ -95,8 +108,7 @@ def density(scene: SceneLike, p: Numbers) -> Iterator[Look]:
     """
     rho = p["environment.water_density"]
     odd = (rho < LIMITS["light water"].value) | (rho > LIMITS["heavy water"].value)
-    text = "{:.6g} kg/m3 is not water, which has 1,000 or more: a unit?"
-    yield "environment.water_density", odd, lambda i: text.format(rho[i])
+    yield "environment.water_density", odd, _text("{:.6g} kg/m3 is not water, which has 1,000 or more: a unit?", rho)
 
 
 def currents(scene: SceneLike, p: Numbers) -> Iterator[Look]:
@@ -115,12 +127,7 @@ def currents(scene: SceneLike, p: Numbers) -> Iterator[Look]:
             continue
         values = p[f"{term.key}.{field}"]
         speed = np.sqrt(np.square(values).sum(axis=-1)).reshape(len(values), -1).max(axis=1)
-        yield f"{term.key}.{field}", speed > LIMITS["current"].value, _too_fast(speed)
-
-
-def _too_fast(speed: np.ndarray) -> Callable[[int], str]:
-    limit = LIMITS["current"].value
-    return lambda i: f"a current of {speed[i]:.4g} m/s is beyond the {limit:g} m/s of the strongest tides: a unit?"
+        yield f"{term.key}.{field}", speed > LIMITS["current"].value, _text(FAST, speed)
 
 
 def fin_angles(scene: SceneLike, p: Numbers) -> Iterator[Look]:
@@ -141,11 +148,7 @@ def fin_angles(scene: SceneLike, p: Numbers) -> Iterator[Look]:
             angle = values.reshape(len(values), -1).max(axis=1)
             held = field == "command_schedule" and len(term.times) == 1
             name = f"{term.key}.{'command' if held else field}"
-            yield name, angle > LIMITS["fin angle"].value * (1.0 + 1e-9), _too_far(angle)
-
-
-def _too_far(angle: np.ndarray) -> Callable[[int], str]:
-    return lambda i: f"an angle of {angle[i]:.4g} rad is beyond 90 degrees: is it given in degrees?"
+            yield name, angle > LIMITS["fin angle"].value * (1.0 + 1e-9), _text(FAR, angle)
 
 
 def depths(scene: SceneLike, p: Numbers) -> Iterator[Look]:
@@ -165,11 +168,7 @@ def depths(scene: SceneLike, p: Numbers) -> Iterator[Look]:
             values, surface = p[f"{term.key}.{field}"], LIMITS["depth"].value
             values = values.reshape(len(values), -1)
             odd = (values.min(axis=1) < surface) & (values.max(axis=1) <= surface)
-            yield f"{term.key}.{field}", odd, _too_high(values.min(axis=1))
-
-
-def _too_high(depth: np.ndarray) -> Callable[[int], str]:
-    return lambda i: f"a depth of {depth[i]:.4g} m is above the surface: depth is positive down"
+            yield f"{term.key}.{field}", odd, _text(HIGH, values.min(axis=1))
 
 
 def inertia(scene: SceneLike, p: Numbers) -> Iterator[Look]:
@@ -206,14 +205,7 @@ def _inertia(p: Numbers, rigid: np.ndarray, arm: np.ndarray, length: np.ndarray)
         limits["vehicle.added_mass_matrix"] = _diagonal(added)[:, 3:].max(axis=1), strips
     for key, pair in limits.items():
         size, most, long = np.broadcast_arrays(*pair, length)
-        yield key, size > most, _too_large(size, most, long)
-
-
-def _too_large(size: np.ndarray, most: np.ndarray, length: np.ndarray) -> Callable[[int], str]:
-    return lambda i: (
-        f"an inertia of {size[i]:.4g} kg m2 is beyond the {most[i]:.4g} kg m2 that the mass allows within the "
-        f"{length[i]:.4g} m of the hull's stations: a unit?"
-    )
+        yield key, size > most, _text(LARGE, size, most, long)
 
 
 def _diagonal(matrices: np.ndarray) -> np.ndarray:
@@ -277,13 +269,13 @@ def _of_start(scene: SceneLike, members: Members) -> Iterator[Look]:
     limit = LIMITS["speed"].value
     yield "start.velocity", speed > limit, lambda i: f"a speed of {speed[i]:.4g} m/s is beyond {limit:g} m/s: a unit?"
     if not ends_at_the_surface(scene):
-        yield "start.position", depth < LIMITS["depth"].value, _too_high(depth)
+        yield "start.position", depth < LIMITS["depth"].value, _text(HIGH, depth)
     for term in own_flows(scene):
         numbers = {name: members.parameters[f"{term.key}.{name}"] for name in term.parameters()}
         water = term.water(numbers, members.position[None], np.zeros(1), members.parameters)
         if water is not None:
             flow = _speed(water[0])
-            yield term.key, flow > LIMITS["current"].value, _too_fast(flow)
+            yield term.key, flow > LIMITS["current"].value, _text(FAST, flow)
 
 
 def own_flows(scene: SceneLike) -> list[Term]:

@@ -212,6 +212,26 @@ class Replicated(Sampling):
             mask = replicate == r
             yield int(r), mask, point[mask]
 
+    def draw(self, space: Space, members: np.ndarray) -> Drawn:
+        """Levels from the points of each replicate."""
+        levels = np.empty((len(members), space.dimensions))
+        for replicate, mask, indices in self.dealt(members):
+            levels[mask] = self.points(space, replicate, indices)
+        return space.split(levels)
+
+    def points(self, space: Space, replicate: int, indices: np.ndarray) -> np.ndarray:
+        """Points of one replicate's sequence; a design without sequences overrides `draw`.
+
+        Args:
+            space: The cube.
+            replicate: Number of the replicate.
+            indices: Indices (n,) in its sequence.
+
+        Returns:
+            Levels (n, dimensions).
+        """
+        raise TypeError(f"{type(self).__name__} is abstract")
+
     def name(self, replicate: int) -> str:
         """The name of a replicate's stream of random numbers.
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.random import generator
-from lgvi_warp.sampling.designs.base import MOST_REPLICATES, Drawn, Replicated, inside
+from lgvi_warp.sampling.designs.base import MOST_REPLICATES, Replicated, inside
 from lgvi_warp.sampling.designs.space import Space
 
 # Bits of a Sobol sequence. A point is in the middle of one of 2^32 parts of each side, so that no level is 0 or 1. The
@@ -30,12 +30,9 @@ class Sobol(Replicated):
 
     kind: ClassVar[str] = "sobol"
 
-    def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Points of the replicates' sequences by their indices."""
-        levels = np.empty((len(members), space.dimensions))
-        for replicate, mask, points in self.dealt(members):
-            levels[mask] = sobol_points(space.seed, self.name(replicate), space.dimensions, points)
-        return space.split(levels)
+    def points(self, space: Space, replicate: int, indices: np.ndarray) -> np.ndarray:
+        """Points of a scrambled sequence."""
+        return sobol_points(space.seed, self.name(replicate), space.dimensions, indices)
 
 
 def sobol_points(seed: int, name: str, dimensions: int, indices: np.ndarray, scramble: bool = True) -> np.ndarray:
@@ -94,15 +91,12 @@ class Halton(Replicated):
 
     kind: ClassVar[str] = "halton"
 
-    def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Points by their indices; neighbouring indices are computed together."""
-        levels = np.empty((len(members), space.dimensions))
-        for replicate, mask, wanted in self.dealt(members):
-            ascending, place = np.unique(wanted, return_inverse=True)
-            runs = np.split(ascending, np.flatnonzero(np.diff(ascending) > 1) + 1)
-            points = np.concatenate([self._run(space, replicate, int(run[0]), len(run)) for run in runs])
-            levels[mask] = inside(points)[place.reshape(-1)]
-        return space.split(levels)
+    def points(self, space: Space, replicate: int, indices: np.ndarray) -> np.ndarray:
+        """Points of a scrambled sequence, drawn run by run of neighbours."""
+        ascending, place = np.unique(indices, return_inverse=True)
+        runs = np.split(ascending, np.flatnonzero(np.diff(ascending) > 1) + 1)
+        points = np.concatenate([self._run(space, replicate, int(run[0]), len(run)) for run in runs])
+        return inside(points)[place.reshape(-1)]
 
     def _run(self, space: Space, replicate: int, first: int, count: int) -> np.ndarray:
         if not space.dimensions:

@@ -35,6 +35,8 @@ class Distribution:
     kinds: ClassVar[dict[str, Any]] = {}
     # Arguments of which exactly one sets the width.
     widths: ClassVar[tuple[str, ...]] = ()
+    # Whether its numbers may be one for each component of what it varies.
+    by_component: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -63,14 +65,6 @@ class Distribution:
     def _check_more(self, faults: Faults) -> None:
         """Add a fault for what else is wrong with this kind of distribution."""
 
-    def numbers(self) -> list[Any]:
-        """The numbers that were given and must fit the components of the quantity.
-
-        Returns:
-            Numbers or arrays, in the order of the fields.
-        """
-        return list(self.numbers_by_name().values())
-
     @property
     def joint(self) -> bool:
         """Whether it draws whole quantities (as a `JointLaw`), and not each entry by itself."""
@@ -87,7 +81,8 @@ class Distribution:
         """
         (shape,) = shapes
         try:
-            fits = np.broadcast_shapes(shape, *(np.shape(number) for number in self.numbers())) == shape
+            numbers = self.numbers_by_name().values() if self.by_component else ()
+            fits = np.broadcast_shapes(shape, *map(np.shape, numbers)) == shape
         except ValueError:
             fits = False
         if fits:
@@ -305,6 +300,7 @@ class Choice(Distribution):
     values: Any = ()
     weights: Any = None
     kind: ClassVar[str] = "choice"
+    by_component: ClassVar[bool] = False
 
     def _check_more(self, faults: Faults) -> None:
         try:
@@ -317,10 +313,6 @@ class Choice(Distribution):
         elif weights.shape != values.shape[:1] or not weights.sum() > 0.0:
             fault = f"does not weigh {len(values)} values"
             faults.add("weights", self.weights, fault, "give one from 0 for each value")
-
-    def numbers(self) -> list[Any]:
-        """Always []: the values need not fit the components."""
-        return []
 
     @property
     def joint(self) -> bool:

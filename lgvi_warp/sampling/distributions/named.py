@@ -78,10 +78,6 @@ class ScipyDistribution(Distribution):
         parameters = self.numbers_by_name() or {"loc": 0.0}
         return {name: np.asarray(value).tolist() for name, value in parameters.items()}
 
-    def numbers(self) -> list[Any]:
-        """The distribution's parameters, in the order given."""
-        return list(self._numbers().values())
-
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
         """Values of the distribution's ppf."""
         return np.asarray(self.distribution.ppf(u), dtype=np.float64)
@@ -148,6 +144,7 @@ class BinnedDistribution(Distribution):
     counts: Any = ()
     edges: Any = ()
     kind: ClassVar[str] = "histogram"
+    by_component: ClassVar[bool] = False
 
     def _check_more(self, faults: Faults) -> None:
         counts, edges = (faults.finite(name, getattr(self, name)) for name in ("counts", "edges"))
@@ -157,10 +154,6 @@ class BinnedDistribution(Distribution):
             faults.add("counts", self.counts, "weigh no bin", "give one from 0 for each bin, not all of them 0")
         elif edges.shape != (len(counts) + 1,) or np.any(np.diff(edges) <= 0.0):
             faults.add("edges", self.edges, f"do not bound {len(counts)} bins", "give one more than counts, rising")
-
-    def numbers(self) -> list[Any]:
-        """Always []: counts and edges need not fit the components."""
-        return []
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
         """Values linear in the level within each bin."""
@@ -184,6 +177,7 @@ class UserDistribution(Distribution):
 
     distribution: Any = None
     kind: ClassVar[str] = "own"
+    by_component: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if (unfrozen := name_of_unfrozen(self.distribution)) is not None:
@@ -195,10 +189,6 @@ class UserDistribution(Distribution):
         if not usable:
             fault = "gives no numbers at the levels 0.25 and 0.75"
             raise refusal("distribution", self.distribution, fault, "give an object with ppf(u)")
-
-    def numbers(self) -> list[Any]:
-        """Always []: the object's numbers are not known."""
-        return []
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
         """Values of the object's own quantile function."""

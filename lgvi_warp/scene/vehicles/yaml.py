@@ -10,21 +10,7 @@ import numpy as np
 
 from lgvi_warp.common import yaml_text
 from lgvi_warp.common.errors import Faults, SceneError, closest
-from lgvi_warp.scene.vehicles.fossen import (
-    HALF_TURN,
-    HALF_TURN_6,
-    PAIRS,
-    STANDARD_GRAVITY,
-    Coefficients,
-    add_derivatives,
-    as_positive,
-    inertia_from_names,
-    read_name,
-    read_text,
-    rigid_body,
-    symmetric,
-    turned,
-)
+from lgvi_warp.scene.vehicles import fossen
 from lgvi_warp.scene.vehicles.plugins import by_diagonal
 
 # YAML ---------------------------------------------------------------------------------------------------------------
@@ -93,12 +79,12 @@ def vehicle_tables_from_yaml(
         faults.choice(key, value, ("flu", "frd"))
     ignore = {ignore} if isinstance(ignore, str) else set(ignore)
     read = by_meaning(faults, parse_yaml(source), ignore) | by_meaning(faults, given, set())
-    positions = HALF_TURN if position_axes == "flu" else np.ones(3)
-    matrices = HALF_TURN_6 if matrix_axes == "flu" else np.ones(6)
+    positions = fossen.HALF_TURN if position_axes == "flu" else np.ones(3)
+    matrices = fossen.HALF_TURN_6 if matrix_axes == "flu" else np.ones(6)
     body = yaml_body(faults, read, positions)
     for name in ("added_mass", "linear", "forward", "quadratic"):
         value = matrices[:, None] * matrix_6(faults, name, read.get(name)) * matrices
-        setattr(body, name, symmetric(faults, name, value) if name == "added_mass" else value)
+        setattr(body, name, fossen.symmetric(faults, name, value) if name == "added_mass" else value)
     if quadratic == "diagonal":
         body.quadratic = by_diagonal(body.warnings, body.quadratic)
     if "coefficients" in read:
@@ -106,7 +92,7 @@ def vehicle_tables_from_yaml(
             faults.add(name, read[name], "is given besides coefficients by name", "keep one of them")
         if matrix_axes == "flu":
             faults.add("matrix_axes", "flu", "does not go with coefficients by name", "Fossen's names are for frd")
-        add_derivatives(faults, body, read["coefficients"], ignore)
+        fossen.add_derivatives(faults, body, read["coefficients"], ignore)
     return body.to_dict(faults)
 
 
@@ -122,7 +108,7 @@ def parse_yaml(source: str | os.PathLike[str]) -> Mapping[str, Any]:
     Raises:
         SceneError: If the content cannot be read or is no map.
     """
-    text = read_text(source, isinstance(source, str) and ("\n" in source or ": " in source), "YAML file")
+    text = fossen.read_text(source, isinstance(source, str) and ("\n" in source or ": " in source), "YAML file")
     content = yaml_text.parsed(text)
     if not isinstance(content, Mapping):
         raise SceneError(["YAML: is not a map; write mass: ..., added_mass: ..."])
@@ -152,7 +138,7 @@ def by_meaning(faults: Faults, content: Mapping[str, Any], ignore: set[str]) -> 
             read[name] = read.get(name, {}) | dict(value)
         elif name is not None:
             read[name] = value
-        elif isinstance(key, str) and read_name(key):
+        elif isinstance(key, str) and fossen.read_name(key):
             read.setdefault("coefficients", {})[key] = value
         elif isinstance(value, Mapping):
             read |= by_meaning(faults, value, ignore)
@@ -162,7 +148,7 @@ def by_meaning(faults: Faults, content: Mapping[str, Any], ignore: set[str]) -> 
     return read
 
 
-def yaml_body(faults: Faults, read: Mapping[str, Any], positions: np.ndarray) -> Coefficients:
+def yaml_body(faults: Faults, read: Mapping[str, Any], positions: np.ndarray) -> fossen.Coefficients:
     """Build mass, inertia, centres and forces of a body from a YAML map.
 
     Args:
@@ -175,9 +161,9 @@ def yaml_body(faults: Faults, read: Mapping[str, Any], positions: np.ndarray) ->
     """
     inertia = read.get("inertia")
     if isinstance(inertia, Mapping):
-        faults.keys("inertia", inertia, [f"i{pair}" for pair in PAIRS])
-        inertia = inertia_from_names(inertia)
-    gravity = read.get("gravity", STANDARD_GRAVITY)
+        faults.keys("inertia", inertia, [f"i{pair}" for pair in fossen.PAIRS])
+        inertia = fossen.inertia_from_names(inertia)
+    gravity = read.get("gravity", fossen.STANDARD_GRAVITY)
     gravity = abs(gravity) if isinstance(gravity, int | float) else gravity
     for key in ("mass", "inertia"):
         if read.get(key) is None:
@@ -191,11 +177,11 @@ def yaml_body(faults: Faults, read: Mapping[str, Any], positions: np.ndarray) ->
     if buoyancy is None and "volume" in read and not is_neutral(faults, read):
         buoyancy = displaced_weight(faults, read["volume"], density, gravity, "density" in read)
     zero = (0.0, 0.0, 0.0)
-    gravity_at = turned(read.get("center_of_gravity", zero), positions)
-    buoyancy_at = turned(read.get("center_of_buoyancy", zero), positions)
+    gravity_at = fossen.turned(read.get("center_of_gravity", zero), positions)
+    buoyancy_at = fossen.turned(read.get("center_of_buoyancy", zero), positions)
     mass = 1.0 if read.get("mass") is None else read["mass"]
     inertia = np.eye(3) if inertia is None else inertia
-    body = rigid_body(faults, mass, inertia, gravity_at, buoyancy_at, read.get("weight"), buoyancy, gravity)
+    body = fossen.rigid_body(faults, mass, inertia, gravity_at, buoyancy_at, read.get("weight"), buoyancy, gravity)
     body.water_density = density
     return body
 
@@ -251,4 +237,4 @@ def matrix_6(faults: Faults, key: str, value: Any) -> np.ndarray:
     if array.shape not in ((6,), (36,), (6, 6)):
         faults.add(key, value, f"has shape {array.shape}", "give 6 numbers or a 6x6 matrix")
         return np.zeros((6, 6))
-    return as_positive(faults, key, np.diag(array) if array.shape == (6,) else array.reshape(6, 6))
+    return fossen.as_positive(faults, key, np.diag(array) if array.shape == (6,) else array.reshape(6, 6))

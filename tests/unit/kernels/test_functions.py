@@ -156,7 +156,11 @@ def test_clamp_and_greatest(width, name):
 
 @pytest.mark.parametrize(
     ("name", "widths"),
-    [("float64", (1, 8)), ("float32", (1, 16)), *(pytest.param(name, WIDTHS, marks=pytest.mark.slow) for name in FORMATS)],
+    [
+        ("float64", (1, 8)),
+        ("float32", (1, 16)),
+        *(pytest.param(name, WIDTHS, marks=pytest.mark.slow) for name in FORMATS),
+    ],
 )
 def test_every_width_gives_the_same_bits(name, widths):
     x = np.concatenate([np.random.default_rng(3).uniform(0.01, 80.0, 4096), [0.0, np.inf, np.nan]])

@@ -230,7 +230,8 @@ class Sample:
         Returns:
             (accepted, refused): names of the first, and name -> reason of the others.
         """
-        good, refused = [], {}
+        good: list[str] = []
+        refused: dict[str, str] = {}
         for name in methods:
             if len(good) == most:
                 break

@@ -468,12 +468,14 @@ def test_other_states_are_another_run(tmp_path):
 
 
 class Mine(lw.Wrench):
-    """A law of a user, which no scene file knows."""
+    """A law of a user."""
 
     type = "mine"
 
 
-def test_a_law_of_your_own_goes_on_with_its_ensemble(tmp_path):
+def test_a_law_of_your_own_goes_on_with_its_ensemble(tmp_path, monkeypatch):
+    # As in another process, which has not made the class: no scene file knows it.
+    monkeypatch.delitem(lw.Term.kinds, "mine")
     scene = lw.Scene(fleet().scene.vehicle, terms=[Mine(force=[0.1, 0.0, 0.0], torque=[0.0, 0.0, 0.0])])
     own = lw.Ensemble(scene, 300, 1, {"mine.force": lw.Normal(std=0.1)})
     whole = lw.solve(own, **SETTINGS, store=tmp_path / "a.zarr")

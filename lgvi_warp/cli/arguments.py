@@ -58,7 +58,7 @@ WORKERS = "threads, processes or workers (default: all cores)"
 FOLDER = "folder for the files, replaced if they exist (default: {})"
 
 
-def _add(verb: Any, names: str, **helps: str) -> None:
+def _add_shared(verb: Any, names: str, **helps: str) -> None:
     """Add shared arguments to a verb; helps: name without dashes -> its help for this verb."""
     for name in names.split():
         own_help = helps.get(name.strip("-").replace("-", "_"))
@@ -99,49 +99,44 @@ def parser() -> argparse.ArgumentParser:
 def _add_run(verbs: Any) -> None:
     """Add the verb run with its arguments."""
     run = verbs.add_parser("run", help="run a scene's ensemble: result.npz, fleet.png, fleet.rrd and a summary")
-    _add(run, SCENE, out=FOLDER.format("runs/NAME of the scene"))
-    run.add_argument(
+    add = run.add_argument
+    _add_shared(run, SCENE, out=FOLDER.format("runs/NAME of the scene"))
+    add(
         "--error",
         metavar="E",
         type=float,
         help="choose the cheapest method, step and precision that keep this error, and check it after the run",
     )
-    run.add_argument("--of", help=f"what --error is of (default: position [m]); {OF}")
-    _add(
+    add("--of", help=f"what --error is of (default: position [m]); {OF}")
+    _add_shared(
         run,
         "--method --step --dtype",
         method="psi_s, psi_1, psi, phi, phi_adjoint, or a composition such as kl6(psi_s)",
         dtype="float64, float32, or float32_compensated: sums of two float32",
     )
-    run.add_argument("--solver", help="of equation (24): quartic, cayley, newton or moser_veselov")
-    run.add_argument(
-        "--iterations", metavar="N", help='of every solve: a number, or "auto" (default: to the tolerance)'
-    )
-    run.add_argument("--tolerance", metavar="T", help="relative residual above which a solve is not converged")
-    run.add_argument("--rtol", metavar="R", help="with --atol, rk5 and rk8 choose their steps for this relative error")
-    run.add_argument("--atol", metavar="A", help="and for this absolute one")
-    run.add_argument(
-        "--checks", help="none, safe (statuses, default) or all (warnings of what arises on the way as well)"
-    )
-    run.add_argument(
-        "--on-failure", help="freeze a member that fails (default), raise: exit code 1, or substep: divide its step"
-    )
-    _add(run, "--keep")
-    run.add_argument("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
-    _add(run, EXECUTOR, threads=WORKERS)
-    _add(
+    add("--solver", help="of equation (24): quartic, cayley, newton or moser_veselov")
+    add("--iterations", metavar="N", help='of every solve: a number, or "auto" (default: to the tolerance)')
+    add("--tolerance", metavar="T", help="relative residual above which a solve is not converged")
+    add("--rtol", metavar="R", help="with --atol, rk5 and rk8 choose their steps for this relative error")
+    add("--atol", metavar="A", help="and for this absolute one")
+    add("--checks", help="none, safe (statuses, default) or all (warnings of what arises on the way as well)")
+    add("--on-failure", help="freeze a member that fails (default), raise: exit code 1, or substep: divide its step")
+    _add_shared(run, "--keep")
+    add("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
+    _add_shared(run, EXECUTOR, threads=WORKERS)
+    _add_shared(
         run,
         "--store --store-dtype",
         store="result.npz when the run ends (default), or run.zarr block by block, which resume can go on with",
         store_dtype="float32: store the samples of a float64 run so",
     )
-    run.add_argument(
+    add(
         "--blocks",
         metavar="A:B",
         help="with --store zarr: run only these blocks, to be merged later (as many of them as there are)",
     )
     existing = run.add_mutually_exclusive_group()
-    _add(existing, "--overwrite")
+    _add_shared(existing, "--overwrite")
     existing.add_argument(
         "--resume", action="store_true", help="go on with a run.zarr that is there, if it is this run"
     )
@@ -152,8 +147,8 @@ def _add_tradeoff(verbs: Any) -> None:
     verb = verbs.add_parser(
         "tradeoff", help="speed against accuracy of every method, step and precision: tradeoff.json, .csv and .png"
     )
-    _add(verb, f"{SCENE} --methods", out=FOLDER.format("runs/NAME_tradeoff"),
-         methods="names, such as psi_s,kl8(psi_x) (default: all that fit)")  # fmt: skip
+    _add_shared(verb, SCENE, out=FOLDER.format("runs/NAME_tradeoff"))
+    _add_shared(verb, "--methods", methods="names, such as psi_s,kl8(psi_x) (default: all that fit)")
     verb.add_argument("--of", default="position", help=f"what errors are of (default: position); {OF}")
     verb.add_argument("--seconds", metavar="S", type=float, default=45.0, help="about how long to measure (default 45)")
 
@@ -164,20 +159,24 @@ def _add_sensitivity(verbs: Any) -> None:
         "sensitivity",
         help="which of the varied parameters matter: Sobol indices or Morris screening; .txt, .csv, .json, .png",
     )
-    _add(verb, "scene", scene="scene file (TOML) with [ensemble.vary]")
-    verb.add_argument("--of", metavar="Q", action="append", help='quantity of interest: "position[2]" (the default), '
-                      'depth, speed, "norm(velocity)", "max(energy)" ...; may be given several times')  # fmt: skip
-    _add(verb, "--out", out="folder for the files (default: runs/NAME_sensitivity)")
-    verb.add_argument("--analysis", choices=("sobol", "morris"), default="sobol", help="default sobol")
-    verb.add_argument("--samples", metavar="N", type=int, help="groups of the design (default: sobol 256, morris 64)")
-    verb.add_argument(
-        "--first-order", action="store_true", help="sobol without pairs of factors: about half the members"
+    add = verb.add_argument
+    _add_shared(verb, "scene", scene="scene file (TOML) with [ensemble.vary]")
+    add("--of", metavar="Q", action="append", help='quantity of interest: "position[2]" (the default), depth, speed, '
+        '"norm(velocity)", "max(energy)" ...; may be given several times')  # fmt: skip
+    _add_shared(verb, "--out", out="folder for the files (default: runs/NAME_sensitivity)")
+    add("--analysis", choices=("sobol", "morris"), default="sobol", help="default sobol")
+    add("--samples", metavar="N", type=int, help="groups of the design (default: sobol 256, morris 64)")
+    add("--first-order", action="store_true", help="sobol without pairs of factors: about half the members")
+    add("--failed", choices=("refuse", "drop"), default="refuse",
+        help="what to do about groups with a failed member (default refuse)")  # fmt: skip
+    _add_shared(
+        verb,
+        "--method --step --dtype --duration --seed --threads --set --quiet",
+        method="integration method, as of run",
+        dtype="float64, float32, or float32_compensated",
+        seed="seed of the design",
+        quiet="no progress and no table",
     )
-    verb.add_argument("--failed", choices=("refuse", "drop"), default="refuse",
-                      help="what to do about groups with a failed member (default refuse)")  # fmt: skip
-    _add(verb, "--method --step --dtype --duration --seed --threads --set --quiet", seed="seed of the design",
-         method="integration method, as of run", dtype="float64, float32, or float32_compensated",
-         quiet="no progress and no table")  # fmt: skip
 
 
 def _add_stability(verbs: Any) -> None:
@@ -186,19 +185,20 @@ def _add_stability(verbs: Any) -> None:
         "stability",
         help="where methods are accurate, bounded, flagged or fail, over two parameters: .json, .csv and .png",
     )
-    _add(verb, "scene --out --duration --seed --set --quiet", out=FOLDER.format("runs/NAME_stability"))
-    verb.add_argument(
+    add = verb.add_argument
+    _add_shared(verb, "scene --out --duration --seed --set --quiet", out=FOLDER.format("runs/NAME_stability"))
+    add(
         "--grid",
         choices=("omega", "mass", "drag", "all"),
         help="step against angular velocity (default), added-mass ratio or drag number, or all three",
     )
     axis = "NAME or NAME=LOW:HIGH[:linear], such as"
-    verb.add_argument("--x", metavar="AXIS", help=f"instead of --grid: {axis} h=0.01:3")
-    verb.add_argument("--y", metavar="AXIS", help=f"instead of --grid: {axis} angular_velocity, vehicle.mass=50:500")
-    _add(verb, "--methods", methods="names, such as psi_s,kl8(psi_x) (default: psi,psi_s,psi_x,rk4)")
-    verb.add_argument("--points", metavar="N", type=int, default=24, help="cells along each axis (default 24)")
-    verb.add_argument("--error", metavar="E", type=float, default=1e-2, help="an accurate cell's bound (default 0.01)")
-    verb.add_argument("--of", default="attitude", help=f"what --error is of (default: attitude); {OF}")
+    add("--x", metavar="AXIS", help=f"instead of --grid: {axis} h=0.01:3")
+    add("--y", metavar="AXIS", help=f"instead of --grid: {axis} angular_velocity, vehicle.mass=50:500")
+    _add_shared(verb, "--methods", methods="names, such as psi_s,kl8(psi_x) (default: psi,psi_s,psi_x,rk4)")
+    add("--points", metavar="N", type=int, default=24, help="cells along each axis (default 24)")
+    add("--error", metavar="E", type=float, default=1e-2, help="an accurate cell's bound (default 0.01)")
+    add("--of", default="attitude", help=f"what --error is of (default: attitude); {OF}")
 
 
 def _add_check(verbs: Any) -> None:
@@ -206,7 +206,9 @@ def _add_check(verbs: Any) -> None:
     verb = verbs.add_parser(
         "check", help="whether a scene can run, and what is odd about it and most likely a unit; nothing runs"
     )
-    _add(verb, "scene --method --step --dtype --duration --members --seed --set --quiet", quiet="the exit code alone")
+    _add_shared(
+        verb, "scene --method --step --dtype --duration --members --seed --set --quiet", quiet="the exit code alone"
+    )
 
 
 def _add_predict(verbs: Any) -> None:
@@ -217,21 +219,21 @@ def _add_predict(verbs: Any) -> None:
         help="time, memory and disk that a run would take, from a small one on this machine",
     )
     names = f"{SCENE} --method --step --dtype --keep --threads --store --store-dtype"
-    _add(verb, names, out=FOLDER.format("runs/NAME of the scene"))
+    _add_shared(verb, names, out=FOLDER.format("runs/NAME of the scene"))
 
 
 def _add_store_verbs(verbs: Any) -> None:
     """Add the verbs resume, merge and export with their arguments."""
     resume = verbs.add_parser("resume", help="go on with a run that was stopped, and mend what is damaged of it")
-    _add(resume, f"dir {EXECUTOR}", threads=WORKERS)
+    _add_shared(resume, f"dir {EXECUTOR}", threads=WORKERS)
     resume.add_argument("--force", action="store_true", help="even on another machine or with other versions")
-    _add(resume, "--quiet")
+    _add_shared(resume, "--quiet")
     merge = verbs.add_parser("merge", help="put runs of some blocks each (run --blocks) together")
     merge.add_argument("dirs", metavar="DIR", type=Path, nargs="+", help="stores, or folders with one each")
     merge.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the whole run")
-    _add(merge, "--overwrite --quiet", quiet="no summary")
+    _add_shared(merge, "--overwrite --quiet", quiet="no summary")
     export = verbs.add_parser("export", help="write a run as one NetCDF or Parquet file")
-    _add(export, "dir")
+    _add_shared(export, "dir")
     export.add_argument("--to", required=True, help="netcdf or parquet")
     export.add_argument(
         "--out", metavar="FILE", type=Path, help="the file, replaced if it exists (default: beside the store)"

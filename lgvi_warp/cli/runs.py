@@ -154,10 +154,8 @@ def check_error(scene: Any, result: Any, suggested: Any, quiet: bool) -> list[st
     from lgvi_warp.studies.suggest import verified
 
     error, members = verified(Ensemble.from_scene(scene), result, suggested)
-    text = (
-        f"error of {suggested.of} {error:.1e} {suggested.unit}, asked {suggested.error:g} ({members} members again at "
-    )
-    text += "half the step, those with the largest errors among them)"
+    asked = f"error of {suggested.of} {error:.1e} {suggested.unit}, asked {suggested.error:g}"
+    text = f"{asked} ({members} members again at half the step, those with the largest errors among them)"
     if not error <= suggested.error:
         return [f"{text}: missed; ask for a smaller one"]
     if not quiet:

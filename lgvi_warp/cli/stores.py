@@ -69,9 +69,8 @@ def info_of_run(path: Path) -> int:
 
     contents = state(path)
     provenance = contents["provenance"]
-    print(
-        f"run         {contents['path']} ({contents['bytes'] / 1e6:.1f} MB), lgvi-warp {provenance['versions']['lgvi-warp']}"
-    )
+    version = provenance["versions"]["lgvi-warp"]
+    print(f"run         {contents['path']} ({contents['bytes'] / 1e6:.1f} MB), lgvi-warp {version}")
     print(members_line(contents["members"], provenance))
     fields = ", ".join(contents["fields"])
     print(f"samples     {contents['samples']} times" + (f" of {fields}" if fields else ", not of all members"))

@@ -41,9 +41,8 @@ class Compared:
             Its numbers (k, n, components), float64 [unit].
         """
         if self.functional is None:
-            return np.asarray(getattr(result, self.name), dtype=np.float64).reshape(
-                len(result.time), result.members, -1
-            )
+            values = np.asarray(getattr(result, self.name), dtype=np.float64)
+            return values.reshape(len(result.time), result.members, -1)
         return self.functional(*samples_of(result))
 
     def distance(self, result: Result, reference: Result) -> np.ndarray:

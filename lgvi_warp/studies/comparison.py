@@ -516,15 +516,13 @@ def growth(sample: Sample, candidate: Candidate) -> Growth:
         Growth of the difference.
     """
     fleet = sample.ensemble
-    members = fleet.select(0, fleet.members)
+    start = fleet.select(0, fleet.members)
     turn = np.random.default_rng(0).normal(size=(fleet.members, 3))
     turn *= NUDGE / np.linalg.norm(turn, axis=1, keepdims=True)
-    varied = {k: v for k, v in members.parameters.items() if len(v) == fleet.members and len(v) > 1}
+    varied = {k: v for k, v in start.parameters.items() if len(v) == fleet.members and len(v) > 1}
     runs = []
-    for R in (members.attitude, members.attitude @ notation.matrix_from_rotation_vector(turn)):
-        nudged = Ensemble.from_states(
-            fleet.scene, members.position, R, members.velocity, members.angular_velocity, varied
-        )
+    for R in (start.attitude, start.attitude @ notation.matrix_from_rotation_vector(turn)):
+        nudged = Ensemble.from_states(fleet.scene, start.position, R, start.velocity, start.angular_velocity, varied)
         nudged.indices, nudged.seed = fleet.indices, fleet.seed
         runs.append(sample.run(candidate, nudged))
     apart = distances(runs[0], runs[1])

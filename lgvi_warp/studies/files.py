@@ -7,7 +7,7 @@ import math
 import os
 from abc import ABC, abstractmethod
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -35,7 +35,13 @@ def finite_or_none(value: Any) -> Any:
 
 
 class Saved(ABC):
-    """What a study found, as content of a JSON file and as records of a CSV file."""
+    """What a study found, as content of a JSON file and as records of a CSV file.
+
+    Attributes:
+        study: name of the study, and of its files.
+    """
+
+    study: ClassVar[str]
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
@@ -75,9 +81,20 @@ class Saved(ABC):
         """
         return write_csv(self.rows(), path)
 
-    def _save(self, folder: str | os.PathLike[str], name: str) -> list[Path]:
-        """Write NAME.json and NAME.csv into a folder, which is made if needed; return their paths."""
-        target = Path(folder)
+    def save(self, folder: str | os.PathLike[str], name: str = "") -> list[Path]:
+        """Write NAME.json and NAME.csv into a folder, which is made if needed.
+
+        Args:
+            folder: of the two files.
+            name: their name without the ending. Default: that of the study, "tradeoff" or "stability".
+
+        Returns:
+            Paths of the two files.
+
+        Raises:
+            OSError: where they cannot be written.
+        """
+        target, name = Path(folder), name or self.study
         target.mkdir(parents=True, exist_ok=True)
         (target / f"{name}.json").write_text(self.to_json())
         return [target / f"{name}.json", self.to_csv(target / f"{name}.csv")]

@@ -173,9 +173,8 @@ def suggest(
     more = sample.more(CHECKED) if sample.whole.members > sample.members else sample
     if more is not sample:
         reference = checked_reference(more, compared, error, 0.4 * seconds, taken)
-    final = [
-        refined(more, trial.candidate, reference, compared.name, error / SAFETY**0.5) for trial in trials[:FINALISTS]
-    ]
+    goal = error / SAFETY**0.5
+    final = [refined(more, trial.candidate, reference, compared.name, goal) for trial in trials[:FINALISTS]]
     final = [trial for trial in final if trial.error(compared.name) <= error] or final[:1]
     priced = list(zip(final, cost.costs([trial.plan for trial in final], rounds=ROUNDS), strict=True))
     text = cost.disagreement([(trial.candidate.text, price.spread) for trial, price in priced])
@@ -380,9 +379,8 @@ def refined(sample: Sample, candidate: Candidate, reference: Reference, of: str,
         size = trial.error(of)
         if size <= target:
             break
-        factor = (
-            min((size / target) ** (1.0 / Method(candidate.method).order) * 1.02, 2.0) if np.isfinite(size) else 1.5
-        )
+        order = Method(candidate.method).order
+        factor = min((size / target) ** (1.0 / order) * 1.02, 2.0) if np.isfinite(size) else 1.5
         m = round(float(sample.spacing) / trial.candidate.h)
         longer = sample.candidate(candidate.method, max(m + 1, math.ceil(m * factor)), candidate.dtype)
         trial = tried(sample, longer, reference)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -115,6 +113,7 @@ class Tradeoff(Saved):
     messages: tuple[str, ...] = ()
     seconds: float = 0.0
     units: dict[str, str] = field(default_factory=lambda: dict(QUANTITIES))
+    study: ClassVar[str] = "tradeoff"
 
     def shown(self, of: str | None = None, kind: str = "path_max") -> list[Measurement]:
         """List the measurements whose error the reference can resolve, the cheapest first.
@@ -167,10 +166,8 @@ class Tradeoff(Saved):
         on_front = {measurement.setting for measurement in self.front()}
         rows = []
         for measurement in self.measurements:
-            row: dict[str, Any] = asdict(measurement.setting) | {
-                "order": measurement.order,
-                "front": measurement.setting in on_front,
-            }
+            row: dict[str, Any] = asdict(measurement.setting)
+            row |= {"order": measurement.order, "front": measurement.setting in on_front}
             row |= {"us_per_vehicle_second": measurement.us_per_vehicle_second, "cost_spread": measurement.cost_spread}
             row |= {"compile_seconds": measurement.compile_seconds}
             for of in self.units:
@@ -179,20 +176,6 @@ class Tradeoff(Saved):
             row["energy_drift"] = measurement.energy_drift
             rows.append(row | {f"bias_{name}": value for name, value in measurement.biases.items()})
         return rows
-
-    def save(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write tradeoff.json and tradeoff.csv into a folder, which is made if needed.
-
-        Args:
-            folder: of the two files.
-
-        Returns:
-            Paths of the two files.
-
-        Raises:
-            OSError: where they cannot be written.
-        """
-        return self._save(folder, "tradeoff")
 
 
 KINDS = ("end_max", "end_rms", "path_max", "path_rms")
@@ -356,14 +339,11 @@ def tradeoff(
         until = trusted_until(reference, compared)
         growth = growth_of(sample, taken, reference)
         if until < len(sample.times) - 1:
-            text = (
-                f"errors of single members are up to {sample.times[until]:g} s, where the reference still agrees with"
-            )
-            messages.append(f"{text} itself; beyond it only statistics are meaningful")
+            text = f"errors of single members are up to {sample.times[until]:g} s, where the reference still agrees"
+            messages.append(f"{text} with itself; beyond it only statistics are meaningful")
     deadline = time.perf_counter() + 0.6 * seconds
-    trials, skipped = sweep(
-        sample, taken, reference, until, deadline, begun + seconds, lambda fraction: report(0.2 + 0.6 * fraction)
-    )
+    latest = begun + seconds
+    trials, skipped = sweep(sample, taken, reference, until, deadline, latest, lambda part: report(0.2 + 0.6 * part))
     if skipped:
         messages.append(
             f"no time for {', '.join(skipped)}: run again, the kernels are compiled now, or give more seconds"
@@ -589,18 +569,15 @@ def report_text(found: Tradeoff) -> str:
     lines.append(f"sample      {found.members} members, 0 to {found.t1:g} s, {len(found.measurements)} settings in "
                  f"{found.seconds:.0f} s")  # fmt: skip
     if found.reference_error:
-        reference_error = found.reference_error[found.of]
-        lines.append(
-            f"reference   {found.reference}: they agree to {reference_error:.1e} {unit} up to {found.until:g} s"
-        )
+        apart = found.reference_error[found.of]
+        lines.append(f"reference   {found.reference}: they agree to {apart:.1e} {unit} up to {found.until:g} s")
     if found.growth:
         lines.append(f"predictable {growth_text(found.growth)}")
     if found.refused:
         lines.append(f"refused     {', '.join(found.refused)} (why: tradeoff.json)")
     if found.measurements:
-        lines.append(
-            f"costs       {cost.agreement_text([measurement.cost_spread for measurement in found.measurements])}"
-        )
+        spreads = [measurement.cost_spread for measurement in found.measurements]
+        lines.append(f"costs       {cost.agreement_text(spreads)}")
     front = found.front()
     kept = any(np.isfinite(measurement.energy_drift) for measurement in front)
     if front:
@@ -654,10 +631,8 @@ def bias_lines(found: Tradeoff) -> list[str]:
     if not double:
         return []
     name = min(double, key=lambda measurement: abs(measurement.order - 2)).setting.name
-    chosen = sorted(
-        (measurement for measurement in double if measurement.setting.name == name),
-        key=lambda measurement: -measurement.setting.h,
-    )
+    chosen = [measurement for measurement in double if measurement.setting.name == name]
+    chosen.sort(key=lambda measurement: -measurement.setting.h)
     means = ("attitude", "velocity", "energy", "angular_momentum")
     columns = ["position_mean", "position_std", *(f"{name}_mean" for name in means)]
     heads = [column.replace("angular_momentum", "ang.mom.").replace("_", " ") for column in columns]

@@ -324,12 +324,8 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str], of: str | None 
     names = list(dict.fromkeys(name for name, _ in groups))
     for (name, dtype), members in groups.items():
         i = names.index(name)
-        style = {
-            "color": COLORS[i % len(COLORS)],
-            "marker": MARKERS[i % len(MARKERS)],
-            "markersize": 4.5,
-            "linewidth": 1.0,
-        }
+        color, marker = COLORS[i % len(COLORS)], MARKERS[i % len(MARKERS)]
+        style = {"color": color, "marker": marker, "markersize": 4.5, "linewidth": 1.0}
         label = name
         if dtype != "float64":
             style |= {"linestyle": "--", "markerfacecolor": "white"}
@@ -415,9 +411,8 @@ def plot_stability(found: StabilityMap, path: str | os.PathLike[str]) -> Path:
         axes.set_visible(False)
     _legend(figure, drawn)
     scene = f"accurate: {found.of} to {found.error_bound:g} {found.unit} up to {found.error_time:.3g} s"
-    figure.suptitle(
-        f"{scene}; bounded: energy up to {found.t1:.3g} s; worst of {found.directions} starts", fontsize="medium"
-    )
+    bounded = f"bounded: energy up to {found.t1:.3g} s; worst of {found.directions} starts"
+    figure.suptitle(f"{scene}; {bounded}", fontsize="medium")
     return save_figure(figure, path, 110)
 
 

@@ -184,9 +184,8 @@ def morris_of(
     # A step moves the level by p / 2 of the cube's p parts, where SALib divides by another length.
     scale = design.levels / (design.levels - 1.0)
     factors = tuple(label for label, _ in space.factors)
-    estimates = {
-        name: np.full((Y.shape[1], len(factors)), np.nan) for name in ("mu", "mu_star", "sigma", "mu_star_conf")
-    }
+    names = ("mu", "mu_star", "sigma", "mu_star_conf")
+    estimates = {name: np.full((Y.shape[1], len(factors)), np.nan) for name in names}
     for q in _varying(Y, outputs.labels, messages):
         S = analyze(salib_problem(space), X, Y[:, q].copy(), num_resamples=resamples, conf_level=confidence,
                     num_levels=design.levels, seed=fleet.seed)  # fmt: skip

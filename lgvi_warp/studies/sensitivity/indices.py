@@ -72,9 +72,8 @@ class Indices:
             lines += ["", f"{quantity}: mean {self.mean[q]:.6g}, standard deviation {self.std[q]:.3g}"]
             lines.append(f"  {'factor':<{width}}" + "".join(f"  {column:>21}" for column in self.columns))
             for f, factor in enumerate(self.factors):
-                lines.append(
-                    f"  {factor:<{width}}" + "".join(f"  {self._cell(column, q, f):>21}" for column in self.columns)
-                )
+                cells = "".join(f"  {self._cell(column, q, f):>21}" for column in self.columns)
+                lines.append(f"  {factor:<{width}}{cells}")
             lines += self._more(q)
         lines.append(f"+- is half the {self.confidence:.0%} interval")
         return "\n".join(lines)

@@ -103,11 +103,9 @@ def evaluate(
         status.append(np.asarray(result.status))
         provenance = result.provenance
     numbers = np.concatenate([np.concatenate(group_values, axis=1) for group_values in values])
-    labels = [
-        label
-        for interest, columns in zip(interests, values[0], strict=True)
-        for label in interest.labels(columns.shape[1])
-    ]
+    labels: list[str] = []
+    for interest, columns in zip(interests, values[0], strict=True):
+        labels += interest.labels(columns.shape[1])
     ended = np.concatenate(status)
     finite = np.isfinite(numbers).all(axis=1)
     names = {Status(int(code)).name.lower(): int((ended == code).sum()) for code in np.unique(ended)}

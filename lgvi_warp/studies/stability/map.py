@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -120,6 +120,7 @@ class StabilityMap(Saved):
     messages: tuple[str, ...] = ()
     seconds: float = 0.0
     unit: str = ""
+    study: ClassVar[str] = "stability"
 
     def __post_init__(self) -> None:
         if not self.unit:  # a map written before `of` could be any quantity
@@ -251,21 +252,6 @@ class StabilityMap(Saved):
                 ratios = {f"h_over_{name}_limit": values[i, j] for name, values in self.ratios[method].items()}
                 rows.append(row | ratios)
         return rows
-
-    def save(self, folder: str | os.PathLike[str], name: str = "stability") -> list[Path]:
-        """Write NAME.json and NAME.csv into a folder, which is made if needed.
-
-        Args:
-            folder: of the two files.
-            name: their name without the ending. Default "stability".
-
-        Returns:
-            Paths of the two files.
-
-        Raises:
-            OSError: where they cannot be written.
-        """
-        return self._save(folder, name)
 
 
 # Fields that hold an array (ny, nx) for each method, and its type.
@@ -454,14 +440,8 @@ def cells_of(one: Found, verified: np.ndarray, error: float, energy_bound: float
     """
     unbounded = ~(one.growth / energy_bound <= 1.0)
     flagged = one.warned | failed(one.status)
-    accurate = verified & (one.error <= error)
-    classes = {
-        Cell.SILENT: unbounded & ~flagged,
-        Cell.FAILED: unbounded,
-        Cell.FLAGGED: flagged,
-        Cell.ACCURATE: accurate,
-    }
-    return np.select(list(classes.values()), list(classes), Cell.BOUNDED)
+    masks = [unbounded & ~flagged, unbounded, flagged, verified & (one.error <= error)]
+    return np.select(masks, [Cell.SILENT, Cell.FAILED, Cell.FLAGGED, Cell.ACCURATE], Cell.BOUNDED)
 
 
 def _ratios(grid: StabilityGrid, methods: Sequence[str]) -> dict[str, dict[str, np.ndarray]]:

@@ -344,15 +344,13 @@ def _judge(result: Result, column: Column, at: np.ndarray, found: Found, of: Com
             change = np.max(np.abs(result.energy[early] - energy), axis=0)
             found.growth[members] = _with_rotation(change / np.maximum(size, 1e-300), result)
             return
-    found.growth[members] = _with_rotation(
-        invariants.energy_growth(result, dissipative=judged == "dissipative"), result
-    )
+    growth = invariants.energy_growth(result, dissipative=judged == "dissipative")
+    found.growth[members] = _with_rotation(growth, result)
 
 
 def _at_times(result: Result, rows: np.ndarray) -> Result:
-    return replace(
-        result, time=result.time[rows], samples={name: values[rows] for name, values in result.samples.items()}
-    )
+    samples = {name: values[rows] for name, values in result.samples.items()}
+    return replace(result, time=result.time[rows], samples=samples)
 
 
 def _with_rotation(growth: np.ndarray, result: Result) -> np.ndarray:

@@ -43,8 +43,12 @@ def checksum(data: Any, before: int = 0) -> int:
 
 
 @functools.cache
-def _syncs() -> ThreadPoolExecutor:
-    """Threads that wait for the disk."""
+def syncs() -> ThreadPoolExecutor:
+    """Threads that wait for the disk.
+
+    Returns:
+        An executor that the whole process shares.
+    """
     return ThreadPoolExecutor(SYNCS, thread_name_prefix="lgvi_warp_sync")
 
 
@@ -54,7 +58,7 @@ _room = threading.BoundedSemaphore(MOST_WAITING)
 def _renew() -> None:
     """Start afresh in a child after a fork, where none of the threads exists."""
     global _room
-    _syncs.cache_clear()
+    syncs.cache_clear()
     _room = threading.BoundedSemaphore(MOST_WAITING)
 
 
@@ -83,7 +87,7 @@ def sync_file(beside: Path, target: Path) -> None:
 def _begun(descriptor: int, target: Path) -> Future[None]:
     """Start to sync an open file; wait first where too many are waiting."""
     _room.acquire()
-    return _syncs().submit(_sync_early, os.dup(descriptor), target)
+    return syncs().submit(_sync_early, os.dup(descriptor), target)
 
 
 def _sync_early(descriptor: int, target: Path) -> None:
@@ -160,7 +164,7 @@ class Files:
     def sync(self) -> None:
         """Start to sync the files whose sync has not begun."""
         self._waiting = [
-            (beside, target, sync or _syncs().submit(sync_file, beside, target))
+            (beside, target, sync or syncs().submit(sync_file, beside, target))
             for beside, target, sync in self._waiting
         ]
 
@@ -220,7 +224,7 @@ def finish_together(several: Sequence[Files]) -> list[OSError | None]:
         except OSError as error:
             errors.append(error)
     try:
-        list(_syncs().map(sync_folder, sorted(folders)))
+        list(syncs().map(sync_folder, sorted(folders)))
     except OSError as error:
         return [earlier or error for earlier in errors]
     return errors

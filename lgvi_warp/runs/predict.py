@@ -164,7 +164,7 @@ def predict(
         set_up=set_up,
         advance=step * steps * more,
         write=write,
-        memory=_resident() + memory(runs, count),
+        memory=resident() + memory(runs, count),
         disk=metadata + sum(sized.disk for sized in runs),
         free_memory=machine.memory_bytes(),
         free_disk=shutil.disk_usage(place).free,
@@ -394,8 +394,12 @@ def disk_speed(folder: Path, threads: int) -> float:
         return len(data) * threads / (time.perf_counter() - start)
 
 
-def _resident() -> int:
-    """Memory of this process [bytes]; 0 where the system does not tell."""
+def resident() -> int:
+    """Memory of this process.
+
+    Returns:
+        Resident memory [bytes]; 0 where the system does not tell.
+    """
     try:
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError):

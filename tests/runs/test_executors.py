@@ -190,7 +190,7 @@ def test_threads_of_one_dask_worker_share_it(memory):
         for _ in dask.Dask(client).run(work, blocks(2048), lambda *_: None):
             at_once.append(work.most)
             break
-        assert at_once == [2] and sum(dask._at_work.values()) == 0 and 2 <= len(work.begun) < 8
+        assert at_once == [2] and sum(dask.tasks_at_work.values()) == 0 and 2 <= len(work.begun) < 8
 
 
 class Overlapping:

@@ -133,22 +133,22 @@ def _work(data: bytes, block: Block, topic: str, kind: dict[str, str]) -> Any:
             [f"worker {worker_kind}: is not of the kind of the machine that asks, {kind}, and would give other bits; "
              "let workers be of one kind, and run from one of them"]
         )  # fmt: skip
-    _at_work[topic] += 1
+    tasks_at_work[topic] += 1
     try:
         return _received(data)(block, lambda: topic in _ended, _teller(topic, block))
     finally:
-        _at_work[topic] -= 1
+        tasks_at_work[topic] -= 1
 
 
 # On a worker: number of running blocks of each run, and runs that ended early.
-_at_work: Counter[str] = Counter()
+tasks_at_work: Counter[str] = Counter()
 _ended: set[str] = set()
 
 
 async def _end(topic: str) -> None:
     """On a worker: halt the blocks of a run, and wait until none is running."""
     _ended.add(topic)
-    while _at_work[topic] > 0:
+    while tasks_at_work[topic] > 0:
         await asyncio.sleep(0.05)
 
 

@@ -204,7 +204,7 @@ class Bank(Packets):
         Lane = bench.examine.Lane
         self.params = wp.array(params, dtype=bench.examine.Params, device="cpu")
         self.table, self.memory = (wp.array(x, dtype=Lane, shape=x.shape[:2], device="cpu") for x in (table, memory))
-        self._launch(views, 0)
+        self.launch(views, 0)
 
     def evaluate(self, views: Views) -> dict[str, np.ndarray]:
         """Evaluate every role of the law, and its energy where it has one.
@@ -215,11 +215,20 @@ class Bank(Packets):
         Returns:
             By role: (count, numbers of the role).
         """
-        out = self._launch(views, -1)
+        out = self.launch(views, -1)
         roles = (*self.bench.roles, *["energy"] * hasattr(self.bench.module, "energy"))
         return {role: out[:, COLUMNS[role][0] : sum(COLUMNS[role])] for role in roles}
 
-    def _launch(self, views: Views, second: int) -> np.ndarray:
+    def launch(self, views: Views, second: int) -> np.ndarray:
+        """Evaluate the law once at each view.
+
+        Args:
+            views: k views.
+            second: which half of a kick `evolve` makes, 0 or 1; -1 for neither.
+
+        Returns:
+            (k, OUT_FIELDS), the columns of `lgvi_kernels.advance.examine.COLUMNS`.
+        """
         width, Lane = self.bench.width, self.bench.examine.Lane
         flat = [views.attitude.reshape(-1, 9), views.position, views.velocity, views.rate]
         rows = pack(np.concatenate(flat, axis=1), width)

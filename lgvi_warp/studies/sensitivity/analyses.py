@@ -88,7 +88,7 @@ def sobol_of(
         FailedMembers: where members failed and the indices cannot be computed from the others.
         ImportError: without SALib.
     """
-    analyze = _salib("sobol")
+    analyze = salib("sobol")
     design = fleet.sampling
     assert isinstance(design, Saltelli)
     factors = tuple(label for label, _ in fleet.space.factors)
@@ -174,7 +174,7 @@ def morris_of(
         FailedMembers: where members failed and the effects cannot be computed from the others.
         ImportError: without SALib.
     """
-    analyze = _salib("morris")
+    analyze = salib("morris")
     design, space = fleet.sampling, fleet.space
     assert isinstance(design, Morris)
     group = design.group_size(space)
@@ -248,7 +248,18 @@ def _designed(scene: Any, vary: Any, seed: int | None, design: Sampling, samples
     return Ensemble(scene, samples * design.group_size(first.space), chosen[1], chosen[0], design)
 
 
-def _salib(name: str) -> Callable[..., Any]:
+def salib(name: str) -> Callable[..., Any]:
+    """The function of SALib that analyses a design.
+
+    Args:
+        name: module of `SALib.analyze`: "sobol" or "morris".
+
+    Returns:
+        Its `analyze`.
+
+    Raises:
+        ImportError: SALib is not installed; the message names the extra.
+    """
     try:
         from importlib import import_module
 

@@ -328,7 +328,7 @@ class StabilityGrid:
             size = np.linalg.norm(start)
             # A vector of zero length gets a direction off the body's axes, for an axis that sets its size.
             unit = start / size if size > 0.0 else np.full(3, 3.0**-0.5)
-            turns = notation.matrix_from_rotation_vector(_rotations(rng, d))
+            turns = notation.matrix_from_rotation_vector(rotation_vectors(rng, d))
             self.direction[name] = np.tile(turns @ unit, (n // d, 1))
             self.state[name] = size * self.direction[name]
         self.h = np.full(n, self.step or 0.0)
@@ -422,8 +422,16 @@ class StabilityGrid:
         return [(float(h), np.flatnonzero(step_index == i)) for i, h in enumerate(steps)]
 
 
-def _rotations(rng: np.random.Generator, n: int) -> np.ndarray:
-    """Draw rotation vectors (n, 3) [rad] of uniformly random attitudes; the first is zero."""
+def rotation_vectors(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Draw the rotation vectors of uniformly random attitudes; the first is zero.
+
+    Args:
+        rng: generator of the draws.
+        n: number of attitudes.
+
+    Returns:
+        Rotation vectors (n, 3) [rad].
+    """
     q = rng.normal(size=(n, 4))
     q /= np.linalg.norm(q, axis=1, keepdims=True)
     angle = 2.0 * np.arctan2(np.linalg.norm(q[:, 1:], axis=1), q[:, 0])

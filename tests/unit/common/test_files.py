@@ -105,6 +105,6 @@ def test_no_descriptor_stays_open(name, full, root, monkeypatch):
         monkeypatch.setattr(os, "fsync", no_room)
     before = sorted(os.listdir(DESCRIPTORS))
     act(ACTIONS[name], root)
-    files._syncs().submit(int).result()
+    files.syncs().submit(int).result()
     assert sorted(os.listdir(DESCRIPTORS)) == before
     assert not list(root.rglob(f"*{files.UNFINISHED}"))

@@ -10,10 +10,10 @@ from lgvi_warp.runs.store.create import nearest_folder
 
 def test_the_memory_of_this_process(monkeypatch):
     held = np.ones(30_000_000)
-    assert predict._resident() > held.nbytes
+    assert predict.resident() > held.nbytes
     for error in (OSError, ValueError):
         monkeypatch.setattr(Path, "read_text", lambda *_, error=error: (_ for _ in ()).throw(error()))
-        assert predict._resident() == 0
+        assert predict.resident() == 0
 
 
 def test_the_nearest_folder_that_exists(tmp_path):

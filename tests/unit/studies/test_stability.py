@@ -11,7 +11,7 @@ import lgvi_warp as lw
 from lgvi_warp.common.status import Status
 from lgvi_warp.physics import notation, vehicle
 from lgvi_warp.scene.settings import RunSettings
-from lgvi_warp.studies.stability.grid import Axis, Line, StabilityGrid, _rotations
+from lgvi_warp.studies.stability.grid import Axis, Line, StabilityGrid, rotation_vectors
 from lgvi_warp.studies.stability.limits import drag_limit, drag_rate, oscillation_limit, rates, rotation_limit
 from lgvi_warp.studies.stability.map import Cell, StabilityMap, cells_of
 from lgvi_warp.studies.stability.runs import REFUSED, Found
@@ -255,7 +255,7 @@ def test_json_round_trip(tmp_path):
 
 def test_attitudes_of_a_map_are_the_first_and_any():
     """The first direction keeps the axes; the others are uniform on all rotations, of which the trace tells."""
-    vectors = _rotations(np.random.default_rng(1), 20_000)
+    vectors = rotation_vectors(np.random.default_rng(1), 20_000)
     R = notation.matrix_from_rotation_vector(vectors)
     np.testing.assert_array_equal(R[0], np.eye(3))
     # Each entry of a random rotation has mean 0 and mean square 1/3; five standard errors.

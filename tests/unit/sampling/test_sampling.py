@@ -517,7 +517,7 @@ def test_a_scene_file_names_its_sampling(tmp_path):
         ({"grid": {}}, None, ["names nothing"]),
         ({"grid": {"vehicle.mass": []}}, None, ["no list of values"]),
         ({"grid": {"vehicle.mass": 0}}, None, ["whole number from 1"]),
-        ({"grid": {"environment.gravity": 3}}, None, ["has no law"]),
+        ({"grid": {"environment.gravity": 3}}, None, ["has no distribution"]),
         ({"grid": {"environment.gravity": [9.8, 9.9]}}, 3, ["is not the 2 of the grid"]),
         ({"grid": {"vehicle.mass": [1.0, 2.0]}}, None, ["drop one of them"]),
         ({"table": {}}, None, ["one of file and values"]),

@@ -204,7 +204,7 @@ class Bank(Packets):
         Lane = bench.examine.Lane
         self.params = wp.array(params, dtype=bench.examine.Params, device="cpu")
         self.table, self.memory = (wp.array(x, dtype=Lane, shape=x.shape[:2], device="cpu") for x in (table, memory))
-        self.evaluate(views, 0)
+        self.run_device(views, 0)
 
     def evaluate(self, views: Views) -> dict[str, np.ndarray]:
         """Evaluate every role of the law, and its energy where it has one.
@@ -215,11 +215,11 @@ class Bank(Packets):
         Returns:
             By role: (count, numbers of the role).
         """
-        out = self.evaluate(views, -1)
+        out = self.run_device(views, -1)
         roles = (*self.bench.roles, *["energy"] * hasattr(self.bench.module, "energy"))
         return {role: out[:, COLUMNS[role][0] : sum(COLUMNS[role])] for role in roles}
 
-    def evaluate(self, views: Views, second: int) -> np.ndarray:
+    def run_device(self, views: Views, second: int) -> np.ndarray:
         """Evaluate the law once at each view.
 
         Args:

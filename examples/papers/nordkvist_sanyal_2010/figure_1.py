@@ -30,8 +30,8 @@ def crouch_grossman(scene):
     """(t, E(t) - E(0)) after every step of Crouch-Grossman 3, by the NumPy reference."""
     vehicle, gravity = scene.vehicle, scene.environment.gravity
     terms = (
-        Weight(vehicle.mass * gravity - vehicle.buoyancy),
-        Restoring(vehicle.buoyancy * vehicle.center_of_buoyancy),
+        Weight(net=vehicle.mass * gravity - vehicle.buoyancy),
+        Restoring(moment=vehicle.buoyancy * vehicle.center_of_buoyancy),
     )
     body = Body(vehicle.mass_matrix, vehicle.inertia, terms)
     one = lw.Ensemble(scene, members=1).select(0, 1)

@@ -52,9 +52,10 @@ class Law:
     """A law that does nothing; each overrides what it does. Its numbers have the names and units of the term in lgvi_warp."""
 
     potential_force = False  # whether `wrench` follows from `potential`
+    in_order: tuple[str, ...] = ()  # numbers that may be given without their names
 
-    def __init__(self, **numbers: Any) -> None:
-        vars(self).update(numbers)
+    def __init__(self, *values: Any, **numbers: Any) -> None:
+        vars(self).update(dict(zip(self.in_order, values, strict=True)) if values else {}, **numbers)
 
     def __getattr__(self, name: str) -> Any:
         raise AttributeError(f"{type(self).__name__} has no number {name!r}")

@@ -10,6 +10,7 @@ class Restoring(Law):
     """moment: buoyancy times the lever B r (less weight times its own), (3,) [N m], from the body's origin."""
 
     potential_force = True
+    in_order = ("moment",)
 
     def wrench(self, view: View) -> tuple[Array, Array]:
         """No force and the torque mU(b, R) = -B r x z, z = R^T e3."""

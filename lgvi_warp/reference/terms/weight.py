@@ -10,6 +10,7 @@ class Weight(Law):
     """net: weight less buoyancy (m - rho V) g [N]."""
 
     potential_force = True
+    in_order = ("net",)
 
     def wrench(self, view: View) -> tuple[Array, Array]:
         """Force f(b, R) = net z and no torque, z = R^T e3."""

@@ -169,7 +169,7 @@ def removable(I6: Array) -> Array | None:
 
 
 def skew(E: Array) -> Array:
-    """(E - E^T)/2."""
+    """The antisymmetric part (E - E^T)/2 of a matrix (3, 3)."""
     return 0.5 * (E - E.T)
 
 

@@ -238,7 +238,7 @@ class OfExpression(OfPath):
 
     @property
     def reduction(self) -> Reduction:
-        """The expression's."""
+        """How the expression reduces a member's samples to a number."""
         return self._functional.reduction
 
     @property

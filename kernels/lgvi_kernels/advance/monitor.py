@@ -161,12 +161,12 @@ def make_matrix_rate(View, Damping, damping, velocities):
     return matrix_rate
 
 
-def make_sum(one, other):
+def make_sum(unity, other):
     """The sum of two rates: of drag along axes, and of damping matrices beside it."""
 
     @wp.func
     def rate(x: Any, c: Any):
-        return one(x, c) + other(x, c)
+        return unity(x, c) + other(x, c)
 
     return rate
 
@@ -180,9 +180,9 @@ def make_backward(drag_rate):
     @wp.func
     def backward(x: Any, c: Any, length: Any):
         n = length * drag_rate(x, c)
-        one = ones(n)
-        over = n - length.dtype(wp.static(MOST_BACKWARD_DRAG)) * one
-        code = positive(over, length.dtype(wp.static(float(BACKWARD_DRAG))) * one, one - one)
+        unity = ones(n)
+        over = n - length.dtype(wp.static(MOST_BACKWARD_DRAG)) * unity
+        code = positive(over, length.dtype(wp.static(float(BACKWARD_DRAG))) * unity, unity - unity)
         x.alarm.size = positive(x.alarm.code, x.alarm.size, positive(over, n * n, x.alarm.size))
         x.alarm.code = positive(x.alarm.code, x.alarm.code, code)
         return x
@@ -237,11 +237,11 @@ def make_energy(laws, real, View, velocities, shifted):
 
 
 @wp.func
-def noted(seen: Any, excess: Any, number: Any, square: Any):
+def noted(crossings: Any, excess: Any, number: Any, square: Any):
     """Add a row where its excess is positive; rows come in the order of their bits, so that the last one's value stays."""
-    seen.bits = seen.bits + positive(excess, number * ones(excess), ones(excess) - ones(excess))
-    seen.size = positive(excess, square, seen.size)
-    return seen
+    crossings.bits = crossings.bits + positive(excess, number * ones(excess), ones(excess) - ones(excess))
+    crossings.size = positive(excess, square, crossings.size)
+    return crossings
 
 
 def make_look(rows, width, real, velocities, drag_rate):
@@ -251,37 +251,43 @@ def make_look(rows, width, real, velocities, drag_rate):
 
     @wp.func
     def look_at(x: Any, c: Any, limits: Any, growth: Any):
-        seen = Seen()
-        one = ones(x.b.x)
-        zero = one - one
+        crossings = Seen()
+        unity = ones(x.b.x)
+        zero = unity - unity
         nu, Om = velocities(c.inertia, x.p, x.pi)
         if wp.static("precision" in rows):
             step = limits.step * limits.step
             # At rest, where moved is 0, no digit of a motion is lost.
             moved = step * dot(nu, nu)
             lost = real(wp.static(EPSILON[real] ** 2)) * dot(x.b, x.b)
-            excess = positive(moved, lost - limits.precision_limit * moved, zero - one)
-            seen = noted(seen, excess, real(wp.static(number["precision"])), lost / moved)
+            excess = positive(moved, lost - limits.precision_limit * moved, zero - unity)
+            crossings = noted(crossings, excess, real(wp.static(number["precision"])), lost / moved)
         if wp.static("orthogonality" in rows):
-            d = largest(size3(vec3(dot(x.R0, x.R0) - one, dot(x.R1, x.R1) - one, dot(x.R2, x.R2) - one)))
+            d = largest(size3(vec3(dot(x.R0, x.R0) - unity, dot(x.R1, x.R1) - unity, dot(x.R2, x.R2) - unity)))
             d = greatest(d, largest(size3(vec3(dot(x.R0, x.R1), dot(x.R1, x.R2), dot(x.R2, x.R0)))))
-            excess = d * d - limits.orthogonality_limit * one
-            seen = noted(seen, excess, real(wp.static(number["orthogonality"])), d * d)
+            excess = d * d - limits.orthogonality_limit * unity
+            crossings = noted(crossings, excess, real(wp.static(number["orthogonality"])), d * d)
         if wp.static("munk_coarse" in rows):
             w = limits.munk * dot(x.p, x.p)
-            seen = noted(seen, w - limits.munk_coarse_limit * one, real(wp.static(number["munk_coarse"])), w)
+            crossings = noted(
+                crossings, w - limits.munk_coarse_limit * unity, real(wp.static(number["munk_coarse"])), w
+            )
         if wp.static("rotation" in rows):
             turn = (limits.step * limits.step) * dot(Om, Om)
-            seen = noted(seen, turn - limits.rotation_limit * one, real(wp.static(number["rotation"])), turn)
+            crossings = noted(
+                crossings, turn - limits.rotation_limit * unity, real(wp.static(number["rotation"])), turn
+            )
         if wp.static("drag" in rows):
             d = limits.step * drag_rate(x, c)
-            seen = noted(seen, d * d - limits.drag_limit * one, real(wp.static(number["drag"])), d * d)
+            crossings = noted(crossings, d * d - limits.drag_limit * unity, real(wp.static(number["drag"])), d * d)
         if wp.static("munk_unstable" in rows):
             w = limits.munk * dot(x.p, x.p)
-            seen = noted(seen, w - limits.munk_unstable_limit * one, real(wp.static(number["munk_unstable"])), w)
+            crossings = noted(
+                crossings, w - limits.munk_unstable_limit * unity, real(wp.static(number["munk_unstable"])), w
+            )
         if wp.static("energy" in rows):
             g = greatest(growth, zero)
-            seen = noted(seen, g * g - limits.energy_limit * one, real(wp.static(number["energy"])), g * g)
-        return seen
+            crossings = noted(crossings, g * g - limits.energy_limit * unity, real(wp.static(number["energy"])), g * g)
+        return crossings
 
     return look_at

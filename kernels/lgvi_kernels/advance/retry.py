@@ -78,8 +78,8 @@ def make_retry(spec):
     def retried(good: State, x: State, code: Lane, c: Constants, k: int, h: wp.float64, stage_h: wp.array(dtype=real),
                 lead_h: wp.array(dtype=real), opening: real):  # fmt: skip
         """(state, code) after step k: where it had no solution, by 2, 4, ... equal parts, as soon as those have one."""
-        one = ones(code)
-        zero = one - one
+        unity = ones(code)
+        zero = unity - unity
         # A sum, since a plain assignment would be a second name of `code`.
         codes = code + zero
         pending = zero
@@ -95,8 +95,8 @@ def make_retry(spec):
             y = in_parts(y, c, k, h, real(1.0) / real(parts), parts, stage_h, lead_h, opening, pending)
             if wp.static(watched):
                 y = to_event(y, c, real(h))
-            new_codes = failures(y, one - pending)
-            solved = one - one
+            new_codes = failures(y, unity - pending)
+            solved = unity - unity
             for j in range(wp.static(width)):
                 # An event is no failure: the step is made, and the lane's code is the event's.
                 if pending[j] > real(0.0) and (

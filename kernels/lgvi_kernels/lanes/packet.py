@@ -67,21 +67,21 @@ def turned_too_far(alarm: Any):
 
     Beyond, the series of the tangent has no digit of the angle, and shears by it multiply rounding errors by its square.
     """
-    one = ones(alarm.size)
-    over = alarm.size - one
-    alarm.code = positive(over, one.dtype(wp.static(float(STEP_TOO_LARGE))) * one, alarm.code)
-    alarm.size = positive(over, alarm.size, one - one)
+    unity = ones(alarm.size)
+    over = alarm.size - unity
+    alarm.code = positive(over, unity.dtype(wp.static(float(STEP_TOO_LARGE))) * unity, alarm.code)
+    alarm.size = positive(over, alarm.size, unity - unity)
     return alarm
 
 
 @wp.func
 def failures(x: Any, frozen: Any):
     """The failure code of each lane that is not frozen yet, 0 where it is well."""
-    one = ones(frozen)
-    zero = one - one
+    unity = ones(frozen)
+    zero = unity - unity
     # 1 where all is finite; where it is NaN, positive() takes its last argument.
-    well = one - probe(x)
-    code = positive(x.alarm.code, x.alarm.code, positive(well, zero, one.dtype(wp.static(float(NON_FINITE))) * one))
+    well = unity - probe(x)
+    code = positive(x.alarm.code, x.alarm.code, positive(well, zero, unity.dtype(wp.static(float(NON_FINITE))) * unity))
     return positive(frozen, zero, code)
 
 

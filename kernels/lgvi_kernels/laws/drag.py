@@ -37,8 +37,8 @@ def decay3(x: Any):
 @wp.func
 def remaining(x: Any, s: Any):
     """e^-x from s = (1 - e^-x)/x; beyond x = 37, where only the round-off of the difference is left, 0."""
-    one = ones(x)
-    return positive(x - one.dtype(37.0) * one, one - one, one - x * s)
+    unity = ones(x)
+    return positive(x - unity.dtype(37.0) * unity, unity - unity, unity - x * s)
 
 
 @wp.func
@@ -80,11 +80,11 @@ def make_taken(linear, quadratic):
     def taken(v: Any, gain: Any, loss: Any):
         minus_one = v.x.dtype(-1.0)
         if wp.static(quadratic):
-            one = vec3(ones(v.x), ones(v.x), ones(v.x))
+            unity = vec3(ones(v.x), ones(v.x), ones(v.x))
             g = gain * size3(v)
             if wp.static(linear):
-                return minus_one * (((g + loss) / (one + g)) * v)
-            return minus_one * ((g / (one + g)) * v)
+                return minus_one * (((g + loss) / (unity + g)) * v)
+            return minus_one * ((g / (unity + g)) * v)
         return minus_one * (loss * v)
 
     return taken
@@ -142,11 +142,11 @@ def make_E(parts, by_changes):
     @wp.func
     def slowed(v: Any, gain: Any):
         """v / (1 + gain |v|) per axis."""
-        one = ones(v.x)
+        unity = ones(v.x)
         return vec3(
-            v.x / (one + gain.x * absolute(v.x)),
-            v.y / (one + gain.y * absolute(v.y)),
-            v.z / (one + gain.z * absolute(v.z)),
+            v.x / (unity + gain.x * absolute(v.x)),
+            v.y / (unity + gain.y * absolute(v.y)),
+            v.z / (unity + gain.z * absolute(v.z)),
         )
 
     @wp.func

@@ -39,10 +39,10 @@ def make_axis(component, linear, quadratic):
 
     @wp.func
     def changed(w: Any, decay: Any, gain: Any):
-        one = ones(w)
+        unity = ones(w)
         slowed = w
         if wp.static(quadratic):
-            slowed = slowed / (one + component(gain) * absolute(w))
+            slowed = slowed / (unity + component(gain) * absolute(w))
         if wp.static(linear):
             slowed = component(decay) * slowed
         return slowed - w

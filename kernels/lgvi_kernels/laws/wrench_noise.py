@@ -26,10 +26,10 @@ def params(width, real):
 @wp.func
 def law(w: Any, view: Any, p: Any):
     """S xi / sqrt(h): held over the kick, so that the impulse's variance is S^2 h."""
-    one = ones(view.b.x)
-    size = one / root(view.h * one)
-    f = size * normals3(one, p.member, view.step, p.channel, p.seed0, p.seed1)
-    m = size * normals3(one, p.member, view.step, p.channel + 1, p.seed0, p.seed1)
+    unity = ones(view.b.x)
+    size = unity / root(view.h * unity)
+    f = size * normals3(unity, p.member, view.step, p.channel, p.seed0, p.seed1)
+    m = size * normals3(unity, p.member, view.step, p.channel + 1, p.seed0, p.seed1)
     w.force = w.force + (f.x * p.forcex + f.y * p.forcey + f.z * p.forcez)
     w.torque = w.torque + (f.x * p.momentx + f.y * p.momenty + f.z * p.momentz)
     w.torque = w.torque + (m.x * p.torquex + m.y * p.torquey + m.z * p.torquez)

@@ -83,8 +83,8 @@ class Gathered:
             The estimates, in the order of the statistics.
         """
         estimates: list[Estimate] = []
-        for asked, statistic, tree in zip(self._asked, self.statistics, self.trees, strict=True):
-            if chosen is None or asked is chosen:
+        for requested, statistic, tree in zip(self._asked, self.statistics, self.trees, strict=True):
+            if chosen is None or requested is chosen:
                 with np.errstate(invalid="ignore", over="ignore"):
                     estimates += self.said(statistic, tree.parts())
         return estimates

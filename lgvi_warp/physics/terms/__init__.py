@@ -86,7 +86,7 @@ def _from_table(where: str, table: Any) -> Term:
         remedy = "write a table with type = ..., or give a term such as lw.Drag(quadratic=...)"
         raise refusal(where, table, "is no term", remedy)
     word = table.get("type", "")
-    implied = [one.type for one in IMPLIED]
+    implied = [term.type for term in IMPLIED]
     kind = TYPES.get(word) if isinstance(word, str) else None
     if kind is None or word in implied:
         follows = word in (*implied, "buoyancy")

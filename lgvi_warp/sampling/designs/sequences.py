@@ -31,7 +31,6 @@ class Sobol(Replicated):
     kind: ClassVar[str] = "sobol"
 
     def points(self, space: Space, replicate: int, indices: np.ndarray) -> np.ndarray:
-        """Points of a scrambled sequence."""
         return sobol_points(space.seed, self.name(replicate), space.dimensions, indices)
 
 
@@ -92,7 +91,6 @@ class Halton(Replicated):
     kind: ClassVar[str] = "halton"
 
     def points(self, space: Space, replicate: int, indices: np.ndarray) -> np.ndarray:
-        """Points of a scrambled sequence, drawn run by run of neighbours."""
         ascending, place = np.unique(indices, return_inverse=True)
         runs = np.split(ascending, np.flatnonzero(np.diff(ascending) > 1) + 1)
         points = np.concatenate([self._run(space, replicate, int(run[0]), len(run)) for run in runs])

@@ -60,8 +60,8 @@ class Threads:
         Yields:
             Each block and its result, as it finishes.
         """
-        # The main thread waits, so that it hears an interrupt at once.
-        if self.threads == 1 and threading.current_thread() is not threading.main_thread():
+        # A launch cannot be cut short in any thread, so one thread needs no second that waits for it.
+        if self.threads == 1 or len(blocks) == 1:
             yield from ThisThread().run(work, blocks, advanced)
             return
         stop = threading.Event()

@@ -60,8 +60,9 @@ class Threads:
         Yields:
             Each block and its result, as it finishes.
         """
-        # A launch cannot be cut short in any thread, so one thread needs no second that waits for it.
-        if self.threads == 1 or len(blocks) == 1:
+        # The main thread waits, so that blocks at work come to their end when it hears an interrupt. One block alone would
+        # be lost in any thread.
+        if len(blocks) == 1 or (self.threads == 1 and threading.current_thread() is not threading.main_thread()):
             yield from ThisThread().run(work, blocks, advanced)
             return
         stop = threading.Event()

@@ -59,23 +59,23 @@ def frame_of(method: Method, parameters: Parameters) -> tuple[Frame, np.ndarray,
         (frame, U, coupling): the frame; U (n, 3, 3) of the turns of psi_x, zero for other methods; and the coupling
         norm (n,) that is left in this frame and that the method cannot treat.
     """
-    I6 = vehicle.inertia6(parameters)
-    coupling = np.zeros(len(I6))
+    body = vehicle.inertia_blocks(parameters)
+    coupling = np.zeros(1)
     if method.turns:
-        return *inertia.turns_frame(I6, middle_axis(method.program)), coupling
+        return *inertia.turns_frame(body, middle_axis(method.program)), coupling
     if method.base == "psi_w":
-        frame = inertia.symmetric_frame(I6)
+        frame = inertia.symmetric_frame(body)
     elif method.tableau:
-        frame = _explicit_frame(I6)
+        frame = _explicit_frame(body)
     else:
-        frame, coupling = inertia.uncoupled_frame(I6)
-    return frame, np.zeros_like(frame.M), coupling
+        frame, coupling = inertia.uncoupled_frame(body)
+    return frame, np.zeros((1, 3, 3)), coupling
 
 
-def _explicit_frame(I6: np.ndarray) -> Frame:
+def _explicit_frame(body: inertia.Blocks) -> Frame:
     """The frame about the origin where E is symmetric, with E set to zero for members without coupling."""
-    frame = inertia.symmetric_frame(I6)
-    coupling = inertia.uncoupled_frame(I6)[1]
+    frame = inertia.symmetric_frame(body)
+    coupling = inertia.uncoupled_frame(body)[1]
     E = np.where(coupling[:, None, None] > UNCOUPLED, frame.E, 0.0)
     return replace(frame, E=E, E_forces=E)
 
@@ -118,6 +118,12 @@ class Survey:
     buoyant: bool
     odd: Oddities
 
+    @property
+    def decisive(self) -> tuple[Any, ...]:
+        """All that decides what a kernel must contain: surveys that agree in it lead to one kernel."""
+        facts = vars(self) | {"odd": None, "left": self.left > UNCOUPLED}
+        return tuple(facts.values())
+
     def joined(self, other: Survey) -> Survey:
         """The survey of the members of both.
 
@@ -143,7 +149,6 @@ def survey(ensemble: Ensemble, method: Method, h: float, shared: Shared | None =
     Returns:
         What holds for at least one member, and the largest values.
     """
-
     known = Shared({*ensemble.varied_names, MEMBERS}) if shared is None else shared
 
     def look(first: int, stop: int) -> Survey:

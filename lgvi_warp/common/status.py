@@ -167,7 +167,8 @@ def stopped(status: Any) -> np.ndarray:
     Returns:
         bool, shape (n,).
     """
-    return np.asarray(np.asarray(status) >= Status.SURFACE)
+    codes = np.asarray(status)
+    return np.asarray((codes >= Status.SURFACE) & (codes <= max(Status)))
 
 
 def failed(status: Any) -> np.ndarray:

@@ -40,19 +40,25 @@ def block_size(members: int) -> int:
     return size
 
 
-def shares(members: int, threads: int) -> int:
+# Steps of vehicles in a block beyond which its own cost, a millisecond, is small beside that of its kernel.
+WORTHWHILE = 4_000_000
+
+
+def shares(members: int, threads: int, steps: int) -> int:
     """Number of members of a block of a run whose bits and files do not depend on blocks.
 
-    Fewer blocks cost less; some blocks for each thread keep all threads at work until the end.
+    Fewer blocks cost less. Some for each thread keep all threads at work until the end, and blocks of long runs are small, so
+    that an interrupt leaves as many finished members as it can.
 
     Args:
         members: number of members of the run.
         threads: number of threads.
+        steps: number of steps of the run.
 
     Returns:
         Members of each block but the last, a multiple of 256 up to 16,384.
     """
-    wanted = -(-members // (4 * threads if threads > 1 else 1))
+    wanted = min(-(-members // (4 * threads if threads > 1 else 1)), -(-WORTHWHILE // steps))
     return min(16_384, -(-wanted // 256) * 256)
 
 

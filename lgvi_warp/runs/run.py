@@ -102,7 +102,10 @@ def run_plan(
     runner = executor or Threads(threads)
     # Statistics are joined block by block, so their bits depend on the blocks; those of samples do not.
     free = isinstance(runner, Threads) and not observing.keepers
-    parts, work = blocks(total, shares(total, threads) if free else None), Work(plan, keepers, warned=warned)
+    parts, work = (
+        blocks(total, shares(total, threads, plan.grid.steps) if free else None),
+        Work(plan, keepers, warned=warned),
+    )
     try:
         n = run_blocks(work, parts, runner, overall.at, enough=observing.enough, merged=merged)
     except NotSurveyed:

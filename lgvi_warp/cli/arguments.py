@@ -93,6 +93,9 @@ def parser() -> argparse.ArgumentParser:
     bench = verbs.add_parser("bench", help="speed of the kernel on this machine, beside the core's peak")
     bench.add_argument("--members", type=int, default=4096, help="vehicles (default 4096)")
     bench.add_argument("--steps", type=int, default=1000, help="steps (default 1000)")
+    verbs.add_parser(
+        "tune", help="measure how many vehicles a packet should hold on this machine, for runs from now on"
+    )
     return top
 
 

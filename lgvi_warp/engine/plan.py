@@ -21,12 +21,13 @@ from lgvi_kernels.advance.spec import CHUNK, Spec
 from lgvi_kernels.lanes.arithmetic import WIDTHS
 from lgvi_kernels.maps.explicit import Explicit
 from lgvi_warp.common.errors import Faults, SceneError
-from lgvi_warp.common.machine import DTYPES, default_width
+from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.status import CHECKS, ON_FAILURE
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
 from lgvi_warp.engine.kernel_choice import KernelChoice, choose_kernel, declared, is_built_in
 from lgvi_warp.engine.step_warnings import watched
+from lgvi_warp.engine.widths import default_width
 from lgvi_warp.methods.gauss import gauss
 from lgvi_warp.methods.method import KINDS, Method
 from lgvi_warp.methods.saveat import TimeGrid
@@ -57,6 +58,7 @@ class Plan:
     Attributes:
         kernel_choice: the laws that act and the method's program for them.
         spec: all that decides the kernel's source.
+        width_source: what chose the width (see widths.Width).
 
     Raises:
         SceneError: if dtype, width, checks or on_failure is none of these, or the method cannot do what the scene asks.
@@ -72,6 +74,7 @@ class Plan:
     on_failure: str = "freeze"
     kernel_choice: KernelChoice = field(init=False)
     spec: Spec = field(init=False)
+    width_source: str = field(init=False, default="asked for", compare=False)
     # Of a plan made by part(): the whole plan, the members and the fields.
     _whole: tuple[Plan, Sequence[int], Sequence[str]] | None = field(
         default=None, init=False, compare=False, repr=False
@@ -98,11 +101,9 @@ class Plan:
         object.__setattr__(self, "kernel_choice", choice)
         self._check_substep()
         if self.width is None:
-            # Each turn of psi_x waits for the one before, so two registers pay; the implicit step V of damping laws and
-            # compensated sums fill the registers by themselves.
-            full = "dense" in self.kernel_choice.parts or self.dtype == "float32_compensated"
-            chained = self.method.turns and not full
-            object.__setattr__(self, "width", default_width(self.dtype, chained=chained))
+            width, source = default_width(self._kind(), self.dtype)
+            object.__setattr__(self, "width", width)
+            object.__setattr__(self, "width_source", source)
         object.__setattr__(self, "fields", tuple(name for name in SAMPLE_FIELDS if name in self.fields))
         object.__setattr__(self, "spec", self._spec())
 
@@ -215,6 +216,14 @@ class Plan:
             backward=checked and back,
             substep=self.on_failure == "substep",
         )
+
+    def _kind(self) -> str:
+        """The kind of kernel for which a width is chosen, one of widths.KINDS."""
+        if "dense" in self.kernel_choice.parts:
+            return "dense"
+        if self.method.tableau or self.method.gauss:
+            return "explicit"
+        return "chained" if self.method.turns else "plain"
 
     def _explicit(self) -> Explicit | None:
         tableau = self.method.tableau

@@ -1,6 +1,5 @@
 """Damped bodies that come to rest: processor time of a step early and late in 400 s, when their rates are next to nothing."""
 
-import dataclasses
 import time
 
 import numpy as np
@@ -8,8 +7,6 @@ import numpy as np
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.physics.terms.drag import Drag
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.sampling.distributions.basic import Normal
-from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.studies import speed
 
 DTYPES = ("float64", "float32", "float32_compensated")
@@ -30,8 +27,7 @@ def seconds_of_parts(plan):
 
 def run(quick):
     members, rounds = (32, 1) if quick else (256, 3)
-    scene = dataclasses.replace(speed.example(), terms=(DRAG,))
-    fleet = Ensemble(scene, members, 1, {"start.angular_velocity": Normal(relative=0.1)})
+    fleet = speed.fleet(members, DRAG)
     plans = [make_plan(fleet, "psi_s", h=H, t1=H * STEPS, dtype=dtype) for dtype in DTYPES]
     readings = [[list(seconds_of_parts(plan)) for plan in plans] for _ in range(rounds)]
     seconds = np.min(readings, axis=0) * 1e9 * PARTS / (members * STEPS)

@@ -108,10 +108,16 @@ def versions() -> dict[str, str]:
     Returns:
         Name -> version, of Python and four packages.
     """
+    return dict(_versions())
+
+
+@functools.cache
+def _versions() -> tuple[tuple[str, str], ...]:
+    """Read once: the modules of a process do not change, and reading takes milliseconds."""
     from importlib import metadata
 
     names = ("lgvi-warp", "warp-lang", "numpy", "scipy")
-    return {"python": platform.python_version()} | {name: metadata.version(name) for name in names}
+    return ("python", platform.python_version()), *((name, metadata.version(name)) for name in names)
 
 
 def kind() -> dict[str, str]:

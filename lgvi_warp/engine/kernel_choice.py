@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, closest
-from lgvi_warp.engine.survey import COUPLINGS, SHAPES_OF_MASS, UNCOUPLED, Survey, survey
+from lgvi_warp.engine.survey import COUPLINGS, SHAPES_OF_MASS, UNCOUPLED, Survey
 from lgvi_warp.methods.method import FORCED, Method, Program, divided, merged, simplified, with_hops
 from lgvi_warp.physics import terms, vehicle
 from lgvi_warp.physics.terms.base import Term
@@ -65,7 +65,12 @@ class KernelChoice:
 
 
 def choose_kernel(
-    ensemble: Ensemble, method: Method, h: float, built_in: Callable[[str, str], Any], checked: bool = True
+    ensemble: Ensemble,
+    method: Method,
+    h: float,
+    facts: Survey,
+    built_in: Callable[[str, str], Any],
+    checked: bool = True,
 ) -> KernelChoice:
     """Choose what the kernel of a run must contain.
 
@@ -73,6 +78,7 @@ def choose_kernel(
         ensemble: the members.
         method: the integration method.
         h: step [s].
+        facts: survey of the members.
         built_in: (folder, name) -> module of built-in device code in the folder "laws" or "stops", None where there is none.
         checked: whether the run watches the energy of scenes that conserve or lose it (default True).
 
@@ -82,7 +88,6 @@ def choose_kernel(
     Raises:
         SceneError: if the method cannot do what the scene asks, or a law's device code is unusable.
     """
-    facts = survey(ensemble, method, h)
     explicit = method.tableau is not None
     acting = _acting(ensemble, facts, built_in)
     events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)
@@ -103,7 +108,6 @@ def choose_kernel(
         drag = tuple(part for part in PARTS if part in facts.drag)
         module = built_in("laws", "drag_directions" if facts.bent else "drag")
         acting = [(term, module), *((t, m) for t, m in acting if t is not term)]
-        _check_backward_drag(ensemble, method, term, h)
     dense = damping or (bool(drags) and not exact) or flow == "varying"
     memory = any(term.memory for term, _ in acting)
     _check(method, facts, dense=dense, flow=flow, memory=memory, acting=acting)
@@ -182,11 +186,22 @@ def _conservative(facts: Survey, acting: list[tuple[Term, Any]], built_in: Calla
 MOST_BACKWARD_DRAG = 0.5
 
 
-def _check_backward_drag(ensemble: Ensemble, method: Method, term: Drag, h: float) -> None:
-    """Refuse drag that is too strong for a composition's backward stages, judged by the members' starts."""
+def check_backward_drag(ensemble: Ensemble, choice: KernelChoice, method: Method, h: float) -> None:
+    """Refuse drag that is too strong for a composition's backward stages, judged by the members' starts.
+
+    Args:
+        ensemble: the members.
+        choice: what their kernel contains.
+        method: the integration method.
+        h: step [s].
+
+    Raises:
+        SceneError: if a member's drag is too strong; it names the largest drag number.
+    """
     back = -h * min(0.0, *method.stages)
-    if back == 0.0:
+    if back == 0.0 or not choice.drag:
         return
+    term = choice.laws[0][0]
 
     def largest(first: int, stop: int) -> float:
         members = ensemble.select(first, stop)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import copy
 import dataclasses
 import functools
 import time
@@ -25,8 +24,10 @@ from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.status import CHECKS, ON_FAILURE
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
-from lgvi_warp.engine.kernel_choice import KernelChoice, choose_kernel, declared, is_built_in
+from lgvi_warp.engine.kernel_choice import KernelChoice, check_backward_drag, choose_kernel, declared, is_built_in
+from lgvi_warp.engine.shared import MEMBERS, SEED, Shared
 from lgvi_warp.engine.step_warnings import watched
+from lgvi_warp.engine.survey import survey
 from lgvi_warp.engine.widths import default_width
 from lgvi_warp.methods.gauss import gauss
 from lgvi_warp.methods.method import KINDS, Method
@@ -97,8 +98,10 @@ class Plan:
             faults.add("checks", self.checks, problem, 'use checks="safe", or on_failure="freeze"')
         faults.raise_if_any()
         checked = self.checks != "none"
-        choice = choose_kernel(self.ensemble, self.method, self.grid.h, built_in, checked)
+        facts = survey(self.ensemble, self.method, self.grid.h, self.shared)
+        choice = choose_kernel(self.ensemble, self.method, self.grid.h, facts, built_in, checked)
         object.__setattr__(self, "kernel_choice", choice)
+        check_backward_drag(self.ensemble, choice, self.method, self.grid.h)
         self._check_substep()
         if self.width is None:
             width, source = default_width(self._kind(), self.dtype)
@@ -112,6 +115,16 @@ class Plan:
         """The kernel and its types, made when first asked for: many plans are never run."""
         with build_lock, self._laws_compile():
             return make_advance(self.spec)
+
+    @functools.cached_property
+    def shared(self) -> Shared:
+        """What all members share, computed once."""
+        return Shared({*self.ensemble.varied_names, MEMBERS, SEED})
+
+    @functools.cached_property
+    def idle(self) -> list[Any]:
+        """Packets of finished blocks, to be used again."""
+        return []
 
     def _check_substep(self) -> None:
         """Refuse to divide the steps of a method or of laws that cannot be divided, with the reason."""
@@ -134,6 +147,30 @@ class Plan:
                 )
                 faults.add("on_failure", "substep", f"{term.key} {why}", 'use on_failure="freeze", or a shorter step')
         faults.raise_if_any()
+
+    def of(self, ensemble: Ensemble) -> Plan:
+        """The same plan for other members, of the same scene and with the same names that vary.
+
+        Args:
+            ensemble: the members; the survey of the whole plan must hold for them.
+
+        Returns:
+            A plan that shares the kernel and all that members share.
+
+        Raises:
+            SceneError: if a member's drag is too strong for the method.
+        """
+        check_backward_drag(ensemble, self.kernel_choice, self.method, self.grid.h)
+        plan = self._copy()
+        object.__setattr__(plan, "ensemble", ensemble)
+        return plan
+
+    def _copy(self) -> Plan:
+        """The same plan, with nothing chosen anew, as copy.copy would by way of __reduce__."""
+        _ = self.shared, self.idle  # which copies have in common
+        plan = object.__new__(Plan)
+        plan.__dict__.update(self.__dict__)
+        return plan
 
     def with_neighbours(self, indices: np.ndarray) -> np.ndarray:
         """The members whose run gives these members the bits of the whole run.
@@ -164,8 +201,8 @@ class Plan:
         Returns:
             A plan for m members.
         """
-        subplan = copy.copy(self)
-        for name in ("advance", "dtypes", "times"):
+        subplan = self._copy()
+        for name in ("advance", "dtypes", "times", "shared", "idle"):
             subplan.__dict__.pop(name, None)
         object.__setattr__(subplan, "ensemble", self.ensemble.subset(indices))
         object.__setattr__(subplan, "fields", tuple(name for name in SAMPLE_FIELDS if name in fields))

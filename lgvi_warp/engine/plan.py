@@ -21,6 +21,7 @@ from lgvi_kernels.lanes.arithmetic import WIDTHS
 from lgvi_kernels.maps.explicit import Explicit
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.machine import DTYPES
+from lgvi_warp.common.phases import Phases
 from lgvi_warp.common.status import CHECKS, ON_FAILURE
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
@@ -60,6 +61,7 @@ class Plan:
         kernel_choice: the laws that act and the method's program for them.
         spec: all that decides the kernel's source.
         width_source: what chose the width (see widths.Width).
+        phases: how long `compile` took, by phase; zeros where this process had loaded the kernel.
 
     Raises:
         SceneError: if dtype, width, checks or on_failure is none of these, or the method cannot do what the scene asks.
@@ -76,6 +78,7 @@ class Plan:
     kernel_choice: KernelChoice = field(init=False)
     spec: Spec = field(init=False)
     width_source: str = field(init=False, default="asked for", compare=False)
+    phases: Phases = field(init=False, default=Phases(), compare=False)
     # Of a plan made by part(): the whole plan, the members and the fields.
     _whole: tuple[Plan, Sequence[int], Sequence[str]] | None = field(
         default=None, init=False, compare=False, repr=False
@@ -317,9 +320,12 @@ class Plan:
         """
         start = time.perf_counter()
         module = self.advance.kernel.module
+        made = time.perf_counter() - start
         with self._laws_compile():
-            kernel_cache.load(module)
+            phases = kernel_cache.load(module)
         _ = self.dtypes, self.times  # made here, before threads ask for them
+        if any(phases):  # not loaded before in this process
+            object.__setattr__(self, "phases", phases._replace(source=made + phases.source))
         return time.perf_counter() - start
 
     @functools.cached_property

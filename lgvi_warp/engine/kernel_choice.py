@@ -17,7 +17,7 @@ from lgvi_warp.methods.method import FORCED, Method, Program, divided, merged, s
 from lgvi_warp.physics import terms, vehicle
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.physics.terms.drag import PARTS, Drag
-from lgvi_warp.scene.ensemble import Ensemble, over_members
+from lgvi_warp.scene.ensemble import SURVEYED, Ensemble, over_members
 from lgvi_warp.scene.oddities import Oddities
 
 
@@ -211,7 +211,7 @@ def check_backward_drag(ensemble: Ensemble, choice: KernelChoice, method: Method
         mobilities = np.einsum("nii->ni", np.linalg.inv(vehicle.inertia6(members.parameters)))
         return float((back * (coefficients["linear"] + coefficients["quadratic"] * speeds) * mobilities).max())
 
-    number = max(over_members(largest, ensemble.members))
+    number = max(over_members(largest, min(ensemble.members, SURVEYED)))
     if number > MOST_BACKWARD_DRAG:
         faults = Faults()
         problem = f"goes backward by {back:.3g} s, where {term.key} has a drag number up to {number:.3g}"

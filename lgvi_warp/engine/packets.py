@@ -49,6 +49,7 @@ class Packets:
         self.failed_size = wp.zeros(self.count, dtype=types.Lane, device="cpu")
         self.out: wp.array | None = None
         self.monitor = self._monitor()
+        self._noted = [array.numpy() for array in self._written_by_the_kernel()]
         self._launch: Any = None
         self.refill(members)
 
@@ -101,8 +102,8 @@ class Packets:
         self._warned: tuple[np.ndarray, np.ndarray] | None = None
         if self._launch is None:
             return
-        for array in self._written_by_the_kernel():
-            array.zero_()
+        for view in self._noted:
+            view.fill(0)
         if any(new is not old for new, old in zip(self._arrays(), before, strict=True)):
             self._launch = None
 

@@ -25,15 +25,17 @@ from lgvi_warp.common.phases import Phases
 from lgvi_warp.common.status import CHECKS, ON_FAILURE
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
+from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.kernel_choice import KernelChoice, check_backward_drag, choose_kernel, declared, is_built_in
 from lgvi_warp.engine.shared import MEMBERS, SEED, Shared
 from lgvi_warp.engine.step_warnings import watched
-from lgvi_warp.engine.survey import survey
+from lgvi_warp.engine.survey import Survey, survey, survey_of
 from lgvi_warp.engine.widths import default_width
 from lgvi_warp.methods.gauss import gauss
 from lgvi_warp.methods.method import KINDS, Method
 from lgvi_warp.methods.saveat import TimeGrid
-from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.sampling.members import Members
+from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
 
 # Sub-maps whose equation may have no solution.
 SOLVING = {"D", "W", "A", "Phi", "Phi*"}
@@ -41,6 +43,10 @@ SOLVING = {"D", "W", "A", "Phi", "Phi*"}
 # Limits of one launch: they keep progress current, interrupts prompt and the sample buffer small in long runs.
 SEGMENT_VEHICLE_STEPS = 20_000_000
 SEGMENT_SAMPLE_BYTES = 16_000_000
+
+
+class NotSurveyed(Exception):  # noqa: N818  (what happened, and no fault of the scene)
+    """Raised when a member beyond those that were looked at needs another kernel."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +62,8 @@ class Plan:
         width: members of a packet, one a lane; None (default) for what suits this machine's registers.
         checks: "safe" (default), "all" for warnings as well, or "none".
         on_failure: "freeze" (default), "raise" or "substep".
+        survey_all: whether the kernel is chosen by all members (default), or by the first SURVEYED. Then a run looks at the
+            others as it comes to them, and begins anew, with all members looked at, if any of them needs more.
 
     Attributes:
         kernel_choice: the laws that act and the method's program for them.
@@ -75,10 +83,12 @@ class Plan:
     width: int | None = None
     checks: str = "safe"
     on_failure: str = "freeze"
+    survey_all: bool = True
     kernel_choice: KernelChoice = field(init=False)
     spec: Spec = field(init=False)
     width_source: str = field(init=False, default="asked for", compare=False)
     phases: Phases = field(init=False, default=Phases(), compare=False)
+    _facts: Survey = field(init=False, compare=False, repr=False)
     # Of a plan made by part(): the whole plan, the members and the fields.
     _whole: tuple[Plan, Sequence[int], Sequence[str]] | None = field(
         default=None, init=False, compare=False, repr=False
@@ -101,7 +111,9 @@ class Plan:
             faults.add("checks", self.checks, problem, 'use checks="safe", or on_failure="freeze"')
         faults.raise_if_any()
         checked = self.checks != "none"
-        facts = survey(self.ensemble, self.method, self.grid.h, self.shared)
+        most = None if self.survey_all else SURVEYED
+        facts = survey(self.ensemble, self.method, self.grid.h, self.shared, most=most)
+        object.__setattr__(self, "_facts", facts)
         choice = choose_kernel(self.ensemble, self.method, self.grid.h, facts, built_in, checked)
         object.__setattr__(self, "kernel_choice", choice)
         check_backward_drag(self.ensemble, choice, self.method, self.grid.h)
@@ -174,6 +186,25 @@ class Plan:
         plan = object.__new__(Plan)
         plan.__dict__.update(self.__dict__)
         return plan
+
+    def check_block(self, block: Block, members: Members) -> None:
+        """Look at members of a block that were not looked at before the run.
+
+        Args:
+            block: the block.
+            members: its members.
+
+        Raises:
+            SceneError: if a member is unphysical.
+            NotSurveyed: if a member needs what the kernel does not have.
+        """
+        self.ensemble.check_block(block.first, block.stop, members.parameters)
+        if not self.survey_all and block.stop > SURVEYED and self._whole is None:
+            seen = survey_of(members.parameters, self.ensemble, self.method, self.grid.h, self.shared, block)
+            if not self._facts.covers(seen):
+                raise NotSurveyed(
+                    f"a member of {block.first} to {block.stop - 1} needs what the first {SURVEYED} do not"
+                )
 
     def with_neighbours(self, indices: np.ndarray) -> np.ndarray:
         """The members whose run gives these members the bits of the whole run.

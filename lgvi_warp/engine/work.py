@@ -102,6 +102,7 @@ def run_block(
     # Members that are not finite, or exceed float32, get their status from the kernel: no warning from NumPy.
     with np.errstate(invalid="ignore", over="ignore"):
         members = plan.ensemble.select(block.first, block.stop)
+        plan.check_block(block, members)
         packets = Packets.of(plan, members)
         block_keepers = [keeper.open(plan, block, members) for keeper in keepers]
         for block_keeper in block_keepers:

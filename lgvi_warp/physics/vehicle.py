@@ -314,8 +314,19 @@ def inertia_blocks(p: Numbers) -> inertias.Blocks:
     """
     if "vehicle.rigid_body_mass_matrix" in p:
         return inertias.blocks(p["vehicle.rigid_body_mass_matrix"] + p["vehicle.added_mass_matrix"])
-    M = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
-    return inertias.Blocks(M, np.zeros((1, 3, 3)), p["vehicle.inertia"])
+    return inertias.Blocks(mass_matrix(p), np.zeros((1, 3, 3)), p["vehicle.inertia"])
+
+
+def mass_matrix(p: Numbers) -> np.ndarray:
+    """Mass and added mass of a vehicle whose mass matrix has no coupling.
+
+    Args:
+        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+
+    Returns:
+        M (n, 3, 3) [kg].
+    """
+    return np.asarray(p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"])
 
 
 def inertia6(p: Numbers) -> np.ndarray:

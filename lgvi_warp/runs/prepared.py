@@ -30,7 +30,7 @@ from lgvi_warp.sampling.designs.levels import UnitCubePoints
 from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.columns import as_given, columns_of, names_of, stacked, whole_columns
-from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
 from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.scene.scene import Scene
 
@@ -100,12 +100,12 @@ class Runner:
             method, h, dtype = self._last.method, self._last.grid.h, self._last.dtype
             if self._auto:
                 method = replace(method, iterations=enough_iterations(fleet, method, h, dtype))
-            plan = kind.plans.get((method, survey(fleet, method, h, kind.shared).decisive))
+            plan = kind.plans.get((method, survey(fleet, method, h, kind.shared, odd=False, most=SURVEYED).decisive))
             if plan is not None:
                 return plan.of(fleet)
-        plan = make_plan(fleet, **self.settings, fields=self.observed.fields)
+        plan = make_plan(fleet, **self.settings, fields=self.observed.fields, survey_all=False)
         plan.compile()
-        facts = survey(fleet, plan.method, plan.grid.h, kind.shared)
+        facts = survey(fleet, plan.method, plan.grid.h, kind.shared, odd=False, most=SURVEYED)
         kind.plans[plan.method, facts.decisive] = self._last = plan
         return plan
 
@@ -457,7 +457,9 @@ def prepare(
         statistics=statistics, levels=levels, failed=failed, common_noise=common_noise, threads=threads, executor=executor,
         scheduler=scheduler)  # fmt: skip
     made_of = (fleet, vary, of), known
-    runner.plan(whole if isinstance(table, str) else table)
+    first = whole if isinstance(table, str) else table
+    runner.plan(first)
+    first.select(0, 1)  # which keeps what all members share
     return Prepared(whole, table, names, interests, runner, columns, failed == "refuse", common_noise, made_of)
 
 

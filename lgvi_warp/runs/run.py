@@ -17,7 +17,7 @@ from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.keepers.memory import Outcomes, Samples
 from lgvi_warp.engine.keepers.observation import Observation, Observing
 from lgvi_warp.engine.loop import Merged, RunProgress, run_blocks
-from lgvi_warp.engine.plan import Plan
+from lgvi_warp.engine.plan import NotSurveyed, Plan
 from lgvi_warp.engine.work import Work
 from lgvi_warp.runs import member_fields
 from lgvi_warp.runs.outcomes import failure_text
@@ -105,6 +105,10 @@ def run_plan(
     parts, work = blocks(total, shares(total, threads) if free else None), Work(plan, keepers, warned=warned)
     try:
         n = run_blocks(work, parts, runner, overall.at, enough=observing.enough, merged=merged)
+    except NotSurveyed:
+        # Rare: a kernel for all members, and the run from its beginning, so that all members have the bits of one kernel.
+        plan = replace(plan, survey_all=True)
+        return run_plan(plan, threads, progress, observed, fields, executor, partial, known, warned)
     except KeyboardInterrupt as stop:
         if not (partial and merged.done):
             raise

@@ -182,13 +182,14 @@ class Ensemble:
         if explicit:
             self._start = {key: value for key, value in explicit.items() if key.startswith("start.")}
         self._base = scene.parameters()
+        self._shared_attitude: np.ndarray | None = None
         # Positions of these members in the whole ensemble, and the indices that key their noise; None: all, in order.
         self._places: np.ndarray | None = None
         self._indices: np.ndarray | None = None
         self.variations = self._described()
         self.space: Space = variations.space(self.seed, self.variations)
         self._whole = self._counted(settings)
-        self.members = self._whole
+        self.members = self.checked = self._whole
         if not checked:
             self._check_physical()
 
@@ -276,29 +277,64 @@ class Ensemble:
         return np.arange(first, stop) if self._indices is self._places is None else self.indices[first:stop]
 
     def _check_physical(self) -> None:
-        """Refuse unphysical members: all are checked, so few at a time that memory stays small."""
-        drawn = {target.name for variation in self.variations for target in variation.targets}
+        """Refuse unphysical members, looking at so few at a time that memory stays small.
+
+        Members that are drawn are looked at up to SURVEYED; a run looks at the others as it comes to them.
+        """
         varied = self.varied_names & self._base.keys()
+        self.checked = self.members if self._explicit or self._columns or not varied else min(self.members, SURVEYED)
+
+        def look(first: int, stop: int) -> dict[str, _Unphysical]:
+            with np.errstate(over="ignore", invalid="ignore"):
+                return self._look_at(varied, first, stop, self.parameters(first, stop))
+
         findings: dict[str, _Unphysical] = {}
-        for block_findings in over_members(functools.partial(self._look_at, varied), self.members if varied else 0):
+        for block_findings in over_members(look, self.checked if varied else 0):
             for key, finding in block_findings.items():
                 if key not in findings:
                     findings[key] = finding
                 elif not finding.shared:
                     findings[key].count += finding.count
+        self._refuse(findings, self.checked)
+
+    def check_block(self, first: int, stop: int, parameters: Mapping[str, np.ndarray]) -> None:
+        """Check that members are physical, as far as that was not checked before.
+
+        Args:
+            first: Position of the first member.
+            stop: Position after the last member.
+            parameters: Their parameters by name.
+
+        Raises:
+            SceneError: If a member is unphysical; the message names the first of them.
+        """
+        if stop > self.checked:
+            self._refuse(self._look_at(self.varied_names & self._base.keys(), first, stop, parameters), stop - first)
+
+    def _refuse(self, findings: Mapping[str, _Unphysical], looked_at: int) -> None:
+        """Raise SceneError if anything was found; looked_at: number of members."""
+        drawn = {target.name for variation in self.variations for target in variation.targets}
         faults = Faults()
         for key, finding in findings.items():
             is_drawn = not drawn.isdisjoint(key.split(" + "))
             remedy = (
                 "use a smaller spread, TruncatedNormal or LogNormal" if is_drawn else "give finite, physical values"
             )
-            problem = f"is unphysical ({finding.count} of {finding.of if finding.shared else self.members} members)"
+            of = (
+                f"{looked_at} members"
+                if looked_at == self.members
+                else f"the {looked_at:,} members that were looked at"
+            )
+            problem = (
+                f"is unphysical ({finding.count} of {finding.of} members)"
+                if finding.shared
+                else f"is unphysical ({finding.count} of {of})"
+            )
             faults.add(f"{key} of member {finding.first}", finding.value, problem, remedy)
         faults.raise_if_any()
 
-    def _look_at(self, varied: set[str], first: int, stop: int) -> dict[str, _Unphysical]:
+    def _look_at(self, varied: set[str], first: int, stop: int, p: Mapping[str, np.ndarray]) -> dict[str, _Unphysical]:
         with np.errstate(over="ignore", invalid="ignore"):
-            p = self.parameters(first, stop)
             checks = _vehicle_checks(p, varied, self.scene.vehicle.inertia_tolerance)
             for term in (*self.scene.terms, *self.scene.events):
                 numbers = self.own(term, p)
@@ -383,7 +419,7 @@ class Ensemble:
         m = stop - first
         values = self._values(first, stop)
         start = {key.removeprefix("start."): values.pop(key) for key in self._start}
-        R = np.broadcast_to(resolve_attitude(start), (m, 3, 3))
+        R = np.broadcast_to(self._attitude(start), (m, 3, 3))
         if "velocity_inertial" in start:
             # Written out: the order of the sum, and so its bits, must not depend on the number of members.
             v = start["velocity_inertial"]
@@ -392,6 +428,15 @@ class Ensemble:
             nu = start["velocity"]
         position, nu, Om = (np.broadcast_to(x, (m, 3)) for x in (start["position"], nu, start["angular_velocity"]))
         return Members(values, position, R, nu, Om, self.indices_of(first, stop), self.seed)
+
+    def _attitude(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Rotation matrices (1 or m, 3, 3) of some members; one that members share is computed once."""
+        if self._shared_attitude is None:
+            R = resolve_attitude(start)
+            if not self.varied_names.isdisjoint(f"start.{way}" for way in ATTITUDES):
+                return R
+            self._shared_attitude = R
+        return self._shared_attitude
 
     def varied(self) -> list[str]:
         """Return the names of the parameters that vary from member to member.
@@ -435,6 +480,8 @@ class Ensemble:
         ensemble._places = chosen if self._places is None else self._places[chosen]
         ensemble._indices = None if self._indices is None else self._indices[chosen]
         ensemble.members = len(chosen)
+        # Some of these may lie beyond the members that were checked.
+        ensemble.checked = len(chosen) if self.checked == self.members else 0
         return ensemble
 
     def with_columns(self, columns: Mapping[str, np.ndarray]) -> Ensemble:
@@ -524,6 +571,8 @@ class Ensemble:
 
 # Members that are checked together before a run: some tens of megabytes per thread.
 AT_ONCE = 16_384
+# Members that are drawn and checked before a run; the others are checked as the run comes to them.
+SURVEYED = 32_768
 Found = TypeVar("Found")
 
 

@@ -32,19 +32,16 @@ def simd() -> str:
     return "avx2" if features.get("AVX2") else "other"
 
 
-def default_width(dtype: str, *, chained: bool = False) -> int:
-    """Vehicles per packet that fill one SIMD register.
+def register_width(dtype: str) -> int:
+    """Vehicles of which one number each fills a SIMD register.
 
     Args:
         dtype: "float64", "float32" or "float32_compensated".
-        chained: Whether the step's operations mostly wait for one another. Where registers abound (AVX-512) two are then
-            filled, so that one vehicle's operation runs while another's waits. Default False.
 
     Returns:
-        The number of vehicles; for one register of float64, 8 on AVX-512, 4 on AVX2, 2 elsewhere.
+        The number of vehicles; for float64, 8 on AVX-512, 4 on AVX2, 2 elsewhere.
     """
-    registers = 2 if chained and simd() == "avx512" else 1
-    return registers * REGISTER_BYTES[simd()] // np.dtype(DTYPES[dtype]).itemsize
+    return REGISTER_BYTES[simd()] // np.dtype(DTYPES[dtype]).itemsize
 
 
 def affinity() -> int:

@@ -20,7 +20,8 @@ from lgvi_kernels.advance.spec import CHUNK, Spec
 from lgvi_kernels.lanes.arithmetic import WIDTHS
 from lgvi_kernels.maps.explicit import Explicit
 from lgvi_warp.common.errors import Faults, SceneError
-from lgvi_warp.common.machine import DTYPES, default_width
+from lgvi_warp.common.machine import DTYPES
+from lgvi_warp.common.phases import Phases
 from lgvi_warp.common.status import CHECKS, ON_FAILURE
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
@@ -29,6 +30,7 @@ from lgvi_warp.engine.kernel_choice import KernelChoice, check_backward_drag, ch
 from lgvi_warp.engine.shared import MEMBERS, SEED, Shared
 from lgvi_warp.engine.step_warnings import watched
 from lgvi_warp.engine.survey import Survey, survey, survey_of
+from lgvi_warp.engine.widths import default_width
 from lgvi_warp.methods.gauss import gauss
 from lgvi_warp.methods.method import KINDS, Method
 from lgvi_warp.methods.saveat import TimeGrid
@@ -66,6 +68,8 @@ class Plan:
     Attributes:
         kernel_choice: the laws that act and the method's program for them.
         spec: all that decides the kernel's source.
+        width_source: what chose the width (see widths.Width).
+        phases: how long `compile` took, by phase; zeros where this process had loaded the kernel.
 
     Raises:
         SceneError: if dtype, width, checks or on_failure is none of these, or the method cannot do what the scene asks.
@@ -82,6 +86,8 @@ class Plan:
     survey_all: bool = True
     kernel_choice: KernelChoice = field(init=False)
     spec: Spec = field(init=False)
+    width_source: str = field(init=False, default="asked for", compare=False)
+    phases: Phases = field(init=False, default=Phases(), compare=False)
     _facts: Survey = field(init=False, compare=False, repr=False)
     # Of a plan made by part(): the whole plan, the members and the fields.
     _whole: tuple[Plan, Sequence[int], Sequence[str]] | None = field(
@@ -113,11 +119,9 @@ class Plan:
         check_backward_drag(self.ensemble, choice, self.method, self.grid.h)
         self._check_substep()
         if self.width is None:
-            # Each turn of psi_x waits for the one before, so two registers pay; the implicit step V of damping laws and
-            # compensated sums fill the registers by themselves.
-            full = "dense" in self.kernel_choice.parts or self.dtype == "float32_compensated"
-            chained = self.method.turns and not full
-            object.__setattr__(self, "width", default_width(self.dtype, chained=chained))
+            width, source = default_width(self._kind(), self.dtype)
+            object.__setattr__(self, "width", width)
+            object.__setattr__(self, "width_source", source)
         object.__setattr__(self, "fields", tuple(name for name in SAMPLE_FIELDS if name in self.fields))
         object.__setattr__(self, "spec", self._spec())
 
@@ -284,6 +288,14 @@ class Plan:
             substep=self.on_failure == "substep",
         )
 
+    def _kind(self) -> str:
+        """The kind of kernel for which a width is chosen, one of widths.KINDS."""
+        if "dense" in self.kernel_choice.parts:
+            return "dense"
+        if self.method.tableau or self.method.gauss:
+            return "explicit"
+        return "chained" if self.method.turns else "plain"
+
     def _explicit(self) -> Explicit | None:
         tableau = self.method.tableau
         if tableau is None:
@@ -339,9 +351,12 @@ class Plan:
         """
         start = time.perf_counter()
         module = self.advance.kernel.module
+        made = time.perf_counter() - start
         with self._laws_compile():
-            kernel_cache.load(module)
+            phases = kernel_cache.load(module)
         _ = self.dtypes, self.times  # made here, before threads ask for them
+        if any(phases):  # not loaded before in this process
+            object.__setattr__(self, "phases", phases._replace(source=made + phases.source))
         return time.perf_counter() - start
 
     @functools.cached_property

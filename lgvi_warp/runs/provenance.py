@@ -57,7 +57,7 @@ def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence
         "terms": [term.type for term, _ in plan.kernel_choice.laws],
         "kernel": plan.kernel_hash,
         "versions": machine.versions(),
-        "machine": machine.describe(),
+        "machine": machine.describe() | {"width_source": plan.width_source},
     }
     if observed is not None and observed != Observation():
         kept = {} if observed.samples else {"fields": list(plan.fields if fields is None else fields)}

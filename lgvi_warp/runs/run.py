@@ -97,7 +97,7 @@ def run_plan(
     def ended(n: int, whole: bool = True) -> Result:
         run_seconds = time.perf_counter() - start
         result = _in_memory(plan, n, observed, outcomes, samples, observing if whole else None, fields, known)
-        return replace(result, compile_seconds=compile_seconds, run_seconds=run_seconds)
+        return replace(result, compile_seconds=compile_seconds, compile_phases=plan.phases, run_seconds=run_seconds)
 
     runner = executor or Threads(threads)
     # Statistics are joined block by block, so their bits depend on the blocks; those of samples do not.

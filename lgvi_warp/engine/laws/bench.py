@@ -12,7 +12,7 @@ import warp as wp
 from lgvi_kernels.advance.examine import COLUMNS, OUT_FIELDS, make_examine
 from lgvi_warp.common import warp_setup
 from lgvi_warp.common.errors import SceneError
-from lgvi_warp.common.machine import default_width
+from lgvi_warp.common.machine import register_width
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
 from lgvi_warp.engine.arrays import Lanes, LawArrays, put_rows
@@ -134,7 +134,7 @@ class Bench:
     packets: Bank
 
     def __init__(self, term: Term, module: Any, scene: Scene, packets: int, seed: int):
-        self.term, self.module, self.width = term, module, default_width("float64")
+        self.term, self.module, self.width = term, module, register_width("float64")
         self.noisy = bool(getattr(module, "NOISE", False))
         self.roles = tuple(role for role in COLUMNS if hasattr(module, role))
         numbers = scene.parameters() | {f"{term.key}.{name}": value for name, value in term.parameters().items()}

@@ -90,12 +90,13 @@ class Structs:
 
     Attributes:
         array: the Warp array, of one struct, or of one a packet where a number varies; None before `write`.
+        view: the same memory in NumPy.
     """
 
     def __init__(self, struct: Any, dtype: np.dtype):
         assert dtype.itemsize == ctypes.sizeof(struct.ctype)
         self._struct, self._dtype = struct, dtype
-        self._view = np.empty(0, dtype)
+        self.view = np.empty(0, dtype)
         self.array: Any = None
 
     def write(self, packets: int, parts: list[tuple[tuple[str, ...], Any, bool]]) -> None:
@@ -107,7 +108,7 @@ class Structs:
         """
         varying = [(path, fields) for path, fields, shared in parts if not shared]
         count = packets if max((longest(fields) for _, fields in varying), default=1) > 1 else 1
-        if count != len(self._view):
+        if count != len(self.view):
             template = np.zeros(1, self._dtype)
             for path, fields, shared in parts:
                 if shared:
@@ -116,10 +117,10 @@ class Structs:
             # The array's own memory: wp.array(values) lets NumPy parse the struct's type from text, which in several
             # threads occasionally fails (Python before 3.11.8 and 3.12.2, python/cpython#106905).
             memory: Any = (ctypes.c_char * (count * self._dtype.itemsize)).from_address(self.array.ptr)
-            self._view = np.ndarray(count, self._dtype, memory)
-            self._view[:] = np.repeat(template, count)
+            self.view = np.ndarray(count, self._dtype, memory)
+            self.view[:] = np.repeat(template, count)
         for path, fields in varying:
-            fill(_at(self._view, path), fields)
+            fill(_at(self.view, path), fields)
 
 
 def _at(target: np.ndarray, path: tuple[str, ...]) -> np.ndarray:

@@ -32,6 +32,8 @@ class Packets:
         count: number of packets.
         frame: axes and origins that the kernel works in.
         scale: (1 or m,) [kg m^2], number that momenta are divided by in the kernel; 1 for methods that need none.
+        inertia, laws, events: numbers of the vehicle, of its laws and of the events.
+        state_lanes: states, (packets, fields of a state).
     """
 
     def __init__(self, plan: Plan, members: Members):
@@ -40,9 +42,9 @@ class Packets:
         self.count = -(-members.count // width)
         structs = (types.Inertia, types.Params, types.Events, types.Limits)
         inertia, params, events, limits = zip(structs, plan.dtypes, strict=True)
-        self._inertia, self._events, self._limits = (Structs(*kind) for kind in (inertia, events, limits))
-        self._laws = LawArrays(self.count, *params, types.Lane)
-        self._state = Lanes(self.count, plan.spec.state_fields, types.Lane)
+        self.inertia, self.events, self._limits = (Structs(*kind) for kind in (inertia, events, limits))
+        self.laws = LawArrays(self.count, *params, types.Lane)
+        self.state_lanes = Lanes(self.count, plan.spec.state_fields, types.Lane)
         self._rows = np.empty((self.count * width, plan.spec.state_fields))
         self.status = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
         self.failed_step = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
@@ -88,17 +90,17 @@ class Packets:
         packing = Packing(plan, members)
         self.frame, self.scale = packing.frame, packing.scale
         shared, before = plan.shared.keeps, self._arrays() if self._launch else []
-        self._inertia.write(self.count, [((), packing.inertia(), shared("inertia"))])
+        self.inertia.write(self.count, [((), packing.inertia(), shared("inertia"))])
         laws, events = packing.laws(), packing.events()
-        self._laws.write(laws, [shared(("law", i)) for i in range(len(laws))], packing.scratch())
-        self._events.write(self.count, nested(events, [shared(("event", i)) for i in range(len(events))]))
+        self.laws.write(laws, [shared(("law", i)) for i in range(len(laws))], packing.scratch())
+        self.events.write(self.count, nested(events, [shared(("event", i)) for i in range(len(events))]))
         if plan.spec.looks:
             self._limits.write(self.count, [((), self._watched_limits(), False)])
             self.monitor.limits = self._limits.array
         m = members.count
         packing.state(self._rows[:m])
         self._rows[m:] = self._rows[m - 1]
-        self._state.view[...] = self._rows.reshape(self.count, -1, self._rows.shape[1]).transpose(0, 2, 1)
+        self.state_lanes.view[...] = self._rows.reshape(self.count, -1, self._rows.shape[1]).transpose(0, 2, 1)
         self._warned: tuple[np.ndarray, np.ndarray] | None = None
         if self._launch is None:
             return
@@ -110,17 +112,17 @@ class Packets:
     @property
     def state(self) -> Any:
         """The states, a Warp array (packets, fields of a state) of lanes."""
-        return self._state.array
+        return self.state_lanes.array
 
     @property
     def memory(self) -> Any:
         """What laws and method remember, a Warp array (packets, rows) of lanes; the second half is a backup."""
-        return self._laws.memory.array
+        return self.laws.memory.array
 
     def _arrays(self) -> list[Any]:
         """The kernel's arrays that `refill` may replace."""
-        laws = self._laws
-        return [self._inertia.array, laws.params.array, self._events.array, laws.table.array, self._limits.array]
+        laws = self.laws
+        return [self.inertia.array, laws.params.array, self.events.array, laws.table.array, self._limits.array]
 
     def _written_by_the_kernel(self) -> list[Any]:
         monitor, spec = self.monitor, self.plan.spec

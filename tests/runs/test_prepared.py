@@ -200,9 +200,9 @@ def leaves(values):
 
 def arrays(packets):
     """All numbers that a kernel is given, as bytes."""
-    structs = [packets._inertia, packets._laws.params, packets._events]
-    views = [leaf for part in structs if len(part._view) for leaf in leaves(part._view)]
-    views += [packets._laws.table.view, packets._laws.memory.view, packets._state.view]
+    structs = [packets.inertia, packets.laws.params, packets.events]
+    views = [leaf for part in structs if len(part.view) for leaf in leaves(part.view)]
+    views += [packets.laws.table.view, packets.laws.memory.view, packets.state_lanes.view]
     return [np.broadcast_to(view, (packets.count, *view.shape[1:])).tobytes() for view in views]
 
 

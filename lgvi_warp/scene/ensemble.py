@@ -419,7 +419,8 @@ class Ensemble:
         m = stop - first
         values = self._values(first, stop)
         start = {key.removeprefix("start."): values.pop(key) for key in self._start}
-        R = np.broadcast_to(self._attitude(start), (m, 3, 3))
+        # In one memory layout, on which the order of the sums of a matrix product depends.
+        R = np.broadcast_to(np.ascontiguousarray(self._attitude(start)), (m, 3, 3))
         if "velocity_inertial" in start:
             # Written out: the order of the sum, and so its bits, must not depend on the number of members.
             v = start["velocity_inertial"]

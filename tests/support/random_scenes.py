@@ -51,13 +51,13 @@ def judged(fleet, found, asked, rounds=5):
     """
     sample = comparison.Sample(fleet, asked["t1"], fleet.members, suggestion.TIMES)
     reference = comparison.make_reference(sample, asked["of"], asked["error"] / 100.0)
-    own = tradeoffs.tried(sample, found.setting, reference)
+    own = tradeoffs.tried(sample, found.candidate, reference)
     good = [own]
     for method in METHODS:
         for dtype in tradeoffs.PRECISIONS:
             m, last = sample.coarsest(3.0), None
-            while sample.h(m) > 0.5 * found.setting.h * len(lw.Method(method).stages) / len(own.plan.method.stages):
-                one = tradeoffs.tried(sample, sample.setting(method, m, dtype), reference)
+            while sample.h(m) > 0.5 * found.candidate.h * len(lw.Method(method).stages) / len(own.plan.method.stages):
+                one = tradeoffs.tried(sample, sample.candidate(method, m, dtype), reference)
                 if one.error(asked["of"]) <= asked["error"]:
                     last = one
                     break

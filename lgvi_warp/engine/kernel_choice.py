@@ -17,6 +17,7 @@ from lgvi_warp.methods.method import FORCED, Method, Program, divided, merged, s
 from lgvi_warp.physics import terms, vehicle
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.physics.terms.drag import PARTS, Drag
+from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.scene.ensemble import Ensemble, over_members
 from lgvi_warp.scene.oddities import Oddities
 
@@ -231,6 +232,8 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
     else:
         for role in roles:
             _check_signature(faults, term, module, role)
+        if isinstance(term, NoisyTerm) and not getattr(module, "NOISE", False):
+            faults.add(f"{term.key}.device", module, "does not say that it is noise", "write NOISE = True")
         flow = getattr(module, "FLOW", "none")
         if flow not in FLOWS:
             faults.add(f"{term.key}.FLOW", flow, "is not known", closest(str(flow), FLOWS))
@@ -250,17 +253,21 @@ def is_built_in(module: Any) -> bool:
     return str(getattr(module, "__name__", "")).startswith("lgvi_kernels.")
 
 
-def declared(term: Term, module: Any) -> tuple[tuple[str, int], ...]:
-    """The declared numbers of which the device struct of a term is made.
+def declared(term: Term, module: Any) -> tuple[tuple[str, Any], ...]:
+    """The fields of the device struct of a term that do not follow from its module.
 
     Args:
         term: the term.
         module: its device code.
 
     Returns:
-        (name, length) of each number; () for a module that defines `params` itself.
+        (name, kind) of each number, unless the module defines `params`, and of a noisy term's key (see
+        lgvi_kernels.maps.compose).
     """
-    return (getattr(module, "params", None) is None and term.lanes()) or ()
+    numbers = (getattr(module, "params", None) is None and term.lanes()) or ()
+    if isinstance(term, NoisyTerm):
+        return (*numbers, ("key", "step" if term.noise_step is None else "grid"))
+    return numbers
 
 
 def _check_signature(faults: Faults, term: Term, module: Any, role: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import os
 import platform
@@ -67,6 +68,7 @@ def thread_count() -> int:
     return affinity() if quota is None else max(1, min(affinity(), math.ceil(quota)))
 
 
+@functools.cache
 def cpu_name() -> str:
     """Name of the processor.
 
@@ -109,10 +111,16 @@ def versions() -> dict[str, str]:
     Returns:
         Name -> version, of Python and four packages.
     """
+    return dict(_versions())
+
+
+@functools.cache
+def _versions() -> tuple[tuple[str, str], ...]:
+    """Read once: the modules of a process do not change, and reading takes milliseconds."""
     from importlib import metadata
 
     names = ("lgvi-warp", "warp-lang", "numpy", "scipy")
-    return {"python": platform.python_version()} | {name: metadata.version(name) for name in names}
+    return ("python", platform.python_version()), *((name, metadata.version(name)) for name in names)
 
 
 def kind() -> dict[str, str]:

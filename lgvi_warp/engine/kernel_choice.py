@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, closest
-from lgvi_warp.engine.survey import COUPLINGS, SHAPES_OF_MASS, UNCOUPLED, Survey, survey
+from lgvi_warp.engine.survey import COUPLINGS, SHAPES_OF_MASS, UNCOUPLED, Survey
 from lgvi_warp.methods.method import FORCED, Method, Program, divided, merged, simplified, with_hops
 from lgvi_warp.physics import terms, vehicle
 from lgvi_warp.physics.terms.base import Term
@@ -66,7 +66,12 @@ class KernelChoice:
 
 
 def choose_kernel(
-    ensemble: Ensemble, method: Method, h: float, built_in: Callable[[str, str], Any], checked: bool = True
+    ensemble: Ensemble,
+    method: Method,
+    h: float,
+    facts: Survey,
+    built_in: Callable[[str, str], Any],
+    checked: bool = True,
 ) -> KernelChoice:
     """Choose what the kernel of a run must contain.
 
@@ -74,6 +79,7 @@ def choose_kernel(
         ensemble: the members.
         method: the integration method.
         h: step [s].
+        facts: survey of the members.
         built_in: (folder, name) -> module of built-in device code in the folder "laws" or "stops", None where there is none.
         checked: whether the run watches the energy of scenes that conserve or lose it (default True).
 
@@ -83,7 +89,6 @@ def choose_kernel(
     Raises:
         SceneError: if the method cannot do what the scene asks, or a law's device code is unusable.
     """
-    facts = survey(ensemble, method, h)
     explicit = method.tableau is not None
     acting = _acting(ensemble, facts, built_in)
     events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)

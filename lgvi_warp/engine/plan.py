@@ -26,7 +26,9 @@ from lgvi_warp.common.status import CHECKS, ON_FAILURE
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
 from lgvi_warp.engine.kernel_choice import KernelChoice, choose_kernel, declared, is_built_in
+from lgvi_warp.engine.shared import MEMBERS, Shared
 from lgvi_warp.engine.step_warnings import watched
+from lgvi_warp.engine.survey import survey
 from lgvi_warp.methods.gauss import gauss
 from lgvi_warp.methods.method import KINDS, Method
 from lgvi_warp.methods.saveat import TimeGrid, divisors
@@ -98,7 +100,8 @@ class Plan:
             faults.add("checks", self.checks, problem, 'use checks="safe", or on_failure="freeze"')
         faults.raise_if_any()
         checked = self.checks != "none"
-        choice = choose_kernel(self.ensemble, self.method, self.grid.h, built_in, checked)
+        facts = survey(self.ensemble, self.method, self.grid.h, self.shared)
+        choice = choose_kernel(self.ensemble, self.method, self.grid.h, facts, built_in, checked)
         object.__setattr__(self, "kernel_choice", choice)
         self._check_substep()
         self._check_noise_steps()
@@ -116,6 +119,11 @@ class Plan:
         """The kernel and its types, made when first asked for: many plans are never run."""
         with build_lock, self._laws_compile():
             return make_advance(self.spec)
+
+    @functools.cached_property
+    def shared(self) -> Shared:
+        """What all members share, computed once."""
+        return Shared({*self.ensemble.varied_names, MEMBERS})
 
     def _check_substep(self) -> None:
         """Refuse to divide the steps of a method or of laws that cannot be divided, with the reason."""
@@ -192,7 +200,7 @@ class Plan:
             A plan for m members.
         """
         subplan = copy.copy(self)
-        for name in ("advance", "dtypes", "times"):
+        for name in ("advance", "dtypes", "times", "shared"):
             subplan.__dict__.pop(name, None)
         object.__setattr__(subplan, "ensemble", self.ensemble.subset(indices))
         object.__setattr__(subplan, "fields", tuple(name for name in SAMPLE_FIELDS if name in fields))

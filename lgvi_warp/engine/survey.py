@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from lgvi_warp.engine.shared import FRAME, MEMBERS, Shared, context
 from lgvi_warp.methods.method import Method, middle_axis
 from lgvi_warp.physics import inertia, terms, vehicle
 from lgvi_warp.physics.inertia import Frame
-from lgvi_warp.physics.terms.base import PackingContext
+from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.physics.terms.drag import Drag, has_exact_flow
 from lgvi_warp.scene.ensemble import Ensemble, over_members
 from lgvi_warp.scene.oddities import Oddities
@@ -129,48 +131,90 @@ class Survey:
         return Survey(*(a | b if isinstance(a, frozenset | Oddities) else max(a, b) for a, b in pairs))
 
 
-def survey(ensemble: Ensemble, method: Method, h: float) -> Survey:
+def survey(ensemble: Ensemble, method: Method, h: float, shared: Shared | None = None) -> Survey:
     """Look at all members, or at one alone where no number of the vehicle, the water or the laws varies.
 
     Args:
         ensemble: the members.
         method: the integration method.
         h: step [s].
+        shared: what all members share, filled here as far as it is computed; by default it is forgotten.
 
     Returns:
         What holds for at least one member, and the largest values.
     """
 
+    known = Shared({*ensemble.varied_names, MEMBERS}) if shared is None else shared
+
     def look(first: int, stop: int) -> Survey:
         # Members that overflow get their status, or their fault, elsewhere: no warning from NumPy.
         with np.errstate(over="ignore", invalid="ignore"):
-            return _look(ensemble, method, h, first, stop)
+            return _look(ensemble, method, h, known, first, stop)
 
     return functools.reduce(Survey.joined, over_members(look, ensemble.members if ensemble.varied() else 1))
 
 
-def _look(ensemble: Ensemble, method: Method, h: float, first: int, stop: int) -> Survey:
-    p = ensemble.parameters(first, stop)
-    frame, U, coupling = frame_of(method, p)
-    context = PackingContext(p, frame, ensemble.indices_of(first, stop), ensemble.seed, h, frame.aligned)
-    implied = {t.key for t in terms.IMPLIED if any(np.any(v) for v in t.packed({}, context).values.values())}
-    numbered = [(term, ensemble.own(term, p)) for term in ensemble.scene.terms]
+def framed(method: Method, parameters: Parameters, shared: Shared) -> dict[str, Any]:
+    """Parameters with the frame that follows from them, under the name FRAME.
+
+    Args:
+        method: the integration method.
+        parameters: parameters of n members by name.
+        shared: what all members share, and the frame if it is shared.
+
+    Returns:
+        The parameters and, under FRAME, what `frame_of` returns.
+    """
+    frame = shared(FRAME, parameters, functools.partial(frame_of, method))
+    if not shared.keeps(FRAME):
+        shared.varied.add(FRAME)
+    return {**parameters, FRAME: frame}
+
+
+def _look(ensemble: Ensemble, method: Method, h: float, shared: Shared, first: int, stop: int) -> Survey:
+    p = framed(method, ensemble.parameters(first, stop), shared)
+    frame, scene, own = p[FRAME][0], ensemble.scene, ensemble.own
+    aligned = shared("aligned", p, lambda numbers: numbers[FRAME][0].aligned)
+    run = frame, ensemble.indices_of(first, stop), ensemble.seed, h, aligned
+
+    def is_felt(term: Term, numbers: Any) -> bool:
+        if term not in terms.IMPLIED:
+            return term.present(own(term, numbers))
+        return any(np.any(value) for value in term.packed({}, context(numbers, *run)).values.values())
+
+    def parts(term: Drag, numbers: Any) -> frozenset[str]:
+        return frozenset(term.parts(own(term, numbers)))
+
+    def rises(term: Term, numbers: Any) -> bool:
+        return bool(np.any(own(term, numbers)["velocity"][:, 2]))
+
+    def of_each(name: str, compute: Any, those: Iterable[Term]) -> dict[str, Any]:
+        return {t.key: shared((name, t.key), p, functools.partial(compute, t)) for t in those}
+
+    felt = of_each("felt", is_felt, (*terms.IMPLIED, *scene.terms))
+    drags = of_each("drag", parts, (term for term in scene.terms if isinstance(term, Drag)))
+    rising = of_each("rises", rises, (term for term in scene.terms if term.type == "current"))
     return Survey(
-        turned=not frame.aligned,
-        bent=not has_exact_flow(frame),
-        mass=SHAPES_OF_MASS.index(shape_of_mass(frame.M)),
-        coupled=frame.coupled,
-        moved=bool(np.any(frame.origin)),
-        forces_moved=bool(np.any(frame.forces)),
-        apart=bool(np.any(frame.origin != frame.forces)),
-        couplings=frozenset(i for i, at in enumerate(COUPLINGS) if np.any(U[:, *at])),
-        left=float(coupling.max()),
-        felt=frozenset(implied | {term.key for term, numbers in numbered if term.present(numbers)}),
-        drag=frozenset(part for term, numbers in numbered if isinstance(term, Drag) for part in term.parts(numbers)),
-        rising=frozenset(
-            term.key for term, numbers in numbered if term.type == "current" and np.any(numbers["velocity"][:, 2])
-        ),
-        weightless=bool(np.any(p["environment.gravity"] == 0.0)),
-        buoyant=bool(np.any(p["vehicle.buoyancy"])),
-        odd=of_numbers(ensemble.scene, p, first, stop),
+        **shared("frame's facts", p, lambda numbers: _facts(*numbers[FRAME])),
+        felt=frozenset(key for key, yes in felt.items() if yes),
+        drag=frozenset().union(*drags.values()),
+        rising=frozenset(key for key, yes in rising.items() if yes),
+        weightless=shared("weightless", p, lambda numbers: bool(np.any(numbers["environment.gravity"] == 0.0))),
+        buoyant=shared("buoyant", p, lambda numbers: bool(np.any(numbers["vehicle.buoyancy"]))),
+        odd=of_numbers(scene, p, first, stop, shared),
     )
+
+
+def _facts(frame: Frame, U: np.ndarray, coupling: np.ndarray) -> dict[str, Any]:
+    """What a survey says of the frames of some members."""
+    return {
+        "turned": not frame.aligned,
+        "bent": not has_exact_flow(frame),
+        "mass": SHAPES_OF_MASS.index(shape_of_mass(frame.M)),
+        "coupled": frame.coupled,
+        "moved": bool(np.any(frame.origin)),
+        "forces_moved": bool(np.any(frame.forces)),
+        "apart": bool(np.any(frame.origin != frame.forces)),
+        "couplings": frozenset(i for i, at in enumerate(COUPLINGS) if np.any(U[:, *at])),
+        "left": float(coupling.max()),
+    }

@@ -278,7 +278,7 @@ class Ensemble:
     def _check_physical(self) -> None:
         """Refuse unphysical members: all are checked, so few at a time that memory stays small."""
         drawn = {target.name for variation in self.variations for target in variation.targets}
-        varied = self._varied_names & self._base.keys()
+        varied = self.varied_names & self._base.keys()
         findings: dict[str, _Unphysical] = {}
         for block_findings in over_members(functools.partial(self._look_at, varied), self.members if varied else 0):
             for key, finding in block_findings.items():
@@ -399,11 +399,11 @@ class Ensemble:
         Returns:
             Names in the order of `scene.parameters()`; those of the start are not among them.
         """
-        varied = self._varied_names
+        varied = self.varied_names
         return [name for name in self._base if name in varied]
 
     @property
-    def _varied_names(self) -> set[str]:
+    def varied_names(self) -> set[str]:
         """Names of what members have of their own: drawn, from columns or explicit."""
         targets = [target for variation in self.variations for target in variation.targets]
         return {target.name for target in (*targets, *(target for target, _ in self._columns))} | self._explicit.keys()
@@ -411,7 +411,7 @@ class Ensemble:
     @property
     def starts_vary(self) -> bool:
         """Whether the initial state differs from member to member."""
-        return not self._varied_names <= self._base.keys()
+        return not self.varied_names <= self._base.keys()
 
     def subset(self, indices: Sequence[int] | np.ndarray) -> Ensemble:
         """Return some members as an ensemble of their own, with the same numbers.
@@ -497,6 +497,8 @@ def over_members(look: Callable[[int, int], Found], members: int) -> list[Found]
         The function's results, in the order of the members.
     """
     firsts = range(0, members, AT_ONCE)
+    if len(firsts) < 2:
+        return [look(0, members)] if members else []
     with ThreadPoolExecutor(min(machine.thread_count(), max(1, len(firsts)))) as pool:
         return list(pool.map(lambda first: look(first, min(first + AT_ONCE, members)), firsts))
 

@@ -318,7 +318,8 @@ def _check(
     composed = len(method.stages) > 1
     noisy = any(getattr(module, "NOISE", False) for _, module in acting)
     if composed and not method.two_part and (dense or flow in ("uniform", "varying") or memory or noisy):
-        cause = "a damping matrix" if dense else "water that varies" if flow != "none" else "a term that remembers"
+        causes = {"a damping matrix": dense, "water that varies": flow in ("uniform", "varying"), "noise": noisy}
+        cause = next((cause for cause, present in causes.items() if present), "a term that remembers")
         faults.add("method", method.name, f"keeps its order only if a step of -h undoes one of h, and {cause} prevents that",
                    f"use {method.base}")  # fmt: skip
     for term, module in acting:
@@ -329,9 +330,12 @@ def _check(
                              or isinstance(term, Drag) or getattr(module, "NOISE", False)):  # fmt: skip
             problem = f"takes forces of position and time only, which {term.key} is not"
             faults.add("method", method.name, problem, "use psi_s")
-    if method.tableau and (memory or noisy):
-        why = "noise, which has no rate" if noisy else "a term that remembers, which is kept once a step"
+    if method.tableau and memory:
+        why = "a term that remembers, which is kept once a step"
         faults.add("method", method.name, f"cannot advance {why}", "use psi_s, psi_x or psi_w")
+    if method.adaptive and noisy:
+        why = "cannot choose its steps where noise is drawn once a step"
+        faults.add("method", method.name, why, "leave out rtol and atol")
     kicks = sum(letter in ("K", "Phi", "Phi*") for letter, _ in method.program)
     if noisy and not composed and not method.tableau and kicks != 1:
         faults.add("method", method.name, "would draw noise more than once a step", "use psi_s, psi_x or psi_w")

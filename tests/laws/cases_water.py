@@ -44,7 +44,9 @@ CASES = {
     "waves": Case((terms.Waves(**WAVES),), (Waves(**arrays(WAVES), gravity=GRAVITY),)),
     "Gauss-Markov current": noisy(terms.GaussMarkovCurrent, GaussMarkovCurrent, GAUSS_MARKOV),
     "wrench noise": noisy(terms.WrenchNoise, WrenchNoise, WRENCH_NOISE),
-    "Gauss-Markov current on a grid": noisy(terms.GaussMarkovCurrent, GaussMarkovCurrent, GAUSS_MARKOV, noise_step=GRID),
+    "Gauss-Markov current on a grid": noisy(
+        terms.GaussMarkovCurrent, GaussMarkovCurrent, GAUSS_MARKOV, noise_step=GRID
+    ),
     "wrench noise on a grid": noisy(terms.WrenchNoise, WrenchNoise, WRENCH_NOISE, noise_step=GRID),
     "two wrench noises": Case(
         *(

@@ -1,7 +1,7 @@
 """Random numbers of a law that is noise: its key, and what the draws of one step of the run add up to.
 
-A law may draw on a grid of its own, finer than the run's steps: then runs of all steps that are multiples of the grid's see one
-path. Only the key's type says so, so that a law without a grid has no code for it.
+A law may draw on a grid of its own, finer than the run's steps: then runs of all steps that are multiples of the grid's see
+one path. Only the key's type says so, so that a law without a grid has no code for it.
 """
 
 import functools

@@ -31,7 +31,7 @@ def numbers_struct(law, numbers, width, real):
 
 
 def field_type(kind, width, real):
-    """The type of a field: 1, a lane; 3, a 3-vector of lanes; "step" or "grid", the key of noise drawn once a step or on a grid."""
+    """The type of a field: 1, a lane; 3, a 3-vector of lanes; "step", "grid": the key of noise (see lanes/noise.py)."""
     if kind in ("step", "grid"):
         return noise_key(width, kind == "grid")
     return {1: lane, 3: lane3}[kind](width, real)

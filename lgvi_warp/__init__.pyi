@@ -43,6 +43,8 @@ from lgvi_warp.physics.terms.wrench import WrenchSchedule as WrenchSchedule
 from lgvi_warp.physics.terms.wrench_noise import WrenchNoise as WrenchNoise
 from lgvi_warp.physics.vehicle import Vehicle as Vehicle
 from lgvi_warp.runs.predict import predict as predict
+from lgvi_warp.runs.prepared import Prepared as Prepared
+from lgvi_warp.runs.prepared import prepare as prepare
 from lgvi_warp.runs.result import Result as Result
 from lgvi_warp.runs.solve import solve as solve
 from lgvi_warp.runs.store.export import export as export

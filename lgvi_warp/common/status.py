@@ -167,7 +167,7 @@ def stopped(status: Any) -> np.ndarray:
     Returns:
         bool, shape (n,).
     """
-    return np.isin(np.asarray(status), [code for code in Status if code.stopped])
+    return np.asarray(np.asarray(status) >= Status.SURFACE)
 
 
 def failed(status: Any) -> np.ndarray:

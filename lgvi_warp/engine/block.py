@@ -40,14 +40,31 @@ def block_size(members: int) -> int:
     return size
 
 
-def blocks(members: int) -> list[Block]:
+def shares(members: int, threads: int) -> int:
+    """Number of members of a block of a run whose bits and files do not depend on blocks.
+
+    Fewer blocks cost less; some blocks for each thread keep all threads at work until the end.
+
+    Args:
+        members: number of members of the run.
+        threads: number of threads.
+
+    Returns:
+        Members of each block but the last, a multiple of 256 up to 16,384.
+    """
+    wanted = -(-members // (4 * threads if threads > 1 else 1))
+    return min(16_384, -(-wanted // 256) * 256)
+
+
+def blocks(members: int, size: int | None = None) -> list[Block]:
     """Divide the members of a run into blocks.
 
     Args:
         members: number of members of the run.
+        size: members of a block; default `block_size(members)`.
 
     Returns:
-        Blocks of `block_size(members)` members in order; the last one has the rest.
+        Blocks of that many members in order; the last one has the rest.
     """
-    size = block_size(members)
+    size = size or block_size(members)
     return [Block(i, min(i + size, members)) for i in range(0, members, size)]

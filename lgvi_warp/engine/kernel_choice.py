@@ -18,7 +18,7 @@ from lgvi_warp.physics import terms, vehicle
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.physics.terms.drag import PARTS, Drag
 from lgvi_warp.physics.terms.noisy import NoisyTerm
-from lgvi_warp.scene.ensemble import Ensemble, over_members
+from lgvi_warp.scene.ensemble import SURVEYED, Ensemble, over_members
 from lgvi_warp.scene.oddities import Oddities
 
 
@@ -109,7 +109,6 @@ def choose_kernel(
         drag = tuple(part for part in PARTS if part in facts.drag)
         module = built_in("laws", "drag_directions" if facts.bent else "drag")
         acting = [(term, module), *((t, m) for t, m in acting if t is not term)]
-        _check_backward_drag(ensemble, method, term, h)
     dense = damping or (bool(drags) and not exact) or flow == "varying"
     memory = any(term.memory for term, _ in acting)
     _check(method, facts, dense=dense, flow=flow, memory=memory, acting=acting)
@@ -188,11 +187,22 @@ def _conservative(facts: Survey, acting: list[tuple[Term, Any]], built_in: Calla
 MOST_BACKWARD_DRAG = 0.5
 
 
-def _check_backward_drag(ensemble: Ensemble, method: Method, term: Drag, h: float) -> None:
-    """Refuse drag that is too strong for a composition's backward stages, judged by the members' starts."""
+def check_backward_drag(ensemble: Ensemble, choice: KernelChoice, method: Method, h: float) -> None:
+    """Refuse drag that is too strong for a composition's backward stages, judged by the members' starts.
+
+    Args:
+        ensemble: the members.
+        choice: what their kernel contains.
+        method: the integration method.
+        h: step [s].
+
+    Raises:
+        SceneError: if a member's drag is too strong; it names the largest drag number.
+    """
     back = -h * min(0.0, *method.stages)
-    if back == 0.0:
+    if back == 0.0 or not choice.drag:
         return
+    term = choice.laws[0][0]
 
     def largest(first: int, stop: int) -> float:
         members = ensemble.select(first, stop)
@@ -202,7 +212,7 @@ def _check_backward_drag(ensemble: Ensemble, method: Method, term: Drag, h: floa
         mobilities = np.einsum("nii->ni", np.linalg.inv(vehicle.inertia6(members.parameters)))
         return float((back * (coefficients["linear"] + coefficients["quadratic"] * speeds) * mobilities).max())
 
-    number = max(over_members(largest, ensemble.members))
+    number = max(over_members(largest, min(ensemble.members, SURVEYED)))
     if number > MOST_BACKWARD_DRAG:
         faults = Faults()
         problem = f"goes backward by {back:.3g} s, where {term.key} has a drag number up to {number:.3g}"

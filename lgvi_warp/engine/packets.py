@@ -49,8 +49,34 @@ class Packets:
         self.failed_size = wp.zeros(self.count, dtype=types.Lane, device="cpu")
         self.out: wp.array | None = None
         self.monitor = self._monitor()
+        self._noted = [array.numpy() for array in self._written_by_the_kernel()]
         self._launch: Any = None
         self.refill(members)
+
+    @classmethod
+    def of(cls, plan: Plan, members: Members) -> Packets:
+        """Packets of these members: those of a finished block, if there are any of this size, or new ones.
+
+        Args:
+            plan: the plan of the run.
+            members: the members of the block.
+
+        Returns:
+            The packets, which no other thread has.
+        """
+        for _ in range(len(plan.idle)):
+            try:
+                packets = plan.idle.pop()
+            except IndexError:  # another thread took the last
+                break
+            if packets.count == -(-members.count // plan.spec.width):
+                packets.refill(members)
+                return packets
+        return cls(plan, members)
+
+    def leave(self) -> None:
+        """Leave these packets to the next block; nothing of them may be used any more."""
+        self.plan.idle.append(self)
 
     def refill(self, members: Members) -> None:
         """Take other members in place of these, from their starts on.
@@ -76,8 +102,8 @@ class Packets:
         self._warned: tuple[np.ndarray, np.ndarray] | None = None
         if self._launch is None:
             return
-        for array in self._written_by_the_kernel():
-            array.zero_()
+        for view in self._noted:
+            view.fill(0)
         if any(new is not old for new, old in zip(self._arrays(), before, strict=True)):
             self._launch = None
 
@@ -183,13 +209,18 @@ class Packets:
         with build_lock:
             return wp.launch(plan.advance.kernel, dim=self.count, inputs=inputs, device="cpu", record_cmd=True)
 
-    def outcome(self) -> Outcome:
+    def outcome(self, warned: bool = True) -> Outcome:
         """The outcome of each member so far.
+
+        Args:
+            warned: whether to look for warnings (default True); else there are none.
 
         Returns:
             Status, steps before the failure, value that crossed its limit, warnings and event of the m members.
         """
         m = self.members.count
+        none = np.zeros(m, np.uint16), np.zeros(m, np.int64), np.full(m, np.nan)
+        warnings: tuple[np.ndarray, np.ndarray, np.ndarray] = self._warnings() if warned else none
         kept = PACE_FIELDS if self.plan.method.adaptive else 0
         pace = self.state.numpy()[:, STATE_FIELDS + 2 : STATE_FIELDS + kept]
         code = self._of_members(self.status, np.uint8)
@@ -203,7 +234,7 @@ class Packets:
             self.failed_step.numpy().reshape(-1)[:m].astype(np.int64),
             np.sqrt(self.failed_size.numpy().reshape(-1)[:m].astype(np.float64)),
             pace.transpose(0, 2, 1).reshape(self.count * self.plan.spec.width, pace.shape[1])[:m].astype(np.int64),
-            *self._warnings(),
+            *warnings,
             self._of_members(self.monitor.substeps, np.int64) if self.plan.spec.substep else np.zeros(m, np.int64),
             stopped_by,
         )
@@ -214,7 +245,7 @@ class Packets:
         Returns:
             (status, step): both (m,); after that step a member that ended keeps its state.
         """
-        outcome = self.outcome()
+        outcome = self.outcome(warned=False)
         return outcome.status, outcome.failed_step
 
     def _of_members(self, lanes: Any, kind: Any) -> np.ndarray:

@@ -15,7 +15,7 @@ from lgvi_kernels import built_in
 from lgvi_kernels.advance.rows import STATE_FIELDS
 from lgvi_kernels.maps.collocation import SLOPE_FIELDS
 from lgvi_warp.engine.plan import Plan
-from lgvi_warp.engine.shared import FRAME, context
+from lgvi_warp.engine.shared import AXES, FRAME, context
 from lgvi_warp.engine.survey import framed
 from lgvi_warp.methods import modified_inertia
 from lgvi_warp.physics import inertia, notation, vehicle
@@ -45,7 +45,7 @@ class Packing:
         self.plan, self.members = plan, members
         self.numbers: Any = framed(plan.method, members.parameters, plan.shared)
         self.frame, self.U, _ = self.numbers[FRAME]
-        self.scale = self._shared("scale", lambda numbers: self._scale(numbers[FRAME][0]))
+        self.scale = self._shared("scale", lambda numbers: self._scale(numbers[AXES][0]))
 
     def _shared(self, key: Any, compute: Callable[[Any], Any]) -> Any:
         return self.plan.shared(key, self.numbers, compute)
@@ -70,14 +70,22 @@ class Packing:
     def _inertia(self, numbers: Any) -> Fields:
         frame, U, _ = numbers[FRAME]
         parts, scale = self.plan.spec.parts, self._scale(frame)
-        inverse = _inverse(frame.M) * scale[:, None, None]
-        mean = np.einsum("nii->n", inverse) / 3.0
-        deviation = inverse - mean[:, None, None] * np.eye(3)
-        fields: Fields = {"J": frame.J / scale[:, None], "inverse_scale": 1.0 / scale, "mean": mean}
+        diagonal = _diagonal(frame.M)
+        fields: Fields = {"J": frame.J / scale[:, None], "inverse_scale": 1.0 / scale}
+        if diagonal is not None:
+            # The same bits as below, without the zeros.
+            inverse = 1.0 / diagonal * scale[:, None]
+            mean = (inverse[:, 0] + inverse[:, 1] + inverse[:, 2]) / 3.0
+            deviation = inverse - mean[:, None], np.zeros((1, 3))
+        else:
+            matrix = np.linalg.inv(frame.M) * scale[:, None, None]
+            mean = np.einsum("nii->n", matrix) / 3.0
+            deviation = symmetric(matrix - mean[:, None, None] * np.eye(3))
+        fields["mean"] = mean
         if self.plan.spec.mass == "diagonal":
-            fields["anisotropy"] = np.einsum("nii->ni", deviation)
+            fields["anisotropy"] = deviation[0]
         elif self.plan.spec.mass == "full":
-            fields["anisotropy"] = symmetric(deviation)
+            fields["anisotropy"] = deviation
         if "rates" in parts:
             fields["inverse_J"] = scale[:, None] / frame.J
         if "turns" in parts:
@@ -152,7 +160,7 @@ class Packing:
         m, frame, spec = self.members, self.frame, self.plan.spec
         attitude, velocity, rate = (_once(x) for x in (m.attitude, m.velocity, m.angular_velocity))
         turned = not self._shared("axes kept", lambda numbers: bool(np.all(np.eye(3) == numbers[FRAME][0].Q)))
-        shifted = self._shared("origin moved", lambda numbers: bool(np.any(numbers[FRAME][0].origin)))
+        shifted = self._shared("origin moved", lambda numbers: bool(np.any(numbers[AXES][0].origin)))
         R, nu, Om, position = attitude, velocity, rate, m.position
         if turned:
             R = attitude @ frame.Q
@@ -205,20 +213,20 @@ def _once(values: np.ndarray) -> np.ndarray:
     return values[:1] if values.strides[0] == 0 else values
 
 
-def _inverse(M: np.ndarray) -> np.ndarray:
-    """Inverses of mass matrices (n, 3, 3), by division where no matrix has an entry off its diagonal: the same bits."""
-    if np.any(M[:, ~np.eye(3, dtype=bool)]):
-        return np.linalg.inv(M)
-    inverse = np.zeros_like(M)
-    inverse[:, range(3), range(3)] = 1.0 / np.einsum("nii->ni", M)
-    return inverse
+# Places of the entries of a 3x3 matrix off its diagonal, row by row.
+OFF_DIAGONAL = [1, 2, 3, 5, 6, 7]
+
+
+def _diagonal(matrices: np.ndarray) -> np.ndarray | None:
+    """Diagonals (n, 3) of matrices (n, 3, 3) that have no other entries; None where one has."""
+    if np.any(matrices.reshape(-1, 9)[:, OFF_DIAGONAL]):
+        return None
+    return np.einsum("nii->ni", matrices)
 
 
 def _diagonal_mass(frame: Frame) -> np.ndarray | None:
     """Diagonals (n, 3) of the mass matrices, if momenta are products of these and velocities alone; else None."""
-    if np.any(frame.E) or np.any(frame.M[:, ~np.eye(3, dtype=bool)]):
-        return None
-    return np.einsum("nii->ni", frame.M)
+    return None if np.any(frame.E) else _diagonal(frame.M)
 
 
 def _water(numbers: Any, frame: Frame) -> Fields:

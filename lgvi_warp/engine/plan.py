@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import copy
 import dataclasses
 import functools
 import time
@@ -25,15 +24,17 @@ from lgvi_warp.common.machine import DTYPES, default_width
 from lgvi_warp.common.status import CHECKS, ON_FAILURE
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
-from lgvi_warp.engine.kernel_choice import KernelChoice, choose_kernel, declared, is_built_in
-from lgvi_warp.engine.shared import MEMBERS, Shared
+from lgvi_warp.engine.block import Block
+from lgvi_warp.engine.kernel_choice import KernelChoice, check_backward_drag, choose_kernel, declared, is_built_in
+from lgvi_warp.engine.shared import MEMBERS, SEED, Shared
 from lgvi_warp.engine.step_warnings import watched
-from lgvi_warp.engine.survey import survey
+from lgvi_warp.engine.survey import Survey, survey, survey_of
 from lgvi_warp.methods.gauss import gauss
 from lgvi_warp.methods.method import KINDS, Method
 from lgvi_warp.methods.saveat import TimeGrid, divisors
 from lgvi_warp.physics.terms.noisy import NoisyTerm
-from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.sampling.members import Members
+from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
 
 # Sub-maps whose equation may have no solution.
 SOLVING = {"D", "W", "A", "Phi", "Phi*"}
@@ -44,6 +45,10 @@ STEP_ROUND_OFF = 1e-12
 # Limits of one launch: they keep progress current, interrupts prompt and the sample buffer small in long runs.
 SEGMENT_VEHICLE_STEPS = 20_000_000
 SEGMENT_SAMPLE_BYTES = 16_000_000
+
+
+class NotSurveyed(Exception):  # noqa: N818  (what happened, and no fault of the scene)
+    """Raised when a member beyond those that were looked at needs another kernel."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +64,8 @@ class Plan:
         width: members of a packet, one a lane; None (default) for what suits this machine's registers.
         checks: "safe" (default), "all" for warnings as well, or "none".
         on_failure: "freeze" (default), "raise" or "substep".
+        survey_all: whether the kernel is chosen by all members (default), or by the first SURVEYED. Then a run looks at the
+            others as it comes to them, and begins anew, with all members looked at, if any of them needs more.
 
     Attributes:
         kernel_choice: the laws that act and the method's program for them.
@@ -76,8 +83,10 @@ class Plan:
     width: int | None = None
     checks: str = "safe"
     on_failure: str = "freeze"
+    survey_all: bool = True
     kernel_choice: KernelChoice = field(init=False)
     spec: Spec = field(init=False)
+    _facts: Survey = field(init=False, compare=False, repr=False)
     # Of a plan made by part(): the whole plan, the members and the fields.
     _whole: tuple[Plan, Sequence[int], Sequence[str]] | None = field(
         default=None, init=False, compare=False, repr=False
@@ -100,9 +109,12 @@ class Plan:
             faults.add("checks", self.checks, problem, 'use checks="safe", or on_failure="freeze"')
         faults.raise_if_any()
         checked = self.checks != "none"
-        facts = survey(self.ensemble, self.method, self.grid.h, self.shared)
+        most = None if self.survey_all else SURVEYED
+        facts = survey(self.ensemble, self.method, self.grid.h, self.shared, most=most)
+        object.__setattr__(self, "_facts", facts)
         choice = choose_kernel(self.ensemble, self.method, self.grid.h, facts, built_in, checked)
         object.__setattr__(self, "kernel_choice", choice)
+        check_backward_drag(self.ensemble, choice, self.method, self.grid.h)
         self._check_substep()
         self._check_noise_steps()
         if self.width is None:
@@ -123,7 +135,12 @@ class Plan:
     @functools.cached_property
     def shared(self) -> Shared:
         """What all members share, computed once."""
-        return Shared({*self.ensemble.varied_names, MEMBERS})
+        return Shared({*self.ensemble.varied_names, MEMBERS, SEED})
+
+    @functools.cached_property
+    def idle(self) -> list[Any]:
+        """Packets of finished blocks, to be used again."""
+        return []
 
     def _check_substep(self) -> None:
         """Refuse to divide the steps of a method or of laws that cannot be divided, with the reason."""
@@ -170,6 +187,49 @@ class Plan:
                 faults.add(f"{term.key}.noise_step", noise_step, problem, "there are 2,147,483,647: use a longer one")
         faults.raise_if_any()
 
+    def of(self, ensemble: Ensemble) -> Plan:
+        """The same plan for other members, of the same scene and with the same names that vary.
+
+        Args:
+            ensemble: the members; the survey of the whole plan must hold for them.
+
+        Returns:
+            A plan that shares the kernel and all that members share.
+
+        Raises:
+            SceneError: if a member's drag is too strong for the method.
+        """
+        check_backward_drag(ensemble, self.kernel_choice, self.method, self.grid.h)
+        plan = self._copy()
+        object.__setattr__(plan, "ensemble", ensemble)
+        return plan
+
+    def _copy(self) -> Plan:
+        """The same plan, with nothing chosen anew, as copy.copy would by way of __reduce__."""
+        _ = self.shared, self.idle  # which copies have in common
+        plan = object.__new__(Plan)
+        plan.__dict__.update(self.__dict__)
+        return plan
+
+    def check_block(self, block: Block, members: Members) -> None:
+        """Look at members of a block that were not looked at before the run.
+
+        Args:
+            block: the block.
+            members: its members.
+
+        Raises:
+            SceneError: if a member is unphysical.
+            NotSurveyed: if a member needs what the kernel does not have.
+        """
+        self.ensemble.check_block(block.first, block.stop, members.parameters)
+        if not self.survey_all and block.stop > SURVEYED and self._whole is None:
+            seen = survey_of(members.parameters, self.ensemble, self.method, self.grid.h, self.shared, block)
+            if not self._facts.covers(seen):
+                raise NotSurveyed(
+                    f"a member of {block.first} to {block.stop - 1} needs what the first {SURVEYED} do not"
+                )
+
     def with_neighbours(self, indices: np.ndarray) -> np.ndarray:
         """The members whose run gives these members the bits of the whole run.
 
@@ -199,8 +259,8 @@ class Plan:
         Returns:
             A plan for m members.
         """
-        subplan = copy.copy(self)
-        for name in ("advance", "dtypes", "times", "shared"):
+        subplan = self._copy()
+        for name in ("advance", "dtypes", "times", "shared", "idle"):
             subplan.__dict__.pop(name, None)
         object.__setattr__(subplan, "ensemble", self.ensemble.subset(indices))
         object.__setattr__(subplan, "fields", tuple(name for name in SAMPLE_FIELDS if name in fields))

@@ -12,8 +12,9 @@ from lgvi_warp.physics.terms.base import PackingContext
 
 Value = TypeVar("Value")
 
-# Names under which these are noted beside parameters, whose names all have a dot.
-FRAME, MEMBERS, SEED = "frame", "members", "seed"
+# Names under which these are noted beside parameters, whose names all have a dot. AXES is the frame but for its mass matrix,
+# which alone changes with the mass of most vehicles.
+FRAME, AXES, MEMBERS, SEED = "frame", "axes", "members", "seed"
 
 
 class Reads(dict[str, np.ndarray]):

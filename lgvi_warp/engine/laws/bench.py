@@ -159,11 +159,10 @@ class Bench:
         Returns:
             The context for `count` members.
         """
-        I6 = vehicle.inertia6(parameters)
-        n, none = len(I6), np.zeros((len(I6), 3, 3))
+        M, _, Js = inertia.schur(inertia.blocks(vehicle.inertia6(parameters)))
+        n, none = len(M), np.zeros((len(M), 3, 3))
         Q = np.broadcast_to(TURN if elsewhere else np.eye(3), (n, 3, 3))
         origin = np.broadcast_to(ORIGIN if elsewhere else np.zeros(3), (n, 3))
-        M, _, Js = inertia.schur(I6)
         M, Js = (np.swapaxes(Q, 1, 2) @ A @ Q for A in (M, Js))
         frame = Frame(Q, origin, origin, M, np.einsum("nii->ni", Js), none, none)
         return PackingContext(parameters, frame, np.arange(self.count), self.seed, KICK)

@@ -544,7 +544,8 @@ def make_reference(
     if noisy:
         # 3 2^k draws, which many steps divide; at first sixteen in the longest step that is tried.
         m = 3 * 2 ** math.ceil(math.log2(max(8.0 * m / 3.0, 1.0)))
-    for _ in range(30):
+    # In noise each halving of the step gains one of the error, without an end.
+    for _ in range(10 if noisy else 30):
         finer = max(m + 1, round(1.5 * m))
         if fixed:
             m, finer = (*saveat.divisors(fixed)[-2:-1], fixed)[0], fixed

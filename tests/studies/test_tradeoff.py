@@ -214,7 +214,7 @@ def test_noise_without_a_grid_compares_statistics_only(tmp_path):
 
 @pytest.mark.slow
 def test_noise_is_compared_on_one_path():
-    found = lw.tradeoff(noisy_fleet(CURRENT), 4.0, methods=["psi_x", "psi_s"], seconds=ENOUGH)
+    found = lw.tradeoff(noisy_fleet(CURRENT), 4.0, methods=["psi_x", "psi_s"], seconds=60.0)
     assert "all runs see one path" in found.messages[0] and len(found.front(kind="path_rms")) > 3
     steps, errors = np.array([(one.setting.h, one.error(kind="path_rms")) for one in found.shown()
                               if one.setting.text == "psi_x float64"]).T  # fmt: skip

@@ -33,6 +33,7 @@ from lgvi_warp.physics.terms.gauss_markov_current import GaussMarkovCurrent as G
 from lgvi_warp.physics.terms.hydrostatics import Restoring as Restoring
 from lgvi_warp.physics.terms.hydrostatics import Weight as Weight
 from lgvi_warp.physics.terms.lift import BodyLift as BodyLift
+from lgvi_warp.physics.terms.noisy import NoisyTerm as NoisyTerm
 from lgvi_warp.physics.terms.stratification import Stratification as Stratification
 from lgvi_warp.physics.terms.tether import Tether as Tether
 from lgvi_warp.physics.terms.thrusters import Thrusters as Thrusters

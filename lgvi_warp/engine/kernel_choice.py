@@ -17,6 +17,7 @@ from lgvi_warp.methods.method import FORCED, Method, Program, divided, merged, s
 from lgvi_warp.physics import terms, vehicle
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.physics.terms.drag import PARTS, Drag
+from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.scene.ensemble import SURVEYED, Ensemble, over_members
 from lgvi_warp.scene.oddities import Oddities
 
@@ -246,6 +247,8 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
     else:
         for role in roles:
             _check_signature(faults, term, module, role)
+        if isinstance(term, NoisyTerm) and not getattr(module, "NOISE", False):
+            faults.add(f"{term.key}.device", module, "does not say that it is noise", "write NOISE = True")
         flow = getattr(module, "FLOW", "none")
         if flow not in FLOWS:
             faults.add(f"{term.key}.FLOW", flow, "is not known", closest(str(flow), FLOWS))
@@ -265,17 +268,21 @@ def is_built_in(module: Any) -> bool:
     return str(getattr(module, "__name__", "")).startswith("lgvi_kernels.")
 
 
-def declared(term: Term, module: Any) -> tuple[tuple[str, int], ...]:
-    """The declared numbers of which the device struct of a term is made.
+def declared(term: Term, module: Any) -> tuple[tuple[str, Any], ...]:
+    """The fields of the device struct of a term that do not follow from its module.
 
     Args:
         term: the term.
         module: its device code.
 
     Returns:
-        (name, length) of each number; () for a module that defines `params` itself.
+        (name, kind) of each number, unless the module defines `params`, and of a noisy term's key (see
+        lgvi_kernels.maps.compose).
     """
-    return (getattr(module, "params", None) is None and term.lanes()) or ()
+    numbers = (getattr(module, "params", None) is None and term.lanes()) or ()
+    if isinstance(term, NoisyTerm):
+        return (*numbers, ("key", "step" if term.noise_step is None else "grid"))
+    return numbers
 
 
 def _check_signature(faults: Faults, term: Term, module: Any, role: str) -> None:
@@ -321,7 +328,8 @@ def _check(
     composed = len(method.stages) > 1
     noisy = any(getattr(module, "NOISE", False) for _, module in acting)
     if composed and not method.two_part and (dense or flow in ("uniform", "varying") or memory or noisy):
-        cause = "a damping matrix" if dense else "water that varies" if flow != "none" else "a term that remembers"
+        causes = {"a damping matrix": dense, "water that varies": flow in ("uniform", "varying"), "noise": noisy}
+        cause = next((cause for cause, present in causes.items() if present), "a term that remembers")
         faults.add("method", method.name, f"keeps its order only if a step of -h undoes one of h, and {cause} prevents that",
                    f"use {method.base}")  # fmt: skip
     for term, module in acting:
@@ -332,9 +340,12 @@ def _check(
                              or isinstance(term, Drag) or getattr(module, "NOISE", False)):  # fmt: skip
             problem = f"takes forces of position and time only, which {term.key} is not"
             faults.add("method", method.name, problem, "use psi_s")
-    if method.tableau and (memory or noisy):
-        why = "noise, which has no rate" if noisy else "a term that remembers, which is kept once a step"
+    if method.tableau and memory:
+        why = "a term that remembers, which is kept once a step"
         faults.add("method", method.name, f"cannot advance {why}", "use psi_s, psi_x or psi_w")
+    if method.adaptive and noisy:
+        why = "cannot choose its steps where noise is drawn once a step"
+        faults.add("method", method.name, why, "leave out rtol and atol")
     kicks = sum(letter in ("K", "Phi", "Phi*") for letter, _ in method.program)
     if noisy and not composed and not method.tableau and kicks != 1:
         faults.add("method", method.name, "would draw noise more than once a step", "use psi_s, psi_x or psi_w")

@@ -33,12 +33,16 @@ from lgvi_warp.engine.survey import Survey, survey, survey_of
 from lgvi_warp.engine.widths import default_width
 from lgvi_warp.methods.gauss import gauss
 from lgvi_warp.methods.method import KINDS, Method
-from lgvi_warp.methods.saveat import TimeGrid
+from lgvi_warp.methods.saveat import TimeGrid, divisors
+from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
 
 # Sub-maps whose equation may have no solution.
 SOLVING = {"D", "W", "A", "Phi", "Phi*"}
+
+# A step and the draws that fill it differ by less than this part, the round-off of their quotient and of their texts.
+STEP_ROUND_OFF = 1e-12
 
 # Limits of one launch: they keep progress current, interrupts prompt and the sample buffer small in long runs.
 SEGMENT_VEHICLE_STEPS = 20_000_000
@@ -118,6 +122,7 @@ class Plan:
         object.__setattr__(self, "kernel_choice", choice)
         check_backward_drag(self.ensemble, choice, self.method, self.grid.h)
         self._check_substep()
+        self._check_noise_steps()
         if self.width is None:
             width, source = default_width(self._kind(), self.dtype)
             object.__setattr__(self, "width", width)
@@ -161,6 +166,29 @@ class Plan:
                     "draws its noise once a step" if noisy else "remembers what a step that is made again would change"
                 )
                 faults.add("on_failure", "substep", f"{term.key} {why}", 'use on_failure="freeze", or a shorter step')
+        faults.raise_if_any()
+
+    def _check_noise_steps(self) -> None:
+        """Refuse a step that is no whole multiple of a term's noise_step, and name the nearest one that is."""
+        faults, h = Faults(), self.grid.h
+        # All samples are whole multiples of this one.
+        spacing = h * float(np.gcd.reduce(self.grid.sample_steps))
+        for term, _ in self.kernel_choice.laws:
+            if not isinstance(term, NoisyTerm) or term.noise_step is None:
+                continue
+            noise_step, draws = float(term.noise_step), term.draws(h)
+            if abs(h - draws * noise_step) > STEP_ROUND_OFF * h:
+                whole = round(spacing / noise_step)
+                problem = f"is no whole multiple of {term.key}.noise_step = {noise_step:.9g} s"
+                if whole < 1 or abs(spacing - whole * noise_step) > STEP_ROUND_OFF * spacing:
+                    remedy = f"give a noise_step that divides the {spacing:.9g} s between samples"
+                else:
+                    count = min(divisors(whole), key=lambda count: abs(whole / count * noise_step - h))
+                    remedy = f"use a step of {whole // count * noise_step:.9g} s"
+                faults.add("step", h, problem, remedy)
+            elif self.grid.steps * draws >= 2**31:
+                problem = f"makes {self.grid.steps * draws:,} draws in this run"
+                faults.add(f"{term.key}.noise_step", noise_step, problem, "there are 2,147,483,647: use a longer one")
         faults.raise_if_any()
 
     def of(self, ensemble: Ensemble) -> Plan:

@@ -51,12 +51,12 @@ def judged(fleet, found, asked, rounds=5):
     """
     sample = comparison.Sample(fleet, asked["t1"], fleet.members, suggestion.TIMES)
     reference = comparison.make_reference(sample, asked["of"], asked["error"] / 100.0)
-    own = tradeoffs.tried(sample, found.candidate, reference)
+    own = tradeoffs.tried(sample, found.setting, reference)
     good = [own]
     for method in METHODS:
         for dtype in tradeoffs.PRECISIONS:
             m, last = sample.coarsest(3.0), None
-            while sample.h(m) > 0.5 * found.candidate.h * len(lw.Method(method).stages) / len(own.plan.method.stages):
+            while sample.h(m) > 0.5 * found.setting.h * len(lw.Method(method).stages) / len(own.plan.method.stages):
                 one = tradeoffs.tried(sample, sample.candidate(method, m, dtype), reference)
                 if one.error(asked["of"]) <= asked["error"]:
                     last = one

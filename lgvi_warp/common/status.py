@@ -158,6 +158,9 @@ _WARNING_VALUE = {
 }
 
 
+FIRST_EVENT, LAST_EVENT = int(Status.SURFACE), int(max(Status))
+
+
 def stopped(status: Any) -> np.ndarray:
     """Mask of the members that an event of the scene stopped, which is no failure.
 
@@ -168,7 +171,7 @@ def stopped(status: Any) -> np.ndarray:
         bool, shape (n,).
     """
     codes = np.asarray(status)
-    return np.asarray((codes >= Status.SURFACE) & (codes <= max(Status)))
+    return np.asarray((codes >= FIRST_EVENT) & (codes <= LAST_EVENT))
 
 
 def failed(status: Any) -> np.ndarray:

@@ -390,9 +390,7 @@ class Plan:
     @functools.cached_property
     def dtypes(self) -> tuple[np.dtype, ...]:
         """NumPy dtypes of the kernel's structs Inertia, Params, Events and Limits, in this order."""
-        types = self.advance.types
-        structs = (types.Inertia, types.Params, types.Events, types.Limits)
-        return tuple(np.dtype(struct.numpy_dtype()) for struct in structs)
+        return _dtypes(self.advance)
 
     @functools.cached_property
     def lengths(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -448,3 +446,10 @@ class Plan:
             k1 = min(k + most_steps, int(due[min(last, len(due)) - 1]))
             yield k, k1
             k = k1
+
+
+@functools.lru_cache(maxsize=256)
+def _dtypes(advance: Advance) -> tuple[np.dtype, ...]:
+    """Kept by kernel, since plans of one kernel are many and Warp takes long to tell."""
+    types = advance.types
+    return tuple(np.dtype(kind.numpy_dtype()) for kind in (types.Inertia, types.Params, types.Events, types.Limits))

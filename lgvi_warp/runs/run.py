@@ -46,8 +46,9 @@ def finished(
         MembersFailed: If members failed and the plan's on_failure is "raise".
     """
     if result.store is None:
-        indices, kept = again(plan, observed, result.status, fields, threads or machine.thread_count())
-        result = replace(result, kept=kept, kept_members=indices)
+        indices, kept = again(plan, observed, result.status, fields, threads)
+        if kept is not None:
+            result = replace(result, kept=kept, kept_members=indices)
     failed = failure_text(result) if plan.on_failure == "raise" else ""
     if failed:
         raise MembersFailed(failed, result)
@@ -124,7 +125,7 @@ def run_plan(
 
 
 def again(
-    plan: Plan, observed: Observation, status: np.ndarray, fields: Sequence[str], threads: int
+    plan: Plan, observed: Observation, status: np.ndarray, fields: Sequence[str], threads: int | None = None
 ) -> tuple[np.ndarray, Result | None]:
     """Run the members again whose samples are wanted after the run; they have the same bits as in the run.
 
@@ -133,7 +134,7 @@ def again(
         observed: What the run keeps.
         status: Status of each member, shape (n,).
         fields: Names of the fields whose samples are kept.
-        threads: Number of threads.
+        threads: Number of threads; default all cores.
 
     Returns:
         Indices of these members, shape (m,), and their result, or None if there are none.
@@ -142,7 +143,7 @@ def again(
     if not len(indices):
         return indices, None
     chosen = plan.with_neighbours(indices)
-    result = run_plan(plan.subplan([int(i) for i in chosen], fields), threads)
+    result = run_plan(plan.subplan([int(i) for i in chosen], fields), threads or machine.thread_count())
     return indices, result if len(chosen) == len(indices) else result.part(np.searchsorted(chosen, indices))
 
 

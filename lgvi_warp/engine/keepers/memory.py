@@ -56,6 +56,9 @@ class Outcomes:
             block: the block.
             part: the outcome of its members.
         """
+        if block.count == len(self.all.status):
+            self.all = part
+            return
         at = slice(block.first, block.stop)
         for field in dataclasses.fields(part):
             values = getattr(part, field.name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple, TypeVar
@@ -99,6 +100,12 @@ def number(
     return field(default=default, metadata=meta)
 
 
+@functools.cache
+def _number_fields(kind: Any) -> tuple[dataclasses.Field[Any], ...]:
+    """Kept, since each pass over a term's numbers asks for them."""
+    return tuple(item for item in dataclasses.fields(kind) if "shape" in item.metadata)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Term:
     """A force, a moment or a motion of the water that a scene names.
@@ -156,7 +163,7 @@ class Term:
         Returns:
             The dataclass fields declared by `number`, in the order of the class.
         """
-        return tuple(item for item in dataclasses.fields(cls) if "shape" in item.metadata)
+        return _number_fields(cls)  # type: ignore[arg-type]  # a class is hashable
 
     @classmethod
     def lanes(cls) -> tuple[tuple[str, int], ...] | None:

@@ -4,14 +4,14 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import sub  # noqa: F401
+from lgvi_kernels.lanes.arithmetic import add, sub  # noqa: F401
 from lgvi_kernels.maps.dissipation import damped_force, damped_torque
 from lgvi_kernels.maps.submaps import look, make_at_user_origin
 from lgvi_kernels.maps.water import acceleration_wrench
 
 
 def make_forces(View, Wrench, Flow, Damping, force, damping, flow, flow_varies, shifted):
-    """(everything, forces, current) of these laws; an argument is None where a scene has no such law (see make_K)."""
+    """(everything, forces, current, doubled) of these laws; an argument is None where a scene has no such law (see make_K)."""
     at_user_origin = make_at_user_origin(shifted)
 
     @wp.func
@@ -49,4 +49,13 @@ def make_forces(View, Wrench, Flow, Damping, force, damping, flow, flow_varies, 
         """The water's velocity where the vehicle is, inertial axes."""
         return water_at(look(View(), x, c, h), x, c).velocity
 
-    return everything, forces, current
+    @wp.func
+    def doubled(x: Any, c: Any, h: Any, nu: Any, Om: Any):
+        """D of twice the velocity: the derivative of D nu where each column grows as the size of its velocity, or not at all."""
+        view = look(View(), x, c, h)
+        water = water_at(view, x, c)
+        view.nu = nu + nu
+        view.Om = Om + Om
+        return damping(Damping(), view, water, c)
+
+    return everything, forces, current, doubled

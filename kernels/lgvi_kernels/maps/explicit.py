@@ -373,19 +373,19 @@ def make_munthe_kaas(rates, act, turned, timed):
     return step
 
 
-def make_implicit_stages(spec, rates, velocities, doubled):
-    """The stages of a linearly implicit method for this Spec; doubled: damping of twice the velocity (see make_forces)."""
+def make_implicit_stages(spec, rates, velocities, slope):
+    """The stages of a linearly implicit method for this Spec; slope: the matrix of damping (see make_forces)."""
     method, width, real, coupled = spec.explicit, spec.width, spec.real, "coupled" in spec.parts
     Rates = rates_struct(width, real, method.kind)
     states = [make_stage(make_moves(along, row, completed), None, c, spec.timed) for row, c in zip(method.a, method.c)]
     damped = [make_damped(Rates, make_moves, row, coupled) for row in method.implicit]
     implicit = make_implicit(damping_struct(width, real), factor_struct(width, real), coupled)
-    factor = make_factor(implicit, velocities, doubled, method.implicit[0][0])
+    factor = make_factor(implicit, velocities, slope, method.implicit[0][0])
     return make_damped_stages(slopes_struct(Rates, len(damped)), rates, states, damped, factor)
 
 
-def make_explicit(spec, everything, velocities, doubled):
-    """The step of a Runge-Kutta method for this Spec, with all the laws in `everything`; doubled: see make_implicit_stages."""
+def make_explicit(spec, everything, velocities, slope):
+    """The step of a Runge-Kutta method for this Spec, with all the laws in `everything`; slope: see make_implicit_stages."""
     method, width, real, timed = spec.explicit, spec.width, spec.real, spec.timed
     Wrench = wrench_struct(width, real)
     Rates = rates_struct(width, real, method.kind)
@@ -403,7 +403,7 @@ def make_explicit(spec, everything, velocities, doubled):
     if method.adaptive and len(method.errors[0]) > len(a):
         a, c = (*a, method.b), (*c, 1.0)
     if method.implicit:
-        stages = make_implicit_stages(spec, rates, velocities, doubled)
+        stages = make_implicit_stages(spec, rates, velocities, slope)
     else:
         stages = make_stages(Rates, rates, move, complete, push, a, c, timed)
     finish = make_moves(move, method.b + (0.0,) * (len(a) - len(method.b)), complete)

@@ -4,6 +4,8 @@ k_i = f(y_i) + h A (g_i1 k_1 + ... + g_ii k_i). Of df/dy the matrix A has only w
 out costs accuracy, no order.
 """
 
+from typing import Protocol
+
 import numpy as np
 
 from lgvi_warp.reference.explicit import USER, Step, Tableau, at, pack, rates, unpack
@@ -11,7 +13,7 @@ from lgvi_warp.reference.rotation import Array, hat
 from lgvi_warp.reference.submaps import Body, State, damping, look, water
 
 
-class Implicit(Tableau):
+class Implicit(Tableau, Protocol):
     """A tableau with the matrix g of a linearly implicit method."""
 
     @property
@@ -46,7 +48,9 @@ def stages(x: State, body: Body, h: float, tableau: Implicit, origin: Array = US
     g = tableau.implicit[0][0]
     moved = np.eye(6)  # momenta at the user's origin -> at this one
     moved[3:, :3] = -hat(origin)
-    factor = moved @ (np.eye(6) + g * h * slope(at(x, -origin), body, h) @ np.linalg.inv(body.I6)) @ np.linalg.inv(moved)
+    factor = (
+        moved @ (np.eye(6) + g * h * slope(at(x, -origin), body, h) @ np.linalg.inv(body.I6)) @ np.linalg.inv(moved)
+    )
     for i, (row, c) in enumerate(zip(tableau.a, tableau.c, strict=True)):
         K[i] = rates(unpack(y + h * np.array(row) @ K[:i], x, x.t + c * h), body, h, origin)
         s = np.array(tableau.implicit[i][:i]) @ K[:i, 9:] / g

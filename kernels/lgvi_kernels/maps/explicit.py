@@ -13,8 +13,8 @@ import warp as wp
 
 from lgvi_kernels.lanes.arithmetic import add, cross, div, dot, lane3, mul, ones, sub, vec3  # noqa: F401
 from lgvi_kernels.lanes.functions import root, sine
-from lgvi_kernels.lanes.rotations import rodrigues, rotation_struct, transpose_apply
 from lgvi_kernels.lanes.matrix3 import factor_struct
+from lgvi_kernels.lanes.rotations import rodrigues, rotation_struct, transpose_apply
 from lgvi_kernels.lanes.state import damping_struct, struct, view_struct, wrench_struct
 from lgvi_kernels.laws.drag import make_resistance
 from lgvi_kernels.maps.compose import superpose

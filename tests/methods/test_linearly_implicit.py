@@ -12,6 +12,7 @@ from lgvi_warp.methods.tableaux import DOP853, RK4, RKW3
 from lgvi_warp.reference import explicit, linearly_implicit
 from lgvi_warp.reference.terms.drag import Drag, DragMatrix
 from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.studies.comparison import Sample
 from tests.laws import test_parity, test_remus_100
 from tests.laws.cases import CASES, together
 from tests.methods import test_coupled
@@ -246,6 +247,13 @@ def test_compensated_sums_are_refused():
     fleet = lw.Ensemble.from_scene(test_parity.scene_of(CASES["drag"]))
     with pytest.raises(SceneError, match="which rkw3 is not"):
         make_plan(fleet, METHOD, h=0.1, t1=1.0, dtype="float32_compensated")
+
+
+def test_studies_try_it_where_something_is_damped():
+    for name, tried in (("drag", ["rk4", METHOD]), ("wrench", ["rk4"])):
+        sample = Sample(lw.Ensemble.from_scene(test_parity.scene_of(CASES[name])), 1.0, 1)
+        taken, refused = sample.accepted(["rk4", METHOD])
+        assert taken == tried and list(refused.values()) == ["method rkw3: in this scene it is rk4"] * (2 - len(tried))
 
 
 def test_drag_has_no_limit_of_the_step():

@@ -33,6 +33,7 @@ from lgvi_warp.physics.terms.gauss_markov_current import GaussMarkovCurrent as G
 from lgvi_warp.physics.terms.hydrostatics import Restoring as Restoring
 from lgvi_warp.physics.terms.hydrostatics import Weight as Weight
 from lgvi_warp.physics.terms.lift import BodyLift as BodyLift
+from lgvi_warp.physics.terms.noisy import NoisyTerm as NoisyTerm
 from lgvi_warp.physics.terms.stratification import Stratification as Stratification
 from lgvi_warp.physics.terms.tether import Tether as Tether
 from lgvi_warp.physics.terms.thrusters import Thrusters as Thrusters
@@ -42,6 +43,8 @@ from lgvi_warp.physics.terms.wrench import WrenchSchedule as WrenchSchedule
 from lgvi_warp.physics.terms.wrench_noise import WrenchNoise as WrenchNoise
 from lgvi_warp.physics.vehicle import Vehicle as Vehicle
 from lgvi_warp.runs.predict import predict as predict
+from lgvi_warp.runs.prepared import Prepared as Prepared
+from lgvi_warp.runs.prepared import prepare as prepare
 from lgvi_warp.runs.result import Result as Result
 from lgvi_warp.runs.solve import solve as solve
 from lgvi_warp.runs.store.export import export as export

@@ -11,6 +11,7 @@ import pytest
 import warp._src.context as context
 
 import lgvi_warp as lw
+from lgvi_warp.engine import widths
 from lgvi_warp.reference.submaps import Body, State
 from lgvi_warp.reference.terms.restoring import Restoring
 from lgvi_warp.reference.terms.weight import Weight
@@ -44,6 +45,13 @@ def pytest_runtest_protocol(item):
 def refuse(module, *_, **__):
     """In place of Warp's Module.load."""
     pytest.fail(f"this test loads the kernel {module.name}: mark it with @pytest.mark.kernel")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def widths_of_the_table(tmp_path_factory):
+    """Packets as on a machine where `lgvi-warp tune` never ran."""
+    with mock.patch.object(widths, "path", lambda: tmp_path_factory.getbasetemp() / widths.FILE):
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,7 @@
 
 from benchmarks.cases.terms import case
 from benchmarks.pages import markdown, stamp
-from lgvi_warp.common import machine
+from lgvi_warp.engine import widths
 
 TEXT = """Nanoseconds per vehicle and step on one core: psi_s with the term alone, and what that is more than with weight,
 buoyancy and restoring moment alone ("none"). One run, all scenes in turn, medians; {members} vehicles in lanes
@@ -58,8 +58,8 @@ def main():
     terms, methods = table(rows(case.run(quick=False)))
     return TEXT.format(
         members=4096,
-        width64=machine.default_width("float64"),
-        width32=machine.default_width("float32"),
+        width64=widths.default_width("plain", "float64").lanes,
+        width32=widths.default_width("plain", "float32").lanes,
         step=case.STEP,
         stamp=stamp("term"),
         terms=terms,

@@ -21,6 +21,7 @@ from lgvi_kernels.lanes.arithmetic import (
     vec3,
 )
 from lgvi_kernels.lanes.functions import clamp, cosine, decay, exponential, greatest, logarithm, normals3, root, sine
+from lgvi_kernels.lanes.noise import normals_over, wandered
 from lgvi_kernels.lanes.state import struct
 from lgvi_kernels.lanes.view import (
     add_outer,
@@ -62,6 +63,7 @@ __all__ = [
     "mul",
     "neg",
     "normals3",
+    "normals_over",
     "ones",
     "positive",
     "ramp",
@@ -79,4 +81,5 @@ __all__ = [
     "to_inertial",
     "vec3",
     "velocity_at",
+    "wandered",
 ]

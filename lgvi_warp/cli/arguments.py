@@ -93,6 +93,10 @@ def parser() -> argparse.ArgumentParser:
     bench = verbs.add_parser("bench", help="speed of the kernel on this machine, beside the core's peak")
     bench.add_argument("--members", type=int, default=4096, help="vehicles (default 4096)")
     bench.add_argument("--steps", type=int, default=1000, help="steps (default 1000)")
+    _add_warm(verbs)
+    verbs.add_parser(
+        "tune", help="measure how many vehicles a packet should hold on this machine, for runs from now on"
+    )
     return top
 
 
@@ -208,6 +212,20 @@ def _add_check(verbs: Any) -> None:
     )
     _add_shared(
         verb, "scene --method --step --dtype --duration --members --seed --set --quiet", quiet="the exit code alone"
+    )
+
+
+def _add_warm(verbs: Any) -> None:
+    """Add the verb warm with its arguments."""
+    verb = verbs.add_parser("warm", help="compile the kernels of a scene ahead of its runs, several at a time")
+    _add_shared(verb, "scene --methods", methods="names, such as psi_s,rk4 (default: the scene's)")
+    names = SHARED["--methods"] | {"help": "float64, float32, float32_compensated (default: the scene's)"}
+    verb.add_argument("--dtypes", **names)
+    _add_shared(
+        verb,
+        "--step --duration --set --threads --quiet",
+        threads="processes (default: all cores)",
+        quiet="print nothing",
     )
 
 

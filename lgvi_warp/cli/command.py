@@ -10,15 +10,16 @@ from collections.abc import Callable
 
 from lgvi_warp.cli.arguments import parser
 from lgvi_warp.cli.check import check
-from lgvi_warp.cli.machine import bench, info
+from lgvi_warp.cli.machine import bench, info, tune
 from lgvi_warp.cli.runs import predict, resume, run
 from lgvi_warp.cli.settings import RUN, out_of
 from lgvi_warp.cli.signals import Ended, Signals, Streams
 from lgvi_warp.cli.stores import export, merge
 from lgvi_warp.cli.studies import sensitivity, stability, tradeoff
+from lgvi_warp.cli.warm import warm
 from lgvi_warp.common.errors import SceneError
 
-_VERBS = (run, check, resume, predict, merge, export, tradeoff, sensitivity, stability, info, bench)
+_VERBS = (run, check, resume, predict, merge, export, tradeoff, sensitivity, stability, info, bench, tune, warm)
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {verb.__name__: verb for verb in _VERBS}
 VERBS["plan"] = predict  # its name before
 
@@ -83,7 +84,7 @@ def left(chosen: argparse.Namespace) -> str:
     Returns:
         One sentence, with the way to go on where there is one.
     """
-    if chosen.verb in ("info", "check", "predict", "plan", "bench"):
+    if chosen.verb in ("info", "check", "predict", "plan", "bench", "tune", "warm"):
         return "nothing was to be written"
     store = chosen.dir if chosen.verb == "resume" else None
     if chosen.verb == "run" and chosen.store == "zarr" and (out_of(chosen) / RUN).exists():

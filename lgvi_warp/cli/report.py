@@ -209,10 +209,11 @@ def _speed(result: Any, seconds: float) -> list[str]:
     if not result.run_seconds:
         return []
     rate = result.members * result.provenance["steps"] / result.run_seconds
-    return [
+    lines = [
         f"speed       {rate:.3g} vehicle-steps per second ({result.run_seconds:.2f} s; kernel loaded in "
         f"{result.compile_seconds:.2f} s; {seconds:.2f} s in all)"
     ]
+    return [*lines, f"kernel      compiled: {result.compile_phases}"] if result.compile_phases.clang else lines
 
 
 def members_line(members: int, provenance: dict[str, Any]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import os
 import platform
@@ -31,19 +32,16 @@ def simd() -> str:
     return "avx2" if features.get("AVX2") else "other"
 
 
-def default_width(dtype: str, *, chained: bool = False) -> int:
-    """Vehicles per packet that fill one SIMD register.
+def register_width(dtype: str) -> int:
+    """Vehicles of which one number each fills a SIMD register.
 
     Args:
         dtype: "float64", "float32" or "float32_compensated".
-        chained: Whether the step's operations mostly wait for one another. Where registers abound (AVX-512) two are then
-            filled, so that one vehicle's operation runs while another's waits. Default False.
 
     Returns:
-        The number of vehicles; for one register of float64, 8 on AVX-512, 4 on AVX2, 2 elsewhere.
+        The number of vehicles; for float64, 8 on AVX-512, 4 on AVX2, 2 elsewhere.
     """
-    registers = 2 if chained and simd() == "avx512" else 1
-    return registers * REGISTER_BYTES[simd()] // np.dtype(DTYPES[dtype]).itemsize
+    return REGISTER_BYTES[simd()] // np.dtype(DTYPES[dtype]).itemsize
 
 
 def affinity() -> int:
@@ -67,6 +65,7 @@ def thread_count() -> int:
     return affinity() if quota is None else max(1, min(affinity(), math.ceil(quota)))
 
 
+@functools.cache
 def cpu_name() -> str:
     """Name of the processor.
 
@@ -109,10 +108,16 @@ def versions() -> dict[str, str]:
     Returns:
         Name -> version, of Python and four packages.
     """
+    return dict(_versions())
+
+
+@functools.cache
+def _versions() -> tuple[tuple[str, str], ...]:
+    """Read once: the modules of a process do not change, and reading takes milliseconds."""
     from importlib import metadata
 
     names = ("lgvi-warp", "warp-lang", "numpy", "scipy")
-    return {"python": platform.python_version()} | {name: metadata.version(name) for name in names}
+    return ("python", platform.python_version()), *((name, metadata.version(name)) for name in names)
 
 
 def kind() -> dict[str, str]:

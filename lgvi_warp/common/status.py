@@ -167,7 +167,8 @@ def stopped(status: Any) -> np.ndarray:
     Returns:
         bool, shape (n,).
     """
-    return np.isin(np.asarray(status), [code for code in Status if code.stopped])
+    codes = np.asarray(status)
+    return np.asarray((codes >= Status.SURFACE) & (codes <= max(Status)))
 
 
 def failed(status: Any) -> np.ndarray:

@@ -40,14 +40,37 @@ def block_size(members: int) -> int:
     return size
 
 
-def blocks(members: int) -> list[Block]:
+# Steps of vehicles in a block beyond which its own cost, a millisecond, is small beside that of its kernel.
+WORTHWHILE = 4_000_000
+
+
+def shares(members: int, threads: int, steps: int) -> int:
+    """Number of members of a block of a run whose bits and files do not depend on blocks.
+
+    Fewer blocks cost less. Some for each thread keep all threads at work until the end, and blocks of long runs are small, so
+    that an interrupt leaves as many finished members as it can.
+
+    Args:
+        members: number of members of the run.
+        threads: number of threads.
+        steps: number of steps of the run.
+
+    Returns:
+        Members of each block but the last, a multiple of 256 up to 16,384.
+    """
+    wanted = min(-(-members // (4 * threads if threads > 1 else 1)), -(-WORTHWHILE // steps))
+    return min(16_384, -(-wanted // 256) * 256)
+
+
+def blocks(members: int, size: int | None = None) -> list[Block]:
     """Divide the members of a run into blocks.
 
     Args:
         members: number of members of the run.
+        size: members of a block; default `block_size(members)`.
 
     Returns:
-        Blocks of `block_size(members)` members in order; the last one has the rest.
+        Blocks of that many members in order; the last one has the rest.
     """
-    size = block_size(members)
+    size = size or block_size(members)
     return [Block(i, min(i + size, members)) for i in range(0, members, size)]

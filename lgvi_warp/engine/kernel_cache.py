@@ -31,6 +31,7 @@ import warp as wp
 
 from lgvi_warp.common import files as durable
 from lgvi_warp.common import warp_setup
+from lgvi_warp.common.phases import Phases
 from lgvi_warp.common.warp_setup import build_lock
 
 # Source, code and header of a kernel are a few 100 kB; Clang's precompiled header is 5 MB.
@@ -44,11 +45,14 @@ TORN, OURS, OLD = re.compile(r"(\w+)_p\d+_t\d+"), "wp_make_", 86_400.0
 loaded: weakref.WeakSet[Any] = weakref.WeakSet()
 
 
-def load(module: Any) -> None:
+def load(module: Any) -> Phases:
     """Load a kernel's code, compiling it where the cache has none that is whole.
 
     Args:
         module: Warp's module of the kernel.
+
+    Returns:
+        How long each phase took; zeros for a kernel that this process has loaded already.
 
     Raises:
         OSError: where the cache has no such kernel and takes none; it names the folder and WARP_CACHE_PATH.
@@ -56,16 +60,20 @@ def load(module: Any) -> None:
     warp_setup.start()
     with build_lock:
         if module in loaded:
-            return
+            return Phases()
+        begun = time.time()
         cache = Path(wp.config.kernel_cache_dir)
         folder = cache / module.get_module_identifier(BLOCK_DIM)
         code = folder / module._get_compile_output_name(wp.get_device("cpu"), block_dim=BLOCK_DIM)
         with one_at_a_time(module.get_module_hash().hex()):
+            hashed = time.time()
             if is_whole(code):
                 wp.load_module(module, device="cpu")
+                written = compiled = hashed
             else:
-                compile_module(module, cache, code)
+                written, compiled = compile_module(module, cache, code)
         loaded.add(module)
+        return Phases(written - begun, compiled - written, time.time() - compiled)
 
 
 @contextlib.contextmanager
@@ -111,13 +119,16 @@ def _sha256(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def compile_module(module: Any, cache: Path, code: Path) -> None:
+def compile_module(module: Any, cache: Path, code: Path) -> tuple[float, float]:
     """Compile and load a kernel in a scratch folder, then put its files into the cache, checksums last.
 
     Args:
         module: Warp's module of the kernel.
         cache: The cache's folder.
         code: The file that will hold the kernel's code.
+
+    Returns:
+        When its source and its code were written, as time.time() counts [s].
 
     Raises:
         OSError: The cache has no room, or cannot be written.
@@ -134,7 +145,10 @@ def compile_module(module: Any, cache: Path, code: Path) -> None:
                 raise
             finally:
                 wp.config.kernel_cache_dir = str(cache)
-            _move(scratch / code.parent.name, code)
+            files = scratch / code.parent.name
+            times = [path.stat().st_mtime for path in (*files.glob("*.cpp"), files / code.name)]
+            _move(files, code)
+            return times[0], times[-1]
     except OSError as error:
         raise warp_setup.unusable(cache, error) from error
 

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, closest
-from lgvi_warp.engine.survey import COUPLINGS, SHAPES_OF_MASS, UNCOUPLED, Survey, survey
+from lgvi_warp.engine.survey import COUPLINGS, SHAPES_OF_MASS, UNCOUPLED, Survey
 from lgvi_warp.methods.method import FORCED, Method, Program, divided, merged, simplified, with_hops
 from lgvi_warp.physics import terms, vehicle
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.physics.terms.drag import PARTS, Drag
-from lgvi_warp.scene.ensemble import Ensemble, over_members
+from lgvi_warp.physics.terms.noisy import NoisyTerm
+from lgvi_warp.scene.ensemble import SURVEYED, Ensemble, over_members
 from lgvi_warp.scene.oddities import Oddities
 
 
@@ -65,7 +66,12 @@ class KernelChoice:
 
 
 def choose_kernel(
-    ensemble: Ensemble, method: Method, h: float, built_in: Callable[[str, str], Any], checked: bool = True
+    ensemble: Ensemble,
+    method: Method,
+    h: float,
+    facts: Survey,
+    built_in: Callable[[str, str], Any],
+    checked: bool = True,
 ) -> KernelChoice:
     """Choose what the kernel of a run must contain.
 
@@ -73,6 +79,7 @@ def choose_kernel(
         ensemble: the members.
         method: the integration method.
         h: step [s].
+        facts: survey of the members.
         built_in: (folder, name) -> module of built-in device code in the folder "laws" or "stops", None where there is none.
         checked: whether the run watches the energy of scenes that conserve or lose it (default True).
 
@@ -82,7 +89,6 @@ def choose_kernel(
     Raises:
         SceneError: if the method cannot do what the scene asks, or a law's device code is unusable.
     """
-    facts = survey(ensemble, method, h)
     explicit = method.tableau is not None
     acting = _acting(ensemble, facts, built_in)
     events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)
@@ -103,7 +109,6 @@ def choose_kernel(
         drag = tuple(part for part in PARTS if part in facts.drag)
         module = built_in("laws", "drag_directions" if facts.bent else "drag")
         acting = [(term, module), *((t, m) for t, m in acting if t is not term)]
-        _check_backward_drag(ensemble, method, term, h)
     dense = damping or (bool(drags) and not exact) or flow == "varying"
     memory = any(term.memory for term, _ in acting)
     _check(method, facts, dense=dense, flow=flow, memory=memory, acting=acting)
@@ -182,11 +187,22 @@ def _conservative(facts: Survey, acting: list[tuple[Term, Any]], built_in: Calla
 MOST_BACKWARD_DRAG = 0.5
 
 
-def _check_backward_drag(ensemble: Ensemble, method: Method, term: Drag, h: float) -> None:
-    """Refuse drag that is too strong for a composition's backward stages, judged by the members' starts."""
+def check_backward_drag(ensemble: Ensemble, choice: KernelChoice, method: Method, h: float) -> None:
+    """Refuse drag that is too strong for a composition's backward stages, judged by the members' starts.
+
+    Args:
+        ensemble: the members.
+        choice: what their kernel contains.
+        method: the integration method.
+        h: step [s].
+
+    Raises:
+        SceneError: if a member's drag is too strong; it names the largest drag number.
+    """
     back = -h * min(0.0, *method.stages)
-    if back == 0.0:
+    if back == 0.0 or not choice.drag:
         return
+    term = choice.laws[0][0]
 
     def largest(first: int, stop: int) -> float:
         members = ensemble.select(first, stop)
@@ -196,7 +212,7 @@ def _check_backward_drag(ensemble: Ensemble, method: Method, term: Drag, h: floa
         mobilities = np.einsum("nii->ni", np.linalg.inv(vehicle.inertia6(members.parameters)))
         return float((back * (coefficients["linear"] + coefficients["quadratic"] * speeds) * mobilities).max())
 
-    number = max(over_members(largest, ensemble.members))
+    number = max(over_members(largest, min(ensemble.members, SURVEYED)))
     if number > MOST_BACKWARD_DRAG:
         faults = Faults()
         problem = f"goes backward by {back:.3g} s, where {term.key} has a drag number up to {number:.3g}"
@@ -231,6 +247,8 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
     else:
         for role in roles:
             _check_signature(faults, term, module, role)
+        if isinstance(term, NoisyTerm) and not getattr(module, "NOISE", False):
+            faults.add(f"{term.key}.device", module, "does not say that it is noise", "write NOISE = True")
         flow = getattr(module, "FLOW", "none")
         if flow not in FLOWS:
             faults.add(f"{term.key}.FLOW", flow, "is not known", closest(str(flow), FLOWS))
@@ -250,17 +268,21 @@ def is_built_in(module: Any) -> bool:
     return str(getattr(module, "__name__", "")).startswith("lgvi_kernels.")
 
 
-def declared(term: Term, module: Any) -> tuple[tuple[str, int], ...]:
-    """The declared numbers of which the device struct of a term is made.
+def declared(term: Term, module: Any) -> tuple[tuple[str, Any], ...]:
+    """The fields of the device struct of a term that do not follow from its module.
 
     Args:
         term: the term.
         module: its device code.
 
     Returns:
-        (name, length) of each number; () for a module that defines `params` itself.
+        (name, kind) of each number, unless the module defines `params`, and of a noisy term's key (see
+        lgvi_kernels.maps.compose).
     """
-    return (getattr(module, "params", None) is None and term.lanes()) or ()
+    numbers = (getattr(module, "params", None) is None and term.lanes()) or ()
+    if isinstance(term, NoisyTerm):
+        return (*numbers, ("key", "step" if term.noise_step is None else "grid"))
+    return numbers
 
 
 def _check_signature(faults: Faults, term: Term, module: Any, role: str) -> None:
@@ -306,7 +328,8 @@ def _check(
     composed = len(method.stages) > 1
     noisy = any(getattr(module, "NOISE", False) for _, module in acting)
     if composed and not method.two_part and (dense or flow in ("uniform", "varying") or memory or noisy):
-        cause = "a damping matrix" if dense else "water that varies" if flow != "none" else "a term that remembers"
+        causes = {"a damping matrix": dense, "water that varies": flow in ("uniform", "varying"), "noise": noisy}
+        cause = next((cause for cause, present in causes.items() if present), "a term that remembers")
         faults.add("method", method.name, f"keeps its order only if a step of -h undoes one of h, and {cause} prevents that",
                    f"use {method.base}")  # fmt: skip
     for term, module in acting:
@@ -317,9 +340,12 @@ def _check(
                              or isinstance(term, Drag) or getattr(module, "NOISE", False)):  # fmt: skip
             problem = f"takes forces of position and time only, which {term.key} is not"
             faults.add("method", method.name, problem, "use psi_s")
-    if method.tableau and (memory or noisy):
-        why = "noise, which has no rate" if noisy else "a term that remembers, which is kept once a step"
+    if method.tableau and memory:
+        why = "a term that remembers, which is kept once a step"
         faults.add("method", method.name, f"cannot advance {why}", "use psi_s, psi_x or psi_w")
+    if method.adaptive and noisy:
+        why = "cannot choose its steps where noise is drawn once a step"
+        faults.add("method", method.name, why, "leave out rtol and atol")
     kicks = sum(letter in ("K", "Phi", "Phi*") for letter, _ in method.program)
     if noisy and not composed and not method.tableau and kicks != 1:
         faults.add("method", method.name, "would draw noise more than once a step", "use psi_s, psi_x or psi_w")

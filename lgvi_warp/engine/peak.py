@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from lgvi_warp.common.machine import default_width
+from lgvi_warp.common.machine import register_width
 
 
 def fma_peak(dtype: str = "float64", width: int | None = None, rounds: int = 5, loops: int = 1_000_000) -> float:
@@ -29,7 +29,7 @@ def fma_peak(dtype: str = "float64", width: int | None = None, rounds: int = 5, 
 
     warp_setup.start()
     real = wp.float64 if dtype == "float64" else wp.float32
-    width = width or default_width(dtype)
+    width = width or register_width(dtype)
     kernel, Lane = make_peak(width, real)
     values = np.full((CHAINS + 3, width), 0.5, dtype=dtype)
     data = wp.array(values, dtype=Lane, device="cpu")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import copy
 import dataclasses
 import functools
 import time
@@ -21,23 +20,37 @@ from lgvi_kernels.advance.spec import CHUNK, Spec
 from lgvi_kernels.lanes.arithmetic import WIDTHS
 from lgvi_kernels.maps.explicit import Explicit
 from lgvi_warp.common.errors import Faults, SceneError
-from lgvi_warp.common.machine import DTYPES, default_width
+from lgvi_warp.common.machine import DTYPES
+from lgvi_warp.common.phases import Phases
 from lgvi_warp.common.status import CHECKS, ON_FAILURE
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
-from lgvi_warp.engine.kernel_choice import KernelChoice, choose_kernel, declared, is_built_in
+from lgvi_warp.engine.block import Block
+from lgvi_warp.engine.kernel_choice import KernelChoice, check_backward_drag, choose_kernel, declared, is_built_in
+from lgvi_warp.engine.shared import MEMBERS, SEED, Shared
 from lgvi_warp.engine.step_warnings import watched
+from lgvi_warp.engine.survey import Survey, survey, survey_of
+from lgvi_warp.engine.widths import default_width
 from lgvi_warp.methods.gauss import gauss
 from lgvi_warp.methods.method import KINDS, Method
-from lgvi_warp.methods.saveat import TimeGrid
-from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.methods.saveat import TimeGrid, divisors
+from lgvi_warp.physics.terms.noisy import NoisyTerm
+from lgvi_warp.sampling.members import Members
+from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
 
 # Sub-maps whose equation may have no solution.
 SOLVING = {"D", "W", "A", "Phi", "Phi*"}
 
+# A step and the draws that fill it differ by less than this part, the round-off of their quotient and of their texts.
+STEP_ROUND_OFF = 1e-12
+
 # Limits of one launch: they keep progress current, interrupts prompt and the sample buffer small in long runs.
 SEGMENT_VEHICLE_STEPS = 20_000_000
 SEGMENT_SAMPLE_BYTES = 16_000_000
+
+
+class NotSurveyed(Exception):  # noqa: N818  (what happened, and no fault of the scene)
+    """Raised when a member beyond those that were looked at needs another kernel."""
 
 
 @dataclass(frozen=True)
@@ -53,10 +66,14 @@ class Plan:
         width: members of a packet, one a lane; None (default) for what suits this machine's registers.
         checks: "safe" (default), "all" for warnings as well, or "none".
         on_failure: "freeze" (default), "raise" or "substep".
+        survey_all: whether the kernel is chosen by all members (default), or by the first SURVEYED. Then a run looks at the
+            others as it comes to them, and begins anew, with all members looked at, if any of them needs more.
 
     Attributes:
         kernel_choice: the laws that act and the method's program for them.
         spec: all that decides the kernel's source.
+        width_source: what chose the width (see widths.Width).
+        phases: how long `compile` took, by phase; zeros where this process had loaded the kernel.
 
     Raises:
         SceneError: if dtype, width, checks or on_failure is none of these, or the method cannot do what the scene asks.
@@ -70,8 +87,12 @@ class Plan:
     width: int | None = None
     checks: str = "safe"
     on_failure: str = "freeze"
+    survey_all: bool = True
     kernel_choice: KernelChoice = field(init=False)
     spec: Spec = field(init=False)
+    width_source: str = field(init=False, default="asked for", compare=False)
+    phases: Phases = field(init=False, default=Phases(), compare=False)
+    _facts: Survey = field(init=False, compare=False, repr=False)
     # Of a plan made by part(): the whole plan, the members and the fields.
     _whole: tuple[Plan, Sequence[int], Sequence[str]] | None = field(
         default=None, init=False, compare=False, repr=False
@@ -94,15 +115,18 @@ class Plan:
             faults.add("checks", self.checks, problem, 'use checks="safe", or on_failure="freeze"')
         faults.raise_if_any()
         checked = self.checks != "none"
-        choice = choose_kernel(self.ensemble, self.method, self.grid.h, built_in, checked)
+        most = None if self.survey_all else SURVEYED
+        facts = survey(self.ensemble, self.method, self.grid.h, self.shared, most=most)
+        object.__setattr__(self, "_facts", facts)
+        choice = choose_kernel(self.ensemble, self.method, self.grid.h, facts, built_in, checked)
         object.__setattr__(self, "kernel_choice", choice)
+        check_backward_drag(self.ensemble, choice, self.method, self.grid.h)
         self._check_substep()
+        self._check_noise_steps()
         if self.width is None:
-            # Each turn of psi_x waits for the one before, so two registers pay; the implicit step V of damping laws and
-            # compensated sums fill the registers by themselves.
-            full = "dense" in self.kernel_choice.parts or self.dtype == "float32_compensated"
-            chained = self.method.turns and not full
-            object.__setattr__(self, "width", default_width(self.dtype, chained=chained))
+            width, source = default_width(self._kind(), self.dtype)
+            object.__setattr__(self, "width", width)
+            object.__setattr__(self, "width_source", source)
         object.__setattr__(self, "fields", tuple(name for name in SAMPLE_FIELDS if name in self.fields))
         object.__setattr__(self, "spec", self._spec())
 
@@ -111,6 +135,16 @@ class Plan:
         """The kernel and its types, made when first asked for: many plans are never run."""
         with build_lock, self._laws_compile():
             return make_advance(self.spec)
+
+    @functools.cached_property
+    def shared(self) -> Shared:
+        """What all members share, computed once."""
+        return Shared({*self.ensemble.varied_names, MEMBERS, SEED})
+
+    @functools.cached_property
+    def idle(self) -> list[Any]:
+        """Packets of finished blocks, to be used again."""
+        return []
 
     def _check_substep(self) -> None:
         """Refuse to divide the steps of a method or of laws that cannot be divided, with the reason."""
@@ -133,6 +167,72 @@ class Plan:
                 )
                 faults.add("on_failure", "substep", f"{term.key} {why}", 'use on_failure="freeze", or a shorter step')
         faults.raise_if_any()
+
+    def _check_noise_steps(self) -> None:
+        """Refuse a step that is no whole multiple of a term's noise_step, and name the nearest one that is."""
+        faults, h = Faults(), self.grid.h
+        # All samples are whole multiples of this one.
+        spacing = h * float(np.gcd.reduce(self.grid.sample_steps))
+        for term, _ in self.kernel_choice.laws:
+            if not isinstance(term, NoisyTerm) or term.noise_step is None:
+                continue
+            noise_step, draws = float(term.noise_step), term.draws(h)
+            if abs(h - draws * noise_step) > STEP_ROUND_OFF * h:
+                whole = round(spacing / noise_step)
+                problem = f"is no whole multiple of {term.key}.noise_step = {noise_step:.9g} s"
+                if whole < 1 or abs(spacing - whole * noise_step) > STEP_ROUND_OFF * spacing:
+                    remedy = f"give a noise_step that divides the {spacing:.9g} s between samples"
+                else:
+                    count = min(divisors(whole), key=lambda count: abs(whole / count * noise_step - h))
+                    remedy = f"use a step of {whole // count * noise_step:.9g} s"
+                faults.add("step", h, problem, remedy)
+            elif self.grid.steps * draws >= 2**31:
+                problem = f"makes {self.grid.steps * draws:,} draws in this run"
+                faults.add(f"{term.key}.noise_step", noise_step, problem, "there are 2,147,483,647: use a longer one")
+        faults.raise_if_any()
+
+    def of(self, ensemble: Ensemble) -> Plan:
+        """The same plan for other members, of the same scene and with the same names that vary.
+
+        Args:
+            ensemble: the members; the survey of the whole plan must hold for them.
+
+        Returns:
+            A plan that shares the kernel and all that members share.
+
+        Raises:
+            SceneError: if a member's drag is too strong for the method.
+        """
+        check_backward_drag(ensemble, self.kernel_choice, self.method, self.grid.h)
+        plan = self._copy()
+        object.__setattr__(plan, "ensemble", ensemble)
+        return plan
+
+    def _copy(self) -> Plan:
+        """The same plan, with nothing chosen anew, as copy.copy would by way of __reduce__."""
+        _ = self.shared, self.idle  # which copies have in common
+        plan = object.__new__(Plan)
+        plan.__dict__.update(self.__dict__)
+        return plan
+
+    def check_block(self, block: Block, members: Members) -> None:
+        """Look at members of a block that were not looked at before the run.
+
+        Args:
+            block: the block.
+            members: its members.
+
+        Raises:
+            SceneError: if a member is unphysical.
+            NotSurveyed: if a member needs what the kernel does not have.
+        """
+        self.ensemble.check_block(block.first, block.stop, members.parameters)
+        if not self.survey_all and block.stop > SURVEYED and self._whole is None:
+            seen = survey_of(members.parameters, self.ensemble, self.method, self.grid.h, self.shared, block)
+            if not self._facts.covers(seen):
+                raise NotSurveyed(
+                    f"a member of {block.first} to {block.stop - 1} needs what the first {SURVEYED} do not"
+                )
 
     def with_neighbours(self, indices: np.ndarray) -> np.ndarray:
         """The members whose run gives these members the bits of the whole run.
@@ -163,8 +263,8 @@ class Plan:
         Returns:
             A plan for m members.
         """
-        subplan = copy.copy(self)
-        for name in ("advance", "dtypes", "times"):
+        subplan = self._copy()
+        for name in ("advance", "dtypes", "times", "shared", "idle"):
             subplan.__dict__.pop(name, None)
         object.__setattr__(subplan, "ensemble", self.ensemble.subset(indices))
         object.__setattr__(subplan, "fields", tuple(name for name in SAMPLE_FIELDS if name in fields))
@@ -215,6 +315,14 @@ class Plan:
             backward=checked and back,
             substep=self.on_failure == "substep",
         )
+
+    def _kind(self) -> str:
+        """The kind of kernel for which a width is chosen, one of widths.KINDS."""
+        if "dense" in self.kernel_choice.parts:
+            return "dense"
+        if self.method.tableau or self.method.gauss:
+            return "explicit"
+        return "chained" if self.method.turns else "plain"
 
     def _explicit(self) -> Explicit | None:
         tableau = self.method.tableau
@@ -273,9 +381,12 @@ class Plan:
         """
         start = time.perf_counter()
         module = self.advance.kernel.module
+        made = time.perf_counter() - start
         with self._laws_compile():
-            kernel_cache.load(module)
+            phases = kernel_cache.load(module)
         _ = self.dtypes, self.times  # made here, before threads ask for them
+        if any(phases):  # not loaded before in this process
+            object.__setattr__(self, "phases", phases._replace(source=made + phases.source))
         return time.perf_counter() - start
 
     @functools.cached_property

@@ -152,9 +152,11 @@ def at_start(plan: Watched, members: Members, frame: Frame, momentum: np.ndarray
     bits, value = np.zeros(m, np.uint16), np.full(m, np.nan)
 
     def note(warning: Warnings, size: Any, limit: float) -> None:
-        over = np.broadcast_to(np.asarray(size) > limit, m)
-        bits[over] |= np.uint16(warning)
-        value[over] = np.broadcast_to(size, m)[over]
+        above = np.asarray(size) > limit
+        if above.any():
+            over = np.broadcast_to(above, m)
+            bits[over] |= np.uint16(warning)
+            value[over] = np.broadcast_to(size, m)[over]
 
     small, middle, large = np.sort(frame.J, axis=1).T
     note(Warnings.INERTIA, large / (small + middle), 1.0 + 1e-9)

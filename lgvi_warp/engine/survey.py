@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from lgvi_warp.engine.block import Block
+from lgvi_warp.engine.shared import AXES, FRAME, MEMBERS, Shared, context
 from lgvi_warp.methods.method import Method, middle_axis
 from lgvi_warp.physics import inertia, terms, vehicle
 from lgvi_warp.physics.inertia import Frame
-from lgvi_warp.physics.terms.base import PackingContext
+from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.physics.terms.drag import Drag, has_exact_flow
 from lgvi_warp.scene.ensemble import Ensemble, over_members
 from lgvi_warp.scene.oddities import Oddities
@@ -57,23 +60,26 @@ def frame_of(method: Method, parameters: Parameters) -> tuple[Frame, np.ndarray,
         (frame, U, coupling): the frame; U (n, 3, 3) of the turns of psi_x, zero for other methods; and the coupling
         norm (n,) that is left in this frame and that the method cannot treat.
     """
-    I6 = vehicle.inertia6(parameters)
-    coupling = np.zeros(len(I6))
+    return _frame_of(method, vehicle.inertia_blocks(parameters))
+
+
+def _frame_of(method: Method, body: inertia.Blocks) -> tuple[Frame, np.ndarray, np.ndarray]:
+    coupling = np.zeros(1)
     if method.turns:
-        return *inertia.turns_frame(I6, middle_axis(method.program)), coupling
+        return *inertia.turns_frame(body, middle_axis(method.program)), coupling
     if method.base == "psi_w":
-        frame = inertia.symmetric_frame(I6)
+        frame = inertia.symmetric_frame(body)
     elif method.tableau:
-        frame = _explicit_frame(I6)
+        frame = _explicit_frame(body)
     else:
-        frame, coupling = inertia.uncoupled_frame(I6)
-    return frame, np.zeros_like(frame.M), coupling
+        frame, coupling = inertia.uncoupled_frame(body)
+    return frame, np.zeros((1, 3, 3)), coupling
 
 
-def _explicit_frame(I6: np.ndarray) -> Frame:
+def _explicit_frame(body: inertia.Blocks) -> Frame:
     """The frame about the origin where E is symmetric, with E set to zero for members without coupling."""
-    frame = inertia.symmetric_frame(I6)
-    coupling = inertia.uncoupled_frame(I6)[1]
+    frame = inertia.symmetric_frame(body)
+    coupling = inertia.uncoupled_frame(body)[1]
     E = np.where(coupling[:, None, None] > UNCOUPLED, frame.E, 0.0)
     return replace(frame, E=E, E_forces=E)
 
@@ -116,6 +122,23 @@ class Survey:
     buoyant: bool
     odd: Oddities
 
+    @property
+    def decisive(self) -> tuple[Any, ...]:
+        """All that decides what a kernel must contain: surveys that agree in it lead to one kernel."""
+        facts = vars(self) | {"odd": None, "left": self.left > UNCOUPLED}
+        return tuple(facts.values())
+
+    def covers(self, other: Survey) -> bool:
+        """Whether a kernel chosen by this survey serves the members of the other, too.
+
+        Args:
+            other: survey of other members.
+
+        Returns:
+            False where the other members need more.
+        """
+        return self.joined(other).decisive == self.decisive
+
     def joined(self, other: Survey) -> Survey:
         """The survey of the members of both.
 
@@ -129,48 +152,145 @@ class Survey:
         return Survey(*(a | b if isinstance(a, frozenset | Oddities) else max(a, b) for a, b in pairs))
 
 
-def survey(ensemble: Ensemble, method: Method, h: float) -> Survey:
-    """Look at all members, or at one alone where no number of the vehicle, the water or the laws varies.
+def survey(
+    ensemble: Ensemble,
+    method: Method,
+    h: float,
+    shared: Shared | None = None,
+    odd: bool = True,
+    most: int | None = None,
+) -> Survey:
+    """Look at members, or at one alone where no number of the vehicle, the water or the laws varies.
 
     Args:
         ensemble: the members.
         method: the integration method.
         h: step [s].
+        shared: what all members share, filled here as far as it is computed; by default it is forgotten.
+        odd: whether to look for odd numbers (default True).
+        most: number of the first members to look at; None (default) for all.
 
     Returns:
         What holds for at least one member, and the largest values.
     """
+    known = Shared({*ensemble.varied_names, MEMBERS}) if shared is None else shared
 
     def look(first: int, stop: int) -> Survey:
         # Members that overflow get their status, or their fault, elsewhere: no warning from NumPy.
         with np.errstate(over="ignore", invalid="ignore"):
-            return _look(ensemble, method, h, first, stop)
+            return _look(ensemble, method, h, known, odd, first, stop)
 
-    return functools.reduce(Survey.joined, over_members(look, ensemble.members if ensemble.varied() else 1))
+    count = min(ensemble.members, most or ensemble.members) if ensemble.varied() else 1
+    return functools.reduce(Survey.joined, over_members(look, count))
 
 
-def _look(ensemble: Ensemble, method: Method, h: float, first: int, stop: int) -> Survey:
-    p = ensemble.parameters(first, stop)
-    frame, U, coupling = frame_of(method, p)
-    context = PackingContext(p, frame, ensemble.indices_of(first, stop), ensemble.seed, h, frame.aligned)
-    implied = {t.key for t in terms.IMPLIED if any(np.any(v) for v in t.packed({}, context).values.values())}
-    numbered = [(term, ensemble.own(term, p)) for term in ensemble.scene.terms]
+def survey_of(
+    parameters: Parameters, ensemble: Ensemble, method: Method, h: float, shared: Shared, block: Block
+) -> Survey:
+    """Look at the members of one block, whose parameters are drawn already.
+
+    Args:
+        parameters: their parameters by name.
+        ensemble: all members.
+        method: the integration method.
+        h: step [s].
+        shared: what all members share.
+        block: the block.
+
+    Returns:
+        What holds for at least one of them, without what is odd.
+    """
+    return _seen(parameters, ensemble, method, h, shared, False, block.first, block.stop)
+
+
+def framed(method: Method, parameters: Parameters, shared: Shared) -> dict[str, Any]:
+    """Parameters with the frame that follows from them, under the name FRAME.
+
+    Args:
+        method: the integration method.
+        parameters: parameters of n members by name.
+        shared: what all members share, and the frame if it is shared.
+
+    Returns:
+        The parameters and, under FRAME, what `frame_of` returns; under AXES the same, but any mass matrix in it.
+    """
+    p: dict[str, Any] = dict(parameters)
+    if "vehicle.mass" in p:
+        # Without coupling the axes do not depend on the mass.
+        nothing = np.eye(3)[None], np.zeros((1, 3, 3))
+        p[AXES] = shared(AXES, p, lambda n: _frame_of(method, inertia.Blocks(*nothing, n["vehicle.inertia"])))
+        if not shared.keeps(AXES):
+            shared.varied.add(AXES)
+        mass = shared("mass", p, lambda n: inertia.in_axes(n[AXES][0].Q, vehicle.mass_matrix(n)))
+        p[FRAME] = replace(p[AXES][0], M=mass), *p[AXES][1:]
+        if not (shared.keeps(AXES) and shared.keeps("mass")):
+            shared.varied.add(FRAME)
+    else:
+        p[AXES] = p[FRAME] = shared(FRAME, p, functools.partial(frame_of, method))
+        if not shared.keeps(FRAME):
+            shared.varied.update((FRAME, AXES))
+    return p
+
+
+def _look(ensemble: Ensemble, method: Method, h: float, shared: Shared, odd: bool, first: int, stop: int) -> Survey:
+    return _seen(ensemble.parameters(first, stop), ensemble, method, h, shared, odd, first, stop)
+
+
+def _seen(
+    parameters: Parameters,
+    ensemble: Ensemble,
+    method: Method,
+    h: float,
+    shared: Shared,
+    odd: bool,
+    first: int,
+    stop: int,
+) -> Survey:
+    p = framed(method, parameters, shared)
+    frame, scene, own = p[FRAME][0], ensemble.scene, ensemble.own
+    aligned = shared("aligned", p, lambda numbers: numbers[AXES][0].aligned)
+    run = frame, ensemble.indices_of(first, stop), ensemble.seed, h, aligned
+
+    def is_felt(term: Term, numbers: Any) -> bool:
+        if term not in terms.IMPLIED:
+            return term.present(own(term, numbers))
+        return any(np.any(value) for value in term.packed({}, context(numbers, *run)).values.values())
+
+    def parts(term: Drag, numbers: Any) -> frozenset[str]:
+        return frozenset(term.parts(own(term, numbers)))
+
+    def rises(term: Term, numbers: Any) -> bool:
+        return bool(np.any(own(term, numbers)["velocity"][:, 2]))
+
+    def of_each(name: str, compute: Any, those: Iterable[Term]) -> dict[str, Any]:
+        return {t.key: shared((name, t.key), p, functools.partial(compute, t)) for t in those}
+
+    felt = of_each("felt", is_felt, (*terms.IMPLIED, *scene.terms))
+    drags = of_each("drag", parts, (term for term in scene.terms if isinstance(term, Drag)))
+    rising = of_each("rises", rises, (term for term in scene.terms if term.type == "current"))
+    of_axes = shared("facts of axes", p, lambda numbers: _facts(*numbers[AXES]))
+    mass = shared("shape of mass", p, lambda numbers: SHAPES_OF_MASS.index(shape_of_mass(numbers[FRAME][0].M)))
     return Survey(
-        turned=not frame.aligned,
-        bent=not has_exact_flow(frame),
-        mass=SHAPES_OF_MASS.index(shape_of_mass(frame.M)),
-        coupled=frame.coupled,
-        moved=bool(np.any(frame.origin)),
-        forces_moved=bool(np.any(frame.forces)),
-        apart=bool(np.any(frame.origin != frame.forces)),
-        couplings=frozenset(i for i, at in enumerate(COUPLINGS) if np.any(U[:, *at])),
-        left=float(coupling.max()),
-        felt=frozenset(implied | {term.key for term, numbers in numbered if term.present(numbers)}),
-        drag=frozenset(part for term, numbers in numbered if isinstance(term, Drag) for part in term.parts(numbers)),
-        rising=frozenset(
-            term.key for term, numbers in numbered if term.type == "current" and np.any(numbers["velocity"][:, 2])
-        ),
-        weightless=bool(np.any(p["environment.gravity"] == 0.0)),
-        buoyant=bool(np.any(p["vehicle.buoyancy"])),
-        odd=of_numbers(ensemble.scene, p, first, stop),
+        **of_axes,
+        mass=mass,
+        bent=not shared("exact flow", p, lambda numbers: has_exact_flow(numbers[FRAME][0])),
+        felt=frozenset(key for key, yes in felt.items() if yes),
+        drag=frozenset().union(*drags.values()),
+        rising=frozenset(key for key, yes in rising.items() if yes),
+        weightless=shared("weightless", p, lambda numbers: bool(np.any(numbers["environment.gravity"] == 0.0))),
+        buoyant=shared("buoyant", p, lambda numbers: bool(np.any(numbers["vehicle.buoyancy"]))),
+        odd=of_numbers(scene, p, first, stop, shared) if odd else Oddities({}),
     )
+
+
+def _facts(frame: Frame, U: np.ndarray, coupling: np.ndarray) -> dict[str, Any]:
+    """What a survey says of the axes and origins of some members."""
+    return {
+        "turned": not frame.aligned,
+        "coupled": frame.coupled,
+        "moved": bool(np.any(frame.origin)),
+        "forces_moved": bool(np.any(frame.forces)),
+        "apart": bool(np.any(frame.origin != frame.forces)),
+        "couplings": frozenset(i for i, at in enumerate(COUPLINGS) if np.any(U[:, *at])),
+        "left": float(coupling.max()),
+    }

@@ -33,11 +33,13 @@ class Work:
         plan: the plan of the run.
         keepers: what is kept of the members.
         store: the store; None (default) for none.
+        warned: whether outcomes have warnings (default True).
     """
 
     plan: Plan
     keepers: tuple[Keeper, ...]
     store: BlockStore | None = None
+    warned: bool = True
 
     def __call__(
         self,
@@ -63,7 +65,7 @@ class Work:
             advanced(steps_made)
 
         if self.store is None:
-            return run_block(self.plan, block, self.keepers, halted, add)
+            return run_block(self.plan, block, self.keepers, halted, add, self.warned)
         stored = self.store.parts(block, self.keepers)
         if stored is not None:
             return stored
@@ -80,6 +82,7 @@ def run_block(
     keepers: Sequence[Keeper],
     halted: Callable[[], bool] = lambda: False,
     advanced: Callable[[int], None] = lambda vehicle_steps: None,
+    warned: bool = True,
 ) -> tuple[Any, ...] | None:
     """Advance a block through all steps.
 
@@ -89,6 +92,7 @@ def run_block(
         keepers: what is kept of the members.
         halted: asked before each launch whether to give up (default: never).
         advanced: called with the vehicle-steps made since the last call (default: nothing).
+        warned: whether the outcome has warnings (default True).
 
     Returns:
         What each keeper closed with; None if the block was halted before the end.
@@ -98,7 +102,8 @@ def run_block(
     # Members that are not finite, or exceed float32, get their status from the kernel: no warning from NumPy.
     with np.errstate(invalid="ignore", over="ignore"):
         members = plan.ensemble.select(block.first, block.stop)
-        packets = Packets(plan, members)
+        plan.check_block(block, members)
+        packets = Packets.of(plan, members)
         block_keepers = [keeper.open(plan, block, members) for keeper in keepers]
         for block_keeper in block_keepers:
             block_keeper.take(slice(0, 1), samples_of(plan, slice(0, 1), at_start(plan, members), packets.ended))
@@ -113,8 +118,10 @@ def run_block(
                 for block_keeper in block_keepers:
                     block_keeper.take(when, samples)
             advanced(block.count * (k1 - k0))
-        outcome = packets.outcome()
-        return tuple(block_keeper.close(outcome) for block_keeper in block_keepers)
+        outcome = packets.outcome(warned)
+        results = tuple(block_keeper.close(outcome) for block_keeper in block_keepers)
+        packets.leave()
+        return results
 
 
 def at_start(plan: Plan, members: Members) -> dict[str, np.ndarray]:

@@ -137,3 +137,16 @@ def time_grid(h: float, t1: float, save: SaveAt) -> TimeGrid:
     # A quotient of whole numbers is the float nearest to each time; a sum of steps would not be.
     times = [k * step.numerator / step.denominator for k in steps.tolist()]
     return TimeGrid(float(step), steps.astype(np.int64), np.array(times), messages)
+
+
+def divisors(count: int) -> list[int]:
+    """The whole numbers that divide a whole number.
+
+    Args:
+        count: A whole number from 1.
+
+    Returns:
+        Its divisors, rising.
+    """
+    small = [k for k in range(1, math.isqrt(count) + 1) if count % k == 0]
+    return sorted({*small, *(count // k for k in small)})

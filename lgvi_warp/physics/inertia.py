@@ -7,6 +7,7 @@ all members) or n. A shift of the origin by d (body axes) leaves M and Js unchan
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,16 +30,30 @@ def vee(A: np.ndarray) -> np.ndarray:
     return 0.5 * np.stack([A[..., i, j] - A[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=-1)
 
 
-def blocks(I6: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+class Blocks(NamedTuple):
+    """The blocks of mass matrices. Each has a leading dimension of 1 or n of its own.
+
+    Args:
+        M: Mass, (., 3, 3) [kg].
+        C: Coupling, (., 3, 3) [kg m].
+        J: Inertia, (., 3, 3) [kg m2].
+    """
+
+    M: np.ndarray
+    C: np.ndarray
+    J: np.ndarray
+
+
+def blocks(I6: np.ndarray) -> Blocks:
     """The blocks M, C and J of mass matrices.
 
     Args:
         I6: Mass matrices (n, 6, 6), linear part first.
 
     Returns:
-        M [kg], C [kg m] and J [kg m2], each (n, 3, 3).
+        Blocks of n members each.
     """
-    return I6[:, :3, :3], I6[:, :3, 3:], I6[:, 3:, 3:]
+    return Blocks(I6[:, :3, :3], I6[:, :3, 3:], I6[:, 3:, 3:])
 
 
 def joined(M: np.ndarray, C: np.ndarray, J: np.ndarray) -> np.ndarray:
@@ -52,7 +67,7 @@ def joined(M: np.ndarray, C: np.ndarray, J: np.ndarray) -> np.ndarray:
     Returns:
         I6 (n, 6, 6), linear part first.
     """
-    I6 = np.empty((len(M), 6, 6))
+    I6 = np.empty((max(len(M), len(C), len(J)), 6, 6))
     I6[:, :3, :3], I6[:, :3, 3:], I6[:, 3:, :3], I6[:, 3:, 3:] = M, C, np.swapaxes(C, -1, -2), J
     return I6
 
@@ -195,45 +210,61 @@ def _expanded(origin: np.ndarray, like: np.ndarray) -> np.ndarray:
     return origin.reshape(len(origin), *(1,) * (like.ndim - 2), 3)
 
 
-def schur(I6: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def schur(body: Blocks) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The mass, E and the Schur complement of mass matrices.
 
     Args:
-        I6: Mass matrices (n, 6, 6).
+        body: Mass matrices.
 
     Returns:
-        M [kg], E = M^-1 C [m] and Js = J - C^T E [kg m2], each (n, 3, 3).
+        M [kg], E = M^-1 C [m] and Js = J - C^T E [kg m2], each (., 3, 3).
     """
-    M, C, J = blocks(I6)
-    coupled = np.any(C, axis=(-2, -1))
+    coupled = np.any(body.C, axis=(-2, -1))
     if not coupled.any():
-        return M, np.zeros_like(C), J
+        return body.M, np.zeros_like(body.C), body.J
+    M, C, J = notation.repeated(*body)
+    coupled = np.broadcast_to(coupled, len(C))
     E, Js = np.zeros_like(C), J.copy()
     E[coupled] = np.linalg.solve(M[coupled], C[coupled])
     Js[coupled] -= np.swapaxes(C[coupled], -1, -2) @ E[coupled]
     return M, E, Js
 
 
-def uncoupled_frame(I6: np.ndarray) -> tuple[Frame, np.ndarray]:
+def in_axes(Q: np.ndarray, A: np.ndarray) -> np.ndarray:
+    """Matrices in other axes, Q^T A Q.
+
+    Args:
+        Q: The other axes in the user's, (., 3, 3).
+        A: Matrices (., 3, 3) in the user's axes.
+
+    Returns:
+        Matrices (., 3, 3) in the axes Q.
+    """
+    if np.all(np.eye(3) == Q):
+        return A
+    return np.asarray(np.swapaxes(Q, -1, -2) @ A @ Q)
+
+
+def uncoupled_frame(body: Blocks) -> tuple[Frame, np.ndarray]:
     """The frame at the origin where M and J are uncoupled, with J diagonal.
 
     The coupling vanishes there if and only if E is skew.
 
     Args:
-        I6: Mass matrices (n, 6, 6) about the user's origin, in the user's axes.
+        body: Mass matrices about the user's origin, in the user's axes.
 
     Returns:
-        The frame, and the coupling norm (n,) that remains there.
+        The frame, and the coupling norm (.,) that remains there.
     """
-    M, E, Js = schur(I6)
+    M, E, Js = schur(body)
     origin = -vee(E)
     Q, J = notation.principal_axes(Js)
     coupled, remaining = np.any(E, axis=(-2, -1)), np.zeros(len(E))
     if coupled.any():
-        remaining[coupled] = coupling(moved(I6[coupled], origin[coupled], Q[coupled]))
-    zero = np.zeros_like(M)
+        remaining[coupled] = coupling(moved(joined(*body)[coupled], origin[coupled], Q[coupled]))
+    zero = np.zeros_like(E)
     # Mass does not depend on the origin.
-    return Frame(Q, origin, origin, np.swapaxes(Q, -1, -2) @ M @ Q, J, zero, zero), remaining
+    return Frame(Q, origin, origin, in_axes(Q, M), J, zero, zero), remaining
 
 
 def ascending(Q: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -252,20 +283,19 @@ def ascending(Q: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return Q, np.take_along_axis(J, order, axis=1)
 
 
-def turns_frame(I6: np.ndarray, middle: int = 3) -> tuple[Frame, np.ndarray]:
+def turns_frame(body: Blocks, middle: int = 3) -> tuple[Frame, np.ndarray]:
     """The frame of psi_x: the state at axis 1's origin, the forces at the origin of axis `middle`.
 
     Args:
-        I6: Mass matrices (n, 6, 6) about the user's origin, in the user's axes.
+        body: Mass matrices about the user's origin, in the user's axes.
         middle: Axis at whose origin the kick acts, 2 or 3; 3 by default.
 
     Returns:
         The frame, and U (n, 3, 3) [m], upper triangular: E at the origin of the state.
     """
-    M, E, Js = schur(I6)
+    M, E, Js = schur(body)
     Q, J = ascending(*notation.principal_axes(Js))
-    turned = np.swapaxes(Q, -1, -2)
-    EQ = turned @ E @ Q
+    EQ = in_axes(Q, E)
     size = np.abs(EQ).max(axis=(-2, -1), keepdims=True)
     d = np.stack([-EQ[:, 2, 1], EQ[:, 2, 0], -EQ[:, 1, 0]], axis=-1)
     U = np.triu(EQ + hat(d))
@@ -273,22 +303,21 @@ def turns_frame(I6: np.ndarray, middle: int = 3) -> tuple[Frame, np.ndarray]:
     a = np.stack([U[:, 1, 2], -U[:, 0, 2], U[:, 0, 1]], axis=-1)
     if middle == 2:
         a[:, :2] = 0.0
-    M = turned @ M @ Q
+    M = in_axes(Q, M)
     return Frame(Q, notation.rotate_out(Q, d), notation.rotate_out(Q, d + a), M, J, U, U + hat(a)), U
 
 
-def symmetric_frame(I6: np.ndarray) -> Frame:
+def symmetric_frame(body: Blocks) -> Frame:
     """The frame of psi_w: at the origin where E = S is symmetric, in the principal axes of Js.
 
     Args:
-        I6: Mass matrices (n, 6, 6) about the user's origin, in the user's axes.
+        body: Mass matrices about the user's origin, in the user's axes.
 
     Returns:
         The frame.
     """
-    M, E, Js = schur(I6)
+    M, E, Js = schur(body)
     origin = -vee(E)
     Q, J = notation.principal_axes(Js)
-    turned = np.swapaxes(Q, -1, -2)
-    S = turned @ (0.5 * (E + np.swapaxes(E, -1, -2))) @ Q
-    return Frame(Q, origin, origin, turned @ M @ Q, J, S, S)
+    S = in_axes(Q, 0.5 * (E + np.swapaxes(E, -1, -2)))
+    return Frame(Q, origin, origin, in_axes(Q, M), J, S, S)

@@ -303,6 +303,32 @@ def impossible(rigid: np.ndarray, tolerance: float = 0.0) -> np.ndarray:
     return shortage(rigid) > max(tolerance, ROUND_OFF)
 
 
+def inertia_blocks(p: Numbers) -> inertias.Blocks:
+    """Blocks of the mass matrix of body and added mass about the user's origin, each with a member for what varies in it.
+
+    Args:
+        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+
+    Returns:
+        The blocks.
+    """
+    if "vehicle.rigid_body_mass_matrix" in p:
+        return inertias.blocks(p["vehicle.rigid_body_mass_matrix"] + p["vehicle.added_mass_matrix"])
+    return inertias.Blocks(mass_matrix(p), np.zeros((1, 3, 3)), p["vehicle.inertia"])
+
+
+def mass_matrix(p: Numbers) -> np.ndarray:
+    """Mass and added mass of a vehicle whose mass matrix has no coupling.
+
+    Args:
+        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+
+    Returns:
+        M (n, 3, 3) [kg].
+    """
+    return np.asarray(p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"])
+
+
 def inertia6(p: Numbers) -> np.ndarray:
     """Mass matrix of body and added mass about the user's origin.
 
@@ -312,12 +338,7 @@ def inertia6(p: Numbers) -> np.ndarray:
     Returns:
         I6 (n, 6, 6) [kg, kg m, kg m2], linear part first.
     """
-    if "vehicle.rigid_body_mass_matrix" in p:
-        return np.asarray(p["vehicle.rigid_body_mass_matrix"] + p["vehicle.added_mass_matrix"])
-    M = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
-    J = p["vehicle.inertia"]
-    M, J = notation.repeated(M, J)
-    return inertias.joined(M, np.zeros_like(M), J)
+    return inertias.joined(*inertia_blocks(p))
 
 
 def dry_mass(p: Numbers) -> np.ndarray:

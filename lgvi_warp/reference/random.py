@@ -4,6 +4,8 @@ A number is a function of its key and counter, nothing is carried along: any mem
 in any order, on any machine.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -48,3 +50,16 @@ def normals(
     *counter, seed0, seed1 = np.broadcast_arrays(*numbers)
     words = philox4x32(np.stack(counter, axis=-1), np.stack([seed0, seed1], axis=-1))
     return np.concatenate([box_muller(words[..., :2]), box_muller(words[..., 2:])], axis=-1)
+
+
+def draws_of_step(law: Any, view: Any, stream: int = 0) -> NDArray[np.float64]:
+    """Three standard normals of each draw of a step, shape (r, 3): step k has the draws k r to k r + r - 1.
+
+    Args:
+        law: Its key (seed0, seed1 and channel) and `noise_step` [s], the time between two draws, or None for the step.
+        view: Its member, step and h [s].
+        stream: 0, the default, or 1, two that are independent.
+    """
+    count = 1 if law.noise_step is None else round(view.h / law.noise_step)
+    draws = view.step * count + np.arange(count)
+    return normals(law.seed0, law.seed1, view.member, draws, law.channel + stream)[:, :3]

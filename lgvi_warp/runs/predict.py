@@ -143,7 +143,7 @@ def predict(
     scene = ensemble.scene
     observed = observe(ensemble.members, scene.run, statistics, keep, until, scene.events)
     fields = (settings.get("save") or SaveAt()).fields
-    plan = make_plan(ensemble, **settings, fields=observed.fields)
+    plan = make_plan(ensemble, **settings, fields=observed.fields, survey_all=False)
     compile_seconds = plan.compile()
     count = threads or machine.thread_count()
     set_up, step = costs(plan, count, observed)

@@ -11,7 +11,7 @@ from lgvi_warp.common import machine
 from lgvi_warp.engine.keepers.observation import Observation
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.scene import plausibility
-from lgvi_warp.scene.ensemble import AT_ONCE
+from lgvi_warp.scene.ensemble import AT_ONCE, SURVEYED
 
 
 def messages(plan: Plan) -> tuple[str, ...]:
@@ -57,7 +57,7 @@ def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence
         "terms": [term.type for term, _ in plan.kernel_choice.laws],
         "kernel": plan.kernel_hash,
         "versions": machine.versions(),
-        "machine": machine.describe(),
+        "machine": machine.describe() | {"width_source": plan.width_source},
     }
     if observed is not None and observed != Observation():
         kept = {} if observed.samples else {"fields": list(plan.fields if fields is None else fields)}
@@ -93,4 +93,5 @@ def odd_before(plan: Plan) -> tuple[str, ...]:
     ensemble = plan.ensemble
     varies = ensemble.starts_vary or bool(ensemble.varied() and plausibility.own_flows(ensemble.scene))
     starts = plausibility.of_start(ensemble.scene, ensemble.select(0, min(AT_ONCE, ensemble.members) if varies else 1))
-    return plan.kernel_choice.odd.messages(ensemble.members) + starts.messages(ensemble.members, AT_ONCE)
+    most = None if plan.survey_all else SURVEYED
+    return plan.kernel_choice.odd.messages(ensemble.members, most) + starts.messages(ensemble.members, AT_ONCE)

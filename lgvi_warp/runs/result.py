@@ -15,6 +15,7 @@ import numpy as np
 from lgvi_warp.common import files as durable
 from lgvi_warp.common import npy_files
 from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.phases import Phases
 from lgvi_warp.common.status import StatusArray, WarningArray
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
@@ -63,6 +64,7 @@ class Result:
         kept_members: Indices of these members, shape (m,).
         store: Folder from which samples and parameters are read each time they are used; None for a result in memory.
         compile_seconds: Time to load the kernel [s].
+        compile_phases: Of this, `source` to write its C++, `clang` to compile it (0 where the cache had it), `load` [s].
         run_seconds: Time of the run without that [s].
     """
 
@@ -84,6 +86,7 @@ class Result:
     kept_members: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     store: Path | None = None
     compile_seconds: float = field(default=0.0, compare=False)
+    compile_phases: Phases = field(default=Phases(), compare=False)
     run_seconds: float = field(default=0.0, compare=False)
 
     def _kept(self, name: str) -> np.ndarray:

@@ -5,18 +5,19 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Interrupted, MembersFailed
-from lgvi_warp.engine.block import blocks
+from lgvi_warp.engine.block import blocks, shares
 from lgvi_warp.engine.executors.base import Executor
 from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.keepers.memory import Outcomes, Samples
 from lgvi_warp.engine.keepers.observation import Observation, Observing
 from lgvi_warp.engine.loop import Merged, RunProgress, run_blocks
-from lgvi_warp.engine.plan import Plan
+from lgvi_warp.engine.plan import NotSurveyed, Plan
 from lgvi_warp.engine.work import Work
 from lgvi_warp.runs import member_fields
 from lgvi_warp.runs.outcomes import failure_text
@@ -61,6 +62,8 @@ def run_plan(
     fields: Sequence[str] | None = None,
     executor: Executor | None = None,
     partial: bool = False,
+    known: tuple[dict[str, Any], tuple[str, ...]] | None = None,
+    warned: bool = True,
 ) -> Result:
     """Run the blocks of a plan, all or as many as its statistics need, and gather the result in memory.
 
@@ -72,6 +75,8 @@ def run_plan(
         fields: Names of the fields whose samples are kept; default all of the plan.
         executor: What runs the blocks; default this number of threads.
         partial: Whether an interrupt raises Interrupted with the members that were finished.
+        known: Provenance and messages of the run, where many runs share them; by default they are made for this run.
+        warned: Whether the result has warnings; default True.
 
     Returns:
         The result of all members, or of the first ones where `until` ended the run.
@@ -91,12 +96,22 @@ def run_plan(
 
     def ended(n: int, whole: bool = True) -> Result:
         run_seconds = time.perf_counter() - start
-        result = _in_memory(plan, n, observed, outcomes, samples, observing if whole else None, fields)
-        return replace(result, compile_seconds=compile_seconds, run_seconds=run_seconds)
+        result = _in_memory(plan, n, observed, outcomes, samples, observing if whole else None, fields, known)
+        return replace(result, compile_seconds=compile_seconds, compile_phases=plan.phases, run_seconds=run_seconds)
 
+    runner = executor or Threads(threads)
+    # Statistics are joined block by block, so their bits depend on the blocks; those of samples do not.
+    free = isinstance(runner, Threads) and not observing.keepers
+    parts, work = (
+        blocks(total, shares(total, threads, plan.grid.steps) if free else None),
+        Work(plan, keepers, warned=warned),
+    )
     try:
-        n = run_blocks(Work(plan, keepers), blocks(total), executor or Threads(threads), overall.at, enough=observing.enough,
-                       merged=merged)  # fmt: skip
+        n = run_blocks(work, parts, runner, overall.at, enough=observing.enough, merged=merged)
+    except NotSurveyed:
+        # Rare: a kernel for all members, and the run from its beginning, so that all members have the bits of one kernel.
+        plan = replace(plan, survey_all=True)
+        return run_plan(plan, threads, progress, observed, fields, executor, partial, known, warned)
     except KeyboardInterrupt as stop:
         if not (partial and merged.done):
             raise
@@ -139,10 +154,10 @@ def _in_memory(
     samples: Samples | None,
     observing: Observing | None,
     fields: Sequence[str] | None,
+    known: tuple[dict[str, Any], tuple[str, ...]] | None,
 ) -> Result:
     """The result of the first n members; observing: their statistics, None if these include other members."""
-    content = provenance(plan, observed, fields)
-    parameters = Drawn(plan.ensemble, n)
+    content, texts = (provenance(plan, observed, fields), messages(plan)) if known is None else known
     of_members = {name: values[:n] for name, values in member_fields.of(plan, outcomes.all).items()}
     estimates, remarks = Estimates(), tuple[str, ...]()
     if observing is not None:
@@ -150,12 +165,13 @@ def _in_memory(
     # The arrays have room for all members; beyond the last one that ran nothing was written.
     kept = samples.fields if samples and samples.fields else {}
     histories = {name: values[:, :n] for name, values in kept.items()}
+    on_the_way = plausibility.on_the_way(plan.ensemble.scene, histories).messages(n) if known is None else ()
     return Result(
         time=plan.grid.times,
         samples=histories,
         **Result.per_member(of_members),
-        parameters=dict(parameters) if samples is not None else parameters,
-        messages=messages(plan) + remarks + plausibility.on_the_way(plan.ensemble.scene, histories).messages(n),
+        parameters=Drawn(plan.ensemble, n),
+        messages=texts + remarks + on_the_way,
         provenance=at_end(content, of_members, n, plan.ensemble.members),
         terms=tuple(plan.ensemble.scene.terms),
         statistics=estimates,

@@ -53,6 +53,7 @@ def make_plan(
     checks: str | None = None,
     on_failure: str | None = None,
     fields: Callable[[Sequence[str]], tuple[str, ...]] = tuple,
+    survey_all: bool = True,
 ) -> Plan:
     """Settle the settings of a run, from the arguments and, where they are None, from the scene's [run] section.
 
@@ -67,6 +68,7 @@ def make_plan(
         checks: "safe", "all" or "none".
         on_failure: "freeze", "raise" or "substep".
         fields: Function from the names of the fields that `save` asks for to those that the kernel writes; default the same.
+        survey_all: As of `Plan`; default True.
 
     Returns:
         The plan, with a fixed number of Newton steps where the method says iterations="auto".
@@ -106,7 +108,8 @@ def make_plan(
         number = f"{n} a solve, enough for" if n is not None else f"to the tolerance: {MOST_FIXED} are too few for"
         text = f"Newton steps {number} every member's start at twice the step"
         grid = replace(grid, messages=(*grid.messages, text))
-    return Plan(ensemble, chosen, grid, fields(save.fields), dtype, width, checks, on_failure or settings.on_failure)
+    on_failure = on_failure or settings.on_failure
+    return Plan(ensemble, chosen, grid, fields(save.fields), dtype, width, checks, on_failure, survey_all)
 
 
 # With more Newton steps than this, a fixed number gains nothing over iterating to the tolerance.

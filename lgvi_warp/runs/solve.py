@@ -104,8 +104,8 @@ def solve(
     faults.raise_if_any()
     assert runner is not None
     plan = make_plan(
-        ensemble, method, h, t1, save, dtype, width=width, checks=checks, on_failure=on_failure, fields=observed.fields
-    )
+        ensemble, method, h, t1, save, dtype, width=width, checks=checks, on_failure=on_failure, fields=observed.fields,
+        survey_all=store is not None)  # fmt: skip
     fields, count = (save or SaveAt()).fields, threads or machine.thread_count()
     if store is None:
         result = run_plan(plan, count, progress, observed, fields, runner, partial=True)

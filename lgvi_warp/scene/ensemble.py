@@ -182,13 +182,14 @@ class Ensemble:
         if explicit:
             self._start = {key: value for key, value in explicit.items() if key.startswith("start.")}
         self._base = scene.parameters()
+        self._shared_attitude: np.ndarray | None = None
         # Positions of these members in the whole ensemble, and the indices that key their noise; None: all, in order.
         self._places: np.ndarray | None = None
         self._indices: np.ndarray | None = None
         self.variations = self._described()
         self.space: Space = variations.space(self.seed, self.variations)
         self._whole = self._counted(settings)
-        self.members = self._whole
+        self.members = self.checked = self._whole
         if not checked:
             self._check_physical()
 
@@ -276,29 +277,64 @@ class Ensemble:
         return np.arange(first, stop) if self._indices is self._places is None else self.indices[first:stop]
 
     def _check_physical(self) -> None:
-        """Refuse unphysical members: all are checked, so few at a time that memory stays small."""
-        drawn = {target.name for variation in self.variations for target in variation.targets}
-        varied = self._varied_names & self._base.keys()
+        """Refuse unphysical members, looking at so few at a time that memory stays small.
+
+        Members that are drawn are looked at up to SURVEYED; a run looks at the others as it comes to them.
+        """
+        varied = self.varied_names & self._base.keys()
+        self.checked = self.members if self._explicit or self._columns or not varied else min(self.members, SURVEYED)
+
+        def look(first: int, stop: int) -> dict[str, _Unphysical]:
+            with np.errstate(over="ignore", invalid="ignore"):
+                return self._look_at(varied, first, stop, self.parameters(first, stop))
+
         findings: dict[str, _Unphysical] = {}
-        for block_findings in over_members(functools.partial(self._look_at, varied), self.members if varied else 0):
+        for block_findings in over_members(look, self.checked if varied else 0):
             for key, finding in block_findings.items():
                 if key not in findings:
                     findings[key] = finding
                 elif not finding.shared:
                     findings[key].count += finding.count
+        self._refuse(findings, self.checked)
+
+    def check_block(self, first: int, stop: int, parameters: Mapping[str, np.ndarray]) -> None:
+        """Check that members are physical, as far as that was not checked before.
+
+        Args:
+            first: Position of the first member.
+            stop: Position after the last member.
+            parameters: Their parameters by name.
+
+        Raises:
+            SceneError: If a member is unphysical; the message names the first of them.
+        """
+        if stop > self.checked:
+            self._refuse(self._look_at(self.varied_names & self._base.keys(), first, stop, parameters), stop - first)
+
+    def _refuse(self, findings: Mapping[str, _Unphysical], looked_at: int) -> None:
+        """Raise SceneError if anything was found; looked_at: number of members."""
+        drawn = {target.name for variation in self.variations for target in variation.targets}
         faults = Faults()
         for key, finding in findings.items():
             is_drawn = not drawn.isdisjoint(key.split(" + "))
             remedy = (
                 "use a smaller spread, TruncatedNormal or LogNormal" if is_drawn else "give finite, physical values"
             )
-            problem = f"is unphysical ({finding.count} of {finding.of if finding.shared else self.members} members)"
+            of = (
+                f"{looked_at} members"
+                if looked_at == self.members
+                else f"the {looked_at:,} members that were looked at"
+            )
+            problem = (
+                f"is unphysical ({finding.count} of {finding.of} members)"
+                if finding.shared
+                else f"is unphysical ({finding.count} of {of})"
+            )
             faults.add(f"{key} of member {finding.first}", finding.value, problem, remedy)
         faults.raise_if_any()
 
-    def _look_at(self, varied: set[str], first: int, stop: int) -> dict[str, _Unphysical]:
+    def _look_at(self, varied: set[str], first: int, stop: int, p: Mapping[str, np.ndarray]) -> dict[str, _Unphysical]:
         with np.errstate(over="ignore", invalid="ignore"):
-            p = self.parameters(first, stop)
             checks = _vehicle_checks(p, varied, self.scene.vehicle.inertia_tolerance)
             for term in (*self.scene.terms, *self.scene.events):
                 numbers = self.own(term, p)
@@ -383,7 +419,8 @@ class Ensemble:
         m = stop - first
         values = self._values(first, stop)
         start = {key.removeprefix("start."): values.pop(key) for key in self._start}
-        R = np.broadcast_to(resolve_attitude(start), (m, 3, 3))
+        # In one memory layout, on which the order of the sums of a matrix product depends.
+        R = np.broadcast_to(np.ascontiguousarray(self._attitude(start)), (m, 3, 3))
         if "velocity_inertial" in start:
             # Written out: the order of the sum, and so its bits, must not depend on the number of members.
             v = start["velocity_inertial"]
@@ -393,17 +430,26 @@ class Ensemble:
         position, nu, Om = (np.broadcast_to(x, (m, 3)) for x in (start["position"], nu, start["angular_velocity"]))
         return Members(values, position, R, nu, Om, self.indices_of(first, stop), self.seed)
 
+    def _attitude(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Rotation matrices (1 or m, 3, 3) of some members; one that members share is computed once."""
+        if self._shared_attitude is None:
+            R = resolve_attitude(start)
+            if not self.varied_names.isdisjoint(f"start.{way}" for way in ATTITUDES):
+                return R
+            self._shared_attitude = R
+        return self._shared_attitude
+
     def varied(self) -> list[str]:
         """Return the names of the parameters that vary from member to member.
 
         Returns:
             Names in the order of `scene.parameters()`; those of the start are not among them.
         """
-        varied = self._varied_names
+        varied = self.varied_names
         return [name for name in self._base if name in varied]
 
     @property
-    def _varied_names(self) -> set[str]:
+    def varied_names(self) -> set[str]:
         """Names of what members have of their own: drawn, from columns or explicit."""
         targets = [target for variation in self.variations for target in variation.targets]
         return {target.name for target in (*targets, *(target for target, _ in self._columns))} | self._explicit.keys()
@@ -411,7 +457,7 @@ class Ensemble:
     @property
     def starts_vary(self) -> bool:
         """Whether the initial state differs from member to member."""
-        return not self._varied_names <= self._base.keys()
+        return not self.varied_names <= self._base.keys()
 
     def subset(self, indices: Sequence[int] | np.ndarray) -> Ensemble:
         """Return some members as an ensemble of their own, with the same numbers.
@@ -435,6 +481,49 @@ class Ensemble:
         ensemble._places = chosen if self._places is None else self._places[chosen]
         ensemble._indices = None if self._indices is None else self._indices[chosen]
         ensemble.members = len(chosen)
+        # Some of these may lie beyond the members that were checked.
+        ensemble.checked = len(chosen) if self.checked == self.members else 0
+        return ensemble
+
+    def with_columns(self, columns: Mapping[str, np.ndarray]) -> Ensemble:
+        """Return an ensemble of other members, of which a table's columns have other values.
+
+        Args:
+            columns: Values (n, ...) by label of what the table of this ensemble sets, such as "start.position[2]".
+
+        Returns:
+            The ensemble of n members.
+
+        Raises:
+            SceneError: If a member is unphysical.
+        """
+        ensemble = copy.copy(self)
+        ensemble._columns = [(target, columns[target.label]) for target, _ in self._columns]
+        ensemble._places = ensemble._indices = None
+        ensemble._whole = ensemble.members = len(ensemble._columns[0][1])
+        ensemble._check_physical()
+        return ensemble
+
+    def with_seed(self, seed: int, members: int) -> Ensemble:
+        """Return an ensemble of other members, drawn from the same distributions.
+
+        Args:
+            seed: Whole number >= 0.
+            members: Number of members.
+
+        Returns:
+            The ensemble.
+
+        Raises:
+            SceneError: If the sampling cannot have so many members, or a member is unphysical.
+        """
+        settings = EnsembleSettings(members, seed, self.vary, self.sampling)
+        ensemble = copy.copy(self)
+        ensemble.seed = int(settings.seed)
+        ensemble._places = ensemble._indices = None
+        ensemble.space = variations.space(ensemble.seed, self.variations)
+        ensemble._whole = ensemble.members = ensemble._counted(settings)
+        ensemble._check_physical()
         return ensemble
 
     def member(self, index: int) -> Ensemble:
@@ -483,6 +572,8 @@ class Ensemble:
 
 # Members that are checked together before a run: some tens of megabytes per thread.
 AT_ONCE = 16_384
+# Members that are drawn and checked before a run; the others are checked as the run comes to them.
+SURVEYED = 32_768
 Found = TypeVar("Found")
 
 
@@ -497,6 +588,8 @@ def over_members(look: Callable[[int, int], Found], members: int) -> list[Found]
         The function's results, in the order of the members.
     """
     firsts = range(0, members, AT_ONCE)
+    if len(firsts) < 2:
+        return [look(0, members)] if members else []
     with ThreadPoolExecutor(min(machine.thread_count(), max(1, len(firsts)))) as pool:
         return list(pool.map(lambda first: look(first, min(first + AT_ONCE, members)), firsts))
 
@@ -518,31 +611,42 @@ def _is_name(name: Any) -> bool:
 
 
 def _vehicle_checks(p: Mapping[str, np.ndarray], varied: set[str], tolerance: float) -> dict[str, np.ndarray]:
-    """Return masks (n,) by name: which members' numbers of vehicle and environment are unphysical."""
-    checks: dict[str, np.ndarray] = {}
-    if "vehicle.mass" in p:
-        mass = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
-        heavy = np.isfinite(p["vehicle.mass"]) & (p["vehicle.mass"] >= vehicles.LEAST)
-        checks |= {
-            "vehicle.mass": ~heavy,
-            "vehicle.inertia": ~_positive_definite(p["vehicle.inertia"]),
-            "vehicle.mass + vehicle.added_mass": heavy & ~_positive_definite(mass),
-        }
-    else:
-        rigid, added = "vehicle.rigid_body_mass_matrix", "vehicle.added_mass_matrix"
+    """Return masks (n,) by name: which members' varied numbers of vehicle and environment are unphysical."""
+
+    def heavy() -> np.ndarray:
+        return np.isfinite(p["vehicle.mass"]) & (p["vehicle.mass"] >= vehicles.LEAST)
+
+    def light_with_water() -> np.ndarray:
+        total = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
+        return heavy() & ~_positive_definite(total)
+
+    def impossible_body() -> np.ndarray:
         good = _positive_definite(p[rigid])
         possible = np.where(good[:, None, None], p[rigid], np.eye(6))
-        bad = ~good | vehicles.impossible(possible, tolerance)
-        checks |= {rigid: bad, f"{rigid} + {added}": ~_positive_definite(p[rigid] + p[added])}
-    for key in ("vehicle.center_of_buoyancy", "vehicle.center_of_gravity"):
-        if key in p:
-            checks[key] = ~np.isfinite(p[key]).all(axis=1)
-    for key in ("vehicle.buoyancy", "vehicle.weight", "environment.gravity"):
-        if key in p:
-            checks[key] = ~(np.isfinite(p[key]) & (p[key] >= 0.0))
+        return np.asarray(~good | vehicles.impossible(possible, tolerance))
+
+    def negative(key: str) -> np.ndarray:
+        return np.asarray(~(np.isfinite(p[key]) & (p[key] >= 0.0)))
+
+    def not_finite(key: str) -> np.ndarray:
+        return np.asarray(~np.isfinite(p[key]).all(axis=1))
+
+    rigid, added = "vehicle.rigid_body_mass_matrix", "vehicle.added_mass_matrix"
+    checks: dict[str, Callable[[], np.ndarray]] = {}
+    if "vehicle.mass" in p:
+        checks["vehicle.mass"] = lambda: ~heavy()
+        checks["vehicle.inertia"] = lambda: ~_positive_definite(p["vehicle.inertia"])
+        checks["vehicle.mass + vehicle.added_mass"] = light_with_water
+    else:
+        checks[rigid] = impossible_body
+        checks[f"{rigid} + {added}"] = lambda: ~_positive_definite(p[rigid] + p[added])
+    for keys, check in ((("center_of_buoyancy", "center_of_gravity"), not_finite), (("buoyancy", "weight"), negative)):
+        checks |= {key: functools.partial(check, key) for key in map("vehicle.{}".format, keys) if key in p}
+    if "environment.gravity" in p:
+        checks["environment.gravity"] = functools.partial(negative, "environment.gravity")
     density = p["environment.water_density"]
-    checks["environment.water_density"] = ~(np.isfinite(density) & (density > 0))
-    return {key: bad for key, bad in checks.items() if any(name in varied for name in key.split(" + "))}
+    checks["environment.water_density"] = lambda: ~(np.isfinite(density) & (density > 0))
+    return {key: check() for key, check in checks.items() if any(name in varied for name in key.split(" + "))}
 
 
 def _state(faults: Faults, key: str, value: Any) -> np.ndarray:

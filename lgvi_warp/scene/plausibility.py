@@ -6,10 +6,11 @@ Every check looks at the numbers of many members at once. Members with odd value
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 import operator
 from collections.abc import Callable, Iterator, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -216,7 +217,13 @@ def _diagonal(matrices: np.ndarray) -> np.ndarray:
 OF_NUMBERS = (net_weight, density, currents, fin_angles, depths, inertia)
 
 
-def of_numbers(scene: SceneLike, p: Numbers, first: int, stop: int) -> Oddities:
+def of_numbers(
+    scene: SceneLike,
+    p: Numbers,
+    first: int,
+    stop: int,
+    once: Callable[[Any, Any, Callable[[Any], Any]], Any] = lambda key, numbers, compute: compute(numbers),
+) -> Oddities:
     """Return the odd parameters of some members.
 
     Args:
@@ -224,12 +231,19 @@ def of_numbers(scene: SceneLike, p: Numbers, first: int, stop: int) -> Oddities:
         p: Parameters by name, of 1 (shared) or of stop - first members.
         first: Index of the first member.
         stop: Index after the last member.
+        once: Function of a key, numbers and a computation of them, which may remember what all members share; by default
+            it computes each time.
 
     Returns:
         Odd values by name.
     """
     with np.errstate(all="ignore"):
-        return gathered((look for check in OF_NUMBERS for look in check(scene, p)), first, stop)
+        looks = [once(check, p, functools.partial(_looks, check, scene)) for check in OF_NUMBERS]
+        return gathered(itertools.chain(*looks), first, stop)
+
+
+def _looks(check: Callable[[SceneLike, Numbers], Iterator[Look]], scene: SceneLike, p: Numbers) -> list[Look]:
+    return list(check(scene, p))
 
 
 def of_ensemble(ensemble: Ensemble) -> Oddities:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.runs.result import Result
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.scene.ensemble import Ensemble
@@ -35,6 +37,8 @@ SAMPLES = 20
 # Methods for the reference, the best first; neighbours share as little as possible.
 PRECISE = ("kl8(psi_x)", "rk8", "kl8(psi_s)", "kl6(psi_x)", "kl6(psi_s)", "rk5", "su4(psi_x)", "su4(psi_s)", "rk4", "psi_x",
            "psi_s", "psi_w", "psi_1", "psi")  # fmt: skip
+# The same where noise acts, which leaves nothing to a high order.
+PRECISE_IN_NOISE = ("rk4", "psi_x", "psi_s", "psi_w", "phi")
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,7 @@ class Sample:
     """The first members of an ensemble from 0 to t1, at times that runs of every step have in common.
 
     Steps are spacing / m for whole m. The spacing is run.save_every of the scene where it divides t1, else t1 / samples.
+    Where noise acts on a grid, m divides the number of its draws in the spacing, so that all runs see one path.
 
     Args:
         fleet: the ensemble, or a Scene with one.
@@ -114,9 +119,11 @@ class Sample:
         index: the times as multiples of the spacing (k,), int64.
         times: the times (k,) [s].
         rate: largest angular rate at the start, at least one turn in t1 [rad/s].
+        draws: number of draws of noise in the spacing; 0 for runs that draw once a step.
+        fixed_draws: the most that the noise_steps of the scene allow; 0 where no term has one.
 
     Raises:
-        SceneError: without an end time.
+        SceneError: without an end time, and where a noise_step of the scene does not divide the spacing.
     """
 
     def __init__(self, fleet: Ensemble | Scene, t1: float | None = None, members: int = 128, samples: int = SAMPLES):
@@ -132,6 +139,7 @@ class Sample:
         assert t1 is not None
         self.whole, self.t1, self.samples = ensemble, float(t1), samples
         self.ensemble = ensemble if ensemble.members <= members else ensemble.subset(range(members))
+        self._drawn_once_a_step = self.ensemble
         self.members = self.ensemble.members
         end = saveat.exact(self.t1)
         every = settings.save_every
@@ -142,6 +150,7 @@ class Sample:
         self.times = np.array([float(int(i) * self.spacing) for i in self.index])
         start = self.ensemble.select(0, self.members)
         self.rate = float(max(np.nanmax(np.linalg.norm(start.angular_velocity, axis=1)), 2.0 * math.pi / self.t1))
+        self.draws, self.fixed_draws = 0, self._fixed_draws()
 
     def more(self, members: int) -> Sample:
         """Make the same sample with more members.
@@ -154,6 +163,48 @@ class Sample:
         """
         return Sample(self.whole, self.t1, members, self.samples)
 
+    def on_grid(self, draws: int) -> Sample:
+        """Make the same sample with noise on a grid that all its runs share.
+
+        Args:
+            draws: number of draws in the spacing, for terms without a noise_step of their own.
+
+        Returns:
+            A sample whose steps are multiples of the grid's.
+        """
+        sample = copy.copy(self)
+        sample.draws = draws
+        sample.ensemble = drawn_every(self._drawn_once_a_step, self.h(draws))
+        return sample
+
+    def _fixed_draws(self) -> int:
+        """The most draws in the spacing whose grid every noise_step of the scene divides; 0 where no term has one."""
+        faults, counts = Faults(), [0]
+        for term in self.ensemble.scene.terms:
+            if isinstance(term, NoisyTerm) and term.noise_step is not None:
+                count = self.spacing / saveat.exact(term.noise_step)
+                if count.denominator != 1:
+                    problem = f"does not divide the {float(self.spacing):g} s between the times of the comparison"
+                    faults.add(
+                        f"{term.key}.noise_step", term.noise_step, problem, "give run.save_every a multiple of it"
+                    )
+                counts.append(int(count))
+        faults.raise_if_any()
+        return math.gcd(*counts)
+
+    def allowed(self, m: int) -> int:
+        """Find a number of steps that noise on a grid allows.
+
+        Args:
+            m: number of steps in the spacing.
+
+        Returns:
+            The least number from m on that divides the draws, or the draws; m itself without a grid.
+        """
+        if not self.draws:
+            return m
+        return next((count for count in saveat.divisors(self.draws) if count >= m), self.draws)
+
     def coarsest(self, angle: float) -> int:
         """Find the largest step in which no member turns by more than an angle at the start.
 
@@ -163,7 +214,7 @@ class Sample:
         Returns:
             m, for the step spacing / m.
         """
-        return max(1, math.ceil(float(self.spacing) * self.rate / angle))
+        return self.allowed(max(1, math.ceil(float(self.spacing) * self.rate / angle)))
 
     def h(self, m: int) -> float:
         """Compute a step from its number.
@@ -253,17 +304,42 @@ class Sample:
                 refused[name] = str(error)
         return good, refused
 
-    def noisy(self, method: str) -> bool:
-        """Tell whether random numbers act, which differ from step to step.
+    def noise(self, method: str) -> str:
+        """Tell whether random numbers act, and whether they can be drawn on a grid.
 
         Args:
             method: name of a method that the scene takes.
 
         Returns:
-            True if a force or a current of the scene is noise.
+            "none"; "grid"; or "free", for a term with NOISE that is no NoisyTerm: its path differs from step to step.
         """
         laws = self.plan(self.candidate(method, 1)).kernel_choice.laws
-        return any(getattr(module, "NOISE", False) for _, module in laws)
+        noisy = [term for term, module in laws if getattr(module, "NOISE", False)]
+        if not noisy:
+            return "none"
+        return "grid" if all(isinstance(term, NoisyTerm) for term in noisy) else "free"
+
+
+def drawn_every(fleet: Ensemble, noise_step: float, own: bool = True) -> Ensemble:
+    """Put the noise of an ensemble on a grid.
+
+    Args:
+        fleet: the ensemble.
+        noise_step: time from one draw to the next [s].
+        own: whether terms with a noise_step keep it. Default True.
+
+    Returns:
+        The same members of a scene whose noisy terms have this noise_step.
+    """
+    terms = [
+        replace(term, noise_step=noise_step)
+        if isinstance(term, NoisyTerm) and not (own and term.noise_step is not None)
+        else term
+        for term in fleet.scene.terms
+    ]
+    drawn, scene = copy.copy(fleet), cast(Scene, fleet.scene)
+    drawn.scene = replace(scene, terms=terms)
+    return drawn
 
 
 def failed(result: Result) -> bool:
@@ -330,12 +406,14 @@ class Reference:
         result: of the finer run.
         text: the two methods and their steps, in words.
         own: quantity -> (k,), largest difference of the two runs over the members and up to each time [its unit].
+        sample: members, times and noise of the two runs, on which others are compared with them.
         asked: quantity of the errors, where it is none of QUANTITIES.
     """
 
     result: Result
     text: str
     own: dict[str, np.ndarray]
+    sample: Sample
     asked: Compared | None = None
 
     def error(self, of: str, until: int = -1) -> float:
@@ -364,7 +442,7 @@ class Reference:
 
 
 def extrapolated(sample: Sample, method: str, m: int) -> Result:
-    """Run a method; where its order is below four, extrapolate from three steps.
+    """Run a method; where its order is below four and no noise acts, extrapolate from three steps.
 
     Richardson's extrapolation of the steps h, h/2 and h/4 takes out the terms in h^2 and h^3.
 
@@ -376,7 +454,7 @@ def extrapolated(sample: Sample, method: str, m: int) -> Result:
     Returns:
         The result at the sample's times.
     """
-    if Method(method).order >= 4:
+    if Method(method).order >= 4 or sample.draws:
         return sample.run(sample.candidate(method, m))
     runs = [sample.run(sample.candidate(method, k * m)) for k in (1, 2, 4)]
     samples = {}
@@ -431,6 +509,9 @@ def make_reference(
 ) -> Reference:
     """Refine two high-order runs together until they agree to a goal, agree no better, or the time is spent.
 
+    Where noise acts, both see one path, drawn at each step of the finer run. Each refinement has a path of its own, and that
+    of the best one is the path of `Reference.sample`.
+
     How well the runs agree is for the caller to judge.
 
     Args:
@@ -449,25 +530,42 @@ def make_reference(
     """
     compared = compared_in(of)
     of = compared.name
+    fixed = sample.fixed_draws
+    if fixed:
+        sample = sample.on_grid(fixed)
     names = list(methods or sample.accepted(PRECISE, most=2)[0])
     if not names:
         raise SceneError(
             [f"method: the scene takes none of {', '.join(PRECISE)}; name one that it takes: methods=[...]"]
         )
+    noisy = sample.noise(names[0]) == "grid"
+    if noisy and not methods:
+        names = sample.accepted(PRECISE_IN_NOISE, most=2)[0]
     first, second = (names[0], names[-1]) if methods else paired(names)
     begun = time.perf_counter()
     best: Reference | None = None
     worse, m = 0, sample.coarsest(0.5)
-    for _ in range(30):
+    # In noise half the step halves the difference, but for the chance of another path.
+    stalled = 0.9 if noisy else 0.5
+    if noisy:
+        # 3 2^k draws, which many steps divide; at first sixteen in the longest step that is tried.
+        m = 3 * 2 ** math.ceil(math.log2(max(8.0 * m / 3.0, 1.0)))
+    # In noise each halving of the step gains one of the error, without an end.
+    for _ in range(10 if noisy else 30):
         finer = max(m + 1, round(1.5 * m))
+        if fixed:
+            m, finer = (*saveat.divisors(fixed)[-2:-1], fixed)[0], fixed
+        elif noisy:
+            finer = 2 * m
+            sample = sample.on_grid(finer)
         with np.errstate(all="ignore"):
             runs = extrapolated(sample, first, m), extrapolated(sample, second, finer)
             disagreement = agreement(*runs, compared)
         end = disagreement[of][-1]
         if best is None or end < best.error(of):
-            worse = worse + 1 if best and end > 0.5 * best.error(of) and end < LOST else 0
+            worse = worse + 1 if best and end > stalled * best.error(of) and end < LOST else 0
             text = f"{second} at h = {sample.h(finer):.4g} s against {first} at h = {sample.h(m):.4g} s"
-            best = Reference(runs[1], text, disagreement, compared)
+            best = Reference(runs[1], text, disagreement, sample, compared)
         else:
             worse += best.error(of) < LOST
         begun += sum(run.compile_seconds for run in runs)
@@ -475,7 +573,7 @@ def make_reference(
         last, spent = 1.75 * sum(run.run_seconds for run in runs), time.perf_counter() - begun
         if report:
             report(min(1.0, spent / seconds))
-        if best.error(of) <= goal or worse >= 2 or spent + 2.0 * last > seconds:
+        if best.error(of) <= goal or worse >= 2 or spent + 2.0 * last > seconds or fixed:
             break
         m *= 2
     assert best is not None

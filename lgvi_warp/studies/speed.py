@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -14,6 +15,7 @@ from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.peak import fma_peak
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import Method
+from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.physics.vehicle import Vehicle
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene.ensemble import Ensemble
@@ -54,18 +56,21 @@ def example() -> Scene:
     return Scene(vehicle, Environment(gravity=9.8), start=start)
 
 
-def fleet(members: int) -> Ensemble:
+def fleet(members: int, *terms: Term) -> Ensemble:
     """Build an ensemble around the example, whose angular velocities vary by 10 %.
 
     Args:
         members: number of members.
+        terms: what acts on them besides weight and buoyancy. Default nothing.
 
     Returns:
         The ensemble.
     """
     from lgvi_warp.sampling.distributions.basic import Normal
 
-    return Ensemble(example(), members, 1, {"start.angular_velocity": Normal(relative=0.1)})
+    return Ensemble(
+        dataclasses.replace(example(), terms=terms), members, 1, {"start.angular_velocity": Normal(relative=0.1)}
+    )
 
 
 def stepper(plan: Plan) -> Callable[[], None]:
@@ -105,6 +110,25 @@ def interleaved(calls: Sequence[Callable[[], None]], rounds: int = 5) -> list[fl
             call()
             seconds.append(time.perf_counter() - start)
     return [median(seconds) for seconds in times]
+
+
+def least(calls: Sequence[Callable[[], None]], rounds: int = 15) -> list[float]:
+    """Time calls in turn; other work on the machine can only lengthen a reading, so the least of each counts.
+
+    Args:
+        calls: functions without arguments.
+        rounds: number of readings of each. Default 15.
+
+    Returns:
+        Least wall time of each call [s].
+    """
+    best = [np.inf] * len(calls)
+    for _ in range(rounds):
+        for i, call in enumerate(calls):
+            start = time.perf_counter()
+            call()
+            best[i] = min(best[i], time.perf_counter() - start)
+    return best
 
 
 def measure(members: int = 4096, steps: int = 1000) -> Iterator[str]:

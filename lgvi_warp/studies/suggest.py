@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from lgvi_warp.engine.executors.threads import ThisThread
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import TimeGrid
+from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.runs.result import Result
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
@@ -28,7 +29,16 @@ from lgvi_warp.studies import tradeoff as tradeoffs
 from lgvi_warp.studies.compared import Compared, compared_in
 from lgvi_warp.studies.comparison import Candidate, Reference, Sample
 from lgvi_warp.studies.speed import void
-from lgvi_warp.studies.tradeoff import PRECISIONS, Trial, chosen_methods, costs, growth_of, growth_text, tried
+from lgvi_warp.studies.tradeoff import (
+    PRECISIONS,
+    Trial,
+    chosen_methods,
+    costs,
+    growth_of,
+    growth_text,
+    noise_text,
+    tried,
+)
 
 # A setting is accepted where its error on the sample is below the error asked for by this factor.
 SAFETY = 1.15
@@ -127,7 +137,8 @@ def suggest(
     """Find the cheapest method, step and precision that keep an error for every member up to a time.
 
     The search runs a sample of members; its best settings are then checked on up to 1024 members, and their steps
-    shortened where needed.
+    shortened where needed. Where noise acts, all runs of the search see one path of it, drawn every noise_step of the scene
+    or, without one, finer than any step that is tried; a run of the setting draws at its own steps.
 
     Args:
         fleet: the ensemble, or a Scene with one.
@@ -145,8 +156,8 @@ def suggest(
         The cheapest setting, its expected error, its predicted time and memory, and the next best settings.
 
     Raises:
-        SceneError: for faulty arguments, all in one message; where noise acts; and where no reference is ten times better
-            than the error, with the time up to which one is.
+        SceneError: for faulty arguments, all in one message; where noise acts that is no NoisyTerm; and where no reference is
+            ten times better than the error, with the time up to which one is.
     """
     compared = compared_in(of)
     faults = Faults()
@@ -160,10 +171,11 @@ def suggest(
     taken, refused = sample.accepted(names)
     if not taken:
         raise SceneError([f"method {name}: {why}" for name, why in refused.items()])
-    if sample.noisy(taken[0]):
+    if sample.noise(taken[0]) == "free":
         problem = f"error = {error:g}: noise acts, whose path differs from step to step, so members have no error"
         raise SceneError([f"{problem}; use lgvi-warp tradeoff, which compares statistics"])
     reference = checked_reference(sample, compared, error, 0.4 * seconds, taken)
+    sample = reference.sample
     report(0.3)
     deadline = time.perf_counter() + 0.6 * seconds
     trials = search(sample, taken, reference, compared, error / SAFETY, deadline, lambda part: report(0.3 + 0.5 * part))
@@ -173,6 +185,7 @@ def suggest(
     more = sample.more(CHECKED) if sample.whole.members > sample.members else sample
     if more is not sample:
         reference = checked_reference(more, compared, error, 0.4 * seconds, taken)
+        more = reference.sample
     goal = error / SAFETY**0.5
     final = [refined(more, trial.candidate, reference, compared.name, goal) for trial in trials[:FINALISTS]]
     final = [trial for trial in final if trial.error(compared.name) <= error] or final[:1]
@@ -204,7 +217,7 @@ def suggest(
         ),
         worst=worst_of(best, reference, compared.name),
         asked=compared,
-        messages=(text,) if text else (),
+        messages=(*([text] if text else ()), *([noise_text(more)] if more.draws else ())),
     )
 
 
@@ -247,7 +260,9 @@ def checked_reference(sample: Sample, of: Compared, error: float, seconds: float
         until = sample.times[reference.reaches(of.name, 0.1 * error)]
         unit = of.unit
         problem = f"error = {error:g} {unit} of {of.name} up to {sample.t1:g} s cannot be checked: {reference.text} differ by "
-        problem += f"{reference.error(of.name):.1e} {unit}; {growth_text(growth_of(sample, taken, reference))}"
+        problem += (
+            f"{reference.error(of.name):.1e} {unit}; {growth_text(growth_of(reference.sample, taken, reference))}"
+        )
         remedy = (
             f"ask for t1 (--duration) up to {until:g} s, " if until > 0.0 else "ask for a shorter t1 (--duration), "
         )
@@ -307,8 +322,10 @@ def search(
             worse = worse + 1 if size > 0.8 * before and before < 0.1 else 0
             if worse >= 2 or m > 10**7 or time.perf_counter() > deadline:
                 break
+            if m == sample.allowed(2 * m):
+                break
             before = size
-            m *= 2
+            m = sample.allowed(2 * m)
     cheapest = min((price for price, _ in priced), default=math.inf)
     return [trial for price, trial in sorted(priced, key=lambda pair: pair[0]) if price < 1.5 * cheapest]
 
@@ -348,7 +365,7 @@ def lengthened(
     for _ in range(3):
         slope = math.log(before / max(size, 1e-300)) / math.log(high / low)
         guess = round(low * (before / target) ** (1.0 / max(slope, 0.5)) + 0.5)
-        guess = min(max(guess, low + 1), high - 1)
+        guess = sample.allowed(min(max(guess, low + 1), high - 1))
         if guess <= low or guess >= high or high - low < 0.04 * high:
             break
         trial = tried(sample, sample.candidate(good.candidate.method, guess, good.candidate.dtype), reference)
@@ -374,16 +391,16 @@ def refined(sample: Sample, candidate: Candidate, reference: Reference, of: str,
     Returns:
         The last trial; after six shorter steps it may still miss the target.
     """
-    trial = tried(sample, candidate, reference)
+    m = sample.allowed(round(float(sample.spacing) / candidate.h))
+    trial = tried(sample, replace(candidate, h=sample.h(m)), reference)
+    order = 1 if sample.draws else Method(candidate.method).order
     for _ in range(6):
         size = trial.error(of)
-        if size <= target:
+        if size <= target or m == sample.draws:
             break
-        order = Method(candidate.method).order
         factor = min((size / target) ** (1.0 / order) * 1.02, 2.0) if np.isfinite(size) else 1.5
-        m = round(float(sample.spacing) / trial.candidate.h)
-        longer = sample.candidate(candidate.method, max(m + 1, math.ceil(m * factor)), candidate.dtype)
-        trial = tried(sample, longer, reference)
+        m = sample.allowed(max(m + 1, math.ceil(m * factor)))
+        trial = tried(sample, sample.candidate(candidate.method, m, candidate.dtype), reference)
     return trial
 
 
@@ -425,7 +442,9 @@ def verified(fleet: Ensemble, result: Result, found: Suggestion) -> tuple[float,
     """Measure the error of a finished run by running some of its members again with half the step.
 
     The members are those with the largest errors in the search, then the first ones. A method of order p is 2^p times
-    better at half the step, so the difference between the runs is the error but for one part in 2^p.
+    better at half the step, so the difference between the runs is the error but for one part in 2^p. Where noise acts, the
+    members are run with both steps on one path, drawn at each of the shorter ones; errors are of order 1, and what each
+    halving changes is independent, so that squares add up.
 
     Args:
         fleet: the ensemble that was run.
@@ -442,8 +461,13 @@ def verified(fleet: Ensemble, result: Result, found: Suggestion) -> tuple[float,
     h = result.provenance["step"]
     steps = np.rint(result.time / h).astype(np.int64)
     # In double precision, so that the error contains the run's round-off too.
+    done, left = comparison.part(result, chosen), 1.0 - 2.0**-plan.method.order
+    if any(isinstance(term, NoisyTerm) for term, _ in plan.kernel_choice.laws):
+        checked_fleet, left = comparison.drawn_every(checked_fleet, h / 2.0, own=False), math.sqrt(1.0 - 2.0**-2)
+        whole = TimeGrid(h, steps, result.time)
+        done = run_plan(Plan(checked_fleet, plan.method, whole, plan.fields, candidate.dtype), 1)
     half = Plan(checked_fleet, plan.method, TimeGrid(h / 2.0, 2 * steps, result.time), plan.fields, "float64")
     with np.errstate(all="ignore"):
-        apart = comparison.distances(comparison.part(result, chosen), run_plan(half, 1), found.asked)
+        apart = comparison.distances(done, run_plan(half, 1), found.asked)
         size = comparison.errors(apart, len(result.time) - 1)[found.of]["path_max"]
-    return size / (1.0 - 2.0**-plan.method.order), len(chosen)
+    return size / left, len(chosen)

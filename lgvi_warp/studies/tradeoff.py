@@ -187,7 +187,7 @@ class Trial:
 
     Attributes:
         candidate: method, step, precision and solver.
-        plan: its plan.
+        plan: its plan, by which its cost is measured: noise without a noise_step of the scene is drawn once a step.
         result: the result at the sample's times.
         errors: quantity -> kind -> error; empty where a member failed or there is no reference.
         cpu_seconds: CPU time of the run, without compiling [s].
@@ -238,6 +238,8 @@ def tried(sample: Sample, candidate: Candidate, reference: Reference | None, unt
             errors = comparison.errors(comparison.distances(result, reference.result, reference.asked), until)
             if not all(np.isfinite(norms["path_max"]) for norms in errors.values()):
                 errors = {}
+    if sample.draws:
+        plan = sample.on_grid(round(float(sample.spacing) / candidate.h)).plan(candidate)
     return Trial(candidate, plan, result, errors, cpu_seconds)
 
 
@@ -295,8 +297,9 @@ def tradeoff(
 
     The cost of a step is CPU time of the thread that runs it: the least of several readings, one number for all steps
     of a method. Readings that disagree are reported in the messages. Errors are measured against a reference that two
-    independent runs agree on to a tenth of the smallest error shown. Where noise acts, members have no errors, and
-    statistics are compared with those of the finest run.
+    independent runs agree on to a tenth of the smallest error shown. Where noise acts, all runs see one path of it, drawn
+    every noise_step of the scene or, without one, finer than any step that is tried; where that cannot be, or the path is too
+    rough for errors of members, statistics are compared with those of the finest run.
 
     Args:
         fleet: the ensemble, or a Scene with one.
@@ -327,15 +330,24 @@ def tradeoff(
     if not taken:
         raise SceneError([f"method {name}: {why}" for name, why in refused.items()])
     messages: list[str] = []
-    reference, finest, until, growth = None, None, len(sample.times) - 1, None
-    if sample.noisy(taken[0]):
+    reference: Reference | None = None
+    until, growth, noise = len(sample.times) - 1, None, sample.noise(taken[0])
+    if noise == "free":
         messages.append("noise acts, whose path differs from step to step: only statistics are compared")
         finest = tried(sample, sample.candidate(taken[0], 32 * sample.coarsest(0.5)), None).result
     else:
         reference = comparison.make_reference(
             sample, compared, seconds=0.3 * seconds, report=lambda fraction: report(0.2 * fraction)
         )
-        finest = reference.result
+        sample, finest = reference.sample, reference.result
+        if noise == "grid":
+            messages.append(noise_text(sample))
+    if reference and noise == "grid" and reaches_nothing(reference, compared):
+        messages.append(
+            f"{reference.text} differ by {reference.error(compared.name):.1e}: only statistics are compared"
+        )
+        reference = None
+    if reference:
         until = trusted_until(reference, compared)
         growth = growth_of(sample, taken, reference)
         if until < len(sample.times) - 1:
@@ -380,9 +392,35 @@ def growth_of(sample: Sample, taken: Sequence[str], reference: Reference) -> Gro
         Growth of a small difference.
     """
     method = max(taken, key=lambda name: Method(name).order)
-    often = Sample(sample.whole, sample.t1, sample.members)
+    often = sample if sample.draws else Sample(sample.whole, sample.t1, sample.members)
     m = max(1, round(float(often.spacing) / reference.result.provenance["step"]))
     return comparison.growth(often, often.candidate(method, m))
+
+
+def noise_text(sample: Sample) -> str:
+    """Say how the runs of a comparison share their noise.
+
+    Args:
+        sample: members and times, with noise on a grid.
+
+    Returns:
+        A sentence.
+    """
+    every = f"{sample.h(sample.draws):.4g} s"
+    return f"noise acts: all runs see one path of it, drawn every {every}; errors by paths are of order 1"
+
+
+def reaches_nothing(reference: Reference, of: Compared) -> bool:
+    """Tell whether a reference is too rough for errors of members even at the first time.
+
+    Args:
+        reference: its own errors decide.
+        of: quantity that they are of.
+
+    Returns:
+        True where `trusted_until` would raise an error.
+    """
+    return reference.reaches(of.name, comparison.LOST / (TRUST * TRUST)) < 1
 
 
 def trusted_until(reference: Reference, of: Compared) -> int:
@@ -399,7 +437,7 @@ def trusted_until(reference: Reference, of: Compared) -> int:
         SceneError: where the reference is not good enough even at the first time.
     """
     until = reference.reaches(of.name, comparison.LOST / (TRUST * TRUST))
-    if until < 1:
+    if reaches_nothing(reference, of):
         apart = reference.own[of.name][1]
         end = reference.result.time[1]
         problem = f"no reference: {reference.text} differ by {apart:.2g} {of.unit} after {end:g} s"
@@ -451,7 +489,9 @@ def sweep(
             trial = tried(sample, sample.candidate(method, m, dtype, solver), reference, until)
             trials.append(trial)
             deadline += trial.result.compile_seconds
-            m *= 2
+            if m == sample.allowed(2 * m):
+                break
+            m = sample.allowed(2 * m)
             if reference is None:
                 continue
             error = max(trial.error(of) for of in DECIDING)
@@ -500,7 +540,7 @@ def between(sample: Sample, trials: list[Trial], reference: Reference, until: in
     for trial in near:
         m = round(float(sample.spacing) / trial.candidate.h)
         for step in {round(m / math.sqrt(2.0)), round(m * math.sqrt(2.0))} - {0}:
-            candidate = replace(trial.candidate, h=sample.h(step))
+            candidate = replace(trial.candidate, h=sample.h(sample.allowed(step)))
             if candidate not in tried_already and time.perf_counter() < deadline:
                 tried_already.add(candidate)
                 trials.append(tried(sample, candidate, reference, until))

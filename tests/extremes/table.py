@@ -40,6 +40,8 @@ What no line shows: a negative, zero, infinite, or subnormal mass or inertia is 
 finite gets NON_FINITE or STEP_TOO_LARGE, alone among 100,000 or all at once; no bit of another vehicle changes for it
 (`tests/extremes/test_inputs.py`, `test_neighbours.py`). rk8 with tolerances shares its steps within a packet, so there the
 neighbours of a failing vehicle change, within their tolerance. Explicit methods know no step that is too large.
+A subnormal number (below 1e-38 in float32, 2e-308 in float64) is zero in the kernel. A body that damping brings to rest keeps
+momenta about as small, and a step costs what it cost before (`tests/extremes/test_rest.py`).
 
 Machine: {cpu}, {simd}. Written by `python -m tests.extremes.table`; do not edit.
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from lgvi_warp.physics import terms
-from lgvi_warp.physics.terms.wrench_noise import channel
+from lgvi_warp.physics.terms.noisy import channel
 from lgvi_warp.reference.terms.gauss_markov_current import GaussMarkovCurrent
 from lgvi_warp.reference.terms.stratification import Stratification
 from lgvi_warp.reference.terms.waves import Waves
@@ -23,6 +23,8 @@ WAVES = dict(
 )
 GAUSS_MARKOV = dict(standard_deviation=(0.3, 0.2, 0.05), time_constant=4.0)
 WRENCH_NOISE = dict(force=(1.0, 2.0, 0.5), torque=(0.1, 0.2, 0.3))
+# A quarter of the step of tests/laws/test_parity.py.
+GRID = 0.005
 STRATIFICATION = dict(gradient=0.05, reference_depth=6.0)
 
 
@@ -31,10 +33,10 @@ def arrays(numbers):
     return {key: np.asarray(value) for key, value in numbers.items()}
 
 
-def noisy(host, twin, numbers, name=""):
+def noisy(host, twin, numbers, name="", noise_step=None):
     """A Case whose twin draws the same random numbers."""
-    term = host(**numbers, name=name)
-    return Case((term,), (twin(**arrays(numbers), channel=channel(term.key)),), False)
+    term = host(**numbers, name=name, noise_step=noise_step)
+    return Case((term,), (twin(**arrays(numbers), channel=channel(term.key), noise_step=noise_step),), False)
 
 
 CASES = {
@@ -42,6 +44,10 @@ CASES = {
     "waves": Case((terms.Waves(**WAVES),), (Waves(**arrays(WAVES), gravity=GRAVITY),)),
     "Gauss-Markov current": noisy(terms.GaussMarkovCurrent, GaussMarkovCurrent, GAUSS_MARKOV),
     "wrench noise": noisy(terms.WrenchNoise, WrenchNoise, WRENCH_NOISE),
+    "Gauss-Markov current on a grid": noisy(
+        terms.GaussMarkovCurrent, GaussMarkovCurrent, GAUSS_MARKOV, noise_step=GRID
+    ),
+    "wrench noise on a grid": noisy(terms.WrenchNoise, WrenchNoise, WRENCH_NOISE, noise_step=GRID),
     "two wrench noises": Case(
         *(
             tuple(noisy(terms.WrenchNoise, WrenchNoise, WRENCH_NOISE, name)[side][0] for name in ("", "second"))

@@ -194,7 +194,7 @@ def test_the_wandering_current_is_that_of_the_twin():
     water = in_water(wander=WANDER)
     term = water[1]
     result = lw.solve(ensemble(*water, members=3, seed=seed), "psi_s", h=h, t1=steps * h, save=lw.SaveAt(every=h))
-    channel = terms.wrench_noise.channel(term.key)
+    channel = terms.noisy.channel(term.key)
     xi = random.normals(12, 34, np.arange(3), np.arange(steps)[:, None], channel)[..., :3]
     u, decay = np.zeros((steps + 1, 3, 3)), np.exp(-h / term.time_constant)
     for k in range(steps):
@@ -273,7 +273,7 @@ def test_noise_does_not_see_the_kernels_axes():
     term = terms.WrenchNoise(**WRENCH_NOISE)
     h, M = 0.01, np.diag([2.0, 3.0, 4.0])
     result = lw.solve(ensemble(term, members=5, M=M, J=FULL), "psi_s", h=h, t1=h)
-    channels = terms.wrench_noise.channel(term.key) + np.array([[0], [1]])
+    channels = terms.noisy.channel(term.key) + np.array([[0], [1]])
     xi = random.normals(7, 0, np.arange(5), 0, channels)[..., :3] * np.sqrt(h)
     Om = np.linalg.solve(FULL, (term.torque * xi[1]).T).T
     # Half a step of turning, |Om| h / 2, is left.

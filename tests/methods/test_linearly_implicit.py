@@ -128,7 +128,7 @@ def test_kernel_with_coupled_inertia(named):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("dtype", "bound"), [("float64", 1e-12), ("float32", 1e-5)])
-@pytest.mark.parametrize("names", [("drag",), ("drag", "wrench schedule", "waves"), ("cross-flow", "fins")])
+@pytest.mark.parametrize("names", [("drag",), ("drag", "wrench schedule", "waves"), ("cross-flow", "wrench noise")])
 def test_kernel_with_laws(names, dtype, bound):
     # 25 steps of round-off 1e-15, or 6e-8, and little growth.
     case = together(*names)
@@ -236,10 +236,9 @@ def test_methods_that_do_not_exist(arguments, words):
         lw.Method(**arguments)
 
 
-@pytest.mark.parametrize(("name", "words"), [("thrusters", "remembers"), ("wrench noise", "noise, which has no rate")])
-def test_laws_that_it_cannot_advance(name, words):
-    scene = test_parity.scene_of(CASES[name])
-    with pytest.raises(SceneError, match=words):
+def test_laws_that_remember_are_refused():
+    scene = test_parity.scene_of(CASES["thrusters"])
+    with pytest.raises(SceneError, match="cannot advance a term that remembers"):
         make_plan(lw.Ensemble.from_scene(scene), METHOD, h=0.1, t1=1.0)
 
 

@@ -105,6 +105,17 @@ def test_a_term_of_zeros_is_absent():
     assert asked.spec == plain.spec and asked.advance is plain.advance
 
 
+def test_a_grid_of_noise_is_there_only_if_asked_for(tmp_path):
+    for noise_step, there in ((None, False), (0.005, True)):
+        (tmp_path / str(there)).mkdir()
+        noise = [
+            terms.WrenchNoise(force=(1.0, 1.0, 1.0), noise_step=noise_step),
+            terms.GaussMarkovCurrent(standard_deviation=(0.1, 0.1, 0.1), time_constant=2.0, noise_step=noise_step),
+        ]
+        text = source(lw.Scene(BARE, lw.Environment(gravity=9.8), terms=noise), tmp_path / str(there))
+        assert ("StepKey" in text, "GridKey" in text, "draws" in text) == (not there, there, there)
+
+
 def test_a_polynomial_is_there_only_if_asked_for(tmp_path):
     plain = CASES["thrusters"].terms[0]
     numbers = {one.name: getattr(plain, one.name) for one in plain.number_fields()}

@@ -8,6 +8,7 @@ import sys
 import tempfile
 import threading
 import time
+from unittest import mock
 
 import pytest
 import warp as wp
@@ -117,6 +118,18 @@ def test_what_is_damaged_is_compiled_anew(cache, damage):
     forget()
     assert works() and code.read_bytes() == whole and kernel_cache.is_whole(code)
     assert sorted(path.name for path in cache.iterdir()) == sorted([kernel_cache.LOCKS, code.parent.name])
+
+
+def test_phases(cache):
+    begun = time.perf_counter()
+    phases = kernel_cache.load(MODULE)
+    seconds = time.perf_counter() - begun
+    # Times of files are as fine as the system's clock: 1/100 s.
+    assert min(phases) >= 0.0 and phases.clang > 0.01 and abs(sum(phases) - seconds) < 0.03
+    assert kernel_cache.load(MODULE) == (0.0, 0.0, 0.0)
+    forget()
+    phases = kernel_cache.load(MODULE)
+    assert phases.clang == 0.0 < phases.load and "Clang 0.00 s" in str(phases)
 
 
 def test_what_is_whole_is_not_compiled(cache):
@@ -237,15 +250,14 @@ def test_what_killed_processes_left_is_swept(cache):
 
 
 def test_threads_compile_once(cache, monkeypatch):
-    compiled = []
-    compile_it = kernel_cache.compile_module
-    monkeypatch.setattr(kernel_cache, "compile_module", lambda *given: (compiled.append(given), compile_it(*given)))
+    compiled = mock.Mock(side_effect=kernel_cache.compile_module)
+    monkeypatch.setattr(kernel_cache, "compile_module", compiled)
     threads = [threading.Thread(target=kernel_cache.load, args=(MODULE,)) for _ in range(4)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert len(compiled) == 1 and works()
+    assert compiled.call_count == 1 and works()
 
 
 def test_threads_that_start_warp_leave_stderr_as_it_was(monkeypatch):

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_kernels.advance import kernel
+from lgvi_kernels.lanes.arithmetic import WIDTHS
+from lgvi_kernels.lanes.flags import CPU_FLAGS
+from lgvi_warp.engine import plan
 from lgvi_warp.engine.block import blocks
+from tests.conftest import ROOT
 from tests.support.tools import random_states, scene_of
 
 FIELDS = ("position", "attitude", "velocity", "angular_velocity")
@@ -80,3 +85,29 @@ def _with_sick_members(fleet):
     states[2][SICK[3]] = 1e200
     varied = {name: members.parameters[name] for name in ("vehicle.mass", "vehicle.inertia")}
     return lw.Ensemble.from_states(fleet.scene, *states, varied)
+
+
+def scene_called(name):
+    """The paper's scene, or REMUS 100 under way."""
+    if name == "paper":
+        return lw.Scene.load(ROOT / "examples" / "paper.toml")
+    return lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0}, start={"velocity": [1.5, 0.1, 0.0]})
+
+
+@pytest.mark.slow_but("paper-psi_x-float64")
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+@pytest.mark.parametrize(("name", "method"), [("paper", "psi_s"), ("paper", "psi_x"), ("remus", "psi_x")])
+def test_any_width(name, method, dtype, monkeypatch):
+    # Left free to fuse, the compiler joins another product of a sum with the addition at another width. Nothing else differs.
+    flags = CPU_FLAGS.replace("-ffp-contract=fast", "-ffp-contract=off")
+    assert flags != CPU_FLAGS
+    monkeypatch.setattr(kernel, "CPU_FLAGS", flags)
+    monkeypatch.setattr(plan, "make_advance", kernel.make_advance.__wrapped__)
+    fleet = lw.Ensemble(scene_called(name), 37, 1, {"start.angular_velocity": lw.Normal(std=0.1)})
+
+    def solve(width):
+        return lw.solve(fleet, method, h=0.01, t1=3.0, dtype=dtype, width=width)
+
+    quick = (name, method, dtype) == ("paper", "psi_x", "float64")
+    reference = solve(8)
+    assert all(same(reference, solve(width)) for width in ((1, 32) if quick else WIDTHS))

@@ -4,12 +4,15 @@ import csv
 import dataclasses
 import json
 import math
+from typing import Any, ClassVar
 from unittest import mock
 
 import numpy as np
 import pytest
+import warp as wp
 
 import lgvi_warp as lw
+from lgvi_kernels.law import add, div, int_lane, lane, mul, normals3, ones, root, struct  # noqa: F401
 from lgvi_warp import cli
 from lgvi_warp.studies import comparison, cost
 from lgvi_warp.studies import suggest as suggestion
@@ -159,17 +162,76 @@ def test_biases_shrink_with_the_step_and_are_one_for_other_members(scene):
     assert 0.3 < chance["position_mean"] < 4.0 and 0.3 < chance["position_std"] < 4.0
 
 
-@pytest.mark.slow
-def test_noise_compares_statistics_only(tmp_path):
+@wp.func
+def shaken_law(w: Any, view: Any, p: Any):
+    unity = ones(view.b.x)
+    seed = wp.int32(7)
+    w.force = w.force + (p.strength / root(view.h * unity)) * normals3(unity, p.member, view.step, seed, seed, seed)
+    return w
+
+
+class Shaker:
+    NOISE = True
+    law = shaken_law
+
+    @staticmethod
+    def params(width, real):
+        return struct("Shaken", strength=lane(width, real), member=int_lane(width))
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class Shaken(lw.Term):
+    """Noise by its own key, which knows no grid."""
+
+    type: ClassVar[str] = "shaken_of_test"
+    device: ClassVar[Any] = Shaker
+    timed: ClassVar[bool] = True
+    strength: Any = lw.number((), "N s^1/2")
+
+    def packed(self, numbers, context):
+        return lw.Packed({"strength": numbers["strength"], "member": context.members.astype(np.int32)})
+
+
+CURRENT = lw.GaussMarkovCurrent(standard_deviation=[0.2, 0.2, 0.05], time_constant=30.0)
+
+
+def noisy_fleet(term):
+    """A vehicle that this noise alone drives."""
     vehicle = lw.Vehicle(100.0, [50.0, 60.0, 70.0], [5.0, 6.0, 7.0], 981.0, [0.0, 0.0, -0.01])
-    current = lw.GaussMarkovCurrent(standard_deviation=[0.2, 0.2, 0.05], time_constant=30.0)
-    fleet = lw.Ensemble(lw.Scene(vehicle, lw.Environment(gravity=9.81), [current]), 32, 1)
+    return lw.Ensemble(lw.Scene(vehicle, lw.Environment(gravity=9.81), [term]), 32, 1)
+
+
+@pytest.mark.slow
+def test_noise_without_a_grid_compares_statistics_only(tmp_path):
+    fleet = noisy_fleet(Shaken(strength=5.0))
     found = lw.tradeoff(fleet, 4.0, methods=["psi_x"], seconds=60.0)
     assert found.front() == [] and "noise acts" in found.messages[0]
     assert all(0.0 < one.biases["position_mean"] < 5.0 for one in found.measurements)
     assert lw.plot_tradeoff(found, tmp_path / "noise.png").stat().st_size > 10_000
     with pytest.raises(lw.SceneError, match=r"error = 0.001: noise acts.*tradeoff"):
         lw.suggest(fleet, 1e-3, t1=4.0)
+
+
+@pytest.mark.slow
+def test_noise_is_compared_on_one_path():
+    found = lw.tradeoff(noisy_fleet(CURRENT), 4.0, methods=["psi_x", "psi_s"], seconds=60.0)
+    assert "all runs see one path" in found.messages[0] and len(found.front(kind="path_rms")) > 3
+    steps, errors = np.array([(one.setting.h, one.error(kind="path_rms")) for one in found.shown()
+                              if one.setting.text == "psi_x float64"]).T  # fmt: skip
+    # Of order 1, each by 32 members, three axes and as many times as there are.
+    assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(1.0, abs=0.15)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise_step", [None, 0.005])
+def test_a_suggestion_in_noise_keeps_the_error(noise_step):
+    fleet = noisy_fleet(dataclasses.replace(CURRENT, noise_step=noise_step))
+    found = lw.suggest(fleet, 0.02, t1=4.0, methods=["psi_x"], seconds=ENOUGH)
+    assert "all runs see one path" in str(found) and found.expected <= 0.02
+    result = lw.solve(fleet, t1=4.0, threads=1, **found.settings)
+    error, members = suggestion.verified(fleet, result, found)
+    # Another path, and the largest of 32 members: not the same error, but one of its size.
+    assert 0.2 * found.expected < error < 0.04 and members == 32
 
 
 @pytest.mark.slow

@@ -279,7 +279,7 @@ STORES = {
     "a chunk is a socket": (special("status/c.0", bound), "socket"),
     "a chunk is a folder": (special("status/c.0", os.mkdir), "is a folder"),
     "the root is a folder": (special("zarr.json", os.mkdir), "is a folder"),
-    "folders without an end": (endless, "is deeper"),
+    "folders without an end": (endless, "lies deeper"),
     # The root's metadata.
     "the root is empty": (content(ROOT, b""), "is damaged"),
     "the root is no text": (content(ROOT, bytes(range(256))), "is damaged"),

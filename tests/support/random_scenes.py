@@ -57,7 +57,7 @@ def judged(fleet, found, asked, rounds=5):
         for dtype in tradeoffs.PRECISIONS:
             m, last = sample.coarsest(3.0), None
             while sample.h(m) > 0.5 * found.setting.h * len(lw.Method(method).stages) / len(own.plan.method.stages):
-                one = tradeoffs.tried(sample, sample.setting(method, m, dtype), reference)
+                one = tradeoffs.tried(sample, sample.candidate(method, m, dtype), reference)
                 if one.error(asked["of"]) <= asked["error"]:
                     last = one
                     break

@@ -1,7 +1,5 @@
 """What each level of checks costs, and a fleet in which every tenth member fails, frozen or by divided steps."""
 
-import time
-
 import numpy as np
 
 from lgvi_warp.runs.settle import make_plan
@@ -10,17 +8,6 @@ from lgvi_warp.studies import speed
 
 METHODS = ("psi_s", "psi", "psi_1", "psi_x", "kl8(psi_x)", "rk8")
 LEVELS = ("none", "safe", "all")
-
-
-def least(calls, rounds=15):
-    """Least seconds of each call, run in turn: levels differ by less than a busy machine's medians do."""
-    best = [np.inf] * len(calls)
-    for _ in range(rounds):
-        for i, call in enumerate(calls):
-            start = time.perf_counter()
-            call()
-            best[i] = min(best[i], time.perf_counter() - start)
-    return best
 
 
 def run(quick):
@@ -37,7 +24,7 @@ def run(quick):
             plans = [
                 make_plan(one, method, h=0.01, t1=0.01 * steps, dtype=dtype, **setting) for one, setting in settings
             ]
-            seconds = least([speed.stepper(plan) for plan in plans])
+            seconds = speed.least([speed.stepper(plan) for plan in plans])
             none, safe, all_of_them = seconds[:3]
             record = {"method": method, "dtype": dtype} | {
                 f"{level}_ns": round(1e9 * one / (members * steps), 2)
@@ -55,5 +42,5 @@ def substepped(members, steps):
     rates = np.where(np.arange(members)[:, None] % 100 == 0, [[0.0, 0.0, 250.0]], start.angular_velocity)
     fast = Ensemble.from_states(fleet.scene, start.position, start.attitude, start.velocity, rates)
     plans = [make_plan(fast, "psi_s", h=0.01, t1=0.01 * steps, on_failure=how) for how in ("freeze", "substep")]
-    freeze, substep = least([speed.stepper(plan) for plan in plans])
+    freeze, substep = speed.least([speed.stepper(plan) for plan in plans])
     return {"method": "psi_s", "hundredth_by_substeps_over_frozen": round(substep / freeze, 3)}

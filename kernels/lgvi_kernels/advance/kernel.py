@@ -18,6 +18,7 @@ from lgvi_kernels.advance.watching import make_watching
 from lgvi_kernels.lanes.arithmetic import add, any_positive, div, mul, neg, ones, positive, sub  # noqa: F401
 from lgvi_kernels.lanes.flags import CPU_FLAGS
 from lgvi_kernels.lanes.packet import failures, renormalise, turned_too_far
+from lgvi_kernels.lanes.subnormals import flush_subnormals, put_back
 from lgvi_kernels.lanes.sums import at_rest, choose
 from lgvi_kernels.maps.compose import superpose
 
@@ -88,6 +89,7 @@ def make_advance(spec):
         # out
         out: wp.array2d(dtype=Lane),
     ):
+        mode = flush_subnormals()
         i = wp.tid()
         c = Constants()
         c.inertia = inertia[i % inertia.shape[0]]
@@ -230,5 +232,6 @@ def make_advance(spec):
         if any_frozen:
             x = choose(frozen, kept, x)
         write(state, i, x)
+        put_back(mode)
 
     return Advance(advance, types)

@@ -13,5 +13,6 @@ function (see maps/compose.py). Constants of a file: POTENTIAL, `law` follows fr
 sum of one of position, at most quadratic, and one of attitude; FLOW, "steady", "uniform" or "varying" water (see Spec.flow);
 NOISE, the law draws random numbers.
 
-Without `params` the struct holds the numbers that the host's Term declares, as lanes and 3-vectors of lanes.
+Without `params` the struct holds the numbers that the host's Term declares, as lanes and 3-vectors of lanes, and of a
+NoisyTerm the `key` of its random numbers (see lanes/noise.py), whose type `params` of such a law takes as a third argument.
 """

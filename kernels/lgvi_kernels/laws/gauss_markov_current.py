@@ -8,17 +8,16 @@ import warp as wp
 from lgvi_kernels.law import (  # noqa: F401
     add,
     div,
-    int_lane,
     lane,
     lane3,
     mul,
-    normals3,
     ones,
     remember,
     remembered,
     struct,
     sub,
     vec3,
+    wandered,
 )
 
 FLOW = "uniform"
@@ -26,15 +25,14 @@ NOISE = True
 
 
 @functools.cache
-def params(width, real):
-    """Params: decay, e^(-h / tau), and spread, the standard deviation of one step's noise [m/s, inertial], of a step h.
+def params(width, real, Key):
+    """Params: decay, e^(-h / tau), and spread, the standard deviation of the noise [m/s, inertial], over the h of one draw.
 
-    member, seed0, seed1, channel: with the step, the key of the random numbers.
+    key: of the random numbers (see lanes/noise.py).
     memory: the first of its rows: u while the kick lasts (3), u at its end (3), du/dt (3).
     """
     Lane, Lane3 = lane(width, real), lane3(width, real)
-    key = {"member": int_lane(width), "seed0": wp.int32, "seed1": wp.int32, "channel": wp.int32}
-    return struct("GaussMarkovCurrent", decay=Lane, spread=Lane3, memory=wp.int32, **key)
+    return struct("GaussMarkovCurrent", decay=Lane, spread=Lane3, memory=wp.int32, key=Key)
 
 
 @wp.func
@@ -53,7 +51,7 @@ def keep(view: Any, row: int, v: Any):
 
 @wp.func
 def evolve(state: Any, view: Any, p: Any):
-    """u <- e^(-h/tau) u + spread xi, exact over a kick of h (Gillespie 1996): during the kick, the mean of old and new.
+    """u <- e^(-h/tau) u + spread xi, exact over each draw's h (Gillespie 1996): during the kick, the mean of old and new.
 
     All is drawn before the first half of a kick; the second half ends with the new u.
     """
@@ -63,8 +61,7 @@ def evolve(state: Any, view: Any, p: Any):
     else:
         unity = ones(p.decay)
         old = recall(view, at + 3)
-        noise = normals3(p.decay, p.member, view.step, p.channel, p.seed0, p.seed1)
-        new = p.decay * old + p.spread * noise
+        new = wandered(view, p.key, 0, old, p.decay, p.spread)
         keep(view, at, view.h.dtype(0.5) * (old + new))
         keep(view, at + 3, new)
         keep(view, at + 6, (unity / (view.h * unity)) * (new - old))

@@ -6,6 +6,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lanes.arithmetic import lane, lane3
+from lgvi_kernels.lanes.noise import noise_key
 from lgvi_kernels.lanes.state import struct
 
 
@@ -22,12 +23,18 @@ def plays(law, role):
 
 
 def numbers_struct(law, numbers, width, real):
-    """A law's struct of declared numbers, given by name and length: 1 for a lane, 3 for a 3-vector of lanes."""
+    """A law's struct of declared numbers, given by name and kind (see field_type)."""
     name = getattr(law, "__name__", "").rpartition(".")[2]
     name = f"numbers_{name}" if name.isidentifier() else "numbers"  # a user's file may have any name
-    kinds = {1: lane(width, real), 3: lane3(width, real)}
-    fields = {key: kinds[length] for key, length in numbers}
+    fields = {key: field_type(kind, width, real) for key, kind in numbers}
     return struct(name, **fields or {"unused": wp.uint8})
+
+
+def field_type(kind, width, real):
+    """The type of a field: 1, a lane; 3, a 3-vector of lanes; "step", "grid": the key of noise (see lanes/noise.py)."""
+    if kind in ("step", "grid"):
+        return noise_key(width, kind == "grid")
+    return {1: lane, 3: lane3}[kind](width, real)
 
 
 @functools.cache
@@ -35,12 +42,17 @@ def params_of(laws, numbers, width, real):
     """The parameters of several laws, nested: `own`, those of the first law, and `rest`, the same struct of the others.
 
     The functions of superpose nest alike: each hands `rest` on and reads `own`, without a name for each law. numbers: for each
-    law the (name, length) of the numbers that its Term declares, of which the struct of a law without `params` is made.
+    law the (name, kind) of the numbers that its Term declares, of which the struct of a law without `params` is made; one with
+    `params` takes their types as further arguments.
     """
     if not laws:
         return struct("NoParams", unused=wp.uint8)
-    make = getattr(laws[0], "params", None) or functools.partial(numbers_struct, laws[0], numbers[0])
-    return struct("Params", own=make(width, real), rest=params_of(laws[1:], numbers[1:], width, real))
+    make = getattr(laws[0], "params", None)
+    if make:
+        own = make(width, real, *(field_type(kind, width, real) for _, kind in numbers[0]))
+    else:
+        own = numbers_struct(laws[0], numbers[0], width, real)
+    return struct("Params", own=own, rest=params_of(laws[1:], numbers[1:], width, real))
 
 
 @functools.cache

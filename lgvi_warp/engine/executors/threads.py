@@ -60,8 +60,9 @@ class Threads:
         Yields:
             Each block and its result, as it finishes.
         """
-        # The main thread waits, so that it hears an interrupt at once.
-        if self.threads == 1 and threading.current_thread() is not threading.main_thread():
+        # The main thread waits, so that blocks at work come to their end when it hears an interrupt. One block alone would
+        # be lost in any thread.
+        if len(blocks) == 1 or (self.threads == 1 and threading.current_thread() is not threading.main_thread()):
             yield from ThisThread().run(work, blocks, advanced)
             return
         stop = threading.Event()

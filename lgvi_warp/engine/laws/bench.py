@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,15 +12,16 @@ import warp as wp
 from lgvi_kernels.advance.examine import COLUMNS, OUT_FIELDS, make_examine
 from lgvi_warp.common import warp_setup
 from lgvi_warp.common.errors import SceneError
-from lgvi_warp.common.machine import default_width
+from lgvi_warp.common.machine import register_width
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
+from lgvi_warp.engine.arrays import Lanes, LawArrays, put_rows
 from lgvi_warp.engine.kernel_choice import declared
-from lgvi_warp.engine.packets import Packets, pack
 from lgvi_warp.physics import inertia, notation, vehicle
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import PackingContext, Term
 from lgvi_warp.physics.vehicle import Vehicle
+from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import Environment
 
@@ -134,7 +134,7 @@ class Bench:
     packets: Bank
 
     def __init__(self, term: Term, module: Any, scene: Scene, packets: int, seed: int):
-        self.term, self.module, self.width = term, module, default_width("float64")
+        self.term, self.module, self.width = term, module, register_width("float64")
         self.noisy = bool(getattr(module, "NOISE", False))
         self.roles = tuple(role for role in COLUMNS if hasattr(module, role))
         numbers = scene.parameters() | {f"{term.key}.{name}": value for name, value in term.parameters().items()}
@@ -159,11 +159,10 @@ class Bench:
         Returns:
             The context for `count` members.
         """
-        I6 = vehicle.inertia6(parameters)
-        n, none = len(I6), np.zeros((len(I6), 3, 3))
+        M, _, Js = inertia.schur(inertia.blocks(vehicle.inertia6(parameters)))
+        n, none = len(M), np.zeros((len(M), 3, 3))
         Q = np.broadcast_to(TURN if elsewhere else np.eye(3), (n, 3, 3))
         origin = np.broadcast_to(ORIGIN if elsewhere else np.zeros(3), (n, 3))
-        M, _, Js = inertia.schur(I6)
         M, Js = (np.swapaxes(Q, 1, 2) @ A @ Q for A in (M, Js))
         frame = Frame(Q, origin, origin, M, np.einsum("nii->ni", Js), none, none)
         return PackingContext(parameters, frame, np.arange(self.count), self.seed, KICK)
@@ -180,8 +179,8 @@ class Bench:
         return self.packets.evaluate(views)
 
 
-class Bank(Packets):
-    """A term's parameters, table and memory, packed as Packets does for a run but without a run's kernel.
+class Bank:
+    """A term's numbers, table and memory, packed as for a run.
 
     Args:
         bench: the bench with the term and the compiled kernel.
@@ -190,21 +189,16 @@ class Bank(Packets):
     """
 
     def __init__(self, bench: Bench, context: PackingContext, views: Views):
-        # What Packets asks of a Plan and of Members to pack laws.
-        plan: Any = SimpleNamespace(
-            kernel_choice=SimpleNamespace(laws=((bench.term, bench.module),)),
-            spec=SimpleNamespace(width=bench.width, drag=(), gauss=()),
-            dtypes=(None, bench.Params, None),
-            dtype="float64",
-        )
-        members: Any = SimpleNamespace(count=bench.count, parameters=context.parameters, indices=context.members)
-        self.plan, self.members, self.frame, self.bench = plan, members, context.frame, bench
-        self.count = bench.count // bench.width
-        params, table, memory = self.packed_laws(context)
-        Lane = bench.examine.Lane
-        self.params = wp.array(params, dtype=bench.examine.Params, device="cpu")
-        self.table, self.memory = (wp.array(x, dtype=Lane, shape=x.shape[:2], device="cpu") for x in (table, memory))
+        self.bench, self.count = bench, bench.count // bench.width
+        packed = bench.term.packed(Ensemble.own(bench.term, context.parameters), context)
+        self.laws = LawArrays(self.count, bench.examine.Params, bench.Params, bench.examine.Lane)
+        self.laws.write([packed], [False])
         self.run_device(views, 0)
+
+    @property
+    def memory(self) -> Any:
+        """What the law remembers, a Warp array (packets, rows) of lanes; the second half is a backup."""
+        return self.laws.memory.array
 
     def evaluate(self, views: Views) -> dict[str, np.ndarray]:
         """Evaluate every role of the law, and its energy where it has one.
@@ -231,11 +225,13 @@ class Bank(Packets):
         """
         width, Lane = self.bench.width, self.bench.examine.Lane
         flat = [views.attitude.reshape(-1, 9), views.position, views.velocity, views.rate]
-        rows = pack(np.concatenate(flat, axis=1), width)
-        view_lanes = wp.array(rows, dtype=Lane, shape=rows.shape[:2], device="cpu")
+        rows = np.concatenate(flat, axis=1)
+        lanes = Lanes(self.count, rows.shape[1], Lane)
+        put_rows(lanes.view, rows)
         times = wp.array(views.time[::width], dtype=wp.float64, device="cpu")
         out = wp.zeros((self.count, OUT_FIELDS), dtype=Lane, device="cpu")
-        inputs = [self.params, self.table, view_lanes, times, wp.float64(KICK), STEP, second, self.memory, out]
+        inputs = [self.laws.params.array, self.laws.table.array, lanes.array, times, wp.float64(KICK), STEP, second]
+        inputs += [self.laws.memory.array, out]
         with build_lock:
             wp.launch(self.bench.examine.kernel, dim=self.count, inputs=inputs, device="cpu")
         return np.asarray(out.numpy().transpose(0, 2, 1).reshape(-1, OUT_FIELDS))

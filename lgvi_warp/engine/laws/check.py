@@ -10,7 +10,7 @@ import numpy as np
 
 from lgvi_kernels import built_in
 from lgvi_warp.common.errors import SceneError
-from lgvi_warp.common.machine import default_width
+from lgvi_warp.common.machine import register_width
 from lgvi_warp.engine import kernel_choice
 from lgvi_warp.engine.laws.bench import ORIGIN, TURN, Bank, Bench, Views, short, simple_scene, sizes
 from lgvi_warp.physics import notation, terms
@@ -100,7 +100,7 @@ def check_law(
     if not isinstance(term, Term):
         raise SceneError([f"term = {term!r}: is no term; give an object such as lw.Drag(...), not its class"])
     module = kernel_choice.device_module(term, term.device_in(False), built_in)
-    bench = Bench(term, module, scene or simple_scene(), max(1, -(-samples // default_width("float64"))), seed)
+    bench = Bench(term, module, scene or simple_scene(), max(1, -(-samples // register_width("float64"))), seed)
     checks: list[Check] = []
     for examine in (_numbers, _finite, _whole, _potential, _damping, _flow):
         with np.errstate(all="ignore"):  # what is not finite is found by its check

@@ -9,14 +9,14 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.random import uniforms_of
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
-from lgvi_warp.physics.terms.wrench_noise import noise_key
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
+from lgvi_warp.physics.terms.noisy import NoisyTerm
 
 STARTS = ("zero", "stationary")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class GaussMarkovCurrent(Term):
+class GaussMarkovCurrent(NoisyTerm):
     """A uniform current u' = -u / time_constant + noise: a first-order Gauss-Markov process for each member.
 
     Args:
@@ -30,14 +30,14 @@ class GaussMarkovCurrent(Term):
 
     type: ClassVar[str] = "gauss_markov_current"
     strengths: ClassVar[tuple[str, ...]] = ("standard_deviation",)
-    timed: ClassVar[bool] = True
 
     standard_deviation: Any = number((3,), "m/s", least=0.0)
     time_constant: Any = number((), "s", above=0.0)
     start: str = "zero"
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where `start` is unknown."""
+        """Adds a fault where `start` is unknown, and as `NoisyTerm`."""
+        super().check(faults)
         faults.choice("start", self.start, STARTS)
 
     @property
@@ -46,11 +46,11 @@ class GaussMarkovCurrent(Term):
         return True
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """Decay and spread of the process over one step, exact; the memory holds u twice and du/dt."""
-        steps = context.h / numbers["time_constant"]
+        """Decay and spread of the process over one draw, exact; the memory holds u twice and du/dt."""
+        steps = context.h / self.draws(context.h) / numbers["time_constant"]
         spread = numbers["standard_deviation"] * np.sqrt(-np.expm1(-2.0 * steps))[:, None]
         first = self._first(numbers, context)
-        values = {"decay": np.exp(-steps), "spread": spread} | noise_key(self.key, context)
+        values = {"decay": np.exp(-steps), "spread": spread} | self.noise_key(context)
         return Packed(values, memory=np.concatenate([first, first, np.zeros_like(first)], axis=1))
 
     def water_at_start(self, numbers: Numbers, position: np.ndarray, context: PackingContext) -> np.ndarray:

@@ -45,7 +45,8 @@ class Restoring(Term):
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The vector B r_b - W r_g [N m] about the origin of the forces, in the kernel's axes."""
         p, origin = context.parameters, context.frame.forces
-        return Packed({"moment": context.frame.vector(moment(p) + net(p)[:, None] * origin)})
+        about = moment(p) + net(p)[:, None] * origin if np.any(origin) else moment(p)
+        return Packed({"moment": context.frame.vector(about)})
 
     def potential(self, numbers: Numbers, position: Array, attitude: Array, parameters: Numbers) -> Array:
         # Energy U = (B r_b - W r_g).R^T e3, (k, n) [J].

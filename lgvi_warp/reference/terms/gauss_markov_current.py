@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from lgvi_warp.reference.random import normals
+from lgvi_warp.reference.random import draws_of_step
 from lgvi_warp.reference.rotation import Array
 from lgvi_warp.reference.terms import Flow, Law, View
 
@@ -15,6 +15,7 @@ class GaussMarkovCurrent(Law):
     channel = 0
     seed0 = 0
     seed1 = 0
+    noise_step = None
     initial = np.zeros(3)
 
     def start(self) -> Array:
@@ -22,13 +23,15 @@ class GaussMarkovCurrent(Law):
         return np.concatenate([self.initial, self.initial, np.zeros(3)])
 
     def evolve(self, view: View, second: bool) -> Array:
-        """Exact over a kick (Gillespie 1996); during it, the mean of the old and the new."""
+        """Exact over each draw (Gillespie 1996); during it, the mean of the old and the new."""
         _, old, rate = np.split(view.memory, 3)
         if second:
             return np.concatenate([old, old, rate])
-        xi = normals(self.seed0, self.seed1, view.member, view.step, self.channel)[:3]
-        decay = math.exp(-view.h / self.time_constant)
-        new = decay * old + self.standard_deviation * math.sqrt(1.0 - decay**2) * xi
+        draws = draws_of_step(self, view)
+        decay = math.exp(-view.h / len(draws) / self.time_constant)
+        new = old
+        for xi in draws:
+            new = decay * new + self.standard_deviation * math.sqrt(1.0 - decay**2) * xi
         return np.concatenate([0.5 * (old + new), new, (new - old) / view.h])
 
     def flow(self, view: View) -> Flow:

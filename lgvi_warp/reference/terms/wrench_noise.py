@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lgvi_warp.reference.random import normals
+from lgvi_warp.reference.random import draws_of_step
 from lgvi_warp.reference.rotation import Array
 from lgvi_warp.reference.terms import Law, View
 
@@ -13,9 +13,10 @@ class WrenchNoise(Law):
     channel = 0
     seed0 = 0
     seed1 = 0
+    noise_step = None
 
     def wrench(self, view: View) -> tuple[Array, Array]:
-        """Force and torque S xi / sqrt(h), held over the step."""
-        channels = np.array([self.channel, self.channel + 1])
-        xi = normals(self.seed0, self.seed1, view.member, view.step, channels)[:, :3] / np.sqrt(view.h)
-        return self.force * xi[0], self.torque * xi[1]
+        """Force and torque S xi / sqrt(h), held over the step; xi is the sum of the draws over the root of their number."""
+        draws = [draws_of_step(self, view, stream) for stream in (0, 1)]
+        f, m = (xi.sum(axis=0) / np.sqrt(len(xi)) / np.sqrt(view.h) for xi in draws)
+        return self.force * f, self.torque * m

@@ -65,7 +65,8 @@ def run_stored(
     result = result_of(folder, members, messages(plan) + remarks, plan.ensemble.scene.terms, observing)
     if remarks:
         return result  # what was measured is not the whole run
-    return replace(result, compile_seconds=compile_seconds, run_seconds=time.perf_counter() - start)
+    seconds = time.perf_counter() - start
+    return replace(result, compile_seconds=compile_seconds, compile_phases=plan.phases, run_seconds=seconds)
 
 
 def went_on(folder: Folder) -> tuple[str, ...]:

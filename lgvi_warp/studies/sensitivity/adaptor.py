@@ -9,16 +9,14 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError
-from lgvi_warp.common.labelled import columns_by_name, is_labelled
-from lgvi_warp.runs.quantities import OfInterest, quantities
+from lgvi_warp.common.labelled import is_labelled
+from lgvi_warp.runs.prepared import prepare
+from lgvi_warp.runs.quantities import OfInterest
 from lgvi_warp.sampling.designs.designs import salib_problem
-from lgvi_warp.sampling.designs.levels import UnitCubePoints
-from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.scene import variations
+from lgvi_warp.scene.columns import as_given, columns_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
-from lgvi_warp.studies.sensitivity.columns import as_given, columns_of, names_of, stacked, whole_columns
-from lgvi_warp.studies.sensitivity.outputs import FailedMembers, evaluate
 
 
 class ScalarModel:
@@ -30,7 +28,7 @@ class ScalarModel:
         of: one or several quantities of interest, as of `sobol`.
         levels: whether X holds numbers in (0, 1) in place of the values themselves.
         failed: "refuse" or "nan", for members that fail.
-        settings: arguments of `lw.solve` and of `evaluate`.
+        settings: further arguments of `lw.prepare`.
 
     Attributes:
         names: of the columns of X (d,), in the order of `vary`.
@@ -41,18 +39,11 @@ class ScalarModel:
     """
 
     def __init__(self, scene: Scene, vary: Any, of: Any, levels: bool, failed: str, settings: Mapping[str, Any]):
-        self.scene, self.of, self.levels, self.failed, self._settings = scene, of, levels, failed, dict(settings)
-        faults = Faults()
-        with faults.including():
-            quantities(of)
-        faults.choice("failed", failed, ("refuse", "nan"))
+        self.scene, self.of, self.levels, self.failed = scene, of, levels, failed
         self.vary = dict(vary) if isinstance(vary, Mapping) else None
-        names = () if self.vary is not None else names_of(faults, vary)
-        faults.raise_if_any()
-        if self.vary is None and levels:
-            raise SceneError(
-                [f"vary = {vary!r}: has no distributions, which levels=True needs; map names to distributions"]
-            )
+        self._progress = settings.get("progress")
+        settings = {name: value for name, value in settings.items() if name != "progress"}
+        self._prepared = prepare(scene, vary, of, levels=levels, failed=failed, **settings)
         self._fleet = Ensemble(scene, 1, 0, self.vary)
         self._variations = as_given(self._fleet)
         joint = [variation.key for variation in self._variations if variation.distribution.joint]
@@ -63,21 +54,7 @@ class ScalarModel:
         self._columns = [
             column for variation in self._variations for column in columns_of(self._fleet.space, variation.key)
         ]
-        if self.vary is None:
-            self.names = names
-            self._run(np.array([[float(self._scene_value(name)) for name in names]]), dry=True)
-        else:
-            cube = salib_problem(self._fleet.space)
-            self.names = tuple(cube["names"][column] for column in self._columns)
-
-    def _scene_value(self, name: str) -> Any:
-        (target,) = variations.targets(name)
-        known = self._scene_numbers()
-        faults = Faults("vary.")
-        if variations.known_target(faults, name, "...", target, known) and target.of(known[target.name]).ndim:
-            faults.add(f'"{name}"', "...", "is not a single number", f'name its entries, such as "{name}[0]"')
-        faults.raise_if_any()
-        return target.of(known[target.name])
+        self.names = self._prepared.names
 
     @property
     def problem(self) -> dict[str, Any]:
@@ -144,8 +121,7 @@ class ScalarModel:
             SceneError: for labels that are missing, unknown or doubled, and for what is no real number.
             FailedMembers: with failed="refuse", where members failed.
         """
-        Y = self._run(self._numbers(X))
-        return Y[:, 0] if Y.shape[1] == 1 else Y
+        return np.asarray(self._prepared(X, progress=self._progress))
 
     def scipy(self, X: Any) -> np.ndarray:
         """Run members as a call does, in scipy's shape.
@@ -166,46 +142,6 @@ class ScalarModel:
         array = faults.real("X", X, f"give an array of shape ({len(self.names)}, n)")
         faults.raise_if_any()
         return np.ascontiguousarray(self(np.asarray(array).T).T)
-
-    def _numbers(self, X: Any) -> np.ndarray:
-        """Convert X to an array (n, d), columns in the order of the names."""
-        faults = Faults()
-        shape = f"give an array of shape (n, {len(self.names)}), columns {', '.join(self.names)}"
-        if is_labelled(X):
-            columns = whole_columns(faults, self.names, self._scene_numbers(), columns_by_name(faults, "X", X))
-            array = stacked(faults, "X", self.names, columns) if columns else None
-        else:
-            array = faults.real("X", X, shape)
-            if array is not None and (array.ndim != 2 or array.shape[1] != len(self.names)):
-                faults.add("X", "...", f"has shape {array.shape}", shape)
-        if array is not None and self.levels and not np.all((array >= 0.0) & (array <= 1.0)):
-            odd = array[~((array >= 0.0) & (array <= 1.0))][0]
-            faults.add(
-                "X", odd, "is not a level between 0 and 1", "give levels, or leave out levels=True to give the numbers"
-            )
-        faults.raise_if_any()
-        assert array is not None
-        return array
-
-    def _scene_numbers(self) -> dict[str, np.ndarray]:
-        """Collect every number of the scene that may vary, by name."""
-        return self.scene.parameters() | {f"start.{key}": value for key, value in self.scene.start.given().items()}
-
-    def _run(self, X: np.ndarray, dry: bool = False) -> np.ndarray:
-        if self.levels:
-            inside = np.empty_like(X)
-            inside[:, self._columns] = np.clip(X, 2.0**-53, 1.0 - 2.0**-53)
-            fleet = Ensemble(self.scene, None, 0, self.vary, UnitCubePoints(inside))
-        else:
-            fleet = Ensemble(self.scene, None, 0, None, Table(values=dict(zip(self.names, X.T, strict=True))))
-        if dry:
-            return X
-        outputs = evaluate(fleet, self.of, **self._settings)
-        if outputs.failed.any():
-            if self.failed == "refuse":
-                raise FailedMembers([outputs.text('mend what fails, or take NaN for them: failed="nan"')])
-            return np.where(outputs.failed[:, None], np.nan, outputs.values)
-        return outputs.values
 
 
 @dataclass(frozen=True)
@@ -277,7 +213,7 @@ def model(
         levels: whether X holds numbers in (0, 1), which the distributions turn into values, in place of the values
             themselves; joint distributions need it. Default False.
         failed: "refuse" for an error where members fail, "nan" for NaN in their place. Default "refuse".
-        settings: arguments of `lw.solve` (method, h, t1, save, dtype, threads, progress) and of `evaluate`.
+        settings: further arguments of `lw.prepare` (method, h, t1, save, dtype, threads, common_noise), and `progress`.
 
     Returns:
         The function; X may also be a data frame, a mapping, a structured array or an xarray Dataset with columns by name.

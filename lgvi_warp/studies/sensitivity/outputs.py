@@ -8,21 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.status import Status, failed
 from lgvi_warp.methods.saveat import SaveAt
-from lgvi_warp.physics.fields import FIELDS
-from lgvi_warp.runs.quantities import OfInterest, OfResult, quantities
-from lgvi_warp.runs.solve import solve
+from lgvi_warp.runs.prepared import FailedMembers as FailedMembers
+from lgvi_warp.runs.prepared import Runner, samples_for
+from lgvi_warp.runs.quantities import OfInterest, quantities
 from lgvi_warp.scene.ensemble import Ensemble
-from lgvi_warp.scene.like import SceneLike
 
 # Number of members that are run together, so that their kept paths stay small.
 AT_ONCE = 16_384
-
-
-class FailedMembers(SceneError):  # noqa: N818  (what happened, and no fault of the scene)
-    """Raised when members failed and the answer cannot be computed from the remaining ones."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +71,7 @@ def evaluate(
         common_noise: whether forces with noise act on every member alike. Default False.
         progress: called with the fraction of the members that is done, from 0 to 1.
         save: samples to keep of each run. Default: those that the quantities need.
-        settings: arguments of `lw.solve` (method, h, t1, dtype, threads).
+        settings: arguments of `lw.solve` (method, h, t1, dtype, width, checks, on_failure, threads, executor, scheduler).
 
     Returns:
         The quantities of every member, and which members failed.
@@ -86,7 +80,9 @@ def evaluate(
         SceneError: for faulty arguments, and where a path is needed and no sampling interval is known.
     """
     interests = quantities(of)
-    save = _samples(fleet.scene, interests, save)
+    how = {name: settings.pop(name) for name in ("threads", "executor", "scheduler") if name in settings}
+    # The scene's own statistics, keep and until do not apply: every member of the design must run.
+    runner = Runner(fleet.scene, {"save": samples_for(fleet.scene, interests, save), **settings}, **how)
     if common_noise:
         fleet = fleet.subset(np.arange(fleet.members))
         fleet.indices = np.zeros(fleet.members, dtype=np.int64)
@@ -95,9 +91,8 @@ def evaluate(
     for first in range(0, fleet.members, AT_ONCE):
         chosen = np.arange(first, min(first + AT_ONCE, fleet.members))
         group_progress = progress and _part(progress, first / fleet.members, len(chosen) / fleet.members)
-        # The scene's own statistics, keep and until do not apply: every member of the design must run.
         group = fleet.subset(chosen)
-        result = solve(group, save=save, progress=group_progress, statistics=(), keep="all", until=False, **settings)
+        result = runner.run(group, group_progress)
         members = group.select(0, len(chosen)) if looks_at_members else None
         values.append([interest.values(result, members) for interest in interests])
         status.append(np.asarray(result.status))
@@ -116,16 +111,3 @@ def evaluate(
 
 def _part(progress: Callable[[float], None], done: float, share: float) -> Callable[[float], None]:
     return lambda fraction: progress(done + share * fraction)
-
-
-def _samples(scene: SceneLike, asked: Sequence[OfResult], save: SaveAt | None) -> SaveAt:
-    """Choose the samples that the quantities need. Raises SceneError where a path is needed and none is kept."""
-    if save is not None:
-        return save
-    fields = tuple(name for name in FIELDS if any(name in interest.fields for interest in asked))
-    paths = [interest.label for interest in asked if interest.over_path]
-    if paths and scene.run.save_every is None:
-        problem = f"save = None: is missing, and {paths[0]} looks over the path"
-        raise SceneError([f"{problem}; give save=lw.SaveAt(every=...) or [run] save_every"])
-    has_function = any(interest.is_function for interest in asked)
-    return SaveAt(every=scene.run.save_every if paths or has_function else None, fields=fields)

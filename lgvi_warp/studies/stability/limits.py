@@ -183,7 +183,7 @@ def rates(
     n = len(velocity)
     I6 = np.broadcast_to(vehicle.inertia6(parameters), (n, 6, 6))
     p = np.einsum("nij,nj->ni", I6, np.concatenate([velocity, angular_velocity], axis=1))[:, :3]
-    frame, _ = inertia.uncoupled_frame(I6)
+    frame, _ = inertia.uncoupled_frame(inertia.blocks(I6))
     least, most = (1.0 / np.linalg.eigvalsh(frame.M)[:, i] for i in (-1, 0))
     J = np.min(frame.J, axis=1)
     arm = parameters["vehicle.center_of_buoyancy"] - parameters.get("vehicle.center_of_gravity", np.zeros((1, 3)))

@@ -11,9 +11,11 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
-from lgvi_warp.cli import command, settings
+from lgvi_warp.cli import command, machine, settings
 from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.runs import all_failed
+from lgvi_warp.engine import widths
+from lgvi_warp.studies import tuning
 from tests.conftest import ROOT
 
 PAPER = str(ROOT / "examples" / "paper.toml")
@@ -282,7 +284,24 @@ def test_exit_codes_are_told(capsys):
 def test_info(capsys):
     assert cli.main(["info"]) == 0
     out = capsys.readouterr().out
-    assert all(word in out for word in ("cpu", "threads", "warp-lang 1.19", "vehicles per packet", "GFMA/s"))
+    assert all(word in out for word in ("cpu", "threads", "warp-lang 1.19", "chained float32 ", "GFMA/s"))
+
+
+def test_tune_keeps_what_it_measured(tmp_path, monkeypatch, capsys):
+    readings = [
+        tuning.Reading("plain float64", {8: 2.0, 16: 1.5}, 8, 16),
+        tuning.Reading("plain float32", {16: 1.0}, 16, 16),
+    ]
+    monkeypatch.setattr(tuning, "tune", lambda: readings)
+    monkeypatch.setattr(widths, "path", lambda: tmp_path / widths.FILE)
+    assert cli.main(["tune"]) == 0
+    out = capsys.readouterr().out
+    assert "8: 2.00 ns, 16: 1.50 ns: 16, 8 by the table" in out and str(tmp_path) in out
+    assert widths.tuned() == {"plain float64": 16, "plain float32": 16}
+    monkeypatch.setattr(machine, "fma_peak", lambda dtype: 1e9)
+    assert cli.main(["info"]) == 0
+    tuned, table = (line for line in capsys.readouterr().out.splitlines() if line.startswith("packets"))
+    assert "tuned" in tuned and "plain float64 16" in tuned and "table: " in table and "dense float64" in table
 
 
 @pytest.mark.kernel

@@ -6,6 +6,7 @@ import pytest
 import xarray as xr
 
 import lgvi_warp as lw
+from lgvi_warp.runs.prepared import Runner
 from lgvi_warp.studies import sensitivity as uq
 
 MASS, BUOYANCY, DENSITY = "vehicle.mass", "vehicle.buoyancy", "environment.water_density"
@@ -52,13 +53,13 @@ def seen(monkeypatch):
     """What ensembles a model runs, in place of running them: their numbers by name."""
     found = {}
 
-    def evaluate(fleet, of, **settings):
+    def answer(prepared, fleet, progress):
         found.clear()
         found.update(fleet._values(0, fleet.members))
-        n = fleet.members
-        return uq.Outputs(np.zeros((n, 1)), ("position[2]",), np.zeros(n, bool), {"ok": n}, {})
+        return np.zeros(fleet.members)
 
-    monkeypatch.setattr(uq.adaptor, "evaluate", evaluate)
+    monkeypatch.setattr(Runner, "plan", lambda runner, fleet: None)
+    monkeypatch.setattr(lw.Prepared, "_answer", answer)
     return found
 
 
@@ -143,7 +144,7 @@ def test_a_joint_law_keeps_its_place_among_levels(drifting, seen):
     assert seen["vehicle.mass"][0] > 123.8 and seen["environment.gravity"][0] < 9.8
 
 
-def test_problem_and_distributions_have_the_order_of_the_names(drifting):
+def test_problem_and_distributions_have_the_order_of_the_names(drifting, seen):
     vary = {MASS: lw.Normal(std=0.1), BUOYANCY: lw.Uniform(half_width=2.0)}
     for order in (list(vary), list(vary)[::-1]):
         model = uq.model(drifting, {name: vary[name] for name in order}, "depth", h=0.01, t1=0.02)
@@ -210,7 +211,7 @@ def test_names_that_are_no_list(drifting, vary, words):
     assert all(word in message for word in words), message
 
 
-def test_one_name_may_stand_alone(drifting):
+def test_one_name_may_stand_alone(drifting, seen):
     assert uq.model(drifting, MASS, "depth", h=0.01, t1=0.02).names == (MASS,)
 
 

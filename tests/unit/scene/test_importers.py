@@ -374,9 +374,10 @@ HOSTILE = {
 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_xml_is_refused_in_time(name):
-    began = time.process_time()
+    # Of this thread: others of this process may be at work.
+    began = time.thread_time()
     message = refused(from_sdf, HOSTILE[name])
-    assert time.process_time() - began < 2.0
+    assert time.thread_time() - began < 2.0
     assert len(message) < 2_000 and "\n" not in message
 
 

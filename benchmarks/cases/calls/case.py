@@ -1,0 +1,93 @@
+"""What surrounds the kernel: a call of a prepared run, a whole solve and the set-up of a member, beside the kernel alone."""
+
+import time
+
+import numpy as np
+
+import lgvi_warp as lw
+from lgvi_warp.engine.packets import Packets
+from lgvi_warp.runs.settle import make_plan
+
+# Varied numbers of each vehicle; of REMUS 100 twelve, six of its drag matrix among them.
+PAPER = {name: lw.Normal(std=1e-3) for name in ("vehicle.mass", "start.angular_velocity[0]", "vehicle.buoyancy")}
+REMUS = {
+    **{f"drag_matrix.quadratic[{i},{i}]": lw.Normal(relative=0.01) for i in range(6)},
+    **{f"start.velocity[{i}]": lw.Normal(std=0.01) for i in range(3)},
+    **{f"start.angular_velocity[{i}]": lw.Normal(std=0.01) for i in range(3)},
+}
+
+
+def scenes():
+    """By name: scene, distributions and method."""
+    yield "paper", lw.Scene.load("examples/paper.toml"), PAPER, "psi_s"
+    yield "remus_100", lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]}), REMUS, "psi_x"
+
+
+def least(call, rounds):
+    """The least processor time of a call [s], and what it returned."""
+    best, value = np.inf, None
+    for _ in range(rounds):
+        begun = time.thread_time()
+        value = call()
+        best = min(best, time.thread_time() - begun)
+    return best, value
+
+
+def run(quick):
+    rounds = 5 if quick else 200
+    for name, scene, vary, method in scenes():
+        for members, steps in ((1, 1), (16, 1000)):
+            settings = dict(method=method, h=0.01, t1=0.01 * steps, threads=1)
+            call = lw.prepare(scene, vary, of="position", **settings)
+            fleet = lw.Ensemble(scene, members, 1, vary)
+            values = fleet.select(0, members)
+            X = np.column_stack([_column(values, label) for label in call.names])
+            plan = make_plan(fleet, method, h=0.01, t1=0.01 * steps)
+            plan.compile()
+            packets = Packets(plan, values)
+            kernel, _ = least(lambda: packets.launch(0, steps), rounds)  # noqa: B023
+            prepared, Y = least(lambda: call(X), rounds)  # noqa: B023
+            solve, result = least(lambda: lw.solve(fleet, **settings), rounds)  # noqa: B023
+            yield {
+                "vehicle": name,
+                "members": members,
+                "steps": steps,
+                "kernel_ms": round(1e3 * kernel, 3),
+                "call_ms": round(1e3 * prepared, 3),
+                "solve_ms": round(1e3 * solve, 3),
+                "same_bits": bool(np.array_equal(Y, result.position[-1])),
+            }
+        yield from set_up(name, scene, vary, method, 4096, 3 if quick else 20)
+    begun = time.perf_counter()
+    fleet = lw.Ensemble(lw.Scene.load("examples/paper.toml"), 10**8, 1, PAPER)
+    make_plan(fleet, "psi_s", h=0.01, t1=0.2, survey_all=False)
+    yield {"planned_members": 10**8, "s": round(time.perf_counter() - begun, 3)}
+
+
+def set_up(name, scene, vary, method, members, rounds):
+    """What a member costs before its first step."""
+    fleet = lw.Ensemble(scene, members, 1, vary)
+    plan = make_plan(fleet, method, h=0.01, t1=0.01)
+    plan.compile()
+    values = fleet.select(0, members)
+    packets = Packets(plan, values)
+    draw, _ = least(lambda: fleet.select(0, members), rounds)
+    pack, _ = least(lambda: packets.refill(values), rounds)
+    fresh = fleet.subset(np.arange(members))
+    fresh.checked = 0
+    check, _ = least(lambda: fresh.check_block(0, members, values.parameters), rounds)
+    each = {"draw": draw, "pack": pack, "check": check, "all": draw + pack + check}
+    yield {
+        "vehicle": name,
+        "numbers": len(vary),
+        "us_per_member": {k: round(1e6 * s / members, 3) for k, s in each.items()},
+    }
+
+
+def _column(members, label):
+    """One number of each member (n,), by its label."""
+    name, _, rest = label.partition("[")
+    field = name.removeprefix("start.")
+    values = getattr(members, field) if name.startswith("start.") else members.parameters[name]
+    index = tuple(int(i) for i in rest.rstrip("]").split(",")) if rest else ()
+    return np.broadcast_to(values[(slice(None), *index)], members.count)

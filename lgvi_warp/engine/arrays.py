@@ -1,0 +1,235 @@
+"""The kernel's arrays of structs and of lanes, written through NumPy; what all members share is written only once."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from lgvi_warp.physics.terms.base import Packed
+
+
+def put(target: np.ndarray, column: Any) -> None:
+    """Write one number of each member into lanes; lanes beyond the last member get the last member's.
+
+    Args:
+        target: (packets, width), or (1, width) for a number that members share; written in place.
+        column: a number, or an array (1,) or (m,).
+    """
+    if np.ndim(column) == 0 or len(column) == 1:
+        target[...] = column
+    elif len(column) == target.size:
+        target[...] = column.reshape(target.shape)
+    else:
+        padded = np.empty(target.size, column.dtype)
+        padded[: len(column)], padded[len(column) :] = column, column[-1]
+        target[...] = padded.reshape(target.shape)
+
+
+def put_rows(target: np.ndarray, rows: np.ndarray) -> None:
+    """Write rows of members into lanes; lanes beyond the last member get the last member's.
+
+    Args:
+        target: (packets or 1, d, width), written in place.
+        rows: (1 or m, d).
+    """
+    for j in range(rows.shape[1]):
+        put(target[:, j], rows[:, j])
+
+
+def fill(target: np.ndarray, value: Any) -> None:
+    """Write the numbers of members into a field of a structured array.
+
+    Args:
+        target: (packets or 1,), the field; written in place.
+        value: a number, whole numbers (m,), numbers (1 or m,), vectors (1 or m, 3), matrices (1 or m, 3, 3), a pair of
+            diagonal and off-diagonal of symmetric matrices, or a mapping of these by name.
+    """
+    names = target.dtype.names or ()
+    if isinstance(value, Mapping):
+        for name, entry in value.items():
+            fill(target[name], entry)
+    elif isinstance(value, tuple):
+        for name, entry in zip(("diagonal", "off_diagonal"), value, strict=True):
+            fill(target[name], entry)
+    elif names == ("x", "y", "z"):
+        for i, axis in enumerate(names):
+            put(target[axis], value[:, i])
+    elif names:
+        for i, name in enumerate(("row0", "row1", "row2")):
+            fill(target[name], value[:, i])
+    else:
+        put(target, value)
+
+
+def longest(value: Any) -> int:
+    """The leading dimension of what `fill` writes.
+
+    Args:
+        value: as of `fill`.
+
+    Returns:
+        1, or the number of members if any number varies.
+    """
+    if isinstance(value, Mapping):
+        return max(map(longest, value.values()), default=1)
+    if isinstance(value, tuple):
+        return max(map(longest, value))
+    return len(value) if np.ndim(value) else 1
+
+
+class Structs:
+    """A Warp array of structs whose fields are written through NumPy, those that all members share only once.
+
+    Args:
+        struct: the Warp struct.
+        dtype: its NumPy type.
+
+    Attributes:
+        array: the Warp array, of one struct, or of one a packet where a number varies; None before `write`.
+        view: the same memory in NumPy.
+    """
+
+    def __init__(self, struct: Any, dtype: np.dtype):
+        assert dtype.itemsize == ctypes.sizeof(struct.ctype)
+        self._struct, self._dtype = struct, dtype
+        self.view = np.empty(0, dtype)
+        self.array: Any = None
+
+    def write(self, packets: int, parts: list[tuple[tuple[str, ...], Any, bool]]) -> None:
+        """Write numbers of members.
+
+        Args:
+            packets: number of packets.
+            parts: for each part of the struct its path, its fields as of `fill`, and whether all members share it.
+        """
+        varying = [(path, fields) for path, fields, shared in parts if not shared]
+        count = packets if max((longest(fields) for _, fields in varying), default=1) > 1 else 1
+        if count != len(self.view):
+            template = np.zeros(1, self._dtype)
+            for path, fields, shared in parts:
+                if shared:
+                    fill(_at(template, path), fields)
+            self.array = wp.empty(count, dtype=self._struct, device="cpu")
+            # The array's own memory: wp.array(values) lets NumPy parse the struct's type from text, which in several
+            # threads occasionally fails (Python before 3.11.8 and 3.12.2, python/cpython#106905).
+            memory: Any = (ctypes.c_char * (count * self._dtype.itemsize)).from_address(self.array.ptr)
+            self.view = np.ndarray(count, self._dtype, memory)
+            self.view[:] = np.repeat(template, count)
+        for path, fields in varying:
+            fill(_at(self.view, path), fields)
+
+
+def _at(target: np.ndarray, path: tuple[str, ...]) -> np.ndarray:
+    for name in path:
+        target = target[name]
+    return target
+
+
+class Lanes:
+    """A Warp array of lanes, rows of numbers a packet, written through NumPy.
+
+    Args:
+        packets: number of packets.
+        rows: number of rows.
+        Lane: Warp's type of a lane.
+
+    Attributes:
+        array: the Warp array, (packets, rows).
+        view: the same memory, (packets, rows, width).
+    """
+
+    def __init__(self, packets: int, rows: int, Lane: Any):
+        self.array: Any = wp.zeros((packets, rows), dtype=Lane, device="cpu")
+        self.view = self.array.numpy()
+
+
+class LawArrays:
+    """The numbers of a kernel's laws: their structs, their rows of a table, and what they remember.
+
+    Args:
+        packets: number of packets.
+        struct: Warp's struct of the laws' numbers.
+        dtype: its NumPy type.
+        Lane: Warp's type of a lane.
+
+    Attributes:
+        params: the structs.
+        table: rows that the laws read.
+        memory: what laws and method remember from step to step; the second half is a backup.
+    """
+
+    table: Lanes
+    memory: Lanes
+
+    def __init__(self, packets: int, struct: Any, dtype: np.dtype, Lane: Any):
+        self._packets, self._Lane = packets, Lane
+        self.params = Structs(struct, dtype)
+
+    def write(self, laws: Sequence[Packed], shared: Sequence[bool], scratch: int = 0) -> None:
+        """Write what the terms packed.
+
+        Args:
+            laws: what each term packed.
+            shared: for each, whether all members share it, and earlier calls brought the same.
+            scratch: rows that the method remembers for itself (default 0).
+        """
+        rows = [_present(law.rows) for law in laws]
+        starts = [part for law in laws for part in (_present(law.memory), np.zeros((1, law.work)))]
+        row, memory, places = 1, 0, []
+        for law, part in zip(laws, rows, strict=True):
+            kept = _present(law.memory).shape[1]
+            wanted = ("first", row, law.rows), ("memory", memory, law.memory), ("work", memory + kept, law.work or None)
+            places.append({name: place for name, place, part in wanted if part is not None})
+            row, memory = row + part.shape[1], memory + kept + law.work
+        self.params.write(self._packets, nested(laws, shared, places))
+        self._write_table(rows, shared, row)
+        self._write_memory(starts, memory + scratch)
+
+    def _write_table(self, each: list[np.ndarray], shared: Sequence[bool], size: int) -> None:
+        """Write the laws' rows; the first row of the table is none's."""
+        count = self._packets if any(len(rows) > 1 for rows in each) else 1
+        new = not hasattr(self, "table") or len(self.table.view) != count
+        if new:
+            self.table = Lanes(count, size, self._Lane)
+        first = 1
+        for rows, known in zip(each, shared, strict=True):
+            if new or not known:
+                put_rows(self.table.view[:, first : first + rows.shape[1]], rows)
+            first += rows.shape[1]
+
+    def _write_memory(self, parts: list[np.ndarray], half: int) -> None:
+        if not hasattr(self, "memory"):
+            self.memory = Lanes(self._packets, 2 * half, self._Lane)
+        view, first = self.memory.view, 0
+        view[...] = 0.0
+        for part in parts:
+            put_rows(view[:, first : first + part.shape[1]], part)
+            first += part.shape[1]
+        view[:, half:] = view[:, :half]
+
+
+def _present(rows: np.ndarray | None) -> np.ndarray:
+    return np.zeros((1, 0)) if rows is None else rows
+
+
+def nested(
+    each: Sequence[Packed], shared: Sequence[bool], places: Sequence[Mapping[str, int]] = ()
+) -> list[tuple[tuple[str, ...], Any, bool]]:
+    """The numbers of several laws or events as parts of the kernel's struct, which holds those of the first, and the rest.
+
+    Args:
+        each: what the terms packed.
+        shared: for each, whether all members share it.
+        places: for each, further whole numbers by field (default none).
+
+    Returns:
+        Parts as of `Structs.write`.
+    """
+    return [
+        ((*("rest",) * i, "own"), {**packed.values, **(places[i] if places else {})}, known)
+        for i, (packed, known) in enumerate(zip(each, shared, strict=True))
+    ]

@@ -1,0 +1,251 @@
+"""The numbers of a block's members as the kernel takes them: inertia, laws, events and state, one member a lane.
+
+What all members share is computed and written once for a run; each block, or call, brings what varies alone.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from lgvi_kernels import built_in
+from lgvi_kernels.advance.rows import STATE_FIELDS
+from lgvi_kernels.maps.collocation import SLOPE_FIELDS
+from lgvi_warp.engine.plan import Plan
+from lgvi_warp.engine.shared import AXES, FRAME, context
+from lgvi_warp.engine.survey import framed
+from lgvi_warp.methods import modified_inertia
+from lgvi_warp.physics import inertia, notation, vehicle
+from lgvi_warp.physics.inertia import Frame
+from lgvi_warp.physics.terms.base import Packed, PackingContext, Term
+from lgvi_warp.physics.terms.drag import Drag
+from lgvi_warp.sampling.members import Members
+from lgvi_warp.scene.ensemble import Ensemble
+
+Fields = dict[str, Any]
+
+
+class Packing:
+    """What the kernel needs of some members, in its frame and its units.
+
+    Args:
+        plan: the plan of the run.
+        members: the m members.
+
+    Attributes:
+        frame: axes and origins that the kernel works in.
+        U: (1 or m, 3, 3), matrix of the turns of psi_x; zero for other methods.
+        scale: (1 or m,) [kg m^2], number that momenta are divided by in the kernel; 1 for methods that need none.
+    """
+
+    def __init__(self, plan: Plan, members: Members):
+        self.plan, self.members = plan, members
+        self.numbers: Any = framed(plan.method, members.parameters, plan.shared)
+        self.frame, self.U, _ = self.numbers[FRAME]
+        self.scale = self._shared("scale", lambda numbers: self._scale(numbers[AXES][0]))
+
+    def _shared(self, key: Any, compute: Callable[[Any], Any]) -> Any:
+        return self.plan.shared(key, self.numbers, compute)
+
+    def _scale(self, frame: Frame) -> np.ndarray:
+        largest = frame.J.max(axis=1)
+        return largest if self.plan.spec.scaled else np.ones_like(largest)
+
+    def _context(self, numbers: Mapping[str, np.ndarray]) -> PackingContext:
+        m, plan = self.members, self.plan
+        return context(numbers, self.frame, m.indices, m.seed, plan.grid.h, plan.kernel_choice.aligned)
+
+    def inertia(self) -> Fields:
+        """The fields of the kernel's Inertia.
+
+        Returns:
+            Arrays by field, with a leading dimension of 1 or m.
+        """
+        fields: Fields = self._shared("inertia", self._inertia)
+        return fields
+
+    def _inertia(self, numbers: Any) -> Fields:
+        frame, U, _ = numbers[FRAME]
+        parts, scale = self.plan.spec.parts, self._scale(frame)
+        diagonal = _diagonal(frame.M)
+        fields: Fields = {"J": frame.J / scale[:, None], "inverse_scale": 1.0 / scale}
+        if diagonal is not None:
+            # The same bits as below, without the zeros.
+            inverse = 1.0 / diagonal * scale[:, None]
+            mean = (inverse[:, 0] + inverse[:, 1] + inverse[:, 2]) / 3.0
+            deviation = inverse - mean[:, None], np.zeros((1, 3))
+        else:
+            matrix = np.linalg.inv(frame.M) * scale[:, None, None]
+            mean = np.einsum("nii->n", matrix) / 3.0
+            deviation = symmetric(matrix - mean[:, None, None] * np.eye(3))
+        fields["mean"] = mean
+        if self.plan.spec.mass == "diagonal":
+            fields["anisotropy"] = deviation[0]
+        elif self.plan.spec.mass == "full":
+            fields["anisotropy"] = deviation
+        if "rates" in parts:
+            fields["inverse_J"] = scale[:, None] / frame.J
+        if "turns" in parts:
+            fields["half_over_J"] = 0.5 * scale[:, None] / frame.J
+        if "x" in parts:
+            fields["pitch"] = np.einsum("nii->ni", U)
+            fields |= {f"U{i + 1}{j + 1}": U[:, i, j] for i, j in ((0, 1), (0, 2), (1, 2))}
+        if "w" in parts:
+            fields["S"] = symmetric(frame.E)
+        if "coupled" in parts:
+            fields |= {"E": frame.E, "E_forces": frame.E_forces}
+        if "dense" in parts:
+            Md, C, Jd = (block / scale[:, None, None] for block in inertia.blocks(frame.inertia_at(frame.E_forces)))
+            fields |= {"M": symmetric(Md), "C": C, "J_forces": symmetric(Jd)}
+        if "modified" in parts:
+            fields |= modified_inertia.fields(frame.J / scale[:, None])
+        if "water" in parts:
+            fields |= _water(numbers, frame)
+        if "origin" in parts:
+            fields["user_origin"] = -frame.vector(frame.origin)
+            fields["user_origin_forces"] = -frame.vector(frame.forces)
+        return fields
+
+    def laws(self) -> list[Packed]:
+        """The numbers of each law.
+
+        Returns:
+            What each term packs, in the order of the kernel's laws.
+        """
+        each = enumerate(self.plan.kernel_choice.laws)
+        return [self._shared(("law", i), functools.partial(self._law, i, term, module)) for i, (term, module) in each]
+
+    def _law(self, i: int, term: Term, module: Any, numbers: Any) -> Packed:
+        parameters = Ensemble.own(term, numbers)
+        if i > 0 or not self.plan.spec.drag:
+            return term.packed(parameters, self._context(numbers))
+        assert isinstance(term, Drag)
+        if module is built_in("laws", "drag"):
+            frame = numbers[FRAME][0]
+            return term.packed_exact(parameters, frame, self._scale(frame))
+        return term.packed_directions(parameters, self._context(numbers))
+
+    def events(self) -> list[Packed]:
+        """The numbers of each event.
+
+        Returns:
+            What each event packs, in the order of the scene.
+        """
+
+        def pack(event: Any, numbers: Any) -> Packed:
+            packed: Packed = event.packed(Ensemble.own(event, numbers), self._context(numbers))
+            return packed
+
+        each = enumerate(event for event, _ in self.plan.kernel_choice.events)
+        return [self._shared(("event", i), functools.partial(pack, event)) for i, event in each]
+
+    def scratch(self) -> int:
+        """Rows of the memory that the method keeps for itself.
+
+        Returns:
+            Their number.
+        """
+        # Gauss collocation: the slopes of the last step, and room for their extrapolation.
+        return 2 * len(self.plan.spec.gauss[1]) * SLOPE_FIELDS if self.plan.spec.gauss else 0
+
+    def state(self, rows: np.ndarray) -> None:
+        """Write the members' states.
+
+        Args:
+            rows: (m, fields of a state), written in place.
+        """
+        m, frame, spec = self.members, self.frame, self.plan.spec
+        attitude, velocity, rate = (_once(x) for x in (m.attitude, m.velocity, m.angular_velocity))
+        turned = not self._shared("axes kept", lambda numbers: bool(np.all(np.eye(3) == numbers[FRAME][0].Q)))
+        shifted = self._shared("origin moved", lambda numbers: bool(np.any(numbers[AXES][0].origin)))
+        R, nu, Om, position = attitude, velocity, rate, m.position
+        if turned:
+            R = attitude @ frame.Q
+        if shifted:
+            origin = np.broadcast_to(frame.origin, (m.count, 3))
+            nu = velocity + np.cross(m.angular_velocity, origin)
+            position = position + notation.rotate_out(m.attitude, origin)
+        water = self._water_at_start()
+        if water is not None:
+            nu = nu - water
+        if turned:
+            nu, Om = notation.rotate_into(frame.Q, nu), notation.rotate_into(frame.Q, rate)
+        rows[:, :9] = R.reshape(-1, 9)
+        rows[:, 9:12] = position
+        mass = self._shared("diagonal mass", lambda numbers: _diagonal_mass(numbers[FRAME][0]))
+        scale = self.scale[:, None]
+        if mass is not None and not spec.inertial:
+            rows[:, 12:15], rows[:, 15:STATE_FIELDS] = mass * nu / scale, frame.J * Om / scale
+        else:
+            n = max(len(nu), len(Om))
+            twist = np.concatenate([np.broadcast_to(v, (n, 3)) for v in (nu, Om)], axis=1)
+            I6 = self._shared("inertia of the state", lambda numbers: numbers[FRAME][0].inertia_at(numbers[FRAME][0].E))
+            n = max(n, len(I6))
+            momenta = np.einsum("nij,nj->ni", np.broadcast_to(I6, (n, 6, 6)), np.broadcast_to(twist, (n, 6)))
+            if spec.inertial:
+                linear = notation.rotate_out(R, momenta[:, :3])
+                momenta = np.concatenate(np.broadcast_arrays(linear, momenta[:, 3:]), axis=1)
+            rows[:, 12:STATE_FIELDS] = momenta / scale
+        if spec.compensated:
+            low = rows[:, :STATE_FIELDS] - rows[:, :STATE_FIELDS].astype(np.float32)
+            rows[:, STATE_FIELDS:] = np.where(np.isfinite(low), low, 0.0)
+        else:
+            rows[:, STATE_FIELDS:] = 0.0
+
+    def _water_at_start(self) -> np.ndarray | None:
+        """R^T u (m, 3) [m/s]: velocity of the water in the user's body axes where each member starts; None for none."""
+        m = self.members
+        total: Any = None
+        for term, _ in self.plan.kernel_choice.laws:
+            kind = type(term)
+            if kind.water is Term.water and kind.water_at_start is Term.water_at_start:
+                continue
+            flow = term.water_at_start(Ensemble.own(term, m.parameters), m.position, self._context(m.parameters))
+            total = flow if total is None else total + flow
+        return None if total is None else notation.rotate_into(m.attitude, total)
+
+
+def _once(values: np.ndarray) -> np.ndarray:
+    """Values (m, ...) of members, as one entry where they are one value repeated without copies."""
+    return values[:1] if values.strides[0] == 0 else values
+
+
+# Places of the entries of a 3x3 matrix off its diagonal, row by row.
+OFF_DIAGONAL = [1, 2, 3, 5, 6, 7]
+
+
+def _diagonal(matrices: np.ndarray) -> np.ndarray | None:
+    """Diagonals (n, 3) of matrices (n, 3, 3) that have no other entries; None where one has."""
+    if np.any(matrices.reshape(-1, 9)[:, OFF_DIAGONAL]):
+        return None
+    return np.einsum("nii->ni", matrices)
+
+
+def _diagonal_mass(frame: Frame) -> np.ndarray | None:
+    """Diagonals (n, 3) of the mass matrices, if momenta are products of these and velocities alone; else None."""
+    return None if np.any(frame.E) else _diagonal(frame.M)
+
+
+def _water(numbers: Any, frame: Frame) -> Fields:
+    """What accelerating water acts on: displaced mass minus dry mass, and its lever."""
+    displaced, dry = vehicle.displaced_mass(numbers), vehicle.dry_mass(numbers)
+    center = numbers["vehicle.center_of_buoyancy"]
+    lever = displaced[:, None] * center - (dry[:, None] * vehicle.center_of_mass(numbers))
+    excess = displaced - dry
+    return {"excess": excess, "excess_lever": frame.vector(lever - excess[:, None] * frame.forces)}
+
+
+def symmetric(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The entries of symmetric matrices as the kernel takes them.
+
+    Args:
+        matrix: (n, 3, 3).
+
+    Returns:
+        Diagonal (n, 3), and off-diagonal entries 23, 31, 12 (n, 3).
+    """
+    off = np.stack([matrix[:, 1, 2], matrix[:, 2, 0], matrix[:, 0, 1]], axis=1)
+    return np.einsum("nii->ni", matrix), off

@@ -1,0 +1,130 @@
+"""What all members share: results that follow from numbers of which none varies, computed once for a run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+import numpy as np
+
+from lgvi_warp.physics.terms.base import PackingContext
+
+Value = TypeVar("Value")
+
+# Names under which these are noted beside parameters, whose names all have a dot. AXES is the frame but for its mass matrix,
+# which alone changes with the mass of most vehicles.
+FRAME, AXES, MEMBERS, SEED = "frame", "axes", "members", "seed"
+
+
+class Reads(dict[str, np.ndarray]):
+    """Numbers by name, which note the names that were read.
+
+    Attributes:
+        names: the names so far.
+    """
+
+    def __init__(self, numbers: Mapping[str, np.ndarray]):
+        super().__init__(numbers)
+        self.names: set[str] = set()
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        self.names.add(name)
+        return super().__getitem__(name)
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """Return a number, or the default where there is none of this name."""
+        self.names.add(name)
+        return super().get(name, default)
+
+    def __iter__(self) -> Iterator[str]:
+        self.names.update(super().keys())
+        return super().__iter__()
+
+    def keys(self) -> Any:
+        """Return all names, each noted."""
+        self.names.update(super().keys())
+        return super().keys()
+
+    def values(self) -> Any:
+        """Return all numbers, each noted."""
+        self.names.update(super().keys())
+        return super().values()
+
+    def items(self) -> Any:
+        """Return all names with their numbers, each noted."""
+        self.names.update(super().keys())
+        return super().items()
+
+
+class WatchedContext(PackingContext):
+    """A packing context that notes when the frame, the members' indices or the seed are read. Its parameters are `Reads`."""
+
+    def __getattribute__(self, name: str) -> Any:
+        value = super().__getattribute__(name)
+        if name in (FRAME, MEMBERS, SEED):
+            super().__getattribute__("parameters").names.add(name)
+        return value
+
+
+def context(numbers: Mapping[str, np.ndarray], *run: Any) -> PackingContext:
+    """A packing context for a computation that `Shared` may watch.
+
+    Args:
+        numbers: parameters by name, as the computation was given them.
+        run: frame, indices of the members, seed, step and `aligned`, as of `PackingContext`.
+
+    Returns:
+        The context.
+    """
+    return (WatchedContext if isinstance(numbers, Reads) else PackingContext)(numbers, *run)
+
+
+@dataclass
+class Shared:
+    """Results computed once, as far as they follow from numbers that vary from no member to another.
+
+    What a computation reads is seen when it runs first, so nothing has to list it. Which numbers it reads must depend on
+    numbers that it read before only, as is so for any function of them.
+
+    Args:
+        varied: names of what varies; FRAME, MEMBERS and SEED may be among them.
+    """
+
+    varied: set[str]
+    _kept: dict[Any, Any] = field(default_factory=dict)
+    _varying: set[Any] = field(default_factory=set)
+
+    def __call__(self, key: Any, numbers: Mapping[str, np.ndarray], compute: Callable[[Any], Value]) -> Value:
+        """A result from memory, or computed.
+
+        Args:
+            key: name of the computation; two that may differ must have two names.
+            numbers: what it may read, by name.
+            compute: the computation.
+
+        Returns:
+            Its result.
+        """
+        if key in self._kept:
+            return self._kept[key]
+        if key in self._varying:
+            return compute(numbers)
+        reads = Reads(numbers)
+        value = compute(reads)
+        if reads.names.isdisjoint(self.varied):
+            self._kept[key] = value
+        else:
+            self._varying.add(key)
+        return value
+
+    def keeps(self, key: Any) -> bool:
+        """Whether a computation that ran is shared by all members.
+
+        Args:
+            key: name of the computation.
+
+        Returns:
+            False also for one that has not run.
+        """
+        return key in self._kept

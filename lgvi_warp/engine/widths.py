@@ -1,0 +1,180 @@
+"""How many vehicles a packet holds: by a table for each kind of processor, or as `lgvi-warp tune` measured on this machine.
+
+What was measured is kept beside Warp's kernel caches, in CACHE/lgvi_warp_widths.json: machine and versions -> kernel -> width.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from lgvi_warp.common import files, machine, safe_files
+from lgvi_warp.common.errors import SceneError
+
+# Widths that kernels have, as lgvi_kernels knows them.
+WIDTHS = (1, 2, 4, 8, 16, 32)
+# Kinds of kernels. plain: sub-maps, of which each has independent operations; chained: turns, of which each waits for the one
+# before; dense: damping laws with their implicit step V; explicit: stages of explicit and collocation methods.
+KINDS = ("plain", "chained", "dense", "explicit")
+# Compensated kernels are of one kind, whatever the method: their sums fill the registers by themselves.
+KERNELS = (*(f"{kind} {real}" for kind in KINDS for real in ("float64", "float32")), "float32_compensated")
+
+# Kind of processor -> SIMD registers that one number of a packet fills, by kind of kernel; otherwise one. With two, one
+# vehicle's operation runs while another's waits, where registers abound. AMD: `python -m benchmarks run methods` on an EPYC.
+# Intel: psi_s, a server core of two 512-bit units: float64 22.0 ns at 8 lanes and 16.0 at 16, float32 9.9 at 16 and 7.4 at 32.
+REGISTERS = {
+    "Intel, avx512": {"plain": 2, "chained": 2},
+    "avx512": {"chained": 2},
+}
+
+FILE, MOST_BYTES = "lgvi_warp_widths.json", 1_000_000
+
+
+class Width(NamedTuple):
+    """Vehicles in a packet, and what says so.
+
+    Attributes:
+        lanes: The number of vehicles.
+        source: "asked for", "tuned", or "table" and the kind of processor.
+    """
+
+    lanes: int
+    source: str
+
+
+def parts(kernel: str) -> tuple[str, str]:
+    """Split one of KERNELS.
+
+    Args:
+        kernel: Its name.
+
+    Returns:
+        (kind, dtype); "plain" where the kind makes no difference.
+    """
+    kind, _, dtype = kernel.rpartition(" ")
+    return kind or "plain", dtype
+
+
+def kernel_kind(kind: str, dtype: str) -> str:
+    """Name what a width is chosen for.
+
+    Args:
+        kind: One of KINDS.
+        dtype: "float64", "float32" or "float32_compensated".
+
+    Returns:
+        One of KERNELS.
+    """
+    return dtype if dtype == "float32_compensated" else f"{kind} {dtype}"
+
+
+def default_width(kind: str, dtype: str) -> Width:
+    """Choose the width of a kernel on this machine.
+
+    Args:
+        kind: One of KINDS.
+        dtype: "float64", "float32" or "float32_compensated".
+
+    Returns:
+        The width as it was tuned, otherwise that of the table.
+    """
+    lanes = tuned().get(kernel_kind(kind, dtype))
+    return Width(lanes, "tuned") if lanes else of_table(kind, dtype)
+
+
+def of_table(kind: str, dtype: str) -> Width:
+    """Look up the width of a kernel for this kind of processor.
+
+    Args:
+        kind: One of KINDS.
+        dtype: "float64", "float32" or "float32_compensated".
+
+    Returns:
+        The width; of one SIMD register for processors that are not in the table.
+    """
+    simd = machine.simd()
+    processor = f"Intel, {simd}" if "Intel" in machine.cpu_name() else simd
+    processor = processor if processor in REGISTERS else simd
+    registers = 1 if dtype == "float32_compensated" else REGISTERS.get(processor, {}).get(kind, 1)
+    return Width(registers * machine.register_width(dtype), f"table: {processor}")
+
+
+def path() -> Path:
+    """Place of the file of tuned widths.
+
+    Returns:
+        A path in the folder that holds the kernel caches of all versions of Warp.
+    """
+    from warp._src.thirdparty import appdirs
+
+    folder = os.environ.get("WARP_CACHE_PATH") or appdirs.user_cache_dir(appname="warp", appauthor="NVIDIA")
+    return Path(folder) / FILE
+
+
+def tuned() -> dict[str, int]:
+    """Read the widths that were tuned on this machine with these versions.
+
+    Returns:
+        Kernel, one of KERNELS -> width; what is missing, unreadable or odd is left out.
+    """
+    return read(path())
+
+
+@functools.cache
+def read(file: Path) -> dict[str, int]:
+    """Read a file of tuned widths once in a process.
+
+    Args:
+        file: The file.
+
+    Returns:
+        As `tuned`.
+    """
+    known = _content(file).get(this_machine())
+    known = known if isinstance(known, dict) else {}
+    return {name: known[name] for name in KERNELS if type(known.get(name)) is int and known[name] in WIDTHS}
+
+
+def keep(widths: Mapping[str, int]) -> Path:
+    """Keep widths for this machine and these versions, beside those of others.
+
+    Args:
+        widths: Kernel, one of KERNELS -> width.
+
+    Returns:
+        The file.
+
+    Raises:
+        OSError: The file cannot be written.
+        SceneError: A link stands in its place.
+    """
+    file = path()
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with files.locked(file.parent, wait=True):
+        content = _content(file) | {this_machine(): dict(widths)}
+        files.write_whole(file, json.dumps(content, indent=1).encode())
+    read.cache_clear()
+    return file
+
+
+def this_machine() -> str:
+    """Name this machine and the versions with which widths are measured.
+
+    Returns:
+        One line.
+    """
+    versions = machine.versions()
+    return f"{machine.cpu_name()}, {machine.simd()}, lgvi-warp {versions['lgvi-warp']}, Warp {versions['warp-lang']}"
+
+
+def _content(file: Path) -> dict[str, object]:
+    """What a file of tuned widths holds; nothing, if it is none."""
+    with contextlib.suppress(OSError, ValueError, SceneError):
+        content = safe_files.parsed(safe_files.read(file.parent, file.name, MOST_BYTES))
+        return content if isinstance(content, dict) else {}
+    return {}

@@ -1,0 +1,493 @@
+"""`prepare`: a run that is called many times with other numbers, at little more than what its kernel takes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common import machine
+from lgvi_warp.common.errors import Faults, SceneError, shown
+from lgvi_warp.common.labelled import columns_by_name, is_labelled
+from lgvi_warp.common.status import Status, failed
+from lgvi_warp.engine.executors import executor_of
+from lgvi_warp.engine.keepers.observation import observe
+from lgvi_warp.engine.plan import Plan
+from lgvi_warp.engine.shared import MEMBERS, SEED, Shared
+from lgvi_warp.engine.survey import survey
+from lgvi_warp.methods.method import Method
+from lgvi_warp.methods.saveat import SaveAt
+from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.runs.provenance import provenance
+from lgvi_warp.runs.quantities import OfInterest, OfResult, quantities
+from lgvi_warp.runs.result import Result
+from lgvi_warp.runs.run import finished, run_plan
+from lgvi_warp.runs.settle import enough_iterations, make_plan
+from lgvi_warp.sampling.designs.designs import salib_problem
+from lgvi_warp.sampling.designs.levels import UnitCubePoints
+from lgvi_warp.sampling.designs.table import Table
+from lgvi_warp.scene import variations
+from lgvi_warp.scene.columns import as_given, columns_of, names_of, stacked, whole_columns
+from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
+from lgvi_warp.scene.like import SceneLike
+from lgvi_warp.scene.scene import Scene
+
+
+class FailedMembers(SceneError):  # noqa: N818  (what happened, and no fault of the scene)
+    """Raised when members failed and the answer cannot be computed from the remaining ones."""
+
+
+@dataclass
+class _Kind:
+    """Plans of ensembles in which the same names vary, by what their survey found."""
+
+    shared: Shared
+    plans: dict[Any, Plan] = field(default_factory=dict)
+
+
+class Runner:
+    """Settings of a run, and the plans that they lead to: what `solve` settles once for a call, and `prepare` once for many.
+
+    Args:
+        scene: the scene of every member.
+        settings: arguments of `make_plan`, method, h, t1, save, dtype, width, checks and on_failure.
+        statistics: statistics to gather (default none).
+        threads: number of threads; None (default) for all cores.
+        executor: as of `solve`, "threads" by default.
+        scheduler: as of `solve`.
+
+    Raises:
+        SceneError: if a setting is at fault.
+    """
+
+    def __init__(
+        self,
+        scene: SceneLike,
+        settings: Mapping[str, Any],
+        statistics: Sequence[Any] = (),
+        threads: int | None = None,
+        executor: Any = "threads",
+        scheduler: str | None = None,
+    ):
+        self.scene, self.settings = scene, dict(settings)
+        self.observed = observe(1, scene.run, statistics, "all", False, scene.events)
+        self.executor = executor_of(executor, threads, scheduler)
+        self.threads = threads or machine.thread_count()
+        chosen = self.settings.get("method")
+        self._auto = (chosen if isinstance(chosen, Method) else scene.run.method_of(chosen)).iterations == "auto"
+        self._kinds: dict[frozenset[str], _Kind] = {}
+        self._last: Plan | None = None
+
+    def plan(self, fleet: Ensemble) -> Plan:
+        """The plan of a run of some members; a kernel is chosen for what these members are, as `solve` does.
+
+        Args:
+            fleet: the members.
+
+        Returns:
+            A plan, compiled.
+
+        Raises:
+            SceneError: if the method cannot do what these members ask.
+        """
+        names = frozenset(fleet.varied_names)
+        kind = self._kinds.get(names)
+        if kind is None:
+            kind = self._kinds[names] = _Kind(Shared({*names, MEMBERS, SEED}))
+        if self._last is not None:
+            method, h, dtype = self._last.method, self._last.grid.h, self._last.dtype
+            if self._auto:
+                method = replace(method, iterations=enough_iterations(fleet, method, h, dtype))
+            plan = kind.plans.get((method, survey(fleet, method, h, kind.shared, odd=False, most=SURVEYED).decisive))
+            if plan is not None:
+                return plan.of(fleet)
+        plan = make_plan(fleet, **self.settings, fields=self.observed.fields, survey_all=False)
+        plan.compile()
+        facts = survey(fleet, plan.method, plan.grid.h, kind.shared, odd=False, most=SURVEYED)
+        kind.plans[plan.method, facts.decisive] = self._last = plan
+        return plan
+
+    def run(self, fleet: Ensemble, progress: Callable[[float], None] | None = None, warned: bool = True) -> Result:
+        """Run some members.
+
+        Args:
+            fleet: the members.
+            progress: called with the fraction of the work that is done, in [0, 1].
+            warned: whether the result has warnings; default True.
+
+        Returns:
+            Their result, whose provenance names the members' number but not their values, and whose messages leave out what
+            is odd about their values.
+
+        Raises:
+            SceneError: if the method cannot do what these members ask.
+            MembersFailed: if members failed and on_failure is "raise".
+        """
+        plan = self.plan(fleet)
+        content = plan.shared("provenance", {}, lambda numbers: provenance(plan, self.observed))
+        few = {"members": fleet.members, "seed": fleet.seed, "varied": sorted(fleet.varied_names)}
+        known = {**content, "ensemble": few}, plan.grid.messages
+        result = run_plan(
+            plan, self.threads, progress, self.observed, plan.fields, self.executor, known=known, warned=warned
+        )
+        return finished(result, plan, self.observed, plan.fields, self.threads)
+
+
+class Prepared:
+    """A run to be called many times, made by `prepare`.
+
+    Args:
+        fleet: the members of a call without X.
+        table: members whose columns a call with X replaces; or why there are none.
+        names: names of the columns of X.
+        of: quantities of interest; empty for whole results.
+        runner: what settles and runs.
+        levels: columns of the cube, in the order of the names, where X holds levels; None where it holds values.
+        refuse: whether a failed member is an error; else its quantities are NaN.
+        common_noise: whether noise acts on every member alike.
+        made_of: arguments of `prepare`, by position and by name, for a pickle.
+
+    Attributes:
+        names: names of the columns of X (d,).
+    """
+
+    def __init__(
+        self,
+        fleet: Ensemble,
+        table: Ensemble | str,
+        names: tuple[str, ...],
+        of: tuple[OfResult, ...],
+        runner: Runner,
+        levels: Sequence[int] | None,
+        refuse: bool,
+        common_noise: bool,
+        made_of: tuple[Any, ...],
+    ):
+        self._arguments = made_of
+        self._fleet, self._table, self.names, self._of, self._runner = fleet, table, names, of, runner
+        self._levels, self._refuse, self._common_noise = levels, refuse, common_noise
+
+    def __call__(
+        self,
+        X: Any = None,
+        *,
+        seed: int | None = None,
+        members: int | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> Any:
+        """Run members with these numbers, from t = 0 to the end.
+
+        Args:
+            X: (n, d), columns in the order of `names`; or by name, in any order: a mapping of columns, a data frame, a
+                structured array, an xarray Dataset. By name a whole vector may be given, "current.velocity": (n, 3).
+                Without X the members are drawn from the distributions.
+            seed: seed of the members that are drawn; default that of the ensemble.
+            members: number of members that are drawn; default that of the ensemble.
+            progress: called with the fraction of the work that is done, in [0, 1].
+
+        Returns:
+            The quantities, (n,) of a single number and (n, m) of several; a `Result` without `of`.
+
+        Raises:
+            SceneError: if X does not fit the names, or holds unphysical numbers; the message lists every fault.
+            FailedMembers: if members failed, unless failed="nan".
+        """
+        if X is not None and (seed is not None or members is not None):
+            raise SceneError(["X: is given beside seed or members, which draw the numbers; leave out one of them"])
+        return self._answer(self._drawn(seed, members) if X is None else self._members(X), progress)
+
+    def states(self, position: Any, attitude: Any, velocity: Any, angular_velocity: Any, parameters: Any = None) -> Any:
+        """Run members from given states.
+
+        Args:
+            position: (n, 3) [m], inertial axes.
+            attitude: (n, 3, 3), body to inertial axes.
+            velocity: (n, 3) [m/s], body axes.
+            angular_velocity: (n, 3) [rad/s], body axes.
+            parameters: arrays (n, ...) by name, as of `Ensemble.from_states`; default None.
+
+        Returns:
+            As of a call.
+
+        Raises:
+            SceneError: if an array has a wrong shape or unphysical values.
+            FailedMembers: if members failed, unless failed="nan".
+        """
+        given = position, attitude, velocity, angular_velocity, parameters
+        return self._answer(Ensemble.from_states(self._fleet.scene, *given), None)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        arguments, settings = self._arguments
+        return _prepared_again, (arguments, settings)
+
+    def _drawn(self, seed: int | None, members: int | None) -> Ensemble:
+        fleet = self._fleet
+        if seed is None and members is None:
+            return fleet
+        faults = Faults()
+        for name, value, least in (("seed", seed, 0), ("members", members, 1)):
+            if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < least):
+                faults.add(name, value, f"is no whole number from {least} on", "give one, or leave it out")
+        faults.raise_if_any()
+        return fleet.with_seed(fleet.seed if seed is None else seed, members or fleet.members)
+
+    def _members(self, X: Any) -> Ensemble:
+        """The ensemble of the members with these numbers."""
+        if isinstance(self._table, str):
+            raise SceneError([f"X: {self._table}"])
+        numbers = self.numbers(X)
+        if self._levels is None:
+            return self._table.with_columns(dict(zip(self.names, numbers.T, strict=True)))
+        inside = np.empty_like(numbers)
+        inside[:, self._levels] = np.clip(numbers, 2.0**-53, 1.0 - 2.0**-53)
+        return Ensemble(self._fleet.scene, None, self._fleet.seed, self._fleet.vary, UnitCubePoints(inside))
+
+    def numbers(self, X: Any) -> np.ndarray:
+        """Numbers of members as an array.
+
+        Args:
+            X: as of a call.
+
+        Returns:
+            (n, d), columns in the order of the names.
+
+        Raises:
+            SceneError: for labels that are missing, unknown or doubled, and for what is no real number.
+        """
+        faults, names = Faults(), self.names
+        shape = f"give an array of shape (n, {len(names)}), columns {', '.join(names)}"
+        if is_labelled(X):
+            known = scene_numbers(self._fleet.scene)
+            columns = whole_columns(faults, names, known, columns_by_name(faults, "X", X))
+            array = stacked(faults, "X", names, columns) if columns else None
+        else:
+            array = faults.real("X", X, shape)
+            if array is not None and (array.ndim != 2 or array.shape[1] != len(names) or not len(array)):
+                faults.add("X", "...", f"has shape {array.shape}", shape)
+        if array is not None and self._levels is not None and not np.all((array >= 0.0) & (array <= 1.0)):
+            odd = array[~((array >= 0.0) & (array <= 1.0))][0]
+            remedy = "give levels, or leave out levels=True to give the numbers"
+            faults.add("X", odd, "is not a level between 0 and 1", remedy)
+        faults.raise_if_any()
+        assert array is not None
+        return array
+
+    def _answer(self, fleet: Ensemble, progress: Callable[[float], None] | None) -> Any:
+        if self._common_noise:
+            fleet.indices = np.zeros(fleet.members, dtype=np.int64)
+        result = self._runner.run(fleet, progress, warned=not self._of)
+        if not self._of:
+            return result
+        members = fleet.select(0, fleet.members) if any(each.looks_at_members for each in self._of) else None
+        values = np.concatenate([each.values(result, members) for each in self._of], axis=1)
+        lost = failed(np.asarray(result.status)) | ~np.isfinite(values).all(axis=1)
+        if lost.any():
+            if self._refuse:
+                raise FailedMembers([failure_text(result, lost, 'mend what fails, or take NaN for them: failed="nan"')])
+            values = np.where(lost[:, None], np.nan, values)
+        return values[:, 0] if values.shape[1] == 1 else values
+
+
+def failure_text(result: Result, lost: np.ndarray, remedy: str) -> str:
+    """Describe how many members failed, and of what.
+
+    Args:
+        result: their result.
+        lost: (n,), whether each failed, or a quantity of it is not finite.
+        remedy: what the user can do, which ends the text.
+
+    Returns:
+        One line of text.
+    """
+    status = np.asarray(result.status)
+    causes = {Status(int(code)).name.lower(): int((status == code).sum()) for code in np.unique(status[failed(status)])}
+    odd = int((lost & ~failed(status)).sum())
+    causes |= {"quantity not finite": odd} if odd else {}
+    listed = ", ".join(f"{name} {number}" for name, number in causes.items())
+    first = int(np.argmax(lost))
+    return f"{int(lost.sum())} of {len(lost)} members failed ({listed}; the first: member {first}); {remedy}"
+
+
+def scene_numbers(scene: Any) -> dict[str, np.ndarray]:
+    """Every number of a scene that may vary.
+
+    Args:
+        scene: the scene.
+
+    Returns:
+        Values by name, those of the start among them.
+    """
+    return scene.parameters() | {f"start.{key}": value for key, value in scene.start.given().items()}
+
+
+def scene_value(scene: Any, name: str) -> np.ndarray:
+    """A single number of a scene.
+
+    Args:
+        scene: the scene.
+        name: such as "start.position[2]".
+
+    Returns:
+        The number ().
+
+    Raises:
+        SceneError: if the scene has no such number, or the name is that of several.
+    """
+    (target,) = variations.targets(name)
+    known, faults = scene_numbers(scene), Faults("vary.")
+    if variations.known_target(faults, name, "...", target, known) and target.of(known[target.name]).ndim:
+        faults.add(f'"{name}"', "...", "is not a single number", f'name its entries, such as "{name}[0]"')
+    faults.raise_if_any()
+    return target.of(known[target.name])
+
+
+def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -> SaveAt | None:
+    """The samples that quantities need, where the user does not say which to keep.
+
+    Args:
+        scene: the scene.
+        of: the quantities; none for whole results.
+        save: what the user gave.
+
+    Returns:
+        What to save.
+
+    Raises:
+        SceneError: if a quantity looks over the path and no interval of samples is known.
+    """
+    if save is not None or not of:
+        return save
+    fields = tuple(name for name in FIELDS if any(name in each.fields for each in of))
+    paths = [each.label for each in of if each.over_path]
+    if paths and scene.run.save_every is None:
+        problem = f"save = None: is missing, and {paths[0]} looks over the path"
+        raise SceneError([f"{problem}; give save=lw.SaveAt(every=...) or [run] save_every"])
+    has_function = any(each.is_function for each in of)
+    return SaveAt(every=scene.run.save_every if paths or has_function else None, fields=fields)
+
+
+def prepare(
+    fleet: Scene | Ensemble,
+    vary: Mapping[Any, Any] | Sequence[str] | None = None,
+    of: OfInterest | Sequence[OfInterest] | None = None,
+    *,
+    method: str | Method | None = None,
+    h: float | None = None,
+    t1: float | None = None,
+    save: SaveAt | None = None,
+    dtype: str | None = None,
+    statistics: Sequence[Any] = (),
+    levels: bool = False,
+    failed: str = "refuse",
+    common_noise: bool = False,
+    threads: int | None = None,
+    width: int | None = None,
+    checks: str | None = None,
+    on_failure: str | None = None,
+    executor: Any = "threads",
+    scheduler: str | None = None,
+) -> Prepared:
+    """Prepare a run that is called many times with other numbers.
+
+    Checks, choices, the kernel and whatever no number of `vary` changes are settled once. A call then costs what the kernel
+    takes, and little more; it has the bits of `solve`. The function may be called from several threads, and be pickled.
+
+        run = lw.prepare(scene, ["vehicle.mass", "start.position[2]"], of="max(depth)", h=0.01, t1=60.0)
+        depths = run(X)                                    # X (n, 2), depths (n,)
+
+    Args:
+        fleet: A Scene or an Ensemble; its [ensemble] is used where `vary` is None.
+        vary: Names of what varies, ["vehicle.mass", "start.position[2]"], or a mapping of names to distributions.
+        of: One or several quantities of interest: "position[2]", "max(depth)", a Quantity, a function of a Result. Default
+            None: calls return results.
+        method: As of `lw.solve`, like h, t1, dtype, width, checks, on_failure, threads, executor and scheduler. What is left
+            out is taken from the scene's [run].
+        h: Step [s].
+        t1: End of the run [s].
+        save: Samples to keep, as of `lw.solve`; default with `of`: those that the quantities need.
+        dtype: "float64", "float32" or "float32_compensated".
+        statistics: Statistics gathered over the members of each call, in result.statistics; default none.
+        levels: Whether X holds numbers in (0, 1), which the distributions turn into values, in place of the values;
+            joint distributions need it. Default False.
+        failed: "refuse" (default) for an error where members fail, "nan" for NaN in their place; for `of` only.
+        common_noise: Whether forces with noise act on every member alike. Default False.
+        threads: Number of threads; default all cores.
+        width: Vehicles per packet; default from the CPU.
+        checks: "safe", "all" or "none".
+        on_failure: "freeze", "raise" or "substep".
+        executor: "threads" (default), "processes" or "dask", or an object that runs blocks.
+        scheduler: Address of Dask's scheduler.
+
+    Returns:
+        The function; its `names` are the columns of X.
+
+    Raises:
+        SceneError: For faulty arguments, all in one message.
+    """
+    faults = Faults()
+    if not isinstance(fleet, Ensemble | Scene):
+        problem = "is neither an Ensemble nor a Scene"
+        raise SceneError([f"fleet = {shown(fleet)}: {problem}; give lw.Scene(...) or lw.Ensemble(...)"])
+    scene = fleet.scene if isinstance(fleet, Ensemble) else fleet
+    interests: tuple[OfResult, ...] = ()
+    if of is not None:
+        with faults.including():
+            interests = quantities(of)
+    faults.choice("failed", failed, ("refuse", "nan"))
+    distributions = isinstance(vary, Mapping)
+    listed = names_of(faults, vary) if vary is not None and not distributions else ()
+    if levels and listed:
+        faults.add("vary", vary, "has no distributions, which levels=True needs", "map names to distributions")
+    faults.raise_if_any()
+    if vary is None:
+        whole = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(scene)
+    elif distributions:
+        whole = Ensemble(scene, 1, 0, vary)  # type: ignore[arg-type]
+    else:
+        whole = Ensemble(scene, 1)
+    names, table, columns = _columns(whole, listed, levels)
+    save = samples_for(scene, interests, save)
+    settings = dict(
+        method=method, h=h, t1=t1, save=save, dtype=dtype, width=width, checks=checks, on_failure=on_failure
+    )
+    runner = Runner(scene, settings, statistics, threads, executor, scheduler)
+    known = settings | dict(
+        statistics=statistics, levels=levels, failed=failed, common_noise=common_noise, threads=threads, executor=executor,
+        scheduler=scheduler)  # fmt: skip
+    made_of = (fleet, vary, of), known
+    first = whole if isinstance(table, str) else table
+    runner.plan(first)
+    first.select(0, 1)  # which keeps what all members share
+    return Prepared(whole, table, names, interests, runner, columns, failed == "refuse", common_noise, made_of)
+
+
+def _prepared_again(arguments: tuple[Any, ...], settings: dict[str, Any]) -> Prepared:
+    return prepare(*arguments, **settings)
+
+
+def _columns(
+    whole: Ensemble, listed: tuple[str, ...], levels: bool
+) -> tuple[tuple[str, ...], Ensemble | str, list[int] | None]:
+    """(names of the columns of X; an ensemble with these columns, or why X has none; columns of the cube for levels)."""
+    scene, names, cube_columns = whole.scene, listed, None
+    if not listed and whole.vary:
+        described = as_given(whole)
+        joint = [variation for variation in described if variation.distribution.joint]
+        if joint and not levels:
+            remedy = "give levels=True, or let members be drawn: run(seed=...)"
+            return (
+                (),
+                f'vary."{joint[0].key}" is a joint distribution, whose values are not single numbers; {remedy}',
+                None,
+            )
+        cube_columns = [column for variation in described for column in columns_of(whole.space, variation.key)]
+        cube = salib_problem(whole.space)["names"]
+        names = tuple(cube[column] for column in cube_columns)
+        if levels:
+            return names, whole, cube_columns
+    if not names:
+        return (), "has no columns, since nothing varies; name what varies: prepare(scene, vary=[...])", None
+    values = {name: np.array([float(scene_value(scene, name))]) for name in names}
+    return names, Ensemble(scene, None, whole.seed, None, Table(values=values)), None

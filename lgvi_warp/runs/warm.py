@@ -1,0 +1,79 @@
+"""Kernels compiled ahead of a run, several at a time, each in a process of its own."""
+
+from __future__ import annotations
+
+import multiprocessing
+import pickle
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+
+from lgvi_warp.common.phases import Phases
+from lgvi_warp.engine.executors.base import deaf
+from lgvi_warp.engine.keepers.observation import observe
+from lgvi_warp.engine.plan import Plan
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+
+
+def plans_of(scene: Scene, methods: Sequence[str], dtypes: Sequence[str]) -> list[Plan]:
+    """Plan the runs of a scene by some methods and precisions.
+
+    Args:
+        scene: The scene.
+        methods: Names; none for the scene's own.
+        dtypes: Names of precisions; none for the scene's own.
+
+    Returns:
+        One plan for each kernel that these runs take.
+
+    Raises:
+        SceneError: The scene cannot run, or refuses a method or precision.
+    """
+    ensemble = Ensemble.from_scene(scene)
+    observed = observe(ensemble.members, scene.run, None, None, None, scene.events)
+    plans: dict[tuple[object, ...], Plan] = {}
+    for method in methods or (None,):
+        for dtype in dtypes or (None,):
+            plan = make_plan(ensemble, method, dtype=dtype, fields=observed.fields)
+            # Members whose samples are kept run once more after the statistics.
+            again = observed.keep not in ("all", "none")
+            for one in (plan, make_plan(ensemble, method, dtype=dtype)) if again else (plan,):
+                plans[plan.method.name, plan.dtype, one.spec] = one
+    return list(plans.values())
+
+
+def warm(plans: Sequence[Plan], workers: int) -> Iterator[tuple[Plan, Phases]]:
+    """Compile the kernels of some plans into Warp's cache.
+
+    Args:
+        plans: The plans.
+        workers: Number of processes; with one, or for one kernel, this process compiles.
+
+    Yields:
+        A plan whose kernel is in the cache, and how long its phases took.
+
+    Raises:
+        SceneError: The device code of a user's law does not compile.
+        OSError: The kernel cache cannot be written.
+    """
+    workers = min(workers, len(plans))
+    if workers < 2:
+        for plan in plans:
+            yield plan, _phases(pickle.dumps(plan))
+        return
+    with deaf():
+        pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"))
+        waiting = {pool.submit(_phases, pickle.dumps(plan)): plan for plan in plans}
+    try:
+        for future in as_completed(waiting):
+            yield waiting[future], future.result()
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _phases(data: bytes) -> Phases:
+    """Compile the kernel of a pickled plan in this process."""
+    plan: Plan = pickle.loads(data)
+    plan.compile()
+    return plan.phases

@@ -1,0 +1,67 @@
+"""The width of packets by measurement: each kind of kernel at the widths that may suit, in turn on one thread."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from lgvi_warp.common import machine
+from lgvi_warp.engine import widths
+from lgvi_warp.physics.terms.drag import DragMatrix
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.studies import speed
+
+# Kind of kernel -> the method that stands for it.
+METHODS = {"plain": "psi_s", "chained": "psi_x", "dense": "psi_s", "explicit": "rk8"}
+# The damping of the kind dense: every entry of the matrix acts.
+LINEAR = np.array([20.0, 60.0, 60.0, 4.0, 6.0, 6.0])
+TERMS = {"dense": (DragMatrix(linear=np.diag(LINEAR) + 0.1 * np.sqrt(np.outer(LINEAR, LINEAR))),)}
+# A number of a packet fills so many SIMD registers.
+REGISTERS = (1, 2, 4)
+H, STEPS, MEMBERS, ROUNDS = 0.01, 128, 512, 20
+# A width that is faster by less than this part is not better: readings differ by as much.
+WORTH = 0.03
+
+
+class Reading(NamedTuple):
+    """Speeds of one kind of kernel.
+
+    Attributes:
+        kernel: One of widths.KERNELS.
+        ns: Width -> time per vehicle and step [ns].
+        before: The width of the table.
+        best: The fastest; that of the table where it is as fast.
+    """
+
+    kernel: str
+    ns: dict[int, float]
+    before: int
+    best: int
+
+
+def tune(rounds: int = ROUNDS) -> Iterator[Reading]:
+    """Measure every kind of kernel at every width that may suit this machine.
+
+    Args:
+        rounds: Number of readings of each, of which the least counts. Default 20, about a tenth of a second.
+
+    Yields:
+        The speeds of one kind.
+    """
+    for kernel in widths.KERNELS:
+        kind, dtype = widths.parts(kernel)
+        lanes = [n * machine.register_width(dtype) for n in REGISTERS]
+        fleet = speed.fleet(MEMBERS, *TERMS.get(kind, ()))
+        plans = {
+            width: make_plan(fleet, METHODS[kind], h=H, t1=H * STEPS, dtype=dtype, width=width)
+            for width in lanes
+            if width in widths.WIDTHS
+        }
+        seconds = speed.least([speed.stepper(plan) for plan in plans.values()], rounds)
+        ns = {width: 1e9 * one / (MEMBERS * STEPS) for width, one in zip(plans, seconds, strict=True)}
+        before = widths.of_table(kind, dtype).lanes
+        fastest = min(ns, key=lambda width: ns[width])
+        better = ns[fastest] < (1.0 - WORTH) * ns[before]
+        yield Reading(kernel, ns, before, fastest if better else before)

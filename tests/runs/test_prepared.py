@@ -1,0 +1,290 @@
+"""A prepared run has the bits of solve, whatever varies, however often and from however many threads it is called."""
+
+import gc
+import pickle
+import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp.engine import plan as plans
+from lgvi_warp.engine.packets import Packets
+from lgvi_warp.engine.shared import Shared
+from lgvi_warp.runs.prepared import FailedMembers
+from lgvi_warp.runs.run import run_plan
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.scene import ensemble as ensembles
+
+pytestmark = pytest.mark.kernel
+
+NAMES = ["vehicle.mass", "start.angular_velocity[0]", "vehicle.buoyancy"]
+SETTINGS = dict(h=0.01, t1=0.3)
+# Step and end of the runs whose kernel is compiled for one test only.
+SHORT = dict(h=0.01, t1=0.02, width=4)
+
+
+@pytest.fixture(scope="module")
+def paper():
+    return lw.Scene.load("examples/paper.toml")
+
+
+def numbers(n, seed=0):
+    rng = np.random.default_rng(seed)
+    return np.array([123.8, 0.3, 1215.8]) + rng.normal(size=(n, 3)) * [1.0, 0.01, 1.0]
+
+
+def solved(scene, names, X, **settings):
+    """The result of solve for the same members."""
+    fleet = lw.Ensemble(scene, None, 0, None, lw.Table(values=dict(zip(names, np.asarray(X).T, strict=True))))
+    return lw.solve(fleet, **settings)
+
+
+def test_quantities_are_those_of_solve(paper):
+    run = lw.prepare(paper, NAMES, of=["position[2]", "norm(velocity)"], **SETTINGS)
+    assert run.names == tuple(NAMES)
+    for n, seed in ((16, 0), (3, 1), (300, 2), (16, 3), (1, 4), (16, 0)):
+        X = numbers(n, seed)
+        expected = solved(paper, NAMES, X, **SETTINGS)
+        Y = run(X)
+        np.testing.assert_array_equal(Y[:, 0], expected.position[-1, :, 2])
+        np.testing.assert_array_equal(Y[:, 1], np.sqrt((expected.velocity[-1] ** 2).sum(axis=1)))
+
+
+def test_a_result_without_quantities_is_that_of_solve(paper):
+    run = lw.prepare(paper, NAMES, save=lw.SaveAt(every=0.1), **SETTINGS)
+    X = numbers(20)
+    result, expected = run(X), solved(paper, NAMES, X, save=lw.SaveAt(every=0.1), **SETTINGS)
+    for name in ("time", "position", "attitude", "velocity", "angular_velocity", "status", "warnings", "warning_value"):
+        np.testing.assert_array_equal(getattr(result, name), getattr(expected, name))
+    for name, values in expected.parameters.items():
+        np.testing.assert_array_equal(result.parameters[name], values)
+    assert result.provenance["kernel"] == expected.provenance["kernel"]
+    assert result.provenance["ensemble"]["members"] == 20
+
+
+def test_columns_may_have_names(paper):
+    run = lw.prepare(paper, NAMES, of="depth", **SETTINGS)
+    X = numbers(5)
+    by_name = {name: X[:, i] for i, name in enumerate(NAMES)}
+    np.testing.assert_array_equal(run({name: by_name[name] for name in NAMES[::-1]}), run(X))
+
+
+def test_members_may_be_drawn(paper):
+    vary = {"vehicle.mass": lw.Normal(relative=0.01), "start.angular_velocity": lw.Normal(std=0.1)}
+    run = lw.prepare(lw.Ensemble(paper, 40, 7, vary), of="position", **SETTINGS)
+    for seed, members in ((None, None), (8, None), (8, 5), (7, 40)):
+        fleet = lw.Ensemble(paper, members or 40, 7 if seed is None else seed, vary)
+        expected = lw.solve(fleet, **SETTINGS).position[-1]
+        np.testing.assert_array_equal(run(seed=seed, members=members), expected)
+    assert run.names == ("vehicle.mass", *(f"start.angular_velocity[{i}]" for i in range(3)))
+    with pytest.raises(lw.SceneError, match="seed"):
+        run(seed=-1)
+    with pytest.raises(lw.SceneError, match="beside seed"):
+        run(np.ones((1, 4)), seed=1)
+
+
+def test_levels_stand_for_distributions(paper):
+    vary = {"vehicle.mass": lw.Normal(relative=0.01), "start.attitude": lw.RotationNormal(std=0.1)}
+    run = lw.prepare(paper, vary, of="position", levels=True, **SETTINGS)
+    X = np.random.default_rng(0).random((6, len(run.names)))
+    space = lw.Ensemble(paper, 1, 0, vary).space
+    cube = np.empty_like(X)
+    order = [
+        f"{label} {i}" if len(columns) > 1 else label for label, columns in space.factors for i in range(len(columns))
+    ]
+    cube[:, [order.index(name) for name in run.names]] = X
+    fleet = lw.Ensemble(paper, None, 0, vary, lw.UnitCubePoints(cube))
+    np.testing.assert_array_equal(run(X), lw.solve(fleet, **SETTINGS).position[-1])
+    with pytest.raises(lw.SceneError, match="level"):
+        run(X + 1.0)
+    drawn = lw.prepare(paper, vary, of="position", **SETTINGS)
+    with pytest.raises(lw.SceneError, match="joint distribution"):
+        drawn(X)
+
+
+def test_states_may_be_given(paper):
+    run = lw.prepare(paper, NAMES, of="position", **SETTINGS)
+    rng = np.random.default_rng(0)
+    states = rng.normal(size=(4, 3)), np.repeat(np.eye(3)[None], 4, axis=0), rng.normal(size=(4, 3)), np.zeros((4, 3))
+    mass = {"vehicle.mass": np.linspace(120.0, 124.0, 4)}
+    expected = lw.solve(lw.Ensemble.from_states(paper, *states, mass), **SETTINGS)
+    np.testing.assert_array_equal(run.states(*states, mass), expected.position[-1])
+
+
+def test_failed_members_are_refused_or_have_no_number(paper):
+    X = numbers(4)
+    X[2, 1] = 1e6
+    with pytest.raises(FailedMembers, match=r"1 of 4 members failed .*member 2.*failed=\"nan\""):
+        lw.prepare(paper, NAMES, of="depth", **SETTINGS)(X)
+    Y = lw.prepare(paper, NAMES, of="depth", failed="nan", **SETTINGS)(X)
+    assert np.isnan(Y[2]) and np.isfinite(np.delete(Y, 2)).all()
+
+
+def test_unphysical_numbers_are_refused(paper):
+    run = lw.prepare(paper, NAMES, of="depth", **SETTINGS)
+    X = numbers(4)
+    X[1, 0] = -1.0
+    with pytest.raises(lw.SceneError, match=r"vehicle\.mass of member 1"):
+        run(X)
+    for odd in (np.ones((3, 2)), np.ones(3), np.ones((0, 3)), "x"):
+        with pytest.raises(lw.SceneError, match="X"):
+            run(odd)
+    with pytest.raises(lw.SceneError) as caught:
+        lw.prepare(paper, ["vehicle.mas"], of="dept", failed="no", h=0.1, t1=1.0)
+    assert all(word in str(caught.value) for word in ("dept", "failed"))
+
+
+def test_other_members_may_need_another_kernel():
+    """A term that no member feels is in no kernel, and an isotropic mass matrix has code of its own."""
+    scene = lw.Scene(
+        lw.Vehicle(mass=10.0, added_mass=[0.0, 0.0, 0.0], inertia=[1.0, 2.0, 3.0]),
+        start=lw.Start(velocity=[1.0, 0.2, 0.1], angular_velocity=[0.1, 0.2, 0.3]),
+        terms=[lw.Current(velocity=[0.0, 0.0, 0.0])],
+    )
+    names = ["current.velocity[0]", "vehicle.added_mass[1,1]"]
+    run = lw.prepare(scene, names, of="position", **SHORT)
+    for X in ([[0.0, 0.0]], [[0.5, 0.0]], [[0.0, 3.0]], [[0.0, 0.0], [0.5, 3.0]], [[0.0, 0.0]]):
+        np.testing.assert_array_equal(run(np.array(X)), solved(scene, names, X, **SHORT).position[-1])
+
+
+def test_threads_may_call_at_once(paper):
+    run = lw.prepare(paper, NAMES, of="position", threads=1, **SETTINGS)
+    inputs = [numbers(17 + i % 3, i) for i in range(40)]
+    expected = [run(X) for X in inputs]
+    with ThreadPoolExecutor(4) as pool:
+        for Y, known in zip(pool.map(run, inputs), expected, strict=True):
+            np.testing.assert_array_equal(Y, known)
+
+
+def test_a_pickle_runs_again(paper):
+    run = lw.prepare(paper, NAMES, of="depth", **SETTINGS)
+    again = pickle.loads(pickle.dumps(run))
+    np.testing.assert_array_equal(again(numbers(3)), run(numbers(3)))
+
+
+def test_statistics_are_gathered_by_call(paper):
+    mean = lw.Mean("position")
+    run = lw.prepare(paper, NAMES, statistics=[mean], **SETTINGS)
+    X = numbers(12)
+    expected = solved(paper, NAMES, X, statistics=[mean], **SETTINGS).statistics[mean.key]
+    np.testing.assert_array_equal(run(X).statistics[mean.key].value, expected.value)
+
+
+def test_calls_take_no_more_and_more_memory(paper):
+    run = lw.prepare(paper, NAMES, of="depth", h=0.01, t1=0.01)
+    X = [numbers(1 + i % 7) for i in range(50)]
+    for each in X:
+        run(each)
+    tracemalloc.start()
+    try:
+        sizes = []
+        for _ in range(4):
+            for _ in range(5):
+                for each in X:
+                    run(each)
+            gc.collect()
+            sizes.append(tracemalloc.get_traced_memory()[0])
+    finally:
+        tracemalloc.stop()
+    assert sizes[-1] - sizes[0] < 20_000
+
+
+def leaves(values):
+    """The plain arrays of a structured one; between them are bytes that no code reads."""
+    if values.dtype.names is None:
+        return [values]
+    return [leaf for name in values.dtype.names for leaf in leaves(values[name])]
+
+
+def arrays(packets):
+    """All numbers that a kernel is given, as bytes."""
+    structs = [packets.inertia, packets.laws.params, packets.events]
+    views = [leaf for part in structs if len(part.view) for leaf in leaves(part.view)]
+    views += [packets.laws.table.view, packets.laws.memory.view, packets.state_lanes.view]
+    return [np.broadcast_to(view, (packets.count, *view.shape[1:])).tobytes() for view in views]
+
+
+@pytest.mark.parametrize("vehicle", ["paper", "remus_100"])
+def test_what_is_shared_changes_no_bit(vehicle, paper):
+    """For every name of the scene: numbers that vary are packed alone, or all numbers as if all varied."""
+    scene = paper if vehicle == "paper" else lw.Scene.named("remus_100")
+    method = "psi_s" if vehicle == "paper" else "psi_x"
+    width = 4
+    for name, value in scene.parameters().items():
+        if not np.any(value) or name.endswith(("times", "stations", "tolerance")):
+            continue
+        factor = 1.0 + 1e-4 * np.arange(6.0)
+        columns = {name: value[None] * factor.reshape(6, *(1,) * value.ndim)}
+        still = np.zeros((6, 3))
+        states = still, np.repeat(np.eye(3)[None], 6, axis=0), still + 1.0, still + 0.1
+        try:
+            fleet = lw.Ensemble.from_states(scene, *states, columns)
+        except lw.SceneError:  # a table of places that must not move
+            continue
+        plan = make_plan(fleet, method, h=0.01, t1=0.01, width=width)
+        alone = arrays(Packets(plan, fleet.select(0, 6)))
+        everything = {*scene.parameters(), *fleet.varied_names, "frame", "axes", "members", "seed"}
+        plan.__dict__["shared"] = Shared(everything)
+        assert alone == arrays(Packets(plan, fleet.select(0, 6))), name
+
+
+def late(scene, members, odd, values):
+    """Members of which one alone, beyond those that are looked at before a run, has other values: (name -> its value)."""
+
+    class Late(lw.Ensemble):
+        def _values(self, first, stop, start=True):
+            found = super()._values(first, stop, start)
+            for name, value in values.items():
+                if first <= odd < stop:
+                    column = np.repeat(np.asarray(found[name], float)[:1], stop - first, axis=0)
+                    column[odd - first] = value
+                    found[name] = column
+            return found
+
+    return Late(
+        scene, members, 0, {name: lw.Normal(std=0.0) for name in values} | {"vehicle.mass": lw.Normal(std=1e-3)}
+    )
+
+
+@pytest.fixture
+def surveyed(monkeypatch):
+    for module in (ensembles, plans):
+        monkeypatch.setattr(module, "SURVEYED", 256)
+
+
+def test_a_late_member_that_needs_more_starts_the_run_anew(surveyed):
+    scene = lw.Scene(
+        lw.Vehicle(mass=10.0, added_mass=[0.0, 1.0, 2.0], inertia=[1.0, 2.0, 3.0]),
+        start=lw.Start(velocity=[1.0, 0.2, 0.1]),
+        terms=[lw.Current(velocity=[0.0, 0.0, 0.0])],
+    )
+    fleet = late(scene, 600, 500, {"current.velocity": [0.5, 0.0, 0.0]})
+    result = lw.solve(fleet, threads=1, **SHORT)
+    whole = make_plan(fleet, **SHORT)
+    assert {term.type for term, _ in whole.kernel_choice.laws} >= {"current"}
+    assert "current" in result.provenance["terms"]
+    np.testing.assert_array_equal(result.position, run_plan(whole, 1).position)
+
+
+def test_a_late_member_that_is_unphysical_is_named(paper, surveyed):
+    fleet = late(paper, 600, 500, {"vehicle.buoyancy": -1.0})
+    with pytest.raises(lw.SceneError, match=r"vehicle\.buoyancy of member 500"):
+        lw.solve(fleet, **SETTINGS)
+
+
+def test_an_early_member_that_is_unphysical_is_counted_among_those_looked_at(paper, surveyed):
+    with pytest.raises(lw.SceneError, match=r"of the 256 members that were looked at"):
+        lw.Ensemble(paper, 600, 0, {"vehicle.mass": lw.Normal(std=100.0)})
+
+
+def test_a_hundred_million_members_are_planned_at_once(paper):
+    """Nothing has as many entries as there are members: 800 MB each in float64."""
+    tracemalloc.start()
+    try:
+        fleet = lw.Ensemble(paper, 10**8, 1, {"vehicle.mass": lw.Normal(relative=0.001)})
+        make_plan(fleet, h=0.01, t1=0.2, survey_all=False)
+        assert tracemalloc.get_traced_memory()[1] < 100e6
+    finally:
+        tracemalloc.stop()

@@ -1,0 +1,72 @@
+"""Kernels compiled ahead of a run: those that the run takes, and no others."""
+
+import dataclasses
+import os
+import subprocess
+import sys
+from unittest import mock
+
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp import cli
+from lgvi_warp.common.phases import Phases
+from lgvi_warp.runs import solve, warm
+from tests.conftest import ROOT
+
+PAPER = ROOT / "examples" / "paper.toml"
+
+
+def kernels_of(scene, methods=(), dtypes=()):
+    return [(plan.method.name, plan.dtype, plan.spec) for plan in warm.plans_of(scene, methods, dtypes)]
+
+
+def kernel_of_solve(scene, *arguments, **named):
+    """The kernel of a run, which does not begin."""
+    with mock.patch.object(solve, "run_plan", side_effect=InterruptedError) as begun, pytest.raises(InterruptedError):
+        lw.solve(scene, *arguments, **named)
+    return begun.call_args.args[0].spec
+
+
+def test_every_method_and_precision_has_a_kernel():
+    scene = lw.Scene.load(PAPER)
+    kernels = kernels_of(scene, ["psi_s", "rk4", "psi_s"], ["float64", "float32"])
+    assert [kernel[:2] for kernel in kernels] == [(m, d) for m in ("psi_s", "rk4") for d in ("float64", "float32")]
+    assert all(spec == kernel_of_solve(scene, method, dtype=dtype) for method, dtype, spec in kernels)
+    assert [kernel[2] for kernel in kernels_of(scene)] == [kernel_of_solve(scene)]
+    with pytest.raises(lw.SceneError, match="psi_q"):
+        kernels_of(scene, ["psi_q"])
+
+
+def test_kept_members_have_their_own_kernel():
+    scene = lw.Scene.load(PAPER)
+    run = dataclasses.replace(scene.run, keep="failed", statistics=(lw.Mean("position"),))
+    kernels = kernels_of(dataclasses.replace(scene, run=run))
+    assert [set(spec.fields) for _, _, spec in kernels] == [{"position"}, set(lw.SaveAt().fields)]
+
+
+def test_what_it_says(monkeypatch, capsys):
+    monkeypatch.setattr(warm, "warm", lambda plans, workers: zip(plans, [Phases(1, 2, 0.5), Phases(0.5)], strict=True))
+    assert cli.main(["warm", str(PAPER), "--dtypes", "float64,float32", "--threads", "2"]) == 0
+    first, second, last = capsys.readouterr().out.splitlines()
+    assert first == "psi_s float64: source 1.00 s, Clang 2.00 s, load 0.50 s"
+    assert second == "psi_s float32: source 0.50 s, Clang 0.00 s, load 0.00 s (was in the cache)"
+    assert last.startswith("kernels: 2, in ") and last.endswith("take 4.00 s")
+    assert cli.main(["warm", str(PAPER), "--dtypes", "float64,float32", "--quiet"]) == 0 and not capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_run_after_it_compiles_nothing(tmp_path):
+    command = [sys.executable, "-c", "from lgvi_warp.cli import entry; entry()"]
+    env = os.environ | {"WARP_CACHE_PATH": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)}
+
+    def said(*words):
+        done = subprocess.run([*command, *words], env=env, capture_output=True, text=True, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    names = ["warm", str(PAPER), "--methods", "psi_s,psi_x", "--threads", "2"]
+    assert said(*names).count("Clang") == 2 and said(*names).count("was in the cache") == 2
+    short = ["run", str(PAPER), "--members", "2", "--out", "out"]
+    assert "compiled" not in said(*short, "--method", "psi_x")
+    assert "kernel      compiled: source " in said(*short, "--method", "rk4")

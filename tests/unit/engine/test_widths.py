@@ -1,0 +1,134 @@
+"""Vehicles per packet: by the table, as tuned on this machine, or as asked for; files of others are ignored."""
+
+import json
+import os
+
+import pytest
+
+from lgvi_kernels.lanes.arithmetic import WIDTHS
+from lgvi_warp.common import machine
+from lgvi_warp.engine import widths
+from lgvi_warp.engine.widths import path as path_of_users
+from lgvi_warp.runs.provenance import provenance
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.studies import speed, tuning
+
+EPYC, XEON = "AMD EPYC 9654", "Intel(R) Xeon(R) Platinum 8481C"
+DTYPES = ("float64", "float32", "float32_compensated")
+
+
+@pytest.fixture
+def file(tmp_path, monkeypatch):
+    """A file of tuned widths that does not exist yet, in a folder that does not either."""
+    place = tmp_path / "cache" / widths.FILE
+    monkeypatch.setattr(widths, "path", lambda: place)
+    return place
+
+
+@pytest.mark.parametrize(
+    ("cpu", "simd", "kind", "lanes"),
+    [(EPYC, "avx512", "plain", (8, 16, 16)), (EPYC, "avx512", "chained", (16, 32, 16)), (EPYC, "avx512", "dense", (8, 16, 16)),
+     (XEON, "avx512", "plain", (16, 32, 16)), (XEON, "avx512", "chained", (16, 32, 16)),
+     (XEON, "avx512", "explicit", (8, 16, 16)), (XEON, "avx2", "chained", (4, 8, 8)), ("Cortex", "other", "plain", (2, 4, 4))],
+)  # fmt: skip
+def test_the_table(file, monkeypatch, cpu, simd, kind, lanes):
+    monkeypatch.setattr(machine, "cpu_name", lambda: cpu)
+    monkeypatch.setattr(machine, "simd", lambda: simd)
+    chosen = [widths.default_width(kind, dtype) for dtype in DTYPES]
+    assert tuple(width.lanes for width in chosen) == lanes
+    assert all(width.source.startswith("table: ") and width.source.endswith(simd) for width in chosen)
+    assert all("Intel" not in width.source or cpu == XEON for width in chosen)
+
+
+def test_kernels_have_these_widths():
+    assert widths.WIDTHS == WIDTHS
+
+
+def test_kept_widths_count_on_this_machine_alone(file, monkeypatch):
+    assert widths.tuned() == {}
+    assert widths.keep({"plain float64": 4}) == file
+    assert widths.default_width("plain", "float64") == (4, "tuned")
+    assert widths.default_width("plain", "float32").source.startswith("table")
+    monkeypatch.setattr(machine, "cpu_name", lambda: XEON)
+    widths.read.cache_clear()
+    assert widths.tuned() == {}
+    widths.keep({"float32_compensated": 32})
+    assert widths.default_width("chained", "float32_compensated") == (32, "tuned")
+    monkeypatch.undo()
+    monkeypatch.setattr(widths, "path", lambda: file)
+    widths.read.cache_clear()
+    assert widths.tuned() == {"plain float64": 4} and len(json.loads(file.read_bytes())) == 2
+
+
+def contents():
+    """Contents of a file that are no widths, or none of this machine's."""
+    key = widths.this_machine()
+    odd = [{"plain float64": width} for width in (3, 0, -8, True, 8.0, "8", None, [8], 2**70)]
+    odd += [{"other float64": 8}, [8], 8, None, "plain float64"]
+    texts = [json.dumps({key: one}) for one in odd] + [json.dumps({"another": {"plain float64": 4}})]
+    return [
+        *map(str.encode, texts),
+        b"",
+        b"[]",
+        b"8",
+        b"{",
+        b"\xff\xfe",
+        b"[" * 100_000,
+        b" " * (widths.MOST_BYTES + 1),
+    ]
+
+
+def test_foreign_files_are_ignored(file):
+    file.parent.mkdir()
+    for content in contents():
+        file.write_bytes(content)
+        widths.read.cache_clear()
+        assert widths.tuned() == {}, content[:100]
+    # What is whole beside them counts, and what is kept replaces all.
+    file.write_text(json.dumps({widths.this_machine(): {"plain float64": 3, "dense float32": 8}}))
+    widths.read.cache_clear()
+    assert widths.tuned() == {"dense float32": 8}
+
+
+def test_what_is_no_file_is_ignored(file):
+    file.mkdir(parents=True)
+    assert widths.tuned() == {}
+    file.rmdir()
+    os.mkfifo(file)
+    widths.read.cache_clear()
+    assert widths.tuned() == {}
+    file.unlink()
+    file.write_text(json.dumps({widths.this_machine(): {"plain float64": 4}}))
+    file.chmod(0)
+    widths.read.cache_clear()
+    assert widths.tuned() == ({"plain float64": 4} if os.geteuid() == 0 else {})
+
+
+def test_beside_the_kernel_caches(monkeypatch, tmp_path):
+    monkeypatch.setenv("WARP_CACHE_PATH", str(tmp_path))
+    assert path_of_users() == tmp_path / widths.FILE
+    monkeypatch.delenv("WARP_CACHE_PATH")
+    assert path_of_users().parent.name == "warp"
+
+
+@pytest.mark.kernel
+def test_provenance_says_what_chose(file):
+    def plan(**named):
+        return make_plan(speed.fleet(2), "psi_s", h=0.01, t1=0.1, **named)
+
+    assert provenance(plan())["machine"]["width_source"].startswith("table")
+    widths.keep({"plain float64": 4})
+    chosen = provenance(plan())
+    assert (chosen["width"], chosen["machine"]["width_source"]) == (4, "tuned")
+    asked = provenance(plan(width=2))
+    assert (asked["width"], asked["machine"]["width_source"]) == (2, "asked for")
+
+
+@pytest.mark.kernel
+@pytest.mark.slow
+def test_every_kind_is_measured():
+    readings = list(tuning.tune(rounds=1))
+    assert [reading.kernel for reading in readings] == list(widths.KERNELS)
+    for _, ns, of_table, best in readings:
+        assert of_table in ns and best in ns and set(ns) <= set(WIDTHS) and all(one > 0.0 for one in ns.values())
+        assert best == of_table or ns[best] < ns[of_table]

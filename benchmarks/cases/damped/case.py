@@ -1,8 +1,8 @@
 """Driven, damped motion: error and cost of each method and step for REMUS 100 with its rudder at 4 degrees.
 
-As published but in the plane, as in examples/03_remus_100.py; the same with its drag 100 and 1000 times as strong; and in
-six degrees of freedom with linear damping of its roll, at 80 1/s. From 1 to 1.6 m/s; errors are those after 30 s, the largest of the
-members, against rk8 at a tenth of its shortest step here.
+As published but in the plane, as in examples/03_remus_100.py; the same with its drag 100 and 1000 times as strong; and in six
+degrees of freedom with linear damping of its roll, at 80 1/s. From 1 to 1.6 m/s; errors are those after 30 s, the largest of
+the members, against rk8 at a tenth of its shortest step here.
 """
 
 import dataclasses

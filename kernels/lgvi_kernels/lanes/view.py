@@ -4,7 +4,22 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, cross, dot, element, mul, neg, ones, set_element, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
+    absolute,
+    add,
+    any_positive,
+    cross,
+    div,
+    dot,
+    element,
+    mul,
+    neg,
+    ones,
+    positive,
+    set_element,
+    sub,
+    vec3,
+)
 from lgvi_kernels.lanes.functions import clamp
 
 
@@ -101,6 +116,55 @@ def middle_of_half(view: Any):
     if view.second > 0:
         t = view.t + quarter
     return t
+
+
+def make_pursuit(solved):
+    """(view, x, first, count, limit, rate) -> x at view.t, from what it was view.h before, as it follows a command.
+
+    The command is that of a table (see `command`), whose straight pieces follow one another.
+    solved: (x, start, end, length, rate) -> x after `length` [s] in which the command goes straight from start to end.
+    """
+
+    @wp.func
+    def over_piece(x: Any, start: Any, end: Any, length: Any, rate: Any):
+        if any_positive(length):
+            x = solved(x, start, end, length, rate)
+        return x
+
+    @wp.func
+    def pursued(view: Any, x: Any, first: int, count: int, limit: Any, rate: Any):
+        unity = ones(limit)
+        zero = unity - unity
+        # Times count back from view.t: within one piece its length is then view.h to the last digit.
+        left = view.h * unity
+        value = row1(view, first)
+        held = clamp(value, -limit, limit)
+        for i in range(count):
+            at = first + 1 + 3 * i
+            since = view.t * unity - row1(view, at)
+            steepness = row1(view, at + 1)
+            change = row1(view, at + 2)
+            begin = clamp(since, zero, left)
+            end = clamp(since - unity / steepness, zero, left)
+            x = over_piece(x, held, held, left - begin, rate)
+            a = value + clamp((since - begin) * steepness, zero, unity) * change
+            b = value + clamp((since - end) * steepness, zero, unity) * change
+            start = clamp(a, -limit, limit)
+            stop = clamp(b, -limit, limit)
+            # At its limit before, within, and at its limit after: as long as the command would go on beyond it.
+            before = absolute(a - start)
+            after = absolute(b - stop)
+            whole = before + absolute(stop - start) + after
+            length = positive(whole, (begin - end) / whole, zero)
+            x = over_piece(x, start, start, length * before, rate)
+            x = over_piece(x, start, stop, begin - end - length * before - length * after, rate)
+            x = over_piece(x, stop, stop, length * after, rate)
+            value = value + change
+            held = clamp(value, -limit, limit)
+            left = end
+        return over_piece(x, held, held, left, rate)
+
+    return pursued
 
 
 @wp.func

@@ -131,19 +131,20 @@ def make_pursuit(solved):
             x = solved(x, start, end, length, rate)
         return x
 
-    @wp.func
-    def pursued(view: Any, x: Any, first: int, count: int, limit: Any, rate: Any):
+    # Not inlined, for the sake of the compiler: a method calls it at each stage.
+    @wp.func(inline=False)
+    def walked(table: Any, entry: int, t: Any, h: Any, x: Any, first: int, count: int, limit: Any, rate: Any):
         unity = ones(limit)
         zero = unity - unity
-        # Times count back from view.t: within one piece its length is then view.h to the last digit.
-        left = view.h * unity
-        value = row1(view, first)
+        # Times count back from t: within one piece its length is then h to the last digit.
+        left = h * unity
+        value = element(table, entry, first, 0)
         held = clamp(value, -limit, limit)
         for i in range(count):
             at = first + 1 + 3 * i
-            since = view.t * unity - row1(view, at)
-            steepness = row1(view, at + 1)
-            change = row1(view, at + 2)
+            since = t * unity - element(table, entry, at, 0)
+            steepness = element(table, entry, at, 1)
+            change = element(table, entry, at, 2)
             begin = clamp(since, zero, left)
             end = clamp(since - unity / steepness, zero, left)
             x = over_piece(x, held, held, left - begin, rate)
@@ -155,14 +156,18 @@ def make_pursuit(solved):
             before = absolute(a - start)
             after = absolute(b - stop)
             whole = before + absolute(stop - start) + after
-            length = positive(whole, (begin - end) / whole, zero)
-            x = over_piece(x, start, start, length * before, rate)
-            x = over_piece(x, start, stop, begin - end - length * before - length * after, rate)
-            x = over_piece(x, stop, stop, length * after, rate)
+            pace = positive(whole, (begin - end) / whole, zero)
+            x = over_piece(x, start, start, pace * before, rate)
+            x = over_piece(x, start, stop, begin - end - pace * before - pace * after, rate)
+            x = over_piece(x, stop, stop, pace * after, rate)
             value = value + change
             held = clamp(value, -limit, limit)
             left = end
         return over_piece(x, held, held, left, rate)
+
+    @wp.func
+    def pursued(view: Any, x: Any, first: int, count: int, limit: Any, rate: Any):
+        return walked(view.table, view.entry, view.t, view.h, x, first, count, limit, rate)
 
     return pursued
 

@@ -342,8 +342,8 @@ def _check(
                              or isinstance(term, Drag) or getattr(module, "NOISE", False)):  # fmt: skip
             problem = f"takes forces of position and time only, which {term.key} is not"
             faults.add("method", method.name, problem, "use psi_s")
-    for term, module in acting if method.tableau and memory else ():
-        if not term.memory:
+    for term, module in acting:
+        if method.tableau is None or not term.memory:
             continue
         if not hasattr(module, "follow"):
             problem = f"cannot advance {term.key}, a term that remembers what is not known between steps"

@@ -39,7 +39,7 @@ def bench_of(term, folder, aligned=False):
 
 
 def measured(bench, elsewhere):
-    """By role (k, numbers) between the halves of a kick, in the user's axes, and the memory after either half, and what follows."""
+    """By role (k, numbers) between the halves of a kick, in the user's axes; the memory after each half, and what follows."""
     views = bench.views.elsewhere() if elsewhere else bench.views
     context = replace(bench.context(bench.parameters, elsewhere), aligned=not elsewhere)
     bank = Bank(bench, context, views)

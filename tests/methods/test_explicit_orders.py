@@ -160,7 +160,9 @@ def test_water_is_taken_at_the_users_origin():
 
 @pytest.mark.parametrize("method", ["rk4", "rkmk4", "rkw3"])
 def test_laws_that_do_not_fit_are_refused(method):
-    with pytest.raises(lw.SceneError, match=r"gauss_markov_current, a term that remembers what is not known.*use psi_s"):
+    with pytest.raises(
+        lw.SceneError, match=r"gauss_markov_current, a term that remembers what is not known.*use psi_s"
+    ):
         lw.solve(one(test_terms.scene_of(CASES["Gauss-Markov current"]), **test_terms.STATE), method, h=0.02, t1=0.1)
 
 

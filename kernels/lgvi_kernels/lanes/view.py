@@ -131,38 +131,45 @@ def make_pursuit(solved):
             x = solved(x, start, end, length, rate)
         return x
 
+    @wp.func
+    def over_ramp(x: Any, left: Any, value: Any, since: Any, steepness: Any, change: Any, limit: Any, rate: Any):
+        """x after a ramp, and the time that is left then. The ramp goes from `value`, `since` before the whole time ends."""
+        unity = ones(limit)
+        zero = unity - unity
+        begin = clamp(since, zero, left)
+        end = clamp(since - unity / steepness, zero, left)
+        held = clamp(value, -limit, limit)
+        x = over_piece(x, held, held, left - begin, rate)
+        a = value + clamp((since - begin) * steepness, zero, unity) * change
+        b = value + clamp((since - end) * steepness, zero, unity) * change
+        start = clamp(a, -limit, limit)
+        stop = clamp(b, -limit, limit)
+        # At its limit before, within, and at its limit after: as long as the command would go on beyond it.
+        before = absolute(a - start)
+        after = absolute(b - stop)
+        whole = before + absolute(stop - start) + after
+        pace = positive(whole, (begin - end) / whole, zero)
+        x = over_piece(x, start, start, pace * before, rate)
+        x = over_piece(x, start, stop, begin - end - pace * before - pace * after, rate)
+        return over_piece(x, stop, stop, pace * after, rate), end
+
     # Not inlined, for the sake of the compiler: a method calls it at each stage.
     @wp.func(inline=False)
     def walked(table: Any, entry: int, t: Any, h: Any, x: Any, first: int, count: int, limit: Any, rate: Any):
         unity = ones(limit)
-        zero = unity - unity
         # Times count back from t: within one piece its length is then h to the last digit.
         left = h * unity
         value = element(table, entry, first, 0)
-        held = clamp(value, -limit, limit)
         for i in range(count):
             at = first + 1 + 3 * i
             since = t * unity - element(table, entry, at, 0)
             steepness = element(table, entry, at, 1)
             change = element(table, entry, at, 2)
-            begin = clamp(since, zero, left)
-            end = clamp(since - unity / steepness, zero, left)
-            x = over_piece(x, held, held, left - begin, rate)
-            a = value + clamp((since - begin) * steepness, zero, unity) * change
-            b = value + clamp((since - end) * steepness, zero, unity) * change
-            start = clamp(a, -limit, limit)
-            stop = clamp(b, -limit, limit)
-            # At its limit before, within, and at its limit after: as long as the command would go on beyond it.
-            before = absolute(a - start)
-            after = absolute(b - stop)
-            whole = before + absolute(stop - start) + after
-            pace = positive(whole, (begin - end) / whole, zero)
-            x = over_piece(x, start, start, pace * before, rate)
-            x = over_piece(x, start, stop, begin - end - pace * before - pace * after, rate)
-            x = over_piece(x, stop, stop, pace * after, rate)
+            # Ramps that ended before are nothing but their change.
+            if any_positive(positive(left, unity - (since - left) * steepness, unity - unity)):
+                x, left = over_ramp(x, left, value, since, steepness, change, limit, rate)
             value = value + change
-            held = clamp(value, -limit, limit)
-            left = end
+        held = clamp(value, -limit, limit)
         return over_piece(x, held, held, left, rate)
 
     @wp.func

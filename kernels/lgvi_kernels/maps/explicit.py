@@ -301,7 +301,7 @@ def make_recall(View, follow, before, node):
 
 
 def make_stage(moves, push, node, timed, recall):
-    """The state of one stage. push: the function that changes P where it is known (see make_push), or None; recall: see above."""
+    """The state of one stage. push, recall: functions as of make_push and make_recall, or None."""
 
     @wp.func
     def at_node(x: Any, k: Any, c: Any, h: Any):
@@ -424,8 +424,9 @@ def make_munthe_kaas(rates, act, turned, timed, recall):
 
 
 def make_implicit_stages(spec, rates, states, velocities, slope):
-    """The stages of a linearly implicit method for this Spec; states: as in make_stages; slope: the matrix of damping
-    (see make_forces).
+    """The stages of a linearly implicit method for this Spec.
+
+    states: those of the stages (see make_stage); slope: the matrix of damping (see make_forces).
     """
     method, width, real, coupled = spec.explicit, spec.width, spec.real, "coupled" in spec.parts
     Rates = rates_struct(width, real, method.kind)
@@ -457,7 +458,8 @@ def make_explicit(spec, everything, velocities, slope):
         a, c = (*a, method.b), (*c, 1.0)
     *recalls, last = (make_recall(View, follow, before, node) for before, node in zip((0.0, *c), (*c, 1.0)))
     states = [
-        make_stage(make_moves(move, row, complete), push, node, timed, recall) for row, node, recall in zip(a, c, recalls)
+        make_stage(make_moves(move, row, complete), push, node, timed, recall)
+        for row, node, recall in zip(a, c, recalls)
     ]
     kept = follow is not None and method.goes_back
     if method.implicit:

@@ -410,4 +410,5 @@ def _follow(bench: Bench, step: float) -> Iterator[Check]:
     earlier = replace(views, time=views.time - 0.25 * FOLLOWED)
     apart = remembered((earlier, 0.75 * FOLLOWED), (views, 0.25 * FOLLOWED)) - whole
     limit = ROUNDINGS * EPS * (np.abs(whole).max() + 1e-300)
-    yield _judged("follow: exact", apart, limit, views, "advance by the exact solution over view.h, which ends at view.t")
+    remedy = "advance by the exact solution over view.h, which ends at view.t"
+    yield _judged("follow: exact", apart, limit, views, remedy)

@@ -41,7 +41,7 @@ class ControlFins(Fins):
             most = s * np.minimum(self.rate_limit, 1e6)
             ahead = np.where(first > angle, 1.0, -1.0)
             closing = most - ahead * (last - first)
-            part = np.where(closing > 0.0, np.minimum(np.abs(first - angle), closing) / np.maximum(closing, 1e-300), 1.0)
+            part = np.minimum(np.abs(first - angle) / np.maximum(closing, 1e-300), 1.0)
             angle = angle + ahead * part * most
             angle = angle + np.clip(last - angle, (part - 1.0) * most, (1.0 - part) * most)
         return np.asarray(angle)

@@ -52,7 +52,7 @@ def test_a_law_may_remember_a_single_number():
     wing = dict(
         position=[[-0.5, 0.0, 0.0]], chord=[[1.0, 0.0, 0.0]], normal=[[0.0, 0.0, -1.0]], area=0.01, lift_slope=3.0
     )
-    fin = lw.ControlFins(**wing, command=[0.1], rate_limit=0.5)
+    fin = lw.ControlFins(**wing, command=[0.1], rate_limit=0.5, drag=0.0)
     assert fin.memory and lw.check_law(fin).ok
 
 

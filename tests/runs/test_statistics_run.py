@@ -578,8 +578,11 @@ def test_a_function_of_ones_own(fleet, whole):
     np.testing.assert_allclose(found["mean drop"].value[:, 0], expected, atol=1e-14)
     np.testing.assert_allclose(found["mean pair"].value, whole.velocity[..., :2].mean(axis=1), atol=1e-14)
     wrong = lw.Quantity("wrong", lambda s, m: s["velocity"][0], "m/s")
-    with pytest.raises(ValueError, match="quantity wrong: gave shape"):
+    with pytest.raises(ValueError, match=r"quantity wrong: gave shape .*; \(\d+, \d+\) is wanted"):
         lw.solve(fleet, **SETTINGS, statistics=[lw.Mean(wrong)])
+    two = lw.Quantity("two", lambda s, m: s["velocity"], "m/s", ("velocity",), ("u", "v"))
+    with pytest.raises(ValueError, match=r"quantity two: gave shape .*; \(\d+, \d+, 2\) is wanted"):
+        lw.solve(fleet, **SETTINGS, statistics=[lw.Mean(two)])
 
 
 def test_float32_is_summed_up_in_float64(fleet):

@@ -1,5 +1,6 @@
 """A run in a store: the bits of one in memory, whatever reads it; and how it is refused, damaged, mended and exported."""
 
+import asyncio
 import errno
 import json
 import os
@@ -68,6 +69,17 @@ def test_some_members_alone_are_read(whole, memory):
     some = lw.open_run(whole, [5, 1002, 300])
     assert some.position.tobytes() == memory.position[:, [5, 1002, 300]].tobytes() and some.members == 3
     assert lw.open_run(whole, slice(250, 260)).parameters["vehicle.mass"].shape == (10,)
+
+
+def test_zarr_cannot_write_into_it(whole):
+    read_only = store.Folder(whole).checked()
+    before = tree(whole)
+    for write in (lambda: read_only.set("position/c/0/0/0", None), lambda: read_only.delete("position/c/0/0/0")):
+        with pytest.raises(ValueError, match="read-only"):
+            asyncio.run(write())
+    with pytest.raises(ValueError, match="only read"):
+        read_only.with_read_only(False)
+    assert tree(whole) == before
 
 
 def test_xarray_opens_it_without_a_remark(whole, memory, recwarn):

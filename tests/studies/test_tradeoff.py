@@ -141,6 +141,22 @@ def test_errors_of_whatever_statistics_know(scene, tmp_path):
     assert suggestion.verified(fleet, result, suggested)[0] <= 1.05e-4
 
 
+def test_growth_begins_at_one(scene):
+    """The two starts differ by the angle that the curve is divided by, and by nothing else."""
+    sample = Sample(scene, 4.0, 8)
+    grown = comparison.growth(sample, sample.candidate("psi_s", 8))
+    assert grown.curve[0] == pytest.approx(1.0, rel=1e-6)
+
+
+def test_steps_near_the_front_are_between_those_tried_first(found):
+    """Steps are halved, and beside the best ones a few are tried that are 1.4 times longer or shorter."""
+    steps = {}
+    for each in found.measurements:
+        steps.setdefault((each.setting.name, each.setting.dtype), []).append(each.setting.h)
+    ratios = [max(h) / np.array(h) for h in steps.values()]
+    assert any(np.any(np.abs(np.log2(ratio) - np.log2(ratio).round()) > 0.2) for ratio in ratios)
+
+
 def test_growth_of_exponential_and_power():
     t = np.linspace(0.0, 50.0, 21)
     grown = comparison.fitted(t, np.exp(0.3 * t), 50.0)

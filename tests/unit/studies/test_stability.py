@@ -49,6 +49,18 @@ def test_values_rise_by_equal_factors_or_equal_steps():
     assert np.allclose(Axis("h", 1.0, 3.0, log=False).values(3), [1.0, 2.0, 3.0])
 
 
+def test_axes_without_a_range_fit_the_scenes_own_rate(scene):
+    grid = grid_of(scene)
+    w = grid.rate
+    assert w > 0.0 and abs(w - 1.0) > 0.1  # at 1 rad/s a product is a quotient
+    assert (grid.x.low, grid.x.high) == pytest.approx((0.01 / w, 4.0 / w))
+    assert (grid.y.low, grid.y.high) == pytest.approx((0.1 * w, 10.0 * w))
+    damped = grid_of(drag_scene(scene), "drag_number", "speed", h=0.01)
+    speed = np.linalg.norm(damped.base.velocity)
+    assert (damped.x.low, damped.x.high) == pytest.approx((0.01 * damped.rate, 100.0 * damped.rate))
+    assert (damped.y.low, damped.y.high) == pytest.approx((0.1 * speed, 10.0 * speed))
+
+
 def test_steps_and_rates_of_every_member(scene):
     grid = grid_of(scene, ("h", 0.1, 0.4), ("angular_velocity", 0.5, 4.0))
     h, Om = by_cell(grid, grid.h), by_cell(grid, grid.state["angular_velocity"])

@@ -127,8 +127,9 @@ def make_pursuit(solved):
 
     @wp.func
     def over_piece(x: Any, start: Any, end: Any, length: Any, rate: Any):
+        # Lanes without this piece keep their bits, whatever their neighbours have.
         if any_positive(length):
-            x = solved(x, start, end, length, rate)
+            x = positive(length, solved(x, start, end, length, rate), x)
         return x
 
     @wp.func
@@ -166,8 +167,11 @@ def make_pursuit(solved):
             steepness = element(table, entry, at, 1)
             change = element(table, entry, at, 2)
             # Ramps that ended before are nothing but their change.
-            if any_positive(positive(left, unity - (since - left) * steepness, unity - unity)):
-                x, left = over_ramp(x, left, value, since, steepness, change, limit, rate)
+            due = positive(left, unity - (since - left) * steepness, unity - unity)
+            if any_positive(due):
+                after, end = over_ramp(x, left, value, since, steepness, change, limit, rate)
+                x = positive(due, after, x)
+                left = positive(due, end, left)
             value = value + change
         held = clamp(value, -limit, limit)
         return over_piece(x, held, held, left, rate)

@@ -230,6 +230,26 @@ def test_what_is_shared_changes_no_bit(vehicle, paper):
         assert alone == arrays(Packets(plan, fleet.select(0, 6))), name
 
 
+@pytest.mark.parametrize("columns", [(5,), (2, 5)])
+def test_packets_take_members_whose_laws_have_other_rows(columns):
+    """Turned axes: a drag matrix has as many rows as some member has columns, and the thrusters' rows come after them."""
+    inertia = [[1.0, 0.1, 0.0], [0.1, 2.0, 0.2], [0.0, 0.2, 2.5]]
+    vehicle = lw.Vehicle(mass=10.0, added_mass=[1.0, 2.0, 3.0], inertia=inertia)
+    thrusters = lw.Thrusters(position=[[-0.5, 0.2, 0.0]], direction=[[1.0, 0.0, 0.0]], coefficient=[20.0], command=[0.5])
+    drag = lw.DragMatrix(linear=np.eye(6), quadratic=np.diag([10.0, 20.0, 0.0, 1.0, 2.0, 0.0]))
+    scene = lw.Scene(vehicle, terms=[drag, thrusters], start=lw.Start(velocity=[1.0, 0.2, 0.1]))
+    names = ["drag_matrix.quadratic[2,2]", "drag_matrix.quadratic[5,5]"]
+    fleet = lw.Ensemble(scene, None, 0, None, lw.Table(values={name: np.linspace(0.0, 5.0, 6) for name in names}))
+    plan = make_plan(fleet, "psi_x", **SHORT)
+    few, more = [np.zeros((6, 2)) for _ in range(2)]
+    more[:, [names.index(f"drag_matrix.quadratic[{j},{j}]") for j in columns]] = 3.0
+    blocks = [fleet.with_columns(dict(zip(names, X.T, strict=True))).select(0, 6) for X in (few, more, few)]
+    packets = Packets(plan, blocks[0])
+    for members in blocks:
+        packets.refill(members)
+        assert arrays(packets) == arrays(Packets(plan, members))
+
+
 def late(scene, members, odd, values):
     """Members of which one alone, beyond those that are looked at before a run, has other values: (name -> its value)."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -23,7 +24,7 @@ from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.provenance import provenance
 from lgvi_warp.runs.quantities import OfInterest, OfResult, quantities
 from lgvi_warp.runs.result import Result
-from lgvi_warp.runs.run import finished, run_plan
+from lgvi_warp.runs.run import completed
 from lgvi_warp.runs.settle import enough_iterations, make_plan
 from lgvi_warp.sampling.designs.designs import salib_problem
 from lgvi_warp.sampling.designs.levels import UnitCubePoints
@@ -125,14 +126,15 @@ class Runner:
             SceneError: if the method cannot do what these members ask.
             MembersFailed: if members failed and on_failure is "raise".
         """
-        plan = self.plan(fleet)
-        content = plan.shared("provenance", {}, lambda numbers: provenance(plan, self.observed))
         few = {"members": fleet.members, "seed": fleet.seed, "varied": sorted(fleet.varied_names)}
-        known = {**content, "ensemble": few}, plan.grid.messages
-        result = run_plan(
-            plan, self.threads, progress, self.observed, plan.fields, self.executor, known=known, warned=warned
-        )
-        return finished(result, plan, self.observed, plan.fields, self.threads)
+
+        def known(plan: Plan) -> tuple[dict[str, Any], tuple[str, ...]]:
+            content = plan.shared("provenance", {}, lambda numbers: provenance(plan, self.observed))
+            return {**content, "ensemble": few}, plan.grid.messages
+
+        plan = self.plan(fleet)
+        settings = dict(progress=progress, executor=self.executor, known=known, warned=warned)
+        return completed(plan, self.threads, self.observed, plan.fields, **settings)
 
 
 class Prepared:
@@ -184,7 +186,7 @@ class Prepared:
                 structured array, an xarray Dataset. By name a whole vector may be given, "current.velocity": (n, 3).
                 Without X the members are drawn from the distributions.
             seed: seed of the members that are drawn; default that of the ensemble.
-            members: number of members that are drawn; default that of the ensemble.
+            members: number of members that are drawn, the first ones of the sampling; default those of the ensemble.
             progress: called with the fraction of the work that is done, in [0, 1].
 
         Returns:
@@ -226,12 +228,7 @@ class Prepared:
         fleet = self._fleet
         if seed is None and members is None:
             return fleet
-        faults = Faults()
-        for name, value, least in (("seed", seed, 0), ("members", members, 1)):
-            if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < least):
-                faults.add(name, value, f"is no whole number from {least} on", "give one, or leave it out")
-        faults.raise_if_any()
-        return fleet.with_seed(fleet.seed if seed is None else seed, members or fleet.members)
+        return fleet.with_seed(fleet.seed if seed is None else seed, members)
 
     def _members(self, X: Any) -> Ensemble:
         """The ensemble of the members with these numbers."""
@@ -276,6 +273,7 @@ class Prepared:
 
     def _answer(self, fleet: Ensemble, progress: Callable[[float], None] | None) -> Any:
         if self._common_noise:
+            fleet = copy.copy(fleet)
             fleet.indices = np.zeros(fleet.members, dtype=np.int64)
         result = self._runner.run(fleet, progress, warned=not self._of)
         if not self._of:
@@ -472,6 +470,14 @@ def _columns(
 ) -> tuple[tuple[str, ...], Ensemble | str, list[int] | None]:
     """(names of the columns of X; an ensemble with these columns, or why X has none; columns of the cube for levels)."""
     scene, names, cube_columns = whole.scene, listed, None
+    of_sampling = [*whole.sampling.own_values(), *whole.sampling.distributions()]
+    if of_sampling:
+        values = ", ".join(of_sampling[:4])
+        return (
+            (),
+            f"would drop {values}, to which the ensemble's {whole.sampling.kind} gives values; name what varies",
+            None,
+        )
     if not listed and whole.vary:
         described = as_given(whole)
         joint = [variation for variation in described if variation.distribution.joint]

@@ -504,12 +504,12 @@ class Ensemble:
         ensemble._check_physical()
         return ensemble
 
-    def with_seed(self, seed: int, members: int) -> Ensemble:
-        """Return an ensemble of other members, drawn from the same distributions.
+    def with_seed(self, seed: int, members: int | None = None) -> Ensemble:
+        """Return these members, drawn from the same distributions by another seed.
 
         Args:
             seed: Whole number >= 0.
-            members: Number of members.
+            members: Number of members, in place of these the first ones of the sampling; None for these (default).
 
         Returns:
             The ensemble.
@@ -520,9 +520,13 @@ class Ensemble:
         settings = EnsembleSettings(members, seed, self.vary, self.sampling)
         ensemble = copy.copy(self)
         ensemble.seed = int(settings.seed)
-        ensemble._places = ensemble._indices = None
         ensemble.space = variations.space(ensemble.seed, self.variations)
-        ensemble._whole = ensemble.members = ensemble._counted(settings)
+        if members is not None:
+            if self._explicit and members != self._whole:
+                fault = f"are drawn, where the states of {self._whole} are given"
+                raise refusal("members", members, fault, "leave members out")
+            ensemble._places = ensemble._indices = None
+            ensemble._whole = ensemble.members = ensemble._counted(settings)
         ensemble._check_physical()
         return ensemble
 

@@ -472,10 +472,10 @@ def _columns(
     scene, names, cube_columns = whole.scene, listed, None
     of_sampling = [*whole.sampling.own_values(), *whole.sampling.distributions()]
     if of_sampling:
-        values = ", ".join(of_sampling[:4])
+        dropped = ", ".join(of_sampling[:4])
         return (
             (),
-            f"would drop {values}, to which the ensemble's {whole.sampling.kind} gives values; name what varies",
+            f"would drop {dropped}, to which the ensemble's {whole.sampling.kind} gives values; name what varies",
             None,
         )
     if not listed and whole.vary:

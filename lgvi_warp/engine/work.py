@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.keepers.protocol import BlockStore, Keeper
@@ -25,8 +26,9 @@ if TYPE_CHECKING:
 class Work:
     """What an executor does with each block: advance it, and write it to the store if there is one.
 
-    It can be pickled. Calling it with a block returns what each keeper closed with, or None if the block was halted. A
-    block that the store already holds is not run again. A copy in another process returns once its block is durable; in
+    It can be pickled. Calling it with a block returns what each keeper closed with, or None if the block was halted. What
+    is wrong with a block's members is returned, too, and raised once the run needs the block: with `until` it may end before,
+    and threads are ahead by more blocks the more there are. A block that the store already holds is not run again. A copy in another process returns once its block is durable; in
     the run's own process the run waits at its end for blocks that are not durable yet.
 
     Args:
@@ -46,7 +48,7 @@ class Work:
         block: Block,
         halted: Callable[[], bool] = lambda: False,
         advanced: Callable[[int], None] = lambda vehicle_steps: None,
-    ) -> tuple[Any, ...] | None:
+    ) -> tuple[Any, ...] | Exception | None:
         """Advance one block, or take it from the store.
 
         Args:
@@ -55,8 +57,19 @@ class Work:
             advanced: called with the vehicle-steps made of this block so far (default: nothing).
 
         Returns:
-            What each keeper closed with; None if the block was halted.
+            What each keeper closed with; None if the block was halted; a SceneError or NotSurveyed because of its members.
         """
+        from lgvi_warp.engine.plan import NotSurveyed
+
+        try:
+            return self._closed(block, halted, advanced)
+        except (SceneError, NotSurveyed) as error:
+            return error
+
+    def _closed(
+        self, block: Block, halted: Callable[[], bool], advanced: Callable[[int], None]
+    ) -> tuple[Any, ...] | None:
+        """What each keeper closed with."""
         steps_made = 0
 
         def add(vehicle_steps: int) -> None:

@@ -219,8 +219,9 @@ def _seconds(plan: Plan, steps: int, chosen: Sequence[Block], threads: int, obse
         keepers = (*(keepers if observed.samples else ()), *gathering.keepers)
     work = Work(trial, keepers)
     start = time.perf_counter()
-    for _ in Threads(threads).run(work, chosen, lambda block, vehicle_steps: None):
-        pass
+    for _, results in Threads(threads).run(work, chosen, lambda block, vehicle_steps: None):
+        if isinstance(results, Exception):
+            raise results
     return time.perf_counter() - start
 
 

@@ -302,7 +302,7 @@ def late(scene, members, odd, values):
             return found
 
     return Late(
-        scene, members, 0, {name: lw.Normal(std=0.0) for name in values} | {"vehicle.mass": lw.Normal(std=1e-3)}
+        scene, members, 0, {"vehicle.mass": lw.Normal(std=1e-3)} | {name: lw.Normal(std=0.0) for name in values}
     )
 
 
@@ -343,6 +343,22 @@ def test_a_prepared_run_begins_anew_and_says_what_ran(surveyed, drifting):
 def test_a_late_member_that_needs_more_is_predicted(surveyed, drifting, monkeypatch):
     monkeypatch.setattr(predict, "TRIAL_SECONDS", 1e-3)
     assert lw.predict(drifting, threads=3, **SHORT).members == 600
+
+
+class Ahead:
+    """Runs all blocks before it yields the first, as threads may."""
+
+    def run(self, work, blocks, advanced):
+        yield from [(block, work(block)) for block in blocks]
+
+
+@pytest.mark.parametrize("values", [{"vehicle.mass": -1.0}, {"current.velocity": [0.5, 0.0, 0.0]}])
+def test_a_late_member_that_the_run_does_not_need_changes_nothing(surveyed, drifting, values):
+    fleet = late(drifting.scene, 2000, 1900, values)
+    enough = lw.Until("mean position[0]", 1e3, members=256)
+    one, ahead = (lw.solve(fleet, until=enough, **SHORT, **each) for each in ({"threads": 1}, {"executor": Ahead()}))
+    assert len(one.status) < 1900 and one.provenance["terms"] == ahead.provenance["terms"]
+    np.testing.assert_array_equal(one.position, ahead.position)
 
 
 def test_a_late_member_that_is_unphysical_is_named(paper, surveyed):

@@ -189,9 +189,8 @@ class Ensemble:
         self.variations = self._described()
         self.space: Space = variations.space(self.seed, self.variations)
         self._whole = self._counted(settings)
-        self.members = self.checked = self._whole
-        if not checked:
-            self._check_physical()
+        self.members = self._whole
+        self._check_physical(checked)
 
     def _described(self) -> list[Variation]:
         """Return what varies, one entry for each distribution; refuse what does not fit the scene."""
@@ -276,13 +275,15 @@ class Ensemble:
         """
         return np.arange(first, stop) if self._indices is self._places is None else self.indices[first:stop]
 
-    def _check_physical(self) -> None:
-        """Refuse unphysical members, looking at so few at a time that memory stays small.
+    def _check_physical(self, before: bool = False) -> None:
+        """Refuse unphysical members, looking at so few at a time that memory stays small, unless that was done before.
 
         Members that are drawn are looked at up to SURVEYED; a run looks at the others as it comes to them.
         """
         varied = self.varied_names & self._base.keys()
         self.checked = self.members if self._explicit or self._columns or not varied else min(self.members, SURVEYED)
+        if before:
+            return
 
         def look(first: int, stop: int) -> dict[str, _Unphysical]:
             with np.errstate(over="ignore", invalid="ignore"):

@@ -367,6 +367,22 @@ def test_a_late_member_that_is_unphysical_is_named(paper, surveyed):
         lw.solve(fleet, **SETTINGS)
 
 
+def test_late_members_of_a_scene_file_are_looked_at(paper, surveyed):
+    """A file's ensemble is checked when it is read and not again; but its late members as the run comes to them."""
+    vary = {"vehicle.buoyancy": lw.Normal(mean=1215.8, std=390.0).to_dict()}
+    for seed in range(50):
+        ensemble = {"members": 600, "seed": seed, "vary": vary}
+        try:
+            scene = lw.Scene.from_dict(paper.to_dict() | {"ensemble": ensemble})
+        except lw.SceneError:  # an early one
+            continue
+        if (lw.Ensemble.from_scene(scene).parameters(0, 600)["vehicle.buoyancy"] < 0.0).any():
+            break
+    for _ in range(2):
+        with pytest.raises(lw.SceneError, match=r"vehicle\.buoyancy of member"):
+            lw.solve(scene, **SETTINGS)
+
+
 def test_an_early_member_that_is_unphysical_is_counted_among_those_looked_at(paper, surveyed):
     with pytest.raises(lw.SceneError, match=r"of the 256 members that were looked at"):
         lw.Ensemble(paper, 600, 0, {"vehicle.mass": lw.Normal(std=100.0)})

@@ -35,6 +35,9 @@ from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
 from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.scene.scene import Scene
 
+# Members that are run together where quantities look over their paths, which are kept as long as they run.
+PATHS_AT_ONCE = 16_384
+
 
 class FailedMembers(SceneError):  # noqa: N818  (what happened, and no fault of the scene)
     """Raised when members failed and the answer cannot be computed from the remaining ones."""
@@ -275,31 +278,56 @@ class Prepared:
         if self._common_noise:
             fleet = copy.copy(fleet)
             fleet.indices = np.zeros(fleet.members, dtype=np.int64)
-        result = self._runner.run(fleet, progress, warned=not self._of)
         if not self._of:
-            return result
-        members = fleet.select(0, fleet.members) if any(each.looks_at_members for each in self._of) else None
-        values = np.concatenate([each.values(result, members) for each in self._of], axis=1)
-        lost = failed(np.asarray(result.status)) | ~np.isfinite(values).all(axis=1)
+            return self._runner.run(fleet, progress)
+        groups, at_once = (
+            [],
+            PATHS_AT_ONCE if any(each.over_path or each.is_function for each in self._of) else fleet.members,
+        )
+        for first in range(0, fleet.members, at_once):
+            stop = min(first + at_once, fleet.members)
+            group = fleet if stop - first == fleet.members else fleet.subset(np.arange(first, stop))
+            groups.append(self._values(group, progress and part(progress, first / fleet.members, stop / fleet.members)))
+        values, status = (np.concatenate(each) for each in zip(*groups, strict=True))
+        lost = failed(status) | ~np.isfinite(values).all(axis=1)
         if lost.any():
             if self._refuse:
-                raise FailedMembers([failure_text(result, lost, 'mend what fails, or take NaN for them: failed="nan"')])
+                raise FailedMembers([failure_text(status, lost, 'mend what fails, or take NaN for them: failed="nan"')])
             values = np.where(lost[:, None], np.nan, values)
         return values[:, 0] if values.shape[1] == 1 else values
 
+    def _values(self, fleet: Ensemble, progress: Callable[[float], None] | None) -> tuple[np.ndarray, np.ndarray]:
+        """The quantities (n, m) of some members, and their status (n,)."""
+        result = self._runner.run(fleet, progress, warned=False)
+        members = fleet.select(0, fleet.members) if any(each.looks_at_members for each in self._of) else None
+        return np.concatenate([each.values(result, members) for each in self._of], axis=1), np.asarray(result.status)
 
-def failure_text(result: Result, lost: np.ndarray, remedy: str) -> str:
+
+def part(progress: Callable[[float], None], begin: float, end: float) -> Callable[[float], None]:
+    """Tell of a part of the work as a part of the whole.
+
+    Args:
+        progress: called with the fraction of the whole.
+        begin: fraction of the whole where the part begins.
+        end: fraction of the whole where it ends.
+
+    Returns:
+        A function to be called with the fraction of the part.
+    """
+    return lambda fraction: progress(begin + (end - begin) * fraction)
+
+
+def failure_text(status: np.ndarray, lost: np.ndarray, remedy: str) -> str:
     """Describe how many members failed, and of what.
 
     Args:
-        result: their result.
+        status: (n,), their status.
         lost: (n,), whether each failed, or a quantity of it is not finite.
         remedy: what the user can do, which ends the text.
 
     Returns:
         One line of text.
     """
-    status = np.asarray(result.status)
     causes = {Status(int(code)).name.lower(): int((status == code).sum()) for code in np.unique(status[failed(status)])}
     odd = int((lost & ~failed(status)).sum())
     causes |= {"quantity not finite": odd} if odd else {}

@@ -12,7 +12,7 @@ import lgvi_warp as lw
 from lgvi_warp.engine import plan as plans
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.shared import Shared
-from lgvi_warp.runs import predict
+from lgvi_warp.runs import predict, prepared
 from lgvi_warp.runs.prepared import FailedMembers
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
@@ -182,6 +182,21 @@ def test_other_members_may_need_another_kernel():
     run = lw.prepare(scene, names, of="position", **SHORT)
     for X in ([[0.0, 0.0]], [[0.5, 0.0]], [[0.0, 3.0]], [[0.0, 0.0], [0.5, 3.0]], [[0.0, 0.0]]):
         np.testing.assert_array_equal(run(np.array(X)), solved(scene, names, X, **SHORT).position[-1])
+
+
+def test_paths_are_kept_of_some_members_at_a_time(paper, monkeypatch):
+    run = lw.prepare(paper, NAMES, of=["max(depth)", "depth"], save=lw.SaveAt(every=0.1), failed="nan", **SETTINGS)
+    X = numbers(300)
+    X[290, 1] = 1e6
+    expected, sizes, told = run(X), [], []
+    monkeypatch.setattr(prepared, "PATHS_AT_ONCE", 128)
+    whole = prepared.Runner.run
+    monkeypatch.setattr(prepared.Runner, "run", lambda *given, **named: (
+        sizes.append(given[1].members), whole(*given, **named))[1])  # fmt: skip
+    np.testing.assert_array_equal(run(X, progress=told.append), expected)
+    assert sizes == [128, 128, 44] and told == sorted(told) and told[-1] == 1.0 and np.isnan(expected[290]).all()
+    with pytest.raises(FailedMembers, match=r"1 of 300 members failed .*member 290"):
+        lw.prepare(paper, NAMES, of="max(depth)", save=lw.SaveAt(every=0.1), **SETTINGS)(X)
 
 
 def test_threads_may_call_at_once(paper):

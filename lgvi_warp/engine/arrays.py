@@ -192,10 +192,10 @@ class LawArrays:
         starts = [part for law in laws for part in (_present(law.memory), np.zeros((1, law.work)))]
         row, memory, places = 1, 0, []
         for law, part in zip(laws, rows, strict=True):
-            kept = _present(law.memory).shape[1]
-            wanted = ("first", row, law.rows), ("memory", memory, law.memory), ("work", memory + kept, law.work or None)
+            work = memory + memory_rows(law) - law.work
+            wanted = ("first", row, law.rows), ("memory", memory, law.memory), ("work", work, law.work or None)
             places.append({name: place for name, place, part in wanted if part is not None})
-            row, memory = row + part.shape[1], memory + kept + law.work
+            row, memory = row + part.shape[1], memory + memory_rows(law)
         moved = self._places != (places, row, memory)
         if moved:
             # A law may have as many rows as its members need: those after it, though shared, then lie elsewhere.
@@ -226,6 +226,18 @@ class LawArrays:
             put_rows(view[:, first : first + part.shape[1]], part)
             first += part.shape[1]
         view[:, half:] = view[:, :half]
+
+
+def memory_rows(law: Packed) -> int:
+    """Rows of the memory that a law has, its scratch rows among them.
+
+    Args:
+        law: what its term packed.
+
+    Returns:
+        Their number.
+    """
+    return _present(law.memory).shape[1] + law.work
 
 
 def _present(rows: np.ndarray | None) -> np.ndarray:

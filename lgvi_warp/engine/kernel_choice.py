@@ -247,6 +247,8 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
     else:
         for role in roles:
             _check_signature(faults, term, module, role)
+        if hasattr(module, "follow") and not hasattr(module, "evolve"):
+            faults.add(f"{term.key}.device", module, "has follow and no evolve", "see docs/develop/add_a_force.md")
         if isinstance(term, NoisyTerm) and not getattr(module, "NOISE", False):
             faults.add(f"{term.key}.device", module, "does not say that it is noise", "write NOISE = True")
         flow = getattr(module, "FLOW", "none")
@@ -299,7 +301,7 @@ def _check_signature(faults: Faults, term: Term, module: Any, role: str) -> None
         faults.add(f"{term.key}.{role}", f"({', '.join(names)})", f"takes {len(names)} arguments", remedy)
 
 
-ROLES = ("law", "damping", "flow", "evolve")
+ROLES = ("law", "damping", "flow", "evolve", "follow")
 # How water may move, the most special first.
 FLOWS = ("none", "steady", "uniform", "varying")
 
@@ -340,9 +342,15 @@ def _check(
                              or isinstance(term, Drag) or getattr(module, "NOISE", False)):  # fmt: skip
             problem = f"takes forces of position and time only, which {term.key} is not"
             faults.add("method", method.name, problem, "use psi_s")
-    if method.tableau and memory:
-        why = "a term that remembers, which is kept once a step"
-        faults.add("method", method.name, f"cannot advance {why}", "use psi_s, psi_x or psi_w")
+    for term, module in acting:
+        if method.tableau is None or not term.memory:
+            continue
+        if not hasattr(module, "follow"):
+            problem = f"cannot advance {term.key}, a term that remembers what is not known between steps"
+            faults.add("method", method.name, problem, "use psi_s, psi_x or psi_w")
+        elif min(method.tableau.c) < 0.0:
+            problem = f"has a stage before the step's start, where it is not known what {term.key} remembers"
+            faults.add("method", method.name, problem, "use rkmk4")
     if method.adaptive and noisy:
         why = "cannot choose its steps where noise is drawn once a step"
         faults.add("method", method.name, why, "leave out rtol and atol")

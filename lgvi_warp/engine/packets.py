@@ -92,7 +92,7 @@ class Packets:
         shared, before = plan.shared.keeps, self._arrays() if self._launch else []
         self.inertia.write(self.count, [((), packing.inertia(), shared("inertia"))])
         laws, events = packing.laws(), packing.events()
-        self.laws.write(laws, [shared(("law", i)) for i in range(len(laws))], packing.scratch())
+        self.laws.write(laws, [shared(("law", i)) for i in range(len(laws))], packing.scratch(laws))
         self.events.write(self.count, nested(events, [shared(("event", i)) for i in range(len(events))]))
         if plan.spec.looks:
             self._limits.write(self.count, [((), self._watched_limits(), False)])

@@ -6,7 +6,7 @@ What all members share is computed and written once for a run; each block, or ca
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from lgvi_kernels import built_in
 from lgvi_kernels.advance.rows import STATE_FIELDS
 from lgvi_kernels.maps.collocation import SLOPE_FIELDS
+from lgvi_warp.engine.arrays import memory_rows
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.engine.shared import AXES, FRAME, context
 from lgvi_warp.engine.survey import framed
@@ -142,14 +143,20 @@ class Packing:
         each = enumerate(event for event, _ in self.plan.kernel_choice.events)
         return [self._shared(("event", i), functools.partial(pack, event)) for i, event in each]
 
-    def scratch(self) -> int:
+    def scratch(self, laws: Sequence[Packed]) -> int:
         """Rows of the memory that the method keeps for itself.
+
+        Args:
+            laws: what each term packs.
 
         Returns:
             Their number.
         """
+        spec = self.plan.spec
+        if spec.memory and spec.explicit is not None and spec.explicit.goes_back:
+            return sum(memory_rows(law) for law in laws)
         # Gauss collocation: the slopes of the last step, and room for their extrapolation.
-        return 2 * len(self.plan.spec.gauss[1]) * SLOPE_FIELDS if self.plan.spec.gauss else 0
+        return 2 * len(spec.gauss[1]) * SLOPE_FIELDS if spec.gauss else 0
 
     def state(self, rows: np.ndarray) -> None:
         """Write the members' states.

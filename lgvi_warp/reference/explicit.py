@@ -1,7 +1,7 @@
 """Explicit Runge-Kutta methods on y = (b, two rows of R, p, pi), of one vehicle, with all its laws.
 
-The middle row of R is the cross product of the others. What a law remembers is advanced by half a step before and after,
-as in K: such laws are integrated to order 2.
+The middle row of R is the cross product of the others. What a law remembers is known at every stage if it depends on the
+time and itself alone (`Law.follow`); of other laws it is advanced by half a step before and after, as in K, to order 2.
 """
 
 import math
@@ -13,6 +13,7 @@ import numpy as np
 
 from lgvi_warp.reference.rotation import Array, cross
 from lgvi_warp.reference.submaps import Body, State, acceleration_wrench, damping, look, remembered, water
+from lgvi_warp.reference.terms import Law
 
 Row = tuple[float, ...]
 
@@ -124,14 +125,38 @@ def rates(x: State, body: Body, h: float, origin: Array = USER) -> Array:
 def remembered_half(x: State, body: Body, h: float, second: bool) -> State:
     """What laws remember, half a step of h [s] later; x.t is the step's start, or its end in the second half.
 
+    That of laws whose memory is known at every stage stays as it is: see `followed`.
+
     Args:
         x, body, h: State at the start; inertia and laws; step [s].
         second: Whether it is the second half of the step.
     """
     if not any(memory.size for memory in x.memory):
         return x
-    middle = replace(x, t=x.t + (-0.5 if second else 0.5) * h)
-    return replace(remembered(middle, body, h, second), t=x.t)
+    middle = remembered(replace(x, t=x.t + (-0.5 if second else 0.5) * h), body, h, second)
+    memory = (old if follows(law) else new for law, old, new in zip(body.terms, x.memory, middle.memory, strict=True))
+    return replace(x, memory=tuple(memory))
+
+
+def follows(law: Law) -> bool:
+    """Whether what a law remembers depends on the time and itself alone."""
+    return type(law).follow is not Law.follow
+
+
+def followed(x: State, body: Body, h: float) -> State:
+    """The same state with what laws remember at x.t, from what they remembered h [s] before.
+
+    Raises ValueError for h < 0, which a stage of cg3 asks for: what a law remembers does not say how it came about.
+
+    Args:
+        x, body, h: State with the memory of h before; inertia and laws; length of that time [s].
+    """
+    if h == 0.0 or not any(memory.size for memory in x.memory):
+        return x
+    if h < 0.0:
+        raise ValueError(f"h = {h:.3g} s: what laws remember is not known before a step; use rkmk4")
+    laws = zip(body.terms, look(x, body, h), strict=True)
+    return replace(x, memory=tuple(law.follow(view) for law, view in laws))
 
 
 def stages(x: State, body: Body, h: float, tableau: Tableau, origin: Array = USER) -> Array:
@@ -144,7 +169,7 @@ def stages(x: State, body: Body, h: float, tableau: Tableau, origin: Array = USE
     """
     y, K = pack(x), np.zeros((len(tableau.b), 15))
     for i, (row, c) in enumerate(zip(tableau.a, tableau.c, strict=True)):
-        K[i] = rates(unpack(y + h * np.array(row) @ K[:i], x, x.t + c * h), body, h, origin)
+        K[i] = rates(followed(unpack(y + h * np.array(row) @ K[:i], x, x.t + c * h), body, c * h), body, h, origin)
     return K
 
 
@@ -154,7 +179,7 @@ def stepper(tableau: Tableau, origin: Array = USER) -> Step:
     def step(x: State, body: Body, h: float) -> State:
         x = at(remembered_half(x, body, h, second=False), origin)
         y = pack(x) + h * np.array(tableau.b) @ stages(x, body, h, tableau, origin)
-        return remembered_half(at(unpack(y, x, x.t + h), -origin), body, h, second=True)
+        return remembered_half(at(followed(unpack(y, x, x.t + h), body, h), -origin), body, h, second=True)
 
     return step
 
@@ -245,7 +270,7 @@ def attempt(x: State, body: Body, h: float, tableau: Tableau, rtol: float, atol:
     x = remembered_half(x, body, h, second=False)
     K, y = stages(x, body, h, tableau), pack(x)
     y_k1 = y + h * np.array(tableau.b) @ K
-    new = unpack(y_k1, x, x.t + h)
+    new = followed(unpack(y_k1, x, x.t + h), body, h)
     if len(tableau.errors[0]) > len(K):
         K = np.vstack([K, rates(new, body, h)])
     error = error_norm(tableau, K, h, atol + rtol * np.maximum(np.abs(y), np.abs(y_k1)))

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from lgvi_warp.reference.explicit import USER, Step, Tableau, at, pack, rates, unpack
+from lgvi_warp.reference.explicit import USER, Step, Tableau, at, followed, pack, rates, unpack
 from lgvi_warp.reference.rotation import Array, hat
 from lgvi_warp.reference.submaps import Body, State, damping, look, water
 
@@ -52,7 +52,7 @@ def stages(x: State, body: Body, h: float, tableau: Implicit, origin: Array = US
         moved @ (np.eye(6) + g * h * slope(at(x, -origin), body, h) @ np.linalg.inv(body.I6)) @ np.linalg.inv(moved)
     )
     for i, (row, c) in enumerate(zip(tableau.a, tableau.c, strict=True)):
-        K[i] = rates(unpack(y + h * np.array(row) @ K[:i], x, x.t + c * h), body, h, origin)
+        K[i] = rates(followed(unpack(y + h * np.array(row) @ K[:i], x, x.t + c * h), body, c * h), body, h, origin)
         s = np.array(tableau.implicit[i][:i]) @ K[:i, 9:] / g
         K[i, 9:] = np.linalg.solve(factor, K[i, 9:] + s) - s
     return K
@@ -64,6 +64,6 @@ def stepper(tableau: Implicit, origin: Array = USER) -> Step:
     def step(x: State, body: Body, h: float) -> State:
         x = at(x, origin)
         y = pack(x) + h * np.array(tableau.b) @ stages(x, body, h, tableau, origin)
-        return at(unpack(y, x, x.t + h), -origin)
+        return at(followed(unpack(y, x, x.t + h), body, h), -origin)
 
     return step

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from lgvi_warp.reference.classical import CG3_A, CG3_B
-from lgvi_warp.reference.explicit import USER, at, derivatives, remembered_half
+from lgvi_warp.reference.explicit import USER, at, derivatives, followed, remembered_half
 from lgvi_warp.reference.rotation import Array, cross, exp
 from lgvi_warp.reference.submaps import Body, State
 
@@ -51,14 +51,14 @@ def rkmk4(x: State, body: Body, h: float, origin: Array = USER) -> State:
     x = at(remembered_half(x, body, h, second=False), origin)
 
     def k(u: Array, c: float) -> Array:
-        return h * algebra_rates(act(x, u, x.t + c * h), body, h, origin)
+        return h * algebra_rates(followed(act(x, u, x.t + c * h), body, c * h), body, h, origin)
 
     k1 = k(np.zeros(12), 0.0)
     k2 = k(0.5 * k1, 0.5)
     k3 = k(0.5 * k2 + bracket(k1, k2) / 8.0, 0.5)
     k4 = k(k3, 1.0)
     u = (k1 + 2.0 * k2 + 2.0 * k3 + k4 + 0.5 * bracket(k1, k4)) / 6.0
-    return remembered_half(at(act(x, u, x.t + h), -origin), body, h, second=True)
+    return remembered_half(at(followed(act(x, u, x.t + h), body, h), -origin), body, h, second=True)
 
 
 def cg3(x: State, body: Body, h: float, origin: Array = USER) -> State:
@@ -74,7 +74,7 @@ def cg3(x: State, body: Body, h: float, origin: Array = USER) -> State:
         y = x
         for weight, k in zip(row, stages, strict=True):
             y = act(y, weight * k, y.t)
-        y = replace(y, t=x.t + sum(row) * h)
+        y = followed(replace(y, t=x.t + sum(row) * h), body, sum(row) * h)
         if row is not CG3_B:
             stages.append(h * algebra_rates(y, body, h, origin))
     return remembered_half(at(y, -origin), body, h, second=True)

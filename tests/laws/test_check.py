@@ -12,7 +12,7 @@ import warp as wp
 import lgvi_warp as lw
 from lgvi_kernels.lanes.arithmetic import add, cross, div, dot, lane, mul, ones, sub, vec3  # noqa: F401
 from lgvi_kernels.lanes.state import struct
-from lgvi_kernels.lanes.view import to_body
+from lgvi_kernels.lanes.view import remember, remembered, to_body
 from lgvi_kernels.laws import restoring, tether
 from tests.laws.cases import CASES
 
@@ -290,6 +290,51 @@ def test_a_law_that_is_no_number_where_vehicles_are(device, strength, failed, wo
 def test_damping_along_one_axis_is_right():
     kind = type("Good", (Stirred,), {"device": device_of("damping", resisting_damping), "__annotations__": {}})
     assert "finite at rest, along axes" not in names_of_failed(lw.check_law(kind(strength=0.3)))
+
+
+@wp.func
+def drifting_law(w: Any, view: Any, p: Any):
+    w.force = w.force + remembered(view, p.memory) * view.down
+    return w
+
+
+@wp.func
+def held_evolve(state: Any, view: Any, p: Any):
+    return state
+
+
+@wp.func
+def drifting_follow(state: Any, view: Any, p: Any):
+    """By Euler's method, and pushed by the vehicle's depth."""
+    n = remembered(view, p.memory)
+    remember(view, p.memory, n + view.h * (p.strength - n + view.b.z))
+    return state
+
+
+@functools.cache
+def drifting_params(width, real):
+    return struct("Drifting", strength=lane(width, real), memory=wp.int32)
+
+
+class DriftingDevice:
+    params = staticmethod(drifting_params)
+    law = drifting_law
+    evolve = held_evolve
+    follow = drifting_follow
+
+
+class Drifting(Stirred):
+    device = DriftingDevice
+    memory = True
+
+    def packed(self, numbers, context):
+        return lw.Packed({"strength": numbers["strength"]}, memory=np.zeros((1, 1)))
+
+
+def test_a_memory_that_depends_on_the_state():
+    report = lw.check_law(Drifting(strength=0.3))
+    assert names_of_failed(report) == ["follow: blind to the state", "follow: exact"]
+    assert "leave follow() out" in str(report) and "by the exact solution over view.h" in str(report)
 
 
 def test_numbers_that_do_not_fit():

@@ -18,6 +18,8 @@ from tests.laws.case import Case
 from tests.laws.cases import CASES
 from tests.laws.test_parity import GRAVITY, STATE, VEHICLE
 
+# Long enough for several turns of a command.
+FOLLOWED = 0.7
 PACKETS, SEED = 16, 12 + (34 << 32)
 # A hundred roundings of the largest number.
 ROUND_OFF = 100.0 * np.finfo(float).eps
@@ -37,7 +39,7 @@ def bench_of(term, folder, aligned=False):
 
 
 def measured(bench, elsewhere):
-    """By role (k, numbers) between the halves of a kick, in the user's axes, and the memory after either half."""
+    """By role (k, numbers) between the halves of a kick, in the user's axes; the memory after each half, and what follows."""
     views = bench.views.elsewhere() if elsewhere else bench.views
     context = replace(bench.context(bench.parameters, elsewhere), aligned=not elsewhere)
     bank = Bank(bench, context, views)
@@ -45,6 +47,9 @@ def measured(bench, elsewhere):
     kept = [lanes_apart(bank.memory)]
     bank.run_device(views, 1)
     kept.append(lanes_apart(bank.memory))
+    if hasattr(bench.module, "follow"):
+        bank.run_device(views, 2, FOLLOWED)
+        kept.append(lanes_apart(bank.memory))
     if "damping" in values:
         twist = np.concatenate([views.velocity, views.rate], axis=1)
         values["damping"] = -np.einsum("kij,kj->ki", values["damping"].reshape(-1, 6, 6), twist)
@@ -64,11 +69,11 @@ def lanes_apart(memory):
 
 
 def expected(law, views):
-    """The same of the twin: by role (k, numbers), and the memory after either half of the kick."""
+    """The same of the twin: by role (k, numbers), and the memory after either half of the kick, and what follows."""
     if hasattr(law, "seed0"):
         law = type(law)(**vars(law) | {"seed0": SEED & 0xFFFFFFFF, "seed1": SEED >> 32})
     values = {role: [] for role in ("law", "damping", "flow", "energy")}
-    kept = [], []
+    kept = [], [], []
     for i, (R, b, nu, Om, t) in enumerate(zip(*vars(views).values(), strict=True)):
         view = View(R, b, nu, Om, t, KICK, STEP, i, law.start())
         view = replace(view, memory=law.evolve(view, False))
@@ -78,7 +83,9 @@ def expected(law, views):
         values["flow"].append(np.concatenate([flow.velocity, flow.rate, flow.gradient.T.reshape(9)]))
         values["energy"].append([law.potential(view)])
         kept[0].append(view.memory)
-        kept[1].append(law.evolve(view, True))
+        view = replace(view, memory=law.evolve(view, True))
+        kept[1].append(view.memory)
+        kept[2].append(law.follow(replace(view, h=FOLLOWED)))
     return {role: np.array(value) for role, value in values.items()}, [np.array(memory) for memory in kept]
 
 
@@ -98,7 +105,7 @@ def test_a_law_gives_what_its_twin_gives(name, elsewhere):
         values["energy"], twin_values["energy"] = (x["energy"] - x["energy"][0] for x in (values, twin_values))
     for role, value in values.items():
         assert_close(value, twin_values[role])
-    for memory, twin_memory in zip(kept, twin_kept, strict=True):
+    for memory, twin_memory in zip(kept, twin_kept[: len(kept)], strict=True):
         assert_close(memory[:, : twin_memory.shape[1]], twin_memory)
 
 

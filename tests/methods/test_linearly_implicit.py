@@ -236,12 +236,6 @@ def test_methods_that_do_not_exist(arguments, words):
         lw.Method(**arguments)
 
 
-def test_laws_that_remember_are_refused():
-    scene = test_parity.scene_of(CASES["thrusters"])
-    with pytest.raises(SceneError, match="cannot advance a term that remembers"):
-        make_plan(lw.Ensemble.from_scene(scene), METHOD, h=0.1, t1=1.0)
-
-
 def test_compensated_sums_are_refused():
     fleet = lw.Ensemble.from_scene(test_parity.scene_of(CASES["drag"]))
     with pytest.raises(SceneError, match="which rkw3 is not"):

@@ -62,6 +62,18 @@ def test_compensation_is_there_only_if_asked_for(method, tmp_path):
             assert (mark in text) == there, (mark, dtype)
 
 
+def test_memory_in_stages_is_there_only_where_it_is_followed(tmp_path):
+    # A method that goes back in time keeps a copy of the memory; a splitting follows nothing.
+    lagging = scene_of(CASES["thrusters"])
+    held = terms.Thrusters(position=[(0.0, 0.0, 0.0)], direction=[(1.0, 0.0, 0.0)], coefficient=[5.0], command=[0.5])
+    cases = (("rk4", lagging, {"walked"}), ("rk8", lagging, {"walked", "copy_memory"}), ("psi_s", lagging, set()),
+             ("rk8", lw.Scene(VEHICLE, lw.Environment(gravity=9.8), terms=[held]), set()))  # fmt: skip
+    for i, (method, scene, marks) in enumerate(cases):
+        (tmp_path / str(i)).mkdir()
+        text = source(scene, tmp_path / str(i), method)
+        assert {mark for mark in ("walked", "copy_memory") if mark in text} == marks, (method, marks)
+
+
 # Functions of the kernel that a level of checks, or a fallback, brings with it.
 LEVELS = {
     "solve_within": ("none", "safe", "all"), "raise_alarm": ("safe", "all"), "failures": ("safe", "all"),

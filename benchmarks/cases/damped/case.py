@@ -1,8 +1,9 @@
 """Driven, damped motion: error and cost of each method and step for REMUS 100 with its rudder at 4 degrees.
 
-As published but in the plane, as in examples/03_remus_100.py; the same with its drag 100 and 1000 times as strong; and in six
-degrees of freedom with linear damping of its roll, at 80 1/s. From 1 to 1.6 m/s; errors are those after 30 s, the largest of
-the members, against rk8 at a tenth of its shortest step here.
+As published but in the plane, as in examples/03_remus_100.py; the same with its drag 100 and 1000 times as strong; in six
+degrees of freedom with linear damping of its roll, at 80 1/s; and in the plane with a thruster that lags and fins whose rate
+is limited, the rudder to 4 degrees at 5 s and to -4 degrees at 15 s. From 1 to 1.6 m/s; errors are those after 30 s, the
+largest of the members, against rk8 at a tenth of its shortest step here.
 """
 
 import dataclasses
@@ -25,6 +26,16 @@ STEPS = {
 
 
 PLANE = {"center_of_gravity": [0.0] * 3, "rigid_body_mass_matrix": np.diag([30.48] * 3 + [0.177, 3.45, 3.45])}
+# The propeller 10 % slower from 10 s on.
+LAGGING = [{
+    "type": "thrusters", "position": [[-0.7, 0.0, 0.0]], "direction": [[1.0, 0.0, 0.0]], "coefficient": [3.86],
+    "time_constant": 0.3, "times": [0.0, 10.0, 10.001], "command_schedule": [[1.0], [1.0], [0.9]],
+}]  # fmt: skip
+TURNED_IN, RATE = 1e-3, 0.35  # s, rad/s
+RUDDER_STEPS = {
+    "times": [0.0, 5.0, 5.0 + TURNED_IN, 15.0, 15.0 + TURNED_IN], "rate_limit": RATE, "command": None,
+    "command_schedule": [[angle, 0.0] for angle in (0.0, 0.0, RUDDER, RUDDER, -RUDDER)],
+}  # fmt: skip
 NO_TORQUE = [{"type": "wrench", "force": [3.86, 0.0, 0.0]}]
 # Name -> changes of the vehicle and its terms, factor of its drag, damping of roll [N m s].
 SCENES = {
@@ -32,6 +43,7 @@ SCENES = {
     "drag x 100": (PLANE, NO_TORQUE, 100.0, 0.0),
     "drag x 1000": (PLANE, NO_TORQUE, 1000.0, 0.0),
     "roll damping": ({}, [], 1.0, 20.0),
+    "lags": (PLANE, LAGGING, 1.0, 0.0),
 }
 
 
@@ -40,20 +52,23 @@ def scene(vehicle, terms, strength, rolling):
     named = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0} | vehicle, terms=terms)
     linear = np.diag([0.0, 0.0, 0.0, rolling, 0.0, 0.0])
 
-    def damped(term):
-        return dataclasses.replace(term, linear=linear, quadratic=strength * np.asarray(term.quadratic))
+    def changed(term):
+        if isinstance(term, lw.DragMatrix):
+            return dataclasses.replace(term, linear=linear, quadratic=strength * np.asarray(term.quadratic))
+        if isinstance(term, lw.ControlFins) and terms is LAGGING:
+            return dataclasses.replace(term, **RUDDER_STEPS)
+        return term
 
-    terms = [damped(term) if isinstance(term, lw.DragMatrix) else term for term in named.terms]
-    return dataclasses.replace(named, terms=terms)
+    return dataclasses.replace(named, terms=[changed(term) for term in named.terms])
 
 
 def fleet(name, members):
     """Level, at speeds ahead from 1 to 1.6 m/s."""
     nu, zero = np.zeros((members, 3)), np.zeros((members, 3))
     nu[:, 0] = np.linspace(1.0, 1.6, members)
-    command = {"control_fins.command": np.broadcast_to([RUDDER, 0.0], (members, 2))}
+    held = {"control_fins.command": np.broadcast_to([RUDDER, 0.0], (members, 2))}
     level = np.broadcast_to(np.eye(3), (members, 3, 3))
-    return lw.Ensemble.from_states(scene(*SCENES[name]), zero, level, nu, zero, command)
+    return lw.Ensemble.from_states(scene(*SCENES[name]), zero, level, nu, zero, {} if name == "lags" else held)
 
 
 def ends(plan):

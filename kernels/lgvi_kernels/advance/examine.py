@@ -32,6 +32,7 @@ def make_examine(module, numbers, width, real):
     Lane, View, Params = lane(width, real), view_struct(width, real), params_of((module,), (numbers,), width, real)
     Wrench, Damping, Flow = (make(width, real) for make in (wrench_struct, damping_struct, flow_struct))
     law, damping, flow, evolve = (superpose((module,), role) for role in ("law", "damping", "flow", "evolve"))
+    follow = superpose((module,), "follow")
     distance, energy = plays(module, "distance"), superpose((module,), "energy")
 
     @wp.func
@@ -46,7 +47,7 @@ def make_examine(module, numbers, width, real):
         # the law's numbers
         params: wp.array(dtype=Params),
         table: wp.array2d(dtype=Lane),
-        # the views: in space, in time, length and number of the kick; second: -1 evaluates, 0 and 1 call evolve instead
+        # the views: in space, in time, length and number of the kick; second: -1 evaluates, 0 and 1 call evolve, 2 follow
         views: wp.array2d(dtype=Lane),
         times: wp.array(dtype=real),
         h: real,
@@ -73,7 +74,10 @@ def make_examine(module, numbers, width, real):
         view.memory = memory
         view.packet = i
         view.entry = i % table.shape[0]
-        if second >= 0:
+        if second == 2:
+            if wp.static(follow is not None):
+                view = follow(view, view, p)
+        elif second >= 0:
             if wp.static(evolve is not None):
                 view.second = second
                 view = evolve(view, view, p)

@@ -4,7 +4,22 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, cross, dot, element, mul, neg, ones, set_element, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
+    absolute,
+    add,
+    any_positive,
+    cross,
+    div,
+    dot,
+    element,
+    mul,
+    neg,
+    ones,
+    positive,
+    set_element,
+    sub,
+    vec3,
+)
 from lgvi_kernels.lanes.functions import clamp
 
 
@@ -101,6 +116,67 @@ def middle_of_half(view: Any):
     if view.second > 0:
         t = view.t + quarter
     return t
+
+
+def make_pursuit(solved):
+    """(view, x, first, count, limit, rate) -> x at view.t, from what it was view.h before, as it follows a command.
+
+    The command is that of a table (see `command`), whose straight pieces follow one another.
+    solved: (x, start, end, length, rate) -> x after `length` [s] in which the command goes straight from start to end.
+    """
+
+    @wp.func
+    def over_piece(x: Any, start: Any, end: Any, length: Any, rate: Any):
+        if any_positive(length):
+            x = solved(x, start, end, length, rate)
+        return x
+
+    @wp.func
+    def over_ramp(x: Any, left: Any, value: Any, since: Any, steepness: Any, change: Any, limit: Any, rate: Any):
+        """x after a ramp, and the time that is left then. The ramp goes from `value`, `since` before the whole time ends."""
+        unity = ones(limit)
+        zero = unity - unity
+        begin = clamp(since, zero, left)
+        end = clamp(since - unity / steepness, zero, left)
+        held = clamp(value, -limit, limit)
+        x = over_piece(x, held, held, left - begin, rate)
+        a = value + clamp((since - begin) * steepness, zero, unity) * change
+        b = value + clamp((since - end) * steepness, zero, unity) * change
+        start = clamp(a, -limit, limit)
+        stop = clamp(b, -limit, limit)
+        # At its limit before, within, and at its limit after: as long as the command would go on beyond it.
+        before = absolute(a - start)
+        after = absolute(b - stop)
+        whole = before + absolute(stop - start) + after
+        pace = positive(whole, (begin - end) / whole, zero)
+        x = over_piece(x, start, start, pace * before, rate)
+        x = over_piece(x, start, stop, begin - end - pace * before - pace * after, rate)
+        return over_piece(x, stop, stop, pace * after, rate), end
+
+    # Not inlined, for the sake of the compiler: a method calls it at each stage.
+    @wp.func(inline=False)
+    def walked(table: Any, entry: int, t: Any, h: Any, x: Any, first: int, count: int, limit: Any, rate: Any):
+        unity = ones(limit)
+        # Times count back from t: within one piece its length is then h to the last digit.
+        left = h * unity
+        value = element(table, entry, first, 0)
+        for i in range(count):
+            at = first + 1 + 3 * i
+            since = t * unity - element(table, entry, at, 0)
+            steepness = element(table, entry, at, 1)
+            change = element(table, entry, at, 2)
+            # Ramps that ended before are nothing but their change.
+            if any_positive(positive(left, unity - (since - left) * steepness, unity - unity)):
+                x, left = over_ramp(x, left, value, since, steepness, change, limit, rate)
+            value = value + change
+        held = clamp(value, -limit, limit)
+        return over_piece(x, held, held, left, rate)
+
+    @wp.func
+    def pursued(view: Any, x: Any, first: int, count: int, limit: Any, rate: Any):
+        return walked(view.table, view.entry, view.t, view.h, x, first, count, limit, rate)
+
+    return pursued
 
 
 @wp.func

@@ -6,9 +6,11 @@ steady_force(w, view, p): the force of `law` in inertial axes, if it never chang
 energy(u, view, p): the potential [J] of `law`, for the check of energy, with one of two bounds of what it can give:
     supply(s, view, p): the potential less its least value [J]; push(s, view, p): the size of a steady force [N];
 flow(f, view, p): velocity and slopes of the water;
-evolve(state, view, p): advances what the law remembers by half a kick, and returns its first argument.
+evolve(state, view, p): advances what the law remembers by half a kick, and returns its first argument;
+follow(state, view, p): advances what the law remembers to view.t from view.h before, exactly, if that depends on the time and
+    itself alone: for explicit methods, before a stage.
 
-Each of them but the last takes the sum over other laws and returns it with its own part added: in this way laws fold into one
+Each of them but the last two takes the sum over other laws and returns it with its own part added: so laws fold into one
 function (see maps/compose.py). Constants of a file: POTENTIAL, `law` follows from a potential; SEPARABLE, that potential is a
 sum of one of position, at most quadratic, and one of attitude; FLOW, "steady", "uniform" or "varying" water (see Spec.flow);
 NOISE, the law draws random numbers.

@@ -6,14 +6,19 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.law import (  # noqa: F401
+    absolute,
     add,
     clamp,
     command,
     cosine,
+    div,
+    least,
+    make_pursuit,
     middle_of_half,
     mul,
     neg,
     ones,
+    positive,
     remember,
     remembered,
     row1,
@@ -60,6 +65,40 @@ def evolve(state: Any, view: Any, p: Any):
             largest = half * row1(view, p.first + wp.static(ROWS) * i + wp.static(RATE))
             remember(view, p.memory + i, angle + clamp(change, -largest, largest))
     return state
+
+
+@wp.func
+def turned_towards(angle: Any, start: Any, end: Any, length: Any, rate: Any):
+    """Along a straight command: at the rate until the fin meets it, then with it, or after it where it is faster."""
+    unity = ones(angle)
+    gap = start - angle
+    ahead = positive(gap, unity, -unity)
+    most = length * rate
+    closing = most - ahead * (end - start)
+    part = positive(closing, least(absolute(gap) / closing, unity), unity)
+    met = angle + (ahead * part) * most
+    left = (unity - part) * most
+    return met + clamp(end - met, -left, left)
+
+
+turning = make_pursuit(turned_towards)
+
+
+@wp.func
+def turn_to_command(state: Any, view: Any, p: Any):
+    """|deflection'| <= rate: towards the command, piece by piece, from view.h before to view.t."""
+    if p.limited > 0:
+        for i in range(p.count):
+            at = p.first + wp.static(ROWS) * i
+            first = p.first + wp.static(ROWS) * p.count + i * (1 + 3 * p.knots)
+            limit = row1(view, at + wp.static(LIMIT))
+            rate = row1(view, at + wp.static(RATE))
+            angle = remembered(view, p.memory + i)
+            remember(view, p.memory + i, turning(view, angle, first, p.knots, limit, rate))
+    return state
+
+
+follow = turn_to_command
 
 
 @wp.func

@@ -9,9 +9,11 @@ from lgvi_kernels.law import (  # noqa: F401
     absolute,
     add,
     command,
+    decay,
     div,
     exponential,
     greatest,
+    make_pursuit,
     middle_of_half,
     mul,
     neg,
@@ -59,6 +61,31 @@ def evolve(state: Any, view: Any, p: Any):
             rate = row1(view, p.first + wp.static(ROWS) * i + 10)
             remember(view, p.memory + i, u + exponential(-half * rate) * (n - u))
     return state
+
+
+@wp.func
+def lagged(n: Any, start: Any, end: Any, length: Any, rate: Any):
+    """n' = rate (command - n) along a straight command: n less the command decays, and falls behind its slope."""
+    x = length * rate
+    return end + exponential(-x) * (n - start) - decay(x) * (end - start)
+
+
+lagging = make_pursuit(lagged)
+
+
+@wp.func
+def lag_behind_command(state: Any, view: Any, p: Any):
+    """n' = (command - n) / time constant, exactly, from view.h before to view.t."""
+    if p.lagged > 0:
+        for i in range(p.count):
+            at = p.first + wp.static(ROWS) * i
+            first = p.first + wp.static(ROWS) * p.count + i * (1 + 3 * p.knots)
+            n = remembered(view, p.memory + i)
+            remember(view, p.memory + i, lagging(view, n, first, p.knots, row1(view, at + 9), row1(view, at + 10)))
+    return state
+
+
+follow = lag_behind_command
 
 
 @wp.func

@@ -3,7 +3,7 @@
 k_i = f(t + c_i h, y_i), where y_i comes from y by h a_i1 k_1, h a_i2 k_2, ... and the new state by h b_1 k_1, h b_2 k_2, ...
 A move adds: two rows of R are six numbers like the others, which leave the group at the order of the method, and the third
 is their cross product. Or it turns: R <- R exp(h a Om), one after the other (Crouch & Grossman 1993). Zero coefficients make
-no code; the stages are unrolled.
+no code; the stages are unrolled. What laws remember is advanced from stage to stage, exactly.
 """
 
 import functools
@@ -21,7 +21,7 @@ from lgvi_kernels.maps.compose import superpose
 from lgvi_kernels.maps.dissipation import make_implicit
 from lgvi_kernels.maps.linearly_implicit import make_damped, make_damped_stages, make_factor
 from lgvi_kernels.maps.step_control import make_adaptive, make_errors
-from lgvi_kernels.maps.submaps import rotate
+from lgvi_kernels.maps.submaps import look, rotate
 
 # Added under a root that is divided by: the least that keeps 0/0 away.
 TINY = {wp.float64: 1e-300, wp.float32: 1e-36}
@@ -46,6 +46,11 @@ class Explicit(NamedTuple):
     estimate: int = 0
     adaptive: bool = False
     implicit: tuple = ()
+
+    @property
+    def goes_back(self):
+        """Whether a stage may come before the last one in time: what laws remember at the step's start is then kept."""
+        return self.adaptive or any(later < before for before, later in zip(self.c, self.c[1:]))
 
 
 @functools.cache
@@ -264,8 +269,39 @@ def make_push(Wrench, View, laws):
     return pushed
 
 
-def make_stage(moves, push, node, timed):
-    """The state of one stage. push: the function that changes P where it is known (see make_push), or None."""
+@wp.func
+def copy_memory(c: Any, source: int, target: int):
+    """Copy the laws' memory: place 0 is in use, place 1 keeps that of the step's start."""
+    # Half of the array is a backup, and half of the rest is what is kept.
+    rows = c.memory.shape[1] // 4
+    for j in range(rows):
+        c.memory[c.packet, target * rows + j] = c.memory[c.packet, source * rows + j]
+
+
+def make_recall(View, follow, before, node):
+    """(x, constants, h) -> x: advance what laws remember from the node of the last stage to this one, where x is.
+
+    follow: the functions of all laws with this role. None where they are None, or no time passes.
+    """
+    back = node < before
+    part = node if back else node - before
+    if follow is None or part == 0.0:
+        return None
+
+    @wp.func
+    def recall(x: Any, c: Any, h: Any):
+        if wp.static(back):
+            copy_memory(c, 1, 0)
+        view = look(View(), x, c, h.dtype(wp.static(part)) * h)
+        # The view stands for the sum that folded laws hand on (see compose.superpose): these add nothing to it.
+        view = follow(view, view, c.params)
+        return x
+
+    return recall
+
+
+def make_stage(moves, push, node, timed, recall):
+    """The state of one stage. push, recall: functions as of make_push and make_recall, or None."""
 
     @wp.func
     def at_node(x: Any, k: Any, c: Any, h: Any):
@@ -274,21 +310,27 @@ def make_stage(moves, push, node, timed):
             y = push(y, c, h.dtype(wp.static(node)) * h)
         if wp.static(timed):
             y.time = x.time + wp.float64(wp.static(node)) * wp.float64(h)
+        if wp.static(recall is not None):
+            y = recall(y, c, h)
         return y
 
     return at_node
 
 
-def make_stages(Rates, rates, move, complete, push, a, c, timed):
-    """One function (x, constants, h) -> the slopes of all rows of `a`."""
-    count = len(a)
+def make_stages(Rates, rates, ys, kept):
+    """One function (x, constants, h) -> the slopes of all stages.
+
+    ys: their states (see make_stage); kept: whether what laws remember at the step's start is kept.
+    """
+    count = len(ys)
     Slopes = slopes_struct(Rates, count)
-    ys = [make_stage(make_moves(move, row, complete), push, node, timed) for row, node in zip(a, c)]
     _, at_1, at_2, at_3, at_4, at_5, at_6, at_7, at_8, at_9, at_10, at_11, at_12 = ys + [None] * (MOST_STAGES - count)
 
     @wp.func
     def stages(x: Any, constants: Any, h: Any):
         k = Slopes()
+        if wp.static(kept):
+            copy_memory(constants, 0, 1)
         k.k0 = rates(x, constants, h)
         if wp.static(count > 1):
             k.k1 = rates(at_1(x, k, constants, h), constants, h)
@@ -319,8 +361,8 @@ def make_stages(Rates, rates, move, complete, push, a, c, timed):
     return stages
 
 
-def make_fixed(stages, finish, push, timed):
-    """One step of length h. push: as in make_stage."""
+def make_fixed(stages, finish, push, timed, recall):
+    """One step of length h. push, recall: as in make_stage."""
 
     @wp.func
     def step(x: Any, c: Any, h: Any):
@@ -330,13 +372,15 @@ def make_fixed(stages, finish, push, timed):
             x = push(x, c, h)
         if wp.static(timed):
             x.time = x.time + wp.float64(h)
+        if wp.static(recall is not None):
+            x = recall(x, c, h)
         return x
 
     return step
 
 
-def make_munthe_kaas(rates, act, turned, timed):
-    """Munthe-Kaas & Owren (1999): order 4 with two commutators."""
+def make_munthe_kaas(rates, act, turned, timed, recall):
+    """Munthe-Kaas & Owren (1999): order 4 with two commutators. recall: of half a step, see make_recall."""
 
     @wp.func
     def later(y: Any, x: Any, h: Any):
@@ -357,9 +401,15 @@ def make_munthe_kaas(rates, act, turned, timed):
         """Hairer, Lubich & Wanner, IV.8, in body axes, so that the signs of the commutators are opposite."""
         half = h.dtype(0.5) * h
         k1 = rates(x, c, h)
-        k2 = rates(later(act(x, k1, half), x, half), c, h)
+        y = later(act(x, k1, half), x, half)
+        if wp.static(recall is not None):
+            y = recall(y, c, h)
+        k2 = rates(y, c, h)
         k3 = rates(later(moved(x, k2, half, (h.dtype(0.125) * h * h) * cross(k1.Om, k2.Om)), x, half), c, h)
-        k4 = rates(later(act(x, k3, h), x, h), c, h)
+        y = later(act(x, k3, h), x, h)
+        if wp.static(recall is not None):
+            y = recall(y, c, h)
+        k4 = rates(y, c, h)
         two = h.dtype(2.0)
         k = k1
         k.b = k1.b + two * (k2.b + k3.b) + k4.b
@@ -373,11 +423,13 @@ def make_munthe_kaas(rates, act, turned, timed):
     return step
 
 
-def make_implicit_stages(spec, rates, velocities, slope):
-    """The stages of a linearly implicit method for this Spec; slope: the matrix of damping (see make_forces)."""
+def make_implicit_stages(spec, rates, states, velocities, slope):
+    """The stages of a linearly implicit method for this Spec.
+
+    states: those of the stages (see make_stage); slope: the matrix of damping (see make_forces).
+    """
     method, width, real, coupled = spec.explicit, spec.width, spec.real, "coupled" in spec.parts
     Rates = rates_struct(width, real, method.kind)
-    states = [make_stage(make_moves(along, row, completed), None, c, spec.timed) for row, c in zip(method.a, method.c)]
     damped = [make_damped(Rates, make_moves, row, coupled) for row in method.implicit]
     implicit = make_implicit(damping_struct(width, real), factor_struct(width, real), coupled)
     factor = make_factor(implicit, velocities, slope, method.implicit[0][0])
@@ -392,22 +444,30 @@ def make_explicit(spec, everything, velocities, slope):
     turned = make_turned(rotation_struct(width, real), real)
     moves = {"vector": (along, completed), "inertial": (along_known, completed)}
     move, complete = moves.get(method.kind, (make_act(turned), None))
-    push = make_push(Wrench, view_struct(width, real), spec.laws) if method.kind == "inertial" else None
+    View = view_struct(width, real)
+    push = make_push(Wrench, View, spec.laws) if method.kind == "inertial" else None
     shape = (spec.mass, "coupled" in spec.parts, spec.flow != "none", spec.scaled)
     drag = make_resistance(spec.drag) if spec.drag else None
     rates = make_rates(Rates, Wrench, everything, velocities, method.kind, *shape, drag)
+    follow = superpose(spec.laws, "follow") if spec.memory else None
     if method.kind == "munthe_kaas":
-        return make_munthe_kaas(rates, move, turned, timed)
+        return make_munthe_kaas(rates, move, turned, timed, make_recall(View, follow, 0.0, 0.5))
     a, c = method.a, method.c
     # An estimate of one number more asks for the slope at the end of the step, whose row of `a` is b.
     if method.adaptive and len(method.errors[0]) > len(a):
         a, c = (*a, method.b), (*c, 1.0)
+    *recalls, last = (make_recall(View, follow, before, node) for before, node in zip((0.0, *c), (*c, 1.0)))
+    states = [
+        make_stage(make_moves(move, row, complete), push, node, timed, recall)
+        for row, node, recall in zip(a, c, recalls)
+    ]
+    kept = follow is not None and method.goes_back
     if method.implicit:
-        stages = make_implicit_stages(spec, rates, velocities, slope)
+        stages = make_implicit_stages(spec, rates, states, velocities, slope)
     else:
-        stages = make_stages(Rates, rates, move, complete, push, a, c, timed)
+        stages = make_stages(Rates, rates, states, kept)
     finish = make_moves(move, method.b + (0.0,) * (len(a) - len(method.b)), complete)
     if not method.adaptive:
-        return make_fixed(stages, finish, push, timed)
+        return make_fixed(stages, finish, push, timed, last)
     errors = make_errors(Rates, [make_moves(along, row, None) for row in method.errors])
-    return make_adaptive(stages, finish, errors, method.estimate, width, real, timed)
+    return make_adaptive(stages, finish, errors, method.estimate, width, real, timed, copy_memory if kept else None)

@@ -75,8 +75,11 @@ def make_errors(Rates, moves):
     return errors
 
 
-def make_adaptive(stages, finish, errors, estimate, width, real, timed):
-    """From one step of the grid to the next, by steps that the packet's worst lane decides."""
+def make_adaptive(stages, finish, errors, estimate, width, real, timed, copy_memory):
+    """From one step of the grid to the next, by steps that the packet's worst lane decides.
+
+    copy_memory: (constants, source, target), where a law remembers (see maps/explicit.py); else None.
+    """
     # Of PI control: this exponent is that of the step's own error, BETA that of the error before.
     power = 0.75 * BETA - 1.0 / estimate
 
@@ -153,6 +156,8 @@ def make_adaptive(stages, finish, errors, estimate, width, real, timed):
                     x.time = start + wp.float64(done)
             else:
                 stride = taken * wp.min(real(1.0), factor)
+                if wp.static(copy_memory is not None):
+                    copy_memory(c, 1, 0)
                 if not stride > real(wp.static(SMALLEST[real])) * h:
                     x.alarm = given_up(x.alarm, error, real(1.0), taken)
                     stride = remaining

@@ -213,12 +213,13 @@ class Bank:
         roles = (*self.bench.roles, *["energy"] * hasattr(self.bench.module, "energy"))
         return {role: out[:, COLUMNS[role][0] : sum(COLUMNS[role])] for role in roles}
 
-    def run_device(self, views: Views, second: int) -> np.ndarray:
+    def run_device(self, views: Views, second: int, h: float = KICK) -> np.ndarray:
         """Evaluate the law once at each view.
 
         Args:
             views: k views.
-            second: which half of a kick `evolve` makes, 0 or 1; -1 for neither.
+            second: which half of a kick `evolve` makes, 0 or 1; 2 for `follow`; -1 for none of these.
+            h: length of the kick, or of the time before the views (default KICK) [s].
 
         Returns:
             (k, OUT_FIELDS), the columns of `lgvi_kernels.advance.examine.COLUMNS`.
@@ -230,7 +231,7 @@ class Bank:
         put_rows(lanes.view, rows)
         times = wp.array(views.time[::width], dtype=wp.float64, device="cpu")
         out = wp.zeros((self.count, OUT_FIELDS), dtype=Lane, device="cpu")
-        inputs = [self.laws.params.array, self.laws.table.array, lanes.array, times, wp.float64(KICK), STEP, second]
+        inputs = [self.laws.params.array, self.laws.table.array, lanes.array, times, wp.float64(h), STEP, second]
         inputs += [self.laws.memory.array, out]
         with build_lock:
             wp.launch(self.bench.examine.kernel, dim=self.count, inputs=inputs, device="cpu")

@@ -20,6 +20,8 @@ from lgvi_warp.scene.scene import Scene
 EPS = float(np.finfo(np.float64).eps)
 # How many roundings of a law's largest number may add up in it.
 ROUNDINGS = 64.0
+# Length of the time over which a law follows [s].
+FOLLOWED = 0.4
 FLOWS = ("steady", "uniform", "varying")
 
 
@@ -81,6 +83,7 @@ def check_law(
     * `law`: independent of velocities, and of the time unless `timed`. With POTENTIAL, force and torque are the
       derivatives of `potential`, and `energy` adds the same potential.
     * `damping`: nu . D nu >= 0. With `dissipative = False` the least power is reported and is no fault.
+    * `follow`: what it leaves in the memory depends on the time alone, and is the same by two parts of the time as at once.
     * `flow`: rate and gradient are the derivatives of the velocity, `water` gives the same velocity, and FLOW fits it.
 
     Args:
@@ -102,7 +105,7 @@ def check_law(
     module = kernel_choice.device_module(term, term.device_in(False), built_in)
     bench = Bench(term, module, scene or simple_scene(), max(1, -(-samples // register_width("float64"))), seed)
     checks: list[Check] = []
-    for examine in (_numbers, _finite, _whole, _potential, _damping, _flow):
+    for examine in (_numbers, _finite, _whole, _potential, _damping, _flow, _follow):
         with np.errstate(all="ignore"):  # what is not finite is found by its check
             checks += examine(bench, step)
         if examine in (_numbers, _finite) and not all(check.ok for check in checks):
@@ -385,3 +388,27 @@ def _flow_kind(kind: Any, moves: list[Slope], passes: Slope) -> Check:
     good = kind in FLOWS and FLOWS.index(kind) >= FLOWS.index(least)
     text = f"FLOW = {kind!r}" + ("" if good else f": write FLOW = {least!r}")
     return Check("flow: FLOW", float(not good), 0.0, good, text)
+
+
+def _follow(bench: Bench, step: float) -> Iterator[Check]:
+    """follow() sees the time alone, and is exact: two parts of a time give what the whole gives."""
+    if not bench.term.memory or not hasattr(bench.module, "follow"):
+        return
+    views, context = bench.views, bench.context(bench.parameters)
+
+    def remembered(*parts: tuple[Views, float]) -> np.ndarray:
+        bank = Bank(bench, context, views)
+        for at, h in parts:
+            bank.run_device(at, 2, h)
+        rows = bank.memory.numpy()
+        return np.asarray(rows.transpose(0, 2, 1).reshape(-1, rows.shape[1]))
+
+    whole = remembered((views, FOLLOWED))
+    elsewhere = Views(views.attitude[::-1], views.position + 1.0, 1.0 - views.velocity, 1.0 - views.rate, views.time)
+    remedy = "leave follow() out: what this law remembers depends on more than the time"
+    yield _judged("follow: blind to the state", remembered((elsewhere, FOLLOWED)) - whole, 0.0, views, remedy)
+    earlier = replace(views, time=views.time - 0.25 * FOLLOWED)
+    apart = remembered((earlier, 0.75 * FOLLOWED), (views, 0.25 * FOLLOWED)) - whole
+    limit = ROUNDINGS * EPS * (np.abs(whole).max() + 1e-300)
+    remedy = "advance by the exact solution over view.h, which ends at view.t"
+    yield _judged("follow: exact", apart, limit, views, remedy)

@@ -83,3 +83,7 @@ class Law:
     def evolve(self, view: View, second: bool) -> Array:
         """What it remembers after the first or second half of a kick of view.h, view.t being the middle of the kick."""
         return view.memory
+
+    def follow(self, view: View) -> Array:
+        """What it remembers at view.t, exactly, from what it remembered view.h before; of time and memory alone."""
+        return view.memory

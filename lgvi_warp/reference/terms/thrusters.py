@@ -6,7 +6,7 @@ import numpy as np
 
 from lgvi_warp.reference.rotation import Array, cross
 from lgvi_warp.reference.terms import Law, View
-from lgvi_warp.reference.terms.wrench import at_time
+from lgvi_warp.reference.terms.wrench import at_time, pieces
 
 
 class Thrusters(Law):
@@ -35,6 +35,19 @@ class Thrusters(Law):
         u = self.commanded(view.t + (0.25 if second else -0.25) * view.h)
         kept = [math.exp(-0.5 * view.h / tau) if tau > 0.0 else 0.0 for tau in self.time_constant]
         return np.asarray(u + np.array(kept) * (view.memory - u))
+
+    def follow(self, view: View) -> Array:
+        """n' = (command - n) / tau: over s of a straight command n <- last + e^-x (n - first) - (1 - e^-x) / x (last - first).
+
+        x = s / tau; tau is the time constant.
+        """
+        n = view.memory
+        if not self.lagged:
+            return n
+        for s, first, last in pieces(view.t, view.h, self.times, self.command, self.limit):
+            x = [s / tau if tau > 0.0 else math.inf for tau in self.time_constant]
+            n = last + np.exp(np.negative(x)) * (n - first) + np.expm1(np.negative(x)) / x * (last - first)
+        return np.asarray(n)
 
     def wrench(self, view: View) -> tuple[Array, Array]:
         """c+ f+(max(n - band, 0)) - c- f-(max(-n - band, 0)) along each."""

@@ -1,5 +1,7 @@
 """A wrench in body axes, held or by a schedule."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from lgvi_warp.reference.rotation import Array
@@ -36,3 +38,22 @@ def at_time(t: float, times: Array, values: Array, steps: bool) -> Array:
     if steps:
         return np.asarray(np.asarray(values)[max(int(np.searchsorted(times, t, side="left")) - 1, 0)])
     return np.array([np.interp(t, times, column) for column in np.transpose(values)])
+
+
+def pieces(t: float, h: float, times: Array, values: Array, limit: Array) -> Iterator[tuple[float, Array, Array]]:
+    """The straight pieces of a limited table within the h [s] before t, the first first: (duration [s], first, last value).
+
+    Args:
+        t, h: End and length of the interval [s].
+        times: Times [s], rising.
+        values: Values (k, n) at the times.
+        limit: Largest sizes (n,) of a value.
+    """
+    changes = np.diff(values, axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossings = [(sign * limit - values[:-1]) / changes for sign in (-1.0, 1.0)]
+    at = [times[:-1, None] + part * np.diff(times)[:, None] for part in np.clip(np.nan_to_num(crossings), 0.0, 1.0)]
+    turns = np.unique(np.concatenate([times, *(array.ravel() for array in at)]))
+    ends = [t - h, *(s for s in turns if t - h < s < t), t]
+    rows = [np.clip(at_time(s, times, values, False), -limit, limit) for s in ends]
+    yield from zip(np.diff(ends), rows[:-1], rows[1:], strict=True)

@@ -98,6 +98,11 @@ class Structs:
         self._struct, self._dtype = struct, dtype
         self.view = np.empty(0, dtype)
         self.array: Any = None
+        self._written: Any = None
+
+    def forget(self) -> None:
+        """Write everything anew at the next `write`, into an array of its own."""
+        self.view = np.empty(0, self._dtype)
 
     def write(self, packets: int, parts: list[tuple[tuple[str, ...], Any, bool]]) -> None:
         """Write numbers of members.
@@ -108,6 +113,11 @@ class Structs:
         """
         varying = [(path, fields) for path, fields, shared in parts if not shared]
         count = packets if max((longest(fields) for _, fields in varying), default=1) > 1 else 1
+        names = [tuple(fields) for _, fields, _ in parts]
+        if names != self._written:
+            # A field that is not written any more would keep the number of other members.
+            self.forget()
+            self._written = names
         if count != len(self.view):
             template = np.zeros(1, self._dtype)
             for path, fields, shared in parts:
@@ -168,6 +178,7 @@ class LawArrays:
     def __init__(self, packets: int, struct: Any, dtype: np.dtype, Lane: Any):
         self._packets, self._Lane = packets, Lane
         self.params = Structs(struct, dtype)
+        self._places: Any = None
 
     def write(self, laws: Sequence[Packed], shared: Sequence[bool], scratch: int = 0) -> None:
         """Write what the terms packed.
@@ -185,14 +196,19 @@ class LawArrays:
             wanted = ("first", row, law.rows), ("memory", memory, law.memory), ("work", work, law.work or None)
             places.append({name: place for name, place, part in wanted if part is not None})
             row, memory = row + part.shape[1], memory + memory_rows(law)
+        moved = self._places != (places, row, memory)
+        if moved:
+            # A law may have as many rows as its members need: those after it, though shared, then lie elsewhere.
+            self.params.forget()
+            self._places = places, row, memory
         self.params.write(self._packets, nested(laws, shared, places))
-        self._write_table(rows, shared, row)
-        self._write_memory(starts, memory + scratch)
+        self._write_table(rows, shared, row, moved)
+        self._write_memory(starts, memory + scratch, moved)
 
-    def _write_table(self, each: list[np.ndarray], shared: Sequence[bool], size: int) -> None:
+    def _write_table(self, each: list[np.ndarray], shared: Sequence[bool], size: int, moved: bool) -> None:
         """Write the laws' rows; the first row of the table is none's."""
         count = self._packets if any(len(rows) > 1 for rows in each) else 1
-        new = not hasattr(self, "table") or len(self.table.view) != count
+        new = moved or len(self.table.view) != count
         if new:
             self.table = Lanes(count, size, self._Lane)
         first = 1
@@ -201,8 +217,8 @@ class LawArrays:
                 put_rows(self.table.view[:, first : first + rows.shape[1]], rows)
             first += rows.shape[1]
 
-    def _write_memory(self, parts: list[np.ndarray], half: int) -> None:
-        if not hasattr(self, "memory"):
+    def _write_memory(self, parts: list[np.ndarray], half: int, moved: bool) -> None:
+        if moved:
             self.memory = Lanes(self._packets, 2 * half, self._Lane)
         view, first = self.memory.view, 0
         view[...] = 0.0

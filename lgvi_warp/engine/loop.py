@@ -77,11 +77,17 @@ def run_blocks(
 
     Returns:
         Index after the last member merged.
+
+    Raises:
+        SceneError: if a member is unphysical.
+        NotSurveyed: if a member needs what the kernel does not have.
     """
     fresh = set(left or ())
     merged = merged or Merged()
     with contextlib.closing(_in_turn(work, runs, runs if left is None else left, executor, advanced)) as done:
         for block, results in done:
+            if isinstance(results, Exception):
+                raise results
             merged.begun = block.stop
             # Results from the store may not be this run's own: errors in them are reported as faults of the store.
             source = work.store if left is not None and block not in fresh else None

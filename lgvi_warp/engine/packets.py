@@ -120,9 +120,9 @@ class Packets:
         return self.laws.memory.array
 
     def _arrays(self) -> list[Any]:
-        """The kernel's arrays that `refill` may replace."""
-        laws = self.laws
-        return [self.inertia.array, laws.params.array, self.events.array, laws.table.array, self._limits.array]
+        """The kernel's arrays that `refill` may replace, its first arguments in front."""
+        laws, limits = self.laws, self._limits.array
+        return [self.inertia.array, laws.params.array, self.events.array, laws.table.array, self.memory, limits]
 
     def _written_by_the_kernel(self) -> list[Any]:
         monitor, spec = self.monitor, self.plan.spec

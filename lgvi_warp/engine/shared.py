@@ -75,8 +75,9 @@ class WatchedContext(PackingContext):
 
     def __getattribute__(self, name: str) -> Any:
         value = super().__getattribute__(name)
-        if name in (FRAME, MEMBERS, SEED):
-            super().__getattribute__("parameters").names.add(name)
+        if name in (FRAME, MEMBERS, SEED, "__dict__"):
+            parameters = super().__getattribute__("parameters")
+            parameters.names.update((FRAME, MEMBERS, SEED) if name == "__dict__" else (name,))
         return value
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.keepers.protocol import BlockStore, Keeper
@@ -29,6 +30,9 @@ class Work:
     block that the store already holds is not run again. A copy in another process returns once its block is durable; in
     the run's own process the run waits at its end for blocks that are not durable yet.
 
+    What is wrong with a block's members is returned as an exception, which the run raises when that block's turn comes: with
+    `until` it may end before, and how far threads are ahead must not matter.
+
     Args:
         plan: the plan of the run.
         keepers: what is kept of the members.
@@ -46,7 +50,7 @@ class Work:
         block: Block,
         halted: Callable[[], bool] = lambda: False,
         advanced: Callable[[int], None] = lambda vehicle_steps: None,
-    ) -> tuple[Any, ...] | None:
+    ) -> tuple[Any, ...] | Exception | None:
         """Advance one block, or take it from the store.
 
         Args:
@@ -55,8 +59,19 @@ class Work:
             advanced: called with the vehicle-steps made of this block so far (default: nothing).
 
         Returns:
-            What each keeper closed with; None if the block was halted.
+            What each keeper closed with; None if the block was halted; a SceneError or NotSurveyed because of its members.
         """
+        from lgvi_warp.engine.plan import NotSurveyed
+
+        try:
+            return self._closed(block, halted, advanced)
+        except (SceneError, NotSurveyed) as error:
+            return error
+
+    def _closed(
+        self, block: Block, halted: Callable[[], bool], advanced: Callable[[int], None]
+    ) -> tuple[Any, ...] | None:
+        """What each keeper closed with."""
         steps_made = 0
 
         def add(vehicle_steps: int) -> None:

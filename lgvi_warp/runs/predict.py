@@ -24,7 +24,7 @@ from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.keepers.memory import Samples
 from lgvi_warp.engine.keepers.observation import Observation, Observing, observe
 from lgvi_warp.engine.keepers.protocol import Keeper
-from lgvi_warp.engine.plan import SEGMENT_SAMPLE_BYTES, Plan
+from lgvi_warp.engine.plan import SEGMENT_SAMPLE_BYTES, NotSurveyed, Plan
 from lgvi_warp.engine.work import Work
 from lgvi_warp.methods.saveat import SaveAt, TimeGrid
 from lgvi_warp.physics.fields import TABLE
@@ -144,13 +144,18 @@ def predict(
     observed = observe(ensemble.members, scene.run, statistics, keep, until, scene.events)
     fields = (settings.get("save") or SaveAt()).fields
     plan = make_plan(ensemble, **settings, fields=observed.fields, survey_all=False)
-    compile_seconds = plan.compile()
     count = threads or machine.thread_count()
     asked_store = store if isinstance(store, Store) or store is None else Store(store)
     into = settled(asked_store, plan, observed, fields) if asked_store else None
     joined = into is not None or bool(observed.watch(plan.grid.times)[0])
     blocks_of_run = parts(ensemble.members, plan.grid.steps, count, joined)
-    set_up, step = costs(plan, blocks_of_run, count, observed)
+    compile_seconds = plan.compile()
+    try:
+        set_up, step = costs(plan, blocks_of_run, count, observed)
+    except NotSurveyed:  # as `solve` goes on
+        plan = replace(plan, survey_all=True)
+        compile_seconds += plan.compile()
+        set_up, step = costs(plan, blocks_of_run, count, observed)
     place = nearest_folder(into.folder) if into else Path.cwd()
     runs = [Sized(plan, into, fields if observed.samples else (), sizes(plan, observed.watch(plan.grid.times)[0]))]
     runs += again(plan, observed, asked_store, fields)
@@ -214,8 +219,9 @@ def _seconds(plan: Plan, steps: int, chosen: Sequence[Block], threads: int, obse
         keepers = (*(keepers if observed.samples else ()), *gathering.keepers)
     work = Work(trial, keepers)
     start = time.perf_counter()
-    for _ in Threads(threads).run(work, chosen, lambda block, vehicle_steps: None):
-        pass
+    for _, results in Threads(threads).run(work, chosen, lambda block, vehicle_steps: None):
+        if isinstance(results, Exception):
+            raise results
     return time.perf_counter() - start
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -23,7 +24,7 @@ from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.provenance import provenance
 from lgvi_warp.runs.quantities import OfInterest, OfResult, quantities
 from lgvi_warp.runs.result import Result
-from lgvi_warp.runs.run import finished, run_plan
+from lgvi_warp.runs.run import completed
 from lgvi_warp.runs.settle import enough_iterations, make_plan
 from lgvi_warp.sampling.designs.designs import salib_problem
 from lgvi_warp.sampling.designs.levels import UnitCubePoints
@@ -33,6 +34,9 @@ from lgvi_warp.scene.columns import as_given, columns_of, names_of, stacked, who
 from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
 from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.scene.scene import Scene
+
+# Members that are run together where quantities look over their paths, which are kept as long as they run.
+PATHS_AT_ONCE = 16_384
 
 
 class FailedMembers(SceneError):  # noqa: N818  (what happened, and no fault of the scene)
@@ -125,14 +129,15 @@ class Runner:
             SceneError: if the method cannot do what these members ask.
             MembersFailed: if members failed and on_failure is "raise".
         """
-        plan = self.plan(fleet)
-        content = plan.shared("provenance", {}, lambda numbers: provenance(plan, self.observed))
         few = {"members": fleet.members, "seed": fleet.seed, "varied": sorted(fleet.varied_names)}
-        known = {**content, "ensemble": few}, plan.grid.messages
-        result = run_plan(
-            plan, self.threads, progress, self.observed, plan.fields, self.executor, known=known, warned=warned
-        )
-        return finished(result, plan, self.observed, plan.fields, self.threads)
+
+        def known(plan: Plan) -> tuple[dict[str, Any], tuple[str, ...]]:
+            content = plan.shared("provenance", {}, lambda numbers: provenance(plan, self.observed))
+            return {**content, "ensemble": few}, plan.grid.messages
+
+        plan = self.plan(fleet)
+        settings = dict(progress=progress, executor=self.executor, known=known, warned=warned)
+        return completed(plan, self.threads, self.observed, plan.fields, **settings)
 
 
 class Prepared:
@@ -184,7 +189,7 @@ class Prepared:
                 structured array, an xarray Dataset. By name a whole vector may be given, "current.velocity": (n, 3).
                 Without X the members are drawn from the distributions.
             seed: seed of the members that are drawn; default that of the ensemble.
-            members: number of members that are drawn; default that of the ensemble.
+            members: number of members that are drawn, the first ones of the sampling; default those of the ensemble.
             progress: called with the fraction of the work that is done, in [0, 1].
 
         Returns:
@@ -226,12 +231,7 @@ class Prepared:
         fleet = self._fleet
         if seed is None and members is None:
             return fleet
-        faults = Faults()
-        for name, value, least in (("seed", seed, 0), ("members", members, 1)):
-            if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < least):
-                faults.add(name, value, f"is no whole number from {least} on", "give one, or leave it out")
-        faults.raise_if_any()
-        return fleet.with_seed(fleet.seed if seed is None else seed, members or fleet.members)
+        return fleet.with_seed(fleet.seed if seed is None else seed, members)
 
     def _members(self, X: Any) -> Ensemble:
         """The ensemble of the members with these numbers."""
@@ -276,32 +276,58 @@ class Prepared:
 
     def _answer(self, fleet: Ensemble, progress: Callable[[float], None] | None) -> Any:
         if self._common_noise:
+            fleet = copy.copy(fleet)
             fleet.indices = np.zeros(fleet.members, dtype=np.int64)
-        result = self._runner.run(fleet, progress, warned=not self._of)
         if not self._of:
-            return result
-        members = fleet.select(0, fleet.members) if any(each.looks_at_members for each in self._of) else None
-        values = np.concatenate([each.values(result, members) for each in self._of], axis=1)
-        lost = failed(np.asarray(result.status)) | ~np.isfinite(values).all(axis=1)
+            return self._runner.run(fleet, progress)
+        groups, at_once = (
+            [],
+            PATHS_AT_ONCE if any(each.over_path or each.is_function for each in self._of) else fleet.members,
+        )
+        for first in range(0, fleet.members, at_once):
+            stop = min(first + at_once, fleet.members)
+            group = fleet if stop - first == fleet.members else fleet.subset(np.arange(first, stop))
+            groups.append(self._values(group, progress and part(progress, first / fleet.members, stop / fleet.members)))
+        values, status = (np.concatenate(each) for each in zip(*groups, strict=True))
+        lost = failed(status) | ~np.isfinite(values).all(axis=1)
         if lost.any():
             if self._refuse:
-                raise FailedMembers([failure_text(result, lost, 'mend what fails, or take NaN for them: failed="nan"')])
+                raise FailedMembers([failure_text(status, lost, 'mend what fails, or take NaN for them: failed="nan"')])
             values = np.where(lost[:, None], np.nan, values)
         return values[:, 0] if values.shape[1] == 1 else values
 
+    def _values(self, fleet: Ensemble, progress: Callable[[float], None] | None) -> tuple[np.ndarray, np.ndarray]:
+        """The quantities (n, m) of some members, and their status (n,)."""
+        result = self._runner.run(fleet, progress, warned=False)
+        members = fleet.select(0, fleet.members) if any(each.looks_at_members for each in self._of) else None
+        return np.concatenate([each.values(result, members) for each in self._of], axis=1), np.asarray(result.status)
 
-def failure_text(result: Result, lost: np.ndarray, remedy: str) -> str:
+
+def part(progress: Callable[[float], None], begin: float, end: float) -> Callable[[float], None]:
+    """Tell of a part of the work as a part of the whole.
+
+    Args:
+        progress: called with the fraction of the whole.
+        begin: fraction of the whole where the part begins.
+        end: fraction of the whole where it ends.
+
+    Returns:
+        A function to be called with the fraction of the part.
+    """
+    return lambda fraction: progress(begin + (end - begin) * fraction)
+
+
+def failure_text(status: np.ndarray, lost: np.ndarray, remedy: str) -> str:
     """Describe how many members failed, and of what.
 
     Args:
-        result: their result.
+        status: (n,), their status.
         lost: (n,), whether each failed, or a quantity of it is not finite.
         remedy: what the user can do, which ends the text.
 
     Returns:
         One line of text.
     """
-    status = np.asarray(result.status)
     causes = {Status(int(code)).name.lower(): int((status == code).sum()) for code in np.unique(status[failed(status)])}
     odd = int((lost & ~failed(status)).sum())
     causes |= {"quantity not finite": odd} if odd else {}
@@ -472,6 +498,14 @@ def _columns(
 ) -> tuple[tuple[str, ...], Ensemble | str, list[int] | None]:
     """(names of the columns of X; an ensemble with these columns, or why X has none; columns of the cube for levels)."""
     scene, names, cube_columns = whole.scene, listed, None
+    of_sampling = [*whole.sampling.own_values(), *whole.sampling.distributions()]
+    if of_sampling:
+        dropped = ", ".join(of_sampling[:4])
+        return (
+            (),
+            f"would drop {dropped}, to which the ensemble's {whole.sampling.kind} gives values; name what varies",
+            None,
+        )
     if not listed and whole.vary:
         described = as_given(whole)
         joint = [variation for variation in described if variation.distribution.joint]

@@ -27,6 +27,32 @@ from lgvi_warp.scene import plausibility
 from lgvi_warp.statistics.estimate import Estimates
 
 
+def completed(plan: Plan, threads: int, observed: Observation, fields: Sequence[str], **settings: Any) -> Result:
+    """Run a plan, and the members again whose samples alone are kept.
+
+    Args:
+        plan: Plan of the run. Where a member beyond those that were looked at needs another kernel, the run begins anew with a
+            kernel for all members, so that they have the bits of one kernel.
+        threads: Number of threads.
+        observed: What is kept.
+        fields: Names of the fields whose samples are kept.
+        settings: Further arguments of `run_plan`.
+
+    Returns:
+        The result, with `kept` and `kept_members`.
+
+    Raises:
+        MembersFailed: If members failed and the plan's on_failure is "raise".
+        Interrupted: As of `run_plan`.
+    """
+    try:
+        result = run_plan(plan, threads, observed=observed, fields=fields, **settings)
+    except NotSurveyed:
+        plan = replace(plan, survey_all=True)
+        result = run_plan(plan, threads, observed=observed, fields=fields, **settings)
+    return finished(result, plan, observed, fields, threads)
+
+
 def finished(
     result: Result, plan: Plan, observed: Observation, fields: Sequence[str], threads: int | None = None
 ) -> Result:
@@ -63,7 +89,7 @@ def run_plan(
     fields: Sequence[str] | None = None,
     executor: Executor | None = None,
     partial: bool = False,
-    known: tuple[dict[str, Any], tuple[str, ...]] | None = None,
+    known: Callable[[Plan], tuple[dict[str, Any], tuple[str, ...]]] | None = None,
     warned: bool = True,
 ) -> Result:
     """Run the blocks of a plan, all or as many as its statistics need, and gather the result in memory.
@@ -76,7 +102,8 @@ def run_plan(
         fields: Names of the fields whose samples are kept; default all of the plan.
         executor: What runs the blocks; default this number of threads.
         partial: Whether an interrupt raises Interrupted with the members that were finished.
-        known: Provenance and messages of the run, where many runs share them; by default they are made for this run.
+        known: Function from the plan to provenance and messages, where many runs share them; by default they are made for
+            this run.
         warned: Whether the result has warnings; default True.
 
     Returns:
@@ -84,6 +111,7 @@ def run_plan(
 
     Raises:
         Interrupted: On KeyboardInterrupt, if `partial` and a block was finished.
+        NotSurveyed: If a member beyond those that were looked at needs another kernel.
     """
     observed = observed or Observation()
     compile_seconds = plan.compile()
@@ -105,10 +133,6 @@ def run_plan(
     runs, work = parts(total, plan.grid.steps, threads, joined), Work(plan, keepers, warned=warned)
     try:
         n = run_blocks(work, runs, runner, overall.at, enough=observing.enough, merged=merged)
-    except NotSurveyed:
-        # Rare: a kernel for all members, and the run from its beginning, so that all members have the bits of one kernel.
-        plan = replace(plan, survey_all=True)
-        return run_plan(plan, threads, progress, observed, fields, executor, partial, known, warned)
     except KeyboardInterrupt as stop:
         if not (partial and merged.done):
             raise
@@ -151,10 +175,10 @@ def _in_memory(
     samples: Samples | None,
     observing: Observing | None,
     fields: Sequence[str] | None,
-    known: tuple[dict[str, Any], tuple[str, ...]] | None,
+    known: Callable[[Plan], tuple[dict[str, Any], tuple[str, ...]]] | None,
 ) -> Result:
     """The result of the first n members; observing: their statistics, None if these include other members."""
-    content, texts = (provenance(plan, observed, fields), messages(plan)) if known is None else known
+    content, texts = (provenance(plan, observed, fields), messages(plan)) if known is None else known(plan)
     of_members = {name: values[:n] for name, values in member_fields.of(plan, outcomes.all).items()}
     estimates, remarks = Estimates(), tuple[str, ...]()
     if observing is not None:

@@ -14,7 +14,7 @@ from lgvi_warp.engine.keepers.observation import Observation, observe
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.runs.result import Result
-from lgvi_warp.runs.run import finished, run_plan
+from lgvi_warp.runs.run import completed, finished
 from lgvi_warp.runs.settle import blocks_there, make_plan
 from lgvi_warp.runs.store.settings import Store
 from lgvi_warp.runs.store.solve import run_stored
@@ -108,8 +108,7 @@ def solve(
         survey_all=store is not None)  # fmt: skip
     fields, count = (save or SaveAt()).fields, threads or machine.thread_count()
     if store is None:
-        result = run_plan(plan, count, progress, observed, fields, runner, partial=True)
-        return finished(result, plan, observed, fields, count)
+        return completed(plan, count, observed, fields, progress=progress, executor=runner, partial=True)
     only = blocks_there(only, plan)
     into = store if isinstance(store, Store) else Store(store)
     result = run_stored(plan, into, runner, progress, only, observed, fields)

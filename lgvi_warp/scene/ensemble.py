@@ -189,9 +189,8 @@ class Ensemble:
         self.variations = self._described()
         self.space: Space = variations.space(self.seed, self.variations)
         self._whole = self._counted(settings)
-        self.members = self.checked = self._whole
-        if not checked:
-            self._check_physical()
+        self.members = self._whole
+        self._check_physical(checked)
 
     def _described(self) -> list[Variation]:
         """Return what varies, one entry for each distribution; refuse what does not fit the scene."""
@@ -276,13 +275,15 @@ class Ensemble:
         """
         return np.arange(first, stop) if self._indices is self._places is None else self.indices[first:stop]
 
-    def _check_physical(self) -> None:
-        """Refuse unphysical members, looking at so few at a time that memory stays small.
+    def _check_physical(self, before: bool = False) -> None:
+        """Refuse unphysical members, looking at so few at a time that memory stays small, unless that was done before.
 
         Members that are drawn are looked at up to SURVEYED; a run looks at the others as it comes to them.
         """
         varied = self.varied_names & self._base.keys()
         self.checked = self.members if self._explicit or self._columns or not varied else min(self.members, SURVEYED)
+        if before:
+            return
 
         def look(first: int, stop: int) -> dict[str, _Unphysical]:
             with np.errstate(over="ignore", invalid="ignore"):
@@ -504,12 +505,12 @@ class Ensemble:
         ensemble._check_physical()
         return ensemble
 
-    def with_seed(self, seed: int, members: int) -> Ensemble:
-        """Return an ensemble of other members, drawn from the same distributions.
+    def with_seed(self, seed: int, members: int | None = None) -> Ensemble:
+        """Return these members, drawn from the same distributions by another seed.
 
         Args:
             seed: Whole number >= 0.
-            members: Number of members.
+            members: Number of members, in place of these the first ones of the sampling; None for these (default).
 
         Returns:
             The ensemble.
@@ -520,9 +521,13 @@ class Ensemble:
         settings = EnsembleSettings(members, seed, self.vary, self.sampling)
         ensemble = copy.copy(self)
         ensemble.seed = int(settings.seed)
-        ensemble._places = ensemble._indices = None
         ensemble.space = variations.space(ensemble.seed, self.variations)
-        ensemble._whole = ensemble.members = ensemble._counted(settings)
+        if members is not None:
+            if self._explicit and members != self._whole:
+                fault = f"are drawn, where the states of {self._whole} are given"
+                raise refusal("members", members, fault, "leave members out")
+            ensemble._places = ensemble._indices = None
+            ensemble._whole = ensemble.members = ensemble._counted(settings)
         ensemble._check_physical()
         return ensemble
 

@@ -12,6 +12,7 @@ import lgvi_warp as lw
 from lgvi_warp.engine import plan as plans
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.shared import Shared
+from lgvi_warp.runs import predict, prepared
 from lgvi_warp.runs.prepared import FailedMembers
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
@@ -85,6 +86,40 @@ def test_members_may_be_drawn(paper):
         run(np.ones((1, 4)), seed=1)
 
 
+def test_another_seed_draws_the_same_members_anew(paper):
+    vary = {"vehicle.mass": lw.Normal(relative=0.01)}
+    run = lw.prepare(lw.Ensemble(paper, 40, 7, vary).subset([3, 30]), of="position", **SETTINGS)
+    for seed in (7, np.int64(8)):
+        expected = lw.solve(lw.Ensemble(paper, 40, seed, vary).subset([3, 30]), **SETTINGS).position[-1]
+        np.testing.assert_array_equal(run(seed=seed), expected)
+    whole = lw.solve(lw.Ensemble(paper, 5, 7, vary), **SETTINGS).position[-1]
+    np.testing.assert_array_equal(run(members=5), whole)
+
+
+def test_common_noise_leaves_the_ensemble_as_it_is(paper):
+    fleet = lw.Ensemble(paper, 3, 0, {"vehicle.mass": lw.Normal(relative=0.01)})
+    lw.prepare(fleet, of="position", common_noise=True, **SETTINGS)()
+    np.testing.assert_array_equal(fleet.indices, [0, 1, 2])
+
+
+def test_given_states_are_not_drawn(paper):
+    still = np.zeros((4, 3))
+    fleet = lw.Ensemble.from_states(paper, still, np.repeat(np.eye(3)[None], 4, axis=0), still + 1.0, still)
+    run = lw.prepare(fleet, of="position", **SETTINGS)
+    assert run(seed=3).shape == (4, 3)
+    with pytest.raises(lw.SceneError, match=r"members = 9: .* 4 "):
+        run(members=9)
+
+
+def test_columns_that_a_sampling_has_are_not_dropped(paper):
+    vary = {"vehicle.buoyancy": lw.Normal(relative=0.01)}
+    for sampling in (lw.Table(values={"vehicle.mass": np.full(4, 120.0)}), lw.Grid({"vehicle.mass": [120.0, 121.0]})):
+        run = lw.prepare(lw.Ensemble(paper, None, 0, vary, sampling), of="position", **SETTINGS)
+        assert len(run()) in (2, 4)
+        with pytest.raises(lw.SceneError, match=r"X: .*vehicle\.mass"):
+            run(np.full((1, 1), 1215.8))
+
+
 def test_levels_stand_for_distributions(paper):
     vary = {"vehicle.mass": lw.Normal(relative=0.01), "start.attitude": lw.RotationNormal(std=0.1)}
     run = lw.prepare(paper, vary, of="position", levels=True, **SETTINGS)
@@ -147,6 +182,21 @@ def test_other_members_may_need_another_kernel():
     run = lw.prepare(scene, names, of="position", **SHORT)
     for X in ([[0.0, 0.0]], [[0.5, 0.0]], [[0.0, 3.0]], [[0.0, 0.0], [0.5, 3.0]], [[0.0, 0.0]]):
         np.testing.assert_array_equal(run(np.array(X)), solved(scene, names, X, **SHORT).position[-1])
+
+
+def test_paths_are_kept_of_some_members_at_a_time(paper, monkeypatch):
+    run = lw.prepare(paper, NAMES, of=["max(depth)", "depth"], save=lw.SaveAt(every=0.1), failed="nan", **SETTINGS)
+    X = numbers(300)
+    X[290, 1] = 1e6
+    expected, sizes, told = run(X), [], []
+    monkeypatch.setattr(prepared, "PATHS_AT_ONCE", 128)
+    whole = prepared.Runner.run
+    monkeypatch.setattr(prepared.Runner, "run", lambda *given, **named: (
+        sizes.append(given[1].members), whole(*given, **named))[1])  # fmt: skip
+    np.testing.assert_array_equal(run(X, progress=told.append), expected)
+    assert sizes == [128, 128, 44] and told == sorted(told) and told[-1] == 1.0 and np.isnan(expected[290]).all()
+    with pytest.raises(FailedMembers, match=r"1 of 300 members failed .*member 290"):
+        lw.prepare(paper, NAMES, of="max(depth)", save=lw.SaveAt(every=0.1), **SETTINGS)(X)
 
 
 def test_threads_may_call_at_once(paper):
@@ -230,21 +280,44 @@ def test_what_is_shared_changes_no_bit(vehicle, paper):
         assert alone == arrays(Packets(plan, fleet.select(0, 6))), name
 
 
+@pytest.mark.parametrize("columns", [(5,), (2, 5)])
+def test_packets_take_members_whose_laws_have_other_rows(columns):
+    """Turned axes: a drag matrix has as many rows as some member has columns, and the thrusters' rows come after them."""
+    inertia = [[1.0, 0.1, 0.0], [0.1, 2.0, 0.2], [0.0, 0.2, 2.5]]
+    vehicle = lw.Vehicle(mass=10.0, added_mass=[1.0, 2.0, 3.0], inertia=inertia)
+    thrusters = lw.Thrusters(
+        position=[[-0.5, 0.2, 0.0]], direction=[[1.0, 0.0, 0.0]], coefficient=[20.0], command=[0.5]
+    )
+    drag = lw.DragMatrix(linear=np.eye(6), quadratic=np.diag([10.0, 20.0, 0.0, 1.0, 2.0, 0.0]))
+    scene = lw.Scene(vehicle, terms=[drag, thrusters], start=lw.Start(velocity=[1.0, 0.2, 0.1]))
+    names = ["drag_matrix.quadratic[2,2]", "drag_matrix.quadratic[5,5]"]
+    fleet = lw.Ensemble(scene, None, 0, None, lw.Table(values={name: np.linspace(0.0, 5.0, 6) for name in names}))
+    plan = make_plan(fleet, "psi_x", **SHORT)
+    few, more = [np.zeros((6, 2)) for _ in range(2)]
+    more[:, [names.index(f"drag_matrix.quadratic[{j},{j}]") for j in columns]] = 3.0
+    blocks = [fleet.with_columns(dict(zip(names, X.T, strict=True))).select(0, 6) for X in (few, more, few)]
+    packets = Packets(plan, blocks[0])
+    for members in blocks:
+        packets.refill(members)
+        assert arrays(packets) == arrays(Packets(plan, members))
+
+
 def late(scene, members, odd, values):
     """Members of which one alone, beyond those that are looked at before a run, has other values: (name -> its value)."""
 
     class Late(lw.Ensemble):
         def _values(self, first, stop, start=True):
             found = super()._values(first, stop, start)
+            here = self.indices_of(first, stop) == odd
             for name, value in values.items():
-                if first <= odd < stop:
+                if here.any():
                     column = np.repeat(np.asarray(found[name], float)[:1], stop - first, axis=0)
-                    column[odd - first] = value
+                    column[here] = value
                     found[name] = column
             return found
 
     return Late(
-        scene, members, 0, {name: lw.Normal(std=0.0) for name in values} | {"vehicle.mass": lw.Normal(std=1e-3)}
+        scene, members, 0, {"vehicle.mass": lw.Normal(std=1e-3)} | {name: lw.Normal(std=0.0) for name in values}
     )
 
 
@@ -254,24 +327,75 @@ def surveyed(monkeypatch):
         monkeypatch.setattr(module, "SURVEYED", 256)
 
 
-def test_a_late_member_that_needs_more_starts_the_run_anew(surveyed):
+@pytest.fixture
+def drifting():
+    """Members of which one alone, the 500th, has a current."""
     scene = lw.Scene(
         lw.Vehicle(mass=10.0, added_mass=[0.0, 1.0, 2.0], inertia=[1.0, 2.0, 3.0]),
         start=lw.Start(velocity=[1.0, 0.2, 0.1]),
         terms=[lw.Current(velocity=[0.0, 0.0, 0.0])],
     )
-    fleet = late(scene, 600, 500, {"current.velocity": [0.5, 0.0, 0.0]})
-    result = lw.solve(fleet, threads=1, **SHORT)
-    whole = make_plan(fleet, **SHORT)
+    return late(scene, 600, 500, {"current.velocity": [0.5, 0.0, 0.0]})
+
+
+def test_a_late_member_that_needs_more_starts_the_run_anew(surveyed, drifting):
+    result = lw.solve(drifting, threads=1, **SHORT)
+    whole = make_plan(drifting, **SHORT)
     assert {term.type for term, _ in whole.kernel_choice.laws} >= {"current"}
     assert "current" in result.provenance["terms"]
-    np.testing.assert_array_equal(result.position, run_plan(whole, 1).position)
+    expected = run_plan(whole, 1).position
+    np.testing.assert_array_equal(result.position, expected)
+    kept = lw.solve(drifting, threads=1, keep=[3, 500], **SHORT).kept
+    np.testing.assert_array_equal(kept.position, expected[:, [3, 500]])
+
+
+def test_a_prepared_run_begins_anew_and_says_what_ran(surveyed, drifting):
+    result = lw.prepare(drifting, threads=1, **SHORT)()
+    np.testing.assert_array_equal(result.position, lw.solve(drifting, threads=1, **SHORT).position)
+    assert "current" in result.provenance["terms"]
+
+
+def test_a_late_member_that_needs_more_is_predicted(surveyed, drifting, monkeypatch):
+    monkeypatch.setattr(predict, "TRIAL_SECONDS", 1e-3)
+    assert lw.predict(drifting, threads=3, **SHORT).members == 600
+
+
+class Ahead:
+    """Runs all blocks before it yields the first, as threads may."""
+
+    def run(self, work, blocks, advanced):
+        yield from [(block, work(block)) for block in blocks]
+
+
+@pytest.mark.parametrize("values", [{"vehicle.mass": -1.0}, {"current.velocity": [0.5, 0.0, 0.0]}])
+def test_a_late_member_that_the_run_does_not_need_changes_nothing(surveyed, drifting, values):
+    fleet = late(drifting.scene, 2000, 1900, values)
+    enough = lw.Until("mean position[0]", 1e3, members=256)
+    one, ahead = (lw.solve(fleet, until=enough, **SHORT, **each) for each in ({"threads": 1}, {"executor": Ahead()}))
+    assert len(one.status) < 1900 and one.provenance["terms"] == ahead.provenance["terms"]
+    np.testing.assert_array_equal(one.position, ahead.position)
 
 
 def test_a_late_member_that_is_unphysical_is_named(paper, surveyed):
     fleet = late(paper, 600, 500, {"vehicle.buoyancy": -1.0})
     with pytest.raises(lw.SceneError, match=r"vehicle\.buoyancy of member 500"):
         lw.solve(fleet, **SETTINGS)
+
+
+def test_late_members_of_a_scene_file_are_looked_at(paper, surveyed):
+    """A file's ensemble is checked when it is read and not again; but its late members as the run comes to them."""
+    vary = {"vehicle.buoyancy": lw.Normal(mean=1215.8, std=390.0).to_dict()}
+    for seed in range(50):
+        ensemble = {"members": 600, "seed": seed, "vary": vary}
+        try:
+            scene = lw.Scene.from_dict(paper.to_dict() | {"ensemble": ensemble})
+        except lw.SceneError:  # an early one
+            continue
+        if (lw.Ensemble.from_scene(scene).parameters(0, 600)["vehicle.buoyancy"] < 0.0).any():
+            break
+    for _ in range(2):
+        with pytest.raises(lw.SceneError, match=r"vehicle\.buoyancy of member"):
+            lw.solve(scene, **SETTINGS)
 
 
 def test_an_early_member_that_is_unphysical_is_counted_among_those_looked_at(paper, surveyed):

@@ -116,5 +116,6 @@ def ended(futures: Mapping[Future[Any], Block]) -> Iterator[tuple[Block, Any]]:
         Each finished block and its result.
     """
     for future, block in futures.items():
-        if future.done() and not future.cancelled() and future.exception() is None and future.result() is not None:
+        done = future.done() and not future.cancelled() and future.exception() is None
+        if done and not isinstance(future.result(), Exception | None):
             yield block, future.result()

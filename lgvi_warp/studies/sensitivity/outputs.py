@@ -10,13 +10,10 @@ import numpy as np
 
 from lgvi_warp.common.status import Status, failed
 from lgvi_warp.methods.saveat import SaveAt
+from lgvi_warp.runs.prepared import PATHS_AT_ONCE, Runner, part, samples_for
 from lgvi_warp.runs.prepared import FailedMembers as FailedMembers
-from lgvi_warp.runs.prepared import Runner, samples_for
 from lgvi_warp.runs.quantities import OfInterest, quantities
 from lgvi_warp.scene.ensemble import Ensemble
-
-# Number of members that are run together, so that their kept paths stay small.
-AT_ONCE = 16_384
 
 
 @dataclass(frozen=True)
@@ -88,9 +85,9 @@ def evaluate(
         fleet.indices = np.zeros(fleet.members, dtype=np.int64)
     looks_at_members = any(interest.looks_at_members for interest in interests)
     values, status, provenance = [], [], {}
-    for first in range(0, fleet.members, AT_ONCE):
-        chosen = np.arange(first, min(first + AT_ONCE, fleet.members))
-        group_progress = progress and _part(progress, first / fleet.members, len(chosen) / fleet.members)
+    for first in range(0, fleet.members, PATHS_AT_ONCE):
+        chosen = np.arange(first, min(first + PATHS_AT_ONCE, fleet.members))
+        group_progress = progress and part(progress, first / fleet.members, (first + len(chosen)) / fleet.members)
         group = fleet.subset(chosen)
         result = runner.run(group, group_progress)
         members = group.select(0, len(chosen)) if looks_at_members else None
@@ -107,7 +104,3 @@ def evaluate(
     counts = names | ({"quantity not finite": int((~finite).sum())} if not finite.all() else {})
     failures = failed(ended) | ~finite
     return Outputs(numbers, tuple(labels), failures, counts, provenance | {"ensemble": fleet.to_dict()})
-
-
-def _part(progress: Callable[[float], None], done: float, share: float) -> Callable[[float], None]:
-    return lambda fraction: progress(done + share * fraction)

@@ -53,4 +53,6 @@ def test_a_context_notes_what_it_is_asked_for(name, field):
     assert asked.h == 0.01 and not reads.names
     getattr(asked, field)
     assert reads.names == {name}
+    reads.names.clear()
+    assert vars(asked)[field] is not None and name in reads.names
     assert type(context(NUMBERS, "frame", np.arange(5), 7, 0.01, True)).__name__ == "PackingContext"

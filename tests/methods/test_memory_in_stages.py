@@ -183,4 +183,7 @@ def test_what_is_refused_and_what_studies_try():
                           ("kl6(psi_x)", "use psi_x")):  # fmt: skip
         with pytest.raises(lw.SceneError, match=words):
             make_plan(fleet, method, h=0.1, t1=1.0)
+    laws = test_terms.body_of(ROUGH)
+    with pytest.raises(ValueError, match="not known before a step"):
+        munthe_kaas.cg3(begun(laws), laws, 0.1)
     assert Sample(fleet, 1.0, 1).accepted(["rk4", "rk5", "rk8", "rkmk4", "rkw3"])[1] == {}

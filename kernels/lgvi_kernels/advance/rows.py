@@ -74,7 +74,7 @@ def make_rows(Lane, State, paced, compensated):
     return read, write, back_up
 
 
-def make_sample(Lane, fields, compensated, method, drifts, still):
+def make_sample(Lane, compensated, method, drifts, still):
     """The function that writes one sample.
 
     method: see Step; drifts: the water moves; still: a frozen lane keeps the velocity of the water in which it stopped.
@@ -82,33 +82,31 @@ def make_sample(Lane, fields, compensated, method, drifts, still):
     momentum, velocities, water_velocity = method.momentum, method.velocities, method.water_velocity
 
     @wp.func
-    def sample(out: wp.array2d(dtype=Lane), i: int, first: int, x: Any, c: Any, h: Any, monitor: Any, frozen: Lane):
-        """Write the chosen fields of one sample: b, R, nu (that of the water added), Om."""
-        o = first
-        if wp.static("position" in fields):
-            put(out, i, o, x.b)
-            o += 3
+    def sample(out: wp.array2d(dtype=Lane), i: int, first: int, columns: wp.vec4i, x: Any, c: Any, h: Any, monitor: Any,
+               frozen: Lane):  # fmt: skip
+        """Write the fields of SAMPLE_FIELDS that have a column, from `first` on: b, R, nu (that of the water added), Om."""
+        if columns[0] >= 0:
+            put(out, i, first + columns[0], x.b)
             if wp.static(compensated):
-                put(out, i, o, x.b_low)
-                o += 3
-        if wp.static("attitude" in fields):
-            put(out, i, o, x.R0)
-            put(out, i, o + 3, x.R1)
-            put(out, i, o + 6, x.R2)
-            o += 9
-        if wp.static(momentum is not None):
-            x.p = momentum(x)
-        nu, Om = velocities(c.inertia, x.p, x.pi)
-        if wp.static("velocity" in fields):
-            if wp.static(drifts):
-                water = water_velocity(x, c, h)
-                if wp.static(still):
-                    kept = vec3(monitor.still[i, 0], monitor.still[i, 1], monitor.still[i, 2])
-                    water = positive(frozen, kept, water)
-                nu = nu + water
-            put(out, i, o, nu)
-            o += 3
-        if wp.static("angular_velocity" in fields):
-            put(out, i, o, Om)
+                put(out, i, first + columns[0] + 3, x.b_low)
+        if columns[1] >= 0:
+            put(out, i, first + columns[1], x.R0)
+            put(out, i, first + columns[1] + 3, x.R1)
+            put(out, i, first + columns[1] + 6, x.R2)
+        if columns[2] >= 0 or columns[3] >= 0:
+            if wp.static(momentum is not None):
+                x.p = momentum(x)
+            nu, Om = velocities(c.inertia, x.p, x.pi)
+            if columns[3] >= 0:
+                put(out, i, first + columns[3], Om)
+            if columns[2] >= 0:
+                if wp.static(drifts):
+                    water = water_velocity(x, c, h)
+                    if wp.static(still):
+                        kept = vec3(monitor.still[i, 0], monitor.still[i, 1], monitor.still[i, 2])
+                        water = positive(frozen, kept, water)
+                    put(out, i, first + columns[2], nu + water)
+                else:
+                    put(out, i, first + columns[2], nu)
 
     return sample

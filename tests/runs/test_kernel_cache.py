@@ -132,6 +132,15 @@ def test_phases(cache):
     assert phases.clang == 0.0 < phases.load and "Clang 0.00 s" in str(phases)
 
 
+def test_functions_for_gradients_of_structs_are_private(cache):
+    template = kernel_cache.codegen.struct_template
+    visible = "CUDA_CALLABLE void adj_atomic_add({name}* p, {name} t)"
+    assert template.count(visible) == 1  # else Warp writes them in another way, and kernels compile as long as before
+    with kernel_cache.private_gradients():
+        assert kernel_cache.codegen.struct_template == template.replace(visible, f"static {visible}")
+    assert kernel_cache.codegen.struct_template is template
+
+
 def test_what_is_whole_is_not_compiled(cache):
     assert works()
     written = only(cache, ".o").stat().st_mtime_ns

@@ -12,7 +12,7 @@ import numpy as np
 import lgvi_warp as lw
 from benchmarks.pages import show
 from lgvi_warp.methods import limits
-from lgvi_warp.methods.method import COMPOSITIONS, EXPLICIT, GAUSS, HALVES, PROGRAMS, TWO_PART
+from lgvi_warp.methods.method import COMPOSITIONS, GAUSS, HALVES, PROGRAMS, RUNGE_KUTTA, TWO_PART
 from lgvi_warp.physics import notation
 
 ANGLE = 0.3
@@ -73,7 +73,7 @@ def limit(make, method, steps=1000, most=12.0, members=600):
 def names():
     """Every method that there is."""
     composed = [f"{name}({base})" for name in COMPOSITIONS | HALVES for base in ("psi_s", "psi_x")]
-    return [*PROGRAMS, *EXPLICIT, *TWO_PART, *composed, *GAUSS]
+    return [*PROGRAMS, *RUNGE_KUTTA, *TWO_PART, *composed, *GAUSS]
 
 
 def add_options(parser):

@@ -126,8 +126,8 @@ _WARNING_TEXT = {
     "added inertia makes the difference",
     Warnings.PRECISION_LOSS: "the position loses what a step adds to it: eps |b| > 0.05 h |v|; use float64 or "
     "float32_compensated, or an origin nearer to the vehicle",
-    Warnings.ORTHOGONALITY: "the attitude left the rotations: |R^T R - I| > 1e-10 (float64) or 1e-4 (float32), of rk4, rk5 "
-    "and rk8 1e-3; shorten the step, or use a method that stays on the group (psi_s, psi_x)",
+    Warnings.ORTHOGONALITY: "the attitude left the rotations: |R^T R - I| > 1e-10 (float64) or 1e-4 (float32), of rk4, rk5, "
+    "rk8 and rkw3 1e-3; shorten the step, or use a method that stays on the group (psi_s, psi_x)",
     Warnings.MUNK_COARSE: "the Munk moment's oscillation is coarsely resolved: h w > 0.5 in a stage; shorten the step, or do "
     "not trust attitudes",
     Warnings.RESTORING_COARSE: "the restoring moment's oscillation is coarsely resolved: h sqrt(B|r|/J) > 0.5 in a stage; "
@@ -135,7 +135,7 @@ _WARNING_TEXT = {
     Warnings.ROTATION: "the rotation in one step is too large: h |Omega| passed the stability limit of the explicit method "
     "(psi_x: 1, beyond which its turns are inaccurate); shorten the step",
     Warnings.DRAG_STIFF: "drag is stiff for a method that treats it explicitly: h (l + 2 q|v|) / I > 1; shorten the step, or "
-    "use psi_s or psi_x, which treat drag exactly or implicitly",
+    "use psi_s, psi_x or rkw3, which treat drag exactly or implicitly",
     Warnings.MUNK_UNSTABLE: "the Munk moment's oscillation is too fast for this method and step: h w passed the measured "
     "limit of stability; shorten the step",
     Warnings.RESTORING_UNSTABLE: "the restoring moment's oscillation is too fast for this method and step: h sqrt(B|r|/J) "

@@ -74,3 +74,19 @@ def blocks(members: int, size: int | None = None) -> list[Block]:
     """
     size = size or block_size(members)
     return [Block(i, min(i + size, members)) for i in range(0, members, size)]
+
+
+def parts(members: int, steps: int, threads: int, joined: bool) -> list[Block]:
+    """The blocks of a run.
+
+    Args:
+        members: number of members of the run.
+        steps: number of steps of the run.
+        threads: number of threads.
+        joined: whether bits or files depend on blocks: with statistics, which are joined block by block, in a store, and
+            where others than threads of this process run them.
+
+    Returns:
+        The blocks in order.
+    """
+    return blocks(members, None if joined else shares(members, threads, steps))

@@ -99,7 +99,7 @@ def choose_kernel(
     forced = method.base in FORCED and not all(getattr(module, "POTENTIAL", False) for module in others)
     if explicit:
         # Along the kernel's axes drag is six numbers and no matrix.
-        exact = len(drags) == 1 and not facts.bent
+        exact = len(drags) == 1 and not facts.bent and not method.linearly_implicit
     else:
         exact = len(drags) == 1 and not damping and flow != "varying" and not forced
     drag: tuple[str, ...] = ()

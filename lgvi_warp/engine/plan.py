@@ -339,7 +339,9 @@ class Plan:
         kind = KINDS.get(self.method.name, "vector")
         if kind == "vector" and self.kernel_choice.steady and not self.method.adaptive:
             kind = "inertial"
-        return Explicit(kind, tableau.a, tableau.b, tableau.c, *estimate, self.method.adaptive)
+        # Without damping a linearly implicit method has no matrix, and is the explicit one of its tableau.
+        implicit = tableau.implicit if "dense" in self.kernel_choice.parts else ()
+        return Explicit(kind, tableau.a, tableau.b, tableau.c, *estimate, self.method.adaptive, implicit)
 
     @contextlib.contextmanager
     def _laws_compile(self) -> Iterator[None]:

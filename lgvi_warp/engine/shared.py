@@ -37,23 +37,36 @@ class Reads(dict[str, np.ndarray]):
         self.names.add(name)
         return super().get(name, default)
 
-    def __iter__(self) -> Iterator[str]:
+    def _all(self) -> None:
         self.names.update(super().keys())
+
+    def __iter__(self) -> Iterator[str]:
+        self._all()
         return super().__iter__()
+
+    def __or__(self, other: Any) -> Any:
+        return dict(self) | other
+
+    def __ror__(self, other: Any) -> Any:
+        return other | dict(self)
+
+    def copy(self) -> dict[str, np.ndarray]:
+        """Return all names with their numbers in a dict, each noted."""
+        return dict(self)
 
     def keys(self) -> Any:
         """Return all names, each noted."""
-        self.names.update(super().keys())
+        self._all()
         return super().keys()
 
     def values(self) -> Any:
         """Return all numbers, each noted."""
-        self.names.update(super().keys())
+        self._all()
         return super().values()
 
     def items(self) -> Any:
         """Return all names with their numbers, each noted."""
-        self.names.update(super().keys())
+        self._all()
         return super().items()
 
 

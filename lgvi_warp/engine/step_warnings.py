@@ -81,7 +81,8 @@ def watched(plan: Watched) -> tuple[str, ...]:
         dragged = bool(choice.drag) or any(hasattr(module, "damping") for _, module in choice.laws)
         rows += ["munk_coarse"] * munk
         rows += ["rotation"] * (method.turns or method.tableau is not None)
-        rows += ["drag"] * (dragged and (method.tableau is not None or choice.averages is not None))
+        explicit = method.tableau is not None and not method.linearly_implicit
+        rows += ["drag"] * (dragged and (explicit or choice.averages is not None))
         rows += ["munk_unstable"] * munk
     return (*rows, *["energy"] * choice.conservative)
 

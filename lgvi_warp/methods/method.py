@@ -10,7 +10,7 @@ import re
 from dataclasses import dataclass
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.methods.tableaux import CG3, DOP853, DOPRI5, RK4, Tableau
+from lgvi_warp.methods.tableaux import CG3, DOP853, DOPRI5, RK4, RKW3, Tableau
 
 Program = tuple[tuple[str, float], ...]
 
@@ -37,11 +37,13 @@ FORCED: dict[str, Program] = {
     "phi_adjoint": (("Phi*", 1.0),),
     "psi": (("Phi", 0.5), ("Phi*", 0.5)),
 }
-# Explicit methods have no sub-maps. KINDS: those that keep R on the group (see lgvi_kernels.maps.explicit).
+# Runge-Kutta methods have no sub-maps. KINDS: those that keep R on the group (see lgvi_kernels.maps.explicit).
 EXPLICIT: dict[str, Tableau] = {"rk4": RK4, "rk5": DOPRI5, "rk8": DOP853, "cg3": CG3, "rkmk4": RK4}
+LINEARLY_IMPLICIT: dict[str, Tableau] = {"rkw3": RKW3}
+RUNGE_KUTTA = EXPLICIT | LINEARLY_IMPLICIT
 KINDS = {"cg3": "group", "rkmk4": "munthe_kaas"}
 ORDERS = dict.fromkeys(PROGRAMS, 2) | {"phi": 1, "phi_adjoint": 1}
-ORDERS |= {name: tableau.order for name, tableau in EXPLICIT.items()}
+ORDERS |= {name: tableau.order for name, tableau in RUNGE_KUTTA.items()}
 
 # Two-part splittings: A = free rotation (modified Moser-Veselov, order 8) and the kick of U_b(b), B = T and the kick of
 # U_R(R). Blanes & Moan (2002), J. Comput. Appl. Math. 142, 313, table 3: SRKN_6^b, SRKN_11^b, SRKN_14^a, whose printed
@@ -125,7 +127,8 @@ class Method:
             * "rkn4_6", "rkn6_11", "rkn6_14": two parts, for weight and restoring moment;
             * "gauss4" to "gauss12": Gauss collocation by fixed-point iteration, for forces of position and time;
             * explicit methods: "rk4", "rk5" (Dormand & Prince), "rk8" (DOP853's) with R as two rows; "cg3" (Crouch &
-              Grossman) and "rkmk4" (Munthe-Kaas) on the rotation group.
+              Grossman) and "rkmk4" (Munthe-Kaas) on the rotation group;
+            * "rkw3": linearly implicit in the damping, for strong damping and steady motion; without damping it is "rk4".
         solver: Solver of equation (24): "quartic" (default), "cayley", "newton" (the paper's, on the exponential map) or
             "moser_veselov" (explicit).
         iterations: Newton steps, or fixed-point iterations, of every solve, 0 to 100. None (default) iterates each vehicle
@@ -158,10 +161,10 @@ class Method:
     def __post_init__(self) -> None:
         faults = Faults()
         base, composition = self._split()
-        faults.choice("method", base, PROGRAMS | EXPLICIT | TWO_PART | GAUSS)
+        faults.choice("method", base, PROGRAMS | RUNGE_KUTTA | TWO_PART | GAUSS)
         if composition is not None:
             faults.choice("method composition", composition, COMPOSITIONS | HALVES)
-            if ORDERS.get(base) == 1 or base in EXPLICIT:
+            if ORDERS.get(base) == 1 or base in RUNGE_KUTTA:
                 faults.add("method", self.name, "is a composition of a method that is not symmetric", "compose psi_s")
             elif base in TWO_PART or base in GAUSS:
                 fault = "is a composition of a method that is not of order 2"
@@ -229,8 +232,13 @@ class Method:
 
     @property
     def tableau(self) -> Tableau | None:
-        """Coefficients of an explicit method; None for other methods."""
-        return EXPLICIT.get(self.name)
+        """Coefficients of a Runge-Kutta method; None for other methods."""
+        return RUNGE_KUTTA.get(self.name)
+
+    @property
+    def linearly_implicit(self) -> bool:
+        """Whether damping enters the stages by a matrix."""
+        return self.name in LINEARLY_IMPLICIT
 
     @property
     def adaptive(self) -> bool:

@@ -1,6 +1,7 @@
-"""Explicit Runge-Kutta methods as data, for the kernels and for their twin.
+"""Runge-Kutta methods as data, explicit and linearly implicit, for the kernels and for their twin.
 
-k_i = f(t + c_i h, y + h sum_j a_ij k_j), y <- y + h sum_i b_i k_i; an error estimate is h sum_i e_i k_i.
+k_i = f(t + c_i h, y + h sum_j a_ij k_j), y <- y + h sum_i b_i k_i; an error estimate is h sum_i e_i k_i. A linearly implicit
+method adds h A sum_j g_ij k_j to k_i, with a matrix A near df/dy.
 """
 
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ Row = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Tableau:
-    """Coefficients of an explicit Runge-Kutta method with s stages.
+    """Coefficients of a Runge-Kutta method with s stages.
 
     Args:
         order: Order of convergence.
@@ -19,6 +20,8 @@ class Tableau:
         c: Nodes, shape (s,).
         errors: Rows e of error estimates, shape (s,), or (s + 1,) with the slope at the new state last; default none.
         estimate: Power of h in the error estimate, from which the next step follows; default 0.
+        implicit: Matrix g of a linearly implicit method; row i holds its i + 1 numbers, the last of which is the same in all
+            rows; default none, an explicit method.
     """
 
     order: int
@@ -27,6 +30,7 @@ class Tableau:
     c: Row
     errors: tuple[Row, ...] = ()
     estimate: int = 0
+    implicit: tuple[Row, ...] = ()
 
 
 # Kutta (1901): the classical method.
@@ -35,6 +39,23 @@ RK4 = Tableau(
     a=((), (1 / 2,), (0.0, 1 / 2), (0.0, 0.0, 1.0)),
     b=(1 / 6, 1 / 3, 1 / 3, 1 / 6),
     c=(0.0, 1 / 2, 1 / 2, 1.0),
+)
+
+# The classical method with a linearly implicit part, a W-method (Steihaug & Wolfbrandt 1979; Hairer & Wanner, Solving Ordinary
+# Differential Equations II, IV.7): of order 3 whatever the matrix, L-stable with the true one, and without one the classical
+# method. Five of the seven numbers g solve its equations, b g 1 = b a g 1 = b g c = b g g 1 = 0 and R(infinity) = 0; the other
+# two, 0.37 and -0.42, are about those with the least errors of order 4.
+RKW3 = Tableau(
+    order=3,
+    a=RK4.a,
+    b=RK4.b,
+    c=RK4.c,
+    implicit=(
+        (0.37,),
+        (-0.42, 0.37),
+        (0.36626076771653543284, -1.0562607677165354329, 0.37),
+        (0.10747846456692913424, -0.5185895756780402451, 37 / 90, 0.37),
+    ),
 )
 
 # Dormand & Prince (1980); Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, table II.5.2: 5(4).

@@ -18,7 +18,7 @@ import numpy as np
 from lgvi_warp.common import files as durable
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.engine.block import Block, blocks
+from lgvi_warp.engine.block import Block, blocks, parts
 from lgvi_warp.engine.executors import check_threads
 from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.keepers.memory import Samples
@@ -146,9 +146,11 @@ def predict(
     plan = make_plan(ensemble, **settings, fields=observed.fields, survey_all=False)
     compile_seconds = plan.compile()
     count = threads or machine.thread_count()
-    set_up, step = costs(plan, count, observed)
     asked_store = store if isinstance(store, Store) or store is None else Store(store)
     into = settled(asked_store, plan, observed, fields) if asked_store else None
+    joined = into is not None or bool(observed.watch(plan.grid.times)[0])
+    blocks_of_run = parts(ensemble.members, plan.grid.steps, count, joined)
+    set_up, step = costs(plan, blocks_of_run, count, observed)
     place = nearest_folder(into.folder) if into else Path.cwd()
     runs = [Sized(plan, into, fields if observed.samples else (), sizes(plan, observed.watch(plan.grid.times)[0]))]
     runs += again(plan, observed, asked_store, fields)
@@ -158,7 +160,7 @@ def predict(
     return Prediction(
         members=n,
         steps=steps,
-        blocks=len(blocks(n)),
+        blocks=len(blocks_of_run),
         threads=count,
         compile=compile_seconds,
         set_up=set_up,
@@ -171,7 +173,7 @@ def predict(
     )
 
 
-def costs(plan: Plan, threads: int, observed: Observation | None = None) -> tuple[float, float]:
+def costs(plan: Plan, runs: Sequence[Block], threads: int, observed: Observation | None = None) -> tuple[float, float]:
     """Measure the time to set up a run, and the time of one step of all members with its samples.
 
     Trials run one block per thread. The number of steps is doubled until a trial takes long enough; a second trial of half
@@ -179,13 +181,13 @@ def costs(plan: Plan, threads: int, observed: Observation | None = None) -> tupl
 
     Args:
         plan: The plan, compiled.
+        runs: The blocks of the run.
         threads: Number of threads.
         observed: What the run keeps; None: samples of all members and no statistics.
 
     Returns:
         (set-up, one step) [s], for all blocks on all threads.
     """
-    runs = blocks(plan.ensemble.members)
     chosen = runs[:threads]
     steps, most = min(64, plan.grid.steps), plan.grid.steps
     while (high := _seconds(plan, steps, chosen, threads, observed)) < TRIAL_SECONDS and steps < most:
@@ -199,7 +201,7 @@ def costs(plan: Plan, threads: int, observed: Observation | None = None) -> tupl
     return max(0.0, high - slope * steps) * rounds, slope * rounds
 
 
-def _seconds(plan: Plan, steps: int, chosen: list[Block], threads: int, observed: Observation | None) -> float:
+def _seconds(plan: Plan, steps: int, chosen: Sequence[Block], threads: int, observed: Observation | None) -> float:
     """Time of a trial of these blocks up to a step [s], with the samples due by then."""
     due = plan.grid.sample_steps[plan.grid.sample_steps < steps]
     due = np.append(due, steps)
@@ -289,7 +291,9 @@ class Sized:
         Returns:
             Memory [bytes].
         """
-        plan, runs = self.plan, blocks(self.plan.ensemble.members)
+        plan = self.plan
+        joined = self.store is not None or self.statistics.part > 0
+        runs = parts(plan.ensemble.members, plan.grid.steps, threads, joined)
         count = min(len(runs), threads)
         row = sum(plan.sample_fields.values()) * np.dtype(machine.DTYPES[plan.dtype]).itemsize
         segment = min(SEGMENT_SAMPLE_BYTES, row * runs[0].count * len(plan.grid.times))

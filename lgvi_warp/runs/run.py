@@ -11,7 +11,7 @@ import numpy as np
 
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Interrupted, MembersFailed
-from lgvi_warp.engine.block import blocks, shares
+from lgvi_warp.engine.block import parts
 from lgvi_warp.engine.executors.base import Executor
 from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.keepers.memory import Outcomes, Samples
@@ -101,14 +101,10 @@ def run_plan(
         return replace(result, compile_seconds=compile_seconds, compile_phases=plan.phases, run_seconds=run_seconds)
 
     runner = executor or Threads(threads)
-    # Statistics are joined block by block, so their bits depend on the blocks; those of samples do not.
-    free = isinstance(runner, Threads) and not observing.keepers
-    parts, work = (
-        blocks(total, shares(total, threads, plan.grid.steps) if free else None),
-        Work(plan, keepers, warned=warned),
-    )
+    joined = bool(observing.keepers) or not isinstance(runner, Threads)
+    runs, work = parts(total, plan.grid.steps, threads, joined), Work(plan, keepers, warned=warned)
     try:
-        n = run_blocks(work, parts, runner, overall.at, enough=observing.enough, merged=merged)
+        n = run_blocks(work, runs, runner, overall.at, enough=observing.enough, merged=merged)
     except NotSurveyed:
         # Rare: a kernel for all members, and the run from its beginning, so that all members have the bits of one kernel.
         plan = replace(plan, survey_all=True)

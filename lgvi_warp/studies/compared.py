@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,11 +25,13 @@ class Compared:
         name: name of the quantity.
         unit: its unit.
         functional: computes its numbers at each time; None for those of QUANTITIES.
+        mean: whether the error is that of its mean over the members, in place of the largest of any member. Default False.
     """
 
     name: str
     unit: str
     functional: Functional | None = None
+    mean: bool = False
 
     def values(self, result: Result) -> np.ndarray:
         """Compute the quantity at each time.
@@ -53,12 +55,15 @@ class Compared:
             reference: the same members at the same times.
 
         Returns:
-            Length of the difference (k, n) [unit]; of angles [rad] the short way round.
+            Length of the difference (k, n) [unit]; of angles [rad] the short way round. Of a mean, for every member alike, the
+            upper end of the 95 % interval of the difference of the means, whose members are paired.
         """
         with np.errstate(invalid="ignore"):
             apart = self.values(result) - self.values(reference)
             if self.unit == "rad":
                 apart -= 2.0 * np.pi * np.round(apart / (2.0 * np.pi))
+            if self.mean:
+                return np.broadcast_to(_bias(apart)[:, None], apart.shape[:2])
         return np.linalg.norm(apart, axis=-1)
 
     def largest(self, result: Result) -> float:
@@ -73,11 +78,23 @@ class Compared:
         return float(np.nanmax(np.abs(self.values(result))))
 
 
+def _bias(apart: np.ndarray) -> np.ndarray:
+    """Length of the mean of paired differences (k, n, components) and of two standard errors of it, (k,)."""
+    n = apart.shape[1]
+    error = 2.0 * apart.std(axis=1, ddof=1) / np.sqrt(n) if n > 1 else np.zeros(apart[:, 0].shape)
+    return np.asarray(np.linalg.norm(np.abs(apart.mean(axis=1)) + error, axis=-1))
+
+
+# What begins the name of a mean over the members, as lw.Mean has it.
+MEAN = "mean "
+
+
 def compared_in(of: Any) -> Compared:
     """Find the quantity that a name or a lw.Quantity means.
 
     Args:
-        of: a name such as "position", "depth", "position[2]" or "norm(velocity)", a lw.Quantity, or a Compared.
+        of: a name such as "position", "depth", "position[2]" or "norm(velocity)", a lw.Quantity, or a Compared; "mean
+            position[0]" for the mean over the members.
 
     Returns:
         The quantity with its unit.
@@ -89,6 +106,15 @@ def compared_in(of: Any) -> Compared:
         return of
     if isinstance(of, str) and of.strip() in QUANTITIES:
         return Compared(of.strip(), QUANTITIES[of.strip()])
+    if isinstance(of, str) and of.strip().startswith(MEAN):
+        whole = compared_in(of.strip().removeprefix(MEAN))
+        if whole.name == "attitude" or whole.mean:
+            raise SceneError(
+                [f"of = {of!r}: is no mean of numbers; give the mean of an entry, such as 'mean attitude[2,2]'"]
+            )
+        return replace(
+            whole, name=MEAN + whole.name, functional=whole.functional or functional("of", whole.name), mean=True
+        )
     if isinstance(of, list | tuple):
         raise SceneError([f"of = {of!r}: is several quantities; errors are of one of them: give its name"])
     parsed = functional("of", of)

@@ -288,12 +288,18 @@ class Sample:
         """
         good: list[str] = []
         refused: dict[str, str] = {}
+        tableaux: dict[Any, str] = {}
         for name in methods:
             if len(good) == most:
                 break
             try:
-                self.plan(self.candidate(name, 1, dtype))
+                tableau = self.plan(self.candidate(name, 1, dtype)).spec.explicit
+                if tableau in tableaux:
+                    refused[name] = f"method {name}: in this scene it is {tableaux[tableau]}"
+                    continue
                 good.append(name)
+                if tableau is not None:
+                    tableaux[tableau] = name
             except SceneError as error:
                 refused[name] = str(error)
         return good, refused

@@ -26,7 +26,7 @@ from lgvi_warp.studies.speed import void
 
 # Tried in this order; those that a scene refuses are left out.
 CANDIDATES = ("kl8(psi_x)", "psi_x", "psi_s", "su4(psi_x)", "kl6(psi_x)", "rk8", "su8_15(psi_x)", "ss6_13(psi_x)",
-              "rkn6_11", "rkn6_14", "bm6(psi_x)", "bm4(psi_x)", "rk5", "rk4", "psi_1", "psi", "psi_w", "kl8(psi_s)",
+              "rkn6_11", "rkn6_14", "bm6(psi_x)", "bm4(psi_x)", "rk5", "rk4", "rkw3", "psi_1", "psi", "psi_w", "kl8(psi_s)",
               "kl6(psi_s)", "su4(psi_s)", "phi")  # fmt: skip
 # Solvers of equation (24) besides the default, tried for one method that solves it.
 SOLVERS: tuple[tuple[str, int | None], ...] = (("quartic", 1), ("cayley", None), ("newton", None))

@@ -33,7 +33,7 @@ def test_methods_and_their_orders():
     compositions = {name.partition("(")[0] for name in orders if "(" in name}
     assert compositions == set(method.COMPOSITIONS | method.HALVES)
     simple = {name for name in orders if "(" not in name}
-    assert simple == set(method.PROGRAMS | method.EXPLICIT | method.TWO_PART | method.GAUSS)
+    assert simple == set(method.PROGRAMS | method.RUNGE_KUTTA | method.TWO_PART | method.GAUSS)
 
 
 def test_every_public_name_has_a_line():

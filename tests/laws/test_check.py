@@ -48,6 +48,14 @@ def test_what_follows_from_the_vehicle_and_events_are_right(term):
     assert lw.check_law(term, scene=other, samples=5, seed=7).ok
 
 
+def test_a_law_may_remember_a_single_number():
+    wing = dict(
+        position=[[-0.5, 0.0, 0.0]], chord=[[1.0, 0.0, 0.0]], normal=[[0.0, 0.0, -1.0]], area=0.01, lift_slope=3.0
+    )
+    fin = lw.ControlFins(**wing, command=[0.1], rate_limit=0.5, drag=0.0)
+    assert fin.memory and lw.check_law(fin).ok
+
+
 @pytest.mark.parametrize("step", [1e-4, 1e-6])
 def test_the_tolerance_follows_the_step(step):
     assert lw.check_law(CASES["tether"].terms[0], step=step, samples=256).ok

@@ -23,7 +23,7 @@ NOT_THERE = (
     "look",
     "factorise",
     "exponential",
-    "normals",
+    r"(?<!sub)normals",
     "passage",
     "R_i",
     "back_up",

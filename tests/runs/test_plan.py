@@ -10,8 +10,9 @@ import warp as wp
 import lgvi_warp as lw
 from lgvi_kernels.advance.kernel import make_advance
 from lgvi_kernels.laws import restoring, weight
-from lgvi_warp.engine.block import blocks
-from lgvi_warp.engine.packets import Packets, pack
+from lgvi_warp.engine.arrays import put_rows
+from lgvi_warp.engine.block import blocks, parts, shares
+from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.plan import SEGMENT_SAMPLE_BYTES
 from lgvi_warp.engine.survey import shape_of_mass
 from lgvi_warp.methods.method import Method
@@ -112,10 +113,26 @@ def test_blocks_cover_the_members(n):
 
 
 def test_pack_fills_up_with_the_last_member():
-    rows = np.arange(10.0).reshape(5, 2)
-    packed = pack(rows, 4)
-    assert packed.shape == (2, 2, 4)
-    np.testing.assert_array_equal(packed[1, :, :], [[8.0] * 4, [9.0] * 4])
+    rows, packed = np.arange(10.0).reshape(5, 2), np.full((2, 2, 4), np.nan)
+    put_rows(packed, rows)
+    np.testing.assert_array_equal(packed[0], rows[:4].T)
+    np.testing.assert_array_equal(packed[1], [[8.0] * 4, [9.0] * 4])
+    put_rows(packed, rows[:1])
+    np.testing.assert_array_equal(packed, np.broadcast_to(rows[0][:, None], (2, 2, 4)))
+
+
+@pytest.mark.parametrize("threads", [1, 2, 7, 64])
+@pytest.mark.parametrize("steps", [1, 300, 10**6])
+@pytest.mark.parametrize("n", [1, 256, 257, 5000, 1_000_000])
+def test_shares_keep_all_threads_at_work(n, steps, threads):
+    size = shares(n, threads, steps)
+    runs = parts(n, steps, threads, joined=False)
+    assert size % 256 == 0 and 256 <= size <= 16_384 and {run.count for run in runs[:-1]} <= {size}
+    assert runs[0].first == 0 and runs[-1].stop == n
+    # Blocks of 256 are the smallest; else a block is a few million steps of vehicles, or a quarter of a thread's members.
+    assert size == 256 or (size - 256) * steps < 4_000_000
+    assert threads == 1 or size == 256 or len(runs) >= 4 * threads * (1 - 256 / size)
+    assert parts(n, steps, threads, joined=True) == blocks(n)
 
 
 def test_segments_are_contiguous_and_their_buffer_is_bounded(scene):

@@ -360,10 +360,10 @@ def test_bits_and_codes_are_those_of_the_kernel():
 
 
 def test_every_method_has_its_limits():
-    from lgvi_warp.methods.method import COMPOSITIONS, EXPLICIT, GAUSS, HALVES, PROGRAMS, TWO_PART
+    from lgvi_warp.methods.method import COMPOSITIONS, GAUSS, HALVES, PROGRAMS, RUNGE_KUTTA, TWO_PART
 
     composed = [f"{name}({base})" for name in COMPOSITIONS | HALVES for base in ("psi_s", "psi_x", "psi_1", "psi")]
-    for name in (*PROGRAMS, *EXPLICIT, *TWO_PART, *GAUSS, *composed):
+    for name in (*PROGRAMS, *RUNGE_KUTTA, *TWO_PART, *GAUSS, *composed):
         try:
             method = Method(name)
         except lw.SceneError:

@@ -162,8 +162,9 @@ def make_method(spec):
         return to_body(view, flow(Flow(), view, c.params).velocity)
 
     if spec.explicit is not None:
-        acting = (View, Wrench, Flow, Damping, law, damping, flow, varies, shifted)
-        step = make_explicit(spec, make_forces(*acting)[0], velocities)
+        acting = (View, Wrench, Flow, Damping, law, damping, flow, varies, shifted, velocities)
+        everything, _, _, slope = make_forces(*acting)
+        step = make_explicit(spec, everything, velocities, slope)
         momentum = in_body if spec.inertial else None
         return Step(step, step, velocities, prepare, water_velocity, velocities_of_forces, momentum)
     V = None
@@ -194,7 +195,8 @@ def make_method(spec):
             letters[letter] = turns.make_hop(int(letter[1]) - 1, int(letter[2]) - 1, U12, U13, U23, spec.compensated)
     if spec.averages is not None:
         force, potential = superpose(laws, "force"), superpose(laws, "potential")
-        _, forces, current = make_forces(View, Wrench, Flow, Damping, force, damping, flow, varies, shifted)
+        acting = (View, Wrench, Flow, Damping, force, damping, flow, varies, shifted, velocities)
+        _, forces, current, _ = make_forces(*acting)
         maps = (letters["Ab"], None if spec.mass == "isotropic" else Ap, letters["D"])
         functions = (View, Wrench, potential, forces, current, evolve, velocities)
         letters["Phi"], letters["Phi*"] = make_phi(maps, functions, *spec.averages)

@@ -28,12 +28,12 @@ def damped_torque(D: Any, nu: Any, Om: Any):
     return apply(D.torque_velocity, nu) + apply(D.torque_rate, Om)
 
 
-def make_V(damping, velocities, Damping, Factor, coupled):
-    """The step with the sum of these damping laws; `velocities`: (inertia, p, pi) -> (nu, Om) at the origin of the forces."""
+def make_implicit(Damping, Factor, coupled):
+    """The matrix of an implicit step, factorised; coupled: M and J are."""
 
     @wp.func
     def implicit(D: Any, inertia: Any, h: Any):
-        """I6 + h D, factorised. h is divided by max J, as the inertia is."""
+        """I6 + h D, factorised. Where the inertia is divided by max J, h is too."""
         # Blocks of zeros: two to write the symmetric matrices into, two that stay zero where nothing couples.
         zeros = Damping()
         a = combine(symmetric(zeros.force_velocity, inertia.M), h, D.force_velocity)
@@ -44,6 +44,13 @@ def make_V(damping, velocities, Damping, Factor, coupled):
             b = inertia.C
             c = transposed(inertia.C)
         return factorise(Factor(), a, combine(b, h, D.force_rate), combine(c, h, D.torque_velocity), d)
+
+    return implicit
+
+
+def make_V(damping, velocities, Damping, Factor, coupled):
+    """The step with the sum of these damping laws; `velocities`: (inertia, p, pi) -> (nu, Om) at the origin of the forces."""
+    implicit = make_implicit(Damping, Factor, coupled)
 
     @wp.func
     def V(x: Any, view: Any, water: Any, c: Any, h: Any):

@@ -1,4 +1,4 @@
-"""Explicit Runge-Kutta methods on (b, R, p, pi), and on the rotation group: fixed steps, or steps chosen for a tolerance.
+"""Runge-Kutta methods on (b, R, p, pi), and on the rotation group: fixed steps, or steps chosen for a tolerance.
 
 k_i = f(t + c_i h, y_i), where y_i comes from y by h a_i1 k_1, h a_i2 k_2, ... and the new state by h b_1 k_1, h b_2 k_2, ...
 A move adds: two rows of R are six numbers like the others, which leave the group at the order of the method, and the third
@@ -13,10 +13,13 @@ import warp as wp
 
 from lgvi_kernels.lanes.arithmetic import add, cross, div, dot, lane3, mul, ones, sub, vec3  # noqa: F401
 from lgvi_kernels.lanes.functions import root, sine
+from lgvi_kernels.lanes.matrix3 import factor_struct
 from lgvi_kernels.lanes.rotations import rodrigues, rotation_struct, transpose_apply
-from lgvi_kernels.lanes.state import struct, view_struct, wrench_struct
+from lgvi_kernels.lanes.state import damping_struct, struct, view_struct, wrench_struct
 from lgvi_kernels.laws.drag import make_resistance
 from lgvi_kernels.maps.compose import superpose
+from lgvi_kernels.maps.dissipation import make_implicit
+from lgvi_kernels.maps.linearly_implicit import make_damped, make_damped_stages, make_factor
 from lgvi_kernels.maps.step_control import make_adaptive, make_errors
 from lgvi_kernels.maps.submaps import rotate
 
@@ -25,13 +28,14 @@ TINY = {wp.float64: 1e-300, wp.float32: 1e-36}
 
 
 class Explicit(NamedTuple):
-    """All that decides the code of an explicit method: a tableau, whose row i of `a` has i numbers, and how it is used.
+    """All that decides the code of a Runge-Kutta method: a tableau, whose row i of `a` has i numbers, and how it is used.
 
     kind: "vector" (R as two of its rows), "inertial" (the same, and forces never change in inertial axes, so that R p is
     known for all times: it is kept in place of p), "group" (R turns by exponentials) or "munthe_kaas" (order 4 with its
     commutators).
     errors: rows of error estimates, (stages,) or one longer with f of the new state at its end, which go as h to the power
     `estimate`. adaptive: each packet chooses its steps.
+    implicit: rows of the matrix g of a linearly implicit method (see maps/linearly_implicit.py), or none.
     """
 
     kind: str
@@ -41,6 +45,7 @@ class Explicit(NamedTuple):
     errors: tuple = ()
     estimate: int = 0
     adaptive: bool = False
+    implicit: tuple = ()
 
 
 @functools.cache
@@ -368,8 +373,19 @@ def make_munthe_kaas(rates, act, turned, timed):
     return step
 
 
-def make_explicit(spec, everything, velocities):
-    """The step of an explicit method for this Spec, with all the laws in `everything`."""
+def make_implicit_stages(spec, rates, velocities, slope):
+    """The stages of a linearly implicit method for this Spec; slope: the matrix of damping (see make_forces)."""
+    method, width, real, coupled = spec.explicit, spec.width, spec.real, "coupled" in spec.parts
+    Rates = rates_struct(width, real, method.kind)
+    states = [make_stage(make_moves(along, row, completed), None, c, spec.timed) for row, c in zip(method.a, method.c)]
+    damped = [make_damped(Rates, make_moves, row, coupled) for row in method.implicit]
+    implicit = make_implicit(damping_struct(width, real), factor_struct(width, real), coupled)
+    factor = make_factor(implicit, velocities, slope, method.implicit[0][0])
+    return make_damped_stages(slopes_struct(Rates, len(damped)), rates, states, damped, factor)
+
+
+def make_explicit(spec, everything, velocities, slope):
+    """The step of a Runge-Kutta method for this Spec, with all the laws in `everything`; slope: see make_implicit_stages."""
     method, width, real, timed = spec.explicit, spec.width, spec.real, spec.timed
     Wrench = wrench_struct(width, real)
     Rates = rates_struct(width, real, method.kind)
@@ -386,7 +402,10 @@ def make_explicit(spec, everything, velocities):
     # An estimate of one number more asks for the slope at the end of the step, whose row of `a` is b.
     if method.adaptive and len(method.errors[0]) > len(a):
         a, c = (*a, method.b), (*c, 1.0)
-    stages = make_stages(Rates, rates, move, complete, push, a, c, timed)
+    if method.implicit:
+        stages = make_implicit_stages(spec, rates, velocities, slope)
+    else:
+        stages = make_stages(Rates, rates, move, complete, push, a, c, timed)
     finish = make_moves(move, method.b + (0.0,) * (len(a) - len(method.b)), complete)
     if not method.adaptive:
         return make_fixed(stages, finish, push, timed)

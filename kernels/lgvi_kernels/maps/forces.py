@@ -4,14 +4,15 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import sub  # noqa: F401
+from lgvi_kernels.lanes.arithmetic import add, div, mul, ones, sub  # noqa: F401
+from lgvi_kernels.lanes.matrix3 import transposed
 from lgvi_kernels.maps.dissipation import damped_force, damped_torque
 from lgvi_kernels.maps.submaps import look, make_at_user_origin
 from lgvi_kernels.maps.water import acceleration_wrench
 
 
-def make_forces(View, Wrench, Flow, Damping, force, damping, flow, flow_varies, shifted):
-    """(everything, forces, current) of these laws; an argument is None where a scene has no such law (see make_K)."""
+def make_forces(View, Wrench, Flow, Damping, force, damping, flow, flow_varies, shifted, velocities):
+    """(everything, forces, current, slope) of these laws; an argument is None where a scene has no such law (see make_K)."""
     at_user_origin = make_at_user_origin(shifted)
 
     @wp.func
@@ -49,4 +50,39 @@ def make_forces(View, Wrench, Flow, Damping, force, damping, flow, flow_varies, 
         """The water's velocity where the vehicle is, inertial axes."""
         return water_at(look(View(), x, c, h), x, c).velocity
 
-    return everything, forces, current
+    @wp.func
+    def trace(D: Any, inertia: Any):
+        """tr I6^-1 D [1/s], the sum of the rates at which damping acts."""
+        a = transposed(D.force_velocity)
+        b = transposed(D.force_rate)
+        d = transposed(D.torque_velocity)
+        e = transposed(D.torque_rate)
+        u, p = velocities(inertia, a.row0, d.row0)
+        v, q = velocities(inertia, a.row1, d.row1)
+        w, r = velocities(inertia, a.row2, d.row2)
+        total = u.x + v.y + w.z
+        u, p = velocities(inertia, b.row0, e.row0)
+        v, q = velocities(inertia, b.row1, e.row1)
+        w, r = velocities(inertia, b.row2, e.row2)
+        return total + p.x + q.y + r.z
+
+    @wp.func
+    def slope(x: Any, c: Any, h: Any, nu: Any, Om: Any):
+        """D(s nu), near the derivative of D(nu) nu: s = 1 + q^2 / (1 + q^2), q = h tr I6^-1 D.
+
+        s = 2 gives the derivative if each column of D is constant or grows with its velocity. Without it a long step
+        would overshoot; in a short one, where lift across the way is more than drag along it, s = 1 is nearer.
+        """
+        view = look(View(), x, c, h)
+        water = water_at(view, x, c)
+        view.nu = nu
+        view.Om = Om
+        D = damping(Damping(), view, water, c)
+        q = h * trace(D, c.inertia)
+        square = q * q
+        s = ones(q) + square / (ones(q) + square)
+        view.nu = s * nu
+        view.Om = s * Om
+        return damping(Damping(), view, water, c)
+
+    return everything, forces, current, slope

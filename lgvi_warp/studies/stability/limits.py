@@ -112,6 +112,8 @@ def drag_limit(name: str) -> float:
         The limit [1]; infinite where drag is advanced exactly or implicitly.
     """
     method = Method(name)
+    if method.linearly_implicit:
+        return math.inf
     if method.tableau:
         numbers = np.arange(STEP, MOST, STEP)
         return _first(numbers, np.abs(stability_polynomial(method.tableau, -numbers)))

@@ -125,6 +125,26 @@ def test_distances_of_what_is_asked(result):
         np.testing.assert_allclose(apart, np.abs(exact) * np.ones((K, N)), rtol=1e-13, atol=1e-13, err_msg=text)
 
 
+def test_the_error_of_a_mean_is_its_bias_and_two_standard_errors(result):
+    n = result.members
+    shift = np.random.default_rng(3).normal(size=(n, 3))
+    moved = other(result, {"position": result.position + shift})
+    mean, spread = shift.mean(axis=0), 2.0 * shift.std(axis=0, ddof=1) / np.sqrt(n)
+    asked = compared_in("mean position[0]")
+    assert (asked.name, asked.unit, asked.mean) == ("mean position[0]", "m", True)
+    apart = asked.distance(moved, result)
+    np.testing.assert_allclose(apart, (abs(mean[0]) + spread[0]) * np.ones((K, N)), rtol=1e-12)
+    whole = compared_in("mean position").distance(moved, result)
+    np.testing.assert_allclose(whole, np.linalg.norm(np.abs(mean) + spread) * np.ones((K, N)), rtol=1e-12)
+    # Members that all move alike have no spread: the bias alone is left, which no largest error of a member shows smaller.
+    together = other(result, {"position": result.position + 0.5})
+    np.testing.assert_allclose(asked.distance(together, result), 0.5, rtol=1e-12)
+    single = lambda r: r.part(np.array([0]))  # noqa: E731
+    np.testing.assert_allclose(asked.distance(single(moved), single(result)), abs(shift[0, 0]), rtol=1e-12)
+    for text in ("mean attitude", "mean mean depth", "mean max(depth)", "mean nothing"):
+        refused(compared_in, text)
+
+
 def test_angles_go_the_short_way_round(result):
     yaw = np.deg2rad(179.9)
     there, here = (notation.matrix_from_rotation_vector(np.broadcast_to([0.0, 0.0, a], (K, N, 3))) for a in (yaw, -yaw))

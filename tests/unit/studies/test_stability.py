@@ -166,6 +166,7 @@ def test_linear_theory():
     roots = np.roots([1.0, -4.0, 12.0, -24.0])
     root = roots[np.abs(roots.imag) < 1e-12].real[0]
     assert math.isclose(drag_limit("rk4"), root, abs_tol=2e-3)
+    assert drag_limit("rkw3") == math.inf
 
 
 def test_composed_limits_are_of_their_longest_stage():

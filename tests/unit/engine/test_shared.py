@@ -1,0 +1,56 @@
+"""What a computation reads decides whether its result is shared by all members."""
+
+import copy
+
+import numpy as np
+import pytest
+
+from lgvi_warp.engine.shared import FRAME, MEMBERS, SEED, Reads, Shared, context
+
+NUMBERS = {"a.x": np.ones((1, 3)), "b.y": np.zeros(5)}
+WAYS = {
+    "an item": lambda n: n["b.y"],
+    "get": lambda n: n.get("b.y"),
+    "a loop": lambda n: [name for name in n],
+    "keys": lambda n: list(n.keys()),
+    "values": lambda n: list(n.values()),
+    "items": lambda n: list(n.items()),
+    "a dict": lambda n: dict(n)["b.y"],
+    "unpacked": lambda n: {**n}["b.y"],
+    "a copy": lambda n: n.copy()["b.y"],
+    "joined": lambda n: (n | {})["b.y"],
+    "joined from the right": lambda n: ({} | n)["b.y"],
+    "a copy of the module": lambda n: copy.copy(dict(n))["b.y"],
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_every_way_to_read_is_noted(way):
+    reads = Reads(NUMBERS)
+    WAYS[way](reads)
+    assert "b.y" in reads.names
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_what_varies_is_computed_each_time_and_nothing_else(way):
+    shared, calls = Shared({"b.y"}), []
+
+    def compute(numbers):
+        calls.append(1)
+        WAYS[way](numbers)
+        return len(calls)
+
+    assert [shared("sum", NUMBERS, compute) for _ in range(3)] == [1, 2, 3] and not shared.keeps("sum")
+    kept = [shared("x", NUMBERS, lambda n: n["a.x"].sum() + len(calls)) for _ in range(2)]
+    calls.append(1)
+    assert kept == [6.0, 6.0] == [shared("x", NUMBERS, lambda n: 0.0)] * 2 and shared.keeps("x")
+
+
+@pytest.mark.parametrize(("name", "field"), [(FRAME, "frame"), (MEMBERS, "members"), (SEED, "seed")])
+def test_a_context_notes_what_it_is_asked_for(name, field):
+    reads = Reads(NUMBERS)
+    asked = context(reads, "frame", np.arange(5), 7, 0.01, True)
+    assert asked.h == 0.01 and not reads.names
+    getattr(asked, field)
+    assert reads.names == {name}
+    assert type(context(NUMBERS, "frame", np.arange(5), 7, 0.01, True)).__name__ == "PackingContext"

@@ -119,7 +119,9 @@ def test_what_is_damaged_is_compiled_anew(cache, damage):
     assert not kernel_cache.is_whole(code)
     forget()
     assert works() and code.read_bytes() == whole and kernel_cache.is_whole(code)
-    assert sorted(path.name for path in cache.iterdir()) == sorted([kernel_cache.LOCKS, kernel_cache.HEADERS, code.parent.name])
+    assert sorted(path.name for path in cache.iterdir()) == sorted(
+        [kernel_cache.LOCKS, kernel_cache.HEADERS, code.parent.name]
+    )
 
 
 def test_phases(cache):

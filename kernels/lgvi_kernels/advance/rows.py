@@ -97,16 +97,16 @@ def make_sample(Lane, compensated, method, drifts, still):
             if wp.static(momentum is not None):
                 x.p = momentum(x)
             nu, Om = velocities(c.inertia, x.p, x.pi)
+            # In one block with nu, whatever is saved: so the compiler joins the same products with the same sums.
+            if wp.static(drifts):
+                water = water_velocity(x, c, h)
+                if wp.static(still):
+                    kept = vec3(monitor.still[i, 0], monitor.still[i, 1], monitor.still[i, 2])
+                    water = positive(frozen, kept, water)
+                nu = nu + water
+            if columns[2] >= 0:
+                put(out, i, first + columns[2], nu)
             if columns[3] >= 0:
                 put(out, i, first + columns[3], Om)
-            if columns[2] >= 0:
-                if wp.static(drifts):
-                    water = water_velocity(x, c, h)
-                    if wp.static(still):
-                        kept = vec3(monitor.still[i, 0], monitor.still[i, 1], monitor.still[i, 2])
-                        water = positive(frozen, kept, water)
-                    put(out, i, first + columns[2], nu + water)
-                else:
-                    put(out, i, first + columns[2], nu)
 
     return sample

@@ -10,7 +10,7 @@ import warp as wp
 
 from lgvi_kernels.advance.events import FIRST
 from lgvi_kernels.advance.monitor import ENERGY_FIELDS
-from lgvi_kernels.advance.rows import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS
+from lgvi_kernels.advance.rows import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS, WASTE
 from lgvi_kernels.lanes.arithmetic import int_lane
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine.arrays import Lanes, LawArrays, Structs, nested
@@ -188,7 +188,7 @@ class Packets:
         s0, s1 = plan.due(k0, k1)
         numbers = sum(plan.sample_fields.values())
         width = plan.spec.width
-        shape = (self.count, max(1, (s1 - s0) * numbers))
+        shape = (self.count, max(1, (s1 - s0) * numbers) + WASTE * (len(plan.sample_fields) < len(SAMPLE_FIELDS)))
         if self.out is None or self.out.shape != shape:
             self.out = wp.empty(shape, dtype=plan.advance.types.Lane, device="cpu")
             self._launch = None

@@ -14,6 +14,8 @@ PACE_FIELDS = 4
 
 # Sampled quantity -> numbers per sample, in the order they are written.
 SAMPLE_FIELDS = {"position": 3, "attitude": 9, "velocity": 3, "angular_velocity": 3}
+# Columns at the end of a packet's samples where the fields go that are not saved.
+WASTE = 9
 
 
 def make_rows(Lane, State, paced, compensated):
@@ -84,29 +86,29 @@ def make_sample(Lane, compensated, method, drifts, still):
     @wp.func
     def sample(out: wp.array2d(dtype=Lane), i: int, first: int, columns: wp.vec4i, x: Any, c: Any, h: Any, monitor: Any,
                frozen: Lane):  # fmt: skip
-        """Write the fields of SAMPLE_FIELDS that have a column, from `first` on: b, R, nu (that of the water added), Om."""
-        if columns[0] >= 0:
-            put(out, i, first + columns[0], x.b)
-            if wp.static(compensated):
-                put(out, i, first + columns[0] + 3, x.b_low)
-        if columns[1] >= 0:
-            put(out, i, first + columns[1], x.R0)
-            put(out, i, first + columns[1] + 3, x.R1)
-            put(out, i, first + columns[1] + 6, x.R2)
-        if columns[2] >= 0 or columns[3] >= 0:
-            if wp.static(momentum is not None):
-                x.p = momentum(x)
-            nu, Om = velocities(c.inertia, x.p, x.pi)
-            # In one block with nu, whatever is saved: so the compiler joins the same products with the same sums.
-            if wp.static(drifts):
-                water = water_velocity(x, c, h)
-                if wp.static(still):
-                    kept = vec3(monitor.still[i, 0], monitor.still[i, 1], monitor.still[i, 2])
-                    water = positive(frozen, kept, water)
-                nu = nu + water
-            if columns[2] >= 0:
-                put(out, i, first + columns[2], nu)
-            if columns[3] >= 0:
-                put(out, i, first + columns[3], Om)
+        """Write b, R, nu (that of the water added) and Om from `first` on, each at its column; without one, at the end of the row.
+
+        The code has no branches, whatever is saved: so the compiler joins the same products with the same sums.
+        """
+        waste = out.shape[1] - wp.static(WASTE)
+        o = wp.where(columns[0] < 0, waste, first + columns[0])
+        put(out, i, o, x.b)
+        if wp.static(compensated):
+            put(out, i, o + 3, x.b_low)
+        o = wp.where(columns[1] < 0, waste, first + columns[1])
+        put(out, i, o, x.R0)
+        put(out, i, o + 3, x.R1)
+        put(out, i, o + 6, x.R2)
+        if wp.static(momentum is not None):
+            x.p = momentum(x)
+        nu, Om = velocities(c.inertia, x.p, x.pi)
+        if wp.static(drifts):
+            water = water_velocity(x, c, h)
+            if wp.static(still):
+                kept = vec3(monitor.still[i, 0], monitor.still[i, 1], monitor.still[i, 2])
+                water = positive(frozen, kept, water)
+            nu = nu + water
+        put(out, i, wp.where(columns[2] < 0, waste, first + columns[2]), nu)
+        put(out, i, wp.where(columns[3] < 0, waste, first + columns[3]), Om)
 
     return sample

@@ -188,7 +188,8 @@ class Packets:
         s0, s1 = plan.due(k0, k1)
         numbers = sum(plan.sample_fields.values())
         width = plan.spec.width
-        shape = (self.count, max(1, (s1 - s0) * numbers) + WASTE * (len(plan.sample_fields) < len(SAMPLE_FIELDS)))
+        waste = WASTE if len(plan.sample_fields) < len(SAMPLE_FIELDS) else 0
+        shape = (self.count, max(1, (s1 - s0) * numbers) + waste)
         if self.out is None or self.out.shape != shape:
             self.out = wp.empty(shape, dtype=plan.advance.types.Lane, device="cpu")
             self._launch = None

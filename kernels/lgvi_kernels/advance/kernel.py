@@ -85,7 +85,7 @@ def make_advance(spec):
         failed_size: wp.array(dtype=Lane),
         # limits and results of looks
         monitor: Monitor,
-        # out: numbers of a sample, and the column of each of SAMPLE_FIELDS among them, -1 where it is not saved (see WASTE)
+        # out: numbers of a sample, and the column of each of SAMPLE_FIELDS among them, -1 if not saved
         numbers: int,
         columns: wp.vec4i,
         out: wp.array2d(dtype=Lane),

@@ -86,7 +86,7 @@ def make_sample(Lane, compensated, method, drifts, still):
     @wp.func
     def sample(out: wp.array2d(dtype=Lane), i: int, first: int, columns: wp.vec4i, x: Any, c: Any, h: Any, monitor: Any,
                frozen: Lane):  # fmt: skip
-        """Write b, R, nu (that of the water added) and Om from `first` on, each at its column or, without one, at the row's end.
+        """Write b, R, nu (that of the water added) and Om from `first` on, at their columns or, without one, at the row's end.
 
         The code has no branches, whatever is saved: so the compiler joins the same products with the same sums.
         """

@@ -10,6 +10,7 @@ import os
 import sys
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import warp as wp
@@ -108,6 +109,16 @@ def header_folders() -> dict[int, Any]:
         Thread -> folder; empty where Warp keeps them elsewhere.
     """
     return getattr(context.runtime, "_pch_dirs", {})
+
+
+def header_folder() -> Path | None:
+    """The folder of this thread's precompiled header.
+
+    Returns:
+        A folder that is there; None where Warp keeps it elsewhere.
+    """
+    folder = getattr(context.runtime, "get_clang_pch_dir", lambda: None)()
+    return None if folder is None else Path(folder)
 
 
 def end() -> None:

@@ -2,6 +2,7 @@
 
     CACHE/wp_NAME_HASH/NAME.cpuTARGET.o          code of one kind of processor
     CACHE/wp_NAME_HASH/NAME.cpuTARGET.o.sha256   checksums of that file and of its .meta, written last
+    CACHE/lgvi_warp_headers/KEY/NAME.pch         Clang's precompiled header, with its checksum, for later processes
     CACHE/lgvi_warp_locks/                       locks held while a kernel is compiled
     CACHE/lgvi_warp_scratch_RANDOM/              a kernel being compiled, locked by the process that compiles it
 
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import functools
 import hashlib
 import json
 import os
@@ -28,6 +30,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import warp as wp
+import warp._src.codegen as codegen
 
 from lgvi_warp.common import files as durable
 from lgvi_warp.common import warp_setup
@@ -39,6 +42,7 @@ ROOM_BYTES, ROOM_FILES = 16_000_000, 16
 # CPU kernels are launched with one thread a block: a variant of the module of its own.
 BLOCK_DIM = 1
 LOCKS, SCRATCH, SUMS = "lgvi_warp_locks", "lgvi_warp_scratch_", ".sha256"
+HEADERS, HEADER = "lgvi_warp_headers", "builtin_*.pch"
 # Folders that Warp leaves when it is killed while it compiles, and the age at which they belong to no process [s].
 TORN, OURS, OLD = re.compile(r"(\w+)_p\d+_t\d+"), "wp_make_", 86_400.0
 
@@ -136,7 +140,12 @@ def compile_module(module: Any, cache: Path, code: Path) -> tuple[float, float]:
     try:
         sweep(cache, code.parent)
         seek_room(cache)
-        with scratch_folder(cache) as scratch, _clang_headers(scratch):
+        with (
+            scratch_folder(cache) as scratch,
+            _clang_headers(scratch),
+            kept_header(cache, scratch),
+            private_gradients(),
+        ):
             wp.config.kernel_cache_dir = str(scratch)
             try:
                 wp.load_module(module, device="cpu")
@@ -197,6 +206,74 @@ def _clang_headers(scratch: Path) -> Iterator[None]:
             yield
         finally:
             del folders[thread]
+
+
+@contextlib.contextmanager
+def kept_header(cache: Path, scratch: Path) -> Iterator[None]:
+    """Give this thread the precompiled header of an earlier process, or keep the one that Clang writes now.
+
+    Clang needs longer for it than for a plain kernel, and Warp makes it anew in every process.
+
+    Args:
+        cache: The cache's folder.
+        scratch: A folder of this process's own, beside it.
+
+    Yields:
+        While a kernel is compiled.
+    """
+    folder = warp_setup.header_folder()
+    if folder is None:
+        yield
+        return
+    kept = cache / HEADERS / header_key()
+    for path in kept.glob(HEADER):
+        if not (folder / path.name).exists() and is_whole(path):
+            with contextlib.suppress(OSError):
+                shutil.copyfile(path, folder / path.name)
+    before = {path.name for path in folder.glob(HEADER)}
+    yield
+    after = {path.name for path in folder.glob(HEADER)}
+    with contextlib.suppress(OSError):
+        for name in before - after:  # Warp removes one that Clang refuses
+            (kept / (name + SUMS)).unlink(missing_ok=True)
+        for name in after:
+            if not is_whole(kept / name):
+                kept.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(folder / name, scratch / name)
+                (scratch / (name + SUMS)).write_text(json.dumps({name: _sha256(scratch / name)}))
+                (scratch / name).replace(kept / name)
+                (scratch / (name + SUMS)).replace(kept / (name + SUMS))
+
+
+@functools.cache
+def header_key() -> str:
+    """What a precompiled header belongs to: the processor, and Warp's own headers as they were.
+
+    Returns:
+        The name of a folder.
+    """
+    native = Path(wp.__file__).parent / "native"
+    files = [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in sorted(native.glob("*.h"))]
+    content = json.dumps([wp.get_cpu_kernel_cache_key(), str(native), files])
+    return hashlib.sha256(content.encode()).hexdigest()[:16]
+
+
+@contextlib.contextmanager
+def private_gradients() -> Iterator[None]:
+    """Let Clang leave out the functions for gradients that Warp writes for each struct.
+
+    No kernel here calls them, but other files could, unless they are static; they would take up to two fifths of the time.
+
+    Yields:
+        While kernels are compiled.
+    """
+    template = codegen.struct_template
+    visible = "CUDA_CALLABLE void adj_atomic_add("
+    codegen.struct_template = template.replace(visible, f"static {visible}")
+    try:
+        yield
+    finally:
+        codegen.struct_template = template
 
 
 def temporary_room() -> bool:

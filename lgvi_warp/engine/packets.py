@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import warp as wp
 
 from lgvi_kernels.advance.events import FIRST
 from lgvi_kernels.advance.monitor import ENERGY_FIELDS
-from lgvi_kernels.advance.rows import PACE_FIELDS, STATE_FIELDS
+from lgvi_kernels.advance.rows import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS, WASTE
 from lgvi_kernels.lanes.arithmetic import int_lane
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine.arrays import Lanes, LawArrays, Structs, nested
@@ -185,9 +186,10 @@ class Packets:
         """
         plan = self.plan
         s0, s1 = plan.due(k0, k1)
-        numbers = sum(plan.spec.sample_fields.values())
+        numbers = sum(plan.sample_fields.values())
         width = plan.spec.width
-        shape = (self.count, max(1, (s1 - s0) * numbers))
+        waste = WASTE if len(plan.sample_fields) < len(SAMPLE_FIELDS) else 0
+        shape = (self.count, max(1, (s1 - s0) * numbers) + waste)
         if self.out is None or self.out.shape != shape:
             self.out = wp.empty(shape, dtype=plan.advance.types.Lane, device="cpu")
             self._launch = None
@@ -207,7 +209,10 @@ class Packets:
         stage_h, lead_h, sample_step = plan.times
         inputs = [*self._arrays()[:4], *(plan.spec.real(tolerance) for tolerance in tolerances)]
         inputs += [wp.float64(plan.grid.h), stage_h, lead_h, k0, k1, s0, sample_step]
-        inputs += [self.state, self.memory, self.status, self.failed_step, self.failed_size, self.monitor, self.out]
+        inputs += [self.state, self.memory, self.status, self.failed_step, self.failed_size, self.monitor]
+        sizes = plan.sample_fields
+        firsts = dict(zip(sizes, accumulate(sizes.values(), initial=0), strict=False))
+        inputs += [sum(sizes.values()), wp.vec4i(*(firsts.get(name, -1) for name in SAMPLE_FIELDS)), self.out]
         with build_lock:
             return wp.launch(plan.advance.kernel, dim=self.count, inputs=inputs, device="cpu", record_cmd=True)
 

@@ -264,21 +264,28 @@ class Plan:
             A plan for m members.
         """
         subplan = self._copy()
-        for name in ("advance", "dtypes", "times", "shared", "idle"):
+        for name in ("shared", "idle", "sample_fields"):
             subplan.__dict__.pop(name, None)
         object.__setattr__(subplan, "ensemble", self.ensemble.subset(indices))
         object.__setattr__(subplan, "fields", tuple(name for name in SAMPLE_FIELDS if name in fields))
-        object.__setattr__(subplan, "spec", subplan._spec())
         object.__setattr__(subplan, "_whole", (self, indices, fields))
         return subplan
 
-    def _sampled(self) -> tuple[str, ...]:
-        """The fields that the kernel writes: those kept, and those needed to move them back to the user's origin."""
+    @functools.cached_property
+    def sample_fields(self) -> dict[str, int]:
+        """What the kernel writes of a sample: the fields kept, and those needed to move them back to the user's origin.
+
+        Returns:
+            Field -> numbers per sample, in the order in which they are written; a compensated position is b, then b_low.
+        """
         needed = set(self.fields)
         if self.kernel_choice.moved:
             needed |= {"attitude"} if "position" in needed else set()
             needed |= {"angular_velocity"} if "velocity" in needed else set()
-        return tuple(name for name in SAMPLE_FIELDS if name in needed)
+        numbers = {name: size for name, size in SAMPLE_FIELDS.items() if name in needed}
+        if self.spec.compensated and "position" in numbers:
+            numbers["position"] = 6
+        return numbers
 
     def _spec(self) -> Spec:
         choice, checked = self.kernel_choice, self.checks != "none"
@@ -295,7 +302,6 @@ class Plan:
             iterations=int(self.method.iterations or 0),
             adaptive=self.method.iterations is None,
             checked=checked,
-            fields=self._sampled(),
             events=tuple(module for _, module in choice.events),
             drag=choice.drag,
             parts=choice.parts,
@@ -439,7 +445,7 @@ class Plan:
             (k0, k1): a launch makes the steps from k0 to k1.
         """
         due = self.grid.sample_steps
-        per_sample = sum(self.spec.sample_fields.values()) * count * np.dtype(DTYPES[self.dtype]).itemsize
+        per_sample = sum(self.sample_fields.values()) * count * np.dtype(DTYPES[self.dtype]).itemsize
         most_samples = max(1, SEGMENT_SAMPLE_BYTES // max(per_sample, 1))
         most_steps = max(CHUNK, SEGMENT_VEHICLE_STEPS // count // CHUNK * CHUNK)
         k = 0

@@ -128,7 +128,7 @@ def run_block(
             raw = packets.advance(k0, k1)[:, : block.count]
             when = slice(*plan.due(k0, k1))
             if when.start < when.stop and block_keepers:
-                values = unpacked(plan.spec.sample_fields, raw, packets.frame)
+                values = unpacked(plan.sample_fields, raw, packets.frame)
                 samples = samples_of(plan, when, {name: values[name] for name in plan.fields}, packets.ended)
                 for block_keeper in block_keepers:
                     block_keeper.take(when, samples)

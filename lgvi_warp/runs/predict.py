@@ -301,7 +301,7 @@ class Sized:
         joined = self.store is not None or self.statistics.part > 0
         runs = parts(plan.ensemble.members, plan.grid.steps, threads, joined)
         count = min(len(runs), threads)
-        row = sum(plan.spec.sample_fields.values()) * np.dtype(machine.DTYPES[plan.dtype]).itemsize
+        row = sum(plan.sample_fields.values()) * np.dtype(machine.DTYPES[plan.dtype]).itemsize
         segment = min(SEGMENT_SAMPLE_BYTES, row * runs[0].count * len(plan.grid.times))
         # A segment's samples are held three times: as the kernel wrote them, in order of members, and as rotated or moved
         # copies. Parts are held twice: their rows, and all joined.

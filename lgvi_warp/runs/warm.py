@@ -9,7 +9,6 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 
 from lgvi_warp.common.phases import Phases
 from lgvi_warp.engine.executors.base import deaf
-from lgvi_warp.engine.keepers.observation import observe
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene.ensemble import Ensemble
@@ -31,15 +30,11 @@ def plans_of(scene: Scene, methods: Sequence[str], dtypes: Sequence[str]) -> lis
         SceneError: The scene cannot run, or refuses a method or precision.
     """
     ensemble = Ensemble.from_scene(scene)
-    observed = observe(ensemble.members, scene.run, None, None, None, scene.events)
-    plans: dict[tuple[object, ...], Plan] = {}
+    plans: dict[tuple[str, str], Plan] = {}
     for method in methods or (None,):
         for dtype in dtypes or (None,):
-            plan = make_plan(ensemble, method, dtype=dtype, fields=observed.fields)
-            # Members whose samples are kept run once more after the statistics.
-            again = observed.keep not in ("all", "none")
-            for one in (plan, make_plan(ensemble, method, dtype=dtype)) if again else (plan,):
-                plans[plan.method.name, plan.dtype, one.spec] = one
+            plan = make_plan(ensemble, method, dtype=dtype)
+            plans[plan.method.name, plan.dtype] = plan
     return list(plans.values())
 
 

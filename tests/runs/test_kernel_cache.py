@@ -1,6 +1,8 @@
 """A kernel cache that is damaged, full, unwritable or left torn: compiled anew, or told; never loaded."""
 
 import errno
+import hashlib
+import json
 import os
 import resource
 import subprocess
@@ -117,7 +119,9 @@ def test_what_is_damaged_is_compiled_anew(cache, damage):
     assert not kernel_cache.is_whole(code)
     forget()
     assert works() and code.read_bytes() == whole and kernel_cache.is_whole(code)
-    assert sorted(path.name for path in cache.iterdir()) == sorted([kernel_cache.LOCKS, code.parent.name])
+    assert sorted(path.name for path in cache.iterdir()) == sorted(
+        [kernel_cache.LOCKS, kernel_cache.HEADERS, code.parent.name]
+    )
 
 
 def test_phases(cache):
@@ -130,6 +134,61 @@ def test_phases(cache):
     forget()
     phases = kernel_cache.load(MODULE)
     assert phases.clang == 0.0 < phases.load and "Clang 0.00 s" in str(phases)
+
+
+@pytest.fixture
+def header(cache):
+    """The precompiled header that the first kernel of a process leaves, seen by the next process, which has to compile."""
+    folders = warp_setup.header_folders()
+    before = dict(folders)
+    folders.clear()
+    assert works()
+    (kept,) = (cache / kernel_cache.HEADERS).glob("*/*.pch")
+    warp_setup.end()
+    only(cache, ".o").unlink()
+    forget()
+    yield kept
+    folders.update(before)
+
+
+def headers_while_it_compiles():
+    """How many precompiled headers Clang finds."""
+    found, load_module = [], wp.load_module
+
+    def load(*asked, **named):
+        found.extend(warp_setup.header_folder().glob("*.pch"))
+        return load_module(*asked, **named)
+
+    with mock.patch.object(wp, "load_module", load):
+        assert works()
+    return len(found)
+
+
+def test_a_precompiled_header_serves_the_next_process(header, capfd):
+    assert headers_while_it_compiles() == 1 and capfd.readouterr() == ("", "")
+
+
+def test_a_damaged_header_is_made_anew(header, capfd):
+    header.write_bytes(header.read_bytes()[:-1000] + bytes(1000))
+    assert headers_while_it_compiles() == 0 and capfd.readouterr() == ("", "")
+    assert kernel_cache.is_whole(header)
+
+
+def test_a_header_that_clang_refuses_is_not_kept(header):
+    header.write_bytes(bytes(1000))
+    sums = {header.name: hashlib.sha256(bytes(1000)).hexdigest()}
+    header.with_name(header.name + kernel_cache.SUMS).write_text(json.dumps(sums))
+    assert headers_while_it_compiles() == 1
+    assert not kernel_cache.is_whole(header)
+
+
+def test_functions_for_gradients_of_structs_are_private(cache):
+    template = kernel_cache.codegen.struct_template
+    visible = "CUDA_CALLABLE void adj_atomic_add({name}* p, {name} t)"
+    assert template.count(visible) == 1  # else Warp writes them in another way, and kernels compile as long as before
+    with kernel_cache.private_gradients():
+        assert kernel_cache.codegen.struct_template == template.replace(visible, f"static {visible}")
+    assert kernel_cache.codegen.struct_template is template
 
 
 def test_what_is_whole_is_not_compiled(cache):
@@ -311,5 +370,5 @@ def test_one_that_is_killed_while_it_compiles_leaves_nothing_for_long(tmp_path):
     subprocess.run([sys.executable, "-c", code], env=env, check=True, timeout=120)
     (cache,) = tmp_path.iterdir()
     names = {path.name for path in cache.iterdir()}
-    assert len(names) == 2 and kernel_cache.LOCKS in names
+    assert len(names) == 3 and {kernel_cache.LOCKS, kernel_cache.HEADERS} < names
     assert [kernel_cache.is_whole(path) for path in cache.rglob("*.o")] == [True]

@@ -38,11 +38,11 @@ def test_every_method_and_precision_has_a_kernel():
         kernels_of(scene, ["psi_q"])
 
 
-def test_kept_members_have_their_own_kernel():
+def test_statistics_and_kept_members_take_the_kernel_of_the_scene():
     scene = lw.Scene.load(PAPER)
     run = dataclasses.replace(scene.run, keep="failed", statistics=(lw.Mean("position"),))
-    kernels = kernels_of(dataclasses.replace(scene, run=run))
-    assert [set(spec.fields) for _, _, spec in kernels] == [{"position"}, set(lw.SaveAt().fields)]
+    watched = dataclasses.replace(scene, run=run)
+    assert kernels_of(watched) == kernels_of(scene) == [("psi_s", "float64", kernel_of_solve(watched))]
 
 
 def test_what_it_says(monkeypatch, capsys):

@@ -55,10 +55,9 @@ def make_advance(spec):
     lead_coefficient = spec.lead[1] if spec.lead is not None else 0.0
     energetic, substepped, stills, warned = spec.energy, spec.substep, spec.still, bool(spec.looks)
     looking = warned or energetic
-    per_sample = sum(spec.sample_fields.values())
     read, write, back_up = make_rows(Lane, types.State, paced, spec.compensated)
     drifts = superpose(spec.laws, "flow") is not None
-    sample = make_sample(Lane, spec.fields, spec.compensated, stepping.method, drifts, stills)
+    sample = make_sample(Lane, spec.compensated, stepping.method, drifts, stills)
 
     @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": CPU_FLAGS})
     def advance(
@@ -86,7 +85,9 @@ def make_advance(spec):
         failed_size: wp.array(dtype=Lane),
         # limits and results of looks
         monitor: Monitor,
-        # out
+        # out: numbers of a sample, and the column of each of SAMPLE_FIELDS among them, -1 if not saved
+        numbers: int,
+        columns: wp.vec4i,
         out: wp.array2d(dtype=Lane),
     ):
         mode = flush_subnormals()
@@ -227,7 +228,7 @@ def make_advance(spec):
                         y = choose(frozen, kept, x)
                     # Backward over its length, the lead of the next step is undone.
                     y = opened(at_step(y, k, h), c, -opening)
-                    sample(out, i, (s - s0) * wp.static(per_sample), y, c, real(h), monitor, frozen)
+                    sample(out, i, (s - s0) * numbers, columns, y, c, real(h), monitor, frozen)
                     s += 1
         if any_frozen:
             x = choose(frozen, kept, x)

@@ -14,6 +14,8 @@ PACE_FIELDS = 4
 
 # Sampled quantity -> numbers per sample, in the order they are written.
 SAMPLE_FIELDS = {"position": 3, "attitude": 9, "velocity": 3, "angular_velocity": 3}
+# Columns at the end of a packet's samples where the fields go that are not saved.
+WASTE = 9
 
 
 def make_rows(Lane, State, paced, compensated):
@@ -74,7 +76,7 @@ def make_rows(Lane, State, paced, compensated):
     return read, write, back_up
 
 
-def make_sample(Lane, fields, compensated, method, drifts, still):
+def make_sample(Lane, compensated, method, drifts, still):
     """The function that writes one sample.
 
     method: see Step; drifts: the water moves; still: a frozen lane keeps the velocity of the water in which it stopped.
@@ -82,33 +84,31 @@ def make_sample(Lane, fields, compensated, method, drifts, still):
     momentum, velocities, water_velocity = method.momentum, method.velocities, method.water_velocity
 
     @wp.func
-    def sample(out: wp.array2d(dtype=Lane), i: int, first: int, x: Any, c: Any, h: Any, monitor: Any, frozen: Lane):
-        """Write the chosen fields of one sample: b, R, nu (that of the water added), Om."""
-        o = first
-        if wp.static("position" in fields):
-            put(out, i, o, x.b)
-            o += 3
-            if wp.static(compensated):
-                put(out, i, o, x.b_low)
-                o += 3
-        if wp.static("attitude" in fields):
-            put(out, i, o, x.R0)
-            put(out, i, o + 3, x.R1)
-            put(out, i, o + 6, x.R2)
-            o += 9
+    def sample(out: wp.array2d(dtype=Lane), i: int, first: int, columns: wp.vec4i, x: Any, c: Any, h: Any, monitor: Any,
+               frozen: Lane):  # fmt: skip
+        """Write b, R, nu (that of the water added) and Om from `first` on, at their columns or, without one, at the row's end.
+
+        The code has no branches, whatever is saved: so the compiler joins the same products with the same sums.
+        """
+        waste = out.shape[1] - wp.static(WASTE)
+        o = wp.where(columns[0] < 0, waste, first + columns[0])
+        put(out, i, o, x.b)
+        if wp.static(compensated):
+            put(out, i, o + 3, x.b_low)
+        o = wp.where(columns[1] < 0, waste, first + columns[1])
+        put(out, i, o, x.R0)
+        put(out, i, o + 3, x.R1)
+        put(out, i, o + 6, x.R2)
         if wp.static(momentum is not None):
             x.p = momentum(x)
         nu, Om = velocities(c.inertia, x.p, x.pi)
-        if wp.static("velocity" in fields):
-            if wp.static(drifts):
-                water = water_velocity(x, c, h)
-                if wp.static(still):
-                    kept = vec3(monitor.still[i, 0], monitor.still[i, 1], monitor.still[i, 2])
-                    water = positive(frozen, kept, water)
-                nu = nu + water
-            put(out, i, o, nu)
-            o += 3
-        if wp.static("angular_velocity" in fields):
-            put(out, i, o, Om)
+        if wp.static(drifts):
+            water = water_velocity(x, c, h)
+            if wp.static(still):
+                kept = vec3(monitor.still[i, 0], monitor.still[i, 1], monitor.still[i, 2])
+                water = positive(frozen, kept, water)
+            nu = nu + water
+        put(out, i, wp.where(columns[2] < 0, waste, first + columns[2]), nu)
+        put(out, i, wp.where(columns[3] < 0, waste, first + columns[3]), Om)
 
     return sample

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import warp as wp
 
 from lgvi_kernels.advance import monitor as monitors
-from lgvi_kernels.advance.rows import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS
+from lgvi_kernels.advance.rows import PACE_FIELDS, STATE_FIELDS
 from lgvi_kernels.lanes.arithmetic import int_lane, lane
 from lgvi_kernels.lanes.state import alarm_struct, inertia_struct, state_struct, struct, view_struct
 from lgvi_kernels.laws import drag
@@ -28,7 +28,6 @@ class Spec(NamedTuple):
     numbers: the declared numbers of each law, then of each event (see params_of).
     mass: shape of M, "isotropic", "diagonal" or "full".
     solver, iterations, adaptive, checked: of equation (24) (see make_solve); unchecked kernels have no alarms at all.
-    fields: the sampled quantities.
     events: modules of events.
     drag: the parts of drag along the axes (by its exact flow, or as rates) that some member has, or none.
     parts: optional fields of the inertia (see inertia_struct).
@@ -60,7 +59,6 @@ class Spec(NamedTuple):
     iterations: int
     adaptive: bool
     checked: bool
-    fields: tuple
     events: tuple = ()
     drag: tuple = ()
     parts: tuple = ()
@@ -124,14 +122,6 @@ class Spec(NamedTuple):
     def state_fields(self) -> int:
         """Numbers of a packet's state."""
         return STATE_FIELDS * (1 + self.compensated) + PACE_FIELDS * self.paced
-
-    @property
-    def sample_fields(self) -> dict[str, int]:
-        """Field -> numbers per sample, in the order in which they are written; a compensated position is b, then b_low."""
-        numbers = {name: SAMPLE_FIELDS[name] for name in self.fields}
-        if self.compensated and "position" in numbers:
-            numbers["position"] = 6
-        return numbers
 
 
 class Types(NamedTuple):

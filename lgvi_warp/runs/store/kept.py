@@ -118,7 +118,7 @@ class KeptRun:
             return 0
         plan = run.plan.subplan(group.members.tolist(), self.fields)
         content = {key: value for key, value in run.provenance.items() if key != "observed"}
-        again = StoredRun(plan, group, content | {"kernel": plan.kernel_hash}, run.messages)
+        again = StoredRun(plan, group, content, run.messages)
         return again.run(executor, progress and _after(progress, members, len(group.members))).ran
 
 

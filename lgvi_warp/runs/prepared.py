@@ -280,10 +280,8 @@ class Prepared:
             fleet.indices = np.zeros(fleet.members, dtype=np.int64)
         if not self._of:
             return self._runner.run(fleet, progress)
-        groups, at_once = (
-            [],
-            PATHS_AT_ONCE if any(each.over_path or each.is_function for each in self._of) else fleet.members,
-        )
+        large = any(each.over_path or each.is_function for each in self._of)
+        at_once, groups = PATHS_AT_ONCE if large else fleet.members, []
         for first in range(0, fleet.members, at_once):
             stop = min(first + at_once, fleet.members)
             group = fleet if stop - first == fleet.members else fleet.subset(np.arange(first, stop))
@@ -292,7 +290,8 @@ class Prepared:
         lost = failed(status) | ~np.isfinite(values).all(axis=1)
         if lost.any():
             if self._refuse:
-                raise FailedMembers([failure_text(status, lost, 'mend what fails, or take NaN for them: failed="nan"')])
+                remedy = 'mend what fails, or take NaN for them: failed="nan"'
+                raise FailedMembers([lost_text(lost, counted(status, values), remedy)])
             values = np.where(lost[:, None], np.nan, values)
         return values[:, 0] if values.shape[1] == 1 else values
 
@@ -317,23 +316,35 @@ def part(progress: Callable[[float], None], begin: float, end: float) -> Callabl
     return lambda fraction: progress(begin + (end - begin) * fraction)
 
 
-def failure_text(status: np.ndarray, lost: np.ndarray, remedy: str) -> str:
+def lost_text(lost: np.ndarray, counts: Mapping[str, int], remedy: str) -> str:
     """Describe how many members failed, and of what.
 
     Args:
-        status: (n,), their status.
         lost: (n,), whether each failed, or a quantity of it is not finite.
+        counts: number of members by cause.
         remedy: what the user can do, which ends the text.
 
     Returns:
         One line of text.
     """
-    causes = {Status(int(code)).name.lower(): int((status == code).sum()) for code in np.unique(status[failed(status)])}
-    odd = int((lost & ~failed(status)).sum())
-    causes |= {"quantity not finite": odd} if odd else {}
-    listed = ", ".join(f"{name} {number}" for name, number in causes.items())
+    causes = ", ".join(f"{name} {number}" for name, number in counts.items() if name != "ok")
     first = int(np.argmax(lost))
-    return f"{int(lost.sum())} of {len(lost)} members failed ({listed}; the first: member {first}); {remedy}"
+    return f"{int(lost.sum())} of {len(lost)} members failed ({causes}; the first: member {first}); {remedy}"
+
+
+def counted(status: np.ndarray, values: np.ndarray) -> dict[str, int]:
+    """Count members by what became of them.
+
+    Args:
+        status: (n,), their status.
+        values: (n, m), their quantities.
+
+    Returns:
+        Name of a status -> number of members, and how many have a quantity that is not finite.
+    """
+    names = {Status(int(code)).name.lower(): int((status == code).sum()) for code in np.unique(status)}
+    odd = int((~np.isfinite(values).all(axis=1)).sum())
+    return names | ({"quantity not finite": odd} if odd else {})
 
 
 def scene_numbers(scene: Any) -> dict[str, np.ndarray]:

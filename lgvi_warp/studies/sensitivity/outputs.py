@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.status import Status, failed
+from lgvi_warp.common.status import failed
 from lgvi_warp.methods.saveat import SaveAt
-from lgvi_warp.runs.prepared import PATHS_AT_ONCE, Runner, part, samples_for
+from lgvi_warp.runs.prepared import PATHS_AT_ONCE, Runner, counted, lost_text, part, samples_for
 from lgvi_warp.runs.prepared import FailedMembers as FailedMembers
 from lgvi_warp.runs.quantities import OfInterest, quantities
 from lgvi_warp.scene.ensemble import Ensemble
@@ -43,10 +43,7 @@ class Outputs:
         Returns:
             One line of text.
         """
-        bad = int(self.failed.sum())
-        causes = ", ".join(f"{name} {number}" for name, number in self.counts.items() if name != "ok")
-        first = int(np.argmax(self.failed))
-        return f"{bad} of {len(self.failed)} members failed ({causes}; the first: member {first}); {remedy}"
+        return lost_text(self.failed, self.counts, remedy)
 
 
 def evaluate(
@@ -99,8 +96,6 @@ def evaluate(
     for interest, columns in zip(interests, values[0], strict=True):
         labels += interest.labels(columns.shape[1])
     ended = np.concatenate(status)
-    finite = np.isfinite(numbers).all(axis=1)
-    names = {Status(int(code)).name.lower(): int((ended == code).sum()) for code in np.unique(ended)}
-    counts = names | ({"quantity not finite": int((~finite).sum())} if not finite.all() else {})
-    failures = failed(ended) | ~finite
+    failures = failed(ended) | ~np.isfinite(numbers).all(axis=1)
+    counts = counted(ended, numbers)
     return Outputs(numbers, tuple(labels), failures, counts, provenance | {"ensemble": fleet.to_dict()})

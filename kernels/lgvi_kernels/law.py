@@ -1,4 +1,4 @@
-"""What the author of a law or of an event imports: lanes, their functions, structs, and functions of a View.
+"""What the author of a law, an event or a controller imports: lanes, their functions, structs, and functions of a View.
 
 A law that writes + - * / between lanes imports `add`, `sub`, `mul`, `div`, `neg` too: Warp looks the operators up by name.
 """
@@ -20,13 +20,26 @@ from lgvi_kernels.lanes.arithmetic import (
     sub,
     vec3,
 )
-from lgvi_kernels.lanes.functions import clamp, cosine, decay, exponential, greatest, logarithm, normals3, root, sine
+from lgvi_kernels.lanes.functions import (
+    arctangent2,
+    clamp,
+    cosine,
+    decay,
+    exponential,
+    greatest,
+    hyperbolic_tangent,
+    logarithm,
+    normals3,
+    root,
+    sine,
+)
 from lgvi_kernels.lanes.noise import normals_over, wandered
 from lgvi_kernels.lanes.state import struct
 from lgvi_kernels.lanes.view import (
     add_outer,
     add_rows,
     command,
+    heading_error,
     make_pursuit,
     middle_of_half,
     ramp,
@@ -46,6 +59,7 @@ __all__ = [
     "add",
     "add_outer",
     "add_rows",
+    "arctangent2",
     "clamp",
     "command",
     "cosine",
@@ -55,6 +69,8 @@ __all__ = [
     "dot",
     "exponential",
     "greatest",
+    "heading_error",
+    "hyperbolic_tangent",
     "int_lane",
     "lane",
     "lane3",

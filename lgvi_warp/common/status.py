@@ -26,6 +26,7 @@ class Status(IntEnum):
     STEP_TOO_SMALL = 5
     ENERGY_GREW = 6
     BACKWARD_DRAG = 7
+    CONTROL_NON_FINITE = 8
     SURFACE = 16
     FLOOR = 17
     BOX = 18
@@ -61,6 +62,7 @@ _TEXT = {
     Status.BACKWARD_DRAG: "this composition takes some stages with a negative step, and the drag is too strong to be "
     "integrated backward: their drag number, (back) (l + q|v|) / I, passed 0.5; use the method that is composed, or shorten "
     "the step",
+    Status.CONTROL_NON_FINITE: "a command of the controller is not finite; check its gains, its sensors and a law of your own",
     Status.SURFACE: "stopped by an event: rose to the surface",
     Status.FLOOR: "stopped by an event: sank to the sea floor",
     Status.BOX: "stopped by an event: left the box",

@@ -165,32 +165,39 @@ class LawArrays:
         struct: Warp's struct of the laws' numbers.
         dtype: its NumPy type.
         Lane: Warp's type of a lane.
+        loop: Warp's struct of the numbers of a controller's parts, with its NumPy type; None (default) without a controller.
 
     Attributes:
         params: the structs.
         table: rows that the laws read.
         memory: what laws and method remember from step to step; the second half is a backup.
+        loop: the structs of a controller's parts; None without one.
     """
 
     table: Lanes
     memory: Lanes
 
-    def __init__(self, packets: int, struct: Any, dtype: np.dtype, Lane: Any):
+    def __init__(self, packets: int, struct: Any, dtype: np.dtype, Lane: Any, loop: tuple[Any, np.dtype] | None = None):
         self._packets, self._Lane = packets, Lane
         self.params = Structs(struct, dtype)
+        self.loop = Structs(*loop) if loop else None
         self._places: Any = None
 
-    def write(self, laws: Sequence[Packed], shared: Sequence[bool], scratch: int = 0) -> None:
-        """Write what the terms packed.
+    def write(
+        self, laws: Sequence[Packed], shared: Sequence[bool], scratch: int = 0, parts: int = 0, bus: int = 0
+    ) -> None:
+        """Write what the terms packed, and the parts of a controller.
 
         Args:
-            laws: what each term packed.
+            laws: what each term packed, then each part.
             shared: for each, whether all members share it, and earlier calls brought the same.
             scratch: rows that the method remembers for itself (default 0).
+            parts: how many of them are parts of a controller (default 0).
+            bus: rows of the memory before theirs (default 0).
         """
         rows = [_present(law.rows) for law in laws]
         starts = [part for law in laws for part in (_present(law.memory), np.zeros((1, law.work)))]
-        row, memory, places = 1, 0, []
+        row, memory, places = 1, bus, []
         for law, part in zip(laws, rows, strict=True):
             work = memory + memory_rows(law) - law.work
             wanted = ("first", row, law.rows), ("memory", memory, law.memory), ("work", work, law.work or None)
@@ -200,10 +207,15 @@ class LawArrays:
         if moved:
             # A law may have as many rows as its members need: those after it, though shared, then lie elsewhere.
             self.params.forget()
+            if self.loop is not None:
+                self.loop.forget()
             self._places = places, row, memory
-        self.params.write(self._packets, nested(laws, shared, places))
+        n = len(laws) - parts
+        self.params.write(self._packets, nested(laws[:n], shared[:n], places[:n]))
+        if self.loop is not None:
+            self.loop.write(self._packets, nested(laws[n:], shared[n:], places[n:]))
         self._write_table(rows, shared, row, moved)
-        self._write_memory(starts, memory + scratch, moved)
+        self._write_memory(starts, bus, memory + scratch, moved)
 
     def _write_table(self, each: list[np.ndarray], shared: Sequence[bool], size: int, moved: bool) -> None:
         """Write the laws' rows; the first row of the table is none's."""
@@ -217,10 +229,10 @@ class LawArrays:
                 put_rows(self.table.view[:, first : first + rows.shape[1]], rows)
             first += rows.shape[1]
 
-    def _write_memory(self, parts: list[np.ndarray], half: int, moved: bool) -> None:
+    def _write_memory(self, parts: list[np.ndarray], first: int, half: int, moved: bool) -> None:
         if moved:
             self.memory = Lanes(self._packets, 2 * half, self._Lane)
-        view, first = self.memory.view, 0
+        view = self.memory.view
         view[...] = 0.0
         for part in parts:
             put_rows(view[:, first : first + part.shape[1]], part)

@@ -5,7 +5,7 @@ Decided once for a run from a survey of all members; the members' own numbers co
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,8 @@ from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.engine.survey import COUPLINGS, SHAPES_OF_MASS, UNCOUPLED, Survey
 from lgvi_warp.methods.method import FORCED, Method, Program, divided, merged, simplified, with_hops
 from lgvi_warp.physics import terms, vehicle
+from lgvi_warp.physics.control.base import Part
+from lgvi_warp.physics.control.controller import Controller
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.physics.terms.drag import PARTS, Drag
 from lgvi_warp.physics.terms.noisy import NoisyTerm
@@ -44,6 +46,8 @@ class KernelChoice:
         conservative: whether no force creates energy and the kernel knows the potential of every force.
         steady: whether forces are constant in inertial axes.
         odd: what the user should know about the members' numbers.
+        controller: the scene's controller, as it is for these members; None for none.
+        parts_of_control: its parts with the modules of their device code, in the order in which they act.
     """
 
     aligned: bool
@@ -63,6 +67,8 @@ class KernelChoice:
     conservative: bool
     steady: bool
     odd: Oddities
+    controller: Controller | None = None
+    parts_of_control: tuple[tuple[Part, Any], ...] = ()
 
 
 def choose_kernel(
@@ -90,7 +96,9 @@ def choose_kernel(
         SceneError: if the method cannot do what the scene asks, or a law's device code is unusable.
     """
     explicit = method.tableau is not None
-    acting = _acting(ensemble, facts, built_in)
+    controller = _controller(ensemble, facts)
+    control = tuple((part, device_module(part, part.device, built_in)) for part in controller.acting_parts) if controller else ()
+    acting = _acting(ensemble, facts, built_in, controller)
     events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)
     damping = any(hasattr(module, "damping") for term, module in acting if not isinstance(term, Drag))
     flow = max((getattr(module, "FLOW", "none") for _, module in acting), key=FLOWS.index, default="none")
@@ -132,11 +140,12 @@ def choose_kernel(
         lead, maps = None, program
     conservative = checked and _conservative(facts, acting, built_in)
     # Events, water and the potential are evaluated at the user's origin, or at that of the forces.
-    elsewhere = bool(events) or flow != "none" or (conservative and facts.apart)
+    elsewhere = controller is not None or bool(events) or flow != "none" or (conservative and facts.apart)
     parts = {"rates": explicit,
              "turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
              "modified": method.two_part, "dense": dense, "water": flow in ("uniform", "varying"),
-             "origin": bool(elsewhere and (facts.moved or facts.forces_moved))}  # fmt: skip
+             "origin": bool(elsewhere and (facts.moved or facts.forces_moved)),
+             "axes": controller is not None and facts.turned_axes}  # fmt: skip
     return KernelChoice(
         aligned=not facts.turned,
         moved=facts.moved,
@@ -147,7 +156,7 @@ def choose_kernel(
         flow=flow,
         parts=tuple(name for name, wanted in parts.items() if wanted),
         coupling=tuple(i in facts.couplings for i in range(len(COUPLINGS))),
-        timed=any(term.timed for term, _ in (*acting, *events)),
+        timed=any(term.timed for term, _ in (*acting, *events)) or facts.delayed,
         memory=memory or method.gauss > 0,
         program=maps,
         lead=lead,
@@ -155,7 +164,17 @@ def choose_kernel(
         conservative=conservative,
         odd=facts.odd,
         steady=not drag and flow in ("none", "steady") and all(_steady(module) for _, module in acting),
+        controller=controller,
+        parts_of_control=control,
     )
+
+
+def _controller(ensemble: Ensemble, facts: Survey) -> Controller | None:
+    """The scene's controller, with a delay where some member has one."""
+    controller: Controller | None = ensemble.scene.controller
+    if controller is None or controller.bus is None:
+        return None
+    return controller.on(controller.bus._replace(delayed=facts.delayed))
 
 
 def _steady(module: Any) -> bool:
@@ -235,7 +254,7 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
     Raises:
         SceneError: if the module is not known, lacks a struct or all roles, or a role has a wrong signature.
     """
-    folder, roles = ("laws", ROLES) if term.acts else ("stops", ("distance",))
+    folder, roles = _folder_and_roles(term)
     module = built_in(folder, device) if isinstance(device, str) else device
     faults = Faults()
     if module is None:
@@ -256,6 +275,13 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
             faults.add(f"{term.key}.FLOW", flow, "is not known", closest(str(flow), FLOWS))
     faults.raise_if_any()
     return module
+
+
+def _folder_and_roles(term: Term) -> tuple[str, Sequence[str]]:
+    """Where the built-in device code of a term, an event or a part of a controller is, and what it may define."""
+    if isinstance(term, Part):
+        return "laws.control", tuple(ARGUMENTS)
+    return ("laws", ROLES) if term.acts else ("stops", ("distance",))
 
 
 def is_built_in(module: Any) -> bool:
@@ -282,6 +308,8 @@ def declared(term: Term, module: Any) -> tuple[tuple[str, Any], ...]:
         lgvi_kernels.maps.compose).
     """
     numbers = (getattr(module, "params", None) is None and term.lanes()) or ()
+    if term.driver is not None:
+        return (*numbers, ("commands", "delayed" if term.driver.delayed else "held"))
     if isinstance(term, NoisyTerm):
         return (*numbers, ("key", "step" if term.noise_step is None else "grid"))
     return numbers
@@ -292,24 +320,30 @@ def _check_signature(faults: Faults, term: Term, module: Any, role: str) -> None
     function = getattr(module, role, None)
     if function is None:
         return
-    wanted = 2 if role == "distance" else 3
+    arguments = ARGUMENTS.get(role, "view, p" if role == "distance" else "w, view, p")
+    wanted = arguments.count(",") + 1
     names = list(getattr(function, "input_types", {}))
     if not names:
         faults.add(f"{term.key}.{role}", function, "is not a Warp function", "decorate it with @wp.func")
     elif len(names) != wanted:
-        remedy = f"write {role}{'(view, p)' if wanted == 2 else '(w, view, p)'}"
+        remedy = f"write {role}({arguments})"
         faults.add(f"{term.key}.{role}", f"({', '.join(names)})", f"takes {len(names)} arguments", remedy)
 
 
 ROLES = ("law", "damping", "flow", "evolve", "follow")
+# Roles of a controller's parts, with their arguments.
+ARGUMENTS = {"measure": "y, p", "guide": "r, y, p", "control": "w, r, y, p", "allocate": "w, y, p", "send": "y, p"}
 # How water may move, the most special first.
 FLOWS = ("none", "steady", "uniform", "varying")
 
 
-def _acting(ensemble: Ensemble, facts: Survey, built_in: Callable[[str, str], Any]) -> list[tuple[Term, Any]]:
+def _acting(
+    ensemble: Ensemble, facts: Survey, built_in: Callable[[str, str], Any], controller: Controller | None
+) -> list[tuple[Term, Any]]:
     """Terms that affect at least one member, with their device code, in a fixed order."""
     acting = [(term, built_in("laws", term.device)) for term in terms.IMPLIED]
-    acting += [(term, device_module(term, term.device_in(not facts.turned), built_in)) for term in ensemble.scene.terms]
+    listed = [term.driven_by(controller.bus) if term.driver and controller else term for term in ensemble.scene.terms]
+    acting += [(term, device_module(term, term.device_in(not facts.turned), built_in)) for term in listed]
     return [(term, module) for term, module in acting if term.key in facts.felt]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import warp as wp
 
 from lgvi_kernels.advance.events import FIRST
+from lgvi_kernels.advance.feeding import NOTED
 from lgvi_kernels.advance.monitor import ENERGY_FIELDS
 from lgvi_kernels.advance.rows import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS, WASTE
 from lgvi_kernels.lanes.arithmetic import int_lane
@@ -41,10 +42,10 @@ class Packets:
         self.plan = plan
         width, types = plan.spec.width, plan.advance.types
         self.count = -(-members.count // width)
-        structs = (types.Inertia, types.Params, types.Events, types.Limits)
-        inertia, params, events, limits = zip(structs, plan.dtypes, strict=True)
+        structs = (types.Inertia, types.Params, types.Events, types.Limits, *([types.Loop] if types.Loop else []))
+        inertia, params, events, limits, *loop = zip(structs, plan.dtypes, strict=True)
         self.inertia, self.events, self._limits = (Structs(*kind) for kind in (inertia, events, limits))
-        self.laws = LawArrays(self.count, *params, types.Lane)
+        self.laws = LawArrays(self.count, *params, types.Lane, *loop)
         self.state_lanes = Lanes(self.count, plan.spec.state_fields, types.Lane)
         self._rows = np.empty((self.count * width, plan.spec.state_fields))
         self.status = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
@@ -92,8 +93,13 @@ class Packets:
         self.frame, self.scale = packing.frame, packing.scale
         shared, before = plan.shared.keeps, self._arrays() if self._launch else []
         self.inertia.write(self.count, [((), packing.inertia(), shared("inertia"))])
-        laws, events = packing.laws(), packing.events()
-        self.laws.write(laws, [shared(("law", i)) for i in range(len(laws))], packing.scratch(laws))
+        laws, events, parts = packing.laws(), packing.events(), packing.control()
+        known = [shared((kind, i)) for kind, each in (("law", laws), ("part", parts)) for i in range(len(each))]
+        bus, _ = self._bus()
+        everything = [*laws, *parts]
+        self.laws.write(everything, known, packing.scratch(everything, bus), len(parts), bus)
+        if self.laws.loop is not None:
+            self.monitor.loop = self.laws.loop.array
         self.events.write(self.count, nested(events, [shared(("event", i)) for i in range(len(events))]))
         if plan.spec.looks:
             self._limits.write(self.count, [((), self._watched_limits(), False)])
@@ -123,7 +129,8 @@ class Packets:
     def _arrays(self) -> list[Any]:
         """The kernel's arrays that `refill` may replace, its first arguments in front."""
         laws, limits = self.laws, self._limits.array
-        return [self.inertia.array, laws.params.array, self.events.array, laws.table.array, self.memory, limits]
+        arrays = [self.inertia.array, laws.params.array, self.events.array, laws.table.array, self.memory, limits]
+        return arrays + ([laws.loop.array] if laws.loop else [])
 
     def _written_by_the_kernel(self) -> list[Any]:
         monitor, spec = self.monitor, self.plan.spec
@@ -131,6 +138,14 @@ class Packets:
         arrays += [monitor.warned, monitor.warned_step, monitor.warned_size] if spec.looks else []
         parts = ("energy", spec.energy), ("substeps", spec.substep), ("still", spec.still)
         return arrays + [getattr(monitor, name) for name, present in parts if present]
+
+    def _bus(self) -> tuple[int, int]:
+        """Rows of the controller's bus, and the first of those where frozen lanes keep their signals."""
+        controller = self.plan.kernel_choice.controller
+        if controller is None:
+            return 0, 0
+        kept = controller.bus.rows + sum(NOTED[name] for name in self.plan.spec.control.noted)
+        return kept + len(self.plan.signal_rows), kept
 
     def _monitor(self) -> Any:
         """The arrays where the kernel notes what it saw at intervals."""
@@ -145,6 +160,12 @@ class Packets:
             monitor.backward = -plan.grid.h * min(0.0, *plan.method.stages)
         if plan.spec.substep:
             monitor.substeps = wp.zeros(self.count, dtype=Ints, device="cpu")
+        if plan.spec.control:
+            controller, rows = plan.kernel_choice.controller, plan.signal_rows
+            monitor.every, monitor.commands = controller.every(plan.grid.h), controller.bus.count
+            monitor.bus, monitor.kept = controller.bus.rows, self._bus()[1]
+            monitor.signals = wp.array(np.array(rows, np.int32), dtype=wp.int32, device="cpu")
+            monitor.first_signals = wp.zeros((self.count, max(1, len(rows))), dtype=Lane, device="cpu")
         if plan.spec.still:
             monitor.still = wp.zeros((self.count, 3), dtype=Lane, device="cpu")
         return monitor

@@ -105,6 +105,8 @@ class Packing:
             fields |= modified_inertia.fields(frame.J / scale[:, None])
         if "water" in parts:
             fields |= _water(numbers, frame)
+        if "axes" in parts:
+            fields["axes"] = frame.Q
         if "origin" in parts:
             fields["user_origin"] = -frame.vector(frame.origin)
             fields["user_origin_forces"] = -frame.vector(frame.forces)
@@ -129,6 +131,20 @@ class Packing:
             return term.packed_exact(parameters, frame, self._scale(frame))
         return term.packed_directions(parameters, self._context(numbers))
 
+    def control(self) -> list[Packed]:
+        """The numbers of each part of the controller.
+
+        Returns:
+            What each part packs, in the order in which they act.
+        """
+
+        def pack(part: Any, numbers: Any) -> Packed:
+            packed: Packed = part.packed(Ensemble.own(part, numbers), self._context(numbers))
+            return packed
+
+        each = enumerate(part for part, _ in self.plan.kernel_choice.parts_of_control)
+        return [self._shared(("part", i), functools.partial(pack, part)) for i, part in each]
+
     def events(self) -> list[Packed]:
         """The numbers of each event.
 
@@ -143,18 +159,19 @@ class Packing:
         each = enumerate(event for event, _ in self.plan.kernel_choice.events)
         return [self._shared(("event", i), functools.partial(pack, event)) for i, event in each]
 
-    def scratch(self, laws: Sequence[Packed]) -> int:
+    def scratch(self, laws: Sequence[Packed], bus: int = 0) -> int:
         """Rows of the memory that the method keeps for itself.
 
         Args:
-            laws: what each term packs.
+            laws: what each term packs, and each part of the controller.
+            bus: rows of the memory before theirs (default 0).
 
         Returns:
             Their number.
         """
         spec = self.plan.spec
         if spec.memory and spec.explicit is not None and spec.explicit.goes_back:
-            return sum(memory_rows(law) for law in laws)
+            return bus + sum(memory_rows(law) for law in laws)
         # Gauss collocation: the slopes of the last step, and room for their extrapolation.
         return 2 * len(spec.gauss[1]) * SLOPE_FIELDS if spec.gauss else 0
 

@@ -14,9 +14,10 @@ import numpy as np
 import warp as wp
 
 from lgvi_kernels import built_in
-from lgvi_kernels.advance.kernel import Advance, make_advance
 from lgvi_kernels.advance.rows import SAMPLE_FIELDS
-from lgvi_kernels.advance.spec import CHUNK, Spec
+from lgvi_kernels.advance.feeding import NOTED
+from lgvi_kernels.advance.kernel import Advance, make_advance
+from lgvi_kernels.advance.spec import CHUNK, Control, Spec
 from lgvi_kernels.lanes.arithmetic import WIDTHS
 from lgvi_kernels.maps.explicit import Explicit
 from lgvi_warp.common.errors import Faults, SceneError
@@ -123,6 +124,7 @@ class Plan:
         check_backward_drag(self.ensemble, choice, self.method, self.grid.h)
         self._check_substep()
         self._check_noise_steps()
+        self._check_looks()
         if self.width is None:
             width, source = default_width(self._kind(), self.dtype)
             object.__setattr__(self, "width", width)
@@ -151,6 +153,9 @@ class Plan:
         if self.on_failure != "substep":
             return
         faults, name = Faults(), self.method.name
+        if self.kernel_choice.controller is not None:
+            why = "remembers what a step that is made again would change"
+            faults.add("on_failure", "substep", f"the controller {why}", 'use on_failure="freeze", or a shorter step')
         program, lead = self.kernel_choice.program, self.kernel_choice.lead
         letters = {letter for letter, _ in (*program, *([lead] if lead else []))}
         if self.method.gauss:
@@ -166,6 +171,13 @@ class Plan:
                     "draws its noise once a step" if noisy else "remembers what a step that is made again would change"
                 )
                 faults.add("on_failure", "substep", f"{term.key} {why}", 'use on_failure="freeze", or a shorter step')
+        faults.raise_if_any()
+
+    def _check_looks(self) -> None:
+        """Refuse a period or a delay of the controller that is no whole number of steps."""
+        controller, faults = self.kernel_choice.controller, Faults()
+        if controller is not None:
+            controller.check_step(faults, self.grid.h)
         faults.raise_if_any()
 
     def _check_noise_steps(self) -> None:
@@ -308,7 +320,7 @@ class Plan:
             coupling=choice.coupling,
             flow=choice.flow,
             timed=choice.timed,
-            memory=choice.memory,
+            memory=choice.memory or choice.controller is not None,
             averages=choice.averages,
             composed=len(self.method.stages) > 1,
             paired=self.method.halved or (self.method.two_part and not choice.lead),
@@ -320,7 +332,25 @@ class Plan:
             energy=choice.conservative,
             backward=checked and back,
             substep=self.on_failure == "substep",
+            control=self._control(),
         )
+
+    def _control(self) -> Control | None:
+        parts = self.kernel_choice.parts_of_control
+        if self.kernel_choice.controller is None:
+            return None
+        numbers = tuple(declared(part, module) for part, module in parts)
+        return Control(tuple(module for _, module in parts), numbers, tuple(name for name in NOTED if name in self.noted))
+
+    @property
+    def noted(self) -> frozenset[str]:
+        """What each look of the controller notes for the samples, among NOTED."""
+        return frozenset()
+
+    @property
+    def signal_rows(self) -> tuple[int, ...]:
+        """Rows of the memory that are saved with each sample."""
+        return ()
 
     def _kind(self) -> str:
         """The kind of kernel for which a width is chosen, one of widths.KINDS."""
@@ -397,7 +427,7 @@ class Plan:
 
     @functools.cached_property
     def dtypes(self) -> tuple[np.dtype, ...]:
-        """NumPy dtypes of the kernel's structs Inertia, Params, Events and Limits, in this order."""
+        """NumPy dtypes of the kernel's structs Inertia, Params, Events and Limits, and of Loop where there is a controller."""
         return _dtypes(self.advance)
 
     @functools.cached_property
@@ -460,4 +490,5 @@ class Plan:
 def _dtypes(advance: Advance) -> tuple[np.dtype, ...]:
     """Kept by kernel, since plans of one kernel are many and Warp takes long to tell."""
     types = advance.types
-    return tuple(np.dtype(kind.numpy_dtype()) for kind in (types.Inertia, types.Params, types.Events, types.Limits))
+    kinds = (types.Inertia, types.Params, types.Events, types.Limits, *([types.Loop] if types.Loop else []))
+    return tuple(np.dtype(kind.numpy_dtype()) for kind in kinds)

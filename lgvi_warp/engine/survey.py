@@ -104,6 +104,8 @@ class Survey:
         weightless: gravity is zero.
         buoyant: buoyancy is not zero.
         odd: what is odd about the members' numbers.
+        delayed: the commands of a controller are delayed.
+        turned_axes: axes other than the user's, even if only in their order or sense.
     """
 
     turned: bool
@@ -121,6 +123,8 @@ class Survey:
     weightless: bool
     buoyant: bool
     odd: Oddities
+    delayed: bool = False
+    turned_axes: bool = False
 
     @property
     def decisive(self) -> tuple[Any, ...]:
@@ -279,6 +283,8 @@ def _seen(
         rising=frozenset(key for key, yes in rising.items() if yes),
         weightless=shared("weightless", p, lambda numbers: bool(np.any(numbers["environment.gravity"] == 0.0))),
         buoyant=shared("buoyant", p, lambda numbers: bool(np.any(numbers["vehicle.buoyancy"]))),
+        delayed="controller.delay" in p
+        and shared("delayed", p, lambda numbers: bool(np.any(numbers["controller.delay"] > 0.0))),
         odd=of_numbers(scene, p, first, stop, shared) if odd else Oddities({}),
     )
 
@@ -287,6 +293,7 @@ def _facts(frame: Frame, U: np.ndarray, coupling: np.ndarray) -> dict[str, Any]:
     """What a survey says of the axes and origins of some members."""
     return {
         "turned": not frame.aligned,
+        "turned_axes": bool(np.any(frame.Q != np.eye(3))),
         "coupled": frame.coupled,
         "moved": bool(np.any(frame.origin)),
         "forces_moved": bool(np.any(frame.forces)),

@@ -337,7 +337,7 @@ class Ensemble:
     def _look_at(self, varied: set[str], first: int, stop: int, p: Mapping[str, np.ndarray]) -> dict[str, _Unphysical]:
         with np.errstate(over="ignore", invalid="ignore"):
             checks = _vehicle_checks(p, varied, self.scene.vehicle.inertia_tolerance)
-            for term in (*self.scene.terms, *self.scene.events):
+            for term in self.scene.parts:
                 numbers = self.own(term, p)
                 if any(f"{term.key}.{name}" in varied for name in numbers):
                     checks |= {f"{term.key}.{name}": bad for name, bad in term.unphysical(numbers).items()}

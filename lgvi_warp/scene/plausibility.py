@@ -163,7 +163,7 @@ def depths(scene: SceneLike, p: Numbers) -> Iterator[Look]:
         Name of the quantity, mask of the odd members, and the text about one of them. A table of depths is odd if it
         begins above the surface and holds no depth below it.
     """
-    for term in (*scene.terms, *scene.events):
+    for term in scene.parts:
         field = DEPTHS.get(term.type)
         if field is not None:
             values, surface = p[f"{term.key}.{field}"], LIMITS["depth"].value

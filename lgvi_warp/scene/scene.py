@@ -14,6 +14,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.names import alike, folded
 from lgvi_warp.physics import terms
+from lgvi_warp.physics.control.controller import from_table
 from lgvi_warp.physics.terms import events
 from lgvi_warp.physics.vehicle import Vehicle
 from lgvi_warp.sampling.distributions.named import from_dict as distribution_from_dict
@@ -37,7 +38,7 @@ class Scene:
         environment: Gravity and water, as lw.Environment(...); by default the standard values.
         terms: What else acts, such as lw.Drag(...), or tables as in a scene file.
         start: The state at t = 0, as lw.Start(...); by default at rest at the origin.
-        controller: Must be None: this version has no controllers.
+        controller: What steers the vehicle, as lw.Controller(...) or a table as in a scene file; None, the default, for none.
         run: Settings of the run, the section [run] of a scene file.
         ensemble_settings: What varies, the section [ensemble] of a scene file; None if nothing does.
         events: What stops a member, such as lw.Surface(), or tables as in a scene file.
@@ -62,20 +63,45 @@ class Scene:
             object.__setattr__(self, "terms", terms.from_list(self.terms))
         with faults.including():
             object.__setattr__(self, "events", events.from_list(self.events))
+        with faults.including():
+            object.__setattr__(self, "controller", from_table(self.controller))
         if not faults:
             self._check_names(faults)
-        if self.controller is not None:
-            remedy = "leave it out; a held or scheduled wrench and thrusters' commands are terms"
-            faults.add("controller", self.controller, "is not known to this version", remedy)
+        if not faults:
+            with faults.including():
+                self._connect()
         for name, kind in KINDS.items():
             if not isinstance(getattr(self, name), kind):
                 faults.add(name, getattr(self, name), f"is no {kind.__name__}", f"give lw.{kind.__name__}(...)")
         faults.raise_if_any()
 
+    def _connect(self) -> None:
+        """Let terms take the commands of the controller, if there is one; others are by themselves."""
+        bus = None
+        if self.controller is not None:
+            object.__setattr__(self, "controller", self.controller.wired(self.terms))
+            bus = self.controller.bus
+        driven = set(bus.commands) if bus else set()
+        wired = (term.driven_by(bus if term.key in driven else None) for term in self.terms)
+        object.__setattr__(self, "terms", tuple(wired))
+
+    @property
+    def parts(self) -> tuple[Any, ...]:
+        """Everything that has numbers of its own: terms, events, and the parts of the controller."""
+        parts = () if self.controller is None else (self.controller.delay_part, *self.controller.parts)
+        return (*self.terms, *self.events, *parts)
+
     def _check_names(self, faults: Faults) -> None:
         """Require different names of all terms and events, on every file system."""
-        keys = [term.key for term in (*self.terms, *self.events)]
+        parts = () if self.controller is None else self.controller.parts
+        keys = [term.key for term in (*self.terms, *self.events, *parts)]
         counts = Counter(keys)
+        for key in sorted({part.key for part in parts}):
+            if folded(key) in (*terms.RESERVED, "controller"):
+                faults.add("controller", key, "is the name of a section of the scene", f'write name = "{key}_part"')
+            elif counts[key] > 1:
+                faults.add("controller", key, "is the name of two parts or of a term too",
+                           f'give each a name of its own: name = "{key}_2"')  # fmt: skip
         for key in sorted({event.key for event in self.events}):
             if folded(key) in terms.RESERVED:
                 faults.add("events", key, "is the name of a section of the scene", f'write name = "{key}_event"')
@@ -100,7 +126,7 @@ class Scene:
         values = {f"vehicle.{name}": value for name, value in self.vehicle.parameters().items()}
         values["environment.gravity"] = np.asarray(float(self.environment.gravity))
         values["environment.water_density"] = np.asarray(float(self.environment.water_density))
-        for term in (*self.terms, *self.events):
+        for term in self.parts:
             values |= {f"{term.key}.{name}": value for name, value in term.parameters().items()}
         return values
 
@@ -166,6 +192,8 @@ class Scene:
         }
         if self.terms:
             content["terms"] = [term.to_dict() for term in self.terms]
+        if self.controller is not None:
+            content["controller"] = self.controller.to_dict()
         if self.events:
             content["events"] = [event.to_dict() for event in self.events]
         return content | ({"ensemble": self.ensemble_settings.to_dict()} if self.ensemble_settings else {})

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import warp as wp
 
 from lgvi_kernels.advance.events import FIRST
+from lgvi_kernels.advance.feeding import make_note_actuators, make_signals
 from lgvi_kernels.advance.retry import make_retry
 from lgvi_kernels.advance.rows import make_rows, make_sample
 from lgvi_kernels.advance.spec import CHUNK, Types, make_types
@@ -55,9 +56,13 @@ def make_advance(spec):
     lead_coefficient = spec.lead[1] if spec.lead is not None else 0.0
     energetic, substepped, stills, warned = spec.energy, spec.substep, spec.still, bool(spec.looks)
     looking = warned or energetic
+    controlled, feed, held = spec.control is not None, stepping.feed, stepping.held
     read, write, back_up = make_rows(Lane, types.State, paced, spec.compensated)
     drifts = superpose(spec.laws, "flow") is not None
     sample = make_sample(Lane, spec.compensated, stepping.method, drifts, stills)
+
+    keep_signals, sample_signals = make_signals(Lane)
+    note_actuators = make_note_actuators(spec, types.View, at_step) if controlled else stepping.method.step
 
     @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": CPU_FLAGS})
     def advance(
@@ -103,6 +108,8 @@ def make_advance(spec):
         c.entry = i % table.shape[0]
         if wp.static(watched):
             c.events = events[i % events.shape[0]]
+        if wp.static(controlled):
+            c.loop = monitor.loop[i % monitor.loop.shape[0]]
         if wp.static(dragged):
             c.drag = prepare(DragFlow(), c.params.own, real(h))
         stages = lead_h.shape[0] - 1
@@ -129,7 +136,24 @@ def make_advance(spec):
         if k0 == 0:
             if wp.static(looking):
                 begin(x, c, monitor, h, frozen)
+            if wp.static(controlled):
+                x.alarm = Alarm()
+                x.alarm = feed(x, c, monitor, 0, h, real(0.0))
+                note_actuators(x, c, h, 0)
+                for j in range(monitor.signals.shape[0]):
+                    monitor.first_signals[i, j] = memory[i, monitor.signals[j]]
             x = opened(x, c, opening)
+            if wp.static(controlled and checked):
+                early = failures(x, frozen)
+                if any_positive(early):
+                    for j in range(wp.static(width)):
+                        if early[j] > real(0.0):
+                            status[i][j] = int(early[j])
+                    keep_signals(memory, i, monitor, 0, early)
+                    kept = choose(early, x, kept)
+                    frozen = frozen + early
+                    any_frozen = True
+                    x = choose(frozen, at_rest(x), x)
         k = k0
         s = s0
         if wp.static(looking):
@@ -144,13 +168,19 @@ def make_advance(spec):
             if singles > 0:
                 n = 1
             good = x
+            if wp.static(controlled and checked):
+                if singles > 0:
+                    # Where a lane fails in this step, its actuators are those of the step's start.
+                    note_actuators(x, c, h, k)
             if wp.static(remembers and checked):
                 back_up(memory, i, 0, 1)
             x.alarm = Alarm()
             if wp.static(paced):
                 # A lane with a code does not count when the packet chooses its step.
                 x.alarm.code = frozen
-            if wp.static(apart):
+            if wp.static(controlled):
+                x = held(x, c, monitor, k, n, h, stage_h, lead_h, first_h, opening)
+            elif wp.static(apart):
                 x = stepped(x, c, monitor, k, n, h, stage_h, lead_h, first_h, opening)
             else:
                 for j in range(n):
@@ -196,12 +226,17 @@ def make_advance(spec):
                             if wp.static(remembers):
                                 # The search left the memory of a part: make the step once more for the lanes that go on.
                                 back_up(memory, i, 1, 0)
-                                begun = one_step(begun, c, monitor, k, h, stage_h, lead_h, first_h, opening)
+                                if wp.static(controlled):
+                                    begun = held(begun, c, monitor, k, 1, h, stage_h, lead_h, first_h, opening)
+                                else:
+                                    begun = one_step(begun, c, monitor, k, h, stage_h, lead_h, first_h, opening)
                         for j in range(wp.static(width)):
                             if code[j] > real(0.0):
                                 status[i][j] = int(code[j])
                                 failed_step[i][j] = k
                                 failed_size[i][j] = x.alarm.size[j]
+                        if wp.static(controlled):
+                            keep_signals(memory, i, monitor, memory.shape[1] // 2, code)
                         kept = choose(code, landed, kept)
                         frozen = frozen + code
                         any_frozen = True
@@ -229,6 +264,9 @@ def make_advance(spec):
                     # Backward over its length, the lead of the next step is undone.
                     y = opened(at_step(y, k, h), c, -opening)
                     sample(out, i, (s - s0) * numbers, columns, y, c, real(h), monitor, frozen)
+                    if wp.static(controlled):
+                        note_actuators(x, c, h, k)
+                        sample_signals(out, i, (s - s0 + 1) * numbers, memory, monitor, frozen)
                     s += 1
         if any_frozen:
             x = choose(frozen, kept, x)

@@ -75,12 +75,15 @@ def seen_struct(width, real):
 
 
 @functools.cache
-def monitor_struct(width, real, rows, energy, backward, substep, still):
+def monitor_struct(width, real, rows, energy, backward, substep, still, loop=None):
     """The kernel's argument: limits, one entry or one a packet, and the results of looks, by packet.
 
     warned: bits; warned_step and warned_size: steps made at the first crossing of the most serious row, and its square.
     energy: rows of ENERGY_FIELDS. backward: the part of h that stages go back at once. substeps: steps that were divided.
     still: R^T u where and when a lane was frozen, three rows.
+    loop: of a controller, one entry or one a packet, the struct given; every: steps between its looks. commands: how many there
+    are, in the first rows of the memory; bus: the first row of what looks note. signals: rows of the memory that are saved with each sample; kept: the first of as
+    many rows, what frozen lanes save; first_signals: what they are at the start.
     """
     Lane, Ints = lane(width, real), int_lane(width)
     fields = {}
@@ -96,6 +99,10 @@ def monitor_struct(width, real, rows, energy, backward, substep, still):
         fields["substeps"] = wp.array(dtype=Ints)
     if still:
         fields["still"] = wp.array2d(dtype=Lane)
+    if loop is not None:
+        fields |= {"loop": wp.array(dtype=loop), "every": wp.int32, "commands": wp.int32, "bus": wp.int32}
+        fields["kept"] = wp.int32
+        fields |= {"signals": wp.array(dtype=wp.int32), "first_signals": wp.array2d(dtype=Lane)}
     return struct("Monitor", **fields) if fields else struct("NoMonitor", unused=wp.uint8)
 
 

@@ -16,6 +16,19 @@ from lgvi_kernels.maps.compose import params_of
 CHUNK = 128
 
 
+class Control(NamedTuple):
+    """What a scene's controller puts into its kernel.
+
+    parts: modules of its parts, sensors first, then guidance, laws, allocation, and what commands pass on their way.
+    numbers: the declared numbers of each part (see params_of).
+    noted: what each look notes for samples, among NOTED.
+    """
+
+    parts: tuple
+    numbers: tuple
+    noted: tuple = ()
+
+
 class Spec(NamedTuple):
     """Everything that decides the code of a kernel, and nothing else: it is the key by which kernels are cached.
 
@@ -46,6 +59,7 @@ class Spec(NamedTuple):
     energy: whether its growth is a failure.
     backward: whether drag is checked for stages that go backward.
     substep: whether a step that has no solution is divided.
+    control: of a scene with a controller, else None.
     """
 
     width: int
@@ -77,6 +91,7 @@ class Spec(NamedTuple):
     energy: bool = False
     backward: bool = False
     substep: bool = False
+    control: Control | None = None
 
     @property
     def watched(self) -> bool:
@@ -128,6 +143,7 @@ class Types(NamedTuple):
     """The types of a kernel: lanes, the structs of lanes/state.py, and the kernel's arguments.
 
     Constants: all that is the same in every step of a packet. DragFlow: the constants of drag by its exact flow.
+    Loop: the numbers of a controller's parts, nested as those of the laws.
     """
 
     Lane: Any
@@ -142,6 +158,7 @@ class Types(NamedTuple):
     Events: Any
     Limits: Any
     Monitor: Any
+    Loop: Any = None
 
 
 @functools.cache
@@ -153,6 +170,7 @@ def make_types(spec):
     Params = params_of(spec.laws, spec.numbers, width, real)
     Events = params_of(spec.events, spec.numbers[len(spec.laws) :], width, real)
     DragFlow = drag.flow_struct(width, real)
+    Loop = params_of(spec.control.parts, spec.control.numbers, width, real) if spec.control else None
     Constants = struct(
         "Constants",
         inertia=Inertia,
@@ -165,6 +183,7 @@ def make_types(spec):
         entry=wp.int32,
         **({"events": Events} if spec.events else {}),
         **({"drag": DragFlow} if spec.dragged else {}),
+        **({"loop": Loop} if spec.control else {}),
     )
     return Types(
         Lane,
@@ -178,5 +197,6 @@ def make_types(spec):
         Params,
         Events,
         monitors.limits_struct(width, real, spec.looks),
-        monitors.monitor_struct(width, real, spec.looks, spec.energy, spec.backward, spec.substep, spec.still),
+        monitors.monitor_struct(width, real, spec.looks, spec.energy, spec.backward, spec.substep, spec.still, Loop),
+        Loop,
     )

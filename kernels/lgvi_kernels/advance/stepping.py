@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import warp as wp
 
 from lgvi_kernels.advance.events import Watch, make_watch
+from lgvi_kernels.advance.feeding import make_feed
 from lgvi_kernels.advance.method import Step, make_method
 from lgvi_kernels.advance.monitor import make_backward, make_drag_rate
 from lgvi_kernels.advance.spec import make_types
@@ -27,6 +28,8 @@ class Stepping(NamedTuple):
     opened: Any
     one_step: Any
     stepped: Any
+    feed: Any
+    held: Any
 
 
 @functools.cache
@@ -96,4 +99,23 @@ def make_stepping(spec):
             x = one_step(x, c, monitor, k + j, h, stage_h, lead_h, first_h, opening)
         return x
 
-    return Stepping(method, watch, at_step, opened, one_step, stepped)
+    feed = make_feed(spec, types, method, at_step, opened) if spec.control else step
+
+    @wp.func(inline=False)
+    def held(x: State, c: Constants, monitor: Monitor, k: int, n: int, h: wp.float64, stage_h: wp.array(dtype=real),
+             lead_h: wp.array(dtype=real), first_h: real, opening: real):  # fmt: skip
+        """The steps k to k + n, and a look of the controller at each of its times between and after them.
+
+        The looks are around the loop over steps: a test in it would cost more, and a chunk that ends at each of them most.
+        """
+        at = k
+        while at < k + n:
+            m = wp.min(k + n - at, monitor.every - at % monitor.every)
+            for j in range(m):
+                x = one_step(x, c, monitor, at + j, h, stage_h, lead_h, first_h, opening)
+            at += m
+            if at % monitor.every == 0:
+                x.alarm = feed(x, c, monitor, at, h, opening)
+        return x
+
+    return Stepping(method, watch, at_step, opened, one_step, stepped, feed, held if spec.control else step)

@@ -173,6 +173,10 @@ for _real in REALS:
             return vec3(a.x - b.x, a.y - b.y, a.z - b.z)
 
         @wp.func
+        def neg(a: _L3):
+            return vec3(neg(a.x), neg(a.y), neg(a.z))
+
+        @wp.func
         def mul(a: _L3, b: _L3):
             return vec3(a.x * b.x, a.y * b.y, a.z * b.z)
 

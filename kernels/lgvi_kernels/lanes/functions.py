@@ -7,10 +7,28 @@ or 1.2e-7 (float32).
 """
 
 import functools
+import math
+from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import REALS, WIDTHS, int_lane, lane, native_code, native_head, vec3
+from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
+    REALS,
+    WIDTHS,
+    absolute,
+    add,
+    div,
+    int_lane,
+    lane,
+    mul,
+    native_code,
+    native_head,
+    neg,
+    ones,
+    positive,
+    sub,
+    vec3,
+)
 
 # digits          after the leading one;  bias: the exponent of 1.0
 # rounder         1.5 * 2^digits: a number added to it is rounded, and the last bits are that integer
@@ -18,7 +36,7 @@ from lgvi_kernels.lanes.arithmetic import REALS, WIDTHS, int_lane, lane, native_
 # half_pi, ln2    cut into parts so short that the products with the integers that occur are exact (Cody & Waite 1980)
 # extent          the arguments beyond which e^a is surely 0 or inf
 # single          the arguments for which 2^N is a normal number and, below which, 1 - e^a is 1
-# exponential, sine, logarithm: how many terms of the series are needed
+# exponential, sine, logarithm, arctangent: how many terms of the series are needed
 FORMATS = {
     wp.float64: {
         "digits": 52,
@@ -33,6 +51,7 @@ FORMATS = {
         "exponential": 13,
         "sine": 7,
         "logarithm": 10,
+        "arctangent": 20,
     },
     wp.float32: {
         "digits": 23,
@@ -47,6 +66,7 @@ FORMATS = {
         "exponential": 7,
         "sine": 4,
         "logarithm": 5,
+        "arctangent": 9,
     },
 }
 
@@ -195,6 +215,19 @@ def _positive_logarithm(real):
     return f"{_split(real, 'A')} {_logarithm(real)} V R = V(); R = A > (S)0 ? L : R / R;"
 
 
+def _arctangent2(real):
+    """C++ of the angle of (B, A): reduced to one eighth of the circle, then to half of it, by one division."""
+    terms = FORMATS[real]["arctangent"]
+    series = _series("Z", [(-1.0) ** k / (2 * k + 1) for k in range(1, terms + 1)])
+    return (
+        "V P = A < (S)0 ? -A : A; V Q = B < (S)0 ? -B : B; V L = Q < P ? Q : P; V G = Q < P ? P : Q;"
+        # Beyond tan(pi / 8) the angle is pi / 4 less that of (G - L) / (G + L).
+        f"V H = (G * (S){math.tan(PI / 8)!r}); V T = (L > H ? L - G : L) / (L > H ? L + G : (G == (S)0 ? V() + (S)1 : G));"
+        f"V Z = T * T; V R = T + T * Z * {series}; R = L > H ? R + (S){PI / 4!r} : R;"
+        f"R = P > Q ? (S){PI / 2!r} - R : R; R = B < (S)0 ? (S){PI!r} - R : R; R = A < (S)0 ? -R : R;"
+    )
+
+
 # Philox makes numbers from a counter and a key, and has no state: a random number depends on the seed, the member, the step
 # and the channel alone. So threads, packets and steps that are made again do not change it.
 # Philox4x32: the multipliers of words 0 and 2, and what is added to the key from round to round.
@@ -298,6 +331,11 @@ for _real in REALS:
             """ln a of a normal number a, to 2 eps; not a number where a <= 0."""
             ...
 
+        @wp.func_native(_body_here("AB", _arctangent2(_real)))
+        def arctangent2(a: _L, b: _L) -> _L:
+            """The angle of the point (b, a), in [-pi, pi], to 2 eps; 0 for the origin. Of (0, b < 0) it is pi."""
+            ...
+
         @wp.func_native(_body_here("A", _decay(_real)))
         def decay(a: _L) -> _L:
             """(1 - e^-a) / a, 1 at a = 0, to 3 eps for every a > -700 (float32: -87)."""
@@ -323,3 +361,13 @@ for _real in REALS:
             """A 3-vector of the first three of `normals`."""
             four = normals(like, member, step, channel, seed0, seed1)
             return vec3(quarter(four, 0), quarter(four, 1), quarter(four, 2))
+
+
+@wp.func
+def hyperbolic_tangent(a: Any):
+    """tanh a, to 4 eps: 1 - e^-x = x decay(x) has no cancellation, and tanh a = (1 - e^-x) / (1 + e^-x) with x = 2 |a|."""
+    unity = ones(a)
+    x = clamp(absolute(a + a), unity - unity, a.dtype(80.0) * unity)
+    d = x * decay(x)
+    t = d / (unity + unity - d)
+    return positive(a, t, -t)

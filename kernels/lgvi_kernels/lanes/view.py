@@ -20,7 +20,7 @@ from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
     sub,
     vec3,
 )
-from lgvi_kernels.lanes.functions import clamp
+from lgvi_kernels.lanes.functions import arctangent2, clamp
 
 
 @wp.func
@@ -39,6 +39,14 @@ def to_inertial(view: Any, v: Any):
 def velocity_at(view: Any, r: Any):
     """nu + Om x r: the velocity of the body's point r through the water, body axes [m/s]."""
     return view.nu + cross(view.Om, r)
+
+
+@wp.func
+def heading_error(wanted: Any, view: Any):
+    """The heading of one attitude less that of another [rad], in [-pi, pi], from their forward axes; no Euler angle is formed."""
+    c = wanted.north.x * view.north.x + wanted.east.x * view.east.x
+    s = wanted.east.x * view.north.x - wanted.north.x * view.east.x
+    return arctangent2(s, c)
 
 
 @wp.func

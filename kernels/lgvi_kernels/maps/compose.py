@@ -6,6 +6,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lanes.arithmetic import lane, lane3
+from lgvi_kernels.lanes.look import delayed_key, held_key
 from lgvi_kernels.lanes.noise import noise_key
 from lgvi_kernels.lanes.state import struct
 
@@ -31,7 +32,11 @@ def numbers_struct(law, numbers, width, real):
 
 
 def field_type(kind, width, real):
-    """The type of a field: 1, a lane; 3, a 3-vector of lanes; "step", "grid": the key of noise (see lanes/noise.py)."""
+    """The type of a field: 1, a lane; 3, a 3-vector of lanes; "step", "grid": the key of noise (see lanes/noise.py);
+    "held", "delayed": where an actuator finds the commands of a controller (see lanes/look.py).
+    """
+    if kind in ("held", "delayed"):
+        return held_key() if kind == "held" else delayed_key()
     if kind in ("step", "grid"):
         return noise_key(width, kind == "grid")
     return {1: lane, 3: lane3}[kind](width, real)

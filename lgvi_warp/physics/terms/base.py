@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
@@ -44,6 +45,17 @@ class PackingContext:
     h: float
     aligned: bool = False
 
+    def own(self, term: Term) -> dict[str, np.ndarray]:
+        """The numbers of one term.
+
+        Args:
+            term: A term of the scene.
+
+        Returns:
+            Its numbers by field, each of shape (1, ...) or (n, ...).
+        """
+        return {name: self.parameters[f"{term.key}.{name}"] for name in term.parameters()}
+
 
 class Packed(NamedTuple):
     """A term's numbers as its device code reads them; the leading dimension n is 1 where all members share them.
@@ -72,6 +84,8 @@ def number(
     above: float = -np.inf,
     rising: bool = False,
     axes: str | None = None,
+    optional: bool = False,
+    infinite: bool = False,
 ) -> Any:
     """Declare a numeric field of a term.
 
@@ -87,6 +101,8 @@ def number(
         axes: How `Term.packed` turns the field for the device: "vector" of the body, into the kernel's axes; "point" of the
             body, in these axes from the origin of the forces; None, the default, not at all: a number without axes, or
             inertial ones.
+        optional: Whether the field may be None after construction, and then is no parameter; False by default.
+        infinite: Whether the values may be infinite; False by default.
 
     Returns:
         A dataclass field with shape, unit, bounds and axes in its metadata.
@@ -97,7 +113,7 @@ def number(
     if axes not in ("vector", "point", None):
         raise ValueError(f"axes = {axes!r}: is not known; give 'vector', 'point' or None")
     meta = dict(shape=shape, unit=unit, least=least, most=most, above=above, rising=rising, axes=axes)
-    return field(default=default, metadata=meta)
+    return field(default=default, metadata=meta | dict(optional=optional, infinite=infinite))
 
 
 @functools.cache
@@ -134,6 +150,9 @@ class Term:
     dissipative: ClassVar[bool] = True
     # Numbers without which it does nothing: it is absent where all of them are zero. None named: it always acts.
     strengths: ClassVar[tuple[str, ...]] = ()
+    # The bus of a controller that drives it (see physics/control), and the numbers that then do not act.
+    driver: ClassVar[Any] = None
+    driven_fields: ClassVar[tuple[str, ...]] = ()
 
     name: str = ""
 
@@ -178,6 +197,36 @@ class Term:
         return tuple((name, lengths[shape]) for name, shape in shapes.items()) if simple else None
 
     @property
+    def unused(self) -> tuple[str, ...]:
+        """Numbers that do not act: the commands of a term that a controller drives."""
+        return self.driven_fields if self.driver is not None else ()
+
+    def driven_by(self, bus: Any) -> Any:
+        """The same term, with the commands of a controller.
+
+        Args:
+            bus: Where it finds them; None: the term by itself.
+
+        Returns:
+            A copy, or the term where nothing changes.
+        """
+        if bus is None and self.driver is None:
+            return self
+        term = copy.copy(self)
+        object.__setattr__(term, "driver", bus)
+        return term
+
+    @property
+    def channels(self) -> int:
+        """Number of commands that it takes from a controller; 0, the default, for a term that takes none."""
+        return 0
+
+    @property
+    def own_commands(self) -> bool:
+        """Whether it has commands of its own, which no controller may replace; by default False."""
+        return False
+
+    @property
     def key(self) -> str:
         """The name by which parameters refer to this term: its `name`, or its `type` where it has none."""
         return self.name if isinstance(self.name, str) and self.name else self.type
@@ -207,7 +256,11 @@ class Term:
         Returns:
             The array of each numeric field, by the field's name, in the field's own shape.
         """
-        return {item.name: getattr(self, item.name) for item in self.number_fields()}
+        return {
+            item.name: getattr(self, item.name)
+            for item in self.number_fields()
+            if getattr(self, item.name) is not None and item.name not in self.unused
+        }
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         """Which members have numbers that this term cannot take: not finite, or out of bounds.
@@ -218,11 +271,8 @@ class Term:
         Returns:
             A mask (n,) for each numeric field, True where the member's number is refused.
         """
-        bad = {}
-        for item in self.number_fields():
-            value = numbers[item.name]
-            bad[item.name] = _outside(item, value) | _falling(item, value)
-        return bad
+        fields = {item.name: item for item in self.number_fields()}
+        return {name: _outside(fields[name], value) | _falling(fields[name], value) for name, value in numbers.items()}
 
     def present(self, numbers: Numbers) -> bool:
         """Whether any member feels the term; by default where one of its `strengths`, if it names any, is not zero.
@@ -346,6 +396,8 @@ class Term:
 def _checked(faults: Faults, one: dataclasses.Field[Any], value: Any, lengths: dict[str, int]) -> np.ndarray | None:
     """The value of a field as an array of its shape; None after adding a fault."""
     meta = one.metadata
+    if value is None and meta["optional"]:
+        return None
     shape, unit = meta["shape"], meta["unit"]
     if any(isinstance(size, str) for size in shape):
         array = faults.finite(one.name, value, None, unit)
@@ -359,6 +411,8 @@ def _checked(faults: Faults, one: dataclasses.Field[Any], value: Any, lengths: d
             faults.add(one.name, value, f"has shape {array.shape}", f"give {text} numbers [{unit}]")
             return None
         lengths |= {size: got for size, got in zip(shape, array.shape, strict=True) if isinstance(size, str)}
+    elif meta["infinite"]:
+        array = faults.real(one.name, value)
     else:
         array = faults.finite(one.name, value, shape, unit)
     if array is None:
@@ -380,7 +434,7 @@ def _outside(one: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
     flat, meta = values.reshape(len(values), -1), one.metadata
     with np.errstate(invalid="ignore"):
         inside = (flat >= meta["least"]) & (flat <= meta["most"]) & (flat > meta["above"])
-    return ~np.all(np.isfinite(flat) & inside, axis=1)
+    return ~np.all((np.isfinite(flat) | meta["infinite"]) & inside, axis=1)
 
 
 def _falling(one: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:

@@ -8,12 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.physics.notation import repeated
+from lgvi_warp.physics.terms.actuators import UNLIMITED, packed_driven
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number, rows_of, side_by_side
 from lgvi_warp.physics.terms.fins import Fins, fin_rows
 from lgvi_warp.physics.terms.wrench import at_start, commands, first_row, refuse_idle
-
-# From this rate on [rad/s] a limit counts as none.
-UNLIMITED = 1e6
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -38,6 +37,7 @@ class ControlFins(Fins):
     type: ClassVar[str] = "control_fins"
     device: ClassVar[str] = "control_fins"
     timed: ClassVar[bool] = True
+    driven_fields: ClassVar[tuple[str, ...]] = ("command", "times", "command_schedule")
 
     limit: Any = number(("n",), "rad", 0.35, least=0.0)
     rate_limit: Any = number(("n",), "rad/s", UNLIMITED, least=0.0)
@@ -63,10 +63,63 @@ class ControlFins(Fins):
         if self.__dict__["_both"]:
             faults.add("command", self.command, "is given beside command_schedule", "keep one of them")
 
+    @property
+    def has_square_curve(self) -> bool:
+        """Whether effort goes as the command squared."""
+        return False
+
+    @property
+    def channels(self) -> int:
+        """One for each fin."""
+        return len(self.limit)
+
+    @property
+    def own_commands(self) -> bool:
+        """Whether it has a schedule, or a command other than 0."""
+        return len(self.command_schedule) > 1 or bool(np.any(self.command))
+
+    def effect(self, numbers: Numbers, parameters: Numbers, speed: np.ndarray) -> np.ndarray:
+        """The wrench of each fin's lift by its deflection [1/rad] at a speed ahead, about the body's origin.
+
+        Args:
+            numbers: The term's numbers by field.
+            parameters: All parameters of the scene.
+            speed: Speed ahead (1 or n,) [m/s].
+
+        Returns:
+            (1 or n, 6, channels).
+        """
+        position, chord, normal = repeated(numbers["position"], numbers["chord"], numbers["normal"])
+        chord = chord / np.linalg.norm(chord, axis=-1, keepdims=True)
+        normal = normal - np.sum(normal * chord, axis=-1, keepdims=True) * chord
+        normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+        density = parameters["environment.water_density"]
+        size = 0.5 * (density * speed**2)[:, None] * numbers["area"] * numbers["lift_slope"]
+        # The flow along the chord is that of the speed ahead.
+        lift = (size * chord[..., 0] ** 2)[..., None] * normal
+        return np.swapaxes(np.concatenate([lift, np.cross(position, lift)], axis=-1), -1, -2)
+
+    def curve(self, numbers: Numbers) -> tuple[np.ndarray, ...]:
+        """How the angle follows from a command: it is the command.
+
+        Args:
+            numbers: The term's numbers by field.
+
+        Returns:
+            1 ahead and astern, and a dead band of 0, each (1, channels).
+        """
+        unit = np.ones((1, self.channels))
+        return unit, unit, 0.0 * unit
+
+    def device_in(self, aligned: bool) -> str:
+        """The code for a schedule, or for the commands of a controller."""
+        return "control_fins" if self.driver is None else "control_fins_driven"
+
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         """In addition, raises SceneError for members' numbers that would have no effect."""
-        remedy = f"give {self.key}.rate_limit below {UNLIMITED:g} rad/s in the scene as well"
-        refuse_idle(self, numbers, "rate_limit", numbers["rate_limit"] < UNLIMITED, remedy)
+        if self.driver is None:
+            remedy = f"give {self.key}.rate_limit below {UNLIMITED:g} rad/s in the scene as well"
+            refuse_idle(self, numbers, "rate_limit", numbers["rate_limit"] < UNLIMITED, remedy)
         return super().unphysical(numbers)
 
     @property
@@ -76,6 +129,8 @@ class ControlFins(Fins):
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The device rows: those of each fin, then the command table of each fin."""
+        if self.driver is not None:
+            return packed_driven(self, numbers, fin_rows(numbers, context), 2 * self.channels)
         fins = side_by_side(fin_rows(numbers, context), numbers["limit"][..., None], numbers["rate_limit"][..., None])
         times, schedule = commands(numbers)
         count = schedule.shape[2]

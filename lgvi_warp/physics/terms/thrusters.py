@@ -8,6 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.physics.notation import repeated
+from lgvi_warp.physics.terms.actuators import FAST, packed_driven
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number, rows_of, side_by_side
 from lgvi_warp.physics.terms.wrench import at_start, commands, first_row, refuse_idle
 
@@ -40,6 +42,7 @@ class Thrusters(Term):
 
     type: ClassVar[str] = "thrusters"
     timed: ClassVar[bool] = True
+    driven_fields: ClassVar[tuple[str, ...]] = ("command", "times", "command_schedule")
 
     position: Any = number(("n", 3), "m")
     direction: Any = number(("n", 3), "1")
@@ -83,12 +86,56 @@ class Thrusters(Term):
         super().__post_init__()
 
     @property
+    def has_square_curve(self) -> bool:
+        """Whether effort goes as the command squared."""
+        return True
+
+    @property
     def is_square(self) -> bool:
         """Whether the curves ahead and astern are both w^2."""
         return all(np.array_equal(curve, SQUARE) for curve in (self.polynomial, self.polynomial_astern))
 
+    @property
+    def channels(self) -> int:
+        """One for each thruster."""
+        return len(self.coefficient)
+
+    @property
+    def own_commands(self) -> bool:
+        """Whether it has a schedule, or a command other than 0."""
+        return len(self.command_schedule) > 1 or bool(np.any(self.command))
+
+    def effect(self, numbers: Numbers, parameters: Numbers, speed: np.ndarray) -> np.ndarray:
+        """The wrench of a unit of thrust of each thruster, about the body's origin.
+
+        Args:
+            numbers: The term's numbers by field.
+            parameters: All parameters of the scene.
+            speed: Speed ahead (1 or n,) [m/s].
+
+        Returns:
+            (1 or n, 6, channels).
+        """
+        position, direction = repeated(numbers["position"], numbers["direction"])
+        direction = direction / np.linalg.norm(direction, axis=-1, keepdims=True)
+        wrench = np.concatenate([direction, np.cross(position, direction)], axis=-1)
+        return np.swapaxes(wrench, -1, -2)
+
+    def curve(self, numbers: Numbers) -> tuple[np.ndarray, ...]:
+        """How thrust follows from a command.
+
+        Args:
+            numbers: The term's numbers by field.
+
+        Returns:
+            Coefficients ahead and astern, and dead band, each (1 or n, channels).
+        """
+        return numbers["coefficient"], numbers["coefficient_astern"], numbers["dead_band"]
+
     def device_in(self, aligned: bool) -> str:
         """The code that evaluates polynomials only where one is given."""
+        if self.driver is not None:
+            return "thrusters_driven"
         return self.device if self.is_square else "thrusters_polynomial"
 
     def to_dict(self) -> dict[str, Any]:
@@ -146,7 +193,8 @@ class Thrusters(Term):
         bad = super().unphysical(numbers)
         bad["direction"] = bad["direction"] | np.any(~np.any(numbers["direction"], axis=-1), axis=-1)
         remedy = f"give {self.key}.time_constant above 0 [s] in the scene as well"
-        refuse_idle(self, numbers, "time_constant", numbers["time_constant"] > 0.0, remedy)
+        if self.driver is None:
+            refuse_idle(self, numbers, "time_constant", numbers["time_constant"] > 0.0, remedy)
         self._refuse_idle_polynomial(numbers)
         return bad
 
@@ -169,6 +217,9 @@ class Thrusters(Term):
         direction = numbers["direction"] / np.linalg.norm(numbers["direction"], axis=-1, keepdims=True)
         arms = np.cross(numbers["position"] + 0.0 * direction, direction + 0.0 * numbers["position"])
         force, torque = context.frame.vector(direction), context.frame.torque(arms, direction + 0.0 * arms)
+        if self.driver is not None:
+            curves = (numbers[key][..., None] for key in ("coefficient", "coefficient_astern", "dead_band"))
+            return packed_driven(self, numbers, side_by_side(force, torque, *curves))
         with np.errstate(divide="ignore"):
             rate = np.where(numbers["time_constant"] > 0.0, 1.0 / numbers["time_constant"], FAST)
         settings = [numbers[key] for key in ("coefficient", "coefficient_astern", "dead_band", "limit")]
@@ -186,10 +237,6 @@ class Thrusters(Term):
             return Packed(values | {"memory": 0}, side_by_side(*rows))
         start = np.clip(at_start(times, schedule), -numbers["limit"], numbers["limit"])
         return Packed(values, side_by_side(*rows), start)
-
-
-# 1 / time constant of a thruster without lag beside others with one: faster than any step, and within float32.
-FAST = 1e20
 
 
 # The curve w^2, coefficients from the first power up.

@@ -185,7 +185,7 @@ def parameter_units(scene: Any) -> dict[str, str]:
 
     known: dict[str, str | None] = {f"vehicle.{name}": unit for name, unit in vehicle.UNITS.items()}
     known |= {"environment.gravity": "m s-2", "environment.water_density": "kg m-3"}
-    for term in (*scene.terms, *scene.events):
+    for term in scene.parts:
         known |= {f"{term.key}.{item.name}": item.metadata.get("unit") for item in dataclasses.fields(term)}
     return {name: known.get(name) or "1" for name in scene.parameters()}
 

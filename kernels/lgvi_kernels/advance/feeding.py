@@ -1,0 +1,216 @@
+"""The look of a controller: from the state to the commands of its actuators, and the signals that are saved.
+
+Commands are rows of the memory that a look writes and that every step until the next one reads: so a hold of order zero is
+exact, whatever the method. The first rows of the memory are the bus of the controller (lgvi_warp/physics/control/base.py).
+"""
+
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
+    add,
+    any_positive,
+    cross,
+    element,
+    lane,
+    mul,
+    ones,
+    positive,
+    set_element,
+    sub,
+    vec3,
+)
+from lgvi_kernels.lanes.look import measurement_struct, reference_struct
+from lgvi_kernels.lanes.matrix3 import apply
+from lgvi_kernels.lanes.state import wrench_struct
+from lgvi_kernels.lanes.view import heading_error, remember, remembered
+from lgvi_kernels.maps.compose import superpose
+from lgvi_kernels.maps.in_turn import ROLES, in_turn
+from lgvi_kernels.maps.submaps import look, rotate
+
+CONTROL_NON_FINITE = 8
+
+# What a look may note in rows of the memory, in this order, and how many it takes: the demand X Y Z K M N; the measurement:
+# position, attitude row by row, velocities over ground and through the water, angular velocity, heading; the reference:
+# position, attitude, velocity, angular velocity, heading, speed.
+NOTED = {"demand": 6, "measured": 22, "reference": 20}
+
+
+def make_feed(spec, types, method, at_step, opened):
+    """(x, c, monitor, k, h, opening) -> the alarm after a look at the state after k steps.
+
+    method: see Step; at_step, opened: see Stepping.
+    """
+    width, real, control = spec.width, spec.real, spec.control
+    State, Constants, Monitor, Alarm = types.State, types.Constants, types.Monitor, types.Alarm
+    Measurement, Reference = measurement_struct(width, real), reference_struct(width, real)
+    Wrench, Lane = wrench_struct(width, real), types.Lane
+    measure, guide, act, allocate, send = (in_turn(control.parts, role) for role in ROLES)
+    velocities, momentum, water_velocity = method.velocities, method.momentum, method.water_velocity
+    drifts = superpose(spec.laws, "flow") is not None
+    turned, moved, checked = "axes" in spec.parts, "origin" in spec.parts, spec.checked
+    notes_demand, notes_measured, notes_reference = (
+        name in control.noted for name in ("demand", "measured", "reference")
+    )
+
+    @wp.func
+    def put3(memory: wp.array2d(dtype=Lane), i: int, row: int, v: Any):
+        set_element(memory, i, row, 0, v.x)
+        set_element(memory, i, row, 1, v.y)
+        set_element(memory, i, row, 2, v.z)
+
+    @wp.func
+    def truth(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64):
+        """The motion in the user's axes, about his origin."""
+        y = Measurement()
+        nu, Om = velocities(c.inertia, x.p, x.pi)
+        through = nu
+        if wp.static(moved):
+            through = nu + cross(Om, c.inertia.user_origin)
+        over = through
+        if wp.static(drifts):
+            over = through + water_velocity(x, c, real(h))
+        y.position = x.b
+        if wp.static(moved):
+            y.position = x.b + rotate(x, c.inertia.user_origin)
+        if wp.static(turned):
+            y.north = apply(c.inertia.axes, x.R0)
+            y.east = apply(c.inertia.axes, x.R1)
+            y.down = apply(c.inertia.axes, x.R2)
+            y.velocity = apply(c.inertia.axes, over)
+            y.water_velocity = apply(c.inertia.axes, through)
+            y.angular_velocity = apply(c.inertia.axes, Om)
+        else:
+            y.north = x.R0
+            y.east = x.R1
+            y.down = x.R2
+            y.velocity = over
+            y.water_velocity = through
+            y.angular_velocity = Om
+        y.t = real(wp.float64(k) * h)
+        y.h = real(h)
+        y.period = real(wp.float64(monitor.every) * h)
+        y.step = k
+        y.look = k // monitor.every
+        y.table = c.table
+        y.memory = c.memory
+        y.packet = c.packet
+        y.entry = c.entry
+        return y
+
+    @wp.func
+    def upright(like: Lane):
+        """No wish: at rest, upright, heading north."""
+        r = Reference()
+        zero = ones(like) - ones(like)
+        r.north = vec3(ones(like), zero, zero)
+        r.east = vec3(zero, ones(like), zero)
+        r.down = vec3(zero, zero, ones(like))
+        return r
+
+    @wp.func
+    def put_measured(y: Any, memory: wp.array2d(dtype=Lane), i: int, row: int):
+        put3(memory, i, row, y.position)
+        put3(memory, i, row + 3, y.north)
+        put3(memory, i, row + 6, y.east)
+        put3(memory, i, row + 9, y.down)
+        put3(memory, i, row + 12, y.velocity)
+        put3(memory, i, row + 15, y.water_velocity)
+        put3(memory, i, row + 18, y.angular_velocity)
+        set_element(memory, i, row + 21, 0, heading_error(y, upright(y.position.x)))
+
+    @wp.func
+    def put_reference(r: Any, memory: wp.array2d(dtype=Lane), i: int, row: int):
+        put3(memory, i, row, r.position)
+        put3(memory, i, row + 3, r.north)
+        put3(memory, i, row + 6, r.east)
+        put3(memory, i, row + 9, r.down)
+        put3(memory, i, row + 12, r.velocity)
+        put3(memory, i, row + 15, r.angular_velocity)
+        set_element(memory, i, row + 18, 0, heading_error(r, upright(r.position.x)))
+        set_element(memory, i, row + 19, 0, r.speed)
+
+    @wp.func(inline=False)
+    def feed(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real):
+        """Measure, guide, control, allocate, send; the alarm of lanes whose commands are no numbers."""
+        z = opened(at_step(x, k, h), c, -opening)
+        if wp.static(momentum is not None):
+            z.p = momentum(z)
+        y = truth(z, c, monitor, k, h)
+        r = upright(y.position.x)
+        w = Wrench()
+        row = int(monitor.bus)
+        if wp.static(measure is not None):
+            y = measure(y, r, y, c.loop)
+        if wp.static(guide is not None):
+            r = guide(r, r, y, c.loop)
+        if wp.static(act is not None):
+            w = act(w, r, y, c.loop)
+        if wp.static(notes_demand):
+            put3(c.memory, c.packet, row, w.force)
+            put3(c.memory, c.packet, row + 3, w.torque)
+            row += 6
+        if wp.static(allocate is not None):
+            w = allocate(w, r, y, c.loop)
+        # What was not delivered lies behind the commands.
+        put3(c.memory, c.packet, monitor.commands, w.force)
+        put3(c.memory, c.packet, monitor.commands + 3, w.torque)
+        if wp.static(notes_measured):
+            put_measured(y, c.memory, c.packet, row)
+            row += 22
+        if wp.static(notes_reference):
+            put_reference(r, c.memory, c.packet, row)
+        if wp.static(send is not None):
+            y = send(y, r, y, c.loop)
+        alarm = x.alarm
+        if wp.static(checked):
+            unity = ones(y.position.x)
+            zero = unity - unity
+            total = zero
+            for j in range(monitor.commands):
+                total = total + remembered(y, j)
+            # 1 where all commands are finite; where one is not it is NaN, and positive() takes its last argument.
+            well = unity - (total - total)
+            bad = positive(well, zero, real(wp.static(float(CONTROL_NON_FINITE))) * unity)
+            if any_positive(bad):
+                for j in range(monitor.commands):
+                    remember(y, j, positive(bad, zero, remembered(y, j)))
+            alarm.code = positive(alarm.code, alarm.code, bad)
+        return alarm
+
+    return feed
+
+
+def make_note_actuators(spec, View, at_step):
+    """(x, c, h, k): the actuators write where they are into the bus (role `report` of their laws); nothing where none does."""
+    report = superpose(spec.laws, "report")
+
+    @wp.func(inline=False)
+    def note_actuators(x: Any, c: Any, h: wp.float64, k: int):
+        if wp.static(report is not None):
+            view = look(View(), at_step(x, k, h), c, x.b.x.dtype(h))
+            view = report(view, view, c.params)
+
+    return note_actuators
+
+
+def make_signals(Lane):
+    """(keep_signals, sample_signals): of lanes that freeze the signals are kept, and samples write them."""
+
+    @wp.func(inline=False)
+    def keep_signals(memory: wp.array2d(dtype=Lane), i: int, monitor: Any, half: int, code: Lane):
+        """half: where the memory's half begins that holds the signals of lanes with a code."""
+        for j in range(monitor.signals.shape[0]):
+            held = memory[i, half + monitor.signals[j]]
+            memory[i, monitor.kept + j] = positive(code, held, memory[i, monitor.kept + j])
+
+    @wp.func(inline=False)
+    def sample_signals(out: wp.array2d(dtype=Lane), i: int, end: int, memory: wp.array2d(dtype=Lane), monitor: Any, frozen: Lane):
+        """Write the signals as the last numbers of a sample, which ends before the column `end`."""
+        count = monitor.signals.shape[0]
+        for j in range(count):
+            live = memory[i, monitor.signals[j]]
+            out[i, end - count + j] = positive(frozen, memory[i, monitor.kept + j], live)
+
+    return keep_signals, sample_signals

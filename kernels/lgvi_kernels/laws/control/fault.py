@@ -1,0 +1,33 @@
+"""A fault of an actuator: from a time on its command is another one."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.law import add, lane, mul, ones, positive, remember, remembered, struct, sub  # noqa: F401
+
+
+@functools.cache
+def params(width, real):
+    """Params: time, gain and offset of each lane; the row of the command, and where commands are delayed those of the one that
+    acts and of the one before.
+    """
+    Lane = lane(width, real)
+    words = dict.fromkeys(("fresh", "acting", "before", "delayed"), wp.int32)
+    return struct("Fault", time=Lane, gain=Lane, offset=Lane, **words)
+
+
+@wp.func
+def send(y: Any, p: Any):
+    """From the first look at or after its time on: command <- gain * command + offset."""
+    # Half a step is added, since times are sums that round.
+    since = (y.t + y.h.dtype(0.5) * y.h) * ones(p.time) - p.time
+    u = remembered(y, p.fresh)
+    remember(y, p.fresh, positive(since, p.gain * u + p.offset, u))
+    if p.delayed > 0:
+        u = remembered(y, p.acting)
+        remember(y, p.acting, positive(since, p.gain * u + p.offset, u))
+        u = remembered(y, p.before)
+        remember(y, p.before, positive(since, p.gain * u + p.offset, u))
+    return y

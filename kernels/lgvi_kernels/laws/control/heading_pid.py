@@ -1,0 +1,27 @@
+"""PID of the heading: a moment about the body's z axis."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.law import add, heading_error, lane, mul, remembered, struct, sub, vec3, ones  # noqa: F401
+from lgvi_kernels.laws.control.integral import integral, keep_error
+
+
+@functools.cache
+def params(width, real):
+    """Params: gains; first of two rows of the memory, I and the error; row of the moment N that was not delivered."""
+    gains = dict.fromkeys(("kp", "ki", "kd", "integral_limit"), lane(width, real))
+    return struct("HeadingPID", **gains, memory=wp.int32, unmet=wp.int32, conditional=wp.int32)
+
+
+@wp.func
+def control(w: Any, r: Any, y: Any, p: Any):
+    """N = kp e + ki I + kd (r_d - r), e the wanted heading less the measured one."""
+    e = heading_error(r, y)
+    I = integral(y, p.memory, p.integral_limit, remembered(y, p.unmet + 5), p.conditional)
+    N = p.kp * e + p.ki * I + p.kd * (r.angular_velocity.z - y.angular_velocity.z)
+    keep_error(y, p.memory, e)
+    w.torque = vec3(w.torque.x, w.torque.y, w.torque.z + N)
+    return w

@@ -1,0 +1,105 @@
+"""Actuators that a controller drives: how each follows the command that is held, and where it is."""
+
+from typing import Any, NamedTuple
+
+import warp as wp
+
+from lgvi_kernels.lanes.held import held_command
+from lgvi_kernels.law import (  # noqa: F401
+    absolute,
+    add,
+    clamp,
+    div,
+    exponential,
+    greatest,
+    least,
+    mul,
+    neg,
+    ones,
+    positive,
+    remember,
+    remembered,
+    row1,
+    struct,
+    sub,
+)
+
+
+class Driven(NamedTuple):
+    """Functions of an actuator.
+
+    params: the struct of its numbers; place: (view, p, i) -> where channel i is; evolve, follow, report: roles of its law.
+    """
+
+    params: Any
+    place: Any
+    evolve: Any
+    follow: Any
+    report: Any
+
+
+@wp.func
+def approached(n: Any, u: Any, length: Any, lag: Any, rate: Any):
+    """n' = (u - n) lag, no faster than the rate, after a time in which u is held: at the rate, then by the exponential."""
+    unity = ones(n)
+    zero = unity - unity
+    gap = u - n
+    size = absolute(gap)
+    # How long the rate limits; where it is 0 it does so for ever.
+    fast = positive(rate, (size - rate / lag) / positive(rate, rate, unity), length)
+    fast = positive(size, least(greatest(fast, zero), length), zero)
+    left = size - fast * rate
+    left = left * exponential(-((length - fast) * lag))
+    return u - positive(gap, left, -left)
+
+
+def make_driven(name, rows, limit, lag, rate):
+    """The functions of an actuator with `rows` rows a channel; limit, lag and rate: places of 1 / lag and of two limits."""
+
+    def params(width, real, commands):
+        """Params: commands, see lanes/look.py; first row of the table, of the memory if `moving`, of what is reported; count."""
+        words = {"first": wp.int32, "memory": wp.int32, "work": wp.int32, "report": wp.int32}
+        return struct(name, commands=commands, **words, count=wp.int32, moving=wp.int32)
+
+    @wp.func
+    def wanted(view: Any, p: Any, i: int):
+        """The command of channel i within its limit."""
+        most = row1(view, p.first + wp.static(rows) * i + wp.static(limit))
+        return clamp(held_command(view, p.commands, i), -most, most)
+
+    @wp.func
+    def place(view: Any, p: Any, i: int):
+        n = ones(view.b.x)
+        if p.moving > 0:
+            n = remembered(view, p.memory + i)
+        else:
+            n = wanted(view, p, i)
+        return n
+
+    @wp.func
+    def move(state: Any, view: Any, p: Any, length: Any):
+        if p.moving > 0:
+            for i in range(p.count):
+                at = p.first + wp.static(rows) * i
+                n = remembered(view, p.memory + i)
+                time = length * ones(n)
+                lag_here = row1(view, at + wp.static(lag))
+                n = approached(n, wanted(view, p, i), time, lag_here, row1(view, at + wp.static(rate)))
+                remember(view, p.memory + i, n)
+        return state
+
+    @wp.func
+    def evolve(state: Any, view: Any, p: Any):
+        return move(state, view, p, view.h.dtype(0.5) * view.h)
+
+    @wp.func
+    def follow(state: Any, view: Any, p: Any):
+        return move(state, view, p, view.h)
+
+    @wp.func
+    def report(state: Any, view: Any, p: Any):
+        for i in range(p.count):
+            remember(view, p.report + i, place(view, p, i))
+        return state
+
+    return Driven(params, place, evolve, follow, report)

@@ -1,0 +1,266 @@
+"""A controller: what it looks at, what it wants, how it acts, and how often."""
+
+from __future__ import annotations
+
+import copy
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.physics.control.base import SECTIONS, Allocation, Bus, Part
+from lgvi_warp.physics.control.delay import Delay
+from lgvi_warp.physics.control.fault import Fault
+from lgvi_warp.physics.control.pseudo_inverse import PseudoInverse
+from lgvi_warp.physics.terms.base import Term, build, check_list
+
+# A time and a whole number of steps that differ by less than this part of the step are the same.
+ROUND_OFF = 1e-9
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Controller:
+    """A controller that looks once a period, and whose commands are held until the next look.
+
+    Each list holds parts such as lw.HeadingPID(...), or tables as in a scene file.
+
+    Args:
+        period: Time between two looks [s], a whole number of steps.
+        delay: From a look until its commands act [s], a whole number of steps; may vary by member. 0 by default.
+        sensors: What changes the truth into what is measured, in this order; by default the truth is measured.
+        guidance: What says which motion is wanted, in this order.
+        laws: What demands a wrench; their demands are added.
+        allocation: What turns the demand into commands, in this order: each takes what those before it did not deliver. By
+            default the pseudo-inverse, where there is one term that takes commands.
+        faults: What happens to commands and to sensors.
+
+    Raises:
+        SceneError: Where anything is wrong; the message lists every fault.
+    """
+
+    period: float
+    delay: Any = 0.0
+    sensors: Sequence[Any] = ()
+    guidance: Sequence[Any] = ()
+    laws: Sequence[Any] = ()
+    allocation: Sequence[Any] = ()
+    faults: Sequence[Any] = ()
+    # Set by `wired`.
+    bus: Bus | None = field(default=None, init=False, repr=False)
+    actuators: Mapping[str, Term] = field(default_factory=dict, init=False, repr=False)
+
+    key = "controller"
+
+    def __post_init__(self) -> None:
+        faults = Faults("controller.")
+        faults.positive("period", self.period)
+        delay = faults.number("delay", self.delay, "s", 0.0)
+        if delay is not None:
+            object.__setattr__(self, "delay", np.asarray(delay))
+        for section, base in SECTIONS.items():
+            with faults.including():
+                object.__setattr__(self, section, _parts(section, base, getattr(self, section)))
+        if not faults and not self.laws:
+            faults.add("laws", "", "are missing", "give at least one, such as lw.HeadingPID(kp=...)")
+        if not faults:
+            self._check_wishes(faults)
+        faults.raise_if_any()
+
+    def _check_wishes(self, faults: Faults) -> None:
+        """Require that what laws and guidance read of the wanted motion is given."""
+        given: set[str] = set()
+        for part in (*self.guidance, *self.laws):
+            for wish in part.needs:
+                if wish not in given:
+                    remedy = "give guidance that wants it, such as [[controller.guidance]] type = \"set_point\""
+                    faults.add(part.section, part.key, f"needs a wanted {wish}, which no guidance gives", remedy)
+            given |= set(part.gives)
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """All parts that have numbers, sensors first, as the user gave them; with their bus where the controller is wired."""
+        return tuple(part for section in SECTIONS for part in getattr(self, section))
+
+    @property
+    def delay_part(self) -> Delay:
+        """The delay as a part, whose key is that of the section."""
+        part = Delay(name=self.key, period=self.period, delay=self.delay)
+        object.__setattr__(part, "bus", self.bus)
+        return part
+
+    @property
+    def acting_parts(self) -> tuple[Part, ...]:
+        """The parts in the order in which the kernel has them: the delay, where there is one, before the faults."""
+        assert self.bus is not None
+        before = tuple(part for section in tuple(SECTIONS)[:-1] for part in getattr(self, section))
+        return (*before, *((self.delay_part,) if self.bus.delayed else ()), *self.faults)
+
+    def parameters(self) -> dict[str, np.ndarray]:
+        """The numbers that may vary by member.
+
+        Returns:
+            "controller.delay", and the numbers of the parts by "key.field".
+        """
+        values = {f"{part.key}.{name}": value for part in self.parts for name, value in part.parameters().items()}
+        return {f"{self.key}.delay": self.delay} | values
+
+    def wired(self, terms: Sequence[Term]) -> Controller:
+        """The same controller, whose parts know their actuators and the rows of the memory.
+
+        Args:
+            terms: Terms of the scene.
+
+        Returns:
+            A copy.
+
+        Raises:
+            SceneError: Where an allocation or a fault names a term that takes no commands. The message lists every fault.
+        """
+        faults = Faults("controller.")
+        able = {term.key: term for term in terms if term.channels}
+        allocation = self._allocation(faults, able)
+        faults.raise_if_any()
+        actuators = {key: term for key, term in able.items() if key in {part.to for part in allocation}}
+        self._check_faults(faults, actuators)
+        faults.raise_if_any()
+        whole = copy.copy(self)
+        object.__setattr__(whole, "allocation", allocation)
+        object.__setattr__(whole, "actuators", actuators)
+        controller = whole.on(Bus.of({key: term.channels for key, term in actuators.items()}))
+        for part in controller.allocation:
+            part.check_actuator(faults)
+        faults.raise_if_any()
+        return controller
+
+    def on(self, bus: Bus) -> Controller:
+        """The same controller with another bus.
+
+        Args:
+            bus: Rows of the memory.
+
+        Returns:
+            A copy, whose parts have this bus.
+        """
+        controller = copy.copy(self)
+        object.__setattr__(controller, "bus", bus)
+        for section in SECTIONS:
+            parts = tuple(part.wired(bus, self.actuators) for part in getattr(self, section))
+            object.__setattr__(controller, section, parts)
+        return controller
+
+    def _allocation(self, faults: Faults, able: Mapping[str, Term]) -> tuple[Allocation, ...]:
+        """The allocation, or the default one, checked."""
+        given = tuple(self.allocation)
+        if not given:
+            if len(able) != 1:
+                fault = "is missing" if able else "has no actuator: no term of the scene takes commands"
+                which = " or ".join(map(repr, able)) if able else "thrusters, control_fins or control_wrench"
+                faults.add("allocation", "", fault, f"give [[controller.allocation]] to = {which}")
+                return ()
+            given = (PseudoInverse(to=next(iter(able))),)
+        counts = Counter(part.to for part in given)
+        for part in given:
+            if part.to not in able:
+                faults.add("allocation.to", part.to, "is no term that takes commands", closest(part.to, able))
+            elif able[part.to].own_commands:
+                problem = "has commands of its own"
+                faults.add("allocation.to", part.to, problem, f"leave {part.to}.command and its schedule out")
+        for key in (key for key, count in counts.items() if count > 1):
+            faults.add("allocation.to", key, f"is named by {counts[key]} allocations", "keep one of them")
+        return given
+
+    def _check_faults(self, faults: Faults, actuators: Mapping[str, Term]) -> None:
+        for part in self.faults:
+            if not isinstance(part, Fault):
+                continue
+            if part.of not in actuators:
+                faults.add("faults.of", part.of, "is no actuator of this controller", closest(part.of, actuators))
+            elif not 0 <= part.channel < actuators[part.of].channels:
+                count = actuators[part.of].channels
+                faults.add("faults.channel", part.channel, f"is beyond the {count} of {part.of}", f"give 0 to {count - 1}")
+
+    def every(self, h: float) -> int:
+        """Steps between two looks.
+
+        Args:
+            h: Step of the run [s].
+
+        Returns:
+            The whole number nearest to period / h, at least 1.
+        """
+        return max(1, round(self.period / h))
+
+    def check_step(self, faults: Faults, h: float) -> None:
+        """Add a fault where period or delay is no whole number of steps.
+
+        Args:
+            faults: Collects the faults.
+            h: Step of the run [s].
+        """
+        for name, value in (("period", float(self.period)), ("delay", float(self.delay))):
+            low = int(value / h + ROUND_OFF)
+            if abs(value - round(value / h) * h) > ROUND_OFF * h:
+                near = " or ".join(f"{max(i, 1) * h:.9g}" for i in sorted({max(low, 1), low + 1}))
+                faults.add(f"controller.{name}", value, f"is no whole number of steps of {h:.9g} s", f"give {near} s, or another step")
+
+    def to_dict(self) -> dict[str, Any]:
+        """The controller as the section of a scene file.
+
+        Returns:
+            Its numbers, and the lists that are not empty.
+        """
+        content: dict[str, Any] = {"period": float(self.period)}
+        content |= {"delay": float(self.delay)} if self.delay else {}
+        lists = {section: [part.to_dict() for part in getattr(self, section)] for section in SECTIONS}
+        return content | {section: parts for section, parts in lists.items() if parts}
+
+
+def from_table(given: Any) -> Controller | None:
+    """A controller from the section of a scene file.
+
+    Args:
+        given: A Controller, a table, or None.
+
+    Returns:
+        The controller; None for None.
+
+    Raises:
+        SceneError: Where anything is wrong; the message lists every fault.
+    """
+    if given is None or isinstance(given, Controller):
+        return given
+    faults = Faults()
+    if not isinstance(given, Mapping):
+        faults.add("controller", given, "is no table", "write [controller] and its keys below, or give lw.Controller(...)")
+        faults.raise_if_any()
+    known = [item.name for item in fields(Controller) if item.init]
+    faults.keys("controller", given, known)
+    if "period" not in given:
+        faults.add("controller.period", "", "is missing", "give the time between two looks [s]")
+    faults.raise_if_any()
+    return Controller(**given)
+
+
+def _parts(section: str, base: type[Part], given: Any) -> tuple[Part, ...]:
+    """The parts of a list, from objects or tables."""
+    check_list(section, given, f"write [[controller.{section}]] and type = ... below")
+    faults, parts = Faults(), []
+    known = base.kinds
+    for i, entry in enumerate(given):
+        where = f"{section}[{i}]"
+        with faults.including():
+            if isinstance(entry, Mapping):
+                word = entry.get("type", "fault" if section == "faults" else "")
+                if word not in known:
+                    faults.add(f"{where}.type", word, "is not known", closest(str(word), known))
+                else:
+                    parts.append(build(where, known[word], entry))
+            elif isinstance(entry, base):
+                parts.append(entry)
+            else:
+                faults.add(where, entry, "is no part of this list", f"give one of {', '.join(known)}")
+    faults.raise_if_any()
+    return tuple(parts)

@@ -1,0 +1,90 @@
+"""An ideal actuator, which makes the wrench that a controller demands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.physics.terms.actuators import UNLIMITED, packed_driven
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
+
+# Components of a wrench: forces along the body's axes and moments about them.
+COMPONENTS = ("X", "Y", "Z", "K", "M", "N")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ControlWrench(Term):
+    """An ideal actuator: force and torque about the body's origin that a controller commands; none without a controller.
+
+    n' = (command - n) / time constant for each of the six components, |n'| at most the rate limit, the command within the limit.
+
+    Args:
+        limit: Largest size of each component, (6,) [N, N m]; 1e6 by default.
+        rate_limit: Largest rate of each component, (6,) [N/s, N m/s]; none by default.
+        time_constant: Time constant of the lag of each component, (6,) [s]; 0 by default, no lag.
+    """
+
+    type: ClassVar[str] = "control_wrench"
+
+    limit: Any = number((6,), "N, N m", (1e6,) * 6, least=0.0)
+    rate_limit: Any = number((6,), "N/s, N m/s", (UNLIMITED,) * 6, least=0.0)
+    time_constant: Any = number((6,), "s", (0.0,) * 6, least=0.0)
+
+    def __post_init__(self) -> None:
+        for name in ("limit", "rate_limit", "time_constant"):
+            value = getattr(self, name)
+            if np.ndim(np.asarray(value, dtype=object)) == 0:
+                object.__setattr__(self, name, (value,) * 6)
+        super().__post_init__()
+
+    @property
+    def has_square_curve(self) -> bool:
+        """Whether effort goes as the command squared."""
+        return False
+
+    @property
+    def channels(self) -> int:
+        """One for each component."""
+        return 6
+
+    @property
+    def memory(self) -> bool:
+        """Whether it follows its commands with a lag or at a limited rate."""
+        return bool(np.any(self.time_constant > 0.0) or np.any(self.rate_limit < UNLIMITED))
+
+    def present(self, numbers: Numbers) -> bool:
+        """Whether a controller drives it."""
+        return self.driver is not None
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        """The wrench of each channel in the kernel's axes, and its limits."""
+        force, torque = (np.eye(6)[None, :, i : i + 3] for i in (0, 3))
+        blocks = [context.frame.vector(force), context.frame.torque(torque, force)]
+        return packed_driven(self, numbers, np.concatenate(np.broadcast_arrays(*blocks), axis=-1))
+
+    def effect(self, numbers: Numbers, parameters: Numbers, speed: np.ndarray) -> np.ndarray:
+        """The wrench of a unit of effort of each channel, about the body's origin.
+
+        Args:
+            numbers: The term's numbers by field.
+            parameters: All parameters of the scene.
+            speed: Speed ahead (1 or n,) [m/s].
+
+        Returns:
+            (1 or n, 6, channels).
+        """
+        return np.eye(6)[None]
+
+    def curve(self, numbers: Numbers) -> tuple[np.ndarray, ...]:
+        """How effort follows from a command.
+
+        Args:
+            numbers: The term's numbers by field.
+
+        Returns:
+            Effort of a unit of the command ahead and astern, and dead band, each (1 or n, channels).
+        """
+        unit = np.ones((1, 6))
+        return unit, unit, 0.0 * unit

@@ -144,7 +144,7 @@ def fin_angles(scene: SceneLike, p: Numbers) -> Iterator[Look]:
     for term in scene.terms:
         if not isinstance(term, ControlFins):
             continue
-        for field in ("limit", "command_schedule"):
+        for field in ("limit", *(() if term.driver else ("command_schedule",))):
             values = np.abs(p[f"{term.key}.{field}"])
             angle = values.reshape(len(values), -1).max(axis=1)
             held = field == "command_schedule" and len(term.times) == 1

@@ -20,5 +20,5 @@ def held_command(view: Any, key: _Held, i: int):
 
 @wp.func
 def held_command(view: Any, key: _Delayed, i: int):  # noqa: F811
-    since = (view.h.dtype(view.step) + view.h.dtype(0.5)) * ones(view.b.x) - remembered(view, key.switch)
+    since = (view.h.dtype(view.step) + view.h.dtype(0.5)) * ones(view.b.x) - remembered(view, key.begin)
     return positive(since, remembered(view, key.row + i), remembered(view, key.old + i))

@@ -46,7 +46,7 @@ def held_key():
 
 @functools.cache
 def delayed_key():
-    """The same where commands arrive late: `row`, the first of the latest, `old`, of those before; `switch`, row of the step
+    """The same where commands arrive late: `row`, the first of the latest, `old`, of those before; `begin`, row of the step
     from which on the latest act.
     """
-    return struct("DelayedKey", row=wp.int32, old=wp.int32, switch=wp.int32)
+    return struct("DelayedKey", row=wp.int32, old=wp.int32, begin=wp.int32)

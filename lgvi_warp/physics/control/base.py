@@ -70,8 +70,8 @@ class Bus(NamedTuple):
         if not self.delayed:
             return {"commands": {"row": first}, "report": self.report + first}
         rows = {"row": self.acting + first, "old": self.acting + self.count + first}
-        switch = self.acting + 2 * self.count
-        return {"commands": rows | {"switch": switch}, "report": self.report + first}
+        begin = self.acting + 2 * self.count
+        return {"commands": rows | {"begin": begin}, "report": self.report + first}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

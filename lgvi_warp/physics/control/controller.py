@@ -146,8 +146,10 @@ class Controller:
         """
         controller = copy.copy(self)
         object.__setattr__(controller, "bus", bus)
+        actuators = {key: term.driven_by(bus) for key, term in self.actuators.items()}
+        object.__setattr__(controller, "actuators", actuators)
         for section in SECTIONS:
-            parts = tuple(part.wired(bus, self.actuators) for part in getattr(self, section))
+            parts = tuple(part.wired(bus, actuators) for part in getattr(self, section))
             object.__setattr__(controller, section, parts)
         return controller
 

@@ -37,6 +37,6 @@ class Delay(Part):
         periods = steps // every
         sets = int(periods.max()) + 2
         acting, count = bus.acting, bus.count
-        rows = {"fresh": 0, "acting": acting, "before": acting + count, "switch": acting + 2 * count}
+        rows = {"fresh": 0, "acting": acting, "before": acting + count, "begin": acting + 2 * count}
         values = {"periods": periods, "steps": steps - every * periods, "sets": sets, "count": count, **rows}
         return Packed(values, memory=np.zeros((1, sets * count)))

@@ -14,7 +14,7 @@ def params(width, real):
     the first row of the new ones, of those that act from a step on, of those that act before, and of that step.
     """
     Lane = lane(width, real)
-    words = ("memory", "sets", "count", "fresh", "acting", "before", "switch")
+    words = ("memory", "sets", "count", "fresh", "acting", "before", "begin")
     return struct("Delay", periods=Lane, steps=Lane, **dict.fromkeys(words, wp.int32))
 
 
@@ -35,5 +35,5 @@ def send(y: Any, p: Any):
             before = positive(half - absolute(age - p.periods - unity), value, before)
         remember(y, p.acting + i, acting)
         remember(y, p.before + i, before)
-    remember(y, p.switch, y.h.dtype(y.step) * unity + p.steps)
+    remember(y, p.begin, y.h.dtype(y.step) * unity + p.steps)
     return y

@@ -209,7 +209,7 @@ class Packets:
         s0, s1 = plan.due(k0, k1)
         numbers = sum(plan.sample_fields.values())
         width = plan.spec.width
-        waste = WASTE if len(plan.sample_fields) < len(SAMPLE_FIELDS) else 0
+        waste = WASTE if SAMPLE_FIELDS.keys() - plan.sample_fields.keys() else 0
         shape = (self.count, max(1, (s1 - s0) * numbers) + waste)
         if self.out is None or self.out.shape != shape:
             self.out = wp.empty(shape, dtype=plan.advance.types.Lane, device="cpu")
@@ -236,6 +236,16 @@ class Packets:
         inputs += [sum(sizes.values()), wp.vec4i(*(firsts.get(name, -1) for name in SAMPLE_FIELDS)), self.out]
         with build_lock:
             return wp.launch(plan.advance.kernel, dim=self.count, inputs=inputs, device="cpu", record_cmd=True)
+
+    def first_signals(self) -> np.ndarray:
+        """The signals at t = 0, once the first launch has made them.
+
+        Returns:
+            (1, count * width, numbers of the signals), a copy.
+        """
+        rows = self.monitor.first_signals.numpy()[:, : len(self.plan.signal_rows)]
+        packets, numbers, width = rows.shape
+        return rows.transpose(0, 2, 1).reshape(1, packets * width, numbers).copy()
 
     def outcome(self, warned: bool = True) -> Outcome:
         """The outcome of each member so far.

@@ -20,7 +20,7 @@ from lgvi_warp.engine.shared import MEMBERS, SEED, Shared
 from lgvi_warp.engine.survey import survey
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
-from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.physics.control.signals import ordered
 from lgvi_warp.runs.provenance import provenance
 from lgvi_warp.runs.quantities import OfInterest, OfResult, quantities
 from lgvi_warp.runs.result import Result
@@ -396,7 +396,7 @@ def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -
     """
     if save is not None or not of:
         return save
-    fields = tuple(name for name in FIELDS if any(name in each.fields for each in of))
+    fields = ordered(name for each in of for name in each.fields)
     paths = [each.label for each in of if each.over_path]
     if paths and scene.run.save_every is None:
         problem = f"save = None: is missing, and {paths[0]} looks over the path"

@@ -14,6 +14,7 @@ from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt, time_grid
+from lgvi_warp.physics.control.signals import check
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.scene.ensemble import Ensemble
 
@@ -109,6 +110,8 @@ def make_plan(
         text = f"Newton steps {number} every member's start at twice the step"
         grid = replace(grid, messages=(*grid.messages, text))
     on_failure = on_failure or settings.on_failure
+    check(faults, "save.fields", save.fields, ensemble.scene.controller)
+    faults.raise_if_any()
     return Plan(ensemble, chosen, grid, fields(save.fields), dtype, width, checks, on_failure, survey_all)
 
 

@@ -62,7 +62,8 @@ def make_advance(spec):
     sample = make_sample(Lane, spec.compensated, stepping.method, drifts, stills)
 
     keep_signals, sample_signals = make_signals(Lane)
-    note_actuators = make_note_actuators(spec, types.View, at_step) if controlled else stepping.method.step
+    reports = controlled and spec.control.reports
+    note_actuators = make_note_actuators(spec, types.View, at_step) if reports else stepping.method.step
 
     @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": CPU_FLAGS})
     def advance(
@@ -139,7 +140,8 @@ def make_advance(spec):
             if wp.static(controlled):
                 x.alarm = Alarm()
                 x.alarm = feed(x, c, monitor, 0, h, real(0.0))
-                note_actuators(x, c, h, 0)
+                if wp.static(reports):
+                    note_actuators(x, c, h, 0)
                 for j in range(monitor.signals.shape[0]):
                     monitor.first_signals[i, j] = memory[i, monitor.signals[j]]
             x = opened(x, c, opening)
@@ -168,7 +170,7 @@ def make_advance(spec):
             if singles > 0:
                 n = 1
             good = x
-            if wp.static(controlled and checked):
+            if wp.static(reports and checked):
                 if singles > 0:
                     # Where a lane fails in this step, its actuators are those of the step's start.
                     note_actuators(x, c, h, k)
@@ -265,7 +267,8 @@ def make_advance(spec):
                     y = opened(at_step(y, k, h), c, -opening)
                     sample(out, i, (s - s0) * numbers, columns, y, c, real(h), monitor, frozen)
                     if wp.static(controlled):
-                        note_actuators(x, c, h, k)
+                        if wp.static(reports):
+                            note_actuators(x, c, h, k)
                         sample_signals(out, i, (s - s0 + 1) * numbers, memory, monitor, frozen)
                     s += 1
         if any_frozen:

@@ -22,11 +22,13 @@ class Control(NamedTuple):
     parts: modules of its parts, sensors first, then guidance, laws, allocation, and what commands pass on their way.
     numbers: the declared numbers of each part (see params_of).
     noted: what each look notes for samples, among NOTED.
+    reports: whether samples show where actuators are.
     """
 
     parts: tuple
     numbers: tuple
     noted: tuple = ()
+    reports: bool = False
 
 
 class Spec(NamedTuple):

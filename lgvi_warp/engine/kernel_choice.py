@@ -97,7 +97,11 @@ def choose_kernel(
     """
     explicit = method.tableau is not None
     controller = _controller(ensemble, facts)
-    control = tuple((part, device_module(part, part.device, built_in)) for part in controller.acting_parts) if controller else ()
+    control = (
+        tuple((part, device_module(part, part.device, built_in)) for part in controller.acting_parts)
+        if controller
+        else ()
+    )
     acting = _acting(ensemble, facts, built_in, controller)
     events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)
     damping = any(hasattr(module, "damping") for term, module in acting if not isinstance(term, Drag))

@@ -206,7 +206,9 @@ def make_signals(Lane):
             memory[i, monitor.kept + j] = positive(code, held, memory[i, monitor.kept + j])
 
     @wp.func(inline=False)
-    def sample_signals(out: wp.array2d(dtype=Lane), i: int, end: int, memory: wp.array2d(dtype=Lane), monitor: Any, frozen: Lane):
+    def sample_signals(
+        out: wp.array2d(dtype=Lane), i: int, end: int, memory: wp.array2d(dtype=Lane), monitor: Any, frozen: Lane
+    ):
         """Write the signals as the last numbers of a sample, which ends before the column `end`."""
         count = monitor.signals.shape[0]
         for j in range(count):

@@ -211,6 +211,23 @@ class Allocation(Part):
         """
 
 
+# Entries of a projector below this are round-off.
+ROUND_OFF = 1e-12
+
+
+def rest_rows(reached: np.ndarray) -> np.ndarray:
+    """Rows by which the device code finds what actuators cannot make of a demand.
+
+    Args:
+        reached: Projector (n, 6, 6) onto the demands that they can make.
+
+    Returns:
+        The projector onto the others, line by line, (n, 36), without round-off.
+    """
+    others = np.eye(6) - reached
+    return np.where(np.abs(others) < ROUND_OFF, 0.0, others).reshape(len(others), -1)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Sending(Part):
     """A part that changes commands on their way to the actuators."""
@@ -220,4 +237,6 @@ class Sending(Part):
 
 
 # The bases of parts by the list that they stand in, in the order in which their roles act.
-SECTIONS: dict[str, type[Part]] = {kind.section: kind for kind in (MeasuringPart, Guidance, ControlLaw, Allocation, Sending)}
+SECTIONS: dict[str, type[Part]] = {
+    kind.section: kind for kind in (MeasuringPart, Guidance, ControlLaw, Allocation, Sending)
+}

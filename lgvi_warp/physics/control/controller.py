@@ -75,7 +75,7 @@ class Controller:
         for part in (*self.guidance, *self.laws):
             for wish in part.needs:
                 if wish not in given:
-                    remedy = "give guidance that wants it, such as [[controller.guidance]] type = \"set_point\""
+                    remedy = 'give guidance that wants it, such as [[controller.guidance]] type = "set_point"'
                     faults.add(part.section, part.key, f"needs a wanted {wish}, which no guidance gives", remedy)
             given |= set(part.gives)
 
@@ -182,7 +182,9 @@ class Controller:
                 faults.add("faults.of", part.of, "is no actuator of this controller", closest(part.of, actuators))
             elif not 0 <= part.channel < actuators[part.of].channels:
                 count = actuators[part.of].channels
-                faults.add("faults.channel", part.channel, f"is beyond the {count} of {part.of}", f"give 0 to {count - 1}")
+                faults.add(
+                    "faults.channel", part.channel, f"is beyond the {count} of {part.of}", f"give 0 to {count - 1}"
+                )
 
     def every(self, h: float) -> int:
         """Steps between two looks.
@@ -206,7 +208,12 @@ class Controller:
             low = int(value / h + ROUND_OFF)
             if abs(value - round(value / h) * h) > ROUND_OFF * h:
                 near = " or ".join(f"{max(i, 1) * h:.9g}" for i in sorted({max(low, 1), low + 1}))
-                faults.add(f"controller.{name}", value, f"is no whole number of steps of {h:.9g} s", f"give {near} s, or another step")
+                faults.add(
+                    f"controller.{name}",
+                    value,
+                    f"is no whole number of steps of {h:.9g} s",
+                    f"give {near} s, or another step",
+                )
 
     def to_dict(self) -> dict[str, Any]:
         """The controller as the section of a scene file.
@@ -236,7 +243,9 @@ def from_table(given: Any) -> Controller | None:
         return given
     faults = Faults()
     if not isinstance(given, Mapping):
-        faults.add("controller", given, "is no table", "write [controller] and its keys below, or give lw.Controller(...)")
+        faults.add(
+            "controller", given, "is no table", "write [controller] and its keys below, or give lw.Controller(...)"
+        )
         faults.raise_if_any()
     known = [item.name for item in fields(Controller) if item.init]
     faults.keys("controller", given, known)

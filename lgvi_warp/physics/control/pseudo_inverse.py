@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.control.base import Allocation
+from lgvi_warp.physics.control.base import Allocation, rest_rows
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number, side_by_side
 
 
@@ -51,4 +51,4 @@ class PseudoInverse(Allocation):
         assert self.bus is not None
         first, count = self.bus.commands[self.to]
         values = {"commands": first, "count": count, "square": int(self.actuator.has_square_curve)}
-        return Packed(values, rows.reshape(len(rows), -1))
+        return Packed(values, side_by_side(rest_rows(B @ lines), rows.reshape(len(rows), -1)))

@@ -12,7 +12,6 @@ from lgvi_kernels.law import (  # noqa: F401
     div,
     dot,
     greatest,
-    least,
     mul,
     neg,
     ones,
@@ -24,11 +23,14 @@ from lgvi_kernels.law import (  # noqa: F401
     struct,
     sub,
 )
+from lgvi_kernels.laws.control.rest import ROWS as rest_rows
+from lgvi_kernels.laws.control.rest import rest
 
-# Rows of one channel: its line of the pseudo-inverse (6), the wrench of a unit of effort (6), limit of the command, coefficient
+# Rows of rest.py, then of one channel: its line of the pseudo-inverse (6), the wrench of a unit of effort (6), limit of the command, coefficient
 # ahead and astern, dead band. Effort is thrust, force or angle; command = effort / coefficient, or the inverse of the thrust
 # curve where `square`.
 ROWS = 16
+REST = rest_rows
 
 
 @functools.cache
@@ -39,28 +41,28 @@ def params(width, real):
 
 @wp.func
 def allocate(w: Any, y: Any, p: Any):
-    """t = W^-1 B^T (B W^-1 B^T)^+ w; what is left of w is w - B t, t within what the limits allow."""
-    demand = w.force
-    moment = w.torque
+    """t = W^-1 B^T (B W^-1 B^T)^+ w; left of w are (I - B B^+) w and B times what the limits cut off of t."""
+    left = rest(w, y, p.first)
     for i in range(p.count):
-        at = p.first + wp.static(ROWS) * i
+        at = p.first + wp.static(REST) + wp.static(ROWS) * i
         most = row1(y, at + 12)
-        effort = dot(row3(y, at), demand) + dot(row3(y, at + 3), moment)
+        effort = dot(row3(y, at), w.force) + dot(row3(y, at + 3), w.torque)
         c = positive(effort, row1(y, at + 13), row1(y, at + 14))
         u = effort / c
+        zero = ones(c) - ones(c)
         if p.square > 0:
-            zero = ones(c) - ones(c)
             size = root(absolute(effort) / c)
             band = row1(y, at + 15)
-            size = least(positive(size, size + band, zero), most)
+            size = positive(size, size + band, zero)
             u = positive(effort, size, -size)
-            over = greatest(size - band, zero)
-            delivered = c * (over * over)
-            effort = positive(u, delivered, -delivered)
-        else:
-            u = clamp(u, -most, most)
-            effort = u * c
+        size = absolute(u)
+        u = clamp(u, -most, most)
+        delivered = u * c
+        if p.square > 0:
+            over = greatest(most - row1(y, at + 15), zero)
+            delivered = positive(effort, c * (over * over), -(c * (over * over)))
+        cut = positive(size - most, effort - delivered, zero)
         remember(y, p.commands + i, u)
-        w.force = w.force - effort * row3(y, at + 6)
-        w.torque = w.torque - effort * row3(y, at + 9)
-    return w
+        left.force = left.force + cut * row3(y, at + 6)
+        left.torque = left.torque + cut * row3(y, at + 9)
+    return left

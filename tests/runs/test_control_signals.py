@@ -9,13 +9,14 @@ import warp as wp
 
 import lgvi_warp as lw
 from lgvi_kernels.law import div, mul, neg, ones, positive, sub, vec3  # noqa: F401
-from lgvi_warp.common.status import Status
+from lgvi_warp.common.status import Status, under_way
 from lgvi_warp.engine import plan as plans
 from lgvi_warp.physics.control.base import ControlLaw
 from lgvi_warp.physics.control.signals import SAVED, SIGNALS
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.runs.store.folder import Folder
+from tests.runs.test_outcomes_shown import rows
 from tests.support.stores import differing
 
 H, EVERY, STEPS, MEMBERS = 0.01, 5, 60, 600
@@ -265,6 +266,14 @@ def test_members_that_are_kept_after_all_have_them(whole, tmp_path):
     for name in SAVED:
         assert getattr(kept, name).tobytes() == getattr(whole, name)[:, [5, 300]].tobytes(), name
         assert getattr(stored, name).tobytes() == getattr(whole, name)[:, [5, 300]].tobytes(), name
+
+
+def test_a_recording_shows_commands_and_actuators(whole, tmp_path):
+    path, early = lw.log_rerun(whole, tmp_path / "fleet.rrd"), under_way(whole)[3]
+    for name in ("command", "actuator"):
+        median = np.median(getattr(whole, name)[3, early, 5])
+        assert rows(path, f"/{name}/5", "scalars")[3 * H] == pytest.approx([median])
+    assert not rows(path, "/demand/5", "scalars") and not rows(path, "/command/6", "scalars")
 
 
 def test_statistics_and_quantities_of_interest(whole):

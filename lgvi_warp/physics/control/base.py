@@ -37,7 +37,7 @@ class Bus(NamedTuple):
     delayed: bool = False
 
     @property
-    def count(self) -> int:
+    def channels(self) -> int:
         """Number of commands."""
         return self.unmet
 
@@ -69,8 +69,8 @@ class Bus(NamedTuple):
         first = self.commands[key][0]
         if not self.delayed:
             return {"commands": {"row": first}, "report": self.report + first}
-        rows = {"row": self.acting + first, "old": self.acting + self.count + first}
-        begin = self.acting + 2 * self.count
+        rows = {"row": self.acting + first, "old": self.acting + self.channels + first}
+        begin = self.acting + 2 * self.channels
         return {"commands": rows | {"begin": begin}, "report": self.report + first}
 
 

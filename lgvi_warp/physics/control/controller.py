@@ -49,7 +49,7 @@ class Controller:
     allocation: Sequence[Any] = ()
     faults: Sequence[Any] = ()
     # Set by `wired`.
-    bus: Bus | None = field(default=None, init=False, repr=False)
+    bus: Any = field(default=None, init=False, repr=False)
     actuators: Mapping[str, Term] = field(default_factory=dict, init=False, repr=False)
 
     key = "controller"

@@ -16,8 +16,8 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 class PseudoInverse(Allocation):
     """Commands for the efforts t of least sum of weight t^2 whose wrench B t is nearest to the demand (Fossen 2021, 11.2).
 
-    t = W^-1 B^T (B W^-1 B^T)^+ w. Effort is thrust of thrusters, by the inverse of their curve; angle of fins, whose effect B is
-    that at `speed`; force or moment of a control_wrench.
+    t = W^-1 B^T (B W^-1 B^T)^+ w. Effort is thrust of thrusters, by the inverse of their curve; angle of fins, whose effect B
+    is that at `speed`; force or moment of a control_wrench.
 
     Args:
         to: Key of the term that takes the commands.

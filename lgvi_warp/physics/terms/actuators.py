@@ -8,7 +8,7 @@ import numpy as np
 
 from lgvi_warp.physics.terms.base import Numbers, Packed, side_by_side
 
-# 1 / time constant of a channel without lag: faster than any step, and within float32. From this rate on a limit counts as none.
+# 1 / time constant of a channel without lag: faster than any step, and within float32. A limit of a rate that counts as none.
 FAST, UNLIMITED = 1e20, 1e6
 
 
@@ -16,7 +16,7 @@ def packed_driven(term: Any, numbers: Numbers, blocks: np.ndarray, work: int = 0
     """Pack an actuator that a controller drives.
 
     Args:
-        term: The term, driven. Its numbers are `limit`, and where it has them `time_constant` and `rate_limit`, each (n, channels).
+        term: The term, driven. Its numbers are `limit`, and where it has them `time_constant` and `rate_limit`, (n, channels).
         numbers: Its numbers by field, (m, ...).
         blocks: Other rows of each channel, (m, channels, rows).
         work: Scratch rows of its device code; 0 by default.

@@ -12,7 +12,7 @@ from lgvi_warp.reference.rotation import Array
 class Measurement:
     """What is taken for the motion at a look: the truth, until a sensor changes it.
 
-    position (3,) [m] inertial; R (3, 3) body to inertial; velocity over ground and water_velocity through the water (3,) [m/s],
+    position (3,) [m] inertial; R (3, 3) body to inertial; velocity over ground, water_velocity through water (3,) [m/s] and
     angular_velocity (3,) [rad/s], body axes; t, period, h [s]; step and look, numbers of the step that begins and of the look;
     member.
     """
@@ -32,7 +32,7 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Reference:
-    """The wanted motion: position [m] and velocity [m/s], inertial; R; angular_velocity [rad/s] in the axes of R; speed [m/s]."""
+    """The wanted motion: position [m], velocity [m/s], inertial; R; angular_velocity [rad/s] in the axes of R; speed [m/s]."""
 
     position: Array
     velocity: Array

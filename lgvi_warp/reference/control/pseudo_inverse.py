@@ -17,7 +17,7 @@ class PseudoInverse(Part):
     weights = None
 
     def allocate(self, w: Array, actuators: dict[str, Any]) -> Array:
-        """t = W^-1 B^T (B W^-1 B^T)^+ w, as commands within the limits; left are (I - B B^+) w and B times what these cut off."""
+        """t = W^-1 B^T (B W^-1 B^T)^+ w, as commands within limits; left are (I - B B^+) w and B times what these cut off."""
         actuator, B = actuators[self.to], self.effect
         W = np.diag(1.0 / np.sqrt(np.ones(B.shape[1]) if self.weights is None else np.asarray(self.weights)))
         inverse = W @ np.linalg.pinv(B @ W, rcond=1e-10)

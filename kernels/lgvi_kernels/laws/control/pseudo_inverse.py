@@ -26,9 +26,9 @@ from lgvi_kernels.law import (  # noqa: F401
 from lgvi_kernels.laws.control.rest import ROWS as rest_rows
 from lgvi_kernels.laws.control.rest import rest
 
-# Rows of rest.py, then of one channel: its line of the pseudo-inverse (6), the wrench of a unit of effort (6), limit of the command, coefficient
-# ahead and astern, dead band. Effort is thrust, force or angle; command = effort / coefficient, or the inverse of the thrust
-# curve where `square`.
+# Rows of rest.py, then of one channel: its line of the pseudo-inverse (6), the wrench of a unit of effort (6), limit of the
+# command, coefficient ahead and astern, dead band. Effort is thrust, force or angle; command = effort / coefficient, or the
+# inverse of the thrust curve where `square`.
 ROWS = 16
 REST = rest_rows
 

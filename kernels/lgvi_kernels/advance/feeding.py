@@ -41,8 +41,8 @@ NOTED = {"demand": 6, "measured": 22, "reference": 20}
 def make_feed(spec, types, method, at_step, opened):
     """(feed, respond): the alarm after a look at the state after k steps.
 
-    Where the host is asked, feed only measures and guides; respond, at the start of the next launch, does the rest with what the
-    host has written into the memory. method: see Step; at_step, opened: see Stepping.
+    Where the host is asked, feed only measures and guides; respond, at the start of the next launch, does the rest with what
+    the host has written into the memory. method: see Step; at_step, opened: see Stepping.
     """
     width, real, control = spec.width, spec.real, spec.control
     State, Constants, Monitor, Alarm = types.State, types.Constants, types.Monitor, types.Alarm

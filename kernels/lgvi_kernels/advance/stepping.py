@@ -20,8 +20,8 @@ class Stepping(NamedTuple):
 
     method: see Step; watch: see Watch, None without events. at_step: (x, k, h) -> x with the number and the time of step k;
     opened: (x, c, length) -> x moved by the lead; one_step, stepped: one step, and a number of steps.
-    feed, respond: a controller's look (see make_feed); held: a number of steps and the looks between them; all three are `step`
-    where there is no controller.
+    feed, respond: a controller's look (see make_feed); held: a number of steps and the looks between them; all three are
+    `step` where there is no controller.
     """
 
     method: Step

@@ -56,7 +56,8 @@ def make_advance(spec):
     lead_coefficient = spec.lead[1] if spec.lead is not None else 0.0
     energetic, substepped, stills, warned = spec.energy, spec.substep, spec.still, bool(spec.looks)
     looking = warned or energetic
-    controlled, feed, held = spec.control is not None, stepping.feed, stepping.held
+    controlled, feed, respond, held = spec.control is not None, stepping.feed, stepping.respond, stepping.held
+    asked = controlled and spec.control.asked
     read, write, back_up = make_rows(Lane, types.State, paced, spec.compensated)
     drifts = superpose(spec.laws, "flow") is not None
     sample = make_sample(Lane, spec.compensated, stepping.method, drifts, stills)
@@ -139,18 +140,34 @@ def make_advance(spec):
                 begin(x, c, monitor, h, frozen)
             if wp.static(controlled):
                 x.alarm = Alarm()
-                x.alarm = feed(x, c, monitor, 0, h, real(0.0))
+            if wp.static(asked):
+                # A launch without steps lets the host see the start.
+                if k1 == 0:
+                    x.alarm = feed(x, c, monitor, 0, h, real(0.0))
+                else:
+                    x = opened(x, c, opening)
+            else:
+                if wp.static(controlled):
+                    x.alarm = feed(x, c, monitor, 0, h, real(0.0))
+                x = opened(x, c, opening)
+        if wp.static(asked):
+            x.alarm = Alarm()
+            if k1 > k0:
+                x.alarm = respond(x, c, monitor, k0, h)
+        if wp.static(controlled):
+            if k0 == 0:
                 if wp.static(reports):
                     note_actuators(x, c, h, 0)
                 for j in range(monitor.signals.shape[0]):
                     monitor.first_signals[i, j] = memory[i, monitor.signals[j]]
-            x = opened(x, c, opening)
-            if wp.static(controlled and checked):
+        if wp.static(controlled and checked):
+            if wp.static(asked) or k0 == 0:
                 early = failures(x, frozen)
                 if any_positive(early):
                     for j in range(wp.static(width)):
                         if early[j] > real(0.0):
                             status[i][j] = int(early[j])
+                            failed_step[i][j] = k0
                     keep_signals(memory, i, monitor, 0, early)
                     kept = choose(early, x, kept)
                     frozen = frozen + early

@@ -23,12 +23,15 @@ class Control(NamedTuple):
     numbers: the declared numbers of each part (see params_of).
     noted: what each look notes for samples, among NOTED.
     reports: whether samples show where actuators are.
+    asked: whether a function of the host answers each look: a look then ends with the measurement and the wanted motion, and
+        the next launch begins with the commands.
     """
 
     parts: tuple
     numbers: tuple
     noted: tuple = ()
     reports: bool = False
+    asked: bool = False
 
 
 class Spec(NamedTuple):

@@ -5,6 +5,7 @@ from lgvi_warp.common.errors import MembersFailed as MembersFailed
 from lgvi_warp.common.errors import SceneError as SceneError
 from lgvi_warp.common.status import Status as Status
 from lgvi_warp.common.status import Warnings as Warnings
+from lgvi_warp.engine.asking import Looks as Looks
 from lgvi_warp.engine.laws.check import check_law as check_law
 from lgvi_warp.engine.plan import Plan as Plan
 from lgvi_warp.methods.method import Method as Method
@@ -13,6 +14,7 @@ from lgvi_warp.physics import notation as notation
 from lgvi_warp.physics import terms as terms
 from lgvi_warp.physics.control.base import ControlLaw as ControlLaw
 from lgvi_warp.physics.control.base import Guidance as Guidance
+from lgvi_warp.physics.control.callback import Callback as Callback
 from lgvi_warp.physics.control.controller import Controller as Controller
 from lgvi_warp.physics.control.depth_pid import DepthPID as DepthPID
 from lgvi_warp.physics.control.fault import Fault as Fault

@@ -97,11 +97,10 @@ def choose_kernel(
     """
     explicit = method.tableau is not None
     controller = _controller(ensemble, facts)
-    control = (
-        tuple((part, device_module(part, part.device, built_in)) for part in controller.acting_parts)
-        if controller
-        else ()
-    )
+    acting_parts = controller.acting_parts if controller else ()
+    control = tuple((part, device_module(part, part.device, built_in)) for part in acting_parts)
+    # The host looks at states between launches, which must not be those in the middle of a lead.
+    asked = controller is not None and controller.callback is not None
     acting = _acting(ensemble, facts, built_in, controller)
     events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)
     damping = any(hasattr(module, "damping") for term, module in acting if not isinstance(term, Drag))
@@ -138,9 +137,9 @@ def choose_kernel(
     if method.two_part:
         # B merges with that of the next step exactly, A up to the order of the method.
         lead, maps = method.program[0], method.program[1:]
-        if events:
+        if events or asked:
             lead, maps = None, method.program
-    elif events or (lead is not None and lead[0] == "K" and not undone):
+    elif events or asked or (lead is not None and lead[0] == "K" and not undone):
         lead, maps = None, program
     conservative = checked and _conservative(facts, acting, built_in)
     # Events, water and the potential are evaluated at the user's origin, or at that of the forces.

@@ -346,10 +346,16 @@ class Plan:
         parts = self.kernel_choice.parts_of_control
         if self.kernel_choice.controller is None:
             return None
-        groups = {SIGNALS[name].group for name in self.signals}
+        groups = {SIGNALS[name].group for name in self.signals} | ({"measured", "reference"} if self.asks else set())
         numbers = tuple(declared(part, module) for part, module in parts)
         noted = tuple(name for name in NOTED if name in groups)
-        return Control(tuple(module for _, module in parts), numbers, noted, "actuator" in groups)
+        return Control(tuple(module for _, module in parts), numbers, noted, "actuator" in groups, self.asks)
+
+    @property
+    def asks(self) -> bool:
+        """Whether a function of the host answers each look."""
+        controller = self.kernel_choice.controller
+        return controller is not None and controller.callback is not None
 
     @functools.cached_property
     def table(self) -> dict[str, Field]:
@@ -496,6 +502,9 @@ class Plan:
         Yields:
             (k0, k1): a launch makes the steps from k0 to k1.
         """
+        if self.asks:
+            yield from self._periods()
+            return
         due = self.grid.sample_steps
         per_sample = sum(self.sample_fields.values()) * count * np.dtype(DTYPES[self.dtype]).itemsize
         most_samples = max(1, SEGMENT_SAMPLE_BYTES // max(per_sample, 1))
@@ -506,6 +515,14 @@ class Plan:
             k1 = min(k + most_steps, int(due[min(last, len(due)) - 1]))
             yield k, k1
             k = k1
+
+    def _periods(self) -> Iterator[tuple[int, int]]:
+        """The launches where a function of the host answers each look: one a period."""
+        controller = self.kernel_choice.controller
+        assert controller is not None
+        every = controller.every(self.grid.h)
+        for k in range(0, self.grid.steps, every):
+            yield k, min(k + every, self.grid.steps)
 
 
 @functools.lru_cache(maxsize=256)

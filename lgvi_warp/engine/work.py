@@ -118,6 +118,7 @@ def run_block(
     Returns:
         What each keeper closed with; None if the block was halted before the end.
     """
+    from lgvi_warp.engine.asking import ask
     from lgvi_warp.engine.packets import Packets
 
     # Members that are not finite, or exceed float32, get their status from the kernel: no warning from NumPy.
@@ -138,9 +139,13 @@ def run_block(
 
         if not plan.signals:
             keep_start()
+        if plan.asks:
+            packets.advance(0, 0)
         for k0, k1 in plan.segments(block.count):
             if halted():
                 return None
+            if plan.asks:
+                ask(packets, k0 * plan.grid.h)
             raw = packets.advance(k0, k1)[:, : block.count]
             if k0 == 0 and plan.signals:
                 # The first look of a controller is a part of the first launch.

@@ -140,20 +140,16 @@ def make_advance(spec):
                 begin(x, c, monitor, h, frozen)
             if wp.static(controlled):
                 x.alarm = Alarm()
-            if wp.static(asked):
-                # A launch without steps lets the host see the start.
-                if k1 == 0:
+                if wp.static(not asked):
                     x.alarm = feed(x, c, monitor, 0, h, real(0.0))
-                else:
-                    x = opened(x, c, opening)
-            else:
-                if wp.static(controlled):
-                    x.alarm = feed(x, c, monitor, 0, h, real(0.0))
-                x = opened(x, c, opening)
+            x = opened(x, c, opening)
         if wp.static(asked):
+            # A launch without steps measures alone: so the host sees the start. Such a kernel has no lead.
             x.alarm = Alarm()
             if k1 > k0:
                 x.alarm = respond(x, c, monitor, k0, h)
+            else:
+                x.alarm = feed(x, c, monitor, k0, h, real(0.0))
         if wp.static(controlled):
             if k0 == 0:
                 if wp.static(reports):

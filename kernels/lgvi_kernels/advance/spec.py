@@ -24,7 +24,7 @@ class Control(NamedTuple):
     noted: what each look notes for samples, among NOTED.
     reports: whether samples show where actuators are.
     asked: whether a function of the host answers each look: a look then ends with the measurement and the wanted motion, and
-        the next launch begins with the commands.
+        the next launch begins with the commands. Such a kernel has no lead.
     """
 
     parts: tuple

@@ -25,6 +25,7 @@ class Bus(NamedTuple):
         report: First of as many rows as there are commands, where actuators say where they are.
         acting: First row of the commands that act, where commands are delayed. As many rows of the commands before follow, and
             the row of the step from which the former act.
+        answer: First of the rows into which a `Callback` writes; as many as it returns numbers.
         rows: Number of rows.
         delayed: Whether the commands of some member are delayed.
     """
@@ -33,6 +34,7 @@ class Bus(NamedTuple):
     unmet: int
     report: int
     acting: int
+    answer: int
     rows: int
     delayed: bool = False
 
@@ -42,11 +44,12 @@ class Bus(NamedTuple):
         return self.unmet
 
     @classmethod
-    def of(cls, channels: Mapping[str, int]) -> Bus:
+    def of(cls, channels: Mapping[str, int], answers: int = 0) -> Bus:
         """The bus of some actuators.
 
         Args:
             channels: Number of commands of each, by the key of its term.
+            answers: Numbers that a function of the host writes at each look; 0 by default, for none.
 
         Returns:
             Rows for all of them.
@@ -55,7 +58,7 @@ class Bus(NamedTuple):
         for key, count in channels.items():
             commands[key] = (row, count)
             row += count
-        return cls(commands, row, row + 6, 2 * row + 6, 4 * row + 7)
+        return cls(commands, row, row + 6, 2 * row + 6, 4 * row + 7, 4 * row + 7 + answers)
 
     def values_of(self, key: str) -> dict[str, Any]:
         """What the device code of an actuator reads.

@@ -12,6 +12,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.physics.control.base import SECTIONS, Allocation, Bus, Part
+from lgvi_warp.physics.control.callback import Callback, CallbackCommands, refuse_second
 from lgvi_warp.physics.control.delay import Delay
 from lgvi_warp.physics.control.fault import Fault
 from lgvi_warp.physics.control.pseudo_inverse import PseudoInverse
@@ -66,6 +67,7 @@ class Controller:
         if not faults and not self.laws:
             faults.add("laws", "", "are missing", "give at least one, such as lw.HeadingPID(kp=...)")
         if not faults:
+            refuse_second([part for part in self.laws if isinstance(part, Callback)])
             self._check_wishes(faults)
         faults.raise_if_any()
 
@@ -95,8 +97,17 @@ class Controller:
     def acting_parts(self) -> tuple[Part, ...]:
         """The parts in the order in which the kernel has them: the delay, where there is one, before the faults."""
         assert self.bus is not None
-        before = tuple(part for section in tuple(SECTIONS)[:-1] for part in getattr(self, section))
+        callback = self.callback
+        lists = (getattr(self, section) for section in tuple(SECTIONS)[:-1])
+        # The commands of a callback reach their actuator by an allocation of their own.
+        idle = callback if callback is not None and callback.to else None
+        before = tuple(part for each in lists for part in each if part is not idle)
         return (*before, *((self.delay_part,) if self.bus.delayed else ()), *self.faults)
+
+    @property
+    def callback(self) -> Callback | None:
+        """The law that is a function of the host; None where there is none."""
+        return next((part for part in self.laws if isinstance(part, Callback)), None)
 
     def parameters(self) -> dict[str, np.ndarray]:
         """The numbers that may vary by member.
@@ -129,7 +140,10 @@ class Controller:
         whole = copy.copy(self)
         object.__setattr__(whole, "allocation", allocation)
         object.__setattr__(whole, "actuators", actuators)
-        controller = whole.on(Bus.of({key: term.channels for key, term in actuators.items()}))
+        channels = {key: term.channels for key, term in actuators.items()}
+        callback = self.callback
+        answers = 0 if callback is None else channels[callback.to] if callback.to else 6
+        controller = whole.on(Bus.of(channels, answers))
         for part in controller.allocation:
             part.check_actuator(faults)
         faults.raise_if_any()
@@ -156,6 +170,8 @@ class Controller:
     def _allocation(self, faults: Faults, able: Mapping[str, Term]) -> tuple[Allocation, ...]:
         """The allocation, or the default one, checked."""
         given = tuple(self.allocation)
+        if self.callback is not None and self.callback.to:
+            given = (CallbackCommands(to=self.callback.to), *(part for part in given if part.type))
         if not given:
             if len(able) != 1:
                 fault = "is missing" if able else "has no actuator: no term of the scene takes commands"
@@ -223,7 +239,7 @@ class Controller:
         """
         content: dict[str, Any] = {"period": float(self.period)}
         content |= {"delay": float(self.delay)} if self.delay else {}
-        lists = {section: [part.to_dict() for part in getattr(self, section)] for section in SECTIONS}
+        lists = {section: [part.to_dict() for part in getattr(self, section) if part.type] for section in SECTIONS}
         return content | {section: parts for section, parts in lists.items() if parts}
 
 

@@ -25,6 +25,7 @@ from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
 from lgvi_kernels.lanes.look import measurement_struct, reference_struct
 from lgvi_kernels.lanes.matrix3 import apply
 from lgvi_kernels.lanes.state import wrench_struct
+from lgvi_kernels.lanes.sums import place
 from lgvi_kernels.lanes.view import heading_error, remember, remembered
 from lgvi_kernels.maps.compose import superpose
 from lgvi_kernels.maps.in_turn import ROLES, in_turn
@@ -79,9 +80,9 @@ def make_feed(spec, types, method, at_step, opened):
         over = through
         if wp.static(drifts):
             over = through + water_velocity(x, c, real(h))
-        y.position = x.b
+        y.position = place(x)
         if wp.static(moved):
-            y.position = x.b + rotate(x, c.inertia.user_origin)
+            y.position = place(x) + rotate(x, c.inertia.user_origin)
         if wp.static(turned):
             y.north = apply(c.inertia.axes, x.R0)
             y.east = apply(c.inertia.axes, x.R1)

@@ -41,13 +41,13 @@ _VECTORS = {"position": 0, "attitude": 3}
 _MEASURED = _VECTORS | {"velocity": 12, "water_velocity": 15, "angular_velocity": 18, "depth": 2, "heading": 21}
 _WANTED = _VECTORS | {"velocity": 12, "angular_velocity": 15, "depth": 2, "heading": 18, "speed": 19}
 _KINDS = TABLE | {
-    "water_velocity": Field("water_velocity", (3,), "m/s", "velocity through the water in body axes"),
+    "water_velocity": replace(TABLE["velocity"], meaning="velocity through the water in body axes"),
     "heading": Field("heading", (), "rad", "heading, from north to east"),
 }
 _REFERENCE = _KINDS | {
     "velocity": TABLE["velocity_inertial"],
-    "angular_velocity": Field("angular_velocity", (3,), "rad/s", "angular velocity in the axes of the wanted attitude"),
-    "speed": Field("speed", (), "m/s", "speed ahead through the water"),
+    "angular_velocity": replace(TABLE["angular_velocity"], meaning="angular velocity in axes of the wanted attitude"),
+    "speed": replace(TABLE["speed"], meaning="speed ahead through the water"),
 }
 
 

@@ -98,7 +98,10 @@ def choose_kernel(
     explicit = method.tableau is not None
     controller = _controller(ensemble, facts)
     control = (
-        tuple((part, device_module(part, part.device, built_in)) for part in controller.acting_parts)
+        tuple(
+            (part, device_module(part, part.device_in(not facts.turned), built_in))
+            for part in _parts(controller, facts)
+        )
         if controller
         else ()
     )
@@ -179,6 +182,11 @@ def _controller(ensemble: Ensemble, facts: Survey) -> Controller | None:
     if controller is None or controller.bus is None:
         return None
     return controller.on(controller.bus._replace(delayed=facts.delayed))
+
+
+def _parts(controller: Controller, facts: Survey) -> tuple[Part, ...]:
+    """The parts of a controller as they act, each with what some member needs of its device code."""
+    return tuple(part.with_features(facts.features) for part in controller.acting_parts)
 
 
 def _steady(module: Any) -> bool:

@@ -1,0 +1,48 @@
+"""A fault of a sensor: from a time on one number of its reading is another one."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels import device
+from lgvi_kernels.law import add, lane, mul, ones, positive, struct, sub  # noqa: F401
+from lgvi_kernels.laws.control.readings import make_reading
+
+
+@functools.cache
+def params(width, real):
+    """Params: time, gain and offset of each lane; number of the channel."""
+    Lane = lane(width, real)
+    return struct("SensorFault", time=Lane, gain=Lane, offset=Lane, channel=wp.int32)
+
+
+@functools.cache
+def made(features):
+    """The device code of a fault of a sensor, which reads what the only feature names (see readings.py)."""
+    reading = make_reading(features[0])
+    values, with_values = reading.values, reading.with_values
+
+    @wp.func
+    def measure(y: Any, p: Any):
+        """From the first look at or after its time on: reading <- gain * reading + offset."""
+        # Half a step is added, since times are sums that round.
+        since = (y.t + y.h.dtype(0.5) * y.h) * ones(p.time) - p.time
+        v = values(y)
+        if p.channel == 0:
+            v.x = p.gain * v.x + p.offset
+        if p.channel == 1:
+            v.y = p.gain * v.y + p.offset
+        if p.channel == 2:
+            v.z = p.gain * v.z + p.offset
+        z = with_values(y, v)
+        y.position = positive(since, z.position, y.position)
+        y.north = positive(since, z.north, y.north)
+        y.east = positive(since, z.east, y.east)
+        y.down = positive(since, z.down, y.down)
+        y.velocity = positive(since, z.velocity, y.velocity)
+        y.water_velocity = positive(since, z.water_velocity, y.water_velocity)
+        y.angular_velocity = positive(since, z.angular_velocity, y.angular_velocity)
+        return y
+
+    return device(__name__, features, params=params, measure=measure)

@@ -74,7 +74,7 @@ def heading(y: Any):
     return arctangent2(y.east.x, y.north.x)
 
 
-@wp.func
+@wp.func(inline=False)
 def headed(y: Any, e: Any):
     """The attitude turned by e about the vertical."""
     c = cosine(e)
@@ -97,7 +97,7 @@ def rotated(v: Any, w: Any):
     return v - (sine(n) / n) * inner + (half * sinc_half * sinc_half) * cross(w, inner)
 
 
-@wp.func
+@wp.func(inline=False)
 def turned(y: Any, w: Any):
     """R exp(hat(w)): the attitude turned by a rotation vector of the body's axes."""
     y.north = rotated(y.north, w)
@@ -106,7 +106,7 @@ def turned(y: Any, w: Any):
     return y
 
 
-@wp.func
+@wp.func(inline=False)
 def turn_to(y: Any, z: Any):
     """The rotation vector w with R_z = R_y exp(hat(w)); 0 where they are half a turn apart, since there it is not unique."""
     half = y.north.x.dtype(0.5)
@@ -136,14 +136,14 @@ def taken_attitude(y: Any, row: int):
     return y
 
 
-@wp.func
+@wp.func(inline=False)
 def angles(y: Any):
     """Roll, pitch and yaw."""
     level = root(y.north.x * y.north.x + y.east.x * y.east.x)
     return vec3(arctangent2(y.down.y, y.down.z), arctangent2(-y.down.x, level), heading(y))
 
 
-@wp.func
+@wp.func(inline=False)
 def with_angles(y: Any, v: Any):
     """With the attitude of roll, pitch and yaw."""
     cr = cosine(v.x)

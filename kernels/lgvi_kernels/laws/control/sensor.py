@@ -34,6 +34,13 @@ DRAWING = ("noise", "drift", "dropout")
 KEEPING = ("every", "latency", "dropout")
 
 
+# Not inlined, for the sake of the compiler: a scene may have many sensors.
+@wp.func(inline=False)
+def drawn(like: Any, key: Any, look: int, stream: int):
+    """Four standard normals of a look, side by side."""
+    return normals(like, key.member, look, key.channel + stream, key.seed0, key.seed1)
+
+
 @functools.cache
 def made(features):
     """The device code of a sensor: features: what it reads (see readings.py), and its numbers that are not idle."""
@@ -57,12 +64,6 @@ def made(features):
         lanes = {name: Lane for name in others if name in KEEPING}
         key = {"key": noise_key(width)} if draws else {}
         return struct("Sensor", **vectors, **lanes, **key, memory=wp.int32, sets=wp.int32)
-
-    @wp.func
-    def drawn(y: Any, p: Any, stream: int):
-        """Four standard normals of this look, side by side."""
-        key = p.key
-        return normals(y.position.x, key.member, y.look, key.channel + stream, key.seed0, key.seed1)
 
     @wp.func
     def kept(y: Any, p: Any, lost: Any):
@@ -109,7 +110,7 @@ def made(features):
         if wp.static(biased):
             e = e + p.bias
         if wp.static(draws):
-            four = drawn(y, p, 0)
+            four = drawn(unity, p.key, y.look, 0)
             if wp.static(noisy):
                 e = e + p.noise * vec3(quarter(four, 0), quarter(four, 1), quarter(four, 2))
             if wp.static(lossy):
@@ -123,7 +124,7 @@ def made(features):
                 else:
                     walks = remembered3(y, p.memory)
                     e = e + walks
-                    more = drawn(y, p, 1)
+                    more = drawn(unity, p.key, y.look, 1)
                     steps = vec3(quarter(more, 0), quarter(more, 1), quarter(more, 2))
                     remember3(y, p.memory, walks + spread * (p.drift * steps))
         if wp.static(biased or noisy or drifting):

@@ -20,7 +20,8 @@ def params(width, real):
 @functools.cache
 def made(features):
     """The device code of a fault of a sensor, which reads what the only feature names (see readings.py)."""
-    reading = make_reading(features[0])
+    of = features[0]
+    reading = make_reading(of)
     values, with_values = reading.values, reading.with_values
 
     @wp.func
@@ -30,19 +31,19 @@ def made(features):
         since = (y.t + y.h.dtype(0.5) * y.h) * ones(p.time) - p.time
         v = values(y)
         if p.channel == 0:
-            v.x = p.gain * v.x + p.offset
+            v.x = positive(since, p.gain * v.x + p.offset, v.x)
         if p.channel == 1:
-            v.y = p.gain * v.y + p.offset
+            v.y = positive(since, p.gain * v.y + p.offset, v.y)
         if p.channel == 2:
-            v.z = p.gain * v.z + p.offset
-        z = with_values(y, v)
-        y.position = positive(since, z.position, y.position)
-        y.north = positive(since, z.north, y.north)
-        y.east = positive(since, z.east, y.east)
-        y.down = positive(since, z.down, y.down)
-        y.velocity = positive(since, z.velocity, y.velocity)
-        y.water_velocity = positive(since, z.water_velocity, y.water_velocity)
-        y.angular_velocity = positive(since, z.angular_velocity, y.angular_velocity)
+            v.z = positive(since, p.gain * v.z + p.offset, v.z)
+        if wp.static(of == "attitude"):
+            # Angles there and back are not the same bits: lanes without the fault keep theirs.
+            z = with_values(y, v)
+            y.north = positive(since, z.north, y.north)
+            y.east = positive(since, z.east, y.east)
+            y.down = positive(since, z.down, y.down)
+        else:
+            y = with_values(y, v)
         return y
 
     return device(__name__, features, params=params, measure=measure)

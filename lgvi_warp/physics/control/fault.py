@@ -14,6 +14,10 @@ from lgvi_warp.physics.control.sensor import Sensor
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 
 
+# A time and a whole number of steps that differ by less than this part of the step are the same.
+ROUND_OFF = 1e-6
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Fault(Sending):
     """A fault of one channel of an actuator or of a sensor: from a time on, x <- gain * x + offset, x its command or reading.
@@ -63,8 +67,9 @@ class Fault(Sending):
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The numbers, and the rows of the command or the channel of the reading."""
         assert self.bus is not None
-        # Beyond any run, and within float32.
-        own = {**numbers, "time": np.minimum(numbers["time"], 1e30)}
+        # The first step at or after the time; never is beyond any run, and within float32.
+        begin = np.ceil(np.minimum(numbers["time"] / context.h, 1e30) - ROUND_OFF)
+        own = {"begin": begin, "gain": numbers["gain"], "offset": numbers["offset"]}
         if self.sensor is not None:
             return Packed(own | {"channel": self.channel})
         fresh = self.bus.commands[self.of][0] + self.channel

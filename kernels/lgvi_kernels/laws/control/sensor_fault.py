@@ -12,9 +12,9 @@ from lgvi_kernels.laws.control.readings import make_reading
 
 @functools.cache
 def params(width, real):
-    """Params: time, gain and offset of each lane; number of the channel."""
+    """Params: first step, gain and offset of each lane; number of the channel."""
     Lane = lane(width, real)
-    return struct("SensorFault", time=Lane, gain=Lane, offset=Lane, channel=wp.int32)
+    return struct("SensorFault", begin=Lane, gain=Lane, offset=Lane, channel=wp.int32)
 
 
 @functools.cache
@@ -27,8 +27,7 @@ def made(features):
     @wp.func
     def measure(y: Any, p: Any):
         """From the first look at or after its time on: reading <- gain * reading + offset."""
-        # Half a step is added, since times are sums that round.
-        since = (y.t + y.h.dtype(0.5) * y.h) * ones(p.time) - p.time
+        since = (y.h.dtype(y.step) + y.h.dtype(0.5)) * ones(p.begin) - p.begin
         v = values(y)
         if p.channel == 0:
             v.x = positive(since, p.gain * v.x + p.offset, v.x)

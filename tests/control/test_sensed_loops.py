@@ -97,17 +97,17 @@ def test_the_loop_is_the_twins(dtype):
         assert error < (1e-10 if dtype == "float64" else 1e-3), m
 
 
+@pytest.mark.slow
 def test_a_dead_sensor_of_the_depth_makes_the_vehicle_dive():
     dead = [lw.Fault(of="cell", time=np.inf)]
     sensors = [lw.Sensor(name="cell", of="depth", noise=0.01)]
-    controller = steered(sensors, dead).controller
-    scene = lw.Scene.of(controller) if hasattr(lw.Scene, "of") else steered(sensors, dead)
+    still = steered(sensors, dead)
     pushed = lw.Wrench(force=(15.0, 0.0, 0.0))
-    scene = lw.Scene(scene.vehicle, scene.environment, [*scene.terms, pushed], controller=steered(sensors, dead).controller)
-    members = of_members(scene, 2, {"fault.time": np.array([np.inf, 20.0])})
-    depth = lw.solve(members, "psi_s", h=H, t1=60.0, save=lw.SaveAt(every=20.0)).position[..., 2]
+    scene = lw.Scene(still.vehicle, still.environment, [*still.terms, pushed], controller=still.controller)
+    members = of_members(scene, 2, {"fault.time": np.array([np.inf, 50.0])})
+    depth = lw.solve(members, "psi_s", h=H, t1=120.0, save=lw.SaveAt(every=40.0)).position[..., 2]
     assert np.array_equal(depth[:2, 0], depth[:2, 1])
-    # One settles; the other takes itself for afloat, and dives at the limit of its pitch for the rest of the time.
+    # One settles; the other takes itself for afloat, and dives for the rest of the time.
     assert abs(depth[-1, 0] - WANTED["depth"]) < 0.3 and depth[-1, 1] > WANTED["depth"] + 3.0
 
 
@@ -125,8 +125,7 @@ def test_the_variance_under_white_noise_is_that_of_the_lyapunov_equation():
     vehicle = lw.Vehicle(MASS, (1.5, 4.0, J), (5.0, 22.0, 25.0), BUOYANCY, (0.0, 0.0, -0.02))
     scene = lw.Scene(vehicle, lw.Environment(GRAVITY), [lw.ControlWrench()], controller=controller)
     members = 4096
-    save = lw.SaveAt(ts=[40.0, 50.0, 60.0])
-    result = lw.solve(lw.Ensemble(scene, members, 3), "psi_s", h=0.05, t1=60.0, save=save)
+    result = lw.solve(lw.Ensemble(scene, members, 3), "psi_s", h=0.05, t1=60.0, save=lw.SaveAt(every=10.0))
     heading = np.arctan2(result.attitude[..., 1, 0], result.attitude[..., 0, 0])
     x = np.stack([heading, result.angular_velocity[..., 2]], axis=-1)[-3:].reshape(-1, 2)
     A = np.array([[1.0, PERIOD], [0.0, 1.0]])

@@ -28,7 +28,7 @@ class Fault(Sending):
     Args:
         of: Key of the term or of the sensor.
         channel: Number of the channel, from 0; of a sensor, of its reading: an attitude has roll, pitch and yaw [rad].
-        time: When it begins [s]; inf for never.
+        time: When it begins [s]; 0 by default; inf for never.
         gain: Factor of the command or reading; 0 by default.
         offset: Added to it, in its unit; 0 by default.
 
@@ -40,7 +40,7 @@ class Fault(Sending):
 
     of: str = ""
     channel: int = 0
-    time: Any = number((), "s", 0.0, infinite=True)
+    time: Any = number((), "s", 0.0, least=0.0, infinite=True)
     gain: Any = number((), "1", 0.0)
     offset: Any = number((), "unit", 0.0)
 

@@ -15,12 +15,16 @@ from lgvi_warp.physics import terms as terms
 from lgvi_warp.physics.control.base import ControlLaw as ControlLaw
 from lgvi_warp.physics.control.base import Guidance as Guidance
 from lgvi_warp.physics.control.callback import Callback as Callback
+from lgvi_warp.physics.control.complementary_filter import ComplementaryFilter as ComplementaryFilter
 from lgvi_warp.physics.control.controller import Controller as Controller
+from lgvi_warp.physics.control.dead_reckoning import DeadReckoning as DeadReckoning
 from lgvi_warp.physics.control.depth_pid import DepthPID as DepthPID
 from lgvi_warp.physics.control.fault import Fault as Fault
 from lgvi_warp.physics.control.heading_pid import HeadingPID as HeadingPID
+from lgvi_warp.physics.control.low_pass import LowPass as LowPass
 from lgvi_warp.physics.control.matrix import AllocationMatrix as AllocationMatrix
 from lgvi_warp.physics.control.pseudo_inverse import PseudoInverse as PseudoInverse
+from lgvi_warp.physics.control.sensor import Sensor as Sensor
 from lgvi_warp.physics.control.set_point import SetPoint as SetPoint
 from lgvi_warp.physics.terms import register_term as register_term
 from lgvi_warp.physics.terms.base import Packed as Packed

@@ -16,6 +16,18 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term
 WISHES = ("depth", "position", "velocity", "heading", "attitude", "angular_velocity", "speed")
 
 
+# What sensors read, and how many numbers each has.
+READINGS = {
+    "depth": 1,
+    "heading": 1,
+    "position": 3,
+    "attitude": 3,
+    "velocity": 3,
+    "water_velocity": 3,
+    "angular_velocity": 3,
+}
+
+
 class Bus(NamedTuple):
     """The first rows of the memory, by which parts hand numbers on: {actuator: (first row, channels)} and single rows.
 
@@ -91,6 +103,9 @@ class Part(Term):
     acts: ClassVar[bool] = False
     section: ClassVar[str] = ""
     needs: ClassVar[tuple[str, ...]] = ()
+    # What its device code may have, in this order, and what that of a run has.
+    every_feature: ClassVar[tuple[str, ...]] = ()
+    chosen: ClassVar[tuple[str, ...]] = ()
     # Where it finds the numbers of others; set for a part of a scene.
     bus: ClassVar[Bus | None] = None
 
@@ -99,12 +114,37 @@ class Part(Term):
         """What it wants of the motion, among `WISHES`; by default nothing."""
         return ()
 
-    def wired(self, bus: Bus, actuators: Mapping[str, Term]) -> Any:
+    def features(self, numbers: Numbers) -> tuple[str, ...]:
+        """What its device code must have for some members; by default nothing beyond what it always has.
+
+        Args:
+            numbers: The part's numbers by field, each of shape (n, ...).
+
+        Returns:
+            Words that the part knows.
+        """
+        return ()
+
+    def with_features(self, known: frozenset[str]) -> Any:
+        """The same part, with the device code for what some member of a run needs.
+
+        Args:
+            known: Words "key.feature" of all parts.
+
+        Returns:
+            A copy.
+        """
+        part = copy.copy(self)
+        chosen = tuple(word for word in self.every_feature if f"{self.key}.{word}" in known)
+        object.__setattr__(part, "chosen", chosen)
+        return part
+
+    def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
         """The same part, knowing where it finds what others write.
 
         Args:
             bus: Rows of the memory.
-            actuators: Terms that take commands, by key.
+            others: Terms that take commands, and sensors, by key.
 
         Returns:
             A copy.
@@ -200,10 +240,10 @@ class Allocation(Part):
 
     to: str = ""
 
-    def wired(self, bus: Bus, actuators: Mapping[str, Term]) -> Any:
+    def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
         """In addition, knows its actuator."""
-        part = super().wired(bus, actuators)
-        object.__setattr__(part, "actuator", actuators[self.to])
+        part = super().wired(bus, others)
+        object.__setattr__(part, "actuator", others[self.to])
         return part
 
     def check_actuator(self, faults: Faults) -> None:

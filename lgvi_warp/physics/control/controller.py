@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, closest
-from lgvi_warp.physics.control.base import SECTIONS, Allocation, Bus, Part
+from lgvi_warp.physics.control.base import READINGS, SECTIONS, Allocation, Bus, Part
 from lgvi_warp.physics.control.callback import Callback, CallbackCommands, refuse_second
 from lgvi_warp.physics.control.delay import Delay
 from lgvi_warp.physics.control.fault import Fault
 from lgvi_warp.physics.control.pseudo_inverse import PseudoInverse
+from lgvi_warp.physics.control.sensor import Sensor
 from lgvi_warp.physics.terms.base import Term, build, check_list
 
 # A time and a whole number of steps that differ by less than this part of the step are the same.
@@ -95,14 +96,16 @@ class Controller:
 
     @property
     def acting_parts(self) -> tuple[Part, ...]:
-        """The parts in the order in which the kernel has them: the delay, where there is one, before the faults."""
+        """The parts in the order in which the kernel has them: faults of a sensor right after it, others after the delay."""
         assert self.bus is not None
-        callback = self.callback
-        lists = (getattr(self, section) for section in tuple(SECTIONS)[:-1])
+        callback, parts = self.callback, list[Part]()
         # The commands of a callback reach their actuator by an allocation of their own.
         idle = callback if callback is not None and callback.to else None
-        before = tuple(part for each in lists for part in each if part is not idle)
-        return (*before, *((self.delay_part,) if self.bus.delayed else ()), *self.faults)
+        for part in (part for section in tuple(SECTIONS)[:-1] for part in getattr(self, section) if part is not idle):
+            of_sensor = (fault for fault in self.faults if getattr(fault, "sensor", None) and fault.of == part.key)
+            parts += [part, *of_sensor]
+        others = tuple(part for part in self.faults if part not in parts)
+        return (*parts, *((self.delay_part,) if self.bus.delayed else ()), *others)
 
     @property
     def callback(self) -> Callback | None:
@@ -162,8 +165,9 @@ class Controller:
         object.__setattr__(controller, "bus", bus)
         actuators = {key: term.driven_by(bus) for key, term in self.actuators.items()}
         object.__setattr__(controller, "actuators", actuators)
+        others = {**actuators, **{part.key: part for part in self.sensors}}
         for section in SECTIONS:
-            parts = tuple(part.wired(bus, actuators) for part in getattr(self, section))
+            parts = tuple(part.wired(bus, others) for part in getattr(self, section))
             object.__setattr__(controller, section, parts)
         return controller
 
@@ -191,16 +195,16 @@ class Controller:
         return given
 
     def _check_faults(self, faults: Faults, actuators: Mapping[str, Term]) -> None:
-        for part in self.faults:
-            if not isinstance(part, Fault):
-                continue
-            if part.of not in actuators:
-                faults.add("faults.of", part.of, "is no actuator of this controller", closest(part.of, actuators))
-            elif not 0 <= part.channel < actuators[part.of].channels:
-                count = actuators[part.of].channels
-                faults.add(
-                    "faults.channel", part.channel, f"is beyond the {count} of {part.of}", f"give 0 to {count - 1}"
-                )
+        counts = {part.key: READINGS[part.of] for part in self.sensors if isinstance(part, Sensor)}
+        counts |= {key: term.channels for key, term in actuators.items()}
+        for part in (part for part in self.faults if isinstance(part, Fault)):
+            key, count = f"{part.key}.channel", counts.get(part.of, 0)
+            if part.of not in counts:
+                remedy = closest(part.of, counts)
+                faults.add(f"{part.key}.of", part.of, "is no actuator and no sensor of this controller", remedy)
+            elif not 0 <= part.channel < count:
+                remedy = f"give 0 to {count - 1}" if count > 1 else "give 0"
+                faults.add(key, part.channel, f"is beyond the {count} of {part.of}", remedy)
 
     def every(self, h: float) -> int:
         """Steps between two looks.

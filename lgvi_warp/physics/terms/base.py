@@ -170,7 +170,7 @@ class Term:
         lengths: dict[str, int] = {}
         for item in self.number_fields():
             value = getattr(self, item.name)
-            object.__setattr__(self, item.name, _checked(faults, item, value, lengths))
+            object.__setattr__(self, item.name, _checked(faults, item, value, lengths, self.shape_of(item)))
         if not faults:
             self.check(faults)
         faults.raise_if_any()
@@ -183,6 +183,18 @@ class Term:
             The dataclass fields declared by `number`, in the order of the class.
         """
         return _number_fields(cls)  # type: ignore[arg-type]  # a class is hashable
+
+    def shape_of(self, item: dataclasses.Field[Any]) -> tuple[Any, ...]:
+        """The shape of a numeric field of this object.
+
+        Args:
+            item: The field.
+
+        Returns:
+            By default the shape that the class declares.
+        """
+        shape: tuple[Any, ...] = item.metadata["shape"]
+        return shape
 
     @classmethod
     def lanes(cls) -> tuple[tuple[str, int], ...] | None:
@@ -393,12 +405,14 @@ class Term:
         return content
 
 
-def _checked(faults: Faults, one: dataclasses.Field[Any], value: Any, lengths: dict[str, int]) -> np.ndarray | None:
-    """The value of a field as an array of its shape; None after adding a fault."""
+def _checked(
+    faults: Faults, one: dataclasses.Field[Any], value: Any, lengths: dict[str, int], shape: tuple[Any, ...]
+) -> np.ndarray | None:
+    """The value of a field as an array of this shape; None after adding a fault."""
     meta = one.metadata
     if value is None and meta["optional"]:
         return None
-    shape, unit = meta["shape"], meta["unit"]
+    unit = meta["unit"]
     if any(isinstance(size, str) for size in shape):
         array = faults.finite(one.name, value, None, unit)
         if array is None:

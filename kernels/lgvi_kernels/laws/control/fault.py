@@ -10,20 +10,19 @@ from lgvi_kernels.law import add, lane, mul, ones, positive, remember, remembere
 
 @functools.cache
 def params(width, real):
-    """Params: time, gain and offset of each lane; rows of the command.
+    """Params: first step, gain and offset of each lane; rows of the command.
 
     fresh: of the command; acting, before: where commands are delayed, of the one that acts and of the one before.
     """
     Lane = lane(width, real)
     words = dict.fromkeys(("fresh", "acting", "before", "delayed"), wp.int32)
-    return struct("Fault", time=Lane, gain=Lane, offset=Lane, **words)
+    return struct("Fault", begin=Lane, gain=Lane, offset=Lane, **words)
 
 
 @wp.func
 def send(y: Any, p: Any):
     """From the first look at or after its time on: command <- gain * command + offset."""
-    # Half a step is added, since times are sums that round.
-    since = (y.t + y.h.dtype(0.5) * y.h) * ones(p.time) - p.time
+    since = (y.h.dtype(y.step) + y.h.dtype(0.5)) * ones(p.begin) - p.begin
     u = remembered(y, p.fresh)
     remember(y, p.fresh, positive(since, p.gain * u + p.offset, u))
     if p.delayed > 0:

@@ -31,10 +31,10 @@ def measurement_struct(width, real):
 @functools.cache
 def reference_struct(width, real):
     """The wanted motion: position [m] and velocity [m/s], inertial; north, east, down: the wanted attitude, as in a View;
-    angular_velocity [rad/s], in the axes of that attitude; speed [m/s], through the water ahead.
+    angular_velocity [rad/s] and angular_acceleration [rad/s^2], in the axes of that attitude; speed [m/s], through the water ahead.
     """
     Lane3 = lane3(width, real)
-    vectors = ("position", "velocity", "north", "east", "down", "angular_velocity")
+    vectors = ("position", "velocity", "north", "east", "down", "angular_velocity", "angular_acceleration")
     return struct("Reference", **dict.fromkeys(vectors, Lane3), speed=lane(width, real))
 
 

@@ -107,11 +107,12 @@ class Controller:
         values = {f"{part.key}.{name}": value for part in self.parts for name, value in part.parameters().items()}
         return {f"{self.key}.delay": self.delay} | values
 
-    def wired(self, terms: Sequence[Term]) -> Controller:
+    def wired(self, terms: Sequence[Term], nominal: Mapping[str, np.ndarray] | None = None) -> Controller:
         """The same controller, whose parts know their actuators and the rows of the memory.
 
         Args:
             terms: Terms of the scene.
+            nominal: Numbers of the vehicle and its environment by name, as the scene has them; none by default.
 
         Returns:
             A copy.
@@ -129,7 +130,8 @@ class Controller:
         whole = copy.copy(self)
         object.__setattr__(whole, "allocation", allocation)
         object.__setattr__(whole, "actuators", actuators)
-        controller = whole.on(Bus.of({key: term.channels for key, term in actuators.items()}))
+        object.__setattr__(whole, "laws", tuple(part.of_vehicle(nominal or {}) for part in self.laws))
+        controller = whole.on(Bus.of({key: term.channels for key, term in actuators.items()}, self.period))
         for part in controller.allocation:
             part.check_actuator(faults)
         faults.raise_if_any()

@@ -17,8 +17,8 @@ def measurement_struct(width, real):
 
     north, east, down: the inertial axes in body axes, as in a View; position [m], inertial; velocity over ground and
     water_velocity through the water [m/s], angular_velocity [rad/s], body axes.
-    t, period, h [s]: time of this look, time between looks, step. step, look: number of the step that begins, and of this look.
-    table, memory, packet, entry: as in a View.
+    t, period, h [s]: time of this look, time between looks, step. step, look: number of the step that begins, and of this
+    look. table, memory, packet, entry: as in a View.
     """
     Lane, Lane3 = lane(width, real), lane3(width, real)
     directions = {"north": Lane3, "east": Lane3, "down": Lane3, "position": Lane3}
@@ -31,7 +31,8 @@ def measurement_struct(width, real):
 @functools.cache
 def reference_struct(width, real):
     """The wanted motion: position [m] and velocity [m/s], inertial; north, east, down: the wanted attitude, as in a View;
-    angular_velocity [rad/s] and angular_acceleration [rad/s^2], in the axes of that attitude; speed [m/s], through the water ahead.
+    angular_velocity [rad/s] and angular_acceleration [rad/s^2], in the axes of that attitude; speed [m/s], through the water
+    ahead.
     """
     Lane3 = lane3(width, real)
     vectors = ("position", "velocity", "north", "east", "down", "angular_velocity", "angular_acceleration")

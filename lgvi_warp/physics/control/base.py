@@ -210,8 +210,8 @@ class PoseLaw(IntegralLaw):
     """A law of position and attitude, each with an integral of three numbers.
 
     Args:
-        feedforward: "restoring": what balances weight, buoyancy and their moment at the measured attitude, by the numbers of the
-            scene, whatever a member's are: a controller does not know them; or "none", the default.
+        feedforward: "restoring": what balances weight, buoyancy and their moment at the measured attitude, by the numbers of
+            the scene, whatever a member's are: a controller does not know them; or "none", the default.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("position", "velocity", "attitude", "angular_velocity")
@@ -243,8 +243,8 @@ def restoring(nominal: Numbers) -> tuple[np.ndarray, np.ndarray]:
         nominal: Parameters of a scene by name, each of the shape that the scene has.
 
     Returns:
-        Weight less buoyancy (1,) [N], which acts downward; and the sum of both times their points (1, 3) [N m] in body axes, whose
-        cross product with the direction downward is the moment.
+        Weight less buoyancy (1,) [N], which acts downward; and the sum of both times their points (1, 3) [N m] in body axes,
+        whose cross product with the direction downward is the moment.
     """
     numbers = {name: np.asarray(value)[None] for name, value in nominal.items()}
     weight, buoyancy = vehicle.weight(numbers), numbers["vehicle.buoyancy"]

@@ -11,10 +11,11 @@ from lgvi_warp.physics.terms.base import number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HeadingSMC(IntegralLaw):
-    """Integral sliding mode control of the heading psi, with Nomoto's model as feedforward (Fossen 2021, eq. 16.479).
+    """Integral sliding mode control of the heading, with Nomoto's model as feedforward (Fossen 2021, eq. 16.479).
 
-    sigma = (r - r_d) + 2 lambda (psi - psi_d) + lambda^2 I, r_v = r - sigma, a_v its rate where the errors are as they are, and
-    N = (nomoto_time a_v + r_v - k_d sigma - k_sigma sat(sigma / boundary)) / nomoto_gain; sat(x) is x within -1 and 1.
+    psi is the heading, r its rate: sigma = (r - r_d) + 2 lambda (psi - psi_d) + lambda^2 I, r_v = r - sigma, a_v its rate
+    where the errors are as they are, and N = (nomoto_time a_v + r_v - k_d sigma - k_sigma sat(sigma / boundary)) /
+    nomoto_gain; sat(x) is x within -1 and 1.
 
     Args:
         lambda_: Rate at which errors decay while sigma is 0 [1/s]; `lambda` in a scene file.

@@ -11,7 +11,7 @@ from lgvi_warp.physics.terms.base import number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HeavePID(IntegralLaw):
-    """PID of the depth by the force Z: Z = kp e + ki I + kd (wanted - measured depth rate), e the wanted depth less the measured.
+    """PID of the depth by a force: Z = kp e + ki I + kd (wanted - measured depth rate), e the wanted less the measured depth.
 
     For vehicles that can push up and down. The integral I gains e times the period at each look.
 

@@ -51,11 +51,11 @@ PLACES = {name: (place, wish) for place, (name, wish) in enumerate(_places())}
 class Policy(ControlLaw):
     """A perceptron that was trained elsewhere: y = f(W y + b) layer by layer, the last of them times `scale` the demand.
 
-    The file holds weights_0 (n1, n0), biases_0 (n1,), weights_1 (n2, n1), ... as np.savez writes them, uncompressed; nothing in
-    it is executed. Inputs are, of what is wanted less what is measured, "depth_error", "heading_error" [m, rad], "speed_error" [m/s],
-    "position_error" [m, body axes], and "attitude_error", e_R of `PosePID`; of what is measured "depth" [m], "velocity" over ground,
-    "water_velocity" [m/s], "angular_velocity" [rad/s] and "down", the direction downward, all in body axes. A name with [0], [1]
-    or [2] is one number of three.
+    The file holds weights_0 (n1, n0), biases_0 (n1,), weights_1 (n2, n1), ... as np.savez writes them, uncompressed; nothing
+    in it is executed. Inputs are, of what is wanted less what is measured, "depth_error", "heading_error" [m, rad],
+    "speed_error" [m/s], "position_error" [m, body axes], and "attitude_error", e_R of `PosePID`; of what is measured "depth"
+    [m], "velocity" over ground, "water_velocity" [m/s], "angular_velocity" [rad/s] and "down", the direction downward, all
+    in body axes. A name with [0], [1] or [2] is one number of three.
 
     Args:
         file: Path of the .npz file; in a scene file from the folder of the scene.

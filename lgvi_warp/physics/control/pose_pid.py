@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from lgvi_warp.physics.control.base import Numbers, Packed, PackingContext, PoseLaw
+from lgvi_warp.physics.control.base import PoseLaw
 from lgvi_warp.physics.terms.base import number
 
 

@@ -14,8 +14,8 @@ class PoseSMC(PoseLaw):
     """Integral sliding mode control of the pose, each body axis by itself (the form of Fossen 2021, 16.4, on SE(3)).
 
     s = (R^T v_d - nu) + 2 lambda R^T e_b + lambda^2 R^T I, and f = k_d s + k_sigma sat(s / boundary); the same of the attitude
-    with s_r = -(Omega - R^T R_d Omega_d) - 2 lambda_r e_R - lambda_r^2 I_R; e_b, e_R, I and I_R as of `PosePID`, sat(x) is x within
-    -1 and 1.
+    with s_r = -(Omega - R^T R_d Omega_d) - 2 lambda_r e_R - lambda_r^2 I_R; e_b, e_R, I and I_R as of `PosePID`, sat(x) is x
+    within -1 and 1.
 
     Args:
         lambda_: Rates at which errors of position decay while s is 0 (3,) [1/s]; `lambda` in a scene file.

@@ -23,10 +23,10 @@ TERMS = 13
 class ReferenceModel(Guidance):
     """What the guidance before it wants, led smoothly from the measured state (Fossen 2021, 12.1.1).
 
-    Each number x follows its target s by x''' + (2 zeta + 1) omega x'' + (2 zeta + 1) omega^2 x' + omega^3 (x - s) = 0. It starts
-    at the measured position, heading and rates. Between looks the target is held and the equation solved exactly; where x' is
-    then beyond its limit, x went at the limit all the time, and x'' is 0. A heading goes the short way to its target, and may pass
-    pi. Roll and pitch that are wanted are kept.
+    Each number x follows its target s by x''' + (2 zeta + 1) omega x'' + (2 zeta + 1) omega^2 x' + omega^3 (x - s) = 0. It
+    starts at the measured position, heading and rates. Between looks the target is held and the equation solved exactly;
+    where x' is then beyond its limit, x went at the limit all the time, and x'' is 0. A heading goes the short way to its
+    target, and may pass pi. Roll and pitch that are wanted are kept.
 
     Args:
         natural_frequency: omega (2,) [rad/s] of depth and heading, or (4,) of north, east, depth and heading.
@@ -48,7 +48,7 @@ class ReferenceModel(Guidance):
             faults.add("natural_frequency", self.natural_frequency, f"has {count} numbers", f"give {which}")
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """For each number that is filtered its map over a period, (3, 3), line by line, and its limit; x, x', x'' in the memory."""
+        """For each number its map over a period, (3, 3), line by line, and its limit; x, x' and x'' in the memory."""
         omega = numbers["natural_frequency"]
         zeta = numbers.get("damping_ratio", np.ones_like(omega))
         limit = numbers.get("rate_limit", np.full_like(omega, 1e30))

@@ -52,7 +52,7 @@ class Trajectory(Guidance):
         return ("position", "depth", "velocity", "speed", *heading)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """For each piece its time and the coefficients of its polynomials, of position, heading and speed; then the last ones."""
+        """For each piece its time and the coefficients of its polynomials, of position, heading and speed; then the end."""
         times, positions = numbers["times"], numbers["positions"]
         zero = np.zeros_like(times)
         columns = [positions, numbers.get("headings", zero)[..., None], numbers.get("speed", zero)[..., None]]
@@ -70,7 +70,7 @@ class Trajectory(Guidance):
 
 
 def _pieces(t: np.ndarray, values: np.ndarray, interpolation: str) -> np.ndarray:
-    """Rows (1, k, 21): time, and four coefficients of each of five numbers, the lowest power first. The last piece is at rest."""
+    """Rows (1, k, 21): time, and four coefficients of each of five numbers, lowest power first. The last piece is at rest."""
     k, d = values.shape
     coefficients = np.zeros((k, 4, d))
     coefficients[:, 0] = values

@@ -24,8 +24,8 @@ class Waypoints(Guidance):
     "los": atan(y / D);
     "ilos": atan((y + kappa J) / D), where J gains D y / (D^2 + (y + kappa J)^2) a second (Borhaug, Pavlov & Pettersen 2008);
     "alos": beta + atan(y / D), where the estimate beta of the crab angle gains gamma D y / sqrt(D^2 + y^2) a second (Fossen &
-    Aguiar 2024). Wanted depth and position are those of the leg abeam of the vehicle. A leg is done within the radius of its end,
-    or abeam of it; then the next one is sailed.
+    Aguiar 2024). Wanted depth and position are those of the leg abeam of the vehicle. A leg is done within the radius of its
+    end, or abeam of it; then the next one is sailed.
 
     Args:
         points: The points, (k, 3) [m], inertial axes: at least two, each at another place of the map than the one before.
@@ -35,8 +35,8 @@ class Waypoints(Guidance):
         method: "los", "ilos" or "alos"; by default "los".
         kappa: Gain of "ilos" [1/s]; 0.1 by default.
         gamma: Gain of "alos" [rad/(m s)]; 0.002 by default.
-        at_end: At the last point "stop", the default: heading of the last leg, speed 0, the point itself as wanted position; or
-            "go_on": along the last leg, beyond its end.
+        at_end: At the last point "stop", the default: heading of the last leg, speed 0, the point itself as wanted position;
+            or "go_on": along the last leg, beyond its end.
     """
 
     type: ClassVar[str] = "waypoints"

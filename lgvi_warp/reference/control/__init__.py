@@ -113,7 +113,8 @@ class PoseIntegrals:
     """The integrals I of e_b, inertial axes, and I_R of e_R, body axes, of a law of the pose; each waits in body axes."""
 
     def __init__(self) -> None:
-        self.I, self.I_R, self.e, self.e_R = (np.zeros(3) for _ in range(4))
+        zero: Array = np.zeros(3)
+        self.I, self.I_R, self.e, self.e_R = zero, zero, zero, zero
 
     def at_look(self, law: Any, y: Measurement, unmet: Array, e: Array, e_R: Array) -> tuple[Array, Array]:
         """I and I_R at this look, from the errors of the last one; those of this look are kept.

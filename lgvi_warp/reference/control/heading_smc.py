@@ -18,7 +18,7 @@ class HeadingSMC(Part):
         self.integral = Integral()
 
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
-        """Fossen 2021, eq. (16.479), with errors psi - psi_d: N = (T a_v + r_v - k_d sigma - k_sigma sat(sigma / boundary)) / K."""
+        """Fossen 2021, (16.479), of errors psi - psi_d: N = (T a_v + r_v - k_d sigma - k_sigma sat(sigma / boundary)) / K."""
         error = -heading_error(r.R, y.R)
         I = -self.integral.at_look(y.period, self.integral_limit, unmet[5], self.anti_windup == "conditional")
         self.integral.error = -error

@@ -1,11 +1,13 @@
 """A perceptron as a law."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from lgvi_warp.reference.control import Measurement, Part, Reference, heading_error, pose_errors
 from lgvi_warp.reference.rotation import Array
 
-FUNCTIONS = {
+FUNCTIONS: dict[str, Callable[[Array], Array]] = {
     "linear": lambda x: x,
     "tanh": np.tanh,
     "clip": lambda x: np.clip(x, -1.0, 1.0),

@@ -18,7 +18,7 @@ class PoseSMC(Part):
         self.integrals = PoseIntegrals()
 
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
-        """f = k_d s + k_sigma sat(s / boundary), s = (R^T v_d - nu) + 2 lambda R^T e_b + lambda^2 R^T I; so of the attitude."""
+        """f = k_d s + k_sigma sat(s / boundary), s = (R^T v_d - nu) + 2 lambda R^T e_b + lambda^2 R^T I; attitude alike."""
         e, e_R, velocity, rate = pose_errors(r, y)
         I, I_R = self.integrals.at_look(self, y, unmet, e, e_R)
         s = velocity + 2.0 * self.lambda_ * (y.R.T @ e) + self.lambda_**2 * (y.R.T @ I)

@@ -32,11 +32,13 @@ def params(width, real):
 
 @wp.func
 def control(w: Any, r: Any, y: Any, p: Any):
-    """N = (T a_v + r_v - k_d sigma - k_sigma sat(sigma / boundary)) / K, r_v = r_d + 2 lambda e + lambda^2 I, sigma = r - r_v."""
+    """N = (T a_v + r_v - k_d sigma - k_sigma sat(sigma / boundary)) / K.
+
+    r_v = r_d + 2 lambda e + lambda^2 I, sigma = r - r_v; e and its rate are wanted less measured.
+    """
     e = heading_error(r, y)
     I = integral(y, p.memory, p.integral_limit, remembered(y, p.unmet + 5), p.conditional)
     keep_error(y, p.memory, e)
-    # e and its rate are wanted less measured.
     slower = r.angular_velocity.z - y.angular_velocity.z
     virtual = r.angular_velocity.z + p.rate * (e + e + p.rate * I)
     acceleration = r.angular_acceleration.z + p.rate * (slower + slower + p.rate * e)

@@ -35,8 +35,9 @@ RELU = 3
 
 @functools.cache
 def params(width, real):
-    """Params: scale of force and torque; first row of the table, see the host's part; scratch rows; numbers of inputs, layers and
-    outputs; the widest layer; functions of the hidden layers and of the last one.
+    """Params: scale of force and torque; first row of the table; scratch rows; counts; functions of hidden and last layers.
+
+    The table has places of the inputs; of each layer its sizes, W line by line and b; then places of the outputs.
     """
     Lane3 = lane3(width, real)
     words = ("first", "work", "inputs", "layers", "outputs", "widest", "hidden", "last")

@@ -23,8 +23,9 @@ from lgvi_kernels.laws.control.integral import integral3, remember3, remembered3
 
 @functools.cache
 def pose_params(name, gains, width, real):
-    """The struct of a law of the pose: gains, vectors by name; limits of the integrals; net_weight and moment, of `balance`; first
-    of twelve rows of the memory, I, I_R, e_b and e_R; first of six rows of what was not delivered.
+    """The struct of a law of the pose: gains, vectors by name; limits of the integrals; net_weight and moment, of `balance`.
+
+    Then the first of twelve rows of the memory, I, I_R, e_b and e_R; the first of six rows of what was not delivered.
     """
     numbers = dict.fromkeys(("position_limit", "attitude_limit", "net_weight"), lane(width, real))
     vectors = dict.fromkeys((*gains, "moment"), lane3(width, real))
@@ -33,7 +34,7 @@ def pose_params(name, gains, width, real):
 
 @wp.func
 def attitude_error(r: Any, y: Any):
-    """e_R = vee(R_d^T R - R^T R_d) / 2, body axes: the sum over inertial axes of R_i x R_d,i / 2, with R_i their directions."""
+    """e_R = vee(R_d^T R - R^T R_d) / 2, body axes: half the sum of R_i x R_d,i, R_i the directions of inertial axes."""
     return y.period.dtype(0.5) * (cross(y.north, r.north) + cross(y.east, r.east) + cross(y.down, r.down))
 
 

@@ -34,8 +34,9 @@ ALOS = 2
 
 @functools.cache
 def params(width, real):
-    """Params: numbers of each lane; first row of the points; first of two rows of the memory, the leg and J or beta; how many legs;
-    method; whether to stop at the end.
+    """Params: numbers of each lane; first row of the points; first of two rows of the memory, the leg and J or beta.
+
+    Then how many legs; method; whether to stop at the end.
     """
     numbers = dict.fromkeys(("speed", "look_ahead", "radius", "kappa", "gamma"), lane(width, real))
     return struct("Waypoints", **numbers, **dict.fromkeys(("first", "memory", "legs", "method", "stops"), wp.int32))

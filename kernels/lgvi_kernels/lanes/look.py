@@ -32,11 +32,11 @@ def measurement_struct(width, real):
 def reference_struct(width, real):
     """The wanted motion.
 
-    position [m], velocity [m/s], inertial; north, east, down: the wanted attitude, as in a View; angular_velocity [rad/s], in
-    the axes of that attitude; speed [m/s], through the water ahead.
+    position [m], velocity [m/s], inertial; north, east, down: the wanted attitude, as in a View; angular_velocity [rad/s] and
+    angular_acceleration [rad/s^2], in the axes of that attitude; speed [m/s], through the water ahead.
     """
     Lane3 = lane3(width, real)
-    vectors = ("position", "velocity", "north", "east", "down", "angular_velocity")
+    vectors = ("position", "velocity", "north", "east", "down", "angular_velocity", "angular_acceleration")
     return struct("Reference", **dict.fromkeys(vectors, Lane3), speed=lane(width, real))
 
 

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.physics import vehicle
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term
 
 # What guidance may give, and laws may need.
@@ -40,6 +41,7 @@ class Bus(NamedTuple):
         answer: First of the rows into which a `Callback` writes; as many as it returns numbers.
         rows: Number of rows.
         delayed: Whether the commands of some member are delayed.
+        period: Time between two looks [s].
     """
 
     commands: Mapping[str, tuple[int, int]]
@@ -49,6 +51,7 @@ class Bus(NamedTuple):
     answer: int
     rows: int
     delayed: bool = False
+    period: float = 1.0
 
     @property
     def channels(self) -> int:
@@ -56,11 +59,12 @@ class Bus(NamedTuple):
         return self.unmet
 
     @classmethod
-    def of(cls, channels: Mapping[str, int], answers: int = 0) -> Bus:
+    def of(cls, channels: Mapping[str, int], period: float = 1.0, answers: int = 0) -> Bus:
         """The bus of some actuators.
 
         Args:
             channels: Number of commands of each, by the key of its term.
+            period: Time between two looks [s]; 1 by default.
             answers: Numbers that a function of the host writes at each look; 0 by default, for none.
 
         Returns:
@@ -70,7 +74,7 @@ class Bus(NamedTuple):
         for key, count in channels.items():
             commands[key] = (row, count)
             row += count
-        return cls(commands, row, row + 6, 2 * row + 6, 4 * row + 7, 4 * row + 7 + answers)
+        return cls(commands, row, row + 6, 2 * row + 6, 4 * row + 7, 4 * row + 7 + answers, period=period)
 
     def values_of(self, key: str) -> dict[str, Any]:
         """What the device code of an actuator reads.
@@ -191,6 +195,21 @@ class ControlLaw(Part):
     section: ClassVar[str] = "laws"
     kinds: ClassVar[dict[str, Any]] = {}
     demands: ClassVar[tuple[str, ...]] = ()
+    # Numbers of the vehicle by name, as the scene has them, whatever a member's are; set for a law of a scene.
+    nominal: ClassVar[Numbers] = {}
+
+    def of_vehicle(self, nominal: Numbers) -> Any:
+        """The same law, knowing the vehicle that its author had in mind.
+
+        Args:
+            nominal: Parameters of vehicle and environment by name, each of the shape that the scene has.
+
+        Returns:
+            A copy.
+        """
+        law = copy.copy(self)
+        object.__setattr__(law, "nominal", nominal)
+        return law
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The numbers as they are: a controller works in the user's axes."""
@@ -223,6 +242,57 @@ class IntegralLaw(ControlLaw):
         assert self.bus is not None
         words = {"unmet": self.bus.unmet, "conditional": int(self.anti_windup == "conditional")}
         return Packed(dict(numbers) | words, memory=np.zeros((1, 2 * self.integrals)))
+
+
+# What a law of the pose adds to its demand.
+FEEDFORWARD = ("none", "restoring")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PoseLaw(IntegralLaw):
+    """A law of position and attitude, each with an integral of three numbers.
+
+    Args:
+        feedforward: "restoring": what balances weight, buoyancy and their moment at the measured attitude, by the numbers of
+            the scene, whatever a member's are: a controller does not know them; or "none", the default.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("position", "velocity", "attitude", "angular_velocity")
+    demands: ClassVar[tuple[str, ...]] = ("X", "Y", "Z", "K", "M", "N")
+    integrals: ClassVar[int] = 6
+
+    feedforward: str = "none"
+
+    def check(self, faults: Faults) -> None:
+        """In addition, a fault where `feedforward` is unknown."""
+        super().check(faults)
+        faults.choice("feedforward", self.feedforward, FEEDFORWARD)
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        """In addition, each limit by itself, and the nominal weight less buoyancy with the moment of both."""
+        limits = numbers["integral_limit"]
+        values = {name: value for name, value in numbers.items() if name != "integral_limit"}
+        net, moment = np.zeros(1), np.zeros((1, 3))
+        if self.feedforward == "restoring":
+            net, moment = restoring(self.nominal)
+        more = {"position_limit": limits[:, 0], "attitude_limit": limits[:, 1], "net_weight": net, "moment": moment}
+        return super().packed(values | more, context)
+
+
+def restoring(nominal: Numbers) -> tuple[np.ndarray, np.ndarray]:
+    """What weight and buoyancy do to a vehicle.
+
+    Args:
+        nominal: Parameters of a scene by name, each of the shape that the scene has.
+
+    Returns:
+        Weight less buoyancy (1,) [N], which acts downward; and the sum of both times their points (1, 3) [N m] in body axes,
+        whose cross product with the direction downward is the moment.
+    """
+    numbers = {name: np.asarray(value)[None] for name, value in nominal.items()}
+    weight, buoyancy = vehicle.weight(numbers), numbers["vehicle.buoyancy"]
+    centers = vehicle.center_of_mass(numbers), numbers["vehicle.center_of_buoyancy"]
+    return weight - buoyancy, weight[:, None] * centers[0] - buoyancy[:, None] * centers[1]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -121,11 +121,12 @@ class Controller:
         values = {f"{part.key}.{name}": value for part in self.parts for name, value in part.parameters().items()}
         return {f"{self.key}.delay": self.delay} | values
 
-    def wired(self, terms: Sequence[Term]) -> Controller:
+    def wired(self, terms: Sequence[Term], nominal: Mapping[str, np.ndarray] | None = None) -> Controller:
         """The same controller, whose parts know their actuators and the rows of the memory.
 
         Args:
             terms: Terms of the scene.
+            nominal: Numbers of the vehicle and its environment by name, as the scene has them; none by default.
 
         Returns:
             A copy.
@@ -143,10 +144,11 @@ class Controller:
         whole = copy.copy(self)
         object.__setattr__(whole, "allocation", allocation)
         object.__setattr__(whole, "actuators", actuators)
+        object.__setattr__(whole, "laws", tuple(part.of_vehicle(nominal or {}) for part in self.laws))
         channels = {key: term.channels for key, term in actuators.items()}
         callback = self.callback
         answers = 0 if callback is None else channels[callback.to] if callback.to else 6
-        controller = whole.on(Bus.of(channels, answers))
+        controller = whole.on(Bus.of(channels, self.period, answers))
         for part in controller.allocation:
             part.check_actuator(faults)
         faults.raise_if_any()

@@ -179,11 +179,12 @@ def parameter_units(scene: Any) -> dict[str, str]:
         Units by name of the parameter; "1" where none is known.
     """
     from lgvi_warp.physics import vehicle
+    from lgvi_warp.physics.terms.base import word_of
 
     known: dict[str, str | None] = {f"vehicle.{name}": unit for name, unit in vehicle.UNITS.items()}
     known |= {"environment.gravity": "m s-2", "environment.water_density": "kg m-3"}
     for term in scene.parts:
-        known |= {f"{term.key}.{item.name}": item.metadata.get("unit") for item in dataclasses.fields(term)}
+        known |= {f"{term.key}.{word_of(item)}": item.metadata.get("unit") for item in dataclasses.fields(term)}
     return {name: known.get(name) or "1" for name in scene.parameters()}
 
 

@@ -20,10 +20,23 @@ each kernel. Inside it, `if wp.static(...)` is decided then: what a scene does n
 import functools
 from importlib import import_module
 from importlib.util import find_spec
+from types import ModuleType
 
 
 @functools.cache
 def built_in(folder, name):
-    """The device code of a name in a folder ("laws", "stops"), imported when it is asked for first; None for no such name."""
+    """The device code of a name in a folder ("laws", "stops"), imported when it is asked for first; None for no such name.
+
+    Of "thrusters_with:driven,table" it is what that module's `made` returns for the features ("driven", "table").
+    """
+    name, _, features = name.partition(":")
     path = f"{__name__}.{folder}.{name}"
-    return import_module(path) if name.isidentifier() and find_spec(path) else None
+    module = import_module(path) if name.isidentifier() and find_spec(path) else None
+    return module.made(tuple(features.split(","))) if module and features else module
+
+
+def device(path, features, **functions):
+    """Device code that a file makes for some features: a module of this name with its functions, those that are not None."""
+    module = ModuleType(f"{path}_{'_'.join(features)}")
+    vars(module).update({role: function for role, function in functions.items() if function is not None})
+    return module

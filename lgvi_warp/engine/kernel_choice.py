@@ -97,7 +97,8 @@ def choose_kernel(
     """
     explicit = method.tableau is not None
     controller = _controller(ensemble, facts)
-    control = tuple((part, device_module(part, part.device, built_in)) for part in controller.acting_parts) if controller else ()
+    parts = controller.acting_parts if controller else ()
+    control = tuple((part, device_module(part, part.device_in(not facts.turned), built_in)) for part in parts)
     acting = _acting(ensemble, facts, built_in, controller)
     events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)
     damping = any(hasattr(module, "damping") for term, module in acting if not isinstance(term, Drag))
@@ -141,11 +142,11 @@ def choose_kernel(
     conservative = checked and _conservative(facts, acting, built_in)
     # Events, water and the potential are evaluated at the user's origin, or at that of the forces.
     elsewhere = controller is not None or bool(events) or flow != "none" or (conservative and facts.apart)
-    parts = {"rates": explicit,
-             "turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
-             "modified": method.two_part, "dense": dense, "water": flow in ("uniform", "varying"),
-             "origin": bool(elsewhere and (facts.moved or facts.forces_moved)),
-             "axes": controller is not None and facts.turned_axes}  # fmt: skip
+    contents = {"rates": explicit,
+                "turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
+                "modified": method.two_part, "dense": dense, "water": flow in ("uniform", "varying"),
+                "origin": bool(elsewhere and (facts.moved or facts.forces_moved)),
+                "axes": controller is not None and facts.turned_axes}  # fmt: skip
     return KernelChoice(
         aligned=not facts.turned,
         moved=facts.moved,
@@ -154,7 +155,7 @@ def choose_kernel(
         mass="full" if coupled and mass == "isotropic" else mass,
         drag=drag,
         flow=flow,
-        parts=tuple(name for name, wanted in parts.items() if wanted),
+        parts=tuple(name for name, wanted in contents.items() if wanted),
         coupling=tuple(i in facts.couplings for i in range(len(COUPLINGS))),
         timed=any(term.timed for term, _ in (*acting, *events)) or facts.delayed,
         memory=memory or method.gauss > 0,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+import functools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
@@ -182,6 +183,10 @@ class IntegralLaw(ControlLaw):
         return Packed(dict(numbers) | words, memory=np.zeros((1, 2 * self.integrals)))
 
 
+# Later than any run, and within float32.
+NEVER = 1e30
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Allocation(Part):
     """A part that turns the demand into the commands of one term.
@@ -192,8 +197,9 @@ class Allocation(Part):
 
     section: ClassVar[str] = "allocation"
     kinds: ClassVar[dict[str, Any]] = {}
-    # The term that takes the commands; set for a part of a scene.
+    # The term that takes the commands, and the faults of its channels that are known; set for a part of a scene.
     actuator: ClassVar[Any] = None
+    losses: ClassVar[tuple[Any, ...]] = ()
 
     to: str = ""
 
@@ -203,12 +209,56 @@ class Allocation(Part):
         object.__setattr__(part, "actuator", actuators[self.to])
         return part
 
+    def warned_of(self, faults: Sequence[Any]) -> Any:
+        """The same part, knowing which channels are lost from some time on.
+
+        Args:
+            faults: Faults of actuators.
+
+        Returns:
+            A copy.
+        """
+        part = copy.copy(self)
+        known = tuple(fault for fault in faults if fault.of == self.to and fault.known)
+        object.__setattr__(part, "losses", known)
+        return part
+
+    @property
+    def lost_channels(self) -> tuple[int, ...]:
+        """Numbers of the channels that are known to be lost at some time."""
+        return tuple(sorted({fault.channel for fault in self.losses}))
+
+    def times_of_loss(self, context: PackingContext) -> np.ndarray:
+        """When each channel is known to be lost.
+
+        Args:
+            context: The scene's parameters.
+
+        Returns:
+            Times (1 or n, channels) [s]; `NEVER` for a channel that is not.
+        """
+        times = [np.full((1, self.actuator.channels), NEVER)]
+        for fault in self.losses:
+            time = context.parameters[f"{fault.key}.time"]
+            one = np.full((len(time), self.actuator.channels), NEVER)
+            one[:, fault.channel] = np.minimum(time, NEVER)
+            times.append(one)
+        return np.asarray(functools.reduce(np.minimum, times))
+
     def check_actuator(self, faults: Faults) -> None:
         """Add a fault for what does not fit the actuator.
 
         Args:
             faults: Collects the faults.
         """
+
+    def reach(self) -> np.ndarray:
+        """What the channels make: a wrench for each, of the scene's own numbers.
+
+        Returns:
+            (6, channels) [N, N m], of any size.
+        """
+        raise NotImplementedError
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

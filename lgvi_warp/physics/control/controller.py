@@ -127,7 +127,7 @@ class Controller:
         self._check_faults(faults, actuators)
         faults.raise_if_any()
         whole = copy.copy(self)
-        object.__setattr__(whole, "allocation", allocation)
+        object.__setattr__(whole, "allocation", tuple(part.warned_of(self.faults) for part in allocation))
         object.__setattr__(whole, "actuators", actuators)
         controller = whole.on(Bus.of({key: term.channels for key, term in actuators.items()}))
         for part in controller.allocation:

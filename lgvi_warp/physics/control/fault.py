@@ -7,7 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.physics.control.base import Sending
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.physics.control.base import NEVER, Sending
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 
 
@@ -23,6 +24,10 @@ class Fault(Sending):
         time: When it begins [s]; inf for never.
         gain: Factor of the command; 0 by default.
         offset: Added to the command [unit of the command]; 0 by default.
+        known: Whether the allocation knows it, and leaves the channel out from then on; False by default.
+
+    Raises:
+        SceneError: Where `known` is neither true nor false, and as `Term`.
     """
 
     type: ClassVar[str] = "fault"
@@ -32,6 +37,12 @@ class Fault(Sending):
     time: Any = number((), "s", 0.0, infinite=True)
     gain: Any = number((), "1", 0.0)
     offset: Any = number((), "unit", 0.0)
+    known: bool = False
+
+    def check(self, faults: Faults) -> None:
+        """Adds a fault where `known` is neither true nor false."""
+        if not isinstance(self.known, bool):
+            faults.add("known", self.known, "is neither true nor false", "give one of them")
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The numbers, and the rows of the command."""
@@ -40,5 +51,4 @@ class Fault(Sending):
         rows = {"fresh": fresh, "acting": 0, "before": 0, "delayed": int(self.bus.delayed)}
         if self.bus.delayed:
             rows |= {"acting": self.bus.acting + fresh, "before": self.bus.acting + self.bus.count + fresh}
-        # Beyond any run, and within float32.
-        return Packed({**numbers, "time": np.minimum(numbers["time"], 1e30), **rows})
+        return Packed({**numbers, "time": np.minimum(numbers["time"], NEVER), **rows})

@@ -141,10 +141,10 @@ class Packets:
 
     def _bus(self) -> tuple[int, int]:
         """Rows of the controller's bus, and the first of those where frozen lanes keep their signals."""
-        controller = self.plan.kernel_choice.controller
-        if controller is None:
+        controller, control = self.plan.kernel_choice.controller, self.plan.spec.control
+        if controller is None or control is None:
             return 0, 0
-        kept = controller.bus.rows + sum(NOTED[name] for name in self.plan.spec.control.noted)
+        kept = controller.bus.rows + sum(NOTED[name] for name in control.noted)
         return kept + len(self.plan.signal_rows), kept
 
     def _monitor(self) -> Any:
@@ -160,9 +160,10 @@ class Packets:
             monitor.backward = -plan.grid.h * min(0.0, *plan.method.stages)
         if plan.spec.substep:
             monitor.substeps = wp.zeros(self.count, dtype=Ints, device="cpu")
-        if plan.spec.control:
-            controller, rows = plan.kernel_choice.controller, plan.signal_rows
-            monitor.every, monitor.commands = controller.every(plan.grid.h), controller.bus.count
+        controller = plan.kernel_choice.controller
+        if controller is not None:
+            rows = plan.signal_rows
+            monitor.every, monitor.commands = controller.every(plan.grid.h), controller.bus.channels
             monitor.bus, monitor.kept = controller.bus.rows, self._bus()[1]
             monitor.signals = wp.array(np.array(rows, np.int32), dtype=wp.int32, device="cpu")
             monitor.first_signals = wp.zeros((self.count, max(1, len(rows))), dtype=Lane, device="cpu")

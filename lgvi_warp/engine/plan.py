@@ -14,9 +14,9 @@ import numpy as np
 import warp as wp
 
 from lgvi_kernels import built_in
-from lgvi_kernels.advance.rows import SAMPLE_FIELDS
 from lgvi_kernels.advance.feeding import NOTED
 from lgvi_kernels.advance.kernel import Advance, make_advance
+from lgvi_kernels.advance.rows import SAMPLE_FIELDS
 from lgvi_kernels.advance.spec import CHUNK, Control, Spec
 from lgvi_kernels.lanes.arithmetic import WIDTHS
 from lgvi_kernels.maps.explicit import Explicit
@@ -340,7 +340,9 @@ class Plan:
         if self.kernel_choice.controller is None:
             return None
         numbers = tuple(declared(part, module) for part, module in parts)
-        return Control(tuple(module for _, module in parts), numbers, tuple(name for name in NOTED if name in self.noted))
+        return Control(
+            tuple(module for _, module in parts), numbers, tuple(name for name in NOTED if name in self.noted)
+        )
 
     @property
     def noted(self) -> frozenset[str]:

@@ -293,7 +293,7 @@ def _facts(frame: Frame, U: np.ndarray, coupling: np.ndarray) -> dict[str, Any]:
     """What a survey says of the axes and origins of some members."""
     return {
         "turned": not frame.aligned,
-        "turned_axes": bool(np.any(frame.Q != np.eye(3))),
+        "turned_axes": bool(np.any(np.eye(3) != frame.Q)),
         "coupled": frame.coupled,
         "moved": bool(np.any(frame.origin)),
         "forces_moved": bool(np.any(frame.forces)),

@@ -14,7 +14,6 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.names import alike, folded
 from lgvi_warp.physics import terms
-from lgvi_warp.physics.control.controller import from_table
 from lgvi_warp.physics.terms import events
 from lgvi_warp.physics.vehicle import Vehicle
 from lgvi_warp.sampling.distributions.named import from_dict as distribution_from_dict
@@ -63,8 +62,12 @@ class Scene:
             object.__setattr__(self, "terms", terms.from_list(self.terms))
         with faults.including():
             object.__setattr__(self, "events", events.from_list(self.events))
-        with faults.including():
-            object.__setattr__(self, "controller", from_table(self.controller))
+        if self.controller is not None:
+            with faults.including():
+                # A scene without a controller loads none of its parts.
+                from lgvi_warp.physics.control.controller import from_table
+
+                object.__setattr__(self, "controller", from_table(self.controller))
         if not faults:
             self._check_names(faults)
         if not faults:

@@ -7,12 +7,11 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_kernels import built_in
-from lgvi_warp.engine.laws.bench import KICK, Bank, Bench
-from lgvi_warp.physics import terms
+from lgvi_warp.engine.laws.bench import KICK, ORIGIN, TURN, Bank, Bench
 from lgvi_warp.physics.control.base import Bus
 from lgvi_warp.reference.terms import View
 from lgvi_warp.reference.terms.control_fins import ControlFins
-from lgvi_warp.reference.terms.control_wrench import ControlWrench
+from lgvi_warp.reference.terms.driven import ControlWrench
 from lgvi_warp.reference.terms.thrusters import Thrusters
 from tests.laws.cases import PROPELLERS, THRUSTERS
 from tests.laws.cases_lift import DENSITY, FINS, RATES, STALL, arrays
@@ -24,14 +23,17 @@ WRENCH = dict(
     time_constant=(0.2, 0.3, 0.0, 0.5, 0.0, 0.1),
 )
 POLYNOMIAL = dict(polynomial=(3.0, 0.5, 8.0, -2.0, 1.0), polynomial_astern=(2.0, 7.0, -1.5))
-COEFFICIENTS = (2.0, 3.0, 1.0), (1.5, 2.5, 0.5)
+COEFFICIENTS = dict(coefficient=(2.0, 3.0, 1.0), coefficient_astern=(1.5, 2.5, 0.5))
 LAGGED = dict(limit=(0.35, 0.2, 0.5), rate_limit=RATES, time_constant=(0.1, 0.3, 0.0))
 ACTUATORS = {
-    "control wrench": (terms.ControlWrench(**WRENCH), ControlWrench(**arrays(WRENCH))),
+    "control wrench": (lw.ControlWrench(**WRENCH), ControlWrench(**arrays(WRENCH))),
     "thrusters": (
-        lw.Thrusters(**THRUSTERS, **PROPELLERS, **POLYNOMIAL, coefficient=COEFFICIENTS[0], coefficient_astern=COEFFICIENTS[1]),
+        lw.Thrusters(**THRUSTERS, **PROPELLERS, **POLYNOMIAL, **COEFFICIENTS),
         Thrusters(
-            **arrays(THRUSTERS | PROPELLERS), **POLYNOMIAL, forward=np.array(COEFFICIENTS[0]), backward=np.array(COEFFICIENTS[1])
+            **arrays(THRUSTERS | PROPELLERS),
+            **POLYNOMIAL,
+            forward=np.array(COEFFICIENTS["coefficient"]),
+            backward=np.array(COEFFICIENTS["coefficient_astern"]),
         ),
     ),
     "control fins without flow angle": (
@@ -52,17 +54,14 @@ def test_an_actuator_does_what_its_twin_does(name):
     first = count + work
     term = term.driven_by(Bus({term.key: (first, count)}, 0, 0, 0, 0))
     bench = Bench(term, built_in("laws", term.device_in(True)), SCENE, PACKETS, 5)
-    bank = Bank(bench, replace(bench.context(bench.parameters), aligned=True), bench.views)
     commands = 2.0 * term.limit * np.random.default_rng(1).uniform(-1.0, 1.0, (bench.count, count))
-    rows = bank.memory.numpy()
-    rows[:, first : first + count] = commands.reshape(PACKETS, bench.width, count).transpose(0, 2, 1)
-    places, pushes = [], []
-    for second, time in ((0, KICK), (1, KICK), (2, FOLLOWED)):
-        bank.run_device(bench.views, second, time)
-        places.append(lanes_apart(bank.memory)[:, :count])
-        pushes.append(wrench_of(bank.evaluate(bench.views), bench.views))
+    places, pushes = device_of(bench, commands, first, False)
+    for here, there in zip(pushes, device_of(bench, commands, first, True)[1], strict=True):
+        # In other axes about another origin.
+        force, torque = there[:, :3] @ TURN.T, there[:, 3:] @ TURN.T
+        assert_close(np.hstack([force, torque + np.cross(ORIGIN, force)]), here, np.abs(here).max())
     for i, (R, b, nu, Om, t) in enumerate(zip(*vars(bench.views).values(), strict=True)):
-        law.command = commands[i]
+        law.held = commands[i]
         view = View(R, b, nu, Om, t, KICK, 3, i, law.start())
         for j in range(3):
             memory = law.evolve(view, bool(j)) if j < 2 else law.follow(replace(view, h=FOLLOWED))
@@ -78,6 +77,20 @@ def test_an_actuator_does_what_its_twin_does(name):
         np.testing.assert_allclose(places[2][:, 4], within[:, 4], rtol=1e-13)
         ramp = np.sign(within[:, 2]) * np.minimum(np.abs(within[:, 2]), 30.0 * after)
         np.testing.assert_allclose(places[2][:, 2], ramp, rtol=1e-13)
+
+
+def device_of(bench, commands, first, elsewhere):
+    """Places and pushes after either half of a kick, and a time later; commands are written to rows of the memory."""
+    views = bench.views.elsewhere() if elsewhere else bench.views
+    bank = Bank(bench, replace(bench.context(bench.parameters, elsewhere), aligned=not elsewhere), views)
+    rows, count = bank.memory.numpy(), commands.shape[1]
+    rows[:, first : first + count] = commands.reshape(PACKETS, bench.width, count).transpose(0, 2, 1)
+    places, pushes = [], []
+    for second, time in ((0, KICK), (1, KICK), (2, FOLLOWED)):
+        bank.run_device(views, second, time)
+        places.append(lanes_apart(bank.memory)[:, :count])
+        pushes.append(wrench_of(bank.evaluate(views), views))
+    return places, pushes
 
 
 def wrench_of(values, views):

@@ -15,6 +15,7 @@ from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
     element,
     lane,
     mul,
+    neg,
     ones,
     positive,
     set_element,
@@ -43,7 +44,7 @@ def make_feed(spec, types, method, at_step, opened):
     method: see Step; at_step, opened: see Stepping.
     """
     width, real, control = spec.width, spec.real, spec.control
-    State, Constants, Monitor, Alarm = types.State, types.Constants, types.Monitor, types.Alarm
+    State, Constants, Monitor = types.State, types.Constants, types.Monitor
     Measurement, Reference = measurement_struct(width, real), reference_struct(width, real)
     Wrench, Lane = wrench_struct(width, real), types.Lane
     measure, guide, act, allocate, send = (in_turn(control.parts, role) for role in ROLES)
@@ -206,7 +207,9 @@ def make_signals(Lane):
             memory[i, monitor.kept + j] = positive(code, held, memory[i, monitor.kept + j])
 
     @wp.func(inline=False)
-    def sample_signals(out: wp.array2d(dtype=Lane), i: int, end: int, memory: wp.array2d(dtype=Lane), monitor: Any, frozen: Lane):
+    def sample_signals(
+        out: wp.array2d(dtype=Lane), i: int, end: int, memory: wp.array2d(dtype=Lane), monitor: Any, frozen: Lane
+    ):
         """Write the signals as the last numbers of a sample, which ends before the column `end`."""
         count = monitor.signals.shape[0]
         for j in range(count):

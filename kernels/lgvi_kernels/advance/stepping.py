@@ -10,7 +10,7 @@ from lgvi_kernels.advance.feeding import make_feed
 from lgvi_kernels.advance.method import Step, make_method
 from lgvi_kernels.advance.monitor import make_backward, make_drag_rate
 from lgvi_kernels.advance.spec import make_types
-from lgvi_kernels.lanes.arithmetic import add, mul  # noqa: F401
+from lgvi_kernels.lanes.arithmetic import add, mul, sub  # noqa: F401
 from lgvi_kernels.lanes.sums import settled
 from lgvi_kernels.laws import drag_directions
 

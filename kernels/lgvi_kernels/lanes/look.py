@@ -17,7 +17,7 @@ def measurement_struct(width, real):
 
     north, east, down: the inertial axes in body axes, as in a View; position [m], inertial; velocity over ground and
     water_velocity through the water [m/s], angular_velocity [rad/s], body axes.
-    t, period, h [s]: time of this look, time between looks, step. step, look: number of the step that begins, and of this look.
+    t, period, h [s]: time of this look, time between looks, step. step, look: number of the step that begins, of this look.
     table, memory, packet, entry: as in a View.
     """
     Lane, Lane3 = lane(width, real), lane3(width, real)
@@ -30,8 +30,10 @@ def measurement_struct(width, real):
 
 @functools.cache
 def reference_struct(width, real):
-    """The wanted motion: position [m] and velocity [m/s], inertial; north, east, down: the wanted attitude, as in a View;
-    angular_velocity [rad/s], in the axes of that attitude; speed [m/s], through the water ahead.
+    """The wanted motion.
+
+    position [m], velocity [m/s], inertial; north, east, down: the wanted attitude, as in a View; angular_velocity [rad/s], in
+    the axes of that attitude; speed [m/s], through the water ahead.
     """
     Lane3 = lane3(width, real)
     vectors = ("position", "velocity", "north", "east", "down", "angular_velocity")
@@ -46,7 +48,8 @@ def held_key():
 
 @functools.cache
 def delayed_key():
-    """The same where commands arrive late: `row`, the first of the latest, `old`, of those before; `begin`, row of the step
-    from which on the latest act.
+    """The same where commands arrive late.
+
+    row: the first of the latest; old: of those before; begin: row of the step from which on the latest act.
     """
     return struct("DelayedKey", row=wp.int32, old=wp.int32, begin=wp.int32)

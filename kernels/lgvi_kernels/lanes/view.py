@@ -43,7 +43,7 @@ def velocity_at(view: Any, r: Any):
 
 @wp.func
 def heading_error(wanted: Any, view: Any):
-    """The heading of one attitude less that of another [rad], in [-pi, pi], from their forward axes; no Euler angle is formed."""
+    """The heading of one attitude less that of another [rad], in [-pi, pi], from their forward axes, without Euler angles."""
     c = wanted.north.x * view.north.x + wanted.east.x * view.east.x
     s = wanted.east.x * view.north.x - wanted.north.x * view.east.x
     return arctangent2(s, c)

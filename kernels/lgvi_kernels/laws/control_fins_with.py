@@ -29,7 +29,8 @@ from lgvi_kernels.laws.driven import make_driven
 from lgvi_kernels.laws.fins import add_fins, note_lift_and_drag, speed_along
 from lgvi_kernels.laws.scheduled import make_scheduled
 
-# Rows of one fin that its forces need where the flow has no angle: the first of fins.ROWS. Then limit, 1 / lag, limit of the rate.
+# Rows of one fin that its forces need where the flow has no angle: the first of fins.ROWS. Behind those that a law has are
+# limit, 1 / lag and limit of the rate.
 STRAIGHT_ROWS = fins.MATRICES[0]
 
 
@@ -70,7 +71,7 @@ def made(features):
 
     @wp.func
     def straight_damping(D: Any, view: Any, p: Any):
-        """Lift (rho A / 2) slope angle u u along the normal, drag (rho A / 2) (drag + drag_normal angle^2) |u| u along the chord."""
+        """Lift (rho A / 2) slope d u u along the normal, drag (rho A / 2) (drag + drag_normal d^2) |u| u along the chord."""
         for i in range(p.count):
             at = p.first + wp.static(rows) * i
             angle = place(view, p, i)

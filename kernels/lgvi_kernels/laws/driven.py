@@ -60,7 +60,7 @@ def make_driven(name, rows, limit, lag, rate):
     """
 
     def params(width, real, commands):
-        """Params: commands, see lanes/look.py; first row of the table, of the memory if `moving`, of what is reported; count."""
+        """Params: commands, see lanes/look.py; first rows of the table, of the memory if `moving`, of the report; count."""
         words = {"first": wp.int32, "memory": wp.int32, "work": wp.int32, "report": wp.int32}
         words |= dict.fromkeys(("count", "moving", "shared", "size"), wp.int32)
         return struct(name, commands=commands, **words)

@@ -8,7 +8,23 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import absolute, add, clamp, div, greatest, least, mul, neg, ones, root, row1, sub, table1  # noqa: F401
+from lgvi_kernels.lanes.functions import PI
+from lgvi_kernels.law import (  # noqa: F401
+    absolute,
+    add,
+    arctangent2,
+    clamp,
+    div,
+    greatest,
+    least,
+    mul,
+    neg,
+    ones,
+    root,
+    row1,
+    sub,
+    table1,
+)
 
 # Knots of the inverse of a polynomial less one, and rows of one side of it: 1 / its largest value, that value, its place,
 # the least slope, and the table.
@@ -56,14 +72,16 @@ def table_curve(view: Any, first: int, size: int, w: Any):
 def polynomial_inverse(view: Any, first: int, size: int, powers: int, t: Any):
     """The w at which a polynomial, which rises up to a largest value, has the value t or that largest one.
 
-    From a table over sqrt(t), by two steps of Newton's. powers: first row of the polynomial.
+    From a table over x, t = (largest value) sin^2(pi x / 2), by three steps of Newton's. powers: first row of the polynomial.
     """
     unity = ones(t)
     zero = unity - unity
     highest = row1(view, first + 2)
     value = least(t, row1(view, first + 1))
-    w = table1(view, first + 4, wp.static(INVERSE_KNOTS), root(value * row1(view, first)))
-    for step in range(2):
+    part = least(value * row1(view, first), unity)
+    x = t.dtype(wp.static(2.0 / PI)) * arctangent2(root(part), root(unity - part))
+    w = table1(view, first + 4, wp.static(INVERSE_KNOTS), x)
+    for step in range(3):
         f = zero
         slope = zero
         for i in range(size):

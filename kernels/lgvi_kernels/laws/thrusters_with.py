@@ -1,4 +1,4 @@
-"""Thrusters with more than thrusters.py has: a driver, a limited rate, other curves, thrust that falls with the speed, torque."""
+"""Thrusters with more than thrusters.py has: a driver, a limited rate, other curves, loss by the speed, torque."""
 
 import functools
 from typing import Any
@@ -49,7 +49,7 @@ def made(features):
 
     @wp.func
     def thruster_damping(D: Any, view: Any, p: Any):
-        """Thrust falls by c_u |n| u, torque by k_u |n| u, u the speed of the thruster through the water along its direction."""
+        """Thrust falls by c_u |n| u, torque by k_u |n| u, u the thruster's speed through the water along its direction."""
         for i in range(p.count):
             at = p.first + wp.static(rows) * i
             n = beyond(place(view, p, i), row1(view, at + 8))

@@ -38,7 +38,7 @@ class Bus(NamedTuple):
     delayed: bool = False
 
     @property
-    def count(self) -> int:
+    def channels(self) -> int:
         """Number of commands."""
         return self.unmet
 
@@ -70,8 +70,8 @@ class Bus(NamedTuple):
         first = self.commands[key][0]
         if not self.delayed:
             return {"commands": {"row": first}, "report": self.report + first}
-        rows = {"row": self.acting + first, "old": self.acting + self.count + first}
-        begin = self.acting + 2 * self.count
+        rows = {"row": self.acting + first, "old": self.acting + self.channels + first}
+        begin = self.acting + 2 * self.channels
         return {"commands": rows | {"begin": begin}, "report": self.report + first}
 
 
@@ -143,7 +143,7 @@ class Guidance(Part):
 class ControlLaw(Part):
     """A law: the demand X, Y, Z [N] and K, M, N [N m] in the body's axes, from what is wanted and what is measured.
 
-    Class attributes: `demands` names the components that it asks for.
+    Class attributes: `demands` names the components that it asks for, among `COMPONENTS`; none named: all of them.
     """
 
     section: ClassVar[str] = "laws"
@@ -197,9 +197,11 @@ class Allocation(Part):
 
     section: ClassVar[str] = "allocation"
     kinds: ClassVar[dict[str, Any]] = {}
-    # The term that takes the commands, and the faults of its channels that are known; set for a part of a scene.
+    # The term that takes the commands, the faults of its channels that are known, and which of X Y Z K M N laws ask for (6,);
+    # set for a part of a scene.
     actuator: ClassVar[Any] = None
     losses: ClassVar[tuple[Any, ...]] = ()
+    asked: ClassVar[np.ndarray] = np.ones(6)
 
     to: str = ""
 
@@ -209,11 +211,12 @@ class Allocation(Part):
         object.__setattr__(part, "actuator", actuators[self.to])
         return part
 
-    def warned_of(self, faults: Sequence[Any]) -> Any:
-        """The same part, knowing which channels are lost from some time on.
+    def informed(self, faults: Sequence[Any], asked: np.ndarray) -> Any:
+        """The same part, knowing which channels are lost from some time on, and which components count.
 
         Args:
             faults: Faults of actuators.
+            asked: 1 for each of X Y Z K M N that laws ask for, else 0, (6,).
 
         Returns:
             A copy.
@@ -221,6 +224,7 @@ class Allocation(Part):
         part = copy.copy(self)
         known = tuple(fault for fault in faults if fault.of == self.to and fault.known)
         object.__setattr__(part, "losses", known)
+        object.__setattr__(part, "asked", asked)
         return part
 
     @property
@@ -261,6 +265,23 @@ class Allocation(Part):
         raise NotImplementedError
 
 
+# Entries of a projector below this are round-off.
+ROUND_OFF = 1e-12
+
+
+def rest_rows(reached: np.ndarray) -> np.ndarray:
+    """Rows by which the device code finds what actuators cannot make of a demand.
+
+    Args:
+        reached: Projector (n, 6, 6) onto the demands that they can make.
+
+    Returns:
+        The projector onto the others, line by line, (n, 36), without round-off.
+    """
+    others = np.eye(6) - reached
+    return np.where(np.abs(others) < ROUND_OFF, 0.0, others).reshape(len(others), -1)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Sending(Part):
     """A part that changes commands on their way to the actuators."""
@@ -270,4 +291,6 @@ class Sending(Part):
 
 
 # The bases of parts by the list that they stand in, in the order in which their roles act.
-SECTIONS: dict[str, type[Part]] = {kind.section: kind for kind in (MeasuringPart, Guidance, ControlLaw, Allocation, Sending)}
+SECTIONS: dict[str, type[Part]] = {
+    kind.section: kind for kind in (MeasuringPart, Guidance, ControlLaw, Allocation, Sending)
+}

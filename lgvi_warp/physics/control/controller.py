@@ -16,9 +16,12 @@ from lgvi_warp.physics.control.delay import Delay
 from lgvi_warp.physics.control.fault import Fault
 from lgvi_warp.physics.control.pseudo_inverse import PseudoInverse
 from lgvi_warp.physics.terms.base import Term, build, check_list
+from lgvi_warp.physics.terms.control_wrench import COMPONENTS
 
 # A time and a whole number of steps that differ by less than this part of the step are the same.
 ROUND_OFF = 1e-9
+# A part of a component below this is round-off, when it is asked what actuators can make.
+SPANNED = 1e-8
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -49,7 +52,7 @@ class Controller:
     allocation: Sequence[Any] = ()
     faults: Sequence[Any] = ()
     # Set by `wired`.
-    bus: Bus | None = field(default=None, init=False, repr=False)
+    bus: Any = field(default=None, init=False, repr=False)
     actuators: Mapping[str, Term] = field(default_factory=dict, init=False, repr=False)
 
     key = "controller"
@@ -75,7 +78,7 @@ class Controller:
         for part in (*self.guidance, *self.laws):
             for wish in part.needs:
                 if wish not in given:
-                    remedy = "give guidance that wants it, such as [[controller.guidance]] type = \"set_point\""
+                    remedy = 'give guidance that wants it, such as [[controller.guidance]] type = "set_point"'
                     faults.add(part.section, part.key, f"needs a wanted {wish}, which no guidance gives", remedy)
             given |= set(part.gives)
 
@@ -127,13 +130,45 @@ class Controller:
         self._check_faults(faults, actuators)
         faults.raise_if_any()
         whole = copy.copy(self)
-        object.__setattr__(whole, "allocation", tuple(part.warned_of(self.faults) for part in allocation))
+        object.__setattr__(whole, "allocation", tuple(part.informed(self.faults, self.asked) for part in allocation))
         object.__setattr__(whole, "actuators", actuators)
         controller = whole.on(Bus.of({key: term.channels for key, term in actuators.items()}))
         for part in controller.allocation:
             part.check_actuator(faults)
         faults.raise_if_any()
+        controller._check_laws(faults)
+        faults.raise_if_any()
         return controller
+
+    @property
+    def asked(self) -> np.ndarray:
+        """1 for each of X Y Z K M N that some law asks for, else 0, (6,)."""
+        names = {name for law in self.laws for name in law.demands or COMPONENTS}
+        return np.array([float(name in names) for name in COMPONENTS])
+
+    def _effect(self) -> np.ndarray:
+        """What all channels make of the components that are asked for, each column of unit size, (6, channels)."""
+        effect = self.asked[:, None] * np.concatenate([part.reach() for part in self.allocation], axis=1)
+        sizes = np.linalg.norm(effect, axis=0)
+        return np.asarray(effect / np.where(sizes > 0.0, sizes, 1.0))
+
+    @property
+    def unspanned(self) -> tuple[str, ...]:
+        """Components that laws ask for and the actuators cannot make, alone or each by itself."""
+        effect = self._effect()
+        apart = np.eye(6) - effect @ np.linalg.pinv(effect, rcond=SPANNED)
+        missed = self.asked * np.linalg.norm(apart, axis=0) > SPANNED
+        return tuple(name for name, bad in zip(COMPONENTS, missed, strict=True) if bad)
+
+    def _check_laws(self, faults: Faults) -> None:
+        """Add a fault for each law of whose demand the actuators can make nothing at all."""
+        idle = {name for name, row in zip(COMPONENTS, self._effect(), strict=True) if np.all(np.abs(row) < SPANNED)}
+        for law in self.laws:
+            wanted = law.demands or COMPONENTS
+            if idle.issuperset(wanted):
+                made_by = " and ".join(self.actuators)
+                fault = f"asks for {', '.join(wanted)}, of which {made_by} can make nothing"
+                faults.add("laws", law.key, fault, "give actuators that can, or leave the law out")
 
     def on(self, bus: Bus) -> Controller:
         """The same controller with another bus.
@@ -182,7 +217,9 @@ class Controller:
                 faults.add("faults.of", part.of, "is no actuator of this controller", closest(part.of, actuators))
             elif not 0 <= part.channel < actuators[part.of].channels:
                 count = actuators[part.of].channels
-                faults.add("faults.channel", part.channel, f"is beyond the {count} of {part.of}", f"give 0 to {count - 1}")
+                faults.add(
+                    "faults.channel", part.channel, f"is beyond the {count} of {part.of}", f"give 0 to {count - 1}"
+                )
 
     def every(self, h: float) -> int:
         """Steps between two looks.
@@ -206,7 +243,12 @@ class Controller:
             low = int(value / h + ROUND_OFF)
             if abs(value - round(value / h) * h) > ROUND_OFF * h:
                 near = " or ".join(f"{max(i, 1) * h:.9g}" for i in sorted({max(low, 1), low + 1}))
-                faults.add(f"controller.{name}", value, f"is no whole number of steps of {h:.9g} s", f"give {near} s, or another step")
+                faults.add(
+                    f"controller.{name}",
+                    value,
+                    f"is no whole number of steps of {h:.9g} s",
+                    f"give {near} s, or another step",
+                )
 
     def to_dict(self) -> dict[str, Any]:
         """The controller as the section of a scene file.
@@ -236,7 +278,9 @@ def from_table(given: Any) -> Controller | None:
         return given
     faults = Faults()
     if not isinstance(given, Mapping):
-        faults.add("controller", given, "is no table", "write [controller] and its keys below, or give lw.Controller(...)")
+        faults.add(
+            "controller", given, "is no table", "write [controller] and its keys below, or give lw.Controller(...)"
+        )
         faults.raise_if_any()
     known = [item.name for item in fields(Controller) if item.init]
     faults.keys("controller", given, known)

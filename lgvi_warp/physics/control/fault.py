@@ -50,5 +50,5 @@ class Fault(Sending):
         fresh = self.bus.commands[self.of][0] + self.channel
         rows = {"fresh": fresh, "acting": 0, "before": 0, "delayed": int(self.bus.delayed)}
         if self.bus.delayed:
-            rows |= {"acting": self.bus.acting + fresh, "before": self.bus.acting + self.bus.count + fresh}
+            rows |= {"acting": self.bus.acting + fresh, "before": self.bus.acting + self.bus.channels + fresh}
         return Packed({**numbers, "time": np.minimum(numbers["time"], NEVER), **rows})

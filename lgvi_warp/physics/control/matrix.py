@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.control.base import Allocation
+from lgvi_warp.physics.control.base import Allocation, rest_rows
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number, side_by_side
 
 
@@ -16,7 +16,8 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 class AllocationMatrix(Allocation):
     """Commands u = A w of the demand w = (X, Y, Z, K, M, N), each within its limit.
 
-    What the limits cut off is told back to the laws, as w - A^+ u with the pseudo-inverse A^+.
+    What the commands do not deliver is told back to the laws: (I - A^+ A) w and A^+ of what the limits cut off, with the
+    pseudo-inverse A^+.
 
     Args:
         to: Key of the term that takes the commands.
@@ -31,7 +32,12 @@ class AllocationMatrix(Allocation):
         """Adds a fault where the matrix has another number of rows than its actuator has commands."""
         rows, count = len(self.matrix), self.actuator.channels
         if rows != count:
-            faults.add(f"{self.key}.matrix", f"{rows} x 6", f"has {rows} rows", f"give {count}, one for each channel of {self.to}")
+            faults.add(
+                f"{self.key}.matrix",
+                f"{rows} x 6",
+                f"has {rows} rows",
+                f"give {count}, one for each channel of {self.to}",
+            )
 
     def device_in(self, aligned: bool) -> str:
         """The code that leaves channels out only where some may be lost."""
@@ -45,8 +51,10 @@ class AllocationMatrix(Allocation):
         """For each command its line of A, its column of A^+ and its limit."""
         A = numbers["matrix"]
         limit = context.own(self.actuator)["limit"]
-        backward = np.swapaxes(np.linalg.pinv(A), -1, -2)
-        rows = side_by_side(A, backward, limit[..., None], self.times_of_loss(context)[..., None])
+        inverse = np.linalg.pinv(A)
+        rows = side_by_side(A, np.swapaxes(inverse, -1, -2), limit[..., None], self.times_of_loss(context)[..., None])
         assert self.bus is not None
         first, count = self.bus.commands[self.to]
-        return Packed({"commands": first, "count": count}, rows.reshape(len(rows), -1))
+        return Packed(
+            {"commands": first, "count": count}, side_by_side(rest_rows(inverse @ A), rows.reshape(len(rows), -1))
+        )

@@ -19,7 +19,7 @@ class SetPoint(Guidance):
     Args:
         position: Wanted position, (3,) [m], inertial axes.
         depth: Wanted depth [m]; in place of `position`, whose third number it is.
-        heading: Wanted heading [rad], from north to east; the wanted attitude is upright. 0 by default where a position is given.
+        heading: Wanted heading [rad], from north to east, of an upright attitude; 0 by default where a position is given.
         speed: Wanted speed ahead through the water [m/s].
 
     Raises:

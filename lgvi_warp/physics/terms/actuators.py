@@ -9,7 +9,7 @@ import numpy as np
 from lgvi_warp.physics.terms.base import Numbers, Packed, knots, side_by_side
 from lgvi_warp.physics.terms.wrench import at_start, commands
 
-# 1 / time constant of a channel without lag: faster than any step, and within float32. From this rate on a limit counts as none.
+# 1 / time constant of a channel without lag: faster than any step, and within float32. A limit of a rate that counts as none.
 FAST, UNLIMITED = 1e20, 1e6
 
 

@@ -14,7 +14,6 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots,
 from lgvi_warp.physics.terms.fins import Fins, fin_rows
 from lgvi_warp.physics.terms.wrench import at_start, commands, first_row, refuse_idle
 
-
 # Rows of one fin that its forces need where the flow has no angle: those before the matrices of `fin_rows`.
 STRAIGHT_ROWS = 15
 
@@ -30,10 +29,11 @@ class ControlFins(Fins):
         position, chord, normal, area, drag, drag_normal: As of `Fins`.
         lift_slope: As of `Fins`; where a table of lift is given, the factor of its coefficients, 1 by default.
         lift_angles: Angles of attack of a table of lift, (k,) [rad], rising from 0; none by default.
-        lift_coefficients: Lift coefficients at these angles, (k,) [1]; of negative angles they have the other sign. Between the
-            angles they are linear, beyond the last one constant.
-        flow_angle: Whether the angle of the flow adds to the deflection, the default. If not, lift is rho A/2 lift_slope d u u
-            for a deflection d and a flow u along the chord, and drag rho A/2 (drag + drag_normal d^2) |u| u.
+        lift_coefficients: Lift coefficients at these angles, (k,) [1]; of negative angles they have the other sign. Between
+            the angles they are linear, beyond the last one constant.
+        flow_angle: Whether the angle of the flow adds to the deflection, the default. If not, lift is
+            rho A/2 lift_slope d u u for a deflection d and a flow u along the chord, and drag
+            rho A/2 (drag + drag_normal d^2) |u| u.
         limit: Largest deflection either way, (n,) [rad]; 0.35 by default.
         rate_limit: Largest rate of the deflection, (n,) [rad/s]; none by default.
         time_constant: Time constant of the lag of the deflection, (n,) [s]; none by default.

@@ -19,7 +19,7 @@ COMPONENTS = ("X", "Y", "Z", "K", "M", "N")
 class ControlWrench(Term):
     """An ideal actuator: force and torque about the body's origin that a controller commands; none without a controller.
 
-    n' = (command - n) / time constant for each of the six components, |n'| at most the rate limit, the command within the limit.
+    n' = (command - n) / time constant for each of its components, |n'| at most the rate limit, the command within the limit.
 
     Args:
         limit: Largest size of each component, (6,) [N, N m]; 1e6 by default.

@@ -1,4 +1,4 @@
-"""Thrusters with a thrust curve (quadratic, a polynomial or a table), dead band, saturation, lag and loss by the advance speed."""
+"""Thrusters with a thrust curve (square, polynomial or table), dead band, saturation, lag, and loss by the advance speed."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ from lgvi_warp.physics.terms.wrench import at_start, commands, first_row, refuse
 class Thrusters(Term):
     """n thrusters, each with thrust = c+ f+(max(u - band, 0)) - c- f-(max(-u - band, 0)) along its direction (Fossen 2021, 9).
 
-    f(w) = polynomial_1 w + polynomial_2 w^2 + ..., by default w^2, or a table. u is the command within its limit, after the lag
-    and no faster than the rate limit. One number stands for n equal ones. The unit of the command is the user's: 1, V or rad/s.
+    f(w) = polynomial_1 w + polynomial_2 w^2 + ..., by default w^2, or a table. u is the command within its limit, after the
+    lag and no faster than the rate limit. One number stands for n equal ones. The unit of the command is the user's: 1, V or
+    rad/s.
 
-    Beyond the dead band, w = sign(u) max(|u| - band, 0): thrust falls by advance_loss |w| a and torque by torque_loss |w| a, where
-    a is the speed of the thruster through the water along its direction (Fossen 2021, 9.1).
+    Beyond the dead band, w = sign(u) max(|u| - band, 0), thrust falls by advance_loss |w| a and torque by torque_loss |w| a,
+    where a is the speed of the thruster through the water along its direction (Fossen 2021, 9.1).
 
     Args:
         position: Where each thrust acts, (n, 3) [m] from the body's origin.
@@ -36,8 +37,8 @@ class Thrusters(Term):
             outside. They rise, and are 0 at the command 0; some may be 0 around it.
         advance_loss: Loss of thrust c_u ahead, (n,) [N per unit and m/s]; none by default.
         advance_loss_astern: Loss of thrust c_u astern, (n,) [N per unit and m/s]; by default that ahead.
-        torque_coefficient: Torque on the vehicle about the direction, for a unit of w |w|, (n,) [N m per unit^2]: its sign is that
-            of the propeller's hand. None by default.
+        torque_coefficient: Torque on the vehicle about the direction, for a unit of w |w|, (n,) [N m per unit^2]: its sign is
+            that of the propeller's hand. None by default.
         torque_loss: Loss of torque, (n,) [N m per unit and m/s], with the sign of the torque; 0 by default.
         dead_band: Size of the command below which there is no thrust, (n,) [unit]; 0 by default.
         limit: Largest size of the command, (n,) [unit]; 1e6 by default.
@@ -229,7 +230,9 @@ class Thrusters(Term):
                 faults.add("polynomial", self.polynomial, "is given beside a table", "keep one of them")
             if _unfit(self.table_commands[None], self.table_thrusts[None])[0]:
                 fault = "does not rise from below 0 through 0 at the command 0"
-                faults.add("table_thrusts", self.table_thrusts, fault, "sort it, and count commands from the neutral one")
+                faults.add(
+                    "table_thrusts", self.table_thrusts, fault, "sort it, and count commands from the neutral one"
+                )
         if self.torque_loss is not None and self.torque_coefficient is None:
             faults.add("torque_loss", self.torque_loss, "is given without torque_coefficient", "give both")
         if self.__dict__["_both"]:
@@ -285,13 +288,12 @@ class Thrusters(Term):
         rows += [knots(times, schedule[:, :, i : i + 1]) for i in range(count)]
         values = {"count": count, "knots": times.shape[1] - 1, "lagged": int(self.memory)}
         if not self.is_square:
-            curves, values["powers"] = self.curve_rows(numbers)
-            rows.append(curves)
+            polynomials, values["powers"] = self.curve_rows(numbers)
+            rows.append(polynomials)
         if not self.memory:
             return Packed(values | {"memory": 0}, side_by_side(*rows))
         start = np.clip(at_start(times, schedule), -numbers["limit"], numbers["limit"])
         return Packed(values, side_by_side(*rows), start)
-
 
     def curve_rows(self, numbers: Numbers) -> tuple[np.ndarray, int]:
         """The curves as lgvi_kernels.laws.thrust_curves reads them.

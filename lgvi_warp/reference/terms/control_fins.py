@@ -1,6 +1,7 @@
 """Control fins: fins whose deflection follows a command, within a limit, no faster than a rate and after a lag."""
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -14,8 +15,8 @@ class ControlFins(Following, Fins):
     """Numbers as those of `lw.ControlFins`, and of `Following`."""
 
     flow_angle = True
-    lift_angles: Array | None = None
-    lift_coefficients: Array | None = None
+    lift_angles: Any = None
+    lift_coefficients: Any = None
 
     def deflection(self, view: View) -> Array:
         """The place of each fin."""
@@ -32,7 +33,7 @@ class ControlFins(Following, Fins):
         return math.copysign(float(np.interp(abs(angle), self.lift_angles, self.lift_coefficients)), angle)
 
     def fin_damping(self, i: int, angle: float, view: View) -> Array:
-        """That of `Fins`; without the angle of the flow lift is slope d u u along n, and drag (drag + drag_normal d^2) |u| u."""
+        """That of `Fins`; without the angle of the flow lift is slope d u u, and drag (drag + drag_normal d^2) |u| u."""
         if self.flow_angle:
             return super().fin_damping(i, angle, view)
         c, n = orthonormal(self.chord[i], self.normal[i])

@@ -12,7 +12,7 @@ from lgvi_warp.reference.terms.wrench import at_time, pieces
 class Following(Law):
     """Channels with limit (n,), time_constant (n,) [s] or 0, rate_limit (n,) or inf; times (k,) [s] and command (k, n).
 
-    Of a law that is driven, command (n,) is what a controller holds, and memory has the places if something moves.
+    A law that is driven has `held` (n,) instead, the commands of a controller, which its loop sets.
     """
 
     driven = False
@@ -26,7 +26,7 @@ class Following(Law):
 
     def commanded(self, t: float) -> Array:
         """Commands (n,) at t, within their limits."""
-        wanted = self.command if self.driven else at_time(t, self.times, self.command, False)
+        wanted = self.held if self.driven else at_time(t, self.times, self.command, False)
         return np.clip(wanted, -self.limit, self.limit)
 
     def start(self) -> Array:

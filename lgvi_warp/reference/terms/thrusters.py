@@ -1,5 +1,7 @@
 """Thrusters: a thrust curve with dead band and saturation, after a lag; thrust that falls with the speed, and torque."""
 
+from typing import Any
+
 import numpy as np
 
 from lgvi_warp.reference.rotation import Array, cross
@@ -12,8 +14,8 @@ class Thrusters(Following):
 
     polynomial = (0.0, 1.0)
     polynomial_astern = (0.0, 1.0)
-    table_commands: Array | None = None
-    table_thrusts: Array | None = None
+    table_commands: Any = None
+    table_thrusts: Any = None
     advance_loss: Array | float = 0.0
     advance_loss_astern: Array | float = 0.0
     torque_coefficient: Array | float = 0.0

@@ -162,7 +162,7 @@ def test_bytes_that_are_no_text(tmp_path):
         ("[environment]\ngravity = nan", "environment.gravity = nan"),
         ("[start]\nposition = [1.0, 2.0]", "start.position = [1.0, 2.0]"),
         ('[[terms]]\ntype = "drga"', "terms[0].type = 'drga'"),
-        ('[controller]\ntype = "pid"', "controller = "),
+        ('[controller]\nkind = "pid"\nperiod = 0.1', "controller.kind = "),
     ],
 )
 def test_one_bad_line_is_one_fault(line, start):

@@ -11,8 +11,9 @@ from lgvi_kernels.laws.control.lost import since
 
 @functools.cache
 def params(width, real):
-    """Params: time, gain and offset of each lane; the row of the command, and where commands are delayed those of the one that
-    acts and of the one before.
+    """Params: time, gain and offset of each lane; rows of the command.
+
+    fresh: of the command; acting, before: where commands are delayed, of the one that acts and of the one before.
     """
     Lane = lane(width, real)
     words = dict.fromkeys(("fresh", "acting", "before", "delayed"), wp.int32)

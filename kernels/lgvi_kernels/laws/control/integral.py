@@ -4,7 +4,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import clamp, mul, add, neg, positive, remember, remembered  # noqa: F401
+from lgvi_kernels.law import add, clamp, mul, neg, positive, remember, remembered  # noqa: F401
 
 
 @wp.func

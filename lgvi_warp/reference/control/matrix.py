@@ -1,0 +1,19 @@
+"""Allocation by a matrix."""
+
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.reference.control import Part, cannot
+from lgvi_warp.reference.rotation import Array
+
+
+class AllocationMatrix(Part):
+    """Numbers as those of `lw.AllocationMatrix`; `to` names an actuator, which has a limit."""
+
+    def allocate(self, w: Array, actuators: dict[str, Any]) -> Array:
+        """u = A w within the limits; left are (I - A^+ A) w and A^+ of what the limits cut off."""
+        actuator, inverse = actuators[self.to], np.linalg.pinv(self.matrix)
+        wanted = self.matrix @ w
+        actuator.command = np.clip(wanted, -actuator.limit, actuator.limit)
+        return np.asarray(cannot(inverse @ self.matrix) @ w + inverse @ (wanted - actuator.command))

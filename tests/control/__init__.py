@@ -1,0 +1,1 @@
+"""Controllers: parts against their twins, closed loops, analytic answers."""

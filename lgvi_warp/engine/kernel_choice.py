@@ -145,11 +145,11 @@ def choose_kernel(
     conservative = checked and _conservative(facts, acting, built_in)
     # Events, water and the potential are evaluated at the user's origin, or at that of the forces.
     elsewhere = controller is not None or bool(events) or flow != "none" or (conservative and facts.apart)
-    parts = {"rates": explicit,
-             "turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
-             "modified": method.two_part, "dense": dense, "water": flow in ("uniform", "varying"),
-             "origin": bool(elsewhere and (facts.moved or facts.forces_moved)),
-             "axes": controller is not None and facts.turned_axes}  # fmt: skip
+    contents = {"rates": explicit,
+                "turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
+                "modified": method.two_part, "dense": dense, "water": flow in ("uniform", "varying"),
+                "origin": bool(elsewhere and (facts.moved or facts.forces_moved)),
+                "axes": controller is not None and facts.turned_axes}  # fmt: skip
     return KernelChoice(
         aligned=not facts.turned,
         moved=facts.moved,
@@ -158,7 +158,7 @@ def choose_kernel(
         mass="full" if coupled and mass == "isotropic" else mass,
         drag=drag,
         flow=flow,
-        parts=tuple(name for name, wanted in parts.items() if wanted),
+        parts=tuple(name for name, wanted in contents.items() if wanted),
         coupling=tuple(i in facts.couplings for i in range(len(COUPLINGS))),
         timed=any(term.timed for term, _ in (*acting, *events)) or facts.delayed,
         memory=memory or method.gauss > 0,

@@ -100,13 +100,19 @@ def test_a_part_and_a_term_of_one_name_are_told_apart():
 
 
 def test_all_faults_at_once():
-    text = refused(lambda: of_table(sensors=[CELL | {"noise": -1.0}, {"type": "sensor", "of": "x"}], faults=[{"of": 3}]))
+    text = refused(
+        lambda: of_table(sensors=[CELL | {"noise": -1.0}, {"type": "sensor", "of": "x"}], faults=[{"of": 3}])
+    )
     assert all(word in text for word in ("cell.noise", "sensor.of", "fault.of"))
 
 
 def test_a_scene_with_sensors_is_its_own_file():
     sensors = [lw.Sensor(name="cell", of="depth", noise=0.1), lw.Sensor(name="log", of="velocity", bias=0.2, latency=2)]
-    sensors += [lw.DeadReckoning(rule="euler"), lw.LowPass(of="heading", time_constant=1.0), lw.ComplementaryFilter(time_constant=2)]
+    sensors += [
+        lw.DeadReckoning(rule="euler"),
+        lw.LowPass(of="heading", time_constant=1.0),
+        lw.ComplementaryFilter(time_constant=2),
+    ]
     first = scene(sensors, [lw.Fault(of="log", channel=2, time=np.inf)])
     again = lw.Scene.from_dict(first.to_dict())
     assert again.to_dict() == first.to_dict()

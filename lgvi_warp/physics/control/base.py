@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+import functools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
@@ -189,7 +190,7 @@ class Guidance(Part):
 class ControlLaw(Part):
     """A law: the demand X, Y, Z [N] and K, M, N [N m] in the body's axes, from what is wanted and what is measured.
 
-    Class attributes: `demands` names the components that it asks for.
+    Class attributes: `demands` names the components that it asks for, among `COMPONENTS`; none named: all of them.
     """
 
     section: ClassVar[str] = "laws"
@@ -295,6 +296,24 @@ def restoring(nominal: Numbers) -> tuple[np.ndarray, np.ndarray]:
     return weight - buoyancy, weight[:, None] * centers[0] - buoyancy[:, None] * centers[1]
 
 
+# A step beyond any run, and within float32. A time and a whole number of steps that differ by less than the second, as a part of
+# the step, are the same.
+NEVER, SAME_TIME = 1e30, 1e-6
+
+
+def first_step(time: np.ndarray, h: float) -> np.ndarray:
+    """The first step at or after a time.
+
+    Args:
+        time: Times [s], of any shape; inf for never.
+        h: Step of the run [s].
+
+    Returns:
+        Numbers of steps, in the same shape; `NEVER` for never.
+    """
+    return np.ceil(np.minimum(time / h, NEVER) - SAME_TIME)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Allocation(Part):
     """A part that turns the demand into the commands of one term.
@@ -305,8 +324,11 @@ class Allocation(Part):
 
     section: ClassVar[str] = "allocation"
     kinds: ClassVar[dict[str, Any]] = {}
-    # The term that takes the commands; set for a part of a scene.
+    # The term that takes the commands, the faults of its channels that are known, and which of X Y Z K M N laws ask for (6,);
+    # set for a part of a scene.
     actuator: ClassVar[Any] = None
+    losses: ClassVar[tuple[Any, ...]] = ()
+    asked: ClassVar[np.ndarray] = np.ones(6)
 
     to: str = ""
 
@@ -316,12 +338,58 @@ class Allocation(Part):
         object.__setattr__(part, "actuator", others[self.to])
         return part
 
+    def informed(self, faults: Sequence[Any], asked: np.ndarray) -> Any:
+        """The same part, knowing which channels are lost from some time on, and which components count.
+
+        Args:
+            faults: Faults of actuators.
+            asked: 1 for each of X Y Z K M N that laws ask for, else 0, (6,).
+
+        Returns:
+            A copy.
+        """
+        part = copy.copy(self)
+        known = tuple(fault for fault in faults if fault.of == self.to and fault.known)
+        object.__setattr__(part, "losses", known)
+        object.__setattr__(part, "asked", asked)
+        return part
+
+    @property
+    def lost_channels(self) -> tuple[int, ...]:
+        """Numbers of the channels that are known to be lost at some time."""
+        return tuple(sorted({fault.channel for fault in self.losses}))
+
+    def steps_of_loss(self, context: PackingContext) -> np.ndarray:
+        """The first step at which each channel is known to be lost.
+
+        Args:
+            context: The scene's parameters and the step.
+
+        Returns:
+            Numbers of steps (1 or n, channels); `NEVER` for a channel that is not.
+        """
+        times = [np.full((1, self.actuator.channels), NEVER)]
+        for fault in self.losses:
+            time = context.parameters[f"{fault.key}.time"]
+            one = np.full((len(time), self.actuator.channels), NEVER)
+            one[:, fault.channel] = first_step(time, context.h)
+            times.append(one)
+        return np.asarray(functools.reduce(np.minimum, times))
+
     def check_actuator(self, faults: Faults) -> None:
         """Add a fault for what does not fit the actuator.
 
         Args:
             faults: Collects the faults.
         """
+
+    def reach(self) -> np.ndarray:
+        """What the channels make: a wrench for each, of the scene's own numbers.
+
+        Returns:
+            (6, channels) [N, N m], of any size.
+        """
+        raise NotImplementedError
 
 
 # Entries of a projector below this are round-off.

@@ -18,9 +18,12 @@ from lgvi_warp.physics.control.fault import Fault
 from lgvi_warp.physics.control.pseudo_inverse import PseudoInverse
 from lgvi_warp.physics.control.sensor import Sensor
 from lgvi_warp.physics.terms.base import Term, build, check_list
+from lgvi_warp.physics.terms.control_wrench import COMPONENTS
 
 # A time and a whole number of steps that differ by less than this part of the step are the same.
 ROUND_OFF = 1e-9
+# A part of a component below this is round-off, when it is asked what actuators can make.
+SPANNED = 1e-8
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -142,7 +145,7 @@ class Controller:
         self._check_faults(faults, actuators)
         faults.raise_if_any()
         whole = copy.copy(self)
-        object.__setattr__(whole, "allocation", allocation)
+        object.__setattr__(whole, "allocation", tuple(part.informed(self.faults, self.asked) for part in allocation))
         object.__setattr__(whole, "actuators", actuators)
         object.__setattr__(whole, "laws", tuple(part.of_vehicle(nominal or {}) for part in self.laws))
         channels = {key: term.channels for key, term in actuators.items()}
@@ -152,7 +155,39 @@ class Controller:
         for part in controller.allocation:
             part.check_actuator(faults)
         faults.raise_if_any()
+        controller._check_laws(faults)
+        faults.raise_if_any()
         return controller
+
+    @property
+    def asked(self) -> np.ndarray:
+        """1 for each of X Y Z K M N that some law asks for, else 0, (6,)."""
+        names = {name for law in self.laws for name in law.demands or COMPONENTS}
+        return np.array([float(name in names) for name in COMPONENTS])
+
+    def _effect(self) -> np.ndarray:
+        """What all channels make of the components that are asked for, each column of unit size, (6, channels)."""
+        effect = self.asked[:, None] * np.concatenate([part.reach() for part in self.allocation], axis=1)
+        sizes = np.linalg.norm(effect, axis=0)
+        return np.asarray(effect / np.where(sizes > 0.0, sizes, 1.0))
+
+    @property
+    def unspanned(self) -> tuple[str, ...]:
+        """Components that laws ask for and the actuators cannot make, alone or each by itself."""
+        effect = self._effect()
+        apart = np.eye(6) - effect @ np.linalg.pinv(effect, rcond=SPANNED)
+        missed = self.asked * np.linalg.norm(apart, axis=0) > SPANNED
+        return tuple(name for name, bad in zip(COMPONENTS, missed, strict=True) if bad)
+
+    def _check_laws(self, faults: Faults) -> None:
+        """Add a fault for each law of whose demand the actuators can make nothing at all."""
+        idle = {name for name, row in zip(COMPONENTS, self._effect(), strict=True) if np.all(np.abs(row) < SPANNED)}
+        for law in self.laws:
+            wanted = law.demands or COMPONENTS
+            if idle.issuperset(wanted):
+                made_by = " and ".join(self.actuators)
+                fault = f"asks for {', '.join(wanted)}, of which {made_by} can make nothing"
+                faults.add("laws", law.key, fault, "give actuators that can, or leave the law out")
 
     def on(self, bus: Bus) -> Controller:
         """The same controller with another bus.

@@ -34,6 +34,7 @@ from lgvi_warp.engine.widths import default_width
 from lgvi_warp.methods.gauss import gauss
 from lgvi_warp.methods.method import KINDS, Method
 from lgvi_warp.methods.saveat import TimeGrid, divisors
+from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
@@ -454,6 +455,19 @@ class Plan:
             k1 = min(k + most_steps, int(due[min(last, len(due)) - 1]))
             yield k, k1
             k = k1
+
+
+def damping_terms(terms: Sequence[Term]) -> list[Term]:
+    """The terms whose device code has damping.
+
+    Args:
+        terms: terms of a scene.
+
+    Returns:
+        Those terms; they may have no effect in any member.
+    """
+    devices = [built_in("laws", term.device) if isinstance(term.device, str) else term.device for term in terms]
+    return [term for term, device in zip(terms, devices, strict=True) if hasattr(device, "damping")]
 
 
 @functools.lru_cache(maxsize=256)

@@ -111,13 +111,15 @@ def run(quick):
         for plan, (position, rate), price in zip(plans, reached, cost.costs(plans), strict=True):
             with np.errstate(all="ignore"):
                 error, off = np.abs(position - b).max(), np.abs(rate / r - 1.0).max()
-            records.append({
-                "scene": name,
-                "method": plan.method.name,
-                "h": plan.grid.h,
-                "error_m": float(f"{error:.1e}") if error < 10.0 else None,
-                "yaw_rate_off": float(f"{off:.1e}") if error < 10.0 else None,
-                "us_per_vehicle_and_second": round(price.us_per_vehicle_second, 3),
-            })
+            records.append(
+                {
+                    "scene": name,
+                    "method": plan.method.name,
+                    "h": plan.grid.h,
+                    "error_m": float(f"{error:.1e}") if error < 10.0 else None,
+                    "yaw_rate_off": float(f"{off:.1e}") if error < 10.0 else None,
+                    "us_per_vehicle_and_second": round(price.us_per_vehicle_second, 3),
+                }
+            )
             yield records[-1]
         yield from beside_the_default(name, records, defaults.keys())

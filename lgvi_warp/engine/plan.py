@@ -39,6 +39,7 @@ from lgvi_warp.methods.method import KINDS, Method
 from lgvi_warp.methods.saveat import TimeGrid, divisors
 from lgvi_warp.physics.control.signals import SIGNALS, check, ordered, row_of, saved_fields
 from lgvi_warp.physics.fields import Field
+from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
@@ -523,6 +524,19 @@ class Plan:
         every = controller.every(self.grid.h)
         for k in range(0, self.grid.steps, every):
             yield k, min(k + every, self.grid.steps)
+
+
+def damping_terms(terms: Sequence[Term]) -> list[Term]:
+    """The terms whose device code has damping.
+
+    Args:
+        terms: terms of a scene.
+
+    Returns:
+        Those terms; they may have no effect in any member.
+    """
+    devices = [built_in("laws", term.device) if isinstance(term.device, str) else term.device for term in terms]
+    return [term for term, device in zip(terms, devices, strict=True) if hasattr(device, "damping")]
 
 
 @functools.lru_cache(maxsize=256)

@@ -109,6 +109,8 @@ class Runner:
                 return plan.of(fleet)
         plan = make_plan(fleet, **self.settings, fields=self.observed.fields, survey_all=False)
         plan.compile()
+        if plan.method.reason:  # chosen once, by the members of the first plan
+            self.settings["method"] = plan.method
         facts = survey(fleet, plan.method, plan.grid.h, kind.shared, odd=False, most=SURVEYED)
         kind.plans[plan.method, facts.decisive] = self._last = plan
         return plan
@@ -439,8 +441,8 @@ def prepare(
         vary: Names of what varies, ["vehicle.mass", "start.position[2]"], or a mapping of names to distributions.
         of: One or several quantities of interest: "position[2]", "max(depth)", a Quantity, a function of a Result. Default
             None: calls return results.
-        method: As of `lw.solve`, like h, t1, dtype, width, checks, on_failure, threads, executor and scheduler. What is left
-            out is taken from the scene's [run].
+        method: As of `lw.solve`, but where it is left out, chosen once, for `fleet`. What else is left out, of h, t1, dtype,
+            width, checks, on_failure, threads, executor and scheduler, is taken from the scene's [run].
         h: Step [s].
         t1: End of the run [s].
         save: Samples to keep, as of `lw.solve`; default with `of`: those that the quantities need.

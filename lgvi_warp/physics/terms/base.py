@@ -391,6 +391,32 @@ class Term:
         still = self.water(numbers, position[None], np.zeros(1), context.parameters)
         return np.zeros_like(position) if still is None else still[0]
 
+    def braking(self, numbers: Numbers, speeds: Array, water_density: Array) -> Array:
+        """How strongly the term brakes at some speeds: minus the derivative of its wrench by the velocity, or a bound.
+
+        A run without a method looks at it, to choose one that is stable (lgvi_warp.runs.default_method).
+
+        Args:
+            numbers: The term's numbers by field, each of shape (n, ...).
+            speeds: Sizes of velocity and angular velocity along and about the body's axes, (n, 6) [m/s, rad/s].
+            water_density: Density of the water, (n,) [kg/m3].
+
+        Returns:
+            Matrices (n, 6, 6) [N s/m, N s, N m s], user's axes and origin.
+
+        Raises:
+            NotImplementedError: Where the term does not define it: its damping then counts as strong.
+        """
+        raise NotImplementedError(f"{type(self).__name__} does not tell how strongly it brakes")
+
+    def drive(self) -> Array:
+        """Largest force and torque with which the term drives the vehicle, whatever its motion, by the scene's numbers.
+
+        Returns:
+            Sizes along and about the body's axes (6,) [N, N m]; by default zero.
+        """
+        return np.zeros(6)
+
     def potential(self, numbers: Numbers, position: Array, attitude: Array, parameters: Numbers) -> Array | float:
         """Potential energy of the law at sampled states.
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -25,10 +25,9 @@ from lgvi_warp.physics.terms.drag import Drag
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.ensemble import Ensemble
 
-if TYPE_CHECKING:
-    from lgvi_warp.engine.plan import Plan
-
 Fields = dict[str, Any]
+# A Plan, whose module imports this one.
+Plan = Any
 
 
 class Packing:

@@ -20,7 +20,18 @@ from lgvi_kernels.lanes.arithmetic import (
     sub,
     vec3,
 )
-from lgvi_kernels.lanes.functions import clamp, cosine, decay, exponential, greatest, logarithm, normals3, root, sine
+from lgvi_kernels.lanes.functions import (
+    clamp,
+    cosine,
+    decay,
+    exponential,
+    fused,
+    greatest,
+    logarithm,
+    normals3,
+    root,
+    sine,
+)
 from lgvi_kernels.lanes.noise import normals_over, wandered
 from lgvi_kernels.lanes.state import struct
 from lgvi_kernels.lanes.view import (
@@ -54,6 +65,7 @@ __all__ = [
     "div",
     "dot",
     "exponential",
+    "fused",
     "greatest",
     "int_lane",
     "lane",

@@ -44,7 +44,7 @@ class Packets:
         structs = (types.Inertia, types.Params, types.Events, types.Limits)
         inertia, params, events, limits = zip(structs, plan.dtypes, strict=True)
         self.inertia, self.events, self._limits = (Structs(*kind) for kind in (inertia, events, limits))
-        self.laws = LawArrays(self.count, *params, types.Lane)
+        self.laws = LawArrays(self.count, *params, types.Lane, types.Number)
         self.state_lanes = Lanes(self.count, plan.spec.state_fields, types.Lane)
         self._rows = np.empty((self.count * width, plan.spec.state_fields))
         self.status = wp.zeros(self.count, dtype=int_lane(width), device="cpu")

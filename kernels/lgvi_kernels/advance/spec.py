@@ -8,7 +8,7 @@ import warp as wp
 from lgvi_kernels.advance import monitor as monitors
 from lgvi_kernels.advance.rows import PACE_FIELDS, STATE_FIELDS
 from lgvi_kernels.lanes.arithmetic import int_lane, lane
-from lgvi_kernels.lanes.state import alarm_struct, inertia_struct, state_struct, struct, view_struct
+from lgvi_kernels.lanes.state import alarm_struct, inertia_struct, state_struct, struct, table_number, view_struct
 from lgvi_kernels.laws import drag
 from lgvi_kernels.maps.compose import params_of
 
@@ -46,6 +46,7 @@ class Spec(NamedTuple):
     energy: whether its growth is a failure.
     backward: whether drag is checked for stages that go backward.
     substep: whether a step that has no solution is divided.
+    shared_rows: whether all members share the rows of the laws' table (see table_number).
     """
 
     width: int
@@ -77,6 +78,7 @@ class Spec(NamedTuple):
     energy: bool = False
     backward: bool = False
     substep: bool = False
+    shared_rows: bool = False
 
     @property
     def watched(self) -> bool:
@@ -128,9 +130,11 @@ class Types(NamedTuple):
     """The types of a kernel: lanes, the structs of lanes/state.py, and the kernel's arguments.
 
     Constants: all that is the same in every step of a packet. DragFlow: the constants of drag by its exact flow.
+    Number: what the laws' table holds.
     """
 
     Lane: Any
+    Number: Any
     Ints: Any
     State: Any
     Alarm: Any
@@ -148,7 +152,7 @@ class Types(NamedTuple):
 def make_types(spec):
     """The types for this Spec."""
     width, real = spec.width, spec.real
-    Lane = lane(width, real)
+    Lane, Number = lane(width, real), table_number(width, real, spec.shared_rows)
     Inertia = inertia_struct(width, real, spec.mass, spec.parts)
     Params = params_of(spec.laws, spec.numbers, width, real)
     Events = params_of(spec.events, spec.numbers[len(spec.laws) :], width, real)
@@ -159,7 +163,7 @@ def make_types(spec):
         params=Params,
         tolerance=real,
         force_tolerance=real,
-        table=wp.array2d(dtype=Lane),
+        table=wp.array2d(dtype=Number),
         memory=wp.array2d(dtype=Lane),
         packet=wp.int32,
         entry=wp.int32,
@@ -168,10 +172,11 @@ def make_types(spec):
     )
     return Types(
         Lane,
+        Number,
         int_lane(width),
         state_struct(width, real, spec.compensated),
         alarm_struct(width, real),
-        view_struct(width, real),
+        view_struct(width, real, spec.shared_rows),
         Constants,
         DragFlow,
         Inertia,

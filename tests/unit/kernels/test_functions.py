@@ -17,7 +17,7 @@ from lgvi_kernels.lanes.flags import CPU_FLAGS
 
 pytestmark = pytest.mark.kernel
 
-NAMES = ("root", "exponential", "sine", "cosine", "logarithm", "decay", "greatest", "clamp")
+NAMES = ("root", "exponential", "sine", "cosine", "logarithm", "decay", "greatest", "clamp", "fused")
 FORMATS = {"float64": (wp.float64, np.float64), "float32": (wp.float32, np.float32)}
 THOROUGH = [(1, "float64"), (8, "float64"), (1, "float32"), (16, "float32")]
 LARGEST = {"float64": 700.0, "float32": 87.0}
@@ -26,7 +26,7 @@ ERRORS = {"root": 1.0, "exponential": 2.0, "sine": 2.0, "cosine": 2.0, "logarith
 
 @functools.cache
 def kernel(width, name):
-    """All functions of the arguments a: rows in the order of NAMES; greatest and clamp with b and c."""
+    """All functions of the arguments a: rows in the order of NAMES; greatest, clamp and fused with b and c."""
     Lane = lane(width, FORMATS[name][0])
 
     @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": CPU_FLAGS})
@@ -41,6 +41,7 @@ def kernel(width, name):
         out[5, i] = lm.decay(x)
         out[6, i] = lm.greatest(x, a[1, i])
         out[7, i] = lm.clamp(x, a[1, i], a[2, i])
+        out[8, i] = lm.fused(x, a[1, i], a[2, i])
 
     return evaluate
 
@@ -107,6 +108,14 @@ def errors(function, name, width):
 def test_function(function, width, name):
     # A number that is not one fails the comparison too.
     assert errors(function, name, width).max() < ERRORS[function]
+
+
+@pytest.mark.parametrize(("width", "name"), THOROUGH)
+def test_fused_rounds_once(width, name):
+    # (1 + 2^-k)(1 - 2^-k) - 1 = -2^-2k, where the product alone is rounded to 1.
+    k = 30 if name == "float64" else 14
+    part = 2.0**-k
+    assert evaluate(width, name, [1.0 + part], 1.0 - part, -1.0)["fused"] == [-(part**2)]
 
 
 @pytest.mark.parametrize(("width", "name"), THOROUGH)

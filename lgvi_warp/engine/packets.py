@@ -45,7 +45,7 @@ class Packets:
         structs = (types.Inertia, types.Params, types.Events, types.Limits, *([types.Loop] if types.Loop else []))
         inertia, params, events, limits, *loop = zip(structs, plan.dtypes, strict=True)
         self.inertia, self.events, self._limits = (Structs(*kind) for kind in (inertia, events, limits))
-        self.laws = LawArrays(self.count, *params, types.Lane, *loop)
+        self.laws = LawArrays(self.count, *params, types.Lane, types.Number, *loop)
         self.state_lanes = Lanes(self.count, plan.spec.state_fields, types.Lane)
         self._rows = np.empty((self.count * width, plan.spec.state_fields))
         self.status = wp.zeros(self.count, dtype=int_lane(width), device="cpu")

@@ -30,6 +30,7 @@ from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.kernel_choice import KernelChoice, check_backward_drag, choose_kernel, declared, is_built_in
+from lgvi_warp.engine.packing import rows_shared
 from lgvi_warp.engine.shared import MEMBERS, SEED, Shared
 from lgvi_warp.engine.step_warnings import watched
 from lgvi_warp.engine.survey import Survey, survey, survey_of
@@ -138,6 +139,7 @@ class Plan:
             object.__setattr__(self, "width_source", source)
         object.__setattr__(self, "fields", ordered(self.fields))
         object.__setattr__(self, "spec", self._spec())
+        object.__setattr__(self, "spec", self.spec._replace(shared_rows=rows_shared(self)))
 
     @functools.cached_property
     def advance(self) -> Advance:

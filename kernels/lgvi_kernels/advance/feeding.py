@@ -47,7 +47,7 @@ def make_feed(spec, types, method, at_step, opened):
     """
     width, real, control = spec.width, spec.real, spec.control
     State, Constants, Monitor, Alarm = types.State, types.Constants, types.Monitor, types.Alarm
-    Measurement, Reference = measurement_struct(width, real), reference_struct(width, real)
+    Measurement, Reference = measurement_struct(width, real, spec.shared_rows), reference_struct(width, real)
     Wrench, Lane = wrench_struct(width, real), types.Lane
     measure, guide, act, allocate, send = (in_turn(control.parts, role) for role in ROLES)
     velocities, momentum, water_velocity = method.velocities, method.momentum, method.water_velocity
@@ -83,6 +83,7 @@ def make_feed(spec, types, method, at_step, opened):
         y.position = place(x)
         if wp.static(moved):
             y.position = place(x) + rotate(x, c.inertia.user_origin)
+        y.b = y.position
         if wp.static(turned):
             y.north = apply(c.inertia.axes, x.R0)
             y.east = apply(c.inertia.axes, x.R1)

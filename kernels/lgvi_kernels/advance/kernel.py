@@ -39,7 +39,7 @@ def make_advance(spec):
     """Build (without compiling) the kernel for this Spec."""
     width, real, checked = spec.width, spec.real, spec.checked
     types, stepping, watching, retry = make_types(spec), make_stepping(spec), make_watching(spec), make_retry(spec)
-    Lane, Ints, Alarm, Monitor = types.Lane, types.Ints, types.Alarm, types.Monitor
+    Lane, Number, Ints, Alarm, Monitor = types.Lane, types.Number, types.Ints, types.Alarm, types.Monitor
     Constants, DragFlow, Inertia, Params, Events = (
         types.Constants,
         types.DragFlow,
@@ -72,7 +72,7 @@ def make_advance(spec):
         inertia: wp.array(dtype=Inertia),
         params: wp.array(dtype=Params),
         events: wp.array(dtype=Events),
-        table: wp.array2d(dtype=Lane),
+        table: wp.array2d(dtype=Number),
         tolerance: real,
         force_tolerance: real,
         # method: length of each stage [s], in pairs where it has two halves; of the lead after each, and before the first

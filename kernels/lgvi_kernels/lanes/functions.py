@@ -313,6 +313,11 @@ for _real in REALS:
             """a kept between b and c; NaN stays NaN."""
             ...
 
+        @wp.func_native(_native_here("ABC", "A * B + C" if _width == 1 else "__builtin_elementwise_fma(A, B, C)"))
+        def fused(a: _L, b: _L, c: _L) -> _L:
+            """a b + c, rounded once (with one lane, where the compiler joins them)."""
+            ...
+
         @wp.func_native(_native_here("A", _root(_width).format("A")))
         def root(a: _L) -> _L:
             """Square root."""

@@ -18,7 +18,7 @@ from lgvi_kernels.lanes.flags import CPU_FLAGS
 pytestmark = pytest.mark.kernel
 
 NAMES = ("root", "exponential", "sine", "cosine", "logarithm", "decay", "greatest", "clamp", "arctangent2",
-         "hyperbolic_tangent", "neg")  # fmt: skip
+         "hyperbolic_tangent", "neg", "fused")  # fmt: skip
 FORMATS = {"float64": (wp.float64, np.float64), "float32": (wp.float32, np.float32)}
 THOROUGH = [(1, "float64"), (8, "float64"), (1, "float32"), (16, "float32")]
 LARGEST = {"float64": 700.0, "float32": 87.0}
@@ -36,9 +36,9 @@ ARCTANGENT_ERROR = 3.0
 
 @functools.cache
 def kernel(width, name):
-    """All functions of the arguments a: rows in the order of NAMES; greatest, arctangent2 and clamp with b and c.
+    """All functions of the arguments a: rows in the order of NAMES; greatest, arctangent2, clamp and fused with b and c.
 
-    The last one is the minus of a 3-vector, whose numbers are x, b and c: x of it, where the others are as they must be.
+    "neg" is the minus of a 3-vector, whose numbers are x, b and c: x of it, where the others are as they must be.
     """
     Lane = lane(width, FORMATS[name][0])
 
@@ -59,6 +59,7 @@ def kernel(width, name):
         v = neg(vec3(x, a[1, i], a[2, i]))
         # (x, b, c) . (1, 2, 4), of which no sum of two other signs is the same.
         out[10, i] = v.x + (v.y + v.y) + (v.z + v.z + v.z + v.z)
+        out[11, i] = lm.fused(x, a[1, i], a[2, i])
 
     return evaluate
 
@@ -161,6 +162,14 @@ def test_special_values_of_the_arctangent(width, name):
 def test_minus_of_a_vector(width, name):
     a, b, c = np.random.default_rng(5).integers(-9, 10, (3, 1000)).astype(float)
     np.testing.assert_array_equal(evaluate(width, name, a, b, c)["neg"], -(a + 2 * b + 4 * c))
+
+
+@pytest.mark.parametrize(("width", "name"), THOROUGH)
+def test_fused_rounds_once(width, name):
+    # (1 + 2^-k)(1 - 2^-k) - 1 = -2^-2k, where the product alone is rounded to 1.
+    k = 30 if name == "float64" else 14
+    part = 2.0**-k
+    assert evaluate(width, name, [1.0 + part], 1.0 - part, -1.0)["fused"] == [-(part**2)]
 
 
 @pytest.mark.parametrize(("width", "name"), THOROUGH)

@@ -44,8 +44,8 @@ def test_a_delay_is_whole_periods_and_steps(method):
     result = lw.solve(fleet, method, h=H, t1=STEPS * H, save=lw.SaveAt(every=H))
     heading = np.arctan2(result.attitude[..., 1, 0], result.attitude[..., 0, 0])
     for i, delay in enumerate(DELAYS):
-        # A held moment about a principal axis is exact for rk4; the turn of psi_s follows equation (24), with an error of order
-        # h^2 of the angle in a step: (rate h)^2 / 24 of it, a rate of at most 0.2 rad/s.
+        # A held moment about a principal axis is exact for rk4; the turn of psi_s follows equation (24), with an error of
+        # (rate h)^2 / 24 of the angle of a step at most: here the rate stays below 0.2 rad/s.
         allowed = 1e-11 if method == "rk4" else 0.3 * (0.2 * H) ** 2
         assert np.abs(heading[:, i] - wanted(delay)).max() < allowed, delay
         assert np.all(heading[: delay + 1, i] == 0.0) and heading[delay + 1, i] > 0.0

@@ -22,7 +22,9 @@ EPS = {"float64": 2.0**-52, "float32": 2.0**-23}
 # Chains of parts, so that few kernels are compiled. No part hides what another does.
 SENSORS = {
     "all": [
-        dict(name="cell", of="depth", noise=0.02, bias=0.01, drift=0.03, quantum=0.005, every=2, latency=3, dropout=0.3),
+        dict(
+            name="cell", of="depth", noise=0.02, bias=0.01, drift=0.03, quantum=0.005, every=2, latency=3, dropout=0.3
+        ),
         dict(name="ahrs", of="attitude", noise=0.02, bias=(0.01, 0.0, -0.02), drift=0.01, latency=2),
         dict(name="compass", of="heading", noise=0.05, quantum=0.1, drift=0.02, every=3),
         dict(name="log", of="velocity", noise=(0.1, 0.0, 0.2), dropout=0.4),
@@ -86,7 +88,9 @@ def motion(looks=LOOKS, members=MEMBERS, period=PERIOD):
         a = rng.normal(size=12)
         for k in range(looks):
             rates = np.array([0.3 * np.sin(t[k] + a[0]), 0.2 * np.cos(1.3 * t[k] + a[1]), 1.5 + 0.3 * a[2]])
-            turn = exp(np.array([0.0, 0.0, 1.5 * t[k] + a[5]])) @ exp(0.5 * np.array([np.sin(t[k] + a[3]), np.cos(t[k]), 0.0]))
+            turn = exp(np.array([0.0, 0.0, 1.5 * t[k] + a[5]])) @ exp(
+                0.5 * np.array([np.sin(t[k] + a[3]), np.cos(t[k]), 0.0])
+            )
             position = np.array([3.0 * t[k], a[6] * t[k], 10.0 + a[7] * np.sin(t[k])])
             velocity = np.array([1.5 + a[8] * np.sin(t[k]), 0.3 * np.cos(2.0 * t[k]), 0.1 * a[9]])
             rows[k, m] = np.concatenate([position, turn.reshape(-1), velocity, velocity - 0.2, rates])
@@ -183,7 +187,9 @@ def test_the_variance_of_a_walk_grows_with_time(readings):
     walk = readings[..., 18:21]
     for k in (1, 20, 59):
         variance = 0.3**2 * k * PERIOD
-        assert np.abs(walk[0]).max() < 1e-29 and abs(walk[k].var() / variance - 1.0) < ERRORS * np.sqrt(2.0 / (3 * MANY))
+        assert np.abs(walk[0]).max() < 1e-29 and abs(walk[k].var() / variance - 1.0) < ERRORS * np.sqrt(
+            2.0 / (3 * MANY)
+        )
     # What comes after look 20 does not depend on what was before.
     after = ((walk[59] - walk[20]) * walk[20]).mean() / np.sqrt(0.3**4 * 39 * 20 * PERIOD**2)
     assert abs(after) < ERRORS / np.sqrt(3 * MANY)
@@ -230,7 +236,9 @@ def test_each_sensor_and_seed_has_numbers_of_its_own():
     errors = []
     for sensors in (base.sensors, other):
         members = scene(sensors, base.faults, PERIOD)
-        errors += [measured(lw.Ensemble(members, 1, seed), truth, H)[:, 0, 18] - truth[:, 0, 18] for seed in (0, 1, 2**40)]
+        errors += [
+            measured(lw.Ensemble(members, 1, seed), truth, H)[:, 0, 18] - truth[:, 0, 18] for seed in (0, 1, 2**40)
+        ]
     for i, a in enumerate(errors):
         assert all(abs(np.corrcoef(a, b)[0, 1]) < ERRORS / np.sqrt(LOOKS) for b in errors[:i])
 

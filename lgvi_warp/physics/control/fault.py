@@ -13,7 +13,6 @@ from lgvi_warp.physics.control.base import Bus, Sending
 from lgvi_warp.physics.control.sensor import Sensor
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 
-
 # A time and a whole number of steps that differ by less than this part of the step are the same.
 ROUND_OFF = 1e-6
 

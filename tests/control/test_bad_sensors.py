@@ -10,7 +10,6 @@ import lgvi_warp as lw
 from tests.conftest import ROOT
 from tests.control.bench import scene
 
-
 CONTROLLER = {
     "period": 0.1,
     "laws": [{"type": "heading_pid", "kp": 1.0}],

@@ -97,14 +97,11 @@ def choose_kernel(
     """
     explicit = method.tableau is not None
     controller = _controller(ensemble, facts)
-    control = (
-        tuple(
-            (part, device_module(part, part.device_in(not facts.turned), built_in))
-            for part in _parts(controller, facts)
-        )
-        if controller
-        else ()
-    )
+    acting_parts = _parts(controller, facts) if controller else ()
+    modules = (device_module(part, part.device_in(not facts.turned), built_in) for part in acting_parts)
+    control = tuple(zip(acting_parts, modules, strict=True))
+    # The host looks at states between launches, which must not be those in the middle of a lead.
+    asked = controller is not None and controller.callback is not None
     acting = _acting(ensemble, facts, built_in, controller)
     events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)
     damping = any(hasattr(module, "damping") for term, module in acting if not isinstance(term, Drag))
@@ -141,18 +138,18 @@ def choose_kernel(
     if method.two_part:
         # B merges with that of the next step exactly, A up to the order of the method.
         lead, maps = method.program[0], method.program[1:]
-        if events:
+        if events or asked:
             lead, maps = None, method.program
-    elif events or (lead is not None and lead[0] == "K" and not undone):
+    elif events or asked or (lead is not None and lead[0] == "K" and not undone):
         lead, maps = None, program
     conservative = checked and _conservative(facts, acting, built_in)
     # Events, water and the potential are evaluated at the user's origin, or at that of the forces.
     elsewhere = controller is not None or bool(events) or flow != "none" or (conservative and facts.apart)
-    parts = {"rates": explicit,
-             "turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
-             "modified": method.two_part, "dense": dense, "water": flow in ("uniform", "varying"),
-             "origin": bool(elsewhere and (facts.moved or facts.forces_moved)),
-             "axes": controller is not None and facts.turned_axes}  # fmt: skip
+    contents = {"rates": explicit,
+                "turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
+                "modified": method.two_part, "dense": dense, "water": flow in ("uniform", "varying"),
+                "origin": bool(elsewhere and (facts.moved or facts.forces_moved)),
+                "axes": controller is not None and facts.turned_axes}  # fmt: skip
     return KernelChoice(
         aligned=not facts.turned,
         moved=facts.moved,
@@ -161,7 +158,7 @@ def choose_kernel(
         mass="full" if coupled and mass == "isotropic" else mass,
         drag=drag,
         flow=flow,
-        parts=tuple(name for name, wanted in parts.items() if wanted),
+        parts=tuple(name for name, wanted in contents.items() if wanted),
         coupling=tuple(i in facts.couplings for i in range(len(COUPLINGS))),
         timed=any(term.timed for term, _ in (*acting, *events)) or facts.delayed,
         memory=memory or method.gauss > 0,

@@ -33,6 +33,14 @@ class SceneLike(Protocol):
         """Events that stop a member's run."""
 
     @property
+    def controller(self) -> Any:
+        """What steers the vehicle; None for nothing."""
+
+    @property
+    def parts(self) -> Sequence[Any]:
+        """Everything that has numbers of its own: terms, events, and the parts of the controller."""
+
+    @property
     def start(self) -> Start:
         """The state at t = 0, before variation."""
 

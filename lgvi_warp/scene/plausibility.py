@@ -213,8 +213,23 @@ def _diagonal(matrices: np.ndarray) -> np.ndarray:
     return np.diagonal(matrices, axis1=1, axis2=2)
 
 
+def actuators(scene: SceneLike, p: Numbers) -> Iterator[Look]:
+    """Look for components of a force or a moment that a controller asks for, and its actuators cannot make.
+
+    Args:
+        scene: The scene of all members.
+        p: Parameters by name, (1, ...) or (n, ...).
+
+    Yields:
+        Name of the list, a mask of one number, and the text.
+    """
+    missing = () if scene.controller is None else scene.controller.unspanned
+    text = f"actuators cannot make {', '.join(missing)} as the laws ask: what is left is told back to them as not delivered"
+    yield "controller.allocation", np.array([bool(missing)]), lambda i: text
+
+
 # Checks of every member before a run.
-OF_NUMBERS = (net_weight, density, currents, fin_angles, depths, inertia)
+OF_NUMBERS = (net_weight, density, currents, fin_angles, depths, inertia, actuators)
 
 
 def of_numbers(

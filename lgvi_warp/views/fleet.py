@@ -43,7 +43,7 @@ LOOKS = {
     Status.CONDITION: Look("#C9B400", "D"),
 }
 FAILURES = [code for code in Status if code not in LOOKS]
-LOOKS |= {code: Look("#D55E00", marker) for code, marker in zip(FAILURES, "xX*P1+2", strict=True)}
+LOOKS |= {code: Look("#D55E00", marker) for code, marker in zip(FAILURES, "xX*P1+23", strict=True)}
 
 
 class Curve(NamedTuple):

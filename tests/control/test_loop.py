@@ -20,9 +20,9 @@ from lgvi_warp.reference.terms.weight import Weight
 GRAVITY, MASS, BUOYANCY, CENTER = 9.8, 20.0, 20.0 * 9.8, (0.01, 0.005, -0.02)
 LINEAR, QUADRATIC = (3.0, 4.0, 5.0, 0.3, 0.4, 0.5), (10.0, 30.0, 40.0, 1.0, 2.0, 3.0)
 WANTED = dict(depth=6.0, heading=2.5)
-HEADING = dict(kp=6.0, ki=0.5, kd=4.0, integral_limit=0.8)
-DEPTH = dict(kp=0.3, ki=0.02, pitch_limit=0.3, kp_pitch=12.0, ki_pitch=1.0, kd_pitch=6.0, integral_limit=(2.0, 1.0))
-LIMIT = (1e6, 1e6, 1e6, 1e6, 3.0, 4.0)
+HEADING = dict(kp=12.0, ki=0.5, kd=25.0, integral_limit=0.8)
+DEPTH = dict(kp=0.3, ki=0.01, pitch_limit=0.3, kp_pitch=20.0, ki_pitch=1.0, kd_pitch=30.0, integral_limit=(2.0, 1.0))
+LIMIT = (1e6, 1e6, 1e6, 1e6, 8.0, 6.0)
 LAG = (0.0, 0.0, 0.0, 0.0, 0.3, 0.2)
 MATRIX = np.diag((0.0, 0.0, 0.0, 0.0, 1.1, 0.9))
 STATE = {"position": (0.4, -0.3, 3.0), "velocity": (1.2, 0.3, -0.2), "angular_velocity": (0.3, -0.4, 0.5)}

@@ -23,6 +23,18 @@ THRUSTERS = dict(
     time_constant=(0.2, 0.1, 0.3),
 )
 COMMANDS = dict(times=(0.0, 0.5, 1.5), command_schedule=((0.3, 0.8, -0.7), (0.7, -0.9, 0.9), (0.5, 0.5, -1.5)))
+# A rate that some commands exceed, and others do not.
+PROPELLERS = dict(
+    rate_limit=(0.8, 2.0, 1.5),
+    advance_loss=(3.0, 2.0, 0.0),
+    advance_loss_astern=(1.0, 0.0, 2.0),
+    torque_coefficient=(0.5, -0.4, 0.2),
+    torque_loss=(0.1, -0.05, 0.0),
+)
+TABLE_OF_THRUST = (
+    (-0.8, -0.3, -0.1, 0.1, 0.4, 1.0),
+    ((-9.0, -8.0, -5.0), (-2.0, -3.0, -1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (5.0, 3.0, 4.0), (20.0, 12.0, 9.0)),
+)
 
 CASES = {
     "linear drag": case(terms.Drag, linear=LINEAR, quadratic=(0.0,) * 6),
@@ -77,6 +89,26 @@ CASES = {
                 command=np.array(COMMANDS["command_schedule"]),
                 polynomial=(3.0, 0.5, 8.0, -2.0, 1.0),
                 polynomial_astern=(2.0, 7.0, -1.5),
+            ),
+        ),
+        False,
+    ),
+    "thrusters with a table": Case(
+        (
+            terms.Thrusters(
+                **THRUSTERS, **COMMANDS, **PROPELLERS, coefficient=(2.0, 3.0, 1.0), coefficient_astern=(1.5, 2.5, 0.5),
+                table_commands=TABLE_OF_THRUST[0], table_thrusts=TABLE_OF_THRUST[1],
+            ),
+        ),
+        (
+            Thrusters(
+                **{k: np.array(v) for k, v in (THRUSTERS | PROPELLERS).items()},
+                forward=np.array((2.0, 3.0, 1.0)),
+                backward=np.array((1.5, 2.5, 0.5)),
+                times=np.array(COMMANDS["times"]),
+                command=np.array(COMMANDS["command_schedule"]),
+                table_commands=np.array(TABLE_OF_THRUST[0]),
+                table_thrusts=np.array(TABLE_OF_THRUST[1]),
             ),
         ),
         False,

@@ -29,6 +29,8 @@ FINS = dict(
 STEER = dict(limit=(0.35, 0.2, 0.5), times=(0.0, 0.4, 0.9, 1.5))
 COMMANDS = ((0.1, 0.3, -0.2), (-0.3, 0.1, 0.6), (0.5, -0.3, 0.1), (0.0, 0.0, 0.0))
 RATES = (0.4, 0.2, 1.0)
+# Lift that falls at 0.3 rad and is gone across the flow.
+STALL = dict(lift_angles=(0.0, 0.3, 0.4, 1.6), lift_coefficients=(0.0, 0.28, 0.2, 0.0))
 HULL = dict(
     stations=(-0.7, -0.5, 0.0, 0.5, 0.8),
     diameters=(0.02, 0.15, 0.2, 0.2, 0.0),
@@ -37,11 +39,11 @@ HULL = dict(
 LIFT = np.random.default_rng(5).normal(size=(6, 6)) * np.array([4.0, 4.0, 4.0, 0.5, 0.5, 0.5])
 
 
-def steered(rates):
-    """Control fins with a schedule; rates: (3,) [rad/s], or None."""
-    host = {} if rates is None else {"rate_limit": rates}
+def steered(rates, **more):
+    """Control fins with a schedule; rates: (3,) [rad/s], or None; more: further numbers."""
+    host = more if rates is None else {"rate_limit": rates, **more}
     twin = ControlFins(
-        **arrays(FINS | STEER),
+        **arrays(FINS | STEER | more),
         density=DENSITY,
         rate_limit=np.full(3, np.inf) if rates is None else np.array(rates),
         command=np.array(COMMANDS),
@@ -53,6 +55,7 @@ CASES = {
     "fins": Case((terms.Fins(**FINS),), (Fins(**arrays(FINS), density=DENSITY),)),
     "control fins": steered(None),
     "control fins with rates": steered(RATES),
+    "control fins that lag": steered(RATES, time_constant=(0.1, 0.0, 0.3), **STALL),
     "cross-flow": Case((terms.CrossFlow(**HULL),), (CrossFlow(**arrays(HULL), density=DENSITY),)),
     "body lift": Case((terms.BodyLift(matrix=LIFT),), (BodyLift(matrix=LIFT),)),
 }

@@ -81,9 +81,9 @@ def monitor_struct(width, real, rows, energy, backward, substep, still, loop=Non
     warned: bits; warned_step and warned_size: steps made at the first crossing of the most serious row, and its square.
     energy: rows of ENERGY_FIELDS. backward: the part of h that stages go back at once. substeps: steps that were divided.
     still: R^T u where and when a lane was frozen, three rows.
-    loop: of a controller, one entry or one a packet, the struct given; every: steps between its looks. commands: how many there
-    are, in the first rows of the memory; bus: the first row of what looks note. signals: rows of the memory that are saved with each sample; kept: the first of as
-    many rows, what frozen lanes save; first_signals: what they are at the start.
+    loop: of a controller, the struct given, one entry or one a packet; every: steps between its looks; commands: how many are
+    in the first rows of the memory; bus: the first row of what looks note. signals: rows of the memory that are saved with a
+    sample; kept: the first of as many rows, what frozen lanes save; first_signals: what they are at the start.
     """
     Lane, Ints = lane(width, real), int_lane(width)
     fields = {}

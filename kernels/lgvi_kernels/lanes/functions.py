@@ -7,7 +7,6 @@ or 1.2e-7 (float32).
 """
 
 import functools
-import math
 from typing import Any
 
 import warp as wp
@@ -230,7 +229,7 @@ def _arctangent2(real):
     return (
         "V P = A < (S)0 ? -A : A; V Q = B < (S)0 ? -B : B; V L = Q < P ? Q : P; V G = Q < P ? P : Q;"
         # Beyond tan(pi / 8) the angle is pi / 4 less that of (G - L) / (G + L).
-        f"V H = (G * (S){math.tan(PI / 8)!r}); V T = (L > H ? L - G : L) / (L > H ? L + G : (G == (S)0 ? V() + (S)1 : G));"
+        f"V H = (G * (S){2.0**0.5 - 1.0!r}); V T = (L > H ? L - G : L) / (L > H ? L + G : (G == (S)0 ? V() + (S)1 : G));"
         f"V Z = T * T; V R = T + T * Z * {series}; R = L > H ? R + (S){PI / 4!r} : R;"
         f"R = P > Q ? (S){PI / 2!r} - R : R; R = B < (S)0 ? (S){PI!r} - R : R; R = A < (S)0 ? -R : R;"
     )
@@ -312,6 +311,11 @@ for _real in REALS:
         @wp.func_native(_native_here("ABC", "A < B ? B : (A > C ? C : A)"))
         def clamp(a: _L, b: _L, c: _L) -> _L:
             """a kept between b and c; NaN stays NaN."""
+            ...
+
+        @wp.func_native(_native_here("ABC", "A * B + C" if _width == 1 else "__builtin_elementwise_fma(A, B, C)"))
+        def fused(a: _L, b: _L, c: _L) -> _L:
+            """a b + c, rounded once (with one lane, where the compiler joins them)."""
             ...
 
         @wp.func_native(_native_here("A", _root(_width).format("A")))

@@ -54,12 +54,16 @@ def approached(n: Any, u: Any, length: Any, lag: Any, rate: Any):
 
 
 def make_driven(name, rows, limit, lag, rate):
-    """The functions of an actuator with `rows` rows a channel; limit, lag and rate: places of 1 / lag and of two limits."""
+    """The functions of an actuator with `rows` rows a channel; limit, lag and rate: places of 1 / lag and of two limits.
+
+    Rows that all channels share follow from `first + shared` on; `size` says how many there are of a kind.
+    """
 
     def params(width, real, commands):
-        """Params: commands, see lanes/look.py; first row of the table, of the memory if `moving`, of what is reported; count."""
+        """Params: commands, see lanes/look.py; first rows of the table, of the memory if `moving`, of the report; count."""
         words = {"first": wp.int32, "memory": wp.int32, "work": wp.int32, "report": wp.int32}
-        return struct(name, commands=commands, **words, count=wp.int32, moving=wp.int32)
+        words |= dict.fromkeys(("count", "moving", "shared", "size"), wp.int32)
+        return struct(name, commands=commands, **words)
 
     @wp.func
     def wanted(view: Any, p: Any, i: int):

@@ -32,7 +32,8 @@ def numbers_struct(law, numbers, width, real):
 
 
 def field_type(kind, width, real):
-    """The type of a field: 1, a lane; 3, a 3-vector of lanes; "step", "grid": the key of noise (see lanes/noise.py);
+    """The type of a field: 1, a lane; 3, a 3-vector of lanes; "step", "grid": the key of noise (see lanes/noise.py).
+
     "held", "delayed": where an actuator finds the commands of a controller (see lanes/look.py).
     """
     if kind in ("held", "delayed"):

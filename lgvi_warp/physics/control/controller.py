@@ -12,14 +12,18 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.physics.control.base import READINGS, SECTIONS, Allocation, Bus, Part
+from lgvi_warp.physics.control.callback import Callback, CallbackCommands, refuse_second
 from lgvi_warp.physics.control.delay import Delay
 from lgvi_warp.physics.control.fault import Fault
 from lgvi_warp.physics.control.pseudo_inverse import PseudoInverse
 from lgvi_warp.physics.control.sensor import Sensor
 from lgvi_warp.physics.terms.base import Term, build, check_list
+from lgvi_warp.physics.terms.control_wrench import COMPONENTS
 
 # A time and a whole number of steps that differ by less than this part of the step are the same.
 ROUND_OFF = 1e-9
+# A part of a component below this is round-off, when it is asked what actuators can make.
+SPANNED = 1e-8
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -50,7 +54,7 @@ class Controller:
     allocation: Sequence[Any] = ()
     faults: Sequence[Any] = ()
     # Set by `wired`.
-    bus: Bus | None = field(default=None, init=False, repr=False)
+    bus: Any = field(default=None, init=False, repr=False)
     actuators: Mapping[str, Term] = field(default_factory=dict, init=False, repr=False)
 
     key = "controller"
@@ -67,6 +71,7 @@ class Controller:
         if not faults and not self.laws:
             faults.add("laws", "", "are missing", "give at least one, such as lw.HeadingPID(kp=...)")
         if not faults:
+            refuse_second([part for part in self.laws if isinstance(part, Callback)])
             self._check_wishes(faults)
         faults.raise_if_any()
 
@@ -96,14 +101,19 @@ class Controller:
     def acting_parts(self) -> tuple[Part, ...]:
         """The parts in the order in which the kernel has them: faults of a sensor right after it, others after the delay."""
         assert self.bus is not None
-        parts: list[Part] = []
-        for part in (part for section in tuple(SECTIONS)[:-1] for part in getattr(self, section)):
-            parts += [
-                part,
-                *(fault for fault in self.faults if getattr(fault, "sensor", None) and fault.of == part.key),
-            ]
+        callback, parts = self.callback, list[Part]()
+        # The commands of a callback reach their actuator by an allocation of their own.
+        idle = callback if callback is not None and callback.to else None
+        for part in (part for section in tuple(SECTIONS)[:-1] for part in getattr(self, section) if part is not idle):
+            of_sensor = (fault for fault in self.faults if getattr(fault, "sensor", None) and fault.of == part.key)
+            parts += [part, *of_sensor]
         others = tuple(part for part in self.faults if part not in parts)
         return (*parts, *((self.delay_part,) if self.bus.delayed else ()), *others)
+
+    @property
+    def callback(self) -> Callback | None:
+        """The law that is a function of the host; None where there is none."""
+        return next((part for part in self.laws if isinstance(part, Callback)), None)
 
     def parameters(self) -> dict[str, np.ndarray]:
         """The numbers that may vary by member.
@@ -114,11 +124,12 @@ class Controller:
         values = {f"{part.key}.{name}": value for part in self.parts for name, value in part.parameters().items()}
         return {f"{self.key}.delay": self.delay} | values
 
-    def wired(self, terms: Sequence[Term]) -> Controller:
+    def wired(self, terms: Sequence[Term], nominal: Mapping[str, np.ndarray] | None = None) -> Controller:
         """The same controller, whose parts know their actuators and the rows of the memory.
 
         Args:
             terms: Terms of the scene.
+            nominal: Numbers of the vehicle and its environment by name, as the scene has them; none by default.
 
         Returns:
             A copy.
@@ -134,13 +145,49 @@ class Controller:
         self._check_faults(faults, actuators)
         faults.raise_if_any()
         whole = copy.copy(self)
-        object.__setattr__(whole, "allocation", allocation)
+        object.__setattr__(whole, "allocation", tuple(part.informed(self.faults, self.asked) for part in allocation))
         object.__setattr__(whole, "actuators", actuators)
-        controller = whole.on(Bus.of({key: term.channels for key, term in actuators.items()}))
+        object.__setattr__(whole, "laws", tuple(part.of_vehicle(nominal or {}) for part in self.laws))
+        channels = {key: term.channels for key, term in actuators.items()}
+        callback = self.callback
+        answers = 0 if callback is None else channels[callback.to] if callback.to else 6
+        controller = whole.on(Bus.of(channels, self.period, answers))
         for part in controller.allocation:
             part.check_actuator(faults)
         faults.raise_if_any()
+        controller._check_laws(faults)
+        faults.raise_if_any()
         return controller
+
+    @property
+    def asked(self) -> np.ndarray:
+        """1 for each of X Y Z K M N that some law asks for, else 0, (6,)."""
+        names = {name for law in self.laws for name in law.demands or COMPONENTS}
+        return np.array([float(name in names) for name in COMPONENTS])
+
+    def _effect(self) -> np.ndarray:
+        """What all channels make of the components that are asked for, each column of unit size, (6, channels)."""
+        effect = self.asked[:, None] * np.concatenate([part.reach() for part in self.allocation], axis=1)
+        sizes = np.linalg.norm(effect, axis=0)
+        return np.asarray(effect / np.where(sizes > 0.0, sizes, 1.0))
+
+    @property
+    def unspanned(self) -> tuple[str, ...]:
+        """Components that laws ask for and the actuators cannot make, alone or each by itself."""
+        effect = self._effect()
+        apart = np.eye(6) - effect @ np.linalg.pinv(effect, rcond=SPANNED)
+        missed = self.asked * np.linalg.norm(apart, axis=0) > SPANNED
+        return tuple(name for name, bad in zip(COMPONENTS, missed, strict=True) if bad)
+
+    def _check_laws(self, faults: Faults) -> None:
+        """Add a fault for each law of whose demand the actuators can make nothing at all."""
+        idle = {name for name, row in zip(COMPONENTS, self._effect(), strict=True) if np.all(np.abs(row) < SPANNED)}
+        for law in self.laws:
+            wanted = law.demands or COMPONENTS
+            if idle.issuperset(wanted):
+                made_by = " and ".join(self.actuators)
+                fault = f"asks for {', '.join(wanted)}, of which {made_by} can make nothing"
+                faults.add("laws", law.key, fault, "give actuators that can, or leave the law out")
 
     def on(self, bus: Bus) -> Controller:
         """The same controller with another bus.
@@ -164,6 +211,8 @@ class Controller:
     def _allocation(self, faults: Faults, able: Mapping[str, Term]) -> tuple[Allocation, ...]:
         """The allocation, or the default one, checked."""
         given = tuple(self.allocation)
+        if self.callback is not None and self.callback.to:
+            given = (CallbackCommands(to=self.callback.to), *(part for part in given if part.type))
         if not given:
             if len(able) != 1:
                 fault = "is missing" if able else "has no actuator: no term of the scene takes commands"
@@ -231,7 +280,7 @@ class Controller:
         """
         content: dict[str, Any] = {"period": float(self.period)}
         content |= {"delay": float(self.delay)} if self.delay else {}
-        lists = {section: [part.to_dict() for part in getattr(self, section)] for section in SECTIONS}
+        lists = {section: [part.to_dict() for part in getattr(self, section) if part.type] for section in SECTIONS}
         return content | {section: parts for section, parts in lists.items() if parts}
 
 

@@ -36,7 +36,7 @@ class Delay(Part):
         steps = np.rint(numbers["delay"] / context.h)
         periods = steps // every
         sets = int(periods.max()) + 2
-        acting, count = bus.acting, bus.count
+        acting, count = bus.acting, bus.channels
         rows = {"fresh": 0, "acting": acting, "before": acting + count, "begin": acting + 2 * count}
         values = {"periods": periods, "steps": steps - every * periods, "sets": sets, "count": count, **rows}
         return Packed(values, memory=np.zeros((1, sets * count)))

@@ -15,8 +15,8 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 class DepthPID(IntegralLaw):
     """PID of the depth by successive loop closure: the depth asks for a pitch angle, the pitch for a moment M.
 
-    theta_d = -(kp e + ki I) within the pitch limit, e the wanted depth less the measured one: pitch up is positive, depth grows
-    downward. M = kp_pitch (theta_d - theta) + ki_pitch I_theta - kd_pitch q - k_heave w. For vehicles that move ahead.
+    theta_d = -(kp e + ki I) within the pitch limit, e the wanted depth less the measured one: pitch up is positive, depth
+    grows downward. M = kp_pitch (theta_d - theta) + ki_pitch I_theta - kd_pitch q - k_heave w. For vehicles that move ahead.
 
     Args:
         kp: Gain from depth to pitch [rad/m].

@@ -6,15 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.control.base import Bus, Sending
+from lgvi_warp.physics.control.base import Bus, Sending, first_step
 from lgvi_warp.physics.control.sensor import Sensor
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
-
-# A time and a whole number of steps that differ by less than this part of the step are the same.
-ROUND_OFF = 1e-6
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -30,9 +25,10 @@ class Fault(Sending):
         time: When it begins [s]; 0 by default; inf for never.
         gain: Factor of the command or reading; 0 by default.
         offset: Added to it, in its unit; 0 by default.
+        known: Whether the allocation knows it, and leaves the channel out from then on; of actuators; False by default.
 
     Raises:
-        SceneError: Where `of` is no text, or `channel` no whole number; and as `Term`.
+        SceneError: Where `of` is no text, `channel` no whole number, or `known` neither true nor false; and as `Term`.
     """
 
     type: ClassVar[str] = "fault"
@@ -42,16 +38,19 @@ class Fault(Sending):
     time: Any = number((), "s", 0.0, least=0.0, infinite=True)
     gain: Any = number((), "1", 0.0)
     offset: Any = number((), "unit", 0.0)
+    known: bool = False
 
     # The sensor that has it; set for a part of a scene.
     sensor: ClassVar[Any] = None
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where `of` is no text, or the channel no whole number."""
+        """Adds a fault where `of` is no text, the channel no whole number, or `known` neither true nor false."""
         if not isinstance(self.of, str):
             faults.add("of", self.of, "is not a text", "give the name of an actuator or of a sensor")
         if not isinstance(self.channel, int) or isinstance(self.channel, bool):
             faults.add("channel", self.channel, "is no whole number", "give the number of a channel, from 0")
+        if not isinstance(self.known, bool):
+            faults.add("known", self.known, "is neither true nor false", "give one of them")
 
     def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
         """In addition, knows its sensor."""
@@ -66,13 +65,12 @@ class Fault(Sending):
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The numbers, and the rows of the command or the channel of the reading."""
         assert self.bus is not None
-        # The first step at or after the time; never is beyond any run, and within float32.
-        begin = np.ceil(np.minimum(numbers["time"] / context.h, 1e30) - ROUND_OFF)
+        begin = first_step(numbers["time"], context.h)
         own = {"begin": begin, "gain": numbers["gain"], "offset": numbers["offset"]}
         if self.sensor is not None:
             return Packed(own | {"channel": self.channel})
         fresh = self.bus.commands[self.of][0] + self.channel
         rows = {"fresh": fresh, "acting": 0, "before": 0, "delayed": int(self.bus.delayed)}
         if self.bus.delayed:
-            rows |= {"acting": self.bus.acting + fresh, "before": self.bus.acting + self.bus.count + fresh}
+            rows |= {"acting": self.bus.acting + fresh, "before": self.bus.acting + self.bus.channels + fresh}
         return Packed(own | rows)

@@ -39,12 +39,20 @@ class AllocationMatrix(Allocation):
                 f"give {count}, one for each channel of {self.to}",
             )
 
+    def device_in(self, aligned: bool) -> str:
+        """The code that leaves channels out only where some may be lost."""
+        return f"matrix:{'lost' if self.losses else 'all'}"
+
+    def reach(self) -> np.ndarray:
+        """The columns of A^+."""
+        return np.asarray(np.linalg.pinv(self.matrix))
+
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """For each command its line of A, its column of A^+ and its limit."""
         A = numbers["matrix"]
         limit = context.own(self.actuator)["limit"]
         inverse = np.linalg.pinv(A)
-        rows = side_by_side(A, np.swapaxes(inverse, -1, -2), limit[..., None])
+        rows = side_by_side(A, np.swapaxes(inverse, -1, -2), limit[..., None], self.steps_of_loss(context)[..., None])
         assert self.bus is not None
         first, count = self.bus.commands[self.to]
         return Packed(

@@ -7,12 +7,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.physics.notation import repeated
-from lgvi_warp.physics.terms.actuators import UNLIMITED, packed_driven
+from lgvi_warp.physics.terms.actuators import UNLIMITED, packed_following
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number, rows_of, side_by_side
 from lgvi_warp.physics.terms.fins import Fins, fin_rows
 from lgvi_warp.physics.terms.wrench import at_start, commands, first_row, refuse_idle
+
+# Rows of one fin that its forces need where the flow has no angle: those before the matrices of `fin_rows`.
+STRAIGHT_ROWS = 15
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -20,18 +23,27 @@ class ControlFins(Fins):
     """Fins that are turned about their span by a deflection, which follows a command.
 
     A positive deflection lifts along +normal where the flow comes from ahead. It is the command within `limit`, followed no
-    faster than `rate_limit`; at t = 0 it equals the command. One number stands for n equal ones.
+    faster than `rate_limit`, and after a first-order lag; at t = 0 it equals the command. One number stands for n equal ones.
 
     Args:
-        position, chord, normal, area, lift_slope, drag, drag_normal: As of `Fins`.
+        position, chord, normal, area, drag, drag_normal: As of `Fins`.
+        lift_slope: As of `Fins`; where a table of lift is given, the factor of its coefficients, 1 by default.
+        lift_angles: Angles of attack of a table of lift, (k,) [rad], rising from 0; none by default.
+        lift_coefficients: Lift coefficients at these angles, (k,) [1]; of negative angles they have the other sign. Between
+            the angles they are linear, beyond the last one constant.
+        flow_angle: Whether the angle of the flow adds to the deflection, the default. If not, lift is
+            rho A/2 lift_slope d u u for a deflection d and a flow u along the chord, and drag
+            rho A/2 (drag + drag_normal d^2) |u| u.
         limit: Largest deflection either way, (n,) [rad]; 0.35 by default.
         rate_limit: Largest rate of the deflection, (n,) [rad/s]; none by default.
+        time_constant: Time constant of the lag of the deflection, (n,) [s]; none by default.
         command: Deflection that is held, (n,) [rad].
         times: Times of the schedule, (k,) [s], rising.
         command_schedule: Deflections at these times, (k, n) [rad], linear between them; instead of `command`.
 
     Raises:
-        SceneError: As `Fins`, and where times do not rise or the command is given twice.
+        SceneError: As `Fins`, and where times or angles do not rise, the command is given twice, or neither a slope nor a
+            table of lift is given.
     """
 
     type: ClassVar[str] = "control_fins"
@@ -39,19 +51,31 @@ class ControlFins(Fins):
     timed: ClassVar[bool] = True
     driven_fields: ClassVar[tuple[str, ...]] = ("command", "times", "command_schedule")
 
+    lift_slope: Any = number(("n",), "1/rad", None, least=0.0)
+    lift_angles: Any = number(("a",), "rad", None, least=0.0, rising=True, optional=True)
+    lift_coefficients: Any = number(("a",), "1", None, optional=True)
+    flow_angle: bool = True
     limit: Any = number(("n",), "rad", 0.35, least=0.0)
     rate_limit: Any = number(("n",), "rad/s", UNLIMITED, least=0.0)
+    time_constant: Any = number(("n",), "s", None, least=0.0, optional=True)
     command: Any = number(("n",), "rad", None)
     times: Any = number(("k",), "s", None, rising=True)
     command_schedule: Any = number(("k", "n"), "rad", None)
 
     def __post_init__(self) -> None:
+        if self.lift_slope is None:
+            if self.lift_coefficients is None:
+                raise refusal(f"{self.key}.lift_slope", None, "is missing", "give it [1/rad], or a table of lift")
+            object.__setattr__(self, "lift_slope", np.ones(rows_of(self.position)))
+        if not self.flow_angle:
+            # Lift then does work.
+            object.__setattr__(self, "dissipative", False)
         first = first_row(self.command_schedule)
         twice = self.command is not None and self.command_schedule is not None
         object.__setattr__(self, "_both", twice and not np.array_equal(first, self.command))
         if self.command is None:
             object.__setattr__(self, "command", first)
-        self.repeat(rows_of(self.position), "limit", "rate_limit", "command")
+        self.repeat(rows_of(self.position), "limit", "rate_limit", "time_constant", "command")
         if self.command_schedule is None:
             object.__setattr__(self, "command_schedule", [self.command])
             object.__setattr__(self, "times", [0.0] if self.times is None else self.times)
@@ -62,11 +86,19 @@ class ControlFins(Fins):
         super().check(faults)
         if self.__dict__["_both"]:
             faults.add("command", self.command, "is given beside command_schedule", "keep one of them")
+        if (self.lift_angles is None) != (self.lift_coefficients is None):
+            alone = "lift_angles" if self.lift_coefficients is None else "lift_coefficients"
+            faults.add(alone, getattr(self, alone), "is given alone", "give lift_angles and lift_coefficients, or none")
+        elif self.lift_angles is not None and (self.lift_angles[0] != 0.0 or self.lift_coefficients[0] != 0.0):
+            first = (self.lift_angles[0], self.lift_coefficients[0])
+            faults.add("lift_angles", first, "does not begin with no lift at 0", "let both tables begin with 0")
+        if not isinstance(self.flow_angle, bool):
+            faults.add("flow_angle", self.flow_angle, "is neither true nor false", "give one of them")
 
-    @property
-    def has_square_curve(self) -> bool:
-        """Whether effort goes as the command squared."""
-        return False
+    def to_dict(self) -> dict[str, Any]:
+        """The fins as a table of a scene file; `flow_angle` only where it is false."""
+        content = super().to_dict()
+        return {key: value for key, value in content.items() if not (key == "flow_angle" and value is True)}
 
     @property
     def channels(self) -> int:
@@ -95,42 +127,48 @@ class ControlFins(Fins):
         normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
         density = parameters["environment.water_density"]
         size = 0.5 * (density * speed**2)[:, None] * numbers["area"] * numbers["lift_slope"]
+        if self.lift_angles is not None:
+            size = size * (numbers["lift_coefficients"][:, 1] / numbers["lift_angles"][:, 1])[:, None]
         # The flow along the chord is that of the speed ahead.
         lift = (size * chord[..., 0] ** 2)[..., None] * normal
         return np.swapaxes(np.concatenate([lift, np.cross(position, lift)], axis=-1), -1, -2)
 
-    def curve(self, numbers: Numbers) -> tuple[np.ndarray, ...]:
-        """How the angle follows from a command: it is the command.
-
-        Args:
-            numbers: The term's numbers by field.
-
-        Returns:
-            1 ahead and astern, and a dead band of 0, each (1, channels).
-        """
-        unit = np.ones((1, self.channels))
-        return unit, unit, 0.0 * unit
-
     def device_in(self, aligned: bool) -> str:
-        """The code for a schedule, or for the commands of a controller."""
-        return "control_fins" if self.driver is None else "control_fins_driven"
+        """The code for what these fins have."""
+        features = {
+            "driven": self.driver is not None,
+            "lag": self.driver is None and self.time_constant is not None,
+            "lift": self.lift_angles is not None,
+            "straight": not self.flow_angle,
+        }
+        chosen = [name for name, present in features.items() if present]
+        return f"control_fins_with:{','.join(chosen)}" if chosen else "control_fins"
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         """In addition, raises SceneError for members' numbers that would have no effect."""
-        if self.driver is None:
-            remedy = f"give {self.key}.rate_limit below {UNLIMITED:g} rad/s in the scene as well"
-            refuse_idle(self, numbers, "rate_limit", numbers["rate_limit"] < UNLIMITED, remedy)
-        return super().unphysical(numbers)
+        remedy = f"give {self.key}.rate_limit below {UNLIMITED:g} rad/s in the scene as well"
+        refuse_idle(self, numbers, "rate_limit", numbers["rate_limit"] < UNLIMITED, remedy)
+        bad = super().unphysical(numbers)
+        for name in ("lift_angles", "lift_coefficients"):
+            if name in bad:
+                bad[name] = bad[name] | (numbers[name][:, 0] != 0.0)
+        return bad
 
     @property
     def memory(self) -> bool:
-        """Whether the rate of some fin is limited."""
-        return bool(np.any(self.rate_limit < UNLIMITED))
+        """Whether fins lag, or the rate of one is limited."""
+        return bool(self.time_constant is not None or np.any(self.rate_limit < UNLIMITED))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The device rows: those of each fin, then the command table of each fin."""
-        if self.driver is not None:
-            return packed_driven(self, numbers, fin_rows(numbers, context), 2 * self.channels)
+        if self.device_in(context.aligned) != "control_fins":
+            blocks = fin_rows(numbers, context)
+            blocks = blocks if self.flow_angle else blocks[..., :STRAIGHT_ROWS]
+            table, size = None, 0
+            if self.lift_angles is not None:
+                angles, lifts = numbers["lift_angles"], numbers["lift_coefficients"]
+                table, size = knots(angles, lifts[..., None]), angles.shape[1] - 1
+            return packed_following(self, numbers, blocks, table, size, 2 * self.channels)
         fins = side_by_side(fin_rows(numbers, context), numbers["limit"][..., None], numbers["rate_limit"][..., None])
         times, schedule = commands(numbers)
         count = schedule.shape[2]

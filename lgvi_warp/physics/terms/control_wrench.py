@@ -7,8 +7,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.physics.terms.actuators import UNLIMITED, packed_driven
+from lgvi_warp.physics.terms.actuators import UNLIMITED, packed_following
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
+from lgvi_warp.physics.terms.wrench import refuse_idle
 
 # Components of a wrench: forces along the body's axes and moments about them.
 COMPONENTS = ("X", "Y", "Z", "K", "M", "N")
@@ -18,7 +19,7 @@ COMPONENTS = ("X", "Y", "Z", "K", "M", "N")
 class ControlWrench(Term):
     """An ideal actuator: force and torque about the body's origin that a controller commands; none without a controller.
 
-    n' = (command - n) / time constant for each of the six components, |n'| at most the rate limit, the command within the limit.
+    n' = (command - n) / time constant for each of its components, |n'| at most the rate limit, the command within the limit.
 
     Args:
         limit: Largest size of each component, (6,) [N, N m]; 1e6 by default.
@@ -40,11 +41,6 @@ class ControlWrench(Term):
         super().__post_init__()
 
     @property
-    def has_square_curve(self) -> bool:
-        """Whether effort goes as the command squared."""
-        return False
-
-    @property
     def channels(self) -> int:
         """One for each component."""
         return 6
@@ -58,11 +54,19 @@ class ControlWrench(Term):
         """Whether a controller drives it."""
         return self.driver is not None
 
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
+        """In addition, raises SceneError for members' numbers that would have no effect."""
+        if self.driver is not None:
+            moving = {"time_constant": numbers["time_constant"] > 0.0, "rate_limit": numbers["rate_limit"] < UNLIMITED}
+            for name, remembers in moving.items():
+                refuse_idle(self, numbers, name, remembers, f"give {self.key}.{name} in the scene as well")
+        return super().unphysical(numbers)
+
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The wrench of each channel in the kernel's axes, and its limits."""
         force, torque = (np.eye(6)[None, :, i : i + 3] for i in (0, 3))
         blocks = [context.frame.vector(force), context.frame.torque(torque, force)]
-        return packed_driven(self, numbers, np.concatenate(np.broadcast_arrays(*blocks), axis=-1))
+        return packed_following(self, numbers, np.concatenate(np.broadcast_arrays(*blocks), axis=-1))
 
     def effect(self, numbers: Numbers, parameters: Numbers, speed: np.ndarray) -> np.ndarray:
         """The wrench of a unit of effort of each channel, about the body's origin.
@@ -76,15 +80,3 @@ class ControlWrench(Term):
             (1 or n, 6, channels).
         """
         return np.eye(6)[None]
-
-    def curve(self, numbers: Numbers) -> tuple[np.ndarray, ...]:
-        """How effort follows from a command.
-
-        Args:
-            numbers: The term's numbers by field.
-
-        Returns:
-            Effort of a unit of the command ahead and astern, and dead band, each (1 or n, channels).
-        """
-        unit = np.ones((1, 6))
-        return unit, unit, 0.0 * unit

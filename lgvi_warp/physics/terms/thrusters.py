@@ -1,4 +1,4 @@
-"""Thrusters with a thrust curve (quadratic, or a polynomial), dead band, saturation and first-order lag."""
+"""Thrusters with a thrust curve (square, polynomial or table), dead band, saturation, lag, and loss by the advance speed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.physics.notation import repeated
-from lgvi_warp.physics.terms.actuators import FAST, packed_driven
+from lgvi_warp.physics.terms.actuators import FAST, packed_following
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number, rows_of, side_by_side
 from lgvi_warp.physics.terms.wrench import at_start, commands, first_row, refuse_idle
 
@@ -18,8 +18,12 @@ from lgvi_warp.physics.terms.wrench import at_start, commands, first_row, refuse
 class Thrusters(Term):
     """n thrusters, each with thrust = c+ f+(max(u - band, 0)) - c- f-(max(-u - band, 0)) along its direction (Fossen 2021, 9).
 
-    f(w) = polynomial_1 w + polynomial_2 w^2 + ..., by default w^2. u is the command within its limit, after the lag. One
-    number stands for n equal ones. The unit of the command is the user's: 1, V or rad/s.
+    f(w) = polynomial_1 w + polynomial_2 w^2 + ..., by default w^2, or a table. u is the command within its limit, after the
+    lag and no faster than the rate limit. One number stands for n equal ones. The unit of the command is the user's: 1, V or
+    rad/s.
+
+    Beyond the dead band, w = sign(u) max(|u| - band, 0), thrust falls by advance_loss |w| a and torque by torque_loss |w| a,
+    where a is the speed of the thruster through the water along its direction (Fossen 2021, 9.1).
 
     Args:
         position: Where each thrust acts, (n, 3) [m] from the body's origin.
@@ -28,16 +32,25 @@ class Thrusters(Term):
         coefficient_astern: Coefficient c- astern, (n,) [N per unit of f]; by default that ahead.
         polynomial: Polynomial f+ of all thrusters, (p,), from the first power up; w^2 by default.
         polynomial_astern: Polynomial f- of all thrusters, (q,), from the first power up; by default that ahead.
+        table_commands: Commands of a table of thrust, (t,) [unit], rising; in place of polynomials. None by default.
+        table_thrusts: Thrusts at these commands, (t, n) [N], or (t,) for n equal thrusters, linear between them and constant
+            outside. They rise, and are 0 at the command 0; some may be 0 around it.
+        advance_loss: Loss of thrust c_u ahead, (n,) [N per unit and m/s]; none by default.
+        advance_loss_astern: Loss of thrust c_u astern, (n,) [N per unit and m/s]; by default that ahead.
+        torque_coefficient: Torque on the vehicle about the direction, for a unit of w |w|, (n,) [N m per unit^2]: its sign is
+            that of the propeller's hand. None by default.
+        torque_loss: Loss of torque, (n,) [N m per unit and m/s], with the sign of the torque; 0 by default.
         dead_band: Size of the command below which there is no thrust, (n,) [unit]; 0 by default.
         limit: Largest size of the command, (n,) [unit]; 1e6 by default.
         time_constant: Time constant of the first-order lag from the command to u, (n,) [s]; 0 by default, no lag.
+        rate_limit: Largest rate of u, (n,) [unit/s]; none by default.
         command: Command that is held, (n,) [unit]; 0 by default.
         times: Times of the schedule, (k,) [s], rising.
         command_schedule: Commands at these times, (k, n) [unit], linear between them; instead of `command`.
 
     Raises:
         SceneError: Where a direction has no length, times do not rise, the command is given twice, or neither a coefficient
-            nor a polynomial is given. Also as `Term`.
+            nor a polynomial nor a table is given; where a table does not rise, or stands beside a polynomial. Also as `Term`.
     """
 
     type: ClassVar[str] = "thrusters"
@@ -50,23 +63,37 @@ class Thrusters(Term):
     coefficient_astern: Any = number(("n",), "N per unit^2", None, least=0.0)
     polynomial: Any = number(("p",), "1 per unit, 1 per unit^2 ...", None)
     polynomial_astern: Any = number(("q",), "1 per unit, 1 per unit^2 ...", None)
+    table_commands: Any = number(("t",), "unit", None, rising=True, optional=True)
+    table_thrusts: Any = number(("t", "n"), "N", None, optional=True)
+    advance_loss: Any = number(("n",), "N per unit and m/s", None, least=0.0, optional=True)
+    advance_loss_astern: Any = number(("n",), "N per unit and m/s", None, least=0.0, optional=True)
+    torque_coefficient: Any = number(("n",), "N m per unit^2", None, optional=True)
+    torque_loss: Any = number(("n",), "N m per unit and m/s", None, optional=True)
     dead_band: Any = number(("n",), "unit", None, least=0.0)
     limit: Any = number(("n",), "unit", None, least=0.0)
     time_constant: Any = number(("n",), "s", None, least=0.0)
+    rate_limit: Any = number(("n",), "unit/s", None, least=0.0, optional=True)
     command: Any = number(("n",), "unit", None)
     times: Any = number(("k",), "s", None, rising=True)
     command_schedule: Any = number(("k", "n"), "unit", None)
 
     def __post_init__(self) -> None:
         if self.coefficient is None:
-            if self.polynomial is None:
-                fault, remedy = "is missing", "give (n,) [N per unit^2], or a polynomial [N]"
+            if self.polynomial is None and self.table_commands is None:
+                fault, remedy = "is missing", "give (n,) [N per unit^2], or a polynomial or a table [N]"
                 raise refusal(f"{self.key}.coefficient", None, fault, remedy)
             object.__setattr__(self, "coefficient", np.ones(rows_of(self.position)))
         for name, value in (("polynomial", SQUARE), ("polynomial_astern", self.polynomial)):
             if getattr(self, name) is None:
                 object.__setattr__(self, name, SQUARE if value is None else value)
         n = rows_of(self.coefficient)
+        if self.advance_loss is None and self.advance_loss_astern is not None:
+            object.__setattr__(self, "advance_loss", np.zeros(n))
+        if self.advance_loss_astern is None and self.advance_loss is not None:
+            object.__setattr__(self, "advance_loss_astern", self.advance_loss)
+        if np.ndim(np.asarray(self.table_thrusts, dtype=object)) == 1:
+            object.__setattr__(self, "table_thrusts", [[value] * n for value in self.table_thrusts])
+        self.repeat(n, *OPTIONAL)
         defaults = {"coefficient_astern": self.coefficient, "dead_band": np.zeros(n), "limit": np.full(n, 1e6),
                     "time_constant": np.zeros(n)}  # fmt: skip
         scheduled = self.command_schedule is not None
@@ -86,9 +113,16 @@ class Thrusters(Term):
         super().__post_init__()
 
     @property
-    def has_square_curve(self) -> bool:
-        """Whether effort goes as the command squared."""
-        return True
+    def propels(self) -> bool:
+        """Whether thrust falls with the advance speed, or propellers turn the vehicle."""
+        return any(getattr(self, name) is not None for name in PROPELLER)
+
+    @property
+    def shape(self) -> str:
+        """How thrust follows from a command: "square", "polynomial" or "table"."""
+        if self.table_commands is not None:
+            return "table"
+        return "square" if self.is_square else "polynomial"
 
     @property
     def is_square(self) -> bool:
@@ -121,22 +155,18 @@ class Thrusters(Term):
         wrench = np.concatenate([direction, np.cross(position, direction)], axis=-1)
         return np.swapaxes(wrench, -1, -2)
 
-    def curve(self, numbers: Numbers) -> tuple[np.ndarray, ...]:
-        """How thrust follows from a command.
-
-        Args:
-            numbers: The term's numbers by field.
-
-        Returns:
-            Coefficients ahead and astern, and dead band, each (1 or n, channels).
-        """
-        return numbers["coefficient"], numbers["coefficient_astern"], numbers["dead_band"]
-
     def device_in(self, aligned: bool) -> str:
-        """The code that evaluates polynomials only where one is given."""
-        if self.driver is not None:
-            return "thrusters_driven"
-        return self.device if self.is_square else "thrusters_polynomial"
+        """The code for what these thrusters have."""
+        features = {
+            "driven": self.driver is not None,
+            "rate": self.driver is None and self.rate_limit is not None,
+            self.shape: self.shape != "square",
+            "propeller": self.propels,
+        }
+        chosen = [name for name, present in features.items() if present]
+        if chosen in ([], ["polynomial"]):
+            return "thrusters_polynomial" if chosen else "thrusters"
+        return f"thrusters_with:{','.join(chosen)}"
 
     def to_dict(self) -> dict[str, Any]:
         """The term as a table of a scene file; polynomials only where they are not w^2."""
@@ -153,9 +183,20 @@ class Thrusters(Term):
             Thrust (n,) or (k, n) [N] along each direction.
         """
         u = np.clip(np.asarray(command, dtype=np.float64), -self.limit, self.limit)
+        if self.shape == "table":
+            w = np.sign(u) * np.maximum(np.abs(u) - self.dead_band, 0.0)
+            columns = zip(np.moveaxis(w, -1, 0), self.table_thrusts.T, strict=True)
+            f = np.stack([np.interp(x, self.table_commands, values) for x, values in columns], axis=-1)
+            return np.asarray(np.where(w > 0.0, self.coefficient, self.coefficient_astern) * f)
         ahead = evaluate(self.polynomial, np.maximum(u - self.dead_band, 0.0))
         astern = evaluate(self.polynomial_astern, np.maximum(-u - self.dead_band, 0.0))
         return np.asarray(self.coefficient * ahead - self.coefficient_astern * astern)
+
+    def drive(self) -> np.ndarray:
+        """The largest thrusts of the schedule, as if all pushed the same way."""
+        along = self.direction / np.linalg.norm(self.direction, axis=1, keepdims=True)
+        wrenches = np.concatenate([along, np.cross(self.position, along)], axis=1)
+        return np.asarray(np.abs(self.thrust(self.command_schedule)).max(axis=0) @ np.abs(wrenches))
 
     def command_for(self, thrust: Any) -> np.ndarray:
         """The smallest commands that give these thrusts.
@@ -172,8 +213,13 @@ class Thrusters(Term):
             curve = self.polynomial if side > 0.0 else self.polynomial_astern
             gain = self.coefficient if side > 0.0 else self.coefficient_astern
             if wanted and gain[i] > 0.0:
-                reach = max(self.limit[i] - self.dead_band[i], 0.0)
-                least_commands[i] = side * (self.dead_band[i] + solve(curve, abs(wanted) / gain[i], reach))
+                reach, size = max(self.limit[i] - self.dead_band[i], 0.0), abs(wanted) / gain[i]
+                if self.shape == "table":
+                    places, values = side_of_table(self.table_commands[None], self.table_thrusts[None, :, i], side)
+                    w = np.interp(size, values[0], places[0])
+                else:
+                    w = solve(curve, size, reach)
+                least_commands[i] = side * (self.dead_band[i] + w)
         return np.clip(least_commands, -self.limit, self.limit)
 
     def check(self, faults: Faults) -> None:
@@ -182,6 +228,19 @@ class Thrusters(Term):
         if len(zero):
             remedy = "give the direction that the thrust pushes the vehicle, such as [1, 0, 0]"
             faults.add(f"direction[{zero[0]}]", self.direction[zero[0]], "has zero length", remedy)
+        if (self.table_commands is None) != (self.table_thrusts is None):
+            alone = "table_commands" if self.table_thrusts is None else "table_thrusts"
+            faults.add(alone, getattr(self, alone), "is given alone", "give table_commands and table_thrusts, or none")
+        elif self.table_commands is not None:
+            if not self.is_square:
+                faults.add("polynomial", self.polynomial, "is given beside a table", "keep one of them")
+            if _unfit(self.table_commands[None], self.table_thrusts[None])[0]:
+                fault = "does not rise from below 0 through 0 at the command 0"
+                faults.add(
+                    "table_thrusts", self.table_thrusts, fault, "sort it, and count commands from the neutral one"
+                )
+        if self.torque_loss is not None and self.torque_coefficient is None:
+            faults.add("torque_loss", self.torque_loss, "is given without torque_coefficient", "give both")
         if self.__dict__["_both"]:
             faults.add("command", self.command, "differs from the first of command_schedule", "keep one of them")
 
@@ -193,8 +252,9 @@ class Thrusters(Term):
         bad = super().unphysical(numbers)
         bad["direction"] = bad["direction"] | np.any(~np.any(numbers["direction"], axis=-1), axis=-1)
         remedy = f"give {self.key}.time_constant above 0 [s] in the scene as well"
-        if self.driver is None:
-            refuse_idle(self, numbers, "time_constant", numbers["time_constant"] > 0.0, remedy)
+        if "table_commands" in numbers:
+            bad["table_thrusts"] = bad["table_thrusts"] | _unfit(numbers["table_commands"], numbers["table_thrusts"])
+        refuse_idle(self, numbers, "time_constant", numbers["time_constant"] > 0.0, remedy)
         self._refuse_idle_polynomial(numbers)
         return bad
 
@@ -209,17 +269,21 @@ class Thrusters(Term):
 
     @property
     def memory(self) -> bool:
-        """Whether some thruster has a lag."""
-        return bool(np.any(self.time_constant > 0.0))
+        """Whether thrusters have a limited rate, or one of them a lag."""
+        return bool(self.rate_limit is not None or np.any(self.time_constant > 0.0))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The device rows: those of each thruster, then the command table of each thruster."""
         direction = numbers["direction"] / np.linalg.norm(numbers["direction"], axis=-1, keepdims=True)
         arms = np.cross(numbers["position"] + 0.0 * direction, direction + 0.0 * numbers["position"])
         force, torque = context.frame.vector(direction), context.frame.torque(arms, direction + 0.0 * arms)
-        if self.driver is not None:
-            curves = (numbers[key][..., None] for key in ("coefficient", "coefficient_astern", "dead_band"))
-            return packed_driven(self, numbers, side_by_side(force, torque, *curves))
+        if self.device_in(context.aligned) not in ("thrusters", "thrusters_polynomial"):
+            curves = [numbers[key][..., None] for key in ("coefficient", "coefficient_astern", "dead_band")]
+            if self.propels:
+                none = np.zeros_like(numbers["coefficient"])
+                losses = (numbers.get(key, none)[..., None] for key in PROPELLER)
+                curves += [context.frame.vector(direction), *losses]
+            return packed_following(self, numbers, side_by_side(force, torque, *curves), *self.curve_rows(numbers))
         with np.errstate(divide="ignore"):
             rate = np.where(numbers["time_constant"] > 0.0, 1.0 / numbers["time_constant"], FAST)
         settings = [numbers[key] for key in ("coefficient", "coefficient_astern", "dead_band", "limit")]
@@ -230,13 +294,74 @@ class Thrusters(Term):
         rows += [knots(times, schedule[:, :, i : i + 1]) for i in range(count)]
         values = {"count": count, "knots": times.shape[1] - 1, "lagged": int(self.memory)}
         if not self.is_square:
-            ahead, astern = numbers["polynomial"], numbers["polynomial_astern"]
-            values["powers"] = max(ahead.shape[1], astern.shape[1])
-            rows += [np.pad(curve, ((0, 0), (0, values["powers"] - curve.shape[1]))) for curve in (ahead, astern)]
+            polynomials, values["powers"] = self.curve_rows(numbers)
+            rows.append(polynomials)
         if not self.memory:
             return Packed(values | {"memory": 0}, side_by_side(*rows))
         start = np.clip(at_start(times, schedule), -numbers["limit"], numbers["limit"])
         return Packed(values, side_by_side(*rows), start)
+
+    def curve_rows(self, numbers: Numbers) -> tuple[np.ndarray, int]:
+        """The curves as lgvi_kernels.laws.thrust_curves reads them.
+
+        Args:
+            numbers: The term's numbers by field.
+
+        Returns:
+            Rows (1 or n, rows): none of a square, the polynomials ahead and astern, or a table for each thruster; and how many
+            powers, or intervals, there are.
+        """
+        if self.shape == "square":
+            return np.zeros((1, 0)), 0
+        if self.shape == "table":
+            at, values = numbers["table_commands"], numbers["table_thrusts"]
+            tables = [knots(at, values[:, :, i : i + 1]) for i in range(self.channels)]
+            return side_by_side(*tables), at.shape[1] - 1
+        ahead, astern = numbers["polynomial"], numbers["polynomial_astern"]
+        powers = max(ahead.shape[1], astern.shape[1])
+        padded = [np.pad(curve, ((0, 0), (0, powers - curve.shape[1]))) for curve in (ahead, astern)]
+        return side_by_side(*padded), powers
+
+
+# Numbers of propellers in the order of their rows, and all that may be absent with one number for each thruster.
+PROPELLER = ("advance_loss", "advance_loss_astern", "torque_coefficient", "torque_loss")
+OPTIONAL = (*PROPELLER, "rate_limit")
+# A table's thrust at the command 0 counts as 0 below this part of its largest.
+NEUTRAL = 1e-9
+
+
+def _unfit(at: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Mask (n,) of the members whose tables (n, t), (n, t, units) fall or stand elsewhere than at 0, or give thrust at 0."""
+    at, values = repeated(at, values)
+    change = np.diff(values, axis=1)
+    idle = (values[:, 1:] == 0.0) & (values[:, :-1] == 0.0)
+    falls = np.any((change <= 0.0) & ~idle, axis=(1, 2))
+    neutral = np.array([[np.interp(0.0, x, y) for y in columns.T] for x, columns in zip(at, values, strict=True)])
+    return np.asarray(falls | np.any(np.abs(neutral) > NEUTRAL * np.abs(values).max(axis=1), axis=1))
+
+
+def side_of_table(at: np.ndarray, values: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
+    """One side of tables of thrust, by size: from the command at which thrust begins on.
+
+    Args:
+        at: Commands (n, t), rising.
+        values: Thrusts (n, t), rising.
+        side: 1 ahead, -1 astern.
+
+    Returns:
+        Sizes of commands (n, t) and of thrusts (n, t), from (begin, 0) up; points of the other side are at the begin.
+    """
+    if side < 0.0:
+        at, values = -at[:, ::-1], -values[:, ::-1]
+    at, values = repeated(at, values)
+    acts = values > 0.0
+    # The last command without thrust, or where the line to the next one is 0.
+    i = np.clip(np.argmax(acts, axis=1), 1, None) - 1
+    row = np.arange(len(at))
+    low, high = values[row, i], values[row, i + 1]
+    begin = at[row, i] - low / np.where(high > low, high - low, 1.0) * (at[row, i + 1] - at[row, i])
+    begin = np.where(acts.any(axis=1), begin, 0.0)
+    return np.where(acts, at, begin[:, None]), np.where(acts, values, 0.0)
 
 
 # The curve w^2, coefficients from the first power up.

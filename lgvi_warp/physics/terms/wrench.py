@@ -29,6 +29,10 @@ class Wrench(Term):
     force: Any = number((3,), "N", (0.0, 0.0, 0.0))
     torque: Any = number((3,), "N m", (0.0, 0.0, 0.0))
 
+    def drive(self) -> np.ndarray:
+        """The sizes of force and torque."""
+        return np.abs(np.concatenate([self.force, self.torque]))
+
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Force and torque about the origin of the forces, in the kernel's axes."""
         force, torque = numbers["force"], numbers["torque"]
@@ -67,6 +71,10 @@ class WrenchSchedule(Term):
     def check(self, faults: Faults) -> None:
         """Adds a fault where the interpolation is unknown."""
         faults.choice("interpolation", self.interpolation, SHAPES)
+
+    def drive(self) -> np.ndarray:
+        """The largest sizes of force and torque in the schedule."""
+        return np.abs(np.concatenate([self.force, self.torque], axis=1)).max(axis=0)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Two tables: the force, and the torque about the origin of the forces."""
@@ -121,7 +129,8 @@ def at_start(times: np.ndarray, schedule: np.ndarray) -> np.ndarray:
 def refuse_idle(term: Any, numbers: Numbers, rate: str, remembers: np.ndarray, remedy: str) -> None:
     """Refuse members' numbers that would have no effect, since the scene's kernel does not read them.
 
-    That is `command` in a scene with a schedule and the reverse, and the numbers of a memory that the scene does not have.
+    That is `command` in a scene with a schedule and the reverse, and the numbers of a memory that the scene does not have. No
+    controller drives the term, or the former do not exist.
 
     Args:
         term: The term of the scene.
@@ -134,9 +143,11 @@ def refuse_idle(term: Any, numbers: Numbers, rate: str, remembers: np.ndarray, r
         SceneError: Where some member's number would have no effect.
     """
     faults = Faults(f"{term.key}.")
-    held = len(term.command_schedule) == 1
-    acts, idle = ("command", ("times", "command_schedule")) if held else ("command_schedule", ("command",))
-    unread = {name: (numbers[name] != getattr(term, name), f"a {acts}", f"vary {term.key}.{acts}") for name in idle}
+    unread = {}
+    if term.driver is None:
+        held = len(term.command_schedule) == 1
+        acts, idle = ("command", ("times", "command_schedule")) if held else ("command_schedule", ("command",))
+        unread = {name: (numbers[name] != getattr(term, name), f"a {acts}", f"vary {term.key}.{acts}") for name in idle}
     if not term.memory:
         unread[rate] = (remembers, "none", remedy)
     for name, (bad, alternative, what_to_do) in unread.items():

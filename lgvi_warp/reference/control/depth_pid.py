@@ -19,11 +19,11 @@ class DepthPID(Part):
         self.of_depth, self.of_pitch, self.beyond = Integral(), Integral(), 0.0
 
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
-        """theta_d = -(kp e + ki I) within its limit; M = kp_pitch (theta_d - theta) + ki_pitch I_theta - kd_pitch q - k_heave w."""
+        """theta_d = -(kp e + ki I) within its limit; M = kp_pitch e_theta + ki_pitch I_theta - kd_pitch q - k_heave w."""
         conditional = self.anti_windup == "conditional"
         e = r.position[2] - y.position[2]
-        I = self.of_depth.at_look(y.period, self.integral_limit[0], -self.beyond, conditional)
-        wanted = -(self.kp * e + self.ki * I)
+        total = self.of_depth.at_look(y.period, self.integral_limit[0], -self.beyond, conditional)
+        wanted = -(self.kp * e + self.ki * total)
         theta_d = np.clip(wanted, -self.pitch_limit, self.pitch_limit)
         self.beyond, self.of_depth.error = wanted - theta_d, e
         e_theta = theta_d - np.arctan2(-y.R[2, 0], np.hypot(y.R[0, 0], y.R[1, 0]))

@@ -18,8 +18,8 @@ class HeadingPID(Part):
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
         """N = kp e + ki I + kd (r_d - r)."""
         e = heading_error(r.R, y.R)
-        I = self.integral.at_look(y.period, self.integral_limit, unmet[5], self.anti_windup == "conditional")
-        N = self.kp * e + self.ki * I + self.kd * (r.angular_velocity[2] - y.angular_velocity[2])
+        total = self.integral.at_look(y.period, self.integral_limit, unmet[5], self.anti_windup == "conditional")
+        N = self.kp * e + self.ki * total + self.kd * (r.angular_velocity[2] - y.angular_velocity[2])
         self.integral.error = e
         w = w.copy()
         w[5] += N

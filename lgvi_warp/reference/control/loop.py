@@ -27,8 +27,8 @@ class Loop:
     """A controller of one vehicle.
 
     parts: in the order in which they act; actuators: the laws that take commands, by name, each with `command`, an array that
-    the allocation sets, and `held`, by which the law acts; every: steps between looks; delay: steps from a look until its commands
-    act. demand, unmet, command: of the last look.
+    the allocation sets, and `held`, by which the law acts; every: steps between looks; delay: steps from a look until its
+    commands act. measured, demand, unmet: of the last look.
     """
 
     parts: Sequence[Part]
@@ -37,8 +37,8 @@ class Loop:
     delay: int = 0
     faults: Sequence[Fault] = ()
     sent: list[tuple[int, dict[str, Array]]] = field(default_factory=list)
-    unmet: Array = field(default_factory=lambda: np.zeros(6))
-    demand: Array = field(default_factory=lambda: np.zeros(6))
+    unmet: Any = field(default_factory=lambda: np.zeros(6))
+    demand: Any = field(default_factory=lambda: np.zeros(6))
     measured: Measurement | None = None
 
     def begin(self) -> None:
@@ -55,9 +55,11 @@ class Loop:
         view = look(x, body, h)
         nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, x.pi])), 2)
         u = x.R.T @ water(view, body).velocity
-        times = dict(t=x.step * h, period=self.every * h, h=h, step=x.step, look=x.step // self.every)
-        y = Measurement(x.b, x.R, nu + u, nu, Om, **times, member=body.member)
-        r, w = NO_WISH, np.zeros(6)
+        y = Measurement(
+            x.b, x.R, nu + u, nu, Om, x.step * h, self.every * h, h, x.step, x.step // self.every, body.member
+        )
+        r = NO_WISH
+        w: Any = np.zeros(6)
         for part in self.parts:
             y = part.measure(y)
         for part in self.parts:

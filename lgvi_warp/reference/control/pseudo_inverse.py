@@ -4,25 +4,35 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.reference.control import Part, cannot
+from lgvi_warp.reference.control import Measurement, Part, cannot
 from lgvi_warp.reference.rotation import Array
 
 
 class PseudoInverse(Part):
     """Numbers as those of `lw.PseudoInverse`; effect (6, n): the wrench of a unit of effort of each channel of `to`.
 
-    The actuator has limit, and effort(command) with its inverse command_for(effort).
+    The actuator has limit, and effort(command) with its inverse command_for(effort). losses: (channel, time [s]) of each
+    channel that is known to be lost.
     """
 
     weights = None
+    losses: tuple[tuple[int, float], ...] = ()
+    time = 0.0
+
+    def measure(self, y: Measurement) -> Measurement:
+        """Keeps the time, a little later since times round."""
+        self.time = y.t + 1e-6 * y.h
+        return y
 
     def allocate(self, w: Array, actuators: dict[str, Any]) -> Array:
-        """t = W^-1 B^T (B W^-1 B^T)^+ w, as commands within the limits; left are (I - B B^+) w and B times what these cut off."""
-        actuator, B = actuators[self.to], self.effect
+        """t = W^-1 B^T (B W^-1 B^T)^+ w, as commands within limits; left are (I - B B^+) w and B times what is cut off."""
+        actuator, B = actuators[self.to], self.effect.copy()
+        B[:, [channel for channel, time in self.losses if self.time >= time]] = 0.0
         W = np.diag(1.0 / np.sqrt(np.ones(B.shape[1]) if self.weights is None else np.asarray(self.weights)))
         inverse = W @ np.linalg.pinv(B @ W, rcond=1e-10)
         t = inverse @ w
         wanted = actuator.command_for(t)
         actuator.command = np.clip(wanted, -actuator.limit, actuator.limit)
-        cut = np.where(np.abs(wanted) > actuator.limit, t - actuator.effort(actuator.command), 0.0)
+        cut = t - actuator.effort(actuator.command)
+        cut = np.where(np.abs(cut) > 1e-5 * np.abs(t), cut, 0.0)
         return np.asarray(cannot(B @ inverse) @ w + B @ cut)

@@ -1,51 +1,45 @@
-"""Control fins: fins whose deflection follows a command, within a limit and no faster than a rate."""
+"""Control fins: fins whose deflection follows a command, within a limit, no faster than a rate and after a lag."""
+
+import math
+from typing import Any
 
 import numpy as np
 
-from lgvi_warp.reference.rotation import Array
+from lgvi_warp.reference.rotation import Array, cross
 from lgvi_warp.reference.terms import View
-from lgvi_warp.reference.terms.fins import Fins
-from lgvi_warp.reference.terms.wrench import at_time, pieces
+from lgvi_warp.reference.terms.fins import Fins, orthonormal
+from lgvi_warp.reference.terms.following import Following
 
 
-class ControlFins(Fins):
-    """Numbers as those of `lw.ControlFins`, but rate_limit inf for none; times (k,) [s] and command (k, n) [rad]."""
+class ControlFins(Following, Fins):
+    """Numbers as those of `lw.ControlFins`, and of `Following`."""
 
-    @property
-    def limited(self) -> bool:
-        """Whether some fin's rate is limited: then all remember."""
-        return bool(np.any(np.isfinite(self.rate_limit)))
-
-    def commanded(self, t: float) -> Array:
-        """Commands (n,) at t, within their limits."""
-        return np.clip(at_time(t, self.times, self.command, False), -self.limit, self.limit)
-
-    def start(self) -> Array:
-        """The commands at t = 0, or none."""
-        return self.commanded(0.0) if self.limited else np.zeros(0)
-
-    def evolve(self, view: View, second: bool) -> Array:
-        """Towards the command by at most rate h/2, the command that of the middle of the half."""
-        if not self.limited:
-            return view.memory
-        change = self.commanded(view.t + (0.25 if second else -0.25) * view.h) - view.memory
-        most = 0.5 * view.h * self.rate_limit
-        return np.asarray(view.memory + np.clip(change, -most, most))
-
-    def follow(self, view: View) -> Array:
-        """Along each straight piece of the command: at the rate until the fin meets it, then with it, or after it."""
-        angle = view.memory
-        if not self.limited:
-            return angle
-        for s, first, last in pieces(view.t, view.h, self.times, self.command, self.limit):
-            most = s * np.minimum(self.rate_limit, 1e6)
-            ahead = np.where(first > angle, 1.0, -1.0)
-            closing = most - ahead * (last - first)
-            part = np.minimum(np.abs(first - angle) / np.maximum(closing, 1e-300), 1.0)
-            angle = angle + ahead * part * most
-            angle = angle + np.clip(last - angle, (part - 1.0) * most, (1.0 - part) * most)
-        return np.asarray(angle)
+    flow_angle = True
+    lift_angles: Any = None
+    lift_coefficients: Any = None
 
     def deflection(self, view: View) -> Array:
-        """What is remembered, or the command."""
-        return view.memory if self.limited else self.commanded(view.t)
+        """The place of each fin."""
+        return self.place(view)
+
+    def lift_coefficient(self, i: int, uc: float, un: float, V: float) -> float:
+        """That of `Fins`, or of the table, which is odd in the angle of attack."""
+        if self.lift_angles is None:
+            return super().lift_coefficient(i, uc, un, V)
+        return float(self.lift_slope[i] * self.table(math.atan2(un, uc)))
+
+    def table(self, angle: float) -> float:
+        """The table of lift at an angle [rad] of either sign."""
+        return math.copysign(float(np.interp(abs(angle), self.lift_angles, self.lift_coefficients)), angle)
+
+    def fin_damping(self, i: int, angle: float, view: View) -> Array:
+        """That of `Fins`; without the angle of the flow lift is slope d u u, and drag (drag + drag_normal d^2) |u| u."""
+        if self.flow_angle:
+            return super().fin_damping(i, angle, view)
+        c, n = orthonormal(self.chord[i], self.normal[i])
+        chord, normal = (np.concatenate([e, cross(self.position[i], e)]) for e in (c, n))
+        u = chord @ np.concatenate([view.nu, view.Om])
+        half = 0.5 * self.density * self.area[i]
+        lift = self.lift_slope[i] * (angle if self.lift_angles is None else self.table(angle))
+        drag = self.drag[i] + self.drag_normal[i] * angle**2
+        return np.asarray(half * (drag * abs(u) * np.outer(chord, chord) - lift * u * np.outer(normal, chord)))

@@ -1,14 +1,18 @@
 """Control fins that a controller drives."""
 
 from lgvi_warp.reference.rotation import Array
-from lgvi_warp.reference.terms import View
-from lgvi_warp.reference.terms.driven import Driven
-from lgvi_warp.reference.terms.fins import Fins
+from lgvi_warp.reference.terms.control_fins import ControlFins
 
 
-class DrivenFins(Driven, Fins):
-    """Numbers as those of the twin's `Fins`, and those of `Driven` in rad and rad/s."""
+class DrivenFins(ControlFins):
+    """Numbers as those of the twin's `ControlFins`."""
 
-    def deflection(self, view: View) -> Array:
-        """Where the fins are."""
-        return self.place(view)
+    driven = True
+
+    def effort(self, command: Array) -> Array:
+        """The angles of commands [rad]."""
+        return command
+
+    def command_for(self, effort: Array) -> Array:
+        """The commands of angles [rad]."""
+        return effort

@@ -20,6 +20,10 @@ class Fins(Law):
         angles = self.deflection(view)
         return np.asarray(sum((self.fin_damping(i, angle, view) for i, angle in enumerate(angles)), np.zeros((6, 6))))
 
+    def lift_coefficient(self, i: int, uc: float, un: float, V: float) -> float:
+        """slope sin a cos a of fin i, at speeds [m/s] along its chord and normal; V is the size of both."""
+        return float(self.lift_slope[i] * uc * un / V**2)
+
     def fin_damping(self, i: int, angle: float, view: View) -> Array:
         """D (6, 6) of a fin: -l (uc n - un c) - d (uc c + un n), l = kl uc un / V, d = kd V + kn un^2 / V.
 
@@ -36,7 +40,7 @@ class Fins(Law):
         if V == 0.0:
             return np.zeros((6, 6))
         half = 0.5 * self.density * self.area[i]
-        lift = half * self.lift_slope[i] * uc * un / V
+        lift = half * self.lift_coefficient(i, uc, un, V) * V
         drag = half * (self.drag[i] * V + self.drag_normal[i] * un**2 / V)
         along, across = (
             np.outer(chord, chord) + np.outer(normal, normal),

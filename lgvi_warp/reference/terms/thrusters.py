@@ -1,60 +1,58 @@
-"""Thrusters: a thrust curve with dead band and saturation, after a first-order lag."""
+"""Thrusters: a thrust curve with dead band and saturation, after a lag; thrust that falls with the speed, and torque."""
 
-import math
+from typing import Any
 
 import numpy as np
 
 from lgvi_warp.reference.rotation import Array, cross
-from lgvi_warp.reference.terms import Law, View
-from lgvi_warp.reference.terms.wrench import at_time, pieces
+from lgvi_warp.reference.terms import View
+from lgvi_warp.reference.terms.following import Following
 
 
-class Thrusters(Law):
-    """Numbers as those of `lw.Thrusters`, with coefficients forward, backward (n,); times (k,) [s], command (k, n)."""
+class Thrusters(Following):
+    """Numbers as those of `lw.Thrusters`, with coefficients forward, backward (n,), and of `Following`."""
 
     polynomial = (0.0, 1.0)
     polynomial_astern = (0.0, 1.0)
+    table_commands: Any = None
+    table_thrusts: Any = None
+    advance_loss: Array | float = 0.0
+    advance_loss_astern: Array | float = 0.0
+    torque_coefficient: Array | float = 0.0
+    torque_loss: Array | float = 0.0
 
-    @property
-    def lagged(self) -> bool:
-        """Whether some thruster has a lag: then all remember."""
-        return bool(np.any(self.time_constant > 0.0))
+    def beyond(self, n: Array) -> Array:
+        """w, the places (n,) less the dead band."""
+        return np.asarray(np.sign(n) * np.maximum(np.abs(n) - self.dead_band, 0.0))
 
-    def commanded(self, t: float) -> Array:
-        """Commands (n,) at t, within their limits."""
-        return np.clip(at_time(t, self.times, self.command, False), -self.limit, self.limit)
+    def curve(self, w: Array) -> Array:
+        """f (n,), ahead and astern, without the coefficients."""
+        if self.table_commands is not None:
+            columns = zip(w, np.transpose(self.table_thrusts), strict=True)
+            return np.array([np.interp(x, self.table_commands, values) for x, values in columns])
+        ahead, astern = np.maximum(w, 0.0), np.maximum(-w, 0.0)
+        f_ahead = sum(p * ahead ** (i + 1) for i, p in enumerate(self.polynomial))
+        return np.asarray(f_ahead - sum(p * astern ** (i + 1) for i, p in enumerate(self.polynomial_astern)))
 
-    def start(self) -> Array:
-        """The commands at t = 0, or none."""
-        return self.commanded(0.0) if self.lagged else np.zeros(0)
-
-    def evolve(self, view: View, second: bool) -> Array:
-        """n' = (command - n) / time constant over half a kick, the command that of the middle of the half."""
-        if not self.lagged:
-            return view.memory
-        u = self.commanded(view.t + (0.25 if second else -0.25) * view.h)
-        kept = [math.exp(-0.5 * view.h / tau) if tau > 0.0 else 0.0 for tau in self.time_constant]
-        return np.asarray(u + np.array(kept) * (view.memory - u))
-
-    def follow(self, view: View) -> Array:
-        """n' = (command - n) / tau: over s of a straight command n <- last + e^-x (n - first) - (1 - e^-x) / x (last - first).
-
-        x = s / tau; tau is the time constant.
-        """
-        n = view.memory
-        if not self.lagged:
-            return n
-        for s, first, last in pieces(view.t, view.h, self.times, self.command, self.limit):
-            x = [s / tau if tau > 0.0 else math.inf for tau in self.time_constant]
-            n = last + np.exp(np.negative(x)) * (n - first) + np.expm1(np.negative(x)) / x * (last - first)
-        return np.asarray(n)
+    def thrust(self, n: Array) -> Array:
+        """Thrusts (n,) [N] at places, at rest."""
+        w = self.beyond(n)
+        return np.asarray(np.where(w > 0.0, self.forward, self.backward) * self.curve(w))
 
     def wrench(self, view: View) -> tuple[Array, Array]:
-        """c+ f+(max(n - band, 0)) - c- f-(max(-n - band, 0)) along each."""
-        n = view.memory if self.lagged else self.commanded(view.t)
-        ahead, astern = np.maximum(n - self.dead_band, 0.0), np.maximum(-n - self.dead_band, 0.0)
-        f_ahead = sum(p * ahead ** (i + 1) for i, p in enumerate(self.polynomial))
-        f_astern = sum(p * astern ** (i + 1) for i, p in enumerate(self.polynomial_astern))
-        forces = (self.forward * f_ahead - self.backward * f_astern)[:, None] * self.direction
+        """The thrust along each, and the torque k w |w| about it."""
+        n = self.place(view)
+        w = self.beyond(n)
+        forces = self.thrust(n)[:, None] * self.direction
         torque = sum((cross(r, f) for r, f in zip(self.position, forces, strict=True)), np.zeros(3))
-        return forces.sum(axis=0), torque
+        return forces.sum(axis=0), torque + (self.torque_coefficient * w * np.abs(w)) @ self.direction
+
+    def damping(self, view: View) -> Array:
+        """Thrust falls by c_u |w| a, torque by k_u |w| a, where a is the speed of the thruster along its direction."""
+        D = np.zeros((6, 6))
+        w = self.beyond(self.place(view))
+        losses = np.abs(w) * np.where(w > 0.0, self.advance_loss, self.advance_loss_astern)
+        for r, d, loss, torque in zip(self.position, self.direction, losses, np.abs(w) * self.torque_loss, strict=True):
+            along = np.concatenate([d, cross(r, d)])
+            D += np.outer(loss * along + torque * np.concatenate([np.zeros(3), d]), along)
+        return D

@@ -64,7 +64,7 @@ def test_round_trip():
 
 def test_a_small_scene_needs_a_vehicle_only():
     scene = scenes.loads(SMALL)
-    assert scene.ensemble_settings is None and scene.run.step is None and scene.run.method == "psi_s"
+    assert scene.ensemble_settings is None and scene.run.step is None and scene.run.method is None
     assert from_dict(scene.to_dict()).to_dict() == scene.to_dict()
     assert lw.Ensemble.from_scene(scene).members == 1
 
@@ -162,7 +162,7 @@ def test_bytes_that_are_no_text(tmp_path):
         ("[environment]\ngravity = nan", "environment.gravity = nan"),
         ("[start]\nposition = [1.0, 2.0]", "start.position = [1.0, 2.0]"),
         ('[[terms]]\ntype = "drga"', "terms[0].type = 'drga'"),
-        ('[controller]\ntype = "pid"', "controller = "),
+        ('[controller]\nkind = "pid"\nperiod = 0.1', "controller.kind = "),
     ],
 )
 def test_one_bad_line_is_one_fault(line, start):

@@ -10,8 +10,9 @@ from lgvi_kernels.law import absolute, add, lane, mul, ones, positive, remember,
 
 @functools.cache
 def params(width, real):
-    """Params: delay = periods * period + steps * h of each lane; first row of the ring; sets in the ring; commands in a set, and
-    the first row of the new ones, of those that act from a step on, of those that act before, and of that step.
+    """Params: delay = periods * period + steps * h of each lane; the ring's first row; sets in it; commands in a set.
+
+    fresh, acting, before, begin: first row of the new commands, of those that act from a step on and before, of that step.
     """
     Lane = lane(width, real)
     words = ("memory", "sets", "count", "fresh", "acting", "before", "begin")

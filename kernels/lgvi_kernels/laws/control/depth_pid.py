@@ -24,7 +24,7 @@ from lgvi_kernels.laws.control.integral import integral, keep_error
 
 @functools.cache
 def params(width, real):
-    """Params: gains; first of four rows of the memory, I and the error of depth and of pitch; row of what was not delivered."""
+    """Params: gains; first of five rows of the memory, I and error of depth and of pitch, pitch beyond its limit; see Bus."""
     names = ("kp", "ki", "pitch_limit", "kp_pitch", "ki_pitch", "kd_pitch", "k_heave", "depth_limit", "angle_limit")
     gains = dict.fromkeys(names, lane(width, real))
     return struct("DepthPID", **gains, memory=wp.int32, unmet=wp.int32, conditional=wp.int32)
@@ -32,14 +32,14 @@ def params(width, real):
 
 @wp.func
 def control(w: Any, r: Any, y: Any, p: Any):
-    """theta_d = -(kp e + ki I) within +-pitch_limit; M = kp_pitch (theta_d - theta) + ki_pitch I_theta - kd_pitch q - k_heave w.
+    """theta_d = -(kp e + ki I) within its limit; M = kp_pitch (theta_d - theta) + ki_pitch I_theta - kd_pitch q - k_heave w.
 
     Pitch up is positive, and depth grows downward: hence the sign. theta = asin of the forward axis' rise.
     """
     e = r.position.z - y.position.z
     # What the last look wanted of the pitch beyond its limit stands where others have what was not delivered.
-    I = integral(y, p.memory, p.depth_limit, -remembered(y, p.memory + 4), p.conditional)
-    wanted = -(p.kp * e + p.ki * I)
+    total = integral(y, p.memory, p.depth_limit, -remembered(y, p.memory + 4), p.conditional)
+    wanted = -(p.kp * e + p.ki * total)
     theta_d = clamp(wanted, -p.pitch_limit, p.pitch_limit)
     remember(y, p.memory + 4, wanted - theta_d)
     keep_error(y, p.memory, e)

@@ -5,13 +5,15 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import add, lane, mul, ones, positive, remember, remembered, struct, sub  # noqa: F401
+from lgvi_kernels.law import add, lane, mul, positive, remember, remembered, struct  # noqa: F401
+from lgvi_kernels.laws.control.lost import since
 
 
 @functools.cache
 def params(width, real):
-    """Params: first step, gain and offset of each lane; the row of the command, and where commands are delayed those of the one that
-    acts and of the one before.
+    """Params: first step, gain and offset of each lane; rows of the command.
+
+    fresh: of the command; acting, before: where commands are delayed, of the one that acts and of the one before.
     """
     Lane = lane(width, real)
     words = dict.fromkeys(("fresh", "acting", "before", "delayed"), wp.int32)
@@ -21,12 +23,12 @@ def params(width, real):
 @wp.func
 def send(y: Any, p: Any):
     """From the first look at or after its time on: command <- gain * command + offset."""
-    since = (y.h.dtype(y.step) + y.h.dtype(0.5)) * ones(p.begin) - p.begin
+    begun = since(y, p.begin)
     u = remembered(y, p.fresh)
-    remember(y, p.fresh, positive(since, p.gain * u + p.offset, u))
+    remember(y, p.fresh, positive(begun, p.gain * u + p.offset, u))
     if p.delayed > 0:
         u = remembered(y, p.acting)
-        remember(y, p.acting, positive(since, p.gain * u + p.offset, u))
+        remember(y, p.acting, positive(begun, p.gain * u + p.offset, u))
         u = remembered(y, p.before)
-        remember(y, p.before, positive(since, p.gain * u + p.offset, u))
+        remember(y, p.before, positive(begun, p.gain * u + p.offset, u))
     return y

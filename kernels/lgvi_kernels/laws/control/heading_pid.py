@@ -20,8 +20,8 @@ def params(width, real):
 def control(w: Any, r: Any, y: Any, p: Any):
     """N = kp e + ki I + kd (r_d - r), e the wanted heading less the measured one."""
     e = heading_error(r, y)
-    I = integral(y, p.memory, p.integral_limit, remembered(y, p.unmet + 5), p.conditional)
-    N = p.kp * e + p.ki * I + p.kd * (r.angular_velocity.z - y.angular_velocity.z)
+    total = integral(y, p.memory, p.integral_limit, remembered(y, p.unmet + 5), p.conditional)
+    N = p.kp * e + p.ki * total + p.kd * (r.angular_velocity.z - y.angular_velocity.z)
     keep_error(y, p.memory, e)
     w.torque = vec3(w.torque.x, w.torque.y, w.torque.z + N)
     return w

@@ -5,12 +5,15 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import add, clamp, dot, mul, neg, ones, remember, row1, row3, struct, sub  # noqa: F401
+from lgvi_kernels import device
+from lgvi_kernels.law import add, clamp, dot, mul, neg, ones, positive, remember, row1, row3, struct, sub  # noqa: F401
+from lgvi_kernels.laws.control.lost import since
 from lgvi_kernels.laws.control.rest import ROWS as rest_rows
 from lgvi_kernels.laws.control.rest import rest
 
-# Rows of rest.py, then of one command: what of X Y Z and of K M N it takes (6), what a unit of it delivers (6), limit.
-ROWS = 13
+# Rows of rest.py, then of one command: what of X Y Z and of K M N it takes (6), what a unit of it delivers (6), limit, and the
+# time from which it is known to be lost.
+ROWS = 14
 REST = rest_rows
 
 
@@ -20,16 +23,25 @@ def params(width, real):
     return struct("Matrix", first=wp.int32, commands=wp.int32, count=wp.int32)
 
 
-@wp.func
-def allocate(w: Any, y: Any, p: Any):
-    """u = A w within the limits; left of w are (I - A^+ A) w and A^+ of what the limits cut off."""
-    left = rest(w, y, p.first)
-    for i in range(p.count):
-        at = p.first + wp.static(REST) + wp.static(ROWS) * i
-        most = row1(y, at + 12)
-        wanted = dot(row3(y, at), w.force) + dot(row3(y, at + 3), w.torque)
-        u = clamp(wanted, -most, most)
-        remember(y, p.commands + i, u)
-        left.force = left.force + (wanted - u) * row3(y, at + 6)
-        left.torque = left.torque + (wanted - u) * row3(y, at + 9)
-    return left
+@functools.cache
+def made(features):
+    """The allocation; of the features "all" and "lost" the latter says that channels may be known to be lost."""
+    loses = "lost" in features
+
+    @wp.func
+    def allocate_by_matrix(w: Any, y: Any, p: Any):
+        """u = A w within the limits; left of w are (I - A^+ A) w and A^+ of what the limits and losses cut off."""
+        left = rest(w, y, p.first)
+        for i in range(p.count):
+            at = p.first + wp.static(REST) + wp.static(ROWS) * i
+            most = row1(y, at + 12)
+            wanted = dot(row3(y, at), w.force) + dot(row3(y, at + 3), w.torque)
+            u = clamp(wanted, -most, most)
+            if wp.static(loses):
+                u = positive(since(y, row1(y, at + 13)), u - u, u)
+            remember(y, p.commands + i, u)
+            left.force = left.force + (wanted - u) * row3(y, at + 6)
+            left.torque = left.torque + (wanted - u) * row3(y, at + 9)
+        return left
+
+    return device(__name__, features, params=params, allocate=allocate_by_matrix)

@@ -5,13 +5,13 @@ from typing import Any
 
 import warp as wp
 
+from lgvi_kernels import device
 from lgvi_kernels.law import (  # noqa: F401
     absolute,
     add,
-    clamp,
     div,
     dot,
-    greatest,
+    least,
     mul,
     neg,
     ones,
@@ -22,47 +22,116 @@ from lgvi_kernels.law import (  # noqa: F401
     row3,
     struct,
     sub,
+    table1,
+    vec3,
 )
+from lgvi_kernels.laws import thrust_curves
+from lgvi_kernels.laws.control.lost import since
 from lgvi_kernels.laws.control.rest import ROWS as rest_rows
 from lgvi_kernels.laws.control.rest import rest
+from lgvi_kernels.laws.thrust_curves import INVERSE_ROWS, beyond, polynomial_inverse
 
-# Rows of rest.py, then of one channel: its line of the pseudo-inverse (6), the wrench of a unit of effort (6), limit of the command, coefficient
-# ahead and astern, dead band. Effort is thrust, force or angle; command = effort / coefficient, or the inverse of the thrust
-# curve where `square`.
-ROWS = 16
+# For each set of channels that may be lost together, the empty one first: rows of rest.py, and the lines (6) of the
+# pseudo-inverse, one a channel. Then for each channel: the wrench of a unit of effort (6), limit of the command, coefficient
+# ahead and astern, dead band, the time from which it is known to be lost, and what this adds to the number of the set. Then
+# the curves and their inverses.
+ROWS = 12
 REST = rest_rows
+# An effort counts as delivered if less than this part of it is missing: inverses of curves have an error, and anti-windup
+# looks at the sign of what is left.
+MISSING = 1e-5
 
 
 @functools.cache
 def params(width, real):
-    """Params: first row of the table; first row of the commands; count; square: whether effort goes as the command squared."""
-    return struct("PseudoInverse", first=wp.int32, commands=wp.int32, count=wp.int32, square=wp.int32)
+    """Params: first rows of the table and of the commands; count; sets; shared: rows before the curves; size: of a curve."""
+    words = ("first", "commands", "count", "sets", "shared", "size")
+    return struct("PseudoInverse", **dict.fromkeys(words, wp.int32))
 
 
 @wp.func
-def allocate(w: Any, y: Any, p: Any):
-    """t = W^-1 B^T (B W^-1 B^T)^+ w; left of w are (I - B B^+) w and B times what the limits cut off of t."""
-    left = rest(w, y, p.first)
-    for i in range(p.count):
-        at = p.first + wp.static(REST) + wp.static(ROWS) * i
-        most = row1(y, at + 12)
-        effort = dot(row3(y, at), w.force) + dot(row3(y, at + 3), w.torque)
-        c = positive(effort, row1(y, at + 13), row1(y, at + 14))
-        u = effort / c
-        zero = ones(c) - ones(c)
-        if p.square > 0:
-            size = root(absolute(effort) / c)
-            band = row1(y, at + 15)
-            size = positive(size, size + band, zero)
+def positive3(a: Any, b: Any, c: Any):
+    """The vector b where a > 0, else c."""
+    return vec3(positive(a, b.x, c.x), positive(a, b.y, c.y), positive(a, b.z, c.z))
+
+
+@functools.cache
+def made(features):
+    """The allocation for efforts that are "linear" in the command, its "square", a "polynomial" or a "table".
+
+    The feature "lost" says that channels may be known to be lost.
+    """
+    loses, linear = "lost" in features, "linear" in features
+    tables, polynomials = "table" in features, "polynomial" in features
+    curve = getattr(thrust_curves, f"{'table' if tables else 'polynomial' if polynomials else 'square'}_curve")
+
+    @wp.func
+    def size_for(y: Any, p: Any, i: int, t: Any, side: Any):
+        """The size of the command, less the dead band, for an effort of size t; side: above 0 for ahead."""
+        w = t
+        if wp.static(polynomials):
+            first = p.first + p.shared
+            inverse = first + 2 * p.size
+            ahead = polynomial_inverse(y, inverse, p.size, first, t)
+            astern = polynomial_inverse(y, inverse + wp.static(INVERSE_ROWS), p.size, first + p.size, t)
+            w = positive(side, ahead, astern)
+        elif wp.static(tables):
+            inverse = p.first + p.shared + (p.count + 2 * i) * (1 + 3 * p.size)
+            w = positive(side, table1(y, inverse, p.size, t), table1(y, inverse + 1 + 3 * p.size, p.size, t))
+        elif wp.static(not linear):
+            w = root(t)
+        return w
+
+    @wp.func
+    def effort_of(y: Any, p: Any, i: int, n: Any):
+        """The effort of a command less the dead band, without the coefficient."""
+        t = n
+        if wp.static(not linear):
+            first = p.first + p.shared
+            if wp.static(tables):
+                first += i * (1 + 3 * p.size)
+            t = curve(y, first, p.size, n)
+        return t
+
+    @wp.func
+    def allocate_efforts(w: Any, y: Any, p: Any):
+        """t = W^-1 B^T (B W^-1 B^T)^+ w; left of w are (I - B B^+) w and B times what the commands cannot deliver of t."""
+        left = rest(w, y, p.first)
+        stride = wp.static(REST) + 6 * p.count
+        channels = p.first + p.sets * stride
+        unity = ones(y.position.x)
+        zero = unity - unity
+        lost = zero
+        if wp.static(loses):
+            for i in range(p.count):
+                at = channels + wp.static(ROWS) * i
+                lost = lost + positive(since(y, row1(y, at + 10)), row1(y, at + 11), zero)
+            for s in range(1, p.sets):
+                other = rest(w, y, p.first + s * stride)
+                chosen = y.h.dtype(0.5) * unity - absolute(lost - y.h.dtype(s) * unity)
+                left.force = positive3(chosen, other.force, left.force)
+                left.torque = positive3(chosen, other.torque, left.torque)
+        for i in range(p.count):
+            at = channels + wp.static(ROWS) * i
+            line = p.first + wp.static(REST) + 6 * i
+            effort = dot(row3(y, line), w.force) + dot(row3(y, line + 3), w.torque)
+            if wp.static(loses):
+                for s in range(1, p.sets):
+                    turn = line + s * stride
+                    other_effort = dot(row3(y, turn), w.force) + dot(row3(y, turn + 3), w.torque)
+                    here = y.h.dtype(0.5) * unity - absolute(lost - y.h.dtype(s) * unity)
+                    effort = positive(here, other_effort, effort)
+            c = positive(effort, row1(y, at + 7), row1(y, at + 8))
+            # A side without thrust has the coefficient 0, and gets no command.
+            t = positive(c, absolute(effort) / c, zero)
+            band = row1(y, at + 9)
+            size = least(positive(t, size_for(y, p, i, t, effort) + band, zero), row1(y, at + 6))
             u = positive(effort, size, -size)
-        size = absolute(u)
-        u = clamp(u, -most, most)
-        delivered = u * c
-        if p.square > 0:
-            over = greatest(most - row1(y, at + 15), zero)
-            delivered = positive(effort, c * (over * over), -(c * (over * over)))
-        cut = positive(size - most, effort - delivered, zero)
-        remember(y, p.commands + i, u)
-        left.force = left.force + cut * row3(y, at + 6)
-        left.torque = left.torque + cut * row3(y, at + 9)
-    return left
+            remember(y, p.commands + i, u)
+            cut = effort - c * effort_of(y, p, i, beyond(u, band))
+            cut = positive(absolute(cut) - y.h.dtype(wp.static(MISSING)) * absolute(effort), cut, zero)
+            left.force = left.force + cut * row3(y, at)
+            left.torque = left.torque + cut * row3(y, at + 3)
+        return left
+
+    return device(__name__, features, params=params, allocate=allocate_efforts)

@@ -7,6 +7,7 @@ import warp as wp
 
 from lgvi_kernels import device
 from lgvi_kernels.law import add, lane, mul, ones, positive, struct, sub  # noqa: F401
+from lgvi_kernels.laws.control.lost import since
 from lgvi_kernels.laws.control.readings import make_reading
 
 
@@ -27,20 +28,20 @@ def made(features):
     @wp.func
     def measure(y: Any, p: Any):
         """From the first look at or after its time on: reading <- gain * reading + offset."""
-        since = (y.h.dtype(y.step) + y.h.dtype(0.5)) * ones(p.begin) - p.begin
+        begun = since(y, p.begin)
         v = values(y)
         if p.channel == 0:
-            v.x = positive(since, p.gain * v.x + p.offset, v.x)
+            v.x = positive(begun, p.gain * v.x + p.offset, v.x)
         if p.channel == 1:
-            v.y = positive(since, p.gain * v.y + p.offset, v.y)
+            v.y = positive(begun, p.gain * v.y + p.offset, v.y)
         if p.channel == 2:
-            v.z = positive(since, p.gain * v.z + p.offset, v.z)
+            v.z = positive(begun, p.gain * v.z + p.offset, v.z)
         if wp.static(of == "attitude"):
             # Angles there and back are not the same bits: lanes without the fault keep theirs.
             z = with_values(y, v)
-            y.north = positive(since, z.north, y.north)
-            y.east = positive(since, z.east, y.east)
-            y.down = positive(since, z.down, y.down)
+            y.north = positive(begun, z.north, y.north)
+            y.east = positive(begun, z.east, y.east)
+            y.down = positive(begun, z.down, y.down)
         else:
             y = with_values(y, v)
         return y

@@ -1,0 +1,13 @@
+"""What begins at a step: faults, and channels that a controller knows to be lost."""
+
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.law import add, mul, ones, sub  # noqa: F401
+
+
+@wp.func
+def since(y: Any, step: Any):
+    """Above 0 from the first look at or after a step on."""
+    return (y.h.dtype(y.step) + y.h.dtype(0.5)) * ones(step) - step

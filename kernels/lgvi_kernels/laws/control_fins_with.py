@@ -1,0 +1,92 @@
+"""Control fins with more than control_fins.py has: a driver, a lag, a table of lift, or no angle of the flow."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels import device
+from lgvi_kernels.law import (  # noqa: F401
+    absolute,
+    add,
+    add_outer,
+    arctangent2,
+    cosine,
+    mul,
+    neg,
+    ones,
+    positive,
+    remember,
+    root,
+    row1,
+    row3,
+    sine,
+    sub,
+    table1,
+)
+from lgvi_kernels.laws import fins
+from lgvi_kernels.laws.driven import make_driven
+from lgvi_kernels.laws.fins import add_fins, note_lift_and_drag, speed_along
+from lgvi_kernels.laws.scheduled import make_scheduled
+
+# Rows of one fin that its forces need where the flow has no angle: the first of fins.ROWS. Behind those that a law has are
+# limit, 1 / lag and limit of the rate.
+STRAIGHT_ROWS = fins.MATRICES[0]
+
+
+@functools.cache
+def made(features):
+    """The law of control fins with these features: "driven", "lag", "lift" (a table), "straight" (no angle of the flow)."""
+    lift, straight = "lift" in features, "straight" in features
+    own = STRAIGHT_ROWS if straight else fins.ROWS
+    rows = own + 3
+    make = make_driven if "driven" in features else make_scheduled
+    following = make(f"ControlFins_{'_'.join(features)}", rows, own, own + 1, own + 2)
+    place = following.place
+
+    @wp.func
+    def lift_at(view: Any, p: Any, angle: Any):
+        """The table's value, with the sign of the angle."""
+        value = table1(view, p.first + p.shared, p.size, absolute(angle))
+        return positive(angle, value, -value)
+
+    @wp.func
+    def turned_damping(D: Any, view: Any, p: Any):
+        """D = sum over fins, each seen from its turned axes, as in control_fins.py."""
+        for i in range(p.count):
+            at = p.first + wp.static(rows) * i
+            angle = place(view, p, i)
+            c = cosine(angle)
+            s = sine(angle)
+            ahead = speed_along(view, at)
+            aside = speed_along(view, at + 6)
+            along = c * ahead + s * aside
+            across = c * aside - s * ahead
+            note_lift_and_drag(view, at, along, across, p.work + 2 * i)
+            if wp.static(lift):
+                speed = root(along * along + across * across)
+                size = row1(view, at + 12) * (speed * lift_at(view, p, arctangent2(across, along)))
+                remember(view, p.work + 2 * i, size)
+        return add_fins(D, view, p.first, wp.static(rows), p.count, p.work)
+
+    @wp.func
+    def straight_damping(D: Any, view: Any, p: Any):
+        """Lift (rho A / 2) slope d u u along the normal, drag (rho A / 2) (drag + drag_normal d^2) |u| u along the chord."""
+        for i in range(p.count):
+            at = p.first + wp.static(rows) * i
+            angle = place(view, p, i)
+            along = speed_along(view, at)
+            turn = angle
+            if wp.static(lift):
+                turn = lift_at(view, p, angle)
+            up = -(row1(view, at + 12) * (turn * along))
+            back = (row1(view, at + 13) + row1(view, at + 14) * (angle * angle)) * absolute(along)
+            chord = row3(view, at)
+            about = row3(view, at + 3)
+            force = up * row3(view, at + 6) + back * chord
+            D = add_outer(D, force, up * row3(view, at + 9) + back * about, chord, about)
+        return D
+
+    roles = {"evolve": following.evolve, "follow": following.follow, "report": following.report}
+    damping = straight_damping if straight else turned_damping
+    return device(__name__, features, params=following.params, damping=damping, **roles)

@@ -1,0 +1,95 @@
+"""Actuators that follow commands: of a schedule or of a controller, within a limit, with a lag and at a limited rate."""
+
+import math
+
+import numpy as np
+
+from lgvi_warp.reference.rotation import Array
+from lgvi_warp.reference.terms import Law, View
+from lgvi_warp.reference.terms.wrench import at_time, pieces
+
+
+class Following(Law):
+    """Channels with limit (n,), time_constant (n,) [s] or 0, rate_limit (n,) or inf; times (k,) [s] and command (k, n).
+
+    A law that is driven has `held` (n,) instead, the commands of a controller, which its loop sets.
+    """
+
+    driven = False
+    time_constant: Array | float = 0.0
+    rate_limit: Array | float = math.inf
+
+    @property
+    def moves(self) -> bool:
+        """Whether some channel has a lag or a limited rate: then all remember."""
+        return bool(np.any(np.greater(self.time_constant, 0.0)) or np.any(np.isfinite(self.rate_limit)))
+
+    def commanded(self, t: float) -> Array:
+        """Commands (n,) at t, within their limits."""
+        wanted = self.held if self.driven else at_time(t, self.times, self.command, False)
+        return np.clip(wanted, -self.limit, self.limit)
+
+    def start(self) -> Array:
+        """The commands at t = 0, of a driven law 0; none where nothing moves."""
+        if not self.moves:
+            return np.zeros(0)
+        return np.zeros(len(self.limit)) if self.driven else self.commanded(0.0)
+
+    def place(self, view: View) -> Array:
+        """What is remembered, or the command."""
+        return view.memory if self.moves else self.commanded(view.t)
+
+    def evolve(self, view: View, second: bool) -> Array:
+        """Over half a kick, towards the command of the middle of the half."""
+        u = self.commanded(view.t + (0.25 if second else -0.25) * view.h)
+        return self._moved(view.memory, 0.5 * view.h, u, u)
+
+    def follow(self, view: View) -> Array:
+        """Along each straight piece of the command within the view.h before view.t."""
+        n = view.memory
+        if self.driven:
+            return self._moved(n, view.h, self.commanded(view.t), self.commanded(view.t))
+        for s, first, last in pieces(view.t, view.h, self.times, self.command, self.limit):
+            n = self._moved(n, s, first, last)
+        return n
+
+    def _moved(self, n: Array, s: float, first: Array, last: Array) -> Array:
+        if not self.moves:
+            return n
+        lags, rates = (np.broadcast_to(x, n.shape) for x in (self.time_constant, self.rate_limit))
+        return np.array([chased(*one, s) for one in zip(n, first, last, lags, rates, strict=True)])
+
+
+def chased(n: float, first: float, last: float, lag: float, rate: float, s: float) -> float:
+    """n after s [s] in which the command u goes straight from first to last: n' = (u - n) / lag, no faster than rate.
+
+    Args:
+        n, first, last: Place at the start; the command at the start and at the end.
+        lag, rate: Time constant [s], 0 for none; largest rate, inf for none.
+        s: Duration [s].
+    """
+    if s <= 0.0:
+        return n
+    slope, gap, left = (last - first) / s, first - n, s
+    band = rate * lag if lag > 0.0 else 0.0
+    if rate == 0.0:
+        return n
+    if abs(gap) > band:
+        speed = slope - math.copysign(rate, gap) if math.isfinite(rate) else -math.copysign(math.inf, gap)
+        closing = -speed * math.copysign(1.0, gap)
+        needed = (abs(gap) - band) / closing if closing > 0.0 else math.inf
+        if needed >= left:
+            return last - (gap + speed * left)
+        left, gap = left - needed, math.copysign(band, gap)
+    if lag > 0.0:
+        # gap' = slope - gap / lag, for as long as the gap is within the band.
+        final = slope * lag
+        within = left
+        if abs(slope) > rate:
+            edge = math.copysign(band, slope)
+            within = min(left, lag * math.log((gap - final) / (edge - final)))
+        gap = final + math.exp(-within / lag) * (gap - final)
+        left = left - within
+    if abs(slope) > rate:
+        gap += (slope - math.copysign(rate, slope)) * left
+    return last - gap

@@ -110,6 +110,9 @@ class Thrusters(Term):
                 object.__setattr__(self, name, value)
         self.repeat(n, *(defaults.keys() - {"command_schedule"}))
         object.__setattr__(self, "_both", both)
+        if self.torque_loss is not None:
+            # The torque is not along the velocity that it falls with.
+            object.__setattr__(self, "dissipative", False)
         super().__post_init__()
 
     @property

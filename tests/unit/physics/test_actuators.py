@@ -37,7 +37,7 @@ FAULTY_TERMS = {
     "is given beside a table": lambda: thrusters(**TABLE, polynomial=(1.0, 2.0)),
     "torque_loss = [0.1, 0.1]: is given without torque_coefficient": lambda: thrusters(torque_loss=0.1),
     "thrusters.rate_limit": lambda: thrusters(rate_limit=-1.0),
-    "give (n,) [N per unit^2], or a polynomial or a table": lambda: lw.Thrusters(**PAIR),
+    "give (n,) [N per unit^2], a table [N], or a polynomial [N]": lambda: lw.Thrusters(**PAIR),
     "give it [1/rad], or a table of lift": lambda: lw.ControlFins(**FIN),
     "does not begin with no lift at 0": lambda: fins(lift_angles=(0.1, 0.3), lift_coefficients=(0.0, 0.9)),
     "control_fins.lift_angles = [0.0, 0.3]: is given alone": lambda: fins(lift_angles=(0.0, 0.3)),

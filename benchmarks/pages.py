@@ -8,6 +8,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 # Table -> the page that it writes into, between the marks of its name.
 PAGES = {
+    "charts": "docs/explain/how_it_is_fast.md",
     "coupled": "docs/explain/coupled_inertia.md",
     "drift": "docs/explain/long_runs.md",
     "fronts": "docs/guide/accuracy_and_speed.md",

@@ -1,6 +1,7 @@
 """What the author of a law, an event or a controller imports: lanes, their functions, structs, and functions of a View.
 
 A law that writes + - * / between lanes imports `add`, `sub`, `mul`, `div`, `neg` too: Warp looks the operators up by name.
+Only the minus before a 3-vector is written neg(v): for an operator of one operand Warp looks up none.
 """
 
 from lgvi_kernels.lanes.arithmetic import (
@@ -26,11 +27,15 @@ from lgvi_kernels.lanes.functions import (
     cosine,
     decay,
     exponential,
+    fused,
     greatest,
     hyperbolic_tangent,
     logarithm,
+    normals,
     normals3,
+    quarter,
     root,
+    rounded,
     sine,
 )
 from lgvi_kernels.lanes.noise import normals_over, wandered
@@ -68,6 +73,7 @@ __all__ = [
     "div",
     "dot",
     "exponential",
+    "fused",
     "greatest",
     "heading_error",
     "hyperbolic_tangent",
@@ -80,14 +86,17 @@ __all__ = [
     "middle_of_half",
     "mul",
     "neg",
+    "normals",
     "normals3",
     "normals_over",
     "ones",
     "positive",
+    "quarter",
     "ramp",
     "remember",
     "remembered",
     "root",
+    "rounded",
     "row1",
     "row3",
     "sine",

@@ -45,8 +45,7 @@ def _settings(ensemble: Any) -> tuple[str, tuple[str, ...]]:
     missing = [f"run.{name}" for name in ("step", "duration") if getattr(run, name) is None]
     if missing:
         return members, (f"{' and '.join(missing)}: not given, so the method was not looked at; a run wants it",)
-    method = run.method_of(run.method)
-    if method.iterations == "auto":  # found only by a run
-        method = replace(method, iterations=None)
+    # Automatic iterations are found only by a run.
+    method = replace(run.method_of(), iterations=None) if run.iterations == "auto" else None
     plan = make_plan(ensemble, method)
-    return f"{members}, {method.name}, step {plan.grid.h:g} s, {plan.grid.steps:,} steps", plan.grid.messages
+    return f"{members}, {plan.method.name}, step {plan.grid.h:g} s, {plan.grid.steps:,} steps", plan.grid.messages

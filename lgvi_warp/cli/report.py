@@ -224,12 +224,14 @@ def members_line(members: int, provenance: dict[str, Any]) -> str:
         provenance: That of the run.
 
     Returns:
-        One line.
+        One line, and one more where the method was chosen by what acts.
     """
-    return (
-        f"members     {members:,}, {provenance['method']['name']}, {provenance['dtype']}, step {provenance['step']:g} s, "
+    name, chosen = provenance["method"]["name"], provenance["method"].get("chosen")
+    line = (
+        f"members     {members:,}, {name}, {provenance['dtype']}, step {provenance['step']:g} s, "
         f"{provenance['steps']:,} steps"
     )
+    return f"{line}\nmethod      {name}, chosen {chosen}" if chosen else line
 
 
 def file_line(path: Path) -> str:

@@ -140,21 +140,22 @@ def _at(target: np.ndarray, path: tuple[str, ...]) -> np.ndarray:
 
 
 class Lanes:
-    """A Warp array of lanes, rows of numbers a packet, written through NumPy.
+    """A Warp array of lanes, or of single numbers, rows of them a packet, written through NumPy.
 
     Args:
         packets: number of packets.
         rows: number of rows.
-        Lane: Warp's type of a lane.
+        Lane: Warp's type of a lane, or of a number.
 
     Attributes:
         array: the Warp array, (packets, rows).
-        view: the same memory, (packets, rows, width).
+        view: the same memory, (packets, rows, width), or (packets, rows, 1) of numbers.
     """
 
     def __init__(self, packets: int, rows: int, Lane: Any):
         self.array: Any = wp.zeros((packets, rows), dtype=Lane, device="cpu")
-        self.view = self.array.numpy()
+        view = self.array.numpy()
+        self.view = view if view.ndim == 3 else view[:, :, None]
 
 
 class LawArrays:
@@ -165,6 +166,7 @@ class LawArrays:
         struct: Warp's struct of the laws' numbers.
         dtype: its NumPy type.
         Lane: Warp's type of a lane.
+        Number: what the table holds: lanes (default), or numbers that all members share.
         loop: Warp's struct of the numbers of a controller's parts, with its NumPy type; None (default) without a controller.
 
     Attributes:
@@ -177,8 +179,16 @@ class LawArrays:
     table: Lanes
     memory: Lanes
 
-    def __init__(self, packets: int, struct: Any, dtype: np.dtype, Lane: Any, loop: tuple[Any, np.dtype] | None = None):
-        self._packets, self._Lane = packets, Lane
+    def __init__(
+        self,
+        packets: int,
+        struct: Any,
+        dtype: np.dtype,
+        Lane: Any,
+        Number: Any = None,
+        loop: tuple[Any, np.dtype] | None = None,
+    ):
+        self._packets, self._Lane, self._Number = packets, Lane, Number or Lane
         self.params = Structs(struct, dtype)
         self.loop = Structs(*loop) if loop else None
         self._places: Any = None
@@ -222,7 +232,7 @@ class LawArrays:
         count = self._packets if any(len(rows) > 1 for rows in each) else 1
         new = moved or len(self.table.view) != count
         if new:
-            self.table = Lanes(count, size, self._Lane)
+            self.table = Lanes(count, size, self._Number)
         first = 1
         for rows, known in zip(each, shared, strict=True):
             if new or not known:

@@ -97,8 +97,11 @@ def choose_kernel(
     """
     explicit = method.tableau is not None
     controller = _controller(ensemble, facts)
-    parts = controller.acting_parts if controller else ()
-    control = tuple((part, device_module(part, part.device_in(not facts.turned), built_in)) for part in parts)
+    acting_parts = _parts(controller, facts) if controller else ()
+    modules = (device_module(part, part.device_in(not facts.turned), built_in) for part in acting_parts)
+    control = tuple(zip(acting_parts, modules, strict=True))
+    # The host looks at states between launches, which must not be those in the middle of a lead.
+    asked = controller is not None and controller.callback is not None
     acting = _acting(ensemble, facts, built_in, controller)
     events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)
     damping = any(hasattr(module, "damping") for term, module in acting if not isinstance(term, Drag))
@@ -135,9 +138,9 @@ def choose_kernel(
     if method.two_part:
         # B merges with that of the next step exactly, A up to the order of the method.
         lead, maps = method.program[0], method.program[1:]
-        if events:
+        if events or asked:
             lead, maps = None, method.program
-    elif events or (lead is not None and lead[0] == "K" and not undone):
+    elif events or asked or (lead is not None and lead[0] == "K" and not undone):
         lead, maps = None, program
     conservative = checked and _conservative(facts, acting, built_in)
     # Events, water and the potential are evaluated at the user's origin, or at that of the forces.
@@ -176,6 +179,11 @@ def _controller(ensemble: Ensemble, facts: Survey) -> Controller | None:
     if controller is None or controller.bus is None:
         return None
     return controller.on(controller.bus._replace(delayed=facts.delayed))
+
+
+def _parts(controller: Controller, facts: Survey) -> tuple[Part, ...]:
+    """The parts of a controller as they act, each with what some member needs of its device code."""
+    return tuple(part.with_features(facts.features) for part in controller.acting_parts)
 
 
 def _steady(module: Any) -> bool:

@@ -45,7 +45,7 @@ class Packets:
         structs = (types.Inertia, types.Params, types.Events, types.Limits, *([types.Loop] if types.Loop else []))
         inertia, params, events, limits, *loop = zip(structs, plan.dtypes, strict=True)
         self.inertia, self.events, self._limits = (Structs(*kind) for kind in (inertia, events, limits))
-        self.laws = LawArrays(self.count, *params, types.Lane, *loop)
+        self.laws = LawArrays(self.count, *params, types.Lane, types.Number, *loop)
         self.state_lanes = Lanes(self.count, plan.spec.state_fields, types.Lane)
         self._rows = np.empty((self.count * width, plan.spec.state_fields))
         self.status = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
@@ -210,7 +210,7 @@ class Packets:
         s0, s1 = plan.due(k0, k1)
         numbers = sum(plan.sample_fields.values())
         width = plan.spec.width
-        waste = WASTE if len(plan.sample_fields) < len(SAMPLE_FIELDS) else 0
+        waste = WASTE if SAMPLE_FIELDS.keys() - plan.sample_fields.keys() else 0
         shape = (self.count, max(1, (s1 - s0) * numbers) + waste)
         if self.out is None or self.out.shape != shape:
             self.out = wp.empty(shape, dtype=plan.advance.types.Lane, device="cpu")
@@ -237,6 +237,16 @@ class Packets:
         inputs += [sum(sizes.values()), wp.vec4i(*(firsts.get(name, -1) for name in SAMPLE_FIELDS)), self.out]
         with build_lock:
             return wp.launch(plan.advance.kernel, dim=self.count, inputs=inputs, device="cpu", record_cmd=True)
+
+    def first_signals(self) -> np.ndarray:
+        """The signals at t = 0, once the first launch has made them.
+
+        Returns:
+            (1, count * width, numbers of the signals), a copy.
+        """
+        rows = self.monitor.first_signals.numpy()[:, : len(self.plan.signal_rows)]
+        packets, numbers, width = rows.shape
+        return rows.transpose(0, 2, 1).reshape(1, packets * width, numbers).copy()
 
     def outcome(self, warned: bool = True) -> Outcome:
         """The outcome of each member so far.

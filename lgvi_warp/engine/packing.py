@@ -15,7 +15,6 @@ from lgvi_kernels import built_in
 from lgvi_kernels.advance.rows import STATE_FIELDS
 from lgvi_kernels.maps.collocation import SLOPE_FIELDS
 from lgvi_warp.engine.arrays import memory_rows
-from lgvi_warp.engine.plan import Plan
 from lgvi_warp.engine.shared import AXES, FRAME, context
 from lgvi_warp.engine.survey import framed
 from lgvi_warp.methods import modified_inertia
@@ -27,6 +26,8 @@ from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.ensemble import Ensemble
 
 Fields = dict[str, Any]
+# A Plan, whose module imports this one.
+Plan = Any
 
 
 class Packing:
@@ -230,6 +231,21 @@ class Packing:
             flow = term.water_at_start(Ensemble.own(term, m.parameters), m.position, self._context(m.parameters))
             total = flow if total is None else total + flow
         return None if total is None else notation.rotate_into(m.attitude, total)
+
+
+def rows_shared(plan: Plan) -> bool:
+    """Whether some law, or part of a controller, has rows in the table, and all members share every such row.
+
+    Args:
+        plan: a plan whose spec is chosen but for this.
+
+    Returns:
+        True where one number of each row serves all members.
+    """
+    packing = Packing(plan, plan.ensemble.select(0, 1))
+    each = (("law", packing.laws()), ("part", packing.control()))
+    with_rows = [(kind, i) for kind, packed in each for i, one in enumerate(packed) if one.rows is not None]
+    return bool(with_rows) and all(map(plan.shared.keeps, with_rows))
 
 
 def _once(values: np.ndarray) -> np.ndarray:

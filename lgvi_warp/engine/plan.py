@@ -5,9 +5,11 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
+import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -28,6 +30,7 @@ from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.kernel_choice import KernelChoice, check_backward_drag, choose_kernel, declared, is_built_in
+from lgvi_warp.engine.packing import rows_shared
 from lgvi_warp.engine.shared import MEMBERS, SEED, Shared
 from lgvi_warp.engine.step_warnings import watched
 from lgvi_warp.engine.survey import Survey, survey, survey_of
@@ -35,6 +38,9 @@ from lgvi_warp.engine.widths import default_width
 from lgvi_warp.methods.gauss import gauss
 from lgvi_warp.methods.method import KINDS, Method
 from lgvi_warp.methods.saveat import TimeGrid, divisors
+from lgvi_warp.physics.control.signals import SIGNALS, check, ordered, row_of, saved_fields
+from lgvi_warp.physics.fields import Field
+from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
@@ -62,7 +68,7 @@ class Plan:
         ensemble: the members.
         method: the integration method.
         grid: the steps and the sample times.
-        fields: names of the sample fields to keep; stored in the order of `SAMPLE_FIELDS`.
+        fields: names of the samples to keep; stored in their order (see signals.SAVED).
         dtype: numbers of the kernel: "float64" (default), "float32" or "float32_compensated".
         width: members of a packet, one a lane; None (default) for what suits this machine's registers.
         checks: "safe" (default), "all" for warnings as well, or "none".
@@ -114,6 +120,8 @@ class Plan:
         if self.checks == "none" and self.on_failure in ON_FAILURE[1:]:
             problem = f"does not see failures, which on_failure={self.on_failure!r} waits for"
             faults.add("checks", self.checks, problem, 'use checks="safe", or on_failure="freeze"')
+        # Those of `save` are checked before: these are of statistics.
+        check(faults, "statistics", self.fields, self.ensemble.scene.controller)
         faults.raise_if_any()
         checked = self.checks != "none"
         most = None if self.survey_all else SURVEYED
@@ -129,8 +137,9 @@ class Plan:
             width, source = default_width(self._kind(), self.dtype)
             object.__setattr__(self, "width", width)
             object.__setattr__(self, "width_source", source)
-        object.__setattr__(self, "fields", tuple(name for name in SAMPLE_FIELDS if name in self.fields))
+        object.__setattr__(self, "fields", ordered(self.fields))
         object.__setattr__(self, "spec", self._spec())
+        object.__setattr__(self, "spec", self.spec._replace(shared_rows=rows_shared(self)))
 
     @functools.cached_property
     def advance(self) -> Advance:
@@ -276,10 +285,10 @@ class Plan:
             A plan for m members.
         """
         subplan = self._copy()
-        for name in ("shared", "idle", "sample_fields"):
+        for name in ("shared", "idle", "sample_fields", "signal_rows"):
             subplan.__dict__.pop(name, None)
         object.__setattr__(subplan, "ensemble", self.ensemble.subset(indices))
-        object.__setattr__(subplan, "fields", tuple(name for name in SAMPLE_FIELDS if name in fields))
+        object.__setattr__(subplan, "fields", ordered(fields))
         object.__setattr__(subplan, "_whole", (self, indices, fields))
         return subplan
 
@@ -289,6 +298,7 @@ class Plan:
 
         Returns:
             Field -> numbers per sample, in the order in which they are written; a compensated position is b, then b_low.
+            Signals of the controller come last.
         """
         needed = set(self.fields)
         if self.kernel_choice.moved:
@@ -297,7 +307,7 @@ class Plan:
         numbers = {name: size for name, size in SAMPLE_FIELDS.items() if name in needed}
         if self.spec.compensated and "position" in numbers:
             numbers["position"] = 6
-        return numbers
+        return numbers | {name: math.prod(self.table[name].shape) for name in self.signals}
 
     def _spec(self) -> Spec:
         choice, checked = self.kernel_choice, self.checks != "none"
@@ -339,20 +349,39 @@ class Plan:
         parts = self.kernel_choice.parts_of_control
         if self.kernel_choice.controller is None:
             return None
+        groups = {SIGNALS[name].group for name in self.signals} | ({"measured", "reference"} if self.asks else set())
         numbers = tuple(declared(part, module) for part, module in parts)
-        return Control(
-            tuple(module for _, module in parts), numbers, tuple(name for name in NOTED if name in self.noted)
-        )
+        noted = tuple(name for name in NOTED if name in groups)
+        return Control(tuple(module for _, module in parts), numbers, noted, "actuator" in groups, self.asks)
 
     @property
-    def noted(self) -> frozenset[str]:
-        """What each look of the controller notes for the samples, among NOTED."""
-        return frozenset()
+    def asks(self) -> bool:
+        """Whether a function of the host answers each look."""
+        controller = self.kernel_choice.controller
+        return controller is not None and controller.callback is not None
+
+    @functools.cached_property
+    def table(self) -> dict[str, Field]:
+        """The fields that the run may save, by name."""
+        return saved_fields(self.kernel_choice.controller)
 
     @property
+    def signals(self) -> tuple[str, ...]:
+        """Names of the controller's signals among the fields."""
+        return tuple(name for name in self.fields if name in SIGNALS)
+
+    @functools.cached_property
     def signal_rows(self) -> tuple[int, ...]:
-        """Rows of the memory that are saved with each sample."""
-        return ()
+        """Rows of the memory that are saved with each sample: those of each signal in turn."""
+        controller = self.kernel_choice.controller
+        if controller is None or controller.bus is None:
+            return ()
+        # A part of a run may save less than the kernel notes.
+        names = self.spec.control.noted
+        firsts = accumulate((NOTED[name] for name in names), initial=controller.bus.rows)
+        noted = dict(zip(names, firsts, strict=False))
+        begins = ((row_of(name, controller.bus, noted), self.sample_fields[name]) for name in self.signals)
+        return tuple(row + i for row, size in begins for i in range(size))
 
     def _kind(self) -> str:
         """The kind of kernel for which a width is chosen, one of widths.KINDS."""
@@ -476,6 +505,9 @@ class Plan:
         Yields:
             (k0, k1): a launch makes the steps from k0 to k1.
         """
+        if self.asks:
+            yield from self._periods()
+            return
         due = self.grid.sample_steps
         per_sample = sum(self.sample_fields.values()) * count * np.dtype(DTYPES[self.dtype]).itemsize
         most_samples = max(1, SEGMENT_SAMPLE_BYTES // max(per_sample, 1))
@@ -486,6 +518,27 @@ class Plan:
             k1 = min(k + most_steps, int(due[min(last, len(due)) - 1]))
             yield k, k1
             k = k1
+
+    def _periods(self) -> Iterator[tuple[int, int]]:
+        """The launches where a function of the host answers each look: one a period."""
+        controller = self.kernel_choice.controller
+        assert controller is not None
+        every = controller.every(self.grid.h)
+        for k in range(0, self.grid.steps, every):
+            yield k, min(k + every, self.grid.steps)
+
+
+def damping_terms(terms: Sequence[Term]) -> list[Term]:
+    """The terms whose device code has damping.
+
+    Args:
+        terms: terms of a scene.
+
+    Returns:
+        Those terms; they may have no effect in any member.
+    """
+    devices = [built_in("laws", term.device) if isinstance(term.device, str) else term.device for term in terms]
+    return [term for term, device in zip(terms, devices, strict=True) if hasattr(device, "damping")]
 
 
 @functools.lru_cache(maxsize=256)

@@ -105,6 +105,7 @@ class Survey:
         buoyant: buoyancy is not zero.
         odd: what is odd about the members' numbers.
         delayed: the commands of a controller are delayed.
+        features: what the device code of a controller's parts must have, as "key.feature".
         turned_axes: axes other than the user's, even if only in their order or sense.
     """
 
@@ -125,6 +126,7 @@ class Survey:
     odd: Oddities
     delayed: bool = False
     turned_axes: bool = False
+    features: frozenset[str] = frozenset()
 
     @property
     def decisive(self) -> tuple[Any, ...]:
@@ -272,6 +274,8 @@ def _seen(
     felt = of_each("felt", is_felt, (*terms.IMPLIED, *scene.terms))
     drags = of_each("drag", parts, (term for term in scene.terms if isinstance(term, Drag)))
     rising = of_each("rises", rises, (term for term in scene.terms if term.type == "current"))
+    parts_of_control = scene.controller.parts if scene.controller else ()
+    features = of_each("features", lambda part, numbers: part.features(own(part, numbers)), parts_of_control)
     of_axes = shared("facts of axes", p, lambda numbers: _facts(*numbers[AXES]))
     mass = shared("shape of mass", p, lambda numbers: SHAPES_OF_MASS.index(shape_of_mass(numbers[FRAME][0].M)))
     return Survey(
@@ -285,6 +289,7 @@ def _seen(
         buoyant=shared("buoyant", p, lambda numbers: bool(np.any(numbers["vehicle.buoyancy"]))),
         delayed="controller.delay" in p
         and shared("delayed", p, lambda numbers: bool(np.any(numbers["controller.delay"] > 0.0))),
+        features=frozenset(f"{key}.{word}" for key, words in features.items() for word in words),
         odd=of_numbers(scene, p, first, stop, shared) if odd else Oddities({}),
     )
 

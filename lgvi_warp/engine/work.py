@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -13,13 +14,18 @@ from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.keepers.protocol import BlockStore, Keeper
 from lgvi_warp.physics import notation
-from lgvi_warp.physics.fields import TABLE
+from lgvi_warp.physics.control.signals import SIGNALS
+from lgvi_warp.physics.fields import TABLE, Field
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.statistics.samples import Fields
 
 if TYPE_CHECKING:
+    from lgvi_warp.engine.packets import Packets
     from lgvi_warp.engine.plan import Plan
     from lgvi_warp.sampling.members import Members
+
+# Tells status and last own step of each member (see `Fields`).
+Ends = Callable[[], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -112,6 +118,7 @@ def run_block(
     Returns:
         What each keeper closed with; None if the block was halted before the end.
     """
+    from lgvi_warp.engine.asking import ask
     from lgvi_warp.engine.packets import Packets
 
     # Members that are not finite, or exceed float32, get their status from the kernel: no warning from NumPy.
@@ -120,18 +127,33 @@ def run_block(
         plan.check_block(block, members)
         packets = Packets.of(plan, members)
         block_keepers = [keeper.open(plan, block, members) for keeper in keepers]
-        for block_keeper in block_keepers:
-            block_keeper.take(slice(0, 1), samples_of(plan, slice(0, 1), at_start(plan, members), packets.ended))
+
+        def keep(when: slice, values: Mapping[str, np.ndarray], ends: Ends) -> None:
+            samples = samples_of(plan, when, values, ends)
+            for block_keeper in block_keepers:
+                block_keeper.take(when, samples)
+
+        def keep_start() -> None:
+            running = np.zeros(block.count, np.uint8), np.zeros(block.count, np.int64)
+            keep(slice(0, 1), at_start(plan, members, packets), lambda: running)
+
+        if not plan.signals:
+            keep_start()
+        if plan.asks:
+            packets.advance(0, 0)
         for k0, k1 in plan.segments(block.count):
             if halted():
                 return None
+            if plan.asks:
+                ask(packets, k0 * plan.grid.h)
             raw = packets.advance(k0, k1)[:, : block.count]
+            if k0 == 0 and plan.signals:
+                # The first look of a controller is a part of the first launch.
+                keep_start()
             when = slice(*plan.due(k0, k1))
             if when.start < when.stop and block_keepers:
-                values = unpacked(plan.sample_fields, raw, packets.frame)
-                samples = samples_of(plan, when, {name: values[name] for name in plan.fields}, packets.ended)
-                for block_keeper in block_keepers:
-                    block_keeper.take(when, samples)
+                values = unpacked(plan.sample_fields, raw, packets.frame, plan.table)
+                keep(when, {name: values[name] for name in plan.fields}, packets.ended)
             advanced(block.count * (k1 - k0))
         outcome = packets.outcome(warned)
         results = tuple(block_keeper.close(outcome) for block_keeper in block_keepers)
@@ -139,19 +161,25 @@ def run_block(
         return results
 
 
-def at_start(plan: Plan, members: Members) -> dict[str, np.ndarray]:
+def at_start(plan: Plan, members: Members, packets: Packets) -> dict[str, np.ndarray]:
     """The samples at t = 0, in the dtype of those that follow.
 
     Args:
         plan: the plan of the run.
         members: the m members.
+        packets: their packets; signals are 0 before the first launch.
 
     Returns:
         By field: (1, m, ...), in the field's unit.
     """
     real = np.dtype(DTYPES[plan.dtype])
     types = {"position": np.dtype(np.float64)} if plan.spec.compensated else {}
-    return {name: getattr(members, name)[None].astype(types.get(name, real), copy=False) for name in plan.fields}
+    motion = (name for name in plan.fields if name not in SIGNALS)
+    states = {name: getattr(members, name)[None].astype(types.get(name, real), copy=False) for name in motion}
+    if not plan.signals:
+        return states
+    sizes = {name: plan.sample_fields[name] for name in plan.signals}
+    return states | _divided(sizes, packets.first_signals()[:, : members.count], plan.table)
 
 
 def in_order(runs: Sequence[Block], done: Iterable[tuple[Block, Any]]) -> Iterator[tuple[Block, Any]]:
@@ -173,29 +201,24 @@ def in_order(runs: Sequence[Block], done: Iterable[tuple[Block, Any]]) -> Iterat
             position += 1
 
 
-def unpacked(fields: Mapping[str, int], raw: np.ndarray, frame: Frame) -> dict[str, np.ndarray]:
+def unpacked(
+    fields: Mapping[str, int], raw: np.ndarray, frame: Frame, table: Mapping[str, Field] = TABLE
+) -> dict[str, np.ndarray]:
     """Convert the kernel's raw samples to fields, from the kernel's origin and axes to the user's.
 
     Args:
         fields: numbers of each field in a raw sample; twice the field's own for pairs that are summed in float64.
         raw: (samples, members, numbers), as `Packets.advance` returns them.
         frame: the kernel's axes and origins.
+        table: the fields by name (default those of the motion). Signals are in the user's axes already.
 
     Returns:
         By field: (samples, members, ...), in the field's unit.
     """
-    samples: dict[str, np.ndarray] = {}
-    column = 0
-    for name, size in fields.items():
-        shape = TABLE[name].shape
-        values = raw[..., column : column + size]
-        if size == 2 * int(np.prod(shape)):
-            values = np.add(*np.split(values, 2, axis=-1), dtype=np.float64)
-        samples[name] = values.reshape(*raw.shape[:2], *shape)
-        column += size
+    samples = _divided(fields, raw, table)
     if not np.array_equal(frame.Q, np.broadcast_to(np.eye(3), frame.Q.shape)):
         turns = {"attitude": lambda R: R @ np.swapaxes(frame.Q, -1, -2)}
-        for name in samples.keys() - {"position"}:
+        for name in samples.keys() - {"position", *SIGNALS}:
             turn = turns.get(name, lambda v: notation.rotate_out(frame.Q, v))
             samples[name] = turn(samples[name])
     if np.any(frame.origin):
@@ -207,9 +230,21 @@ def unpacked(fields: Mapping[str, int], raw: np.ndarray, frame: Frame) -> dict[s
     return samples
 
 
-def samples_of(
-    plan: Plan, when: slice, fields: Mapping[str, np.ndarray], ends: Callable[[], tuple[np.ndarray, np.ndarray]]
-) -> Fields:
+def _divided(fields: Mapping[str, int], raw: np.ndarray, table: Mapping[str, Field]) -> dict[str, np.ndarray]:
+    """Raw samples by field, as of `unpacked`, in the kernel's frame."""
+    samples: dict[str, np.ndarray] = {}
+    column = 0
+    for name, size in fields.items():
+        shape = table[name].shape
+        values = raw[..., column : column + size]
+        if size == 2 * math.prod(shape):
+            values = np.add(*np.split(values, 2, axis=-1), dtype=np.float64)
+        samples[name] = values.reshape(*raw.shape[:2], *shape)
+        column += size
+    return samples
+
+
+def samples_of(plan: Plan, when: slice, fields: Mapping[str, np.ndarray], ends: Ends) -> Fields:
     """Fields of a block with the times, steps and terms that belong to them.
 
     Args:

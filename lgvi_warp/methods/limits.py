@@ -8,16 +8,25 @@ moment of a sphere and 0.3 rad.
 from __future__ import annotations
 
 import functools
+import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from lgvi_warp.methods.method import Method
+from lgvi_warp.methods.method import FORCED, Method
+from lgvi_warp.methods.tableaux import Tableau
 
 # Largest h |Omega| at which methods that turn about the axes are still accurate.
 TURNS = 1.0
+
+# A step counts as stable where a small motion grows by less than this: tenfold in 4000 steps.
+GROWTH = math.log(10.0) / 4000.0
+# Slowest contraction with which the iteration for the forces of Phi* reaches its tolerance in 60 rounds.
+CONTRACTION = 1e-14 ** (1.0 / 60.0)
+# Spacing and end of the numbers h w that are tried [rad].
+STEP, MOST = 1e-3, 30.0
 
 # The rows (method, largest stable h w of the Munk moment, and of the restoring moment) of methods and compositions. Gauss
 # collocation has none: a status reports where its iteration fails.
@@ -92,3 +101,59 @@ def rotation_limit(method: Method) -> float:
     if method.turns:
         return TURNS / longest_stage(method)
     return imaginary_limit(method.name) if method.tableau else np.inf
+
+
+def stability_polynomial(tableau: Tableau, z: np.ndarray) -> np.ndarray:
+    """Evaluate the stability polynomial R(z) of an explicit method: one step of y' = (z/h) y from y = 1.
+
+    Args:
+        tableau: of the method.
+        z: complex or real numbers (n,).
+
+    Returns:
+        R(z) (n,).
+    """
+    s = len(tableau.b)
+    slopes: list[np.ndarray] = []
+    for i in range(s):
+        slopes.append(1.0 + z * sum((a * k for a, k in zip(tableau.a[i], slopes, strict=False)), np.zeros_like(z)))
+    return np.asarray(1.0 + z * sum(b * k for b, k in zip(tableau.b, slopes, strict=True)))
+
+
+def first_unstable(numbers: np.ndarray, growth: np.ndarray) -> float:
+    """Find the largest number up to which a small motion stays small.
+
+    Args:
+        numbers: numbers h w (n,), rising by STEP [rad].
+        growth: growth of the motion in one step (n,).
+
+    Returns:
+        The limit; infinite where there is none.
+    """
+    beyond = growth > 1.0 + GROWTH
+    return float(numbers[np.argmax(beyond)] - STEP) if beyond.any() else math.inf
+
+
+@functools.cache
+def drag_limit(name: str) -> float:
+    """Compute the largest h (l + 2 q |v|) / I, beyond which explicit drag grows.
+
+    A composition is refused where a stage that goes backward would meet a drag number above 0.5.
+
+    Args:
+        name: of the method.
+
+    Returns:
+        The limit [1]; infinite where drag is advanced exactly or implicitly.
+    """
+    method = Method(name)
+    if method.linearly_implicit:
+        return math.inf
+    if method.tableau:
+        numbers = np.arange(STEP, MOST, STEP)
+        return first_unstable(numbers, np.abs(stability_polynomial(method.tableau, -numbers)))
+    if method.base in FORCED:
+        # Phi is explicit, (1 - x) v; Phi* implicit, v / (1 + x), but its iteration contracts by x, in Psi over h/2.
+        return {"phi": 2.0, "phi_adjoint": CONTRACTION, "psi": 2.0 * CONTRACTION}[method.base]
+    back = -min(0.0, *method.stages)
+    return 0.5 / back if back else math.inf

@@ -7,7 +7,7 @@ discrete Moser-Veselov rotation of equation (24), Ab and Ap the two halves of T.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.methods.tableaux import CG3, DOP853, DOPRI5, RK4, RKW3, Tableau
@@ -144,6 +144,7 @@ class Method:
             worst vehicle of a packet decides. The run's step is then the longest one, and the grid of samples, events and
             statuses.
         atol: Absolute tolerance of the step control; give both or none.
+        reason: Why it was chosen where no one named it; for the summary and the provenance. Default "".
 
     Raises:
         SceneError: A setting is wrong; the message names every fault.
@@ -157,6 +158,7 @@ class Method:
     beta: float = 0.5
     rtol: float | None = None
     atol: float | None = None
+    reason: str = field(default="", compare=False, repr=False)
 
     def __post_init__(self) -> None:
         faults = Faults()

@@ -10,6 +10,7 @@ from fractions import Fraction
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.physics.control.signals import SAVED
 from lgvi_warp.physics.fields import FIELDS
 
 # A grid whose step would be more than this many times shorter than the one asked for is refused.
@@ -26,7 +27,8 @@ class SaveAt:
         every: Interval of samples [s]; default None, the end only.
         at: Rising times of samples [s], >= 0; default None. Give `every` or `at`, not both.
         fields: Any of "position", "attitude", "velocity", "angular_velocity"; default all four. A field that is left out
-            takes no memory.
+            takes no memory. In a scene with a controller also its signals: "command", "actuator", "demand", "unmet",
+            "measured_..." and "reference_..." (see lw.Result).
 
     Raises:
         SceneError: A setting is wrong; the message names every fault.
@@ -47,7 +49,7 @@ class SaveAt:
             if times is not None and (times.ndim != 1 or np.any(times < 0.0) or np.any(np.diff(times) <= 0.0)):
                 faults.add("save.at", self.at, "is not a rising list of times >= 0", "sort it and drop repetitions")
         for name in self.fields:
-            faults.choice("save.fields", name, FIELDS)
+            faults.choice("save.fields", name, SAVED)
         faults.raise_if_any()
 
 

@@ -54,7 +54,20 @@ TABLE = {
         Field("energy", (), "J", "kinetic and potential energy"),
     )
 }
-# Names of the samples that a run computes.
+# Names of the samples of the motion that a run computes.
 FIELDS = tuple(TABLE)[:4]
-# Names of the samples that a file may hold.
-IN_FILES = (*FIELDS, "quaternion_wxyz", "energy")
+# Names of the last dimensions of an array, by their sizes; others are named after the array.
+_TAILS = {(): (), (3,): ("component",), (3, 3): ("row", "column")}
+
+
+def dims_of(name: str, tail: tuple[int, ...]) -> tuple[str, ...]:
+    """Names of the dimensions of one vehicle's numbers at one time, in stores and datasets.
+
+    Args:
+        name: Name of the array.
+        tail: Shape of the numbers.
+
+    Returns:
+        A name for each dimension.
+    """
+    return _TAILS.get(tail, tuple(f"{name}_{i}" for i in range(len(tail))))

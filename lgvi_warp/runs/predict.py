@@ -27,7 +27,6 @@ from lgvi_warp.engine.keepers.protocol import Keeper
 from lgvi_warp.engine.plan import SEGMENT_SAMPLE_BYTES, NotSurveyed, Plan
 from lgvi_warp.engine.work import Work
 from lgvi_warp.methods.saveat import SaveAt, TimeGrid
-from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.runs import member_fields
 from lgvi_warp.runs.sizes import Sizes, sizes
 from lgvi_warp.runs.store.block_files import BlockFiles, marker
@@ -237,7 +236,7 @@ def result_bytes(plan: Plan, fields: Sequence[str] | None = None) -> int:
     """
     k, n = len(plan.grid.times), plan.ensemble.members
     real = np.dtype(machine.DTYPES[plan.dtype]).itemsize
-    rows = {name: int(np.prod(TABLE[name].shape)) * real for name in (plan.fields if fields is None else fields)}
+    rows = {name: int(np.prod(plan.table[name].shape)) * real for name in (plan.fields if fields is None else fields)}
     if plan.spec.compensated and "position" in rows:
         rows["position"] = 24
     first = plan.ensemble.parameters(0, 1)

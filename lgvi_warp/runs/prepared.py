@@ -20,7 +20,7 @@ from lgvi_warp.engine.shared import MEMBERS, SEED, Shared
 from lgvi_warp.engine.survey import survey
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
-from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.physics.control.signals import ordered
 from lgvi_warp.runs.provenance import provenance
 from lgvi_warp.runs.quantities import OfInterest, OfResult, quantities
 from lgvi_warp.runs.result import Result
@@ -109,6 +109,8 @@ class Runner:
                 return plan.of(fleet)
         plan = make_plan(fleet, **self.settings, fields=self.observed.fields, survey_all=False)
         plan.compile()
+        if plan.method.reason:  # chosen once, by the members of the first plan
+            self.settings["method"] = plan.method
         facts = survey(fleet, plan.method, plan.grid.h, kind.shared, odd=False, most=SURVEYED)
         kind.plans[plan.method, facts.decisive] = self._last = plan
         return plan
@@ -396,7 +398,7 @@ def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -
     """
     if save is not None or not of:
         return save
-    fields = tuple(name for name in FIELDS if any(name in each.fields for each in of))
+    fields = ordered(name for each in of for name in each.fields)
     paths = [each.label for each in of if each.over_path]
     if paths and scene.run.save_every is None:
         problem = f"save = None: is missing, and {paths[0]} looks over the path"
@@ -439,8 +441,8 @@ def prepare(
         vary: Names of what varies, ["vehicle.mass", "start.position[2]"], or a mapping of names to distributions.
         of: One or several quantities of interest: "position[2]", "max(depth)", a Quantity, a function of a Result. Default
             None: calls return results.
-        method: As of `lw.solve`, like h, t1, dtype, width, checks, on_failure, threads, executor and scheduler. What is left
-            out is taken from the scene's [run].
+        method: As of `lw.solve`, but where it is left out, chosen once, for `fleet`. What else is left out, of h, t1, dtype,
+            width, checks, on_failure, threads, executor and scheduler, is taken from the scene's [run].
         h: Step [s].
         t1: End of the run [s].
         save: Samples to keep, as of `lw.solve`; default with `of`: those that the quantities need.

@@ -46,6 +46,7 @@ def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence
             "iterations": plan.method.iterations,
             "tolerance": plan.method.residual_tolerance(plan.dtype),
         }
+        | ({"chosen": plan.method.reason} if plan.method.reason else {})
         | ({"alpha": plan.method.alpha, "beta": plan.method.beta} if plan.spec.averages else {})
         | ({"rtol": plan.method.rtol, "atol": plan.method.atol} if plan.method.adaptive else {}),
         "step": plan.grid.h,

@@ -12,6 +12,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.real_numbers import NotReal, real_results
+from lgvi_warp.physics.control.signals import SAVED
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.result import Result
 from lgvi_warp.statistics.functional import Functional, functional
@@ -116,7 +117,7 @@ def samples_of(result: Result, when: slice = slice(None), members: Any = None) -
     Returns:
         The pair (samples, members).
     """
-    fields = {name: result.samples[name][when] for name in FIELDS if name in result.samples}
+    fields = {name: result.samples[name][when] for name in SAVED if name in result.samples}
     start = {name: result.samples[name][0] for name in fields}
     known = SimpleNamespace(parameters=result.parameters, count=result.members, **start)
     return _Samples(fields, result.time[when], result.terms), known if members is None else members

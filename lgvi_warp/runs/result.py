@@ -19,7 +19,8 @@ from lgvi_warp.common.phases import Phases
 from lgvi_warp.common.status import StatusArray, WarningArray
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
-from lgvi_warp.physics.fields import IN_FILES, TABLE
+from lgvi_warp.physics.control.signals import IN_FILES, SIGNALS
+from lgvi_warp.physics.fields import FIELDS, TABLE, dims_of
 from lgvi_warp.physics.terms import from_list
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.runs import member_fields, result_file
@@ -34,6 +35,16 @@ TIME = {"units": "s", "long_name": "time since the start"}
 END_TIME = {"units": "s", "long_name": "time of the event or of the failure of a member, or the end of the run"}
 
 
+class _Signal:
+    """A signal of the controller as an attribute of a result."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, result: Any, owner: type | None = None) -> Any:
+        return self if result is None else result._kept(self._name)
+
+
 @dataclass(frozen=True, eq=False)
 class Result:
     """Samples of n members at k times, the status of each member, and the provenance they follow from.
@@ -45,6 +56,10 @@ class Result:
         time: Times of the samples [s], shape (k,).
         samples: Arrays of the fields that were kept, by name. Each is also an attribute: position (k, n, 3) [m, inertial],
             attitude (k, n, 3, 3) body to inertial, velocity (k, n, 3) [m/s, body], angular_velocity (k, n, 3) [rad/s, body].
+            Signals of a controller, where SaveAt(fields=...) names them, are those after the look at each time: command and
+            actuator (k, n, channels), where the latter is after delay, fault, limit and lag; demand and unmet (k, n, 6) [N,
+            N m]; measured_position, _attitude, _velocity, _water_velocity, _angular_velocity, _depth, _heading;
+            reference_position, _attitude, _velocity (inertial), _angular_velocity, _depth, _heading, _speed.
         status: Status of each member, shape (n,). A member that an event stopped stays at its state from then on.
         failure_time: Time of each member's last good state, or of the event that stopped it [s], shape (n,); NaN where there
             was neither.
@@ -117,6 +132,14 @@ class Result:
         """Angular velocities in body axes [rad/s], shape (k, n, 3)."""
         return self._kept("angular_velocity")
 
+    command, actuator, demand, unmet = _Signal(), _Signal(), _Signal(), _Signal()
+    measured_position, measured_attitude, measured_velocity = _Signal(), _Signal(), _Signal()
+    measured_water_velocity, measured_angular_velocity = _Signal(), _Signal()
+    measured_depth, measured_heading = _Signal(), _Signal()
+    reference_position, reference_attitude, reference_velocity = _Signal(), _Signal(), _Signal()
+    reference_angular_velocity, reference_depth = _Signal(), _Signal()
+    reference_heading, reference_speed = _Signal(), _Signal()
+
     @functools.cached_property
     def quaternion_wxyz(self) -> np.ndarray:
         """Unit quaternions of the attitudes, scalar first and not negative, shape (k, n, 4)."""
@@ -181,12 +204,12 @@ class Result:
         if self.store is not None:
             stored: Any = self.samples
             return stored.dataset(self.store)
-        dims = {1: ("component",), 2: ("row", "column")}
-        names = [*self.samples] + ["energy"] * (len(self.samples) == 4)
+        names = [*self.samples] + ["energy"] * (self.samples.keys() >= set(FIELDS))
+        fields = TABLE | {name: signal.field for name, signal in SIGNALS.items()}
         data = {}
         for name in names:
             values = getattr(self, name)
-            data[name] = (("time", "realization", *dims.get(values.ndim - 2, ())), values, TABLE[name].attributes)
+            data[name] = (("time", "realization", *dims_of(name, values.shape[2:])), values, fields[name].attributes)
         for item in member_fields.EVERY:
             data[item.name] = (("realization",), np.asarray(getattr(self, item.name)), item.attributes)
         data["end_time"] = (("realization",), self.end_time, END_TIME)

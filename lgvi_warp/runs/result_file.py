@@ -11,7 +11,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.safe_files import parsed
-from lgvi_warp.physics.fields import IN_FILES, TABLE
+from lgvi_warp.physics.control.signals import IN_FILES, has_shape
 from lgvi_warp.runs import member_fields
 
 TEXTS = ("messages", "provenance", "statistics")
@@ -60,7 +60,8 @@ def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
     for name, array in content.items():
         base = name.removeprefix("kept/")
         if base in IN_FILES:
-            good = array.shape == (k, n if base == name else m, *TABLE[base].shape) and array.dtype.kind == "f"
+            good = array.shape[:2] == (k, n if base == name else m) and array.dtype.kind == "f"
+            good = good and has_shape(base, array.shape[2:])
         elif name in TEXTS:
             good = array.dtype.kind == "U" and array.shape == ()
         elif name == "time":

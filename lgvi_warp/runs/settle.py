@@ -14,6 +14,8 @@ from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt, time_grid
+from lgvi_warp.physics.control.signals import check
+from lgvi_warp.runs.default_method import planned
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.scene.ensemble import Ensemble
 
@@ -59,7 +61,7 @@ def make_plan(
 
     Args:
         ensemble: The members.
-        method: A name or a Method.
+        method: A name or a Method; where the scene has none either, and no options of one, it is chosen by what acts.
         h: Step [s].
         t1: End of the run [s].
         save: Which samples to save, and when.
@@ -96,19 +98,24 @@ def make_plan(
     dropped = save is None and every is not None and every > float(t1)  # type: ignore[arg-type]
     if save is None:
         save = SaveAt(every=None if dropped else every)
+    check(faults, "save.fields", save.fields, ensemble.scene.controller)
+    faults.raise_if_any()
     grid = time_grid(float(h), float(t1), save)  # type: ignore[arg-type]
     if dropped:
         text = f"run.save_every = {every} s is longer than the run, {t1} s: only the start and the end are kept"
         grid = replace(grid, messages=(*grid.messages, text))
-    chosen = method if isinstance(method, Method) else settings.method_of(method)
     dtype, checks = dtype or settings.dtype, checks or settings.checks
+    on_failure = on_failure or settings.on_failure
+    if method is None and settings.method is None and not settings.method_options:
+        others = fields(save.fields), dtype, width, checks, on_failure, survey_all
+        return planned(ensemble, grid.h, lambda one: Plan(ensemble, one, grid, *others))
+    chosen = method if isinstance(method, Method) else settings.method_of(method)
     if chosen.iterations == "auto":
         chosen = replace(chosen, iterations=enough_iterations(ensemble, chosen, grid.h, dtype))
         n = chosen.iterations
         number = f"{n} a solve, enough for" if n is not None else f"to the tolerance: {MOST_FIXED} are too few for"
         text = f"Newton steps {number} every member's start at twice the step"
         grid = replace(grid, messages=(*grid.messages, text))
-    on_failure = on_failure or settings.on_failure
     return Plan(ensemble, chosen, grid, fields(save.fields), dtype, width, checks, on_failure, survey_all)
 
 

@@ -78,8 +78,8 @@ def _of_times(plan: Plan, statistics: Sequence[Statistic], count: int) -> Sizes:
     block, *others = blocks(plan.ensemble.members)
     when, time = slice(0, count), plan.grid.times[:count]
     members = plan.ensemble.select(block.first, block.stop)
-    start = {name: np.repeat(values, count, axis=0) for name, values in at_start(plan, members).items()}
     packets = Packets(plan, members)
+    start = {name: np.repeat(values, count, axis=0) for name, values in at_start(plan, members, packets).items()}
     keeper = Gathered(time, plan.ensemble.members, statistics, plan.ensemble.replicates)
     gathers = keeper.open(plan, block, members)
     _, taking = _peak(lambda: gathers.take(when, samples_of(plan, when, start, packets.ended)))

@@ -50,7 +50,7 @@ def solve(
 
     Args:
         fleet: An Ensemble, or a Scene, which stands for its own ensemble (one vehicle if it has none).
-        method: A name or a Method; default "psi_s".
+        method: A name or a Method. Default: chosen by what acts, "psi_s" where nothing damps the motion.
         h: Step [s].
         t1: End of the run [s].
         save: Which samples to save, and when; default every [run] save_every of the scene, else the start and the end.

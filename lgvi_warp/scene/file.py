@@ -54,18 +54,31 @@ def tables_of_text(
 
 
 def _files_in(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
-    """Return the content with the path of a table of members, where it is relative, put below the folder."""
+    """Return the content with the paths of files that it names, where they are relative, put below the folder.
+
+    These are a table of members, and the policies of a controller.
+    """
     try:
         ensemble = content["ensemble"]
         sampling = ensemble["sampling"]
         table = sampling["table"]
-        known = isinstance(table["file"], str)
+        if isinstance(table["file"], str):
+            table = table | {"file": os.fspath(folder / table["file"])}
+            content = content | {"ensemble": ensemble | {"sampling": sampling | {"table": table}}}
     except (KeyError, TypeError):
-        return content
-    if not known:
-        return content
-    table = table | {"file": os.fspath(folder / table["file"])}
-    return content | {"ensemble": ensemble | {"sampling": sampling | {"table": table}}}
+        pass
+    try:
+        controller = content["controller"]
+        laws = [_below(folder, law) for law in controller["laws"]]
+        content = content | {"controller": controller | {"laws": laws}}
+    except (KeyError, TypeError, AttributeError):
+        pass
+    return content
+
+
+def _below(folder: Path, law: Any) -> Any:
+    """Return the table of a law, with the path of its file put below the folder."""
+    return law | {"file": os.fspath(folder / law["file"])} if isinstance(law.get("file"), str) else law
 
 
 def override(content: dict[str, Any], key: str, value: Any) -> None:

@@ -70,23 +70,31 @@ class Scene:
                 object.__setattr__(self, "controller", from_table(self.controller))
         if not faults:
             self._check_names(faults)
-        if not faults:
-            with faults.including():
-                self._connect()
+        sound = not faults
         for name, kind in KINDS.items():
             if not isinstance(getattr(self, name), kind):
                 faults.add(name, getattr(self, name), f"is no {kind.__name__}", f"give lw.{kind.__name__}(...)")
+        if sound and isinstance(self.vehicle, Vehicle) and isinstance(self.environment, Environment):
+            with faults.including():
+                self._connect()
         faults.raise_if_any()
 
     def _connect(self) -> None:
         """Let terms take the commands of the controller, if there is one; others are by themselves."""
         bus = None
         if self.controller is not None:
-            object.__setattr__(self, "controller", self.controller.wired(self.terms))
+            object.__setattr__(self, "controller", self.controller.wired(self.terms, self._nominal()))
             bus = self.controller.bus
         driven = set(bus.commands) if bus else set()
         wired = (term.driven_by(bus if term.key in driven else None) for term in self.terms)
         object.__setattr__(self, "terms", tuple(wired))
+
+    def _nominal(self) -> dict[str, np.ndarray]:
+        """The numbers of the vehicle and its environment by name."""
+        values = {f"vehicle.{name}": value for name, value in self.vehicle.parameters().items()}
+        values["environment.gravity"] = np.asarray(float(self.environment.gravity))
+        values["environment.water_density"] = np.asarray(float(self.environment.water_density))
+        return values
 
     @property
     def parts(self) -> tuple[Any, ...]:
@@ -126,9 +134,7 @@ class Scene:
             Values by name: "vehicle.mass", "environment.gravity", "drag.quadratic" (a term's name and its field), ...
             Shapes and units are those of the fields.
         """
-        values = {f"vehicle.{name}": value for name, value in self.vehicle.parameters().items()}
-        values["environment.gravity"] = np.asarray(float(self.environment.gravity))
-        values["environment.water_density"] = np.asarray(float(self.environment.water_density))
+        values = self._nominal()
         for term in self.parts:
             values |= {f"{term.key}.{name}": value for name, value in term.parameters().items()}
         return values

@@ -49,7 +49,7 @@ class RunSettings:
     """The section [run] of a scene file.
 
     Args:
-        method: Name of the integration method; by default "psi_s".
+        method: Name of the integration method; None (default) lets a run choose it by what acts in the scene.
         step: Length of a step [s]; None leaves it to the call of solve.
         duration: Simulated time [s]; None leaves it to the call of solve.
         save_every: Time between samples [s]; None leaves it to the call of solve.
@@ -69,7 +69,7 @@ class RunSettings:
         SceneError: If anything is wrong; the message lists every fault.
     """
 
-    method: str = "psi_s"
+    method: str | None = None
     step: float | None = None
     duration: float | None = None
     save_every: float | None = None
@@ -105,7 +105,7 @@ class RunSettings:
         faults.choice("dtype", self.dtype, DTYPES)
         faults.choice("checks", self.checks, CHECKS)
         faults.choice("on_failure", self.on_failure, ON_FAILURE)
-        if not isinstance(self.method, str):
+        if not isinstance(self.method, str | None):
             faults.add("method", self.method, "is not a text", 'give the name of a method, such as "psi_s"')
         else:
             with faults.including():
@@ -119,8 +119,8 @@ class RunSettings:
         """Return the integration method of this section, or another one by name.
 
         Args:
-            name: Name of a method. None (default), or the name in this section, gives the method with the options in
-                this section; any other name gives that method with its defaults.
+            name: Name of a method. None (default), or the name in this section, "psi_s" if it has none, gives the method with
+                the options in this section; any other name gives that method with its defaults.
 
         Returns:
             The method.
@@ -128,18 +128,24 @@ class RunSettings:
         Raises:
             SceneError: If the name is not known or an option does not fit the method.
         """
-        if name is not None and name != self.method:
+        own = Method.name if self.method is None else self.method
+        if name is not None and name != own:
             return Method(name)
+        return Method(own, **self.method_options)
+
+    @property
+    def method_options(self) -> dict[str, Any]:
+        """The options of the method that this section has, by name."""
         options = {key: getattr(self, key) for key in ("solver", "iterations", "tolerance", "rtol", "atol")}
-        return Method(self.method, **{key: value for key, value in options.items() if value is not None})
+        return {key: value for key, value in options.items() if value is not None}
 
     def to_dict(self) -> dict[str, Any]:
         """Return the section [run] of a scene file.
 
         Returns:
-            Method, dtype and every setting that differs from its default, by name.
+            dtype and every setting that differs from its default, by name.
         """
-        names = {"method", "dtype"}
+        names = {"dtype"}
         for setting in fields(self):
             value = getattr(self, setting.name)
             if not isinstance(value, type(setting.default)) or value != setting.default:

@@ -14,7 +14,8 @@ from lgvi_warp.common.errors import closest, refusal
 from lgvi_warp.common.real_numbers import NotReal, real_results
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
-from lgvi_warp.physics.fields import FIELDS, TABLE
+from lgvi_warp.physics.control.signals import CHANNELS, SIGNALS, ordered
+from lgvi_warp.physics.fields import FIELDS, TABLE, Field
 
 if TYPE_CHECKING:
     from lgvi_warp.physics.terms.base import Term
@@ -121,8 +122,11 @@ def _energy(samples: Fields, members: Members) -> np.ndarray:
 
 
 def _known(name: str, fields: tuple[str, ...], function: Function) -> Quantity:
-    field = TABLE[name]
-    return Quantity(name, function, field.unit, fields, field.labels, needs_limit=True)
+    return _of(TABLE[name], fields, function)
+
+
+def _of(field: Field, fields: tuple[str, ...], function: Function) -> Quantity:
+    return Quantity(field.name, function, field.unit, fields, field.labels, needs_limit=True)
 
 
 KNOWN: dict[str, Quantity] = {
@@ -140,6 +144,10 @@ KNOWN: dict[str, Quantity] = {
         _known("energy", FIELDS, _energy),
     )
 }
+# Signals of a controller whose shape is the same in all scenes.
+SIGNAL_QUANTITIES = {
+    name: _of(signal.field, (name,), _field(name)) for name, signal in SIGNALS.items() if name not in CHANNELS
+}
 
 
 def named(key: str, of: str, text: str) -> Quantity:
@@ -154,8 +162,10 @@ def named(key: str, of: str, text: str) -> Quantity:
         SceneError: the name or the component is not known.
     """
     match = re.fullmatch(r"(\w+)(\[[\d, ]+\])?", text.strip())
-    if match is None or (base := KNOWN.get(match[1])) is None:
-        raise refusal(key, of, "is not known", closest(text, KNOWN))
+    if match and match[1] in CHANNELS:
+        return _channel(key, of, match[1], match[2] or "")
+    if match is None or (base := KNOWN.get(match[1]) or SIGNAL_QUANTITIES.get(match[1])) is None:
+        raise refusal(key, of, "is not known", closest(text, (*KNOWN, *SIGNALS)))
     if match[2] is None:
         return base
     label = f"{base.name}[{', '.join(match[2][1:-1].replace(' ', '').split(','))}]"
@@ -164,6 +174,22 @@ def named(key: str, of: str, text: str) -> Quantity:
             raise refusal(key, of, f"{base.name} has one component", f"give {base.name!r}")
         raise refusal(key, of, f"{base.name} has the components {', '.join(base.labels)}", "give one of them")
     return component(base, base.labels.index(label))
+
+
+def _channel(key: str, of: str, name: str, index: str) -> Quantity:
+    """One channel of the actuators: only the scene knows how many there are."""
+    if not re.fullmatch(r"\[\d+\]", index):
+        raise refusal(key, of, f"is not one channel of {name}", f"give one: '{name}[0]'")
+    i, label = int(index[1:-1]), name + index
+
+    def function(samples: Fields, members: Members) -> np.ndarray:
+        count = samples[name].shape[-1]
+        if i >= count:
+            remedy = f"give '{name}[0]' to '{name}[{count - 1}]'"
+            raise refusal(key, of, f"is beyond the {count} channels of this scene", remedy)
+        return samples[name][..., i]
+
+    return Quantity(label, function, SIGNALS[name].field.unit, (name,), needs_limit=True)
 
 
 def component(base: Quantity, i: int) -> Quantity:
@@ -191,7 +217,7 @@ def joined(parts: Sequence[Quantity]) -> Quantity:
     def function(samples: Fields, members: Members) -> np.ndarray:
         return np.moveaxis(np.concatenate([part(samples, members) for part in parts], axis=1), 1, 2)
 
-    fields = tuple(name for name in FIELDS if any(name in part.fields for part in parts))
+    fields = ordered(name for part in parts for name in part.fields)
     units: Mapping[str, None] = dict.fromkeys(part.unit for part in parts)
     labels = tuple(label for part in parts for label in part.labels)
     needs_limit = any(part.needs_limit for part in parts)

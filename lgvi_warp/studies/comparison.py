@@ -408,6 +408,7 @@ class Reference:
         own: quantity -> (k,), largest difference of the two runs over the members and up to each time [its unit].
         sample: members, times and noise of the two runs, on which others are compared with them.
         asked: quantity of the errors, where it is none of QUANTITIES.
+        methods: names of the methods of the two runs.
     """
 
     result: Result
@@ -415,6 +416,7 @@ class Reference:
     own: dict[str, np.ndarray]
     sample: Sample
     asked: Compared | None = None
+    methods: tuple[str, ...] = ()
 
     def error(self, of: str, until: int = -1) -> float:
         """Return the reference's own error.
@@ -565,7 +567,7 @@ def make_reference(
         if best is None or end < best.error(of):
             worse = worse + 1 if best and end > stalled * best.error(of) and end < LOST else 0
             text = f"{second} at h = {sample.h(finer):.4g} s against {first} at h = {sample.h(m):.4g} s"
-            best = Reference(runs[1], text, disagreement, sample, compared)
+            best = Reference(runs[1], text, disagreement, sample, compared, (first, second))
         else:
             worse += best.error(of) < LOST
         begun += sum(run.compile_seconds for run in runs)

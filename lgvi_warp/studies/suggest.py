@@ -19,6 +19,7 @@ from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.physics.terms.noisy import NoisyTerm
+from lgvi_warp.runs.default_method import h_rates, is_damped
 from lgvi_warp.runs.result import Result
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
@@ -46,6 +47,17 @@ SAFETY = 1.15
 TIMES = 5
 # Methods in the order in which they are tried; those that are seldom the cheapest are left out.
 CANDIDATES = tuple(name for name in tradeoffs.CANDIDATES if name not in ("phi", "psi", "psi_w"))
+# Those that nearly always have the cheapest among them (`python -m benchmarks run suggest`): each kernel takes seconds to
+# compile. The others are tried where these do not keep the error, or where the search has their kernel already.
+SHORT = {
+    "conservative": ("rk8", "kl8(psi_x)", "psi_x", "psi_1"),
+    "damped": ("rk4", "rk8"),
+    "noisy": ("psi_x", "psi_s", "rk4"),
+}
+# Tried as well for drag by its exact flow, and where the step times the fastest rate of damping is above this.
+STIFFLY_DAMPED, STIFF = ("psi_x", "rkw3"), 2.0
+# A step in float32 costs at least this part of one in float64.
+LEAST_FLOAT32 = 0.4
 # Number of members that the choice is checked on.
 CHECKED = 1024
 # Number of members that a finished run is checked on.
@@ -146,7 +158,7 @@ def suggest(
         of: quantity that the error is of: any that statistics know, such as "position" [m], "attitude" [rad], "depth" [m],
             "position[2]" [m], "speed" [m/s] or "energy" [J], or a lw.Quantity. Default "position".
         t1: end time [s]. Default: run.duration of the scene.
-        methods: names of the methods to try. Default: all that the scene takes.
+        methods: names of the methods to try. Default: a few by what acts in the scene, the others where these fail.
         members: size of the sample that is searched. Default 128.
         threads: threads of the predicted run. Default: those of this machine.
         seconds: approximate length of the search, without compiling [s]. Default 30.
@@ -178,7 +190,15 @@ def suggest(
     sample = reference.sample
     report(0.3)
     deadline = time.perf_counter() + 0.6 * seconds
-    trials = search(sample, taken, reference, compared, error / SAFETY, deadline, lambda part: report(0.3 + 0.5 * part))
+    ladders = Ladders(sample, reference, compared, error / SAFETY, deadline)
+    few = taken if methods else short_list(sample, taken)
+    ladders.climb(few, lambda part: report(0.3 + 0.4 * part))
+    if not methods:
+        stiff = [name for name in STIFFLY_DAMPED if name in taken and name not in few and ladders.limited_by_damping]
+        ladders.climb(stiff)
+        others = [name for name in taken if name not in (*few, *stiff)]
+        ladders.climb(others, lambda part: report(0.7 + 0.1 * part), new_kernels=not ladders.priced)
+    trials = ladders.cheapest()
     if not trials:
         problem = f"error = {error:g} {compared.unit} of {compared.name}: no step of {', '.join(taken)} kept it"
         raise SceneError([f"{problem}; ask for a larger error, a shorter t1, or give more seconds"])
@@ -270,64 +290,129 @@ def checked_reference(sample: Sample, of: Compared, error: float, seconds: float
     return reference
 
 
-def search(
-    sample: Sample,
-    methods: Sequence[str],
-    reference: Reference,
-    asked: Compared,
-    target: float,
-    deadline: float,
-    report: Callable[[float], None],
-) -> list[Trial]:
-    """Find for each method and precision the longest step that keeps the target.
-
-    The step is halved until the error is below the target, then lengthened by the slope of the errors. A method is
-    given up where its steps cost twice what the cheapest setting so far does.
+def short_list(sample: Sample, taken: Sequence[str]) -> list[str]:
+    """List the methods to try first, by what acts in the scene.
 
     Args:
         sample: members and times.
-        methods: names of the methods to try, in this order.
+        taken: names of the methods that the scene takes.
+
+    Returns:
+        Their names; all where the scene takes none of the list.
+    """
+    if sample.noise(taken[0]) != "none":
+        names = SHORT["noisy"]
+    elif not is_damped(sample.ensemble):
+        names = SHORT["conservative"]
+    else:
+        splits = [name for name in STIFFLY_DAMPED if name in taken and not Method(name).tableau]
+        exact = any(sample.plan(sample.candidate(name, 1)).kernel_choice.drag for name in splits)
+        names = (*SHORT["damped"], *(splits if exact else ()))
+    return [name for name in names if name in taken] or list(taken)
+
+
+class Ladders:
+    """A search for the longest step of each method and precision that keeps the target.
+
+    The step is halved until the error is below the target, then lengthened by the slope of the errors. A method is
+    given up where its steps cost twice what the cheapest setting so far does, and a precision where the other one is better.
+
+    Args:
+        sample: members and times.
         reference: what errors are measured against.
         asked: quantity that the error is of.
         target: largest error allowed [unit of `asked`].
         deadline: time.perf_counter() at which to stop [s]; compiling postpones it.
-        report: called with the fraction of the search that is done.
 
-    Returns:
-        Trials that keep the target, the cheapest first; those above 1.5 times the cheapest cost are left out.
+    Attributes:
+        priced: (microseconds of one core per vehicle and second, trial) of each setting that keeps the target.
     """
-    of, size_of = asked.name, asked.largest(reference.result)
-    # A precision whose round-off is near the target is not tried.
-    dtypes = [name for name in PRECISIONS if target > 4.0 * comparison.ROUND_OFF[name] * size_of]
-    ladders = [(name, dtype) for name in methods for dtype in dtypes or ["float64"]]
-    priced: list[tuple[float, Trial]] = []
-    for i, (method, dtype) in enumerate(ladders):
-        report(i / len(ladders))
-        if time.perf_counter() > deadline and priced:
-            break
+
+    def __init__(self, sample: Sample, reference: Reference, asked: Compared, target: float, deadline: float):
+        self.sample, self.reference, self.of, self.target, self.deadline = (
+            sample,
+            reference,
+            asked.name,
+            target,
+            deadline,
+        )
+        # A precision whose round-off is near the target is not tried.
+        size = asked.largest(reference.result)
+        coarse = [name for name in PRECISIONS if target > 4.0 * comparison.ROUND_OFF[name] * size]
+        self.dtypes = coarse or ["float64"]
+        self.priced: list[tuple[float, Trial]] = []
+        self._compiled = {sample.plan(sample.candidate(name, 1)).spec for name in reference.methods}
+
+    def climb(self, methods: Sequence[str], report: Callable[[float], None] = void, new_kernels: bool = True) -> None:
+        """Search some methods, in this order.
+
+        Args:
+            methods: their names.
+            report: called with the fraction of them that is done.
+            new_kernels: whether to compile kernels that the search has not loaded. Default True.
+        """
+        specs = {
+            (method, dtype): self.sample.plan(self.sample.candidate(method, 1, dtype)).spec
+            for method in methods
+            for dtype in sorted(self.dtypes)
+        }
+        compiled = {ladder for ladder, spec in specs.items() if spec in self._compiled}
+        others = [ladder for ladder in specs if ladder not in compiled]
+        methods_compiled = {method for method, _ in compiled}
+        # What costs no compiling comes first, and last what the other precision of the method may spare.
+        others.sort(key=lambda ladder: ladder[0] in methods_compiled)
+        prices: dict[str, dict[str, float | None]] = {method: {} for method in methods}
+        for i, (method, dtype) in enumerate((*sorted(compiled, key=list(specs).index), *others)):
+            report(i / len(specs))
+            if time.perf_counter() > self.deadline and self.priced:
+                return
+            new, known = (method, dtype) not in compiled, prices[method]
+            least = min((price for price, _ in self.priced), default=math.inf)
+            # A step in float32 is cheaper, and its error is no smaller: float64 is for what round-off stopped.
+            if known.get("float32") is not None or known.get("float64", 0.0) in (None, math.inf):
+                continue
+            if new and (not new_kernels or LEAST_FLOAT32 * (known.get("float64") or 0.0) > least):
+                continue
+            known[dtype] = self._longest(method, dtype)
+            self._compiled.add(specs[method, dtype])
+
+    def _longest(self, method: str, dtype: str) -> float | None:
+        """Find the longest step, and return its cost [us of one core per vehicle and second].
+
+        It is infinite where steps that might keep the target are too dear, and None where the errors cease to fall.
+        """
+        sample, reference, of, target = self.sample, self.reference, self.of, self.target
         m, before, worse = sample.coarsest(2.0), math.inf, 0
         plan = sample.plan(sample.candidate(method, m, dtype))
-        deadline += plan.compile()
+        self.deadline += plan.compile()
         per_step = step_cost(plan)
-        cheapest = min((price for price, _ in priced), default=math.inf)
+        cheapest = min((price for price, _ in self.priced), default=math.inf)
         while per_step / sample.h(m) < 2.0 * cheapest:
             trial = tried(sample, sample.candidate(method, m, dtype), reference)
-            deadline += trial.result.compile_seconds
+            self.deadline += trial.result.compile_seconds
             size = trial.error(of)
             if size <= target:
                 best = lengthened(sample, trial, m, before, reference, of, target)
                 # Price the step that was found: where a step iterates, its work depends on its length.
-                priced.append((step_cost(best.plan) / best.candidate.h, best))
-                break
+                self.priced.append((step_cost(best.plan) / best.candidate.h, best))
+                return self.priced[-1][0]
             worse = worse + 1 if size > 0.8 * before and before < 0.1 else 0
-            if worse >= 2 or m > 10**7 or time.perf_counter() > deadline:
-                break
-            if m == sample.allowed(2 * m):
-                break
+            if worse >= 2 or m > 10**7 or time.perf_counter() > self.deadline or m == sample.allowed(2 * m):
+                return None
             before = size
             m = sample.allowed(2 * m)
-    cheapest = min((price for price, _ in priced), default=math.inf)
-    return [trial for price, trial in sorted(priced, key=lambda pair: pair[0]) if price < 1.5 * cheapest]
+        return math.inf
+
+    @property
+    def limited_by_damping(self) -> bool:
+        """Whether the cheapest setting's step is no longer small beside the fastest damping; True where there is none."""
+        trials = self.cheapest()
+        return not trials or h_rates(self.sample.ensemble, trials[0].candidate.h)["drag"] > STIFF
+
+    def cheapest(self) -> list[Trial]:
+        """The trials that keep the target, the cheapest first; those above 1.5 times the cheapest cost are left out."""
+        least = min((price for price, _ in self.priced), default=math.inf)
+        return [trial for price, trial in sorted(self.priced, key=lambda pair: pair[0]) if price < 1.5 * least]
 
 
 def step_cost(plan: Plan) -> float:

@@ -1,9 +1,10 @@
-"""A recording of a fleet for the rerun viewer: moving bodies, a few paths, and curves of depth, energy and outcomes."""
+"""A recording of a fleet for the rerun viewer: bodies, a few paths, and curves of depth, energy, commands and outcomes."""
 
 from __future__ import annotations
 
 import json
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,8 +14,9 @@ from lgvi_warp.common import files as durable
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw
 from lgvi_warp.common.status import Status, under_way
 from lgvi_warp.physics import notation
+from lgvi_warp.physics.control.signals import CHANNELS
 from lgvi_warp.runs.outcomes import outcome_text, outcomes
-from lgvi_warp.views.fleet import LOOKS, Curve, energy_curve, evenly, identity, quantiles, title
+from lgvi_warp.views.fleet import FAILURES, LOOKS, Curve, energy_curve, evenly, identity, quantiles, title
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
@@ -25,6 +27,8 @@ TRAILS = 40
 # Frames per chunk of columns: large enough to be quick to write, small enough to seek in.
 FRAMES = 20
 TIMELINE = "sim_time"
+# Colours of channels: those of all outcomes but the failures.
+_COLORS = [LOOKS[code].rgb for code in Status if code not in FAILURES]
 # Name, quantile and colour of each curve.
 CURVES = (("smallest", 0.0, (120, 150, 190)), ("median", 0.5, (255, 200, 60)), ("largest", 1.0, (190, 120, 120)))
 
@@ -33,8 +37,9 @@ def log_rerun(result: Result, path: str | os.PathLike[str]) -> Path:
     """Write the fleet as an .rrd recording; the file is there whole or not at all.
 
     At most MOST_BODIES members are shown, spread evenly. A member that an event stopped, or that failed, stays where it
-    ended, in the colour of its outcome. Curves are of the members under way at each time. The same run always gives the
-    recording and the application the same ids: the viewer keeps recordings and layouts apart by them.
+    ended, in the colour of its outcome. Curves are of the members under way at each time; those of "command" and "actuator",
+    where the result has them, are medians. The same run always gives the recording and the application the same ids: the
+    viewer keeps recordings and layouts apart by them.
 
     Args:
         result: A result with position, attitude, velocity and angular velocity.
@@ -59,15 +64,18 @@ def log_rerun(result: Result, path: str | os.PathLike[str]) -> Path:
     shown = evenly(np.flatnonzero(finite), MOST_BODIES)
     position = result.position[:, shown].astype(np.float32)
     curve, counted = energy_curve(result), under_way(result)
+    of_actuators = [field for field in CHANNELS if field in result.samples]
     name = identity(result)
     recording = rr.RecordingStream(f"lgvi_warp_{name}", recording_id=name)
     try:
         with durable.placed(target) as beside:
-            recording.save(beside, default_blueprint=_blueprint(result.time, position, curve))
+            recording.save(beside, default_blueprint=_blueprint(result.time, position, curve, of_actuators))
             recording.send_recording_name(title(result))
             _world(recording, rr, result, shown, position, counted[:, shown])
             _fan(recording, rr, result.time, "depth", result.position[..., 2], counted)
             _fan(recording, rr, result.time, entity_of(curve), curve.values, counted)
+            for field in of_actuators:
+                _channels(recording, rr, result.time, field, result.samples[field], counted)
             _members(recording, rr, result, counted)
             recording.log("run", rr.TextDocument(_text(result), media_type="text/markdown"), static=True, strict=True)
             recording.flush()
@@ -163,6 +171,13 @@ def _fan(recording: Any, rr: Any, time: np.ndarray, name: str, values: np.ndarra
         _series(recording, rr, f"{name}/{curve}", time, row, curve, color)
 
 
+def _channels(recording: Any, rr: Any, time: np.ndarray, name: str, values: np.ndarray, counted: np.ndarray) -> None:
+    """Log the median of each channel (k, n, channels) over the members that count at each time."""
+    for i in range(values.shape[-1]):
+        (row,) = quantiles(values[..., i], counted, [0.5])
+        _series(recording, rr, f"{name}/{i}", time, row, f"{name}[{i}]", _COLORS[i % len(_COLORS)])
+
+
 def _members(recording: Any, rr: Any, result: Result, counted: np.ndarray) -> None:
     """Log how many members are under way at each time, and how many ended, by outcome."""
     for code, group in _groups(result, np.asarray(result.status), counted):
@@ -186,7 +201,7 @@ def _series(
     recording.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=time)], columns, strict=True)
 
 
-def _blueprint(time: np.ndarray, position: np.ndarray, energy: Curve) -> Any:
+def _blueprint(time: np.ndarray, position: np.ndarray, energy: Curve, of_actuators: Sequence[str]) -> Any:
     """First layout of the viewer: the fleet on the left, the curves and the run's facts on the right."""
     import rerun.blueprint as rrb
 
@@ -211,6 +226,10 @@ def _blueprint(time: np.ndarray, position: np.ndarray, energy: Curve) -> Any:
         rrb.TimeSeriesView(origin="depth", name="Depth [m] of the members under way", axis_x=full_time),
         rrb.TimeSeriesView(
             origin=entity_of(energy), name=f"{energy.name} [J] of the members under way", axis_x=full_time
+        ),
+        *(
+            rrb.TimeSeriesView(origin=field, name=f"{field.capitalize()}s, medians", axis_x=full_time)
+            for field in of_actuators
         ),
         rrb.TimeSeriesView(origin="members", name="Members by outcome", axis_x=full_time),
         rrb.TextDocumentView(origin="run", name="Run"),

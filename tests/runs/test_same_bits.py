@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from benchmarks import problems
 from lgvi_kernels.advance import kernel
 from lgvi_kernels.lanes.arithmetic import WIDTHS
 from lgvi_kernels.lanes.flags import CPU_FLAGS
 from lgvi_warp.engine import plan
 from lgvi_warp.engine.block import blocks
+from lgvi_warp.runs.settle import make_plan
 from tests.conftest import ROOT
 from tests.support.tools import random_states, scene_of
 
@@ -111,3 +113,17 @@ def test_any_width(name, method, dtype, monkeypatch):
     quick = (name, method, dtype) == ("paper", "psi_x", "float64")
     reference = solve(8)
     assert all(same(reference, solve(width)) for width in ((1, 32) if quick else WIDTHS))
+
+
+TABLED = (problems.current_profile, problems.current_harmonics, problems.waves, problems.thrusters)
+EACH_OF_THEM = [pytest.param(problems.ALL, dtype, marks=pytest.mark.slow) for dtype in ("float64", "float32")]
+
+
+@pytest.mark.parametrize(("laws", "dtype"), [(TABLED, "float64"), *EACH_OF_THEM])
+def test_laws_with_rows_that_members_share(laws, dtype):
+    """A number that all members share, given for each of them, has the same bits in another kernel."""
+    scene, states = problems.scene(*(make() for make in laws)), random_states(3, 40)
+    shared = lw.Ensemble.from_states(scene, *states)
+    varied = lw.Ensemble.from_states(scene, *states, {"waves.amplitudes[0]": np.full(40, 0.3)})
+    assert [make_plan(fleet, h=0.05, t1=1.0).spec.shared_rows for fleet in (shared, varied)] == [True, False]
+    assert same(*(lw.solve(fleet, "psi_s", h=0.05, t1=1.0, dtype=dtype) for fleet in (shared, varied)))

@@ -141,6 +141,61 @@ def test_errors_of_whatever_statistics_know(scene, tmp_path):
     assert suggestion.verified(fleet, result, suggested)[0] <= 1.05e-4
 
 
+@pytest.mark.parametrize(
+    ("vehicle", "terms", "names"),
+    [
+        ("torpedo", [], ["rk8", "kl8(psi_x)", "psi_x", "psi_1"]),
+        ("remus_100", [], ["rk4", "rk8"]),
+        ("torpedo", [lw.Drag(linear=[5.0] * 6)], ["rk4", "rk8", "psi_x"]),
+        ("torpedo", [lw.GaussMarkovCurrent(standard_deviation=[0.1] * 3, time_constant=9.0)], ["psi_x", "psi_s"]),
+    ],
+)
+def test_few_methods_are_tried_first_by_what_acts(vehicle, terms, names):
+    sample = Sample(lw.Ensemble(lw.Scene.named(vehicle, terms=terms)), 4.0)
+    taken = sample.accepted(suggestion.CANDIDATES)[0]
+    assert suggestion.short_list(sample, taken) == names
+    refused = [name for name in taken if name not in names]
+    assert not refused or suggestion.short_list(sample, refused) == refused
+
+
+def test_a_search_compiles_only_what_may_be_cheaper(scene, monkeypatch):
+    """Costs are made up; of all kernels that of psi_s in float64 alone is there, from the reference."""
+    sample = Sample(scene, 4.0, 8)
+    reference = comparison.make_reference(sample, methods=("psi_s", "psi_s"), seconds=ENOUGH, goal=1.0)
+    asked = suggestion.compared_in("position")
+
+    def climbed(prices, methods, **settings):
+        ladders = suggestion.Ladders(sample, reference, asked, 0.1, math.inf)
+        climbs = []
+
+        def longest(method, dtype):
+            climbs.append((method, dtype[5:]))
+            price = prices[climbs[-1]]
+            if price is not None and price < math.inf:
+                ladders.priced.append((price, None))
+            return price
+
+        monkeypatch.setattr(ladders, "_longest", longest)
+        ladders.climb(methods, **settings)
+        return climbs
+
+    both = ["rk4", "psi_s"]
+    assert climbed({("psi_s", "64"): 9.0, ("rk4", "32"): 1.0}, both) == [("psi_s", "64"), ("rk4", "32")]
+    near = {("psi_s", "64"): 2.0, ("rk4", "32"): 1.0, ("psi_s", "32"): 0.9}
+    assert climbed(near, both) == list(near)
+    stalled = {("psi_s", "64"): None, ("rk4", "32"): None, ("rk4", "64"): 1.0}
+    assert climbed(stalled, both) == list(stalled)
+    dear = {("psi_s", "64"): math.inf, ("rk4", "32"): math.inf}
+    assert climbed(dear, both) == list(dear)
+    assert climbed({("psi_s", "64"): 1.0}, both, new_kernels=False) == [("psi_s", "64")]
+
+
+def test_compositions_of_one_method_share_a_kernel(scene):
+    sample = Sample(scene, 4.0)
+    specs = [sample.plan(sample.candidate(name, 1)).spec for name in ("kl8(psi_x)", "su4(psi_x)", "ss6_13(psi_x)")]
+    assert specs[0] == specs[1] == specs[2] != sample.plan(sample.candidate("psi_x", 1)).spec
+
+
 def test_growth_begins_at_one(scene):
     """The two starts differ by the angle that the curve is divided by, and by nothing else."""
     sample = Sample(scene, 4.0, 8)

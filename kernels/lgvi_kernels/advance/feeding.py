@@ -25,6 +25,7 @@ from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
 from lgvi_kernels.lanes.look import measurement_struct, reference_struct
 from lgvi_kernels.lanes.matrix3 import apply
 from lgvi_kernels.lanes.state import wrench_struct
+from lgvi_kernels.lanes.sums import place
 from lgvi_kernels.lanes.view import heading_error, remember, remembered
 from lgvi_kernels.maps.compose import superpose
 from lgvi_kernels.maps.in_turn import ROLES, in_turn
@@ -39,13 +40,14 @@ NOTED = {"demand": 6, "measured": 22, "reference": 20}
 
 
 def make_feed(spec, types, method, at_step, opened):
-    """(x, c, monitor, k, h, opening) -> the alarm after a look at the state after k steps.
+    """(feed, respond): the alarm after a look at the state after k steps.
 
-    method: see Step; at_step, opened: see Stepping.
+    Where the host is asked, feed only measures and guides; respond, at the start of the next launch, does the rest with what
+    the host has written into the memory. method: see Step; at_step, opened: see Stepping.
     """
     width, real, control = spec.width, spec.real, spec.control
-    State, Constants, Monitor = types.State, types.Constants, types.Monitor
-    Measurement, Reference = measurement_struct(width, real), reference_struct(width, real)
+    State, Constants, Monitor, Alarm = types.State, types.Constants, types.Monitor, types.Alarm
+    Measurement, Reference = measurement_struct(width, real, spec.shared_rows), reference_struct(width, real)
     Wrench, Lane = wrench_struct(width, real), types.Lane
     measure, guide, act, allocate, send = (in_turn(control.parts, role) for role in ROLES)
     velocities, momentum, water_velocity = method.velocities, method.momentum, method.water_velocity
@@ -54,12 +56,18 @@ def make_feed(spec, types, method, at_step, opened):
     notes_demand, notes_measured, notes_reference = (
         name in control.noted for name in ("demand", "measured", "reference")
     )
+    measured_row = NOTED["demand"] * notes_demand
+    reference_row = measured_row + NOTED["measured"] * notes_measured
 
     @wp.func
     def put3(memory: wp.array2d(dtype=Lane), i: int, row: int, v: Any):
         set_element(memory, i, row, 0, v.x)
         set_element(memory, i, row, 1, v.y)
         set_element(memory, i, row, 2, v.z)
+
+    @wp.func
+    def get3(memory: wp.array2d(dtype=Lane), i: int, row: int):
+        return vec3(element(memory, i, row, 0), element(memory, i, row, 1), element(memory, i, row, 2))
 
     @wp.func
     def truth(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64):
@@ -72,9 +80,10 @@ def make_feed(spec, types, method, at_step, opened):
         over = through
         if wp.static(drifts):
             over = through + water_velocity(x, c, real(h))
-        y.position = x.b
+        y.position = place(x)
         if wp.static(moved):
-            y.position = x.b + rotate(x, c.inertia.user_origin)
+            y.position = place(x) + rotate(x, c.inertia.user_origin)
+        y.b = y.position
         if wp.static(turned):
             y.north = apply(c.inertia.axes, x.R0)
             y.east = apply(c.inertia.axes, x.R1)
@@ -132,39 +141,63 @@ def make_feed(spec, types, method, at_step, opened):
         set_element(memory, i, row + 18, 0, heading_error(r, upright(r.position.x)))
         set_element(memory, i, row + 19, 0, r.speed)
 
-    @wp.func(inline=False)
-    def feed(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real):
-        """Measure, guide, control, allocate, send; the alarm of lanes whose commands are no numbers."""
+    @wp.func
+    def seen(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real):
+        """What is measured and what is wanted after k steps, both noted where they are asked for."""
         z = opened(at_step(x, k, h), c, -opening)
         if wp.static(momentum is not None):
             z.p = momentum(z)
         y = truth(z, c, monitor, k, h)
         r = upright(y.position.x)
-        w = Wrench()
-        row = int(monitor.bus)
         if wp.static(measure is not None):
             y = measure(y, r, y, c.loop)
         if wp.static(guide is not None):
             r = guide(r, r, y, c.loop)
+        if wp.static(notes_measured):
+            put_measured(y, c.memory, c.packet, monitor.bus + wp.static(measured_row))
+        if wp.static(notes_reference):
+            put_reference(r, c.memory, c.packet, monitor.bus + wp.static(reference_row))
+        return y, r
+
+    @wp.func
+    def noted(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64):
+        """The measurement and the wanted motion that the last look noted."""
+        y = truth(x, c, monitor, k, h)
+        row = monitor.bus + wp.static(measured_row)
+        y.position = get3(c.memory, c.packet, row)
+        y.north = get3(c.memory, c.packet, row + 3)
+        y.east = get3(c.memory, c.packet, row + 6)
+        y.down = get3(c.memory, c.packet, row + 9)
+        y.velocity = get3(c.memory, c.packet, row + 12)
+        y.water_velocity = get3(c.memory, c.packet, row + 15)
+        y.angular_velocity = get3(c.memory, c.packet, row + 18)
+        r = Reference()
+        row = monitor.bus + wp.static(reference_row)
+        r.position = get3(c.memory, c.packet, row)
+        r.north = get3(c.memory, c.packet, row + 3)
+        r.east = get3(c.memory, c.packet, row + 6)
+        r.down = get3(c.memory, c.packet, row + 9)
+        r.velocity = get3(c.memory, c.packet, row + 12)
+        r.angular_velocity = get3(c.memory, c.packet, row + 15)
+        r.speed = element(c.memory, c.packet, row + 19, 0)
+        return y, r
+
+    @wp.func
+    def acted(alarm: Alarm, y: Any, r: Any, c: Constants, monitor: Monitor):
+        """Control, allocate and send; the alarm with that of lanes whose commands are no numbers."""
+        w = Wrench()
         if wp.static(act is not None):
             w = act(w, r, y, c.loop)
         if wp.static(notes_demand):
-            put3(c.memory, c.packet, row, w.force)
-            put3(c.memory, c.packet, row + 3, w.torque)
-            row += 6
+            put3(c.memory, c.packet, monitor.bus, w.force)
+            put3(c.memory, c.packet, monitor.bus + 3, w.torque)
         if wp.static(allocate is not None):
             w = allocate(w, r, y, c.loop)
         # What was not delivered lies behind the commands.
         put3(c.memory, c.packet, monitor.commands, w.force)
         put3(c.memory, c.packet, monitor.commands + 3, w.torque)
-        if wp.static(notes_measured):
-            put_measured(y, c.memory, c.packet, row)
-            row += 22
-        if wp.static(notes_reference):
-            put_reference(r, c.memory, c.packet, row)
         if wp.static(send is not None):
             y = send(y, r, y, c.loop)
-        alarm = x.alarm
         if wp.static(checked):
             unity = ones(y.position.x)
             zero = unity - unity
@@ -180,7 +213,25 @@ def make_feed(spec, types, method, at_step, opened):
             alarm.code = positive(alarm.code, alarm.code, bad)
         return alarm
 
-    return feed
+    @wp.func(inline=False)
+    def feed(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real):
+        """Measure, guide, control, allocate, send."""
+        y, r = seen(x, c, monitor, k, h, opening)
+        return acted(x.alarm, y, r, c, monitor)
+
+    @wp.func(inline=False)
+    def ask(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real):
+        """Measure and guide."""
+        y, r = seen(x, c, monitor, k, h, opening)
+        return x.alarm
+
+    @wp.func(inline=False)
+    def respond(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64):
+        """Control, allocate and send, with what the last look noted and the host's answer."""
+        y, r = noted(x, c, monitor, k, h)
+        return acted(x.alarm, y, r, c, monitor)
+
+    return (ask, respond) if control.asked else (feed, method.step)
 
 
 def make_note_actuators(spec, View, at_step):

@@ -39,7 +39,7 @@ def make_advance(spec):
     """Build (without compiling) the kernel for this Spec."""
     width, real, checked = spec.width, spec.real, spec.checked
     types, stepping, watching, retry = make_types(spec), make_stepping(spec), make_watching(spec), make_retry(spec)
-    Lane, Ints, Alarm, Monitor = types.Lane, types.Ints, types.Alarm, types.Monitor
+    Lane, Number, Ints, Alarm, Monitor = types.Lane, types.Number, types.Ints, types.Alarm, types.Monitor
     Constants, DragFlow, Inertia, Params, Events = (
         types.Constants,
         types.DragFlow,
@@ -56,13 +56,15 @@ def make_advance(spec):
     lead_coefficient = spec.lead[1] if spec.lead is not None else 0.0
     energetic, substepped, stills, warned = spec.energy, spec.substep, spec.still, bool(spec.looks)
     looking = warned or energetic
-    controlled, feed, held = spec.control is not None, stepping.feed, stepping.held
+    controlled, feed, respond, held = spec.control is not None, stepping.feed, stepping.respond, stepping.held
+    asked = controlled and spec.control.asked
     read, write, back_up = make_rows(Lane, types.State, paced, spec.compensated)
     drifts = superpose(spec.laws, "flow") is not None
     sample = make_sample(Lane, spec.compensated, stepping.method, drifts, stills)
 
     keep_signals, sample_signals = make_signals(Lane)
-    note_actuators = make_note_actuators(spec, types.View, at_step) if controlled else stepping.method.step
+    reports = controlled and spec.control.reports
+    note_actuators = make_note_actuators(spec, types.View, at_step) if reports else stepping.method.step
 
     @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": CPU_FLAGS})
     def advance(
@@ -70,7 +72,7 @@ def make_advance(spec):
         inertia: wp.array(dtype=Inertia),
         params: wp.array(dtype=Params),
         events: wp.array(dtype=Events),
-        table: wp.array2d(dtype=Lane),
+        table: wp.array2d(dtype=Number),
         tolerance: real,
         force_tolerance: real,
         # method: length of each stage [s], in pairs where it has two halves; of the lead after each, and before the first
@@ -138,17 +140,30 @@ def make_advance(spec):
                 begin(x, c, monitor, h, frozen)
             if wp.static(controlled):
                 x.alarm = Alarm()
-                x.alarm = feed(x, c, monitor, 0, h, real(0.0))
-                note_actuators(x, c, h, 0)
+                if wp.static(not asked):
+                    x.alarm = feed(x, c, monitor, 0, h, real(0.0))
+            x = opened(x, c, opening)
+        if wp.static(asked):
+            # A launch without steps measures alone: so the host sees the start. Such a kernel has no lead.
+            x.alarm = Alarm()
+            if k1 > k0:
+                x.alarm = respond(x, c, monitor, k0, h)
+            else:
+                x.alarm = feed(x, c, monitor, k0, h, real(0.0))
+        if wp.static(controlled):
+            if k0 == 0:
+                if wp.static(reports):
+                    note_actuators(x, c, h, 0)
                 for j in range(monitor.signals.shape[0]):
                     monitor.first_signals[i, j] = memory[i, monitor.signals[j]]
-            x = opened(x, c, opening)
-            if wp.static(controlled and checked):
+        if wp.static(controlled and checked):
+            if wp.static(asked) or k0 == 0:
                 early = failures(x, frozen)
                 if any_positive(early):
                     for j in range(wp.static(width)):
                         if early[j] > real(0.0):
                             status[i][j] = int(early[j])
+                            failed_step[i][j] = k0
                     keep_signals(memory, i, monitor, 0, early)
                     kept = choose(early, x, kept)
                     frozen = frozen + early
@@ -168,7 +183,7 @@ def make_advance(spec):
             if singles > 0:
                 n = 1
             good = x
-            if wp.static(controlled and checked):
+            if wp.static(reports and checked):
                 if singles > 0:
                     # Where a lane fails in this step, its actuators are those of the step's start.
                     note_actuators(x, c, h, k)
@@ -265,7 +280,8 @@ def make_advance(spec):
                     y = opened(at_step(y, k, h), c, -opening)
                     sample(out, i, (s - s0) * numbers, columns, y, c, real(h), monitor, frozen)
                     if wp.static(controlled):
-                        note_actuators(x, c, h, k)
+                        if wp.static(reports):
+                            note_actuators(x, c, h, k)
                         sample_signals(out, i, (s - s0 + 1) * numbers, memory, monitor, frozen)
                     s += 1
         if any_frozen:

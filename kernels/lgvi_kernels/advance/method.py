@@ -122,8 +122,8 @@ def make_damping(laws, shear):
 def make_method(spec):
     """The functions of a method for this Spec."""
     width, real = spec.width, spec.real
-    structs = (make(width, real) for make in (view_struct, wrench_struct, flow_struct, damping_struct))
-    View, Wrench, Flow, Damping = structs
+    View = view_struct(width, real, spec.shared_rows)
+    Wrench, Flow, Damping = (make(width, real) for make in (wrench_struct, flow_struct, damping_struct))
     coupled, shifted = "coupled" in spec.parts, "origin" in spec.parts
     velocity = isotropic_velocity if spec.mass == "isotropic" else anisotropic_velocity
     if spec.explicit and spec.mass == "diagonal":

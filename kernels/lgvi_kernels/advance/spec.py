@@ -8,7 +8,7 @@ import warp as wp
 from lgvi_kernels.advance import monitor as monitors
 from lgvi_kernels.advance.rows import PACE_FIELDS, STATE_FIELDS
 from lgvi_kernels.lanes.arithmetic import int_lane, lane
-from lgvi_kernels.lanes.state import alarm_struct, inertia_struct, state_struct, struct, view_struct
+from lgvi_kernels.lanes.state import alarm_struct, inertia_struct, state_struct, struct, table_number, view_struct
 from lgvi_kernels.laws import drag
 from lgvi_kernels.maps.compose import params_of
 
@@ -22,11 +22,16 @@ class Control(NamedTuple):
     parts: modules of its parts, sensors first, then guidance, laws, allocation, and what commands pass on their way.
     numbers: the declared numbers of each part (see params_of).
     noted: what each look notes for samples, among NOTED.
+    reports: whether samples show where actuators are.
+    asked: whether a function of the host answers each look: a look then ends with the measurement and the wanted motion, and
+        the next launch begins with the commands. Such a kernel has no lead.
     """
 
     parts: tuple
     numbers: tuple
     noted: tuple = ()
+    reports: bool = False
+    asked: bool = False
 
 
 class Spec(NamedTuple):
@@ -60,6 +65,7 @@ class Spec(NamedTuple):
     backward: whether drag is checked for stages that go backward.
     substep: whether a step that has no solution is divided.
     control: of a scene with a controller, else None.
+    shared_rows: whether all members share the rows of the laws' table (see table_number).
     """
 
     width: int
@@ -92,6 +98,7 @@ class Spec(NamedTuple):
     backward: bool = False
     substep: bool = False
     control: Control | None = None
+    shared_rows: bool = False
 
     @property
     def watched(self) -> bool:
@@ -144,9 +151,11 @@ class Types(NamedTuple):
 
     Constants: all that is the same in every step of a packet. DragFlow: the constants of drag by its exact flow.
     Loop: the numbers of a controller's parts, nested as those of the laws.
+    Number: what the laws' table holds.
     """
 
     Lane: Any
+    Number: Any
     Ints: Any
     State: Any
     Alarm: Any
@@ -165,7 +174,7 @@ class Types(NamedTuple):
 def make_types(spec):
     """The types for this Spec."""
     width, real = spec.width, spec.real
-    Lane = lane(width, real)
+    Lane, Number = lane(width, real), table_number(width, real, spec.shared_rows)
     Inertia = inertia_struct(width, real, spec.mass, spec.parts)
     Params = params_of(spec.laws, spec.numbers, width, real)
     Events = params_of(spec.events, spec.numbers[len(spec.laws) :], width, real)
@@ -177,7 +186,7 @@ def make_types(spec):
         params=Params,
         tolerance=real,
         force_tolerance=real,
-        table=wp.array2d(dtype=Lane),
+        table=wp.array2d(dtype=Number),
         memory=wp.array2d(dtype=Lane),
         packet=wp.int32,
         entry=wp.int32,
@@ -187,10 +196,11 @@ def make_types(spec):
     )
     return Types(
         Lane,
+        Number,
         int_lane(width),
         state_struct(width, real, spec.compensated),
         alarm_struct(width, real),
-        view_struct(width, real),
+        view_struct(width, real, spec.shared_rows),
         Constants,
         DragFlow,
         Inertia,

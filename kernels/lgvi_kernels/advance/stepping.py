@@ -20,6 +20,8 @@ class Stepping(NamedTuple):
 
     method: see Step; watch: see Watch, None without events. at_step: (x, k, h) -> x with the number and the time of step k;
     opened: (x, c, length) -> x moved by the lead; one_step, stepped: one step, and a number of steps.
+    feed, respond: a controller's look (see make_feed); held: a number of steps and the looks between them; all three are
+    `step` where there is no controller.
     """
 
     method: Step
@@ -29,6 +31,7 @@ class Stepping(NamedTuple):
     one_step: Any
     stepped: Any
     feed: Any
+    respond: Any
     held: Any
 
 
@@ -99,7 +102,7 @@ def make_stepping(spec):
             x = one_step(x, c, monitor, k + j, h, stage_h, lead_h, first_h, opening)
         return x
 
-    feed = make_feed(spec, types, method, at_step, opened) if spec.control else step
+    feed, respond = make_feed(spec, types, method, at_step, opened) if spec.control else (step, step)
 
     @wp.func(inline=False)
     def held(x: State, c: Constants, monitor: Monitor, k: int, n: int, h: wp.float64, stage_h: wp.array(dtype=real),
@@ -118,4 +121,4 @@ def make_stepping(spec):
                 x.alarm = feed(x, c, monitor, at, h, opening)
         return x
 
-    return Stepping(method, watch, at_step, opened, one_step, stepped, feed, held if spec.control else step)
+    return Stepping(method, watch, at_step, opened, one_step, stepped, feed, respond, held if spec.control else step)

@@ -89,6 +89,12 @@ def _native_element(width, real, statement):
     return f"{kind} r; {place} {statement}"
 
 
+def _native_shared(width, real):
+    """C++ that reads one number of a two-dimensional array into all lanes."""
+    place = "((S*)rows.data)[(wp::int64)(entry * rows.shape[1] + row) + offset]"
+    return f"{native_head(width, real, '')} V R = V() + {place}; wp::vec_t<{width}, S> r; memcpy(&r, &R, sizeof(V)); return r;"
+
+
 def _vec3_maker(width, real):
     """The constructor of one type of Lane3."""
     # An overload cannot name its type by itself: its body is compiled after the loop below, when _L3 is the last type.
@@ -154,6 +160,14 @@ for _real in REALS:
         def element(rows: wp.array2d(dtype=_L), entry: int, row: int, offset: int) -> _L:
             """rows[entry, row + offset] of an array without gaps: one address serves all (constant) offsets."""
             ...
+
+        @wp.func_native(_native_element(_width, _real, "memcpy(&r, place, sizeof(r)); return r;"))
+        def entry_of(like: _L, rows: wp.array2d(dtype=_L), entry: int, row: int, offset: int) -> _L:
+            """`element`; `like` says which type, since the other overload, whose lanes share a number, cannot know it."""
+            ...
+
+        @wp.func_native(_native_shared(_width, _real))
+        def entry_of(like: _L, rows: wp.array2d(dtype=_R), entry: int, row: int, offset: int) -> _L: ...
 
         @wp.func_native(_native_element(_width, _real, "memcpy(place, &value, sizeof(r));"))
         def set_element(rows: wp.array2d(dtype=_L), entry: int, row: int, offset: int, value: _L):

@@ -156,6 +156,14 @@ def _power_of_two(real, p, n):
     return f"I {p}_ = ({n} + {f['bias']}) << {f['digits']}; {_bits('V', p, f'{p}_')}"
 
 
+def _nearest(real):
+    # Beyond half the rounder a number is whole, or as good as whole.
+    rounder = FORMATS[real]["rounder"]
+    return (
+        f"V T = A + (S){rounder!r}; T -= (S){rounder!r}; V B = A < (S)0 ? -A : A; V R = B < (S){rounder / 2!r} ? T : A;"
+    )
+
+
 def _exponential(real):
     # 2^N in two factors: N goes from where 2^N underflows to where it overflows.
     halves = f"I H = N >> 1; {_power_of_two(real, 'P', 'H')} {_power_of_two(real, 'O', '(N - H)')}"
@@ -305,9 +313,19 @@ for _real in REALS:
             """a kept between b and c; NaN stays NaN."""
             ...
 
+        @wp.func_native(_native_here("ABC", "A * B + C" if _width == 1 else "__builtin_elementwise_fma(A, B, C)"))
+        def fused(a: _L, b: _L, c: _L) -> _L:
+            """a b + c, rounded once (with one lane, where the compiler joins them)."""
+            ...
+
         @wp.func_native(_native_here("A", _root(_width).format("A")))
         def root(a: _L) -> _L:
             """Square root."""
+            ...
+
+        @wp.func_native(_body_here("A", _nearest(_real)))
+        def rounded(a: _L) -> _L:
+            """The nearest whole number; of two the even one."""
             ...
 
         @wp.func_native(_body_here("A", _exponential(_real)))

@@ -8,23 +8,24 @@ import functools
 import warp as wp
 
 from lgvi_kernels.lanes.arithmetic import lane, lane3
-from lgvi_kernels.lanes.state import struct
+from lgvi_kernels.lanes.state import struct, table_number
 
 
 @functools.cache
-def measurement_struct(width, real):
+def measurement_struct(width, real, shared=False):
     """What sensors say: the truth at first.
 
     north, east, down: the inertial axes in body axes, as in a View; position [m], inertial; velocity over ground and
     water_velocity through the water [m/s], angular_velocity [rad/s], body axes.
     t, period, h [s]: time of this look, time between looks, step. step, look: number of the step that begins, of this look.
-    table, memory, packet, entry: as in a View.
+    table, memory, packet, entry: as in a View, shared too; b, the true position, is there for functions of a View.
     """
     Lane, Lane3 = lane(width, real), lane3(width, real)
-    directions = {"north": Lane3, "east": Lane3, "down": Lane3, "position": Lane3}
+    directions = {"north": Lane3, "east": Lane3, "down": Lane3, "position": Lane3, "b": Lane3}
     rates = {"velocity": Lane3, "water_velocity": Lane3, "angular_velocity": Lane3}
     times = {"t": real, "period": real, "h": real, "step": wp.int32, "look": wp.int32}
-    rows = {"table": wp.array2d(dtype=Lane), "memory": wp.array2d(dtype=Lane), "packet": wp.int32, "entry": wp.int32}
+    table = wp.array2d(dtype=table_number(width, real, shared))
+    rows = {"table": table, "memory": wp.array2d(dtype=Lane), "packet": wp.int32, "entry": wp.int32}
     return struct("Measurement", **directions, **rates, **times, **rows)
 
 
@@ -32,11 +33,11 @@ def measurement_struct(width, real):
 def reference_struct(width, real):
     """The wanted motion.
 
-    position [m], velocity [m/s], inertial; north, east, down: the wanted attitude, as in a View; angular_velocity [rad/s], in
-    the axes of that attitude; speed [m/s], through the water ahead.
+    position [m], velocity [m/s], inertial; north, east, down: the wanted attitude, as in a View; angular_velocity [rad/s] and
+    angular_acceleration [rad/s^2], in the axes of that attitude; speed [m/s], through the water ahead.
     """
     Lane3 = lane3(width, real)
-    vectors = ("position", "velocity", "north", "east", "down", "angular_velocity")
+    vectors = ("position", "velocity", "north", "east", "down", "angular_velocity", "angular_acceleration")
     return struct("Reference", **dict.fromkeys(vectors, Lane3), speed=lane(width, real))
 
 

@@ -92,18 +92,25 @@ def flow_struct(width, real):
 
 
 @functools.cache
-def view_struct(width, real):
+def table_number(width, real, shared):
+    """What the laws' table holds: lanes, or, where all members share its rows, one number for them all."""
+    return real if shared else lane(width, real)
+
+
+@functools.cache
+def view_struct(width, real, shared=False):
     """What a law may read: the only argument that grows when laws need more, so their signatures stay.
 
     north, east, down: R^T e1, R^T e2, R^T e3, the inertial axes in body axes; b [m], inertial.
     nu [m/s], Om [rad/s]: velocities relative to the water, body axes; only damping laws see them.
     t [s], h [s]: time and length of this kick; step: its number; second: 0 in the first half of a kick, 1 in the second.
-    table, memory: rows of lanes at [packet, row], for laws with arrays of numbers and for laws that remember.
+    table, memory: rows at [packet, row], for laws with arrays of numbers and for laws that remember; shared: see table_number.
     """
     Lane, Lane3 = lane(width, real), lane3(width, real)
     directions = {"north": Lane3, "east": Lane3, "down": Lane3, "b": Lane3, "nu": Lane3, "Om": Lane3}
     times = {"t": real, "h": real, "step": wp.int32, "second": wp.int32}
-    rows = {"table": wp.array2d(dtype=Lane), "memory": wp.array2d(dtype=Lane), "packet": wp.int32, "entry": wp.int32}
+    table = wp.array2d(dtype=table_number(width, real, shared))
+    rows = {"table": table, "memory": wp.array2d(dtype=Lane), "packet": wp.int32, "entry": wp.int32}
     return struct("View", **directions, **times, **rows)
 
 

@@ -12,6 +12,7 @@ from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
     div,
     dot,
     element,
+    entry_of,
     mul,
     neg,
     ones,
@@ -20,7 +21,7 @@ from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
     sub,
     vec3,
 )
-from lgvi_kernels.lanes.functions import arctangent2, clamp
+from lgvi_kernels.lanes.functions import arctangent2, clamp, fused
 
 
 @wp.func
@@ -52,15 +53,16 @@ def heading_error(wanted: Any, view: Any):
 @wp.func
 def row1(view: Any, row: int):
     """One number of the law's table."""
-    return element(view.table, view.entry, row, 0)
+    return entry_of(view.b.x, view.table, view.entry, row, 0)
 
 
 @wp.func
 def row3(view: Any, row: int):
     """Three rows of the law's table as a vector."""
+    like = view.b.x
     t = view.table
     i = view.entry
-    return vec3(element(t, i, row, 0), element(t, i, row, 1), element(t, i, row, 2))
+    return vec3(entry_of(like, t, i, row, 0), entry_of(like, t, i, row, 1), entry_of(like, t, i, row, 2))
 
 
 @wp.func
@@ -81,7 +83,7 @@ def ramp(view: Any, row: int, x: Any):
     unity = ones(x)
     t = view.table
     i = view.entry
-    return clamp((x - element(t, i, row, 0)) * element(t, i, row, 1), unity - unity, unity)
+    return clamp((x - entry_of(x, t, i, row, 0)) * entry_of(x, t, i, row, 1), unity - unity, unity)
 
 
 @wp.func
@@ -91,7 +93,7 @@ def table1(view: Any, first: int, count: int, x: Any):
     value = row1(view, first)
     for i in range(count):
         at = first + 1 + 3 * i
-        value = value + ramp(view, at, x) * element(view.table, view.entry, at, 2)
+        value = fused(ramp(view, at, x), entry_of(x, view.table, view.entry, at, 2), value)
     return value
 
 
@@ -102,9 +104,9 @@ def table3(view: Any, first: int, count: int, x: Any):
     for i in range(count):
         at = first + 3 + 5 * i
         change = vec3(
-            element(view.table, view.entry, at, 2),
-            element(view.table, view.entry, at, 3),
-            element(view.table, view.entry, at, 4),
+            entry_of(x, view.table, view.entry, at, 2),
+            entry_of(x, view.table, view.entry, at, 3),
+            entry_of(x, view.table, view.entry, at, 4),
         )
         value = value + ramp(view, at, x) * change
     return value
@@ -168,12 +170,12 @@ def make_pursuit(solved):
         unity = ones(limit)
         # Times count back from t: within one piece its length is then h to the last digit.
         left = h * unity
-        value = element(table, entry, first, 0)
+        value = entry_of(limit, table, entry, first, 0)
         for i in range(count):
             at = first + 1 + 3 * i
-            since = t * unity - element(table, entry, at, 0)
-            steepness = element(table, entry, at, 1)
-            change = element(table, entry, at, 2)
+            since = t * unity - entry_of(limit, table, entry, at, 0)
+            steepness = entry_of(limit, table, entry, at, 1)
+            change = entry_of(limit, table, entry, at, 2)
             # Ramps that ended before are nothing but their change.
             due = positive(left, unity - (since - left) * steepness, unity - unity)
             if any_positive(due):

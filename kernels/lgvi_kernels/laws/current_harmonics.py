@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import add, cosine, mul, neg, row1, row3, sine, struct  # noqa: F401
+from lgvi_kernels.law import add, cosine, fused, mul, neg, ones, row1, row3, sine, struct  # noqa: F401
 
 FLOW = "uniform"
 
@@ -26,7 +26,7 @@ def flow(f: Any, view: Any, p: Any):
         at = p.first + wp.static(ROWS) * j
         amplitude = row3(view, at)
         omega = row1(view, at + 3)
-        angle = view.t * omega + row1(view, at + 4)
+        angle = fused(view.t * ones(omega), omega, row1(view, at + 4))
         f.velocity = f.velocity + cosine(angle) * amplitude
         f.rate = f.rate + -(omega * sine(angle)) * amplitude
     return f

@@ -9,6 +9,7 @@ from lgvi_kernels.law import (  # noqa: F401
     add,
     cosine,
     exponential,
+    fused,
     greatest,
     mul,
     neg,
@@ -52,7 +53,7 @@ def flow(f: Any, view: Any, p: Any):
         k = row1(view, at + 2)
         omega = row1(view, at + 3)
         speed = row3(view, at + 5)
-        theta = north * view.b.x + east * view.b.y + (row1(view, at + 4) - view.t * omega)
+        theta = north * view.b.x + east * view.b.y + fused(-(view.t * ones(omega)), omega, row1(view, at + 4))
         decayed = exponential(-(k * below))
         c = decayed * cosine(theta)
         s = decayed * sine(theta)

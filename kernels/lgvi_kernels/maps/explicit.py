@@ -444,7 +444,7 @@ def make_explicit(spec, everything, velocities, slope):
     turned = make_turned(rotation_struct(width, real), real)
     moves = {"vector": (along, completed), "inertial": (along_known, completed)}
     move, complete = moves.get(method.kind, (make_act(turned), None))
-    View = view_struct(width, real)
+    View = view_struct(width, real, spec.shared_rows)
     push = make_push(Wrench, View, spec.laws) if method.kind == "inertial" else None
     shape = (spec.mass, "coupled" in spec.parts, spec.flow != "none", spec.scaled)
     drag = make_resistance(spec.drag) if spec.drag else None

@@ -13,7 +13,6 @@ from lgvi_warp.common import machine
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.outcome import Outcome
 from lgvi_warp.engine.plan import Plan
-from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.statistics.samples import Fields
 
@@ -143,7 +142,7 @@ class Samples:
 def _empty(plan: Plan, names: Sequence[str], members: int) -> dict[str, np.ndarray]:
     """Uninitialised arrays for all samples of so many members, by field."""
     k, real = len(plan.grid.times), machine.DTYPES[plan.dtype]
-    fields = {name: np.empty((k, members, *TABLE[name].shape), real) for name in names}
+    fields = {name: np.empty((k, members, *plan.table[name].shape), real) for name in names}
     if plan.spec.compensated and "position" in fields:
         fields["position"] = np.empty((k, members, 3))
     return fields

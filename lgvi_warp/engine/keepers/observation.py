@@ -11,7 +11,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.status import failed, stopped
 from lgvi_warp.engine.keepers.statistics import Gathered
-from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.physics.control.signals import SIGNALS, ordered
 from lgvi_warp.physics.terms.events import Event
 from lgvi_warp.scene.settings import check_keep
 from lgvi_warp.statistics.base import Statistic, from_list
@@ -65,14 +65,17 @@ class Observation:
             asked: fields of the samples to keep.
 
         Returns:
-            Names of the fields, in the order of FIELDS.
+            Names of the fields, in their order.
         """
         wanted = {name for statistic in self.statistics for name in statistic.quantity.fields}
         if self.until is not None:
             wanted |= set(watch_fields(self.until, self.statistics))
         if self.samples:
             wanted |= set(asked)
-        return tuple(name for name in FIELDS if name in wanted)
+        elif self.keep != "none":
+            # Members that are run again have the bits of the run, and so its kernel, which notes these signals.
+            wanted |= set(asked) & SIGNALS.keys()
+        return ordered(wanted)
 
     def watch(self, times: np.ndarray) -> tuple[tuple[Statistic, ...], Watch | None]:
         """The statistics to gather, and the watch of the stopping condition.

@@ -11,10 +11,23 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.physics import vehicle
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term
 
 # What guidance may give, and laws may need.
 WISHES = ("depth", "position", "velocity", "heading", "attitude", "angular_velocity", "speed")
+
+
+# What sensors read, and how many numbers each has.
+READINGS = {
+    "depth": 1,
+    "heading": 1,
+    "position": 3,
+    "attitude": 3,
+    "velocity": 3,
+    "water_velocity": 3,
+    "angular_velocity": 3,
+}
 
 
 class Bus(NamedTuple):
@@ -26,16 +39,20 @@ class Bus(NamedTuple):
         report: First of as many rows as there are commands, where actuators say where they are.
         acting: First row of the commands that act, where commands are delayed. As many rows of the commands before follow, and
             the row of the step from which the former act.
+        answer: First of the rows into which a `Callback` writes; as many as it returns numbers.
         rows: Number of rows.
         delayed: Whether the commands of some member are delayed.
+        period: Time between two looks [s].
     """
 
     commands: Mapping[str, tuple[int, int]]
     unmet: int
     report: int
     acting: int
+    answer: int
     rows: int
     delayed: bool = False
+    period: float = 1.0
 
     @property
     def channels(self) -> int:
@@ -43,11 +60,13 @@ class Bus(NamedTuple):
         return self.unmet
 
     @classmethod
-    def of(cls, channels: Mapping[str, int]) -> Bus:
+    def of(cls, channels: Mapping[str, int], period: float = 1.0, answers: int = 0) -> Bus:
         """The bus of some actuators.
 
         Args:
             channels: Number of commands of each, by the key of its term.
+            period: Time between two looks [s]; 1 by default.
+            answers: Numbers that a function of the host writes at each look; 0 by default, for none.
 
         Returns:
             Rows for all of them.
@@ -56,7 +75,7 @@ class Bus(NamedTuple):
         for key, count in channels.items():
             commands[key] = (row, count)
             row += count
-        return cls(commands, row, row + 6, 2 * row + 6, 4 * row + 7)
+        return cls(commands, row, row + 6, 2 * row + 6, 4 * row + 7, 4 * row + 7 + answers, period=period)
 
     def values_of(self, key: str) -> dict[str, Any]:
         """What the device code of an actuator reads.
@@ -89,6 +108,9 @@ class Part(Term):
     acts: ClassVar[bool] = False
     section: ClassVar[str] = ""
     needs: ClassVar[tuple[str, ...]] = ()
+    # What its device code may have, in this order, and what that of a run has.
+    every_feature: ClassVar[tuple[str, ...]] = ()
+    chosen: ClassVar[tuple[str, ...]] = ()
     # Where it finds the numbers of others; set for a part of a scene.
     bus: ClassVar[Bus | None] = None
 
@@ -97,12 +119,37 @@ class Part(Term):
         """What it wants of the motion, among `WISHES`; by default nothing."""
         return ()
 
-    def wired(self, bus: Bus, actuators: Mapping[str, Term]) -> Any:
+    def features(self, numbers: Numbers) -> tuple[str, ...]:
+        """What its device code must have for some members; by default nothing beyond what it always has.
+
+        Args:
+            numbers: The part's numbers by field, each of shape (n, ...).
+
+        Returns:
+            Words that the part knows.
+        """
+        return ()
+
+    def with_features(self, known: frozenset[str]) -> Any:
+        """The same part, with the device code for what some member of a run needs.
+
+        Args:
+            known: Words "key.feature" of all parts.
+
+        Returns:
+            A copy.
+        """
+        part = copy.copy(self)
+        chosen = tuple(word for word in self.every_feature if f"{self.key}.{word}" in known)
+        object.__setattr__(part, "chosen", chosen)
+        return part
+
+    def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
         """The same part, knowing where it finds what others write.
 
         Args:
             bus: Rows of the memory.
-            actuators: Terms that take commands, by key.
+            others: Terms that take commands, and sensors, by key.
 
         Returns:
             A copy.
@@ -149,6 +196,21 @@ class ControlLaw(Part):
     section: ClassVar[str] = "laws"
     kinds: ClassVar[dict[str, Any]] = {}
     demands: ClassVar[tuple[str, ...]] = ()
+    # Numbers of the vehicle by name, as the scene has them, whatever a member's are; set for a law of a scene.
+    nominal: ClassVar[Numbers] = {}
+
+    def of_vehicle(self, nominal: Numbers) -> Any:
+        """The same law, knowing the vehicle that its author had in mind.
+
+        Args:
+            nominal: Parameters of vehicle and environment by name, each of the shape that the scene has.
+
+        Returns:
+            A copy.
+        """
+        law = copy.copy(self)
+        object.__setattr__(law, "nominal", nominal)
+        return law
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The numbers as they are: a controller works in the user's axes."""
@@ -183,8 +245,73 @@ class IntegralLaw(ControlLaw):
         return Packed(dict(numbers) | words, memory=np.zeros((1, 2 * self.integrals)))
 
 
-# Later than any run, and within float32.
-NEVER = 1e30
+# What a law of the pose adds to its demand.
+FEEDFORWARD = ("none", "restoring")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PoseLaw(IntegralLaw):
+    """A law of position and attitude, each with an integral of three numbers.
+
+    Args:
+        feedforward: "restoring": what balances weight, buoyancy and their moment at the measured attitude, by the numbers of
+            the scene, whatever a member's are: a controller does not know them; or "none", the default.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("position", "velocity", "attitude", "angular_velocity")
+    demands: ClassVar[tuple[str, ...]] = ("X", "Y", "Z", "K", "M", "N")
+    integrals: ClassVar[int] = 6
+
+    feedforward: str = "none"
+
+    def check(self, faults: Faults) -> None:
+        """In addition, a fault where `feedforward` is unknown."""
+        super().check(faults)
+        faults.choice("feedforward", self.feedforward, FEEDFORWARD)
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        """In addition, each limit by itself, and the nominal weight less buoyancy with the moment of both."""
+        limits = numbers["integral_limit"]
+        values = {name: value for name, value in numbers.items() if name != "integral_limit"}
+        net, moment = np.zeros(1), np.zeros((1, 3))
+        if self.feedforward == "restoring":
+            net, moment = restoring(self.nominal)
+        more = {"position_limit": limits[:, 0], "attitude_limit": limits[:, 1], "net_weight": net, "moment": moment}
+        return super().packed(values | more, context)
+
+
+def restoring(nominal: Numbers) -> tuple[np.ndarray, np.ndarray]:
+    """What weight and buoyancy do to a vehicle.
+
+    Args:
+        nominal: Parameters of a scene by name, each of the shape that the scene has.
+
+    Returns:
+        Weight less buoyancy (1,) [N], which acts downward; and the sum of both times their points (1, 3) [N m] in body axes,
+        whose cross product with the direction downward is the moment.
+    """
+    numbers = {name: np.asarray(value)[None] for name, value in nominal.items()}
+    weight, buoyancy = vehicle.weight(numbers), numbers["vehicle.buoyancy"]
+    centers = vehicle.center_of_mass(numbers), numbers["vehicle.center_of_buoyancy"]
+    return weight - buoyancy, weight[:, None] * centers[0] - buoyancy[:, None] * centers[1]
+
+
+# A step beyond any run, and within float32. A time and a whole number of steps that differ by less than the second, as a part of
+# the step, are the same.
+NEVER, SAME_TIME = 1e30, 1e-6
+
+
+def first_step(time: np.ndarray, h: float) -> np.ndarray:
+    """The first step at or after a time.
+
+    Args:
+        time: Times [s], of any shape; inf for never.
+        h: Step of the run [s].
+
+    Returns:
+        Numbers of steps, in the same shape; `NEVER` for never.
+    """
+    return np.ceil(np.minimum(time / h, NEVER) - SAME_TIME)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -205,10 +332,10 @@ class Allocation(Part):
 
     to: str = ""
 
-    def wired(self, bus: Bus, actuators: Mapping[str, Term]) -> Any:
+    def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
         """In addition, knows its actuator."""
-        part = super().wired(bus, actuators)
-        object.__setattr__(part, "actuator", actuators[self.to])
+        part = super().wired(bus, others)
+        object.__setattr__(part, "actuator", others[self.to])
         return part
 
     def informed(self, faults: Sequence[Any], asked: np.ndarray) -> Any:
@@ -232,20 +359,20 @@ class Allocation(Part):
         """Numbers of the channels that are known to be lost at some time."""
         return tuple(sorted({fault.channel for fault in self.losses}))
 
-    def times_of_loss(self, context: PackingContext) -> np.ndarray:
-        """When each channel is known to be lost.
+    def steps_of_loss(self, context: PackingContext) -> np.ndarray:
+        """The first step at which each channel is known to be lost.
 
         Args:
-            context: The scene's parameters.
+            context: The scene's parameters and the step.
 
         Returns:
-            Times (1 or n, channels) [s]; `NEVER` for a channel that is not.
+            Numbers of steps (1 or n, channels); `NEVER` for a channel that is not.
         """
         times = [np.full((1, self.actuator.channels), NEVER)]
         for fault in self.losses:
             time = context.parameters[f"{fault.key}.time"]
             one = np.full((len(time), self.actuator.channels), NEVER)
-            one[:, fault.channel] = np.minimum(time, NEVER)
+            one[:, fault.channel] = first_step(time, context.h)
             times.append(one)
         return np.asarray(functools.reduce(np.minimum, times))
 

@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, closest
-from lgvi_warp.physics.control.base import SECTIONS, Allocation, Bus, Part
+from lgvi_warp.physics.control.base import READINGS, SECTIONS, Allocation, Bus, Part
+from lgvi_warp.physics.control.callback import Callback, CallbackCommands, refuse_second
 from lgvi_warp.physics.control.delay import Delay
 from lgvi_warp.physics.control.fault import Fault
 from lgvi_warp.physics.control.pseudo_inverse import PseudoInverse
+from lgvi_warp.physics.control.sensor import Sensor
 from lgvi_warp.physics.terms.base import Term, build, check_list
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS
 
@@ -69,6 +71,7 @@ class Controller:
         if not faults and not self.laws:
             faults.add("laws", "", "are missing", "give at least one, such as lw.HeadingPID(kp=...)")
         if not faults:
+            refuse_second([part for part in self.laws if isinstance(part, Callback)])
             self._check_wishes(faults)
         faults.raise_if_any()
 
@@ -96,10 +99,21 @@ class Controller:
 
     @property
     def acting_parts(self) -> tuple[Part, ...]:
-        """The parts in the order in which the kernel has them: the delay, where there is one, before the faults."""
+        """The parts in the order in which the kernel has them: faults of a sensor right after it, others after the delay."""
         assert self.bus is not None
-        before = tuple(part for section in tuple(SECTIONS)[:-1] for part in getattr(self, section))
-        return (*before, *((self.delay_part,) if self.bus.delayed else ()), *self.faults)
+        callback, parts = self.callback, list[Part]()
+        # The commands of a callback reach their actuator by an allocation of their own.
+        idle = callback if callback is not None and callback.to else None
+        for part in (part for section in tuple(SECTIONS)[:-1] for part in getattr(self, section) if part is not idle):
+            of_sensor = (fault for fault in self.faults if getattr(fault, "sensor", None) and fault.of == part.key)
+            parts += [part, *of_sensor]
+        others = tuple(part for part in self.faults if part not in parts)
+        return (*parts, *((self.delay_part,) if self.bus.delayed else ()), *others)
+
+    @property
+    def callback(self) -> Callback | None:
+        """The law that is a function of the host; None where there is none."""
+        return next((part for part in self.laws if isinstance(part, Callback)), None)
 
     def parameters(self) -> dict[str, np.ndarray]:
         """The numbers that may vary by member.
@@ -110,11 +124,12 @@ class Controller:
         values = {f"{part.key}.{name}": value for part in self.parts for name, value in part.parameters().items()}
         return {f"{self.key}.delay": self.delay} | values
 
-    def wired(self, terms: Sequence[Term]) -> Controller:
+    def wired(self, terms: Sequence[Term], nominal: Mapping[str, np.ndarray] | None = None) -> Controller:
         """The same controller, whose parts know their actuators and the rows of the memory.
 
         Args:
             terms: Terms of the scene.
+            nominal: Numbers of the vehicle and its environment by name, as the scene has them; none by default.
 
         Returns:
             A copy.
@@ -132,7 +147,11 @@ class Controller:
         whole = copy.copy(self)
         object.__setattr__(whole, "allocation", tuple(part.informed(self.faults, self.asked) for part in allocation))
         object.__setattr__(whole, "actuators", actuators)
-        controller = whole.on(Bus.of({key: term.channels for key, term in actuators.items()}))
+        object.__setattr__(whole, "laws", tuple(part.of_vehicle(nominal or {}) for part in self.laws))
+        channels = {key: term.channels for key, term in actuators.items()}
+        callback = self.callback
+        answers = 0 if callback is None else channels[callback.to] if callback.to else 6
+        controller = whole.on(Bus.of(channels, self.period, answers))
         for part in controller.allocation:
             part.check_actuator(faults)
         faults.raise_if_any()
@@ -183,14 +202,17 @@ class Controller:
         object.__setattr__(controller, "bus", bus)
         actuators = {key: term.driven_by(bus) for key, term in self.actuators.items()}
         object.__setattr__(controller, "actuators", actuators)
+        others = {**actuators, **{part.key: part for part in self.sensors}}
         for section in SECTIONS:
-            parts = tuple(part.wired(bus, actuators) for part in getattr(self, section))
+            parts = tuple(part.wired(bus, others) for part in getattr(self, section))
             object.__setattr__(controller, section, parts)
         return controller
 
     def _allocation(self, faults: Faults, able: Mapping[str, Term]) -> tuple[Allocation, ...]:
         """The allocation, or the default one, checked."""
         given = tuple(self.allocation)
+        if self.callback is not None and self.callback.to:
+            given = (CallbackCommands(to=self.callback.to), *(part for part in given if part.type))
         if not given:
             if len(able) != 1:
                 fault = "is missing" if able else "has no actuator: no term of the scene takes commands"
@@ -210,16 +232,16 @@ class Controller:
         return given
 
     def _check_faults(self, faults: Faults, actuators: Mapping[str, Term]) -> None:
-        for part in self.faults:
-            if not isinstance(part, Fault):
-                continue
-            if part.of not in actuators:
-                faults.add("faults.of", part.of, "is no actuator of this controller", closest(part.of, actuators))
-            elif not 0 <= part.channel < actuators[part.of].channels:
-                count = actuators[part.of].channels
-                faults.add(
-                    "faults.channel", part.channel, f"is beyond the {count} of {part.of}", f"give 0 to {count - 1}"
-                )
+        counts = {part.key: READINGS[part.of] for part in self.sensors if isinstance(part, Sensor)}
+        counts |= {key: term.channels for key, term in actuators.items()}
+        for part in (part for part in self.faults if isinstance(part, Fault)):
+            key, count = f"{part.key}.channel", counts.get(part.of, 0)
+            if part.of not in counts:
+                remedy = closest(part.of, counts)
+                faults.add(f"{part.key}.of", part.of, "is no actuator and no sensor of this controller", remedy)
+            elif not 0 <= part.channel < count:
+                remedy = f"give 0 to {count - 1}" if count > 1 else "give 0"
+                faults.add(key, part.channel, f"is beyond the {count} of {part.of}", remedy)
 
     def every(self, h: float) -> int:
         """Steps between two looks.
@@ -258,7 +280,7 @@ class Controller:
         """
         content: dict[str, Any] = {"period": float(self.period)}
         content |= {"delay": float(self.delay)} if self.delay else {}
-        lists = {section: [part.to_dict() for part in getattr(self, section)] for section in SECTIONS}
+        lists = {section: [part.to_dict() for part in getattr(self, section) if part.type] for section in SECTIONS}
         return content | {section: parts for section, parts in lists.items() if parts}
 
 

@@ -52,7 +52,7 @@ class AllocationMatrix(Allocation):
         A = numbers["matrix"]
         limit = context.own(self.actuator)["limit"]
         inverse = np.linalg.pinv(A)
-        rows = side_by_side(A, np.swapaxes(inverse, -1, -2), limit[..., None], self.times_of_loss(context)[..., None])
+        rows = side_by_side(A, np.swapaxes(inverse, -1, -2), limit[..., None], self.steps_of_loss(context)[..., None])
         assert self.bus is not None
         first, count = self.bus.commands[self.to]
         return Packed(

@@ -87,7 +87,7 @@ class PseudoInverse(Allocation):
         curve = [own.get(key, value) for key, value in keys.items()]
         share = np.zeros((1, B.shape[2]))
         share[0, list(lost)] = 2.0 ** np.arange(len(lost))
-        columns = (limit, *curve, self.times_of_loss(context), share)
+        columns = (limit, *curve, self.steps_of_loss(context), share)
         channels = side_by_side(np.swapaxes(B, -1, -2), *(column[..., None] for column in columns))
         rows.append(channels.reshape(len(channels), -1))
         curves, size = self._curves(own)

@@ -14,7 +14,7 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SetPoint(Guidance):
-    """A place, a heading and a speed that are wanted all the time. What is not given is not wanted.
+    """A place, a heading and a speed that are wanted all the time. What is not given stays as guidance before it wants it.
 
     Args:
         position: Wanted position, (3,) [m], inertial axes.
@@ -50,9 +50,11 @@ class SetPoint(Guidance):
         return (*position, *depth, *heading, *(("speed",) if self.speed is not None else ()))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """All numbers; zeros for what is not wanted."""
+        """All numbers, and which of them are wanted; what is not stays as guidance before it wants it."""
         position = numbers.get("position", np.zeros((1, 3)))
         zero = np.zeros(1)
         depth = numbers.get("depth", position[:, 2])
         values = {"heading": numbers.get("heading", zero), "speed": numbers.get("speed", zero)}
-        return Packed({"position": position, "depth": depth, **values})
+        wishes = {"place": "position", "level": "depth", "turn": "heading", "pace": "speed"}
+        wanted = {name: int(wish in self.gives) for name, wish in wishes.items()}
+        return Packed({"position": position, "depth": depth, **values, **wanted})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import functools
+import keyword
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple, TypeVar
@@ -116,6 +117,19 @@ def number(
     return field(default=default, metadata=meta | dict(optional=optional, infinite=infinite))
 
 
+def word_of(item: dataclasses.Field[Any]) -> str:
+    """The name of a field in scene files, parameters and faults.
+
+    Args:
+        item: A field of a term.
+
+    Returns:
+        Its name; without the underscore at the end where the rest is a word of Python, as of `lambda_`.
+    """
+    word = item.name.removesuffix("_")
+    return word if keyword.iskeyword(word) else item.name
+
+
 @functools.cache
 def _number_fields(kind: Any) -> tuple[dataclasses.Field[Any], ...]:
     """Kept, since each pass over a term's numbers asks for them."""
@@ -170,7 +184,7 @@ class Term:
         lengths: dict[str, int] = {}
         for item in self.number_fields():
             value = getattr(self, item.name)
-            object.__setattr__(self, item.name, _checked(faults, item, value, lengths))
+            object.__setattr__(self, item.name, _checked(faults, item, value, lengths, self.shape_of(item)))
         if not faults:
             self.check(faults)
         faults.raise_if_any()
@@ -183,6 +197,18 @@ class Term:
             The dataclass fields declared by `number`, in the order of the class.
         """
         return _number_fields(cls)  # type: ignore[arg-type]  # a class is hashable
+
+    def shape_of(self, item: dataclasses.Field[Any]) -> tuple[Any, ...]:
+        """The shape of a numeric field of this object.
+
+        Args:
+            item: The field.
+
+        Returns:
+            By default the shape that the class declares.
+        """
+        shape: tuple[Any, ...] = item.metadata["shape"]
+        return shape
 
     @classmethod
     def lanes(cls) -> tuple[tuple[str, int], ...] | None:
@@ -257,7 +283,7 @@ class Term:
             The array of each numeric field, by the field's name, in the field's own shape.
         """
         return {
-            item.name: getattr(self, item.name)
+            word_of(item): getattr(self, item.name)
             for item in self.number_fields()
             if getattr(self, item.name) is not None and item.name not in self.unused
         }
@@ -271,7 +297,7 @@ class Term:
         Returns:
             A mask (n,) for each numeric field, True where the member's number is refused.
         """
-        fields = {item.name: item for item in self.number_fields()}
+        fields = {word_of(item): item for item in self.number_fields()}
         return {name: _outside(fields[name], value) | _falling(fields[name], value) for name, value in numbers.items()}
 
     def present(self, numbers: Numbers) -> bool:
@@ -365,6 +391,32 @@ class Term:
         still = self.water(numbers, position[None], np.zeros(1), context.parameters)
         return np.zeros_like(position) if still is None else still[0]
 
+    def braking(self, numbers: Numbers, speeds: Array, water_density: Array) -> Array:
+        """How strongly the term brakes at some speeds: minus the derivative of its wrench by the velocity, or a bound.
+
+        A run without a method looks at it, to choose one that is stable (lgvi_warp.runs.default_method).
+
+        Args:
+            numbers: The term's numbers by field, each of shape (n, ...).
+            speeds: Sizes of velocity and angular velocity along and about the body's axes, (n, 6) [m/s, rad/s].
+            water_density: Density of the water, (n,) [kg/m3].
+
+        Returns:
+            Matrices (n, 6, 6) [N s/m, N s, N m s], user's axes and origin.
+
+        Raises:
+            NotImplementedError: Where the term does not define it: its damping then counts as strong.
+        """
+        raise NotImplementedError(f"{type(self).__name__} does not tell how strongly it brakes")
+
+    def drive(self) -> Array:
+        """Largest force and torque with which the term drives the vehicle, whatever its motion, by the scene's numbers.
+
+        Returns:
+            Sizes along and about the body's axes (6,) [N, N m]; by default zero.
+        """
+        return np.zeros(6)
+
     def potential(self, numbers: Numbers, position: Array, attitude: Array, parameters: Numbers) -> Array | float:
         """Potential energy of the law at sampled states.
 
@@ -389,18 +441,20 @@ class Term:
         for item in dataclasses.fields(self):
             value = getattr(self, item.name)
             if item.name != "name" and value is not None:
-                content[item.name] = value.tolist() if isinstance(value, np.ndarray) else value
+                content[word_of(item)] = value.tolist() if isinstance(value, np.ndarray) else value
         return content
 
 
-def _checked(faults: Faults, one: dataclasses.Field[Any], value: Any, lengths: dict[str, int]) -> np.ndarray | None:
-    """The value of a field as an array of its shape; None after adding a fault."""
-    meta = one.metadata
+def _checked(
+    faults: Faults, one: dataclasses.Field[Any], value: Any, lengths: dict[str, int], shape: tuple[Any, ...]
+) -> np.ndarray | None:
+    """The value of a field as an array of this shape; None after adding a fault."""
+    meta, name = one.metadata, word_of(one)
     if value is None and meta["optional"]:
         return None
-    shape, unit = meta["shape"], meta["unit"]
+    unit = meta["unit"]
     if any(isinstance(size, str) for size in shape):
-        array = faults.finite(one.name, value, None, unit)
+        array = faults.finite(name, value, None, unit)
         if array is None:
             return None
         wanted = tuple(lengths.get(size, size) if isinstance(size, str) else size for size in shape)
@@ -408,22 +462,22 @@ def _checked(faults: Faults, one: dataclasses.Field[Any], value: Any, lengths: d
         fits = array.ndim == len(shape) and all(isinstance(want, str) or want == size for want, size in pairs)
         if not fits or 0 in array.shape:
             text = " x ".join(str(size) for size in wanted)
-            faults.add(one.name, value, f"has shape {array.shape}", f"give {text} numbers [{unit}]")
+            faults.add(name, value, f"has shape {array.shape}", f"give {text} numbers [{unit}]")
             return None
         lengths |= {size: got for size, got in zip(shape, array.shape, strict=True) if isinstance(size, str)}
     elif meta["infinite"]:
-        array = faults.real(one.name, value)
+        array = faults.real(name, value)
     else:
-        array = faults.finite(one.name, value, shape, unit)
+        array = faults.finite(name, value, shape, unit)
     if array is None:
         return None
     if _outside(one, array[None]).any():
         words = ((meta["above"], "above"), (meta["least"], "from"), (meta["most"], "to"))
         bounds = " ".join(f"{word} {bound:g}" for bound, word in words if np.isfinite(bound))
         problem = "is not positive" if meta["above"] == 0.0 and np.any(array <= 0.0) else "is out of bounds"
-        faults.add(one.name, value, problem, f"give numbers {bounds} [{unit}]")
+        faults.add(name, value, problem, f"give numbers {bounds} [{unit}]")
     elif _falling(one, array[None]).any():
-        faults.add(one.name, value, "is not rising", "sort the table and drop repetitions")
+        faults.add(name, value, "is not rising", "sort the table and drop repetitions")
     else:
         return array
     return None
@@ -512,7 +566,7 @@ def build(where: str, kind: type[AnyTerm], table: Mapping[str, Any]) -> AnyTerm:
         SceneError: Where a field is unknown, missing or wrong. The message lists every fault.
     """
     faults = Faults()
-    fields = {item.name: item for item in dataclasses.fields(kind) if item.init}
+    fields = {word_of(item): item for item in dataclasses.fields(kind) if item.init}
     values = {key: value for key, value in table.items() if key != "type"}
     faults.keys(where, values, fields)
     for name, item in fields.items():
@@ -520,7 +574,7 @@ def build(where: str, kind: type[AnyTerm], table: Mapping[str, Any]) -> AnyTerm:
             faults.add(f"{where}.{name}", "", "is missing", f"give it [{item.metadata.get('unit', '')}]")
     faults.raise_if_any()
     try:
-        return kind(**values)
+        return kind(**{fields[name].name: value for name, value in values.items()})
     except SceneError:
         raise
     except ValueError:  # a law that computes with its numbers before they are checked

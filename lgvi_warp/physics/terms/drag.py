@@ -101,6 +101,11 @@ class Drag(Term):
         matrices = {kind: numbers[kind][:, :, None] * np.eye(6) for kind in ("linear", "quadratic")}
         return packed_matrix(matrices["linear"], matrices["quadratic"], context)
 
+    def braking(self, numbers: Numbers, speeds: np.ndarray, water_density: np.ndarray) -> np.ndarray:
+        """The derivatives on the diagonal."""
+        diagonal = numbers["linear"] + 2.0 * numbers["quadratic"] * speeds
+        return np.asarray(diagonal[:, :, None] * np.eye(6))
+
     def device_in(self, aligned: bool) -> str:
         """The device code of `DragMatrix`, in the form for these axes."""
         return "drag_matrix" if aligned else "drag_matrix_turned"
@@ -168,6 +173,10 @@ class DragMatrix(Term):
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The matrices in the axes and about the origin of the forces."""
         return packed_matrix(numbers["linear"], numbers["quadratic"], context)
+
+    def braking(self, numbers: Numbers, speeds: np.ndarray, water_density: np.ndarray) -> np.ndarray:
+        """The derivatives, column by column."""
+        return np.asarray(numbers["linear"] + 2.0 * numbers["quadratic"] * speeds[:, None, :])
 
     def device_in(self, aligned: bool) -> str:
         """The code that reads matrices directly, or for turned axes the code that first finds the user's velocities."""

@@ -68,6 +68,14 @@ class Fins(Term):
         bad["normal"] = bad["normal"] | np.any(_degenerate(chord, normal), axis=-1)
         return bad
 
+    def braking(self, numbers: Numbers, speeds: np.ndarray, water_density: np.ndarray) -> np.ndarray:
+        """The derivative along each normal, at the whole speed, as if lift and both kinds of drag acted at once."""
+        slope = numbers["lift_slope"] + 2.0 * (numbers["drag"] + numbers["drag_normal"])
+        size = 0.5 * water_density[:, None] * numbers["area"] * slope * np.linalg.norm(speeds[:, :3], axis=1)[:, None]
+        normal = numbers["normal"] / np.linalg.norm(numbers["normal"], axis=-1, keepdims=True)
+        rows = np.concatenate([normal, np.cross(numbers["position"], normal)], axis=-1)
+        return np.asarray(np.einsum("nk,nki,nkj->nij", size, rows, rows))
+
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Device rows of each fin, see `fin_rows`."""
         rows = fin_rows(numbers, context)

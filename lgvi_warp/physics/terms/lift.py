@@ -29,6 +29,11 @@ class BodyLift(Term):
 
     matrix: Any = number((6, 6), "kg/m, kg, kg m")
 
+    def braking(self, numbers: Numbers, speeds: np.ndarray, water_density: np.ndarray) -> np.ndarray:
+        """The matrix at the speed ahead; and by that speed itself the sizes of what it multiplies."""
+        ahead = np.eye(6)[0] * (np.abs(numbers["matrix"]) @ speeds[:, :, None])
+        return np.asarray(numbers["matrix"] * speeds[:, :1, None] + ahead)
+
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Rows that measure u (6), and the matrix (36), in the axes and about the origin of the forces."""
         X = motion_from(context.frame.forces, context.frame.Q)

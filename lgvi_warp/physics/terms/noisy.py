@@ -26,6 +26,24 @@ def channel(key: str) -> int:
     return _signed(2 * zlib.crc32(key.encode()))
 
 
+def key_of(name: str, context: PackingContext) -> dict[str, Any]:
+    """What keys random numbers, besides the number of the draw: the low 64 bits of the seed, the member, who draws.
+
+    Args:
+        name: Name of the term or of the part of a controller.
+        context: The scene's parameters, the frame and the run.
+
+    Returns:
+        The fields of a key of the device (see lgvi_kernels/lanes/noise.py).
+    """
+    return {
+        "member": context.members.astype(np.int32),
+        "seed0": _signed(context.seed),
+        "seed1": _signed(context.seed >> 32),
+        "channel": channel(name),
+    }
+
+
 def _signed(word: int) -> int:
     """The low 32 bits read as an int32."""
     return (word + 2**31) % 2**32 - 2**31
@@ -67,7 +85,7 @@ class NoisyTerm(Term):
         return 1 if self.noise_step is None else max(1, round(h / self.noise_step))
 
     def noise_key(self, context: PackingContext) -> dict[str, Any]:
-        """What keys the random numbers, besides the number of the draw: the low 64 bits of the seed, the member, the term.
+        """What keys the random numbers of this term (see `key_of`).
 
         Args:
             context: The scene's parameters, the frame and the run.
@@ -75,12 +93,7 @@ class NoisyTerm(Term):
         Returns:
             The field `key` of the device struct, for `Packed`.
         """
-        key = {
-            "member": context.members.astype(np.int32),
-            "seed0": _signed(context.seed),
-            "seed1": _signed(context.seed >> 32),
-            "channel": channel(self.key),
-        }
+        key = key_of(self.key, context)
         return {"key": key if self.noise_step is None else key | {"draws": self.draws(context.h)}}
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:

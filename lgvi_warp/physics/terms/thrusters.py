@@ -195,6 +195,12 @@ class Thrusters(Term):
         astern = evaluate(self.polynomial_astern, np.maximum(-u - self.dead_band, 0.0))
         return np.asarray(self.coefficient * ahead - self.coefficient_astern * astern)
 
+    def drive(self) -> np.ndarray:
+        """The largest thrusts of the schedule, as if all pushed the same way."""
+        along = self.direction / np.linalg.norm(self.direction, axis=1, keepdims=True)
+        wrenches = np.concatenate([along, np.cross(self.position, along)], axis=1)
+        return np.asarray(np.abs(self.thrust(self.command_schedule)).max(axis=0) @ np.abs(wrenches))
+
     def command_for(self, thrust: Any) -> np.ndarray:
         """The smallest commands that give these thrusts.
 

@@ -29,6 +29,10 @@ class Wrench(Term):
     force: Any = number((3,), "N", (0.0, 0.0, 0.0))
     torque: Any = number((3,), "N m", (0.0, 0.0, 0.0))
 
+    def drive(self) -> np.ndarray:
+        """The sizes of force and torque."""
+        return np.abs(np.concatenate([self.force, self.torque]))
+
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Force and torque about the origin of the forces, in the kernel's axes."""
         force, torque = numbers["force"], numbers["torque"]
@@ -67,6 +71,10 @@ class WrenchSchedule(Term):
     def check(self, faults: Faults) -> None:
         """Adds a fault where the interpolation is unknown."""
         faults.choice("interpolation", self.interpolation, SHAPES)
+
+    def drive(self) -> np.ndarray:
+        """The largest sizes of force and torque in the schedule."""
+        return np.abs(np.concatenate([self.force, self.torque], axis=1)).max(axis=0)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Two tables: the force, and the torque about the origin of the forces."""

@@ -1,6 +1,6 @@
 """The parts of a controller of one vehicle, in the user's body axes and about his origin: what each does at a look."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -32,13 +32,17 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Reference:
-    """The wanted motion: position [m], velocity [m/s], inertial; R; angular_velocity [rad/s] in the axes of R; speed [m/s]."""
+    """The wanted motion: position [m] and velocity [m/s], inertial; R; speed [m/s].
+
+    angular_velocity [rad/s] and angular_acceleration [rad/s^2] in the axes of R.
+    """
 
     position: Array
     velocity: Array
     R: Array
     angular_velocity: Array
     speed: float
+    angular_acceleration: Array = field(default_factory=lambda: np.zeros(3))
 
 
 NO_WISH = Reference(np.zeros(3), np.zeros(3), np.eye(3), np.zeros(3), 0.0)
@@ -76,10 +80,71 @@ class Part:
         return w
 
 
+def upright(heading: float) -> Array:
+    """The attitude (3, 3) of a heading [rad], without roll and pitch."""
+    c, s = np.cos(heading), np.sin(heading)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
 def heading_error(wanted: Array, measured: Array) -> float:
     """The heading of one attitude (3, 3) less that of another [rad], in [-pi, pi], from their forward axes."""
     s, c = wanted[:2, 0], measured[:2, 0]
     return float(np.arctan2(s[1] * c[0] - s[0] * c[1], s @ c))
+
+
+def attitude_error(wanted: Array, measured: Array) -> Array:
+    """e_R = vee(R_d^T R - R^T R_d) / 2 (3,), in the axes of the measured attitude R, of the wanted one R_d."""
+    skew = wanted.T @ measured - measured.T @ wanted
+    return 0.5 * np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
+
+
+def pose_errors(r: Reference, y: Measurement) -> tuple[Array, Array, Array, Array]:
+    """e_b = b_d - b, inertial axes; e_R; R^T v_d - nu and R^T R_d Omega_d - Omega, body axes."""
+    rate = y.R.T @ r.R @ r.angular_velocity - y.angular_velocity
+    return r.position - y.position, attitude_error(r.R, y.R), y.R.T @ r.velocity - y.velocity, rate
+
+
+def unhindered(error: Array, unmet: Array, conditional: bool) -> Array:
+    """An error (3,) without the parts of which more would go where some of the demand was not delivered."""
+    return np.where(conditional & (unmet * error > 0.0), 0.0, error)
+
+
+class PoseIntegrals:
+    """The integrals I of e_b, inertial axes, and I_R of e_R, body axes, of a law of the pose; each waits in body axes."""
+
+    def __init__(self) -> None:
+        zero: Array = np.zeros(3)
+        self.I, self.I_R, self.e, self.e_R = zero, zero, zero, zero
+
+    def at_look(self, law: Any, y: Measurement, unmet: Array, e: Array, e_R: Array) -> tuple[Array, Array]:
+        """I and I_R at this look, from the errors of the last one; those of this look are kept.
+
+        Args:
+            law: integral_limit (2,) and anti_windup.
+            y, unmet, e, e_R: Measurement; what the last look did not deliver (6,); errors of this look.
+        """
+        conditional = law.anti_windup == "conditional"
+        error = y.R @ unhindered(y.R.T @ self.e, unmet[:3], conditional)
+        error_R = unhindered(self.e_R, -unmet[3:], conditional)
+        limit, limit_R = law.integral_limit
+        self.I = np.clip(self.I + y.period * error, -limit, limit)
+        self.I_R = np.clip(self.I_R + y.period * error_R, -limit_R, limit_R)
+        self.e, self.e_R = e, e_R
+        return self.I, self.I_R
+
+
+def balance(law: Any, y: Measurement) -> Array:
+    """The wrench (6,) that balances weight and buoyancy of the nominal vehicle, if the law's feedforward is "restoring".
+
+    Args:
+        law: feedforward; weight and buoyancy [N], center_of_mass and center_of_buoyancy (3,) [m] of the nominal vehicle.
+        y: Measurement.
+    """
+    if law.feedforward != "restoring":
+        return np.zeros(6)
+    down = y.R[2]
+    moment = np.cross(law.center_of_mass, law.weight * down) - np.cross(law.center_of_buoyancy, law.buoyancy * down)
+    return -np.concatenate([(law.weight - law.buoyancy) * down, moment])
 
 
 def cannot(reached: Array) -> Array:

@@ -79,7 +79,7 @@ class Loop:
         for name, law in self.actuators.items():
             held = arrived[-1][name].copy() if arrived else np.zeros_like(law.limit)
             for fault in self.faults:
-                if fault.of == name and look_time + 0.5 * h > fault.time:
+                if fault.of == name and look_time + 1e-6 * h >= fault.time:
                     held[fault.channel] = fault.gain * held[fault.channel] + fault.offset
             law.held = held
 

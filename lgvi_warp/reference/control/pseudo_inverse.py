@@ -20,14 +20,14 @@ class PseudoInverse(Part):
     time = 0.0
 
     def measure(self, y: Measurement) -> Measurement:
-        """Keeps the time, half a step later since times round."""
-        self.time = y.t + 0.5 * y.h
+        """Keeps the time, a little later since times round."""
+        self.time = y.t + 1e-6 * y.h
         return y
 
     def allocate(self, w: Array, actuators: dict[str, Any]) -> Array:
         """t = W^-1 B^T (B W^-1 B^T)^+ w, as commands within limits; left are (I - B B^+) w and B times what is cut off."""
         actuator, B = actuators[self.to], self.effect.copy()
-        B[:, [channel for channel, time in self.losses if self.time > time]] = 0.0
+        B[:, [channel for channel, time in self.losses if self.time >= time]] = 0.0
         W = np.diag(1.0 / np.sqrt(np.ones(B.shape[1]) if self.weights is None else np.asarray(self.weights)))
         inverse = W @ np.linalg.pinv(B @ W, rcond=1e-10)
         t = inverse @ w

@@ -4,21 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from lgvi_warp.reference.control import Measurement, Part, Reference
+from lgvi_warp.reference.control import Measurement, Part, Reference, upright
 
 
 class SetPoint(Part):
-    """Numbers as those of `lw.SetPoint`; what is not given is 0."""
+    """Numbers as those of `lw.SetPoint`; what is None is not wanted."""
 
-    position = np.zeros(3)
-    depth = None
-    heading = 0.0
-    speed = 0.0
+    position = depth = heading = speed = None
 
     def guide(self, r: Reference, y: Measurement) -> Reference:
         """Position, an upright attitude of this heading, and speed."""
-        c, s = np.cos(self.heading), np.sin(self.heading)
-        x, y_east, z = self.position
-        position = np.array([x, y_east, z if self.depth is None else self.depth])
-        R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        return replace(r, position=position, R=R, speed=self.speed)
+        position = r.position if self.position is None else np.asarray(self.position)
+        if self.depth is not None:
+            position = np.array([*position[:2], self.depth])
+        turned = self.heading is not None or self.position is not None
+        R = upright(self.heading or 0.0) if turned else r.R
+        return replace(r, position=position, R=R, speed=r.speed if self.speed is None else self.speed)

@@ -15,7 +15,7 @@ import numpy as np
 from lgvi_warp.common import files as durable
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.engine.block import Block
-from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.physics.control.signals import SAVED
 from lgvi_warp.runs.store.folder import KEPT, Folder
 from lgvi_warp.runs.store.layout import KEPT_MEMBER, MEMBER
 from lgvi_warp.runs.store.open import folder_of, open_run
@@ -161,7 +161,7 @@ def _parquet(folder: Folder, target: Path) -> None:
 
 def _timed(group: Any) -> list[str]:
     """Names of the fields with samples."""
-    return [name for name in FIELDS if name in group]
+    return [name for name in SAVED if name in group]
 
 
 def _rows(group: Any, run: Block) -> dict[str, tuple[str, np.ndarray]]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from lgvi_warp.common import machine
 from lgvi_warp.engine.block import Block, blocks
-from lgvi_warp.physics.fields import TABLE
+from lgvi_warp.physics.fields import dims_of
 from lgvi_warp.runs import member_fields
 
 if TYPE_CHECKING:
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 # Dimension of the members of a run, and that of kept members, whose coordinate is their index in the run.
 MEMBER, KEPT_MEMBER = "realization", "member"
-# Names of the last dimensions of an array, by their sizes; others are named after the array.
-TAILS = {(): (), (3,): ("component",), (3, 3): ("row", "column")}
 
 
 class Chunking(Protocol):
@@ -73,8 +71,7 @@ class StoreArray:
     @property
     def dims(self) -> tuple[str, ...]:
         """Names of the array's dimensions."""
-        numbered = tuple(f"{self.name}_{i}" for i in range(len(self.tail)))
-        return (*(("time",) if self.times else ()), self.along, *TAILS.get(self.tail, numbered))
+        return (*(("time",) if self.times else ()), self.along, *dims_of(self.name, self.tail))
 
     @property
     def fill(self) -> float | int:
@@ -151,7 +148,7 @@ def _samples(plan: Plan, length: int, store: Chunking) -> list[StoreArray]:
     arrays = []
     for name in (name for name in plan.fields if store.fields is None or name in store.fields):
         computed = np.dtype("f8") if plan.spec.compensated and name == "position" else real
-        field = TABLE[name]
+        field = plan.table[name]
         stored = np.dtype(store.dtype) if store.dtype else computed
         row = length * int(np.prod(field.shape)) * stored.itemsize
         # Chunks of equal length along the times, so that the last one is nearly full as well.
@@ -182,11 +179,12 @@ def parameter_units(scene: Any) -> dict[str, str]:
         Units by name of the parameter; "1" where none is known.
     """
     from lgvi_warp.physics import vehicle
+    from lgvi_warp.physics.terms.base import word_of
 
     known: dict[str, str | None] = {f"vehicle.{name}": unit for name, unit in vehicle.UNITS.items()}
     known |= {"environment.gravity": "m s-2", "environment.water_density": "kg m-3"}
     for term in scene.parts:
-        known |= {f"{term.key}.{item.name}": item.metadata.get("unit") for item in dataclasses.fields(term)}
+        known |= {f"{term.key}.{word_of(item)}": item.metadata.get("unit") for item in dataclasses.fields(term)}
     return {name: known.get(name) or "1" for name in scene.parameters()}
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from lgvi_warp.common import scratch
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.engine.block import block_size
-from lgvi_warp.physics.fields import FIELDS, TABLE
+from lgvi_warp.physics.control.signals import SAVED, has_shape
 from lgvi_warp.runs import member_fields
 from lgvi_warp.runs.store.layout import KEPT_MEMBER, MEMBER, StoreArray
 
@@ -287,13 +287,13 @@ def _checked(arrays: dict[str, StoredArray], groups: tuple[str, ...], members: i
     of_members = {member_field.name: member_field.dtype for member_field in member_fields.FIELDS} | {MEMBER: "<i8"}
     columns = []
     for name, array in arrays.items():
-        timed = name in FIELDS
+        timed = name in SAVED
         if name.startswith("explicit/"):
             good = array.whole and array.bytes <= MOST_CHUNK_BYTES
         elif name in fixed:
             good = array.whole and (array.dtype, array.shape) == fixed[name]
         elif timed:
-            good = array.dtype[1] == "f" and array.shape == (k, members, *TABLE[name].shape)
+            good = array.dtype[1] == "f" and array.shape[:2] == (k, members) and has_shape(name, array.shape[2:])
             good = good and array.chunk[1:] == (length, *array.shape[2:]) and -(-k // array.chunk[0]) <= MOST_CHUNKS
         else:
             good = array.dtype == of_members.get(name, "<f8" if "." in name else "")

@@ -14,7 +14,7 @@ from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.status import Status
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.keepers.observation import Observation, Observing, observation_of, replicates_of
-from lgvi_warp.physics.fields import IN_FILES
+from lgvi_warp.physics.control.signals import IN_FILES
 from lgvi_warp.physics.terms import from_list
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.runs.provenance import at_end

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lgvi_warp.common.errors import Faults, SceneError
-from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.physics.control.signals import SAVED
 from lgvi_warp.runs.store.arrays import whole_array
 from lgvi_warp.runs.store.layout import MEMBER, parameter_units
 
@@ -55,7 +55,7 @@ class Store:
             faults.choice("dtype", self.dtype, ("float32", "float64"))
         faults.choice("existing", self.existing, EXISTING)
         for name in self.fields or ():
-            faults.choice("fields", name, FIELDS)
+            faults.choice("fields", name, SAVED)
         faults.number("chunk_bytes", self.chunk_bytes, "bytes", least=1)
         faults.raise_if_any()
         needed()

@@ -10,7 +10,7 @@ from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.executors.base import Executor
 from lgvi_warp.engine.keepers.observation import Observation, Observing
 from lgvi_warp.engine.plan import Plan
-from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.physics.control.signals import ordered
 from lgvi_warp.runs.provenance import messages, provenance
 from lgvi_warp.runs.result import Result
 from lgvi_warp.runs.store.folder import Folder
@@ -101,4 +101,4 @@ def settled(store: Store, plan: Plan, observed: Observation, fields: Sequence[st
     """
     wanted = set(plan.fields if fields is None else fields) if observed.samples else set()
     stored = wanted if store.fields is None else wanted & set(store.fields)
-    return replace(store, fields=tuple(name for name in FIELDS if name in stored))
+    return replace(store, fields=ordered(stored))

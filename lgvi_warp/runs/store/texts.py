@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from lgvi_warp.common.machine import DTYPES
-from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.physics.control.signals import SAVED
 from lgvi_warp.runs.store.layout_check import NotOursError, is_text
 from lgvi_warp.scene.settings import MOST_MEMBERS
 
@@ -32,7 +32,7 @@ def _texts(value: Any) -> bool:
 
 
 def _known(value: Any) -> bool:
-    return _texts(value) and all(name in FIELDS for name in value)
+    return _texts(value) and all(name in SAVED for name in value)
 
 
 def _table(value: Any) -> bool:

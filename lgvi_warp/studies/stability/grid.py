@@ -11,12 +11,12 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.physics import notation, vehicle
+from lgvi_warp.physics import rates as member_rates
 from lgvi_warp.physics.fields import FIELDS, TABLE
 from lgvi_warp.physics.terms.drag import Drag
 from lgvi_warp.runs.store.layout import parameter_units
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
-from lgvi_warp.studies.stability import limits as stability_limits
 
 # Names of axes that are no parameters of the scene -> unit and label.
 SPECIAL = {
@@ -226,7 +226,7 @@ class StabilityGrid:
     def _rate(self) -> float:
         """The fastest of spin, Munk and restoring oscillation at the scene's start [rad/s]; 1 if all rest."""
         m = self.base
-        rates = stability_limits.rates(m.parameters, m.velocity, m.angular_velocity)
+        rates = member_rates.rates(m.parameters, m.velocity, m.angular_velocity)
         return float(max(rates[name][0] for name in ("rotation", "munk", "restoring"))) or 1.0
 
     def _ranged(self, faults: Faults, axis: Axis) -> Axis:
@@ -315,7 +315,7 @@ class StabilityGrid:
 
     def _drag_rate(self) -> np.ndarray:
         m = self.base
-        return stability_limits.drag_rate(m.parameters, vehicle.inertia6(m.parameters), m.velocity, m.angular_velocity)
+        return member_rates.drag_rate(m.parameters, vehicle.inertia6(m.parameters), m.velocity, m.angular_velocity)
 
     def _build(self, rng: np.random.Generator) -> None:
         """Compute the state, the step and the parameters of every member."""
@@ -350,7 +350,7 @@ class StabilityGrid:
             self._apply_added_mass(values)
         elif key == "drag_number":
             rate = self._drag_rate()
-            for term in stability_limits.drag_keys(self.base.parameters):
+            for term in member_rates.drag_keys(self.base.parameters):
                 for kind in ("linear", "quadratic"):
                     self._scale(f"{term}.{kind}", values / rate)
         elif self.scaled(axis):
@@ -410,7 +410,7 @@ class StabilityGrid:
             Names of studies.stability.limits.LIMITS -> rate (n,) [rad/s or 1/s].
         """
         every = np.arange(len(self.h))
-        return stability_limits.rates(self.parameters(every), self.state["velocity"], self.state["angular_velocity"])
+        return member_rates.rates(self.parameters(every), self.state["velocity"], self.state["angular_velocity"])
 
     def columns(self) -> list[tuple[float, np.ndarray]]:
         """Group the members by their step.
@@ -444,6 +444,6 @@ def _prepared(scene: Scene, names: Sequence[str]) -> Scene:
     """Copy the scene without its ensemble; add drag on every axis where the map varies drag and there is none."""
     terms = list(scene.terms)
     parameters = {key: np.asarray(value)[None] for key, value in scene.parameters().items()}
-    if "drag_number" in names and not stability_limits.drag_keys(parameters):
+    if "drag_number" in names and not member_rates.drag_keys(parameters):
         terms.append(Drag(linear=np.diag(vehicle.inertia6(parameters)[0])))
     return replace(scene, ensemble_settings=None, terms=terms)

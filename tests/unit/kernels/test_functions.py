@@ -12,21 +12,34 @@ import pytest
 import warp as wp
 
 from lgvi_kernels.lanes import functions as lm
-from lgvi_kernels.lanes.arithmetic import REALS, WIDTHS, lane
+from lgvi_kernels.lanes.arithmetic import REALS, WIDTHS, add, lane, neg, vec3  # noqa: F401
 from lgvi_kernels.lanes.flags import CPU_FLAGS
 
 pytestmark = pytest.mark.kernel
 
-NAMES = ("root", "exponential", "sine", "cosine", "logarithm", "decay", "greatest", "clamp")
+NAMES = ("root", "exponential", "sine", "cosine", "logarithm", "decay", "greatest", "clamp", "arctangent2",
+         "hyperbolic_tangent", "neg", "fused")  # fmt: skip
 FORMATS = {"float64": (wp.float64, np.float64), "float32": (wp.float32, np.float32)}
 THOROUGH = [(1, "float64"), (8, "float64"), (1, "float32"), (16, "float32")]
 LARGEST = {"float64": 700.0, "float32": 87.0}
-ERRORS = {"root": 1.0, "exponential": 2.0, "sine": 2.0, "cosine": 2.0, "logarithm": 3.0, "decay": 4.0}
+ERRORS = {
+    "root": 1.0,
+    "exponential": 2.0,
+    "sine": 2.0,
+    "cosine": 2.0,
+    "logarithm": 3.0,
+    "decay": 4.0,
+    "hyperbolic_tangent": 5.0,
+}
+ARCTANGENT_ERROR = 3.0
 
 
 @functools.cache
 def kernel(width, name):
-    """All functions of the arguments a: rows in the order of NAMES; greatest and clamp with b and c."""
+    """All functions of the arguments a: rows in the order of NAMES; greatest, arctangent2, clamp and fused with b and c.
+
+    "neg" is the minus of a 3-vector, whose numbers are x, b and c: x of it, where the others are as they must be.
+    """
     Lane = lane(width, FORMATS[name][0])
 
     @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": CPU_FLAGS})
@@ -41,6 +54,12 @@ def kernel(width, name):
         out[5, i] = lm.decay(x)
         out[6, i] = lm.greatest(x, a[1, i])
         out[7, i] = lm.clamp(x, a[1, i], a[2, i])
+        out[8, i] = lm.arctangent2(x, a[1, i])
+        out[9, i] = lm.hyperbolic_tangent(x)
+        v = neg(vec3(x, a[1, i], a[2, i]))
+        # (x, b, c) . (1, 2, 4), of which no sum of two other signs is the same.
+        out[10, i] = v.x + (v.y + v.y) + (v.z + v.z + v.z + v.z)
+        out[11, i] = lm.fused(x, a[1, i], a[2, i])
 
     return evaluate
 
@@ -69,6 +88,7 @@ EXACT = {
     "cosine": np.cos,
     "logarithm": np.log,
     "decay": exact_decay,
+    "hyperbolic_tangent": np.tanh,
 }
 
 
@@ -80,6 +100,9 @@ def arguments(function, name):
         turns = np.arange(-63000, 63000, 7) * (np.pi / 2)
         spread = [rng.uniform(-reach, reach, n) for reach in (1.0, 10.0, 1e3, 1e5)]
         return np.concatenate([*spread, turns, turns + np.pi / 4, tiny, -tiny])
+    if function == "hyperbolic_tangent":
+        sizes = np.concatenate([tiny, rng.uniform(0.0, 25.0, n), rng.uniform(0.0, 1.0, n), [1e6]])
+        return np.concatenate([sizes, -sizes])
     if function == "exponential":
         halves = (np.arange(-100, 100) + 0.5) * np.log(2.0)
         return np.concatenate([rng.uniform(-top, top, n), rng.uniform(-1.0, 1.0, n), halves, tiny, -tiny])
@@ -110,6 +133,46 @@ def test_function(function, width, name):
 
 
 @pytest.mark.parametrize(("width", "name"), THOROUGH)
+def test_arctangent2(width, name):
+    rng, n, dtype = np.random.default_rng(4), 40_000, FORMATS[name][1]
+    # All around, near the axes and the diagonals, where it changes branch, and points of all sizes.
+    eighths = np.arange(16) * np.pi / 8
+    near = (
+        eighths[:, None] + rng.choice([-1.0, 1.0], (16, 2000)) * 10.0 ** rng.uniform(-12.0, -0.5, (16, 2000))
+    ).ravel()
+    angles = np.concatenate([rng.uniform(-np.pi, np.pi, n), near])
+    sizes = 10.0 ** rng.uniform(-15.0, 15.0, len(angles))
+    y, x = (sizes * np.sin(angles)).astype(dtype), (sizes * np.cos(angles)).astype(dtype)
+    exact = np.arctan2(y.astype(np.longdouble), x.astype(np.longdouble))
+    error = np.abs(evaluate(width, name, y, x)["arctangent2"] - exact) / np.abs(exact) / np.finfo(dtype).eps
+    assert error.max() < ARCTANGENT_ERROR
+
+
+@pytest.mark.parametrize(("width", "name"), THOROUGH)
+def test_special_values_of_the_arctangent(width, name):
+    nan = np.nan
+    y = [0.0, 1.0, -1.0, 0.0, 0.0, 1.0, -1.0, nan, 1.0, nan, 0.0]
+    x = [0.0, 0.0, 0.0, 1.0, -1.0, -1.0, -1.0, 1.0, nan, nan, nan]
+    quarter = np.pi / 4
+    expected = [0.0, 2 * quarter, -2 * quarter, 0.0, 4 * quarter, 3 * quarter, -3 * quarter, nan, nan, nan, nan]
+    np.testing.assert_allclose(evaluate(width, name, y, x)["arctangent2"], expected, rtol=4e-7)
+
+
+@pytest.mark.parametrize(("width", "name"), THOROUGH)
+def test_minus_of_a_vector(width, name):
+    a, b, c = np.random.default_rng(5).integers(-9, 10, (3, 1000)).astype(float)
+    np.testing.assert_array_equal(evaluate(width, name, a, b, c)["neg"], -(a + 2 * b + 4 * c))
+
+
+@pytest.mark.parametrize(("width", "name"), THOROUGH)
+def test_fused_rounds_once(width, name):
+    # (1 + 2^-k)(1 - 2^-k) - 1 = -2^-2k, where the product alone is rounded to 1.
+    k = 30 if name == "float64" else 14
+    part = 2.0**-k
+    assert evaluate(width, name, [1.0 + part], 1.0 - part, -1.0)["fused"] == [-(part**2)]
+
+
+@pytest.mark.parametrize(("width", "name"), THOROUGH)
 def test_special_values(width, name):
     nan, inf = np.nan, np.inf
     x = [0.0, inf, -inf, nan, -1.0, 1e4, -1e4, 1.0]
@@ -121,6 +184,7 @@ def test_special_values(width, name):
         "cosine": [1.0, nan, nan, nan, np.cos(1.0), np.cos(1e4), np.cos(1e4), np.cos(1.0)],
         "logarithm": [nan, None, nan, nan, nan, np.log(1e4), nan, 0.0],
         "decay": [1.0, 0.0, None, nan, np.e - 1.0, 1e-4, None, 1.0 - np.exp(-1.0)],
+        "hyperbolic_tangent": [0.0, 1.0, -1.0, nan, -np.tanh(1.0), 1.0, -1.0, np.tanh(1.0)],
     }
     for function, values in expected.items():
         # None: outside the function's range.

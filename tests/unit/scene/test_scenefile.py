@@ -64,7 +64,7 @@ def test_round_trip():
 
 def test_a_small_scene_needs_a_vehicle_only():
     scene = scenes.loads(SMALL)
-    assert scene.ensemble_settings is None and scene.run.step is None and scene.run.method == "psi_s"
+    assert scene.ensemble_settings is None and scene.run.step is None and scene.run.method is None
     assert from_dict(scene.to_dict()).to_dict() == scene.to_dict()
     assert lw.Ensemble.from_scene(scene).members == 1
 

@@ -9,10 +9,12 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
+from lgvi_warp.methods.limits import drag_limit
 from lgvi_warp.physics import notation, vehicle
+from lgvi_warp.physics.rates import drag_rate, rates
 from lgvi_warp.scene.settings import RunSettings
 from lgvi_warp.studies.stability.grid import Axis, Line, StabilityGrid, rotation_vectors
-from lgvi_warp.studies.stability.limits import drag_limit, drag_rate, oscillation_limit, rates, rotation_limit
+from lgvi_warp.studies.stability.limits import oscillation_limit, rotation_limit
 from lgvi_warp.studies.stability.map import Cell, StabilityMap, cells_of
 from lgvi_warp.studies.stability.runs import REFUSED, Found
 

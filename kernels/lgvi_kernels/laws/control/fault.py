@@ -11,19 +11,19 @@ from lgvi_kernels.laws.control.lost import since
 
 @functools.cache
 def params(width, real):
-    """Params: time, gain and offset of each lane; rows of the command.
+    """Params: first step, gain and offset of each lane; rows of the command.
 
     fresh: of the command; acting, before: where commands are delayed, of the one that acts and of the one before.
     """
     Lane = lane(width, real)
     words = dict.fromkeys(("fresh", "acting", "before", "delayed"), wp.int32)
-    return struct("Fault", time=Lane, gain=Lane, offset=Lane, **words)
+    return struct("Fault", begin=Lane, gain=Lane, offset=Lane, **words)
 
 
 @wp.func
 def send(y: Any, p: Any):
     """From the first look at or after its time on: command <- gain * command + offset."""
-    begun = since(y, p.time)
+    begun = since(y, p.begin)
     u = remembered(y, p.fresh)
     remember(y, p.fresh, positive(begun, p.gain * u + p.offset, u))
     if p.delayed > 0:

@@ -4,7 +4,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import add, clamp, mul, neg, positive, remember, remembered  # noqa: F401
+from lgvi_kernels.law import add, clamp, mul, neg, ones, positive, remember, remembered, sub, vec3  # noqa: F401
 
 
 @wp.func
@@ -26,3 +26,39 @@ def integral(y: Any, row: int, limit: Any, unmet: Any, conditional: int):
 def keep_error(y: Any, row: int, error: Any):
     """Keep the error of this look for the next one's integral."""
     remember(y, row + 1, error)
+
+
+@wp.func
+def remembered3(y: Any, row: int):
+    """Three rows of the memory as a vector."""
+    return vec3(remembered(y, row), remembered(y, row + 1), remembered(y, row + 2))
+
+
+@wp.func
+def remember3(y: Any, row: int, v: Any):
+    """Write a vector into three rows of the memory."""
+    remember(y, row, v.x)
+    remember(y, row + 1, v.y)
+    remember(y, row + 2, v.z)
+
+
+@wp.func
+def unhindered(error: Any, unmet: Any, conditional: int):
+    """An error (a vector in the axes in which actuators push) without the parts that must wait, as of `integral`."""
+    if conditional > 0:
+        zero = ones(error.x) - ones(error.x)
+        error = vec3(
+            positive(unmet.x * error.x, zero, error.x),
+            positive(unmet.y * error.y, zero, error.y),
+            positive(unmet.z * error.z, zero, error.z),
+        )
+    return error
+
+
+@wp.func
+def integral3(y: Any, row: int, limit: Any, error: Any):
+    """A vector I + T error, each number within +-limit, in three rows of the memory."""
+    new = remembered3(y, row) + y.period * error
+    new = vec3(clamp(new.x, -limit, limit), clamp(new.y, -limit, limit), clamp(new.z, -limit, limit))
+    remember3(y, row, new)
+    return new

@@ -1,4 +1,4 @@
-"""Channels that a controller knows to be lost, from a time on."""
+"""What begins at a step: faults, and channels that a controller knows to be lost."""
 
 from typing import Any
 
@@ -8,7 +8,6 @@ from lgvi_kernels.law import add, mul, ones, sub  # noqa: F401
 
 
 @wp.func
-def since(y: Any, time: Any):
-    """Above 0 from the first look at or after a time on."""
-    # Half a step is added, since times are sums that round.
-    return (y.t + y.h.dtype(0.5) * y.h) * ones(time) - time
+def since(y: Any, step: Any):
+    """Above 0 from the first look at or after a step on."""
+    return (y.h.dtype(y.step) + y.h.dtype(0.5)) * ones(step) - step

@@ -1,21 +1,40 @@
 """A set-point: a place, a heading and a speed that are wanted all the time."""
 
+import functools
 from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import cosine, neg, ones, sine, sub, vec3  # noqa: F401
+from lgvi_kernels.law import cosine, lane, lane3, neg, ones, sine, struct, sub, vec3  # noqa: F401
+
+
+@functools.cache
+def params(width, real):
+    """Params: numbers, and whether place, depth (level), heading (turn) and speed (pace) are wanted."""
+    Lane = lane(width, real)
+    wanted = dict.fromkeys(("place", "level", "turn", "pace"), wp.int32)
+    return struct("SetPoint", position=lane3(width, real), depth=Lane, heading=Lane, speed=Lane, **wanted)
+
+
+@wp.func
+def headed(r: Any, c: Any, s: Any):
+    """r with an upright attitude of the heading whose cosine and sine are c and s."""
+    zero = ones(c) - ones(c)
+    r.north = vec3(c, -s, zero)
+    r.east = vec3(s, c, zero)
+    r.down = vec3(zero, zero, ones(c))
+    return r
 
 
 @wp.func
 def guide(r: Any, y: Any, p: Any):
     """Position, an upright attitude of this heading, and speed."""
-    c = cosine(p.heading)
-    s = sine(p.heading)
-    zero = ones(c) - ones(c)
-    r.position = vec3(p.position.x, p.position.y, p.depth)
-    r.north = vec3(c, -s, zero)
-    r.east = vec3(s, c, zero)
-    r.down = vec3(zero, zero, ones(c))
-    r.speed = p.speed
+    if p.place > 0:
+        r.position = p.position
+    if p.level > 0:
+        r.position = vec3(r.position.x, r.position.y, p.depth)
+    if p.turn > 0:
+        r = headed(r, cosine(p.heading), sine(p.heading))
+    if p.pace > 0:
+        r.speed = p.speed
     return r

@@ -1,0 +1,23 @@
+"""Commands of one actuator that a function of the host writes into the memory, once a look."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.law import clamp, neg, remember, remembered, row1, struct  # noqa: F401
+
+
+@functools.cache
+def params(width, real):
+    """Params: first row of the answer and of the commands; count; first row of the table, the limit of each command."""
+    return struct("CallbackCommands", answer=wp.int32, commands=wp.int32, count=wp.int32, first=wp.int32)
+
+
+@wp.func
+def allocate(w: Any, y: Any, p: Any):
+    """The commands within their limits. They deliver nothing of the demand: the host has not been asked for it."""
+    for i in range(p.count):
+        most = row1(y, p.first + i)
+        remember(y, p.commands + i, clamp(remembered(y, p.answer + i), -most, most))
+    return w

@@ -1,0 +1,27 @@
+"""PID of the depth by a force along the body's z axis."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.law import add, dot, lane, mul, remembered, struct, sub, vec3  # noqa: F401
+from lgvi_kernels.laws.control.integral import integral, keep_error
+
+
+@functools.cache
+def params(width, real):
+    """Params: gains; first of two rows of the memory, I and the error; row of the force Z that was not delivered."""
+    gains = dict.fromkeys(("kp", "ki", "kd", "integral_limit"), lane(width, real))
+    return struct("HeavePID", **gains, memory=wp.int32, unmet=wp.int32, conditional=wp.int32)
+
+
+@wp.func
+def control(w: Any, r: Any, y: Any, p: Any):
+    """Z = kp e + ki I + kd (wanted - measured rate of the depth)."""
+    e = r.position.z - y.position.z
+    I = integral(y, p.memory, p.integral_limit, remembered(y, p.unmet + 2), p.conditional)
+    Z = p.kp * e + p.ki * I + p.kd * (r.velocity.z - dot(y.down, y.velocity))
+    keep_error(y, p.memory, e)
+    w.force = vec3(w.force.x, w.force.y, w.force.z + Z)
+    return w

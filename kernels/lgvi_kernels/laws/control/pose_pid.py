@@ -1,0 +1,35 @@
+"""Geometric PID of position and attitude."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.law import add, mul, neg, sub, to_body  # noqa: F401
+from lgvi_kernels.laws.control.pose_error import (
+    attitude_error,
+    attitude_integral,
+    balance,
+    pose_params,
+    position_integral,
+    rate_error,
+    velocity_error,
+)
+
+
+@functools.cache
+def params(width, real):
+    """Params: see pose_error.py."""
+    return pose_params("PosePID", ("kp", "ki", "kd", "kr", "ki_r", "kw"), width, real)
+
+
+@wp.func
+def control(w: Any, r: Any, y: Any, p: Any):
+    """f = R^T (kp e_b + ki I) + kd (R^T v_d - nu); tau = -kr e_R + kw (R^T R_d Omega_d - Omega) - ki_r I_R."""
+    e = r.position - y.position
+    e_R = attitude_error(r, y)
+    I = position_integral(y, p, e)
+    I_R = attitude_integral(y, p, e_R)
+    force = to_body(y, p.kp * e + p.ki * I) + p.kd * velocity_error(r, y)
+    torque = p.kw * rate_error(r, y) - p.kr * e_R - p.ki_r * I_R
+    return balance(w, y, p, force, torque)

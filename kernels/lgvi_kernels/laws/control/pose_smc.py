@@ -1,0 +1,52 @@
+"""Sliding mode control of position and attitude."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.law import add, clamp, div, mul, neg, ones, sub, to_body, vec3  # noqa: F401
+from lgvi_kernels.laws.control.pose_error import (
+    attitude_error,
+    attitude_integral,
+    balance,
+    pose_params,
+    position_integral,
+    rate_error,
+    velocity_error,
+)
+
+
+@functools.cache
+def params(width, real):
+    """Params: see pose_error.py; rate and rate_r are lambda and lambda_r."""
+    of_position = ("rate", "boundary", "k_sigma", "k_d")
+    of_attitude = ("lambda_r", "boundary_r", "k_sigma_r", "k_d_r")
+    return pose_params("PoseSMC", of_position + of_attitude, width, real)
+
+
+@wp.func
+def saturated(v: Any):
+    """Each number of a vector within -1 and 1."""
+    unity = ones(v.x)
+    return vec3(clamp(v.x, -unity, unity), clamp(v.y, -unity, unity), clamp(v.z, -unity, unity))
+
+
+@wp.func
+def sliding(rate: Any, velocity: Any, e: Any, I: Any):
+    """s = velocity + 2 lambda e + lambda^2 I, all of them wanted less measured, in body axes."""
+    return velocity + rate * (e + e + rate * I)
+
+
+@wp.func
+def control(w: Any, r: Any, y: Any, p: Any):
+    """f = k_d s + k_sigma sat(s / boundary); the same of the attitude."""
+    e = r.position - y.position
+    e_R = attitude_error(r, y)
+    I = position_integral(y, p, e)
+    I_R = attitude_integral(y, p, e_R)
+    s = sliding(p.rate, velocity_error(r, y), to_body(y, e), to_body(y, I))
+    force = p.k_d * s + p.k_sigma * saturated(s / p.boundary)
+    s = sliding(p.lambda_r, rate_error(r, y), neg(e_R), neg(I_R))
+    torque = p.k_d_r * s + p.k_sigma_r * saturated(s / p.boundary_r)
+    return balance(w, y, p, force, torque)

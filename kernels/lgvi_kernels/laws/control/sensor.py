@@ -1,0 +1,146 @@
+"""A sensor: what is measured in place of the truth. What no member's sensor has is no code."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels import device
+from lgvi_kernels.lanes.noise import noise_key
+from lgvi_kernels.law import (  # noqa: F401
+    absolute,
+    add,
+    div,
+    lane,
+    lane3,
+    least,
+    mul,
+    normals,
+    ones,
+    positive,
+    quarter,
+    remember,
+    remembered,
+    root,
+    rounded,
+    struct,
+    sub,
+    vec3,
+)
+from lgvi_kernels.laws.control.readings import make_reading, remember3, remembered3
+
+# Features that draw random numbers, and those by which a reading is not that of its own look.
+DRAWING = ("noise", "drift", "dropout")
+KEEPING = ("every", "latency", "dropout")
+
+
+# Not inlined, for the sake of the compiler: a scene may have many sensors.
+@wp.func(inline=False)
+def drawn(like: Any, key: Any, look: int, stream: int):
+    """Four standard normals of a look, side by side."""
+    return normals(like, key.member, look, key.channel + stream, key.seed0, key.seed1)
+
+
+@functools.cache
+def made(features):
+    """The device code of a sensor: features: what it reads (see readings.py), and its numbers that are not idle."""
+    of, *others = features
+    reading = make_reading(of)
+    count, rows = reading.count, reading.rows
+    values, with_values, shifted, put, taken = reading[2:]
+    biased, noisy, drifting, quantised, rare, late, lossy = (
+        name in others for name in ("bias", "noise", "drift", "quantum", "every", "latency", "dropout")
+    )
+    draws = any(name in others for name in DRAWING)
+    keeps = any(name in others for name in KEEPING)
+
+    def params(width, real):
+        """Params: the numbers by member; key of the random numbers; first of its rows of the memory; readings that it keeps.
+
+        Its rows: the walk; `sets` readings as they arrive; that of this look; how many looks the last one is old.
+        """
+        Lane, Lane3 = lane(width, real), lane3(width, real)
+        vectors = {name: Lane3 for name in others if name in ("bias", "noise", "drift", "quantum")}
+        lanes = {name: Lane for name in others if name in KEEPING}
+        key = {"key": noise_key(width)} if draws else {}
+        return struct("Sensor", **vectors, **lanes, **key, memory=wp.int32, sets=wp.int32)
+
+    @wp.func
+    def kept(y: Any, p: Any, lost: Any):
+        """The reading that has arrived by now; `lost` is positive where that of this look never will."""
+        at = p.memory
+        if wp.static(drifting):
+            at += wp.static(count)
+        unity = ones(y.position.x)
+        half = y.h.dtype(0.5) * unity
+        fresh = at + p.sets * wp.static(rows)
+        newest = y.look % p.sets
+        last = (y.look + p.sets - 1) % p.sets
+        put(y, fresh)
+        hold = lost
+        if wp.static(rare):
+            age = remembered(y, fresh + wp.static(rows))
+            waiting = p.every - half - unity - age
+            hold = positive(waiting, unity, hold)
+            remember(y, fresh + wp.static(rows), positive(waiting, age + unity, unity - unity))
+        if y.look == 0:
+            hold = unity - unity
+            if wp.static(rare):
+                remember(y, fresh + wp.static(rows), unity - unity)
+        for j in range(wp.static(rows)):
+            old = remembered(y, at + last * wp.static(rows) + j)
+            value = positive(hold, old, remembered(y, fresh + j))
+            remember(y, at + newest * wp.static(rows) + j, value)
+            if wp.static(late):
+                for s in range(p.sets):
+                    age_of = (newest - s + p.sets) % p.sets
+                    wanted = least(p.latency, y.h.dtype(y.look) * unity)
+                    apart = absolute(y.h.dtype(age_of) * unity - wanted)
+                    value = positive(half - apart, remembered(y, at + s * wp.static(rows) + j), value)
+            remember(y, fresh + j, value)
+        return taken(y, fresh)
+
+    @wp.func
+    def measure(y: Any, p: Any):
+        """The truth, plus bias, walk and noise, rounded to the quantum; then what has arrived of it."""
+        unity = ones(y.position.x)
+        zero = unity - unity
+        e = vec3(zero, zero, zero)
+        lost = zero
+        if wp.static(biased):
+            e = e + p.bias
+        if wp.static(draws):
+            four = drawn(unity, p.key, y.look, 0)
+            if wp.static(noisy):
+                e = e + p.noise * vec3(quarter(four, 0), quarter(four, 1), quarter(four, 2))
+            if wp.static(lossy):
+                lost = p.dropout - quarter(four, 3)
+            if wp.static(drifting):
+                spread = root(y.period * unity)
+                if wp.static(count == 1):
+                    walk = remembered(y, p.memory)
+                    e.x = e.x + walk
+                    remember(y, p.memory, walk + spread * p.drift.x * quarter(four, 1))
+                else:
+                    walks = remembered3(y, p.memory)
+                    e = e + walks
+                    more = drawn(unity, p.key, y.look, 1)
+                    steps = vec3(quarter(more, 0), quarter(more, 1), quarter(more, 2))
+                    remember3(y, p.memory, walks + spread * (p.drift * steps))
+        if wp.static(biased or noisy or drifting):
+            y = shifted(y, e)
+        if wp.static(quantised):
+            q = p.quantum
+            size = vec3(positive(q.x, q.x, unity), positive(q.y, q.y, unity), positive(q.z, q.z, unity))
+            v = values(y)
+            w = vec3(
+                positive(q.x, size.x * rounded(v.x / size.x), v.x),
+                positive(q.y, size.y * rounded(v.y / size.y), v.y),
+                positive(q.z, size.z * rounded(v.z / size.z), v.z),
+            )
+            y = with_values(y, w)
+        if wp.static(keeps):
+            y = kept(y, p, lost)
+        return y
+
+    return device(__name__, features, params=params, measure=measure)

@@ -1,0 +1,27 @@
+"""PI of the speed through the water, by a force along the body's x axis."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.law import absolute, add, lane, mul, remembered, struct, sub, vec3  # noqa: F401
+from lgvi_kernels.laws.control.integral import integral, keep_error
+
+
+@functools.cache
+def params(width, real):
+    """Params: gains; first of two rows of the memory, I and the error; row of the force X that was not delivered."""
+    gains = dict.fromkeys(("kp", "ki", "drag", "integral_limit"), lane(width, real))
+    return struct("SpeedPID", **gains, memory=wp.int32, unmet=wp.int32, conditional=wp.int32)
+
+
+@wp.func
+def control(w: Any, r: Any, y: Any, p: Any):
+    """X = kp e + ki I + drag u_d |u_d|."""
+    e = r.speed - y.water_velocity.x
+    I = integral(y, p.memory, p.integral_limit, remembered(y, p.unmet), p.conditional)
+    X = p.kp * e + p.ki * I + p.drag * (r.speed * absolute(r.speed))
+    keep_error(y, p.memory, e)
+    w.force = vec3(w.force.x + X, w.force.y, w.force.z)
+    return w

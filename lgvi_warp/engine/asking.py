@@ -1,0 +1,111 @@
+"""The exchange with a function of the host at a controller's looks: what it is told, and its answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import Any
+
+import numpy as np
+
+from lgvi_kernels.advance.feeding import NOTED
+from lgvi_warp.engine.packets import Packets
+from lgvi_warp.physics.control.callback import Callback
+
+
+@dataclass(frozen=True)
+class Looks:
+    """What a controller measures, or wants, of m members at a look.
+
+    Args:
+        position: Positions (m, 3) [m], inertial axes.
+        attitude: Attitudes (m, 3, 3), body to inertial axes.
+        velocity: Velocities (m, 3) [m/s]: measured over ground in body axes; wanted in inertial axes.
+        angular_velocity: Angular velocities (m, 3) [rad/s], body axes.
+        heading: Headings (m,) [rad].
+        water_velocity: Measured velocities through the water (m, 3) [m/s], body axes; None, the default, of what is wanted.
+        speed: Wanted speed ahead (m,) [m/s]; None, the default, of what is measured.
+    """
+
+    position: np.ndarray
+    attitude: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+    heading: np.ndarray
+    water_velocity: np.ndarray | None = None
+    speed: np.ndarray | None = None
+
+    @property
+    def depth(self) -> np.ndarray:
+        """Depths (m,) [m]."""
+        return self.position[:, 2]
+
+
+def last_look(packets: Packets) -> tuple[Looks, Looks]:
+    """What was measured and what was wanted at the last look.
+
+    Args:
+        packets: packets of a plan that asks, after a launch.
+
+    Returns:
+        (measured, wanted), copies.
+    """
+    control, controller = packets.plan.spec.control, packets.plan.kernel_choice.controller
+    assert control is not None and controller is not None
+    firsts = accumulate((NOTED[name] for name in control.noted), initial=controller.bus.rows)
+    places = dict(zip(control.noted, firsts, strict=False))
+    y, r = (_numbers(packets, places[name], NOTED[name]) for name in ("measured", "reference"))
+    measured_attitude, wanted_attitude = (rows[:, 3:12].reshape(-1, 3, 3) for rows in (y, r))
+    measured = Looks(y[:, :3], measured_attitude, y[:, 12:15], y[:, 18:21], y[:, 21], water_velocity=y[:, 15:18])
+    return measured, Looks(r[:, :3], wanted_attitude, r[:, 12:15], r[:, 15:18], r[:, 18], speed=r[:, 19])
+
+
+def _numbers(packets: Packets, first: int, count: int) -> np.ndarray:
+    """Rows of the memory by member, (m, count) of float64."""
+    rows = packets.laws.memory.view[:, first : first + count]
+    return rows.transpose(0, 2, 1).reshape(-1, count)[: packets.members.count].astype(np.float64)
+
+
+def answer(packets: Packets, values: np.ndarray) -> None:
+    """Write the host's answer to the last look.
+
+    Args:
+        packets: packets of a plan that asks.
+        values: demands (m, 6), or commands (m, channels).
+    """
+    controller = packets.plan.kernel_choice.controller
+    assert controller is not None
+    view, first = packets.laws.memory.view, controller.bus.answer
+    count, width = values.shape[1], view.shape[2]
+    padded = np.empty((view.shape[0] * width, count))
+    padded[: len(values)], padded[len(values) :] = values, values[-1]
+    view[:, first : first + count] = padded.reshape(-1, width, count).transpose(0, 2, 1)
+
+
+def ask(packets: Packets, t: float) -> None:
+    """Call the function of a plan's controller with the last look, and write its answer.
+
+    Args:
+        packets: packets of the block.
+        t: time of the look [s].
+
+    Raises:
+        ValueError: where the function returns another shape than the one wanted. What it raises itself comes with the block
+            and the time as a note.
+    """
+    controller = packets.plan.kernel_choice.controller
+    assert controller is not None
+    callback: Any = controller.callback
+    assert isinstance(callback, Callback) and callback.function is not None
+    measured, wanted = last_look(packets)
+    members = packets.members.indices
+    where = f"callback {callback.key!r} at t = {t:.9g} s, members {members[0]} to {members[-1]}"
+    try:
+        values = np.asarray(callback.function(t, measured, wanted, members), dtype=np.float64)
+    except Exception as error:
+        error.add_note(where)
+        raise
+    shape = packets.members.count, controller.bus.rows - controller.bus.answer
+    if values.shape != shape:
+        raise ValueError(f"{where}: returned shape {values.shape}; return {shape}, a row for each member")
+    answer(packets, values)

@@ -1,0 +1,25 @@
+"""PID of the depth by a force."""
+
+from lgvi_warp.reference.control import Integral, Measurement, Part, Reference
+from lgvi_warp.reference.rotation import Array
+
+
+class HeavePID(Part):
+    """Numbers as those of `lw.HeavePID`."""
+
+    ki = kd = 0.0
+    integral_limit = 1e6
+    anti_windup = "conditional"
+
+    def begin(self) -> None:
+        """The integral is 0."""
+        self.integral = Integral()
+
+    def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
+        """Z = kp e + ki I + kd (wanted - measured rate of the depth)."""
+        e = r.position[2] - y.position[2]
+        I = self.integral.at_look(y.period, self.integral_limit, unmet[2], self.anti_windup == "conditional")
+        self.integral.error = e
+        w = w.copy()
+        w[2] += self.kp * e + self.ki * I + self.kd * (r.velocity[2] - (y.R @ y.velocity)[2])
+        return w

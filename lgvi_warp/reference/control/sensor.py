@@ -1,0 +1,49 @@
+"""A sensor."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.reference.control import Measurement, Part
+from lgvi_warp.reference.control.readings import shifted, values, with_values
+from lgvi_warp.reference.random import normals
+from lgvi_warp.reference.rotation import Array
+
+
+class Sensor(Part):
+    """Numbers as those of `lw.Sensor`, those of a 3-vector for all axes or (3,); the key of its random numbers."""
+
+    noise = bias = drift = quantum = dropout = 0.0
+    every, latency = 1, 0
+    seed0 = seed1 = channel = 0
+
+    def begin(self) -> None:
+        """No reading yet, and no walk."""
+        self.walk: Any = 0.0
+        self.arrived: list[Measurement] = []
+
+    def drawn(self, y: Measurement, stream: int) -> Array:
+        """Four standard normals of this look."""
+        return normals(self.seed0, self.seed1, y.member, y.look, self.channel + stream)
+
+    def measure(self, y: Measurement) -> Measurement:
+        """The reading that has arrived by now."""
+        count = len(values(y, self.of))
+        first, second = (self.drawn(y, stream) for stream in (0, 1))
+        z = shifted(y, self.of, self.bias + self.walk + self.noise * first[:count])
+        steps = first[1:2] if count == 1 else second[:3]
+        self.walk = self.walk + self.drift * np.sqrt(y.period) * steps
+        v, q = values(z, self.of), np.broadcast_to(self.quantum, count)
+        if np.any(q > 0.0):
+            v = np.where(q > 0.0, np.rint(v / np.where(q > 0.0, q, 1.0)) * q, v)
+            z = with_values(z, self.of, v)
+        # Phi of a standard normal is uniform.
+        lost = 0.5 * math.erfc(-first[3] / math.sqrt(2.0)) < self.dropout
+        old = y.look % self.every != 0
+        self.arrived.append(self.arrived[-1] if self.arrived and (old or lost) else z)
+        seen = self.arrived[max(y.look - self.latency, 0)]
+        if self.of == "attitude":
+            return replace(y, R=seen.R)
+        return with_values(y, self.of, values(seen, self.of))

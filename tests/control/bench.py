@@ -1,0 +1,111 @@
+"""What a controller measures along motions that are given: the parts of a scene on the device, without steps."""
+
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+import lgvi_warp as lw
+from lgvi_kernels.lanes.arithmetic import lane, vec3
+from lgvi_kernels.lanes.look import measurement_struct
+from lgvi_kernels.maps.in_turn import in_turn
+from lgvi_warp.engine.packets import Packets
+from lgvi_warp.runs.settle import make_plan
+
+# Position, attitude row by row, velocity, velocity through the water, angular velocity.
+FIELDS = 21
+
+
+def scene(sensors, faults=(), period=0.1, **law):
+    """A vehicle with these sensors and a law that needs nothing of them."""
+    vehicle = lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 196.0, (0.0, 0.0, -0.02))
+    laws, guidance = [lw.HeadingPID(**{"kp": 1.0} | law)], [lw.SetPoint(heading=0.0)]
+    controller = lw.Controller(period=period, sensors=sensors, guidance=guidance, laws=laws, faults=faults)
+    return lw.Scene(vehicle, lw.Environment(9.8), [lw.ControlWrench()], controller=controller)
+
+
+def measured(ensemble, truth, h=0.02, dtype="float64", width=4):
+    """What members measure at each look.
+
+    Args:
+        ensemble: the members.
+        truth: (looks, members or 1, FIELDS), motions at the looks.
+        h, dtype, width: step [s]; precision; lanes of a packet.
+
+    Returns:
+        (looks, members, FIELDS).
+    """
+    controller = ensemble.scene.controller
+    plan = make_plan(ensemble, "psi_s", h, 1.0, dtype=dtype, width=width)
+    n, looks = ensemble.members, len(truth)
+    packets = Packets(plan, ensemble.select(0, n))
+    kernel = _kernel(plan.spec.control.parts, plan.advance.types.Loop, width, plan.spec.real)
+    every, kind = controller.every(h), np.float64 if dtype == "float64" else np.float32
+    lanes = np.zeros((packets.count * width, looks, FIELDS))
+    lanes[:n] = np.broadcast_to(truth, (looks, n, FIELDS)).transpose(1, 0, 2)
+    rows = np.ascontiguousarray(lanes.reshape(packets.count, width, looks, FIELDS).transpose(0, 2, 3, 1), kind)
+    rows = rows.reshape(packets.count, looks * FIELDS, width)
+    given = wp.array(rows, dtype=lane(width, plan.spec.real), device="cpu")
+    out = wp.zeros((packets.count, looks * FIELDS), dtype=lane(width, plan.spec.real), device="cpu")
+    inputs = [given, packets.laws.loop.array, packets.memory, every, h, looks, out]
+    wp.launch(kernel, dim=packets.count, inputs=inputs, device="cpu")
+    seen = out.numpy().reshape(packets.count, looks, FIELDS, width).transpose(1, 0, 3, 2)
+    return seen.reshape(looks, -1, FIELDS)[:, :n]
+
+
+_kernels = {}
+
+
+def _kernel(parts, Loop, width, real):
+    """Kept: a Warp kernel for each set of parts."""
+    key = parts, Loop, width, real
+    if key not in _kernels:
+        _kernels[key] = _make(in_turn(parts, "measure"), Loop, width, real)
+    return _kernels[key]
+
+
+def _make(measure, Loop, width, real):
+    Lane, Measurement = lane(width, real), measurement_struct(width, real)
+
+    @wp.func
+    def three(rows: wp.array2d(dtype=Lane), i: int, at: int):
+        return vec3(rows[i, at], rows[i, at + 1], rows[i, at + 2])
+
+    @wp.func
+    def put(rows: wp.array2d(dtype=Lane), i: int, at: int, v: Any):
+        rows[i, at] = v.x
+        rows[i, at + 1] = v.y
+        rows[i, at + 2] = v.z
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def run(given: wp.array2d(dtype=Lane), loop: wp.array(dtype=Loop), memory: wp.array2d(dtype=Lane), every: int,
+            h: wp.float64, looks: int, out: wp.array2d(dtype=Lane)):  # fmt: skip
+        i = wp.tid()
+        p = loop[i % loop.shape[0]]
+        for k in range(looks):
+            at = k * wp.static(FIELDS)
+            y = Measurement()
+            y.position = three(given, i, at)
+            y.north = three(given, i, at + 3)
+            y.east = three(given, i, at + 6)
+            y.down = three(given, i, at + 9)
+            y.velocity = three(given, i, at + 12)
+            y.water_velocity = three(given, i, at + 15)
+            y.angular_velocity = three(given, i, at + 18)
+            y.h = real(h)
+            y.step = k * every
+            y.look = k
+            y.t = real(wp.float64(y.step) * h)
+            y.period = real(wp.float64(every) * h)
+            y.memory = memory
+            y.packet = i
+            y = measure(y, y, y, p)
+            put(out, i, at, y.position)
+            put(out, i, at + 3, y.north)
+            put(out, i, at + 6, y.east)
+            put(out, i, at + 9, y.down)
+            put(out, i, at + 12, y.velocity)
+            put(out, i, at + 15, y.water_velocity)
+            put(out, i, at + 18, y.angular_velocity)
+
+    return run

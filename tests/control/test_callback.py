@@ -1,0 +1,79 @@
+"""A law that is a Python function: the same motion as the law in the kernel, and what it says where it fails."""
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+
+H, GAINS = 0.02, dict(kp=3.0, kd=2.0)
+
+
+def scene(laws, members=20, **more):
+    """A body with a heading law and an ideal actuator; members that differ."""
+    controller = lw.Controller(period=5 * H, guidance=[lw.SetPoint(heading=0.8)], laws=laws, **more)
+    vehicle = lw.Vehicle(10.0, (1.0, 2.0, 3.0))
+    terms = [lw.ControlWrench(limit=2.0), lw.Drag(linear=(1.0, 2.0, 2.0, 0.1, 0.1, 0.1), quadratic=(0.0,) * 6)]
+    plain = lw.Scene(vehicle, terms=terms, controller=controller)
+    vary = {"start.angular_velocity": lw.Normal(std=0.1), "start.velocity": lw.Normal(std=0.2)}
+    return lw.Ensemble(plain, members, 3, vary)
+
+
+def heading(t, y, r, members):
+    """The heading law in NumPy."""
+    s, c = r.attitude[:, :2, 0], y.attitude[:, :2, 0]
+    e = np.arctan2(s[:, 1] * c[:, 0] - s[:, 0] * c[:, 1], np.sum(s * c, axis=1))
+    demand = np.zeros((len(members), 6))
+    demand[:, 5] = GAINS["kp"] * e + GAINS["kd"] * (r.angular_velocity[:, 2] - y.angular_velocity[:, 2])
+    return demand
+
+
+def run(laws, **named):
+    return lw.solve(scene(laws), "psi_s", h=H, t1=5.0, save=lw.SaveAt(every=0.5), **named)
+
+
+def test_it_is_the_law_in_the_kernel():
+    asked, fused = run([lw.Callback(heading)]), run([lw.HeadingPID(**GAINS)])
+    # 250 steps of round-off: the two evaluate the same formula in another order.
+    assert np.abs(asked.attitude - fused.attitude).max() < 1e-12
+    assert np.abs(asked.position - fused.position).max() < 1e-12
+
+
+def test_commands():
+    def commands(t, y, r, members):
+        return np.clip(heading(t, y, r, members), -9.0, 9.0)
+
+    asked = run([lw.Callback(commands, to="control_wrench")])
+    fused = run([lw.Callback(heading)])
+    assert np.abs(asked.attitude - fused.attitude).max() < 1e-12
+
+
+def test_one_member_without_an_answer():
+    def broken(t, y, r, members):
+        demand = heading(t, y, r, members)
+        demand[(members == 3) & (t > 1.0)] = np.nan
+        return demand
+
+    result, whole = run([lw.Callback(broken)]), run([lw.Callback(heading)])
+    assert result.status.counts() == {"ok": 19, "control_non_finite": 1}
+    assert result.status[3] == lw.Status.CONTROL_NON_FINITE and 1.0 < result.failure_time[3] <= 1.1 + 1e-9
+    others = np.arange(20) != 3
+    assert np.array_equal(result.position[:, others], whole.position[:, others])
+
+
+def test_wrong_shape():
+    with pytest.raises(ValueError, match=r"returned shape \(20,\); return \(20, 6\)"):
+        run([lw.Callback(lambda t, y, r, members: np.zeros(len(members)))])
+
+
+def test_an_exception_says_where():
+    def fails(t, y, r, members):
+        raise RuntimeError("no solution")
+
+    with pytest.raises(RuntimeError, match="no solution") as info:
+        run([lw.Callback(fails)])
+    assert "t = 0 s, members 0 to 19" in info.value.__notes__[0]
+
+
+def test_no_code_in_files():
+    with pytest.raises(lw.SceneError, match="runs no code"):
+        lw.Controller(period=0.1, laws=[{"type": "callback"}])

@@ -1,0 +1,131 @@
+"""Laws against their twins, each in a member of its own: a single kernel has them all."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import lgvi_warp as lw
+from tests.support.loops import twin_states
+
+H, EVERY, STEPS = 0.05, 2, 400
+LIMIT = (25.0, 20.0, 15.0, 2.0, 2.5, 3.0)
+rng = np.random.default_rng(7)
+# A policy that damps, and pushes toward what is wanted: untrained layers of different widths.
+LAYERS = [(0.3 * rng.normal(size=shape), 0.1 * rng.normal(size=shape[0])) for shape in ((7, 11), (5, 7), (3, 5))]
+# The numbers of each law where it acts; elsewhere those of IDLE.
+ACTING = {
+    "heading_pid": {"kp": 6.0, "ki": 0.5, "kd": 4.0, "integral_limit": 0.8},
+    "depth_pid": {"kp": 0.3, "ki": 0.02, "kp_pitch": 12.0, "ki_pitch": 1.0, "kd_pitch": 6.0},
+    "heave_pid": {"kp": 20.0, "ki": 2.0, "kd": 30.0, "integral_limit": 1.5},
+    "speed_pid": {"kp": 30.0, "ki": 3.0, "drag": 4.0},
+    "pose_pid": {"kp": (20.0, 25.0, 30.0), "ki": (2.0, 3.0, 4.0), "kd": (30.0, 40.0, 50.0), "kr": (6.0, 7.0, 8.0),
+                 "ki_r": (0.4, 0.5, 0.6), "kw": (3.0, 4.0, 5.0), "integral_limit": (1.0, 0.5)},
+    "pose_smc": {"k_sigma": (3.0, 4.0, 5.0), "k_d": (30.0, 40.0, 50.0), "k_sigma_r": (0.5, 0.6, 0.7),
+                 "k_d_r": (3.0, 4.0, 5.0)},
+    "heading_smc": {"k_sigma": 0.2, "k_d": 0.8, "nomoto_gain": 0.25, "nomoto_time": 1.5},
+    "state_feedback": {"K": np.hstack([np.diag((20.0, 25.0, 30.0, 6.0, 7.0, 8.0)), np.diag((30.0, 40.0, 50.0, 3.0, 4.0, 5.0))])
+                       + 0.05 * rng.normal(size=(6, 12))},
+    "policy": {"scale": (10.0, 1.5, 2.0)},
+}  # fmt: skip
+ZERO = (0.0, 0.0, 0.0)
+# An infinite gain of Nomoto's model demands nothing.
+IDLE = {
+    "heading_pid": {"kp": 0.0, "ki": 0.0, "kd": 0.0, "integral_limit": 0.8},
+    "depth_pid": dict.fromkeys(("kp", "ki", "kp_pitch", "ki_pitch", "kd_pitch"), 0.0),
+    "heave_pid": {"kp": 0.0, "ki": 0.0, "kd": 0.0, "integral_limit": 1.5},
+    "speed_pid": dict.fromkeys(("kp", "ki", "drag"), 0.0),
+    "pose_pid": dict.fromkeys(("kp", "ki", "kd", "kr", "ki_r", "kw"), ZERO) | {"integral_limit": (1.0, 0.5)},
+    "pose_smc": dict.fromkeys(("k_sigma", "k_d", "k_sigma_r", "k_d_r"), ZERO),
+    "heading_smc": {"k_sigma": 0.0, "k_d": 0.0, "nomoto_gain": 1e300, "nomoto_time": 0.0},
+    "state_feedback": {"K": np.zeros((6, 12))},
+    "policy": {"scale": ZERO},
+}
+NAMES = tuple(ACTING)
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    """All laws, idle; a trajectory by way of a reference model."""
+    file = tmp_path_factory.mktemp("policy") / "policy.npz"
+    np.savez(
+        file, **{f"{kind}_{i}": a for i, layer in enumerate(LAYERS) for kind, a in zip(("weights", "biases"), layer)}
+    )
+    inputs = [
+        "depth_error",
+        "position_error[1]",
+        "heading_error",
+        "velocity",
+        "attitude_error",
+        "down[0]",
+        "speed_error",
+    ]
+    three = dict(
+        lambda_=(0.3, 0.4, 0.5), boundary=(0.1, 0.2, 0.3), lambda_r=(0.5, 0.6, 0.7), boundary_r=(0.1, 0.2, 0.3)
+    )
+    laws = [
+        lw.HeadingPID(**IDLE["heading_pid"]),
+        lw.DepthPID(**IDLE["depth_pid"], pitch_limit=0.3, integral_limit=(2.0, 1.0)),
+        lw.HeavePID(**IDLE["heave_pid"]),
+        lw.SpeedPID(**IDLE["speed_pid"]),
+        lw.PosePID(**IDLE["pose_pid"], feedforward="restoring"),
+        lw.PoseSMC(**IDLE["pose_smc"], **three),
+        lw.HeadingSMC(**IDLE["heading_smc"], lambda_=0.4, boundary=0.1),
+        lw.StateFeedback(**IDLE["state_feedback"]),
+        lw.Policy(file=file, inputs=inputs, outputs=["Z", "K", "N"], **IDLE["policy"], output_activation="tanh"),
+    ]
+    guidance = [
+        lw.Trajectory(times=(0.5, 3.0, 8.0, 12.0), positions=[(0, 0, 3), (2, 1, 4), (5, -2, 6), (4, 3, 5)],
+                      headings=(0.3, 2.0, -2.5, 1.0), interpolation="cubic"),
+        lw.ReferenceModel(natural_frequency=(1.0, 1.2, 0.8, 1.5), damping_ratio=(1.0, 0.8, 1.2, 1.0),
+                          rate_limit=(0.6, 0.5, 0.4, 0.5)),
+    ]  # fmt: skip
+    vehicle = lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 20.5 * 9.8, (0.01, 0.005, -0.02))
+    terms = [
+        lw.Drag(linear=(3.0, 4.0, 5.0, 0.3, 0.4, 0.5), quadratic=(10.0, 30.0, 40.0, 1.0, 2.0, 3.0)),
+        lw.ControlWrench(limit=LIMIT),
+    ]
+    controller = lw.Controller(period=EVERY * H, guidance=guidance, laws=laws)
+    return lw.Scene(vehicle, lw.Environment(gravity=9.8), terms, controller=controller)
+
+
+def states(n):
+    """Position, attitude, velocity and angular velocity of n members."""
+    rng = np.random.default_rng(3)
+    attitudes = Rotation.from_rotvec(0.5 * rng.normal(size=(n, 3))).as_matrix()
+    velocities = rng.normal(size=(2, n, 3)) * 0.4
+    return np.array((0.4, -0.3, 3.0)) + rng.normal(size=(n, 3)), attitudes, *velocities
+
+
+@pytest.fixture(scope="module")
+def run(scene):
+    """(parameters, states, result): member i has the law i alone."""
+    parameters = {
+        f"{law}.{name}": np.array([ACTING[law][name] if law == other else IDLE[law][name] for other in NAMES], float)
+        for law, names in ACTING.items()
+        for name in names
+    }
+    given = states(len(NAMES))
+    ensemble = lw.Ensemble.from_states(scene, *given, parameters)
+    return parameters, given, lw.solve(ensemble, "psi_s", h=H, t1=STEPS * H, save=lw.SaveAt(every=EVERY * H))
+
+
+@pytest.mark.parametrize("steps", [60, pytest.param(STEPS, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("law", NAMES)
+def test_a_law_is_its_twin(law, steps, scene, run):
+    parameters, given, result = run
+    i = NAMES.index(law)
+    numbers = {name: values[i] for name, values in parameters.items()}
+    b, R = twin_states(scene, numbers, [x[i] for x in given], EVERY, H, steps)
+    assert result.status.counts() == {"ok": len(NAMES)}
+    for got, expected in ((result.position[: len(b), i], b), (result.attitude[: len(b), i], R)):
+        error = np.abs(got - expected).reshape(len(b), -1).max(axis=1)
+        # A look is some hundred roundings of numbers of size 10; 200 looks of a stable loop add up what they leave.
+        assert error[1] < 1e-12 and error.max() < 1e-9
+
+
+def test_laws_act(run):
+    # Each member goes a way of its own.
+    result = run[2]
+    ends = result.position[-1]
+    gaps = np.linalg.norm(ends[:, None] - ends[None], axis=2) + 10.0 * np.eye(len(ends))
+    assert gaps.min() > 1e-3

@@ -1,0 +1,327 @@
+"""What controllers measure, want, demand and command, and where actuators are: saved with every sample, for every member."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+import warp as wp
+
+import lgvi_warp as lw
+from lgvi_kernels.law import div, mul, neg, ones, positive, sub, vec3  # noqa: F401
+from lgvi_warp.common.status import Status, under_way
+from lgvi_warp.engine import plan as plans
+from lgvi_warp.physics.control.base import ControlLaw
+from lgvi_warp.physics.control.signals import SAVED, SIGNALS
+from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.runs.store.folder import Folder
+from tests.runs.test_outcomes_shown import rows
+from tests.support.stores import differing
+
+H, EVERY, STEPS, MEMBERS = 0.01, 5, 60, 600
+LIMIT, LAG, DELAY = 0.4, 0.1, 2
+KP, KD, LEVEL = 1.0, 2.0, 3.0
+CURRENT = np.array([0.2, 0.1, 0.0])
+FLOOR = 5.4
+SETTINGS = {"h": H, "t1": STEPS * H, "save": lw.SaveAt(every=H, fields=SAVED)}
+
+
+@wp.func
+def control(w: Any, r: Any, y: Any, p: Any):
+    """A force downward; no number from a time on."""
+    unity = ones(p.time)
+    # Half a step is added, since times are sums that round.
+    well = positive(p.time - (y.t + y.h.dtype(0.5) * y.h) * unity, unity, unity - unity)
+    w.force = vec3(w.force.x, w.force.y, w.force.z + p.level * (well / well))
+    return w
+
+
+class Device:
+    """The device code of Spoiled."""
+
+    control = control
+
+
+@lw.register_term
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Spoiled(ControlLaw):
+    """A law that gives no number from a time on."""
+
+    type: ClassVar[str] = "spoiled"
+    demands: ClassVar[tuple[str, ...]] = ("Z",)
+    device: ClassVar[Any] = Device
+
+    level: Any = lw.number((), "N")
+    time: Any = lw.number((), "s", 1e6)
+
+
+def scene(controller=True, lag=LAG, delay=DELAY * H, events=True):
+    """A body in a current, which turns to a heading and sinks."""
+    laws = [{"type": "heading_pid", "kp": KP, "kd": KD}, {"type": "spoiled", "level": LEVEL}]
+    wrench = {"type": "control_wrench", "limit": [1e3] * 5 + [LIMIT], "time_constant": [lag] * 6}
+    content = {
+        "vehicle": {"mass": 20.0, "inertia": [1.0, 1.2, 1.4], "added_mass": [5.0, 10.0, 12.0], "buoyancy": 196.2},
+        "start": {"position": [0.0, 0.0, 5.0]},
+        "terms": [{"type": "current", "velocity": CURRENT.tolist()}, wrench],
+        "events": [{"type": "floor", "depth": FLOOR}] if events else [],
+    }
+    guidance = [{"type": "set_point", "depth": 10.0, "heading": 0.5}]
+    section = {"period": EVERY * H, "delay": delay, "guidance": guidance, "laws": laws}
+    return lw.Scene.from_dict(content | ({"controller": section} if controller else {}))
+
+
+def fleet(members=MEMBERS, spoiled=(), **settings):
+    """Members that differ in their starts; some, {index: time}, whose law is spoiled from that time on."""
+    random = np.random.default_rng(1)
+    b = np.array([0.0, 0.0, 5.0]) + 0.1 * random.normal(size=(members, 3))
+    yaw, nu = random.uniform(-2.0, 2.0, members), random.normal(size=(members, 3))
+    c, s, zero, one = np.cos(yaw), np.sin(yaw), np.zeros(members), np.ones(members)
+    R = np.stack([c, -s, zero, s, c, zero, zero, zero, one], axis=1).reshape(-1, 3, 3)
+    Om = 0.3 * random.normal(size=(members, 3)) * [0.0, 0.0, 1.0]
+    nu[:, 2] = np.abs(nu[:, 2]) * (np.arange(members) % 3 == 0)
+    time = np.full(members, 1e6)
+    for index, at in dict(spoiled).items():
+        time[index] = at
+    return lw.Ensemble.from_states(scene(**settings), b, R, nu, Om, {"spoiled.time": time})
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return lw.solve(fleet(), "psi_s", **SETTINGS)
+
+
+def same(x, y, members=slice(None), names=SAVED):
+    """Whether two results have the same bits of these members."""
+    return all(getattr(x, name)[:, members].tobytes() == getattr(y, name)[:, members].tobytes() for name in names)
+
+
+def looked():
+    """The steps at which samples were taken, by the look that holds for each."""
+    return np.arange(STEPS + 1) // EVERY * EVERY
+
+
+def free(result):
+    """Members that no event stopped."""
+    return np.flatnonzero(result.status == 0)
+
+
+def test_a_sample_on_a_look_shows_what_that_look_demands(whole):
+    at, well = looked(), free(whole)
+    assert 50 < len(well) < MEMBERS and set(whole.status) == {0, Status.FLOOR}
+    R, Om = whole.attitude[:, well], whole.angular_velocity[:, well]
+    heading = np.arctan2(R[..., 1, 0], R[..., 0, 0])
+    error = np.arctan2(np.sin(0.5 - heading), np.cos(0.5 - heading))
+    # Of the state at the look itself, t = 0 among them, and held until the next one.
+    demand = np.zeros((STEPS + 1, len(well), 6))
+    demand[..., 2], demand[..., 5] = LEVEL, (KP * error - KD * Om[..., 2])[at]
+    np.testing.assert_allclose(whole.demand[:, well], demand, atol=1e-13)
+    delivered = np.clip(whole.demand, [-1e3] * 5 + [-LIMIT], [1e3] * 5 + [LIMIT])
+    assert (delivered != whole.demand).any() and (delivered[..., 5] == whole.demand[..., 5]).any()
+    np.testing.assert_allclose(whole.command, delivered, atol=1e-13)
+    np.testing.assert_allclose(whole.unmet, whole.demand - delivered, atol=1e-13)
+
+
+def test_actuators_follow_the_commands_late_and_slowly(whole):
+    well = free(whole)
+    command, where = whole.command[:, well], np.zeros((STEPS + 1, len(well), 6))
+    for k in range(STEPS):
+        u = command[k - DELAY] if k >= DELAY else np.zeros_like(command[0])
+        where[k + 1] = u + (where[k] - u) * np.exp(-H / LAG)
+    np.testing.assert_allclose(whole.actuator[:, well], where, atol=1e-13)
+
+
+def test_measured_and_wanted(whole):
+    at, well = looked(), free(whole)
+    R = whole.attitude[at][:, well]
+    truth = {name: getattr(whole, name)[at][:, well] for name in FIELDS}
+    truth["water_velocity"] = truth["velocity"] - np.einsum("knji,j->kni", R, CURRENT)
+    truth |= {"depth": truth["position"][..., 2], "heading": np.arctan2(R[..., 1, 0], R[..., 0, 0])}
+    for name, value in truth.items():
+        np.testing.assert_allclose(getattr(whole, f"measured_{name}")[:, well], value, atol=1e-14, err_msg=name)
+    c, s = np.cos(0.5), np.sin(0.5)
+    wanted = {"attitude": [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], "depth": 10.0, "heading": 0.5, "speed": 0.0}
+    wanted |= {"position": [0.0, 0.0, 10.0], "velocity": [0.0] * 3, "angular_velocity": [0.0] * 3}
+    assert {f"reference_{name}" for name in wanted} | {f"measured_{name}" for name in truth} == {
+        name for name in SIGNALS if "_" in name
+    }
+    for name, value in wanted.items():
+        values = getattr(whole, f"reference_{name}")
+        np.testing.assert_allclose(values, np.broadcast_to(value, values.shape), atol=1e-15, err_msg=name)
+
+
+def test_a_member_that_an_event_stops_keeps_the_signals_of_its_last_whole_step(whole):
+    stopped = np.flatnonzero(whole.status == Status.FLOOR)
+    last = np.floor(whole.failure_time[stopped] / H).astype(int)
+    # In the first step after a look, and in others.
+    assert len(stopped) > 50 and set(last % EVERY) == set(range(EVERY))
+    for name in SIGNALS:
+        values = getattr(whole, name)
+        for member, k in zip(stopped, last, strict=True):
+            assert (values[k + 1 :, member] == values[k, member]).all(), name
+
+
+def test_threads_launches_and_blocks_give_the_same_bits(whole, monkeypatch):
+    assert same(whole, lw.solve(fleet(), "psi_s", **SETTINGS, threads=1))
+    few = lw.solve(fleet(), "psi_s", **SETTINGS | {"save": lw.SaveAt(at=[0.1, 0.23], fields=SAVED)}, threads=2)
+    for name in SAVED:
+        assert getattr(few, name).tobytes() == getattr(whole, name)[[0, 10, 23, STEPS]].tobytes()
+    monkeypatch.setattr(plans, "SEGMENT_SAMPLE_BYTES", 7 * 256 * 100 * 8)
+    plan = make_plan(fleet(), "psi_s", **SETTINGS)
+    assert len(list(plan.segments(256))) > 5
+    assert same(whole, lw.solve(fleet(), "psi_s", **SETTINGS))
+
+
+def test_signals_change_nothing_of_the_motion_and_cost_nothing_where_nobody_asks(whole):
+    settings = SETTINGS | {"save": lw.SaveAt(every=H)}
+    plan = make_plan(fleet(), "psi_s", **settings)
+    assert plan.spec.control.noted == () and not plan.spec.control.reports and plan.signal_rows == ()
+    assert same(whole, lw.solve(fleet(), "psi_s", **settings), names=FIELDS)
+    # What the bus holds anyway needs no other kernel.
+    held = SETTINGS | {"save": lw.SaveAt(every=H, fields=("command", "unmet"))}
+    assert make_plan(fleet(), "psi_s", **held).spec == plan.spec
+    result = lw.solve(fleet(), "psi_s", **held)
+    assert set(result.samples) == {"command", "unmet"} and same(whole, result, names=("command", "unmet"))
+    with pytest.raises(AttributeError, match=r"demand was not kept: add 'demand' to SaveAt\(fields="):
+        _ = result.demand
+
+
+# Two in one packet, and in other blocks one each.
+SPOILED = {1: 0.0, 7: 0.3, 301: 0.0, 599: 0.3}
+
+
+def check_spoiled(whole, spoiled):
+    """Members whose law gives no number fail at that look; no other bit changes."""
+    members = np.array([*SPOILED])
+    assert (whole.status[members] == 0).all()
+    others = np.setdiff1d(np.arange(MEMBERS), members)
+    assert same(whole, spoiled, others)
+    assert (spoiled.status[others] == whole.status[others]).all()
+    assert (spoiled.status[members] == Status.CONTROL_NON_FINITE).all()
+    np.testing.assert_allclose(spoiled.failure_time[members], [max(0.0, at - H) for at in SPOILED.values()], atol=1e-12)
+    for member, at in SPOILED.items():
+        k = max(0, round(at / H) - 1)
+        for name in FIELDS:
+            # At the first look a member rests at its start.
+            np.testing.assert_array_equal(
+                getattr(spoiled, name)[: k + 1, member], getattr(whole, name)[: k + 1, member]
+            )
+            held, stop = getattr(spoiled, name)[k + 1 :, member], getattr(whole, name)[k, member]
+            # The lead of the next step is made and undone.
+            round_off = 8 * np.finfo(held.dtype).eps * max(1.0, np.abs(stop).max())
+            np.testing.assert_allclose(held, np.broadcast_to(stop, held.shape), rtol=0.0, atol=round_off)
+        for name in SIGNALS:
+            values = getattr(spoiled, name)[:, member]
+            if k:
+                assert values[: k + 1].tobytes() == getattr(whole, name)[: k + 1, member].tobytes(), name
+            assert values[k:].tobytes() == np.repeat(values[k : k + 1], len(values) - k, axis=0).tobytes(), name
+        if not k:
+            assert np.isnan(spoiled.demand[0, member, 2]) and (spoiled.command[:, member] == 0.0).all()
+
+
+def test_a_law_that_gives_no_number_ends_its_member_alone(whole):
+    spoiled = lw.solve(fleet(spoiled=SPOILED), "psi_s", **SETTINGS)
+    check_spoiled(whole, spoiled)
+    assert "a command of the controller is not finite" in Status.CONTROL_NON_FINITE.text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("method", "dtype"), [("rk4", "float64"), ("psi_s", "float32")])
+def test_of_other_methods_and_numbers(whole, method, dtype):
+    unlike = {} if method == "psi_s" else {"lag": 0.0}
+    well = lw.solve(fleet(**unlike), method, dtype=dtype, **SETTINGS)
+    check_spoiled(well, lw.solve(fleet(spoiled=SPOILED, **unlike), method, dtype=dtype, **SETTINGS))
+    assert all(getattr(well, name).dtype == np.dtype(dtype) for name in SAVED)
+    if dtype == "float32":
+        both = (whole.status == 0) & (well.status == 0)
+        for name in set(SAVED) - {"unmet"}:
+            a, b = getattr(whole, name)[:, both], getattr(well, name)[:, both]
+            np.testing.assert_allclose(b, a, atol=STEPS * 2.0**-23 * max(1.0, np.abs(a).max()), err_msg=name)
+    else:
+        # Without a lag an actuator is at once where the command is, once that arrives.
+        np.testing.assert_array_equal(well.actuator[DELAY:, free(well)], well.command[:-DELAY, free(well)])
+
+
+@pytest.mark.slow
+def test_a_look_sees_both_parts_of_compensated_sums():
+    # Without events the lead of the next step is merged with the end of this one, and undone for a look.
+    result = lw.solve(fleet(events=False), "psi_s", dtype="float32_compensated", **SETTINGS)
+    well = free(result)
+    assert result.position.dtype == np.float64 and result.measured_position.dtype == np.float32
+    for name in ("position", "attitude", "velocity", "angular_velocity"):
+        # Half a step at these speeds moves a body by 1e-2 m.
+        here, there = getattr(result, name)[looked()][:, well], getattr(result, f"measured_{name}")[:, well]
+        np.testing.assert_allclose(there, here, rtol=0.0, atol=2.0**-22 * np.abs(here).max(), err_msg=name)
+
+
+def test_a_store_holds_them_and_goes_on(whole, tmp_path):
+    path, part = tmp_path / "whole.zarr", tmp_path / "part.zarr"
+    stored = lw.solve(fleet(), "psi_s", **SETTINGS, store=path)
+    assert same(whole, stored)
+    lw.solve(fleet(), "psi_s", **SETTINGS, store=part, only=range(1))
+    assert not Folder(part).complete
+    lw.resume(part)
+    assert differing(path, part) == []
+    opened = lw.open_run(path)
+    assert same(whole, opened)
+    assert opened.dataset["command"].dims == ("time", "realization", "command_0")
+    for name in SAVED:
+        here, there = whole.dataset[name], opened.dataset[name]
+        assert (here.dims, here.attrs) == (there.dims, there.attrs), name
+    loaded = lw.Result.load(whole.save(tmp_path / "result.npz"))
+    assert same(whole, loaded) and set(loaded.samples) == set(SAVED)
+
+
+def test_members_that_are_kept_after_all_have_them(whole, tmp_path):
+    kept = lw.solve(fleet(), "psi_s", **SETTINGS, keep=[5, 300]).kept
+    stored = lw.solve(fleet(), "psi_s", **SETTINGS, keep=[5, 300], store=tmp_path / "run.zarr").kept
+    for name in SAVED:
+        assert getattr(kept, name).tobytes() == getattr(whole, name)[:, [5, 300]].tobytes(), name
+        assert getattr(stored, name).tobytes() == getattr(whole, name)[:, [5, 300]].tobytes(), name
+
+
+def test_a_recording_shows_commands_and_actuators(whole, tmp_path):
+    path, early = lw.log_rerun(whole, tmp_path / "fleet.rrd"), under_way(whole)[3]
+    for name in ("command", "actuator"):
+        median = np.median(getattr(whole, name)[3, early, 5])
+        assert rows(path, f"/{name}/5", "scalars")[3 * H] == pytest.approx([median])
+    assert not rows(path, "/demand/5", "scalars") and not rows(path, "/command/6", "scalars")
+
+
+def test_statistics_and_quantities_of_interest(whole):
+    statistics = [lw.Mean("command[5]"), lw.Mean("measured_depth"), lw.Mean("max(norm(demand))")]
+    statistics += [lw.Quantiles("actuator[2]"), lw.Mean("reference_speed")]
+    lean = lw.solve(fleet(), "psi_s", **SETTINGS, statistics=statistics, keep="none")
+    found = lean.statistics
+    np.testing.assert_allclose(found["mean command[5]"].value[:, 0], whole.command[..., 5].mean(axis=1), rtol=1e-12)
+    np.testing.assert_allclose(found["mean measured_depth"].value[:, 0], whole.measured_depth.mean(axis=1), rtol=1e-12)
+    size = np.linalg.norm(whole.demand, axis=-1).max(axis=0)
+    np.testing.assert_allclose(found["mean max(norm(demand))"].value, size.mean(), rtol=1e-12)
+    run = lw.prepare(
+        fleet(), of=["max(norm(demand))", "command[5]"], method="psi_s", h=H, t1=STEPS * H, save=SETTINGS["save"]
+    )
+    np.testing.assert_allclose(run(), np.stack([size, whole.command[-1, :, 5]], axis=1), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("asked", "text"),
+    [
+        ({"save": lw.SaveAt(fields=("position", "demand"))}, "save.fields = 'demand'"),
+        ({"statistics": [lw.Mean("command[0]")]}, "statistics = 'command'"),
+    ],
+)
+def test_a_scene_without_a_controller_has_none(asked, text):
+    why = r": is a signal of a controller, which this scene has not; give \[controller\]"
+    with pytest.raises(lw.SceneError, match=text + why):
+        lw.solve(scene(controller=False), "psi_s", h=H, t1=1.0, **asked)
+
+
+def test_names_that_are_not_known():
+    with pytest.raises(lw.SceneError, match=r"save.fields = 'commands': is not known; did you mean 'command'\?"):
+        lw.SaveAt(fields=("commands",))
+    with pytest.raises(lw.SceneError, match=r"is not one channel of command; give one: 'command\[0\]'"):
+        lw.Mean("command")
+    with pytest.raises(lw.SceneError, match=r"demand has the components demand\[0\]"):
+        lw.Mean("demand[6]")
+    with pytest.raises(lw.SceneError, match=r"is beyond the 6 channels .*; give 'command\[0\]' to 'command\[5\]'"):
+        lw.solve(fleet(), "psi_s", **SETTINGS, statistics=[lw.Mean("command[6]")])

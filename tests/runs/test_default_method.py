@@ -1,0 +1,168 @@
+"""The method that a run takes for which no one names one: by what acts, by the step, and told."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp.cli.report import members_line
+from lgvi_warp.methods import limits
+from lgvi_warp.reference.terms import View
+from lgvi_warp.runs import default_method
+from lgvi_warp.runs.provenance import provenance
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.runs.store import recipe
+from lgvi_warp.scene.settings import RunSettings
+from tests.laws.cases import CASES
+
+DRAG = lw.Drag(linear=[5.0, 10.0, 10.0, 0.5, 2.0, 2.0])
+MATRIX = lw.DragMatrix(linear=np.diag(DRAG.linear))
+AHEAD = lw.Start(position=[0.0, 0.0, 10.0], velocity=[1.5, 0.0, 0.0])
+REMUS = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0}, start={"velocity": [1.5, 0.0, 0.0]})
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(0)
+
+
+def derivative(law, nu):
+    """The wrench of a law's damping, derived by the velocity (6, 6)."""
+
+    def wrench(nu):
+        return law.damping(View(np.eye(3), np.zeros(3), nu[:3], nu[3:], memory=law.start())) @ nu
+
+    return np.array([(wrench(nu + 1e-6 * e) - wrench(nu - 1e-6 * e)) / 2e-6 for e in np.eye(6)]).T
+
+
+def torpedo(*terms, run=None, start=AHEAD):
+    named = lw.Scene.named("torpedo")
+    return dataclasses.replace(named, terms=list(terms), start=start, run=run or RunSettings())
+
+
+def planned(scene, h=0.1, **settings):
+    return make_plan(lw.Ensemble(scene, 2), h=h, t1=10.0 * h, **settings)
+
+
+def chosen(*terms, h=0.1, start=AHEAD, **settings):
+    return planned(torpedo(*terms, start=start), h, **settings).method.name
+
+
+def test_remus_takes_runge_kutta_methods_by_its_step():
+    steps = {"rk4": (0.01, 0.2, 0.4), "rk8": (0.5, 0.75), "rkw3": (5.0,)}
+    for name, those in steps.items():
+        assert {planned(REMUS, h).method.name for h in those} == {name}
+
+
+def test_what_is_not_damped_keeps_its_method_and_bits(scene):
+    """Whatever drives it, and where a term brakes by nothing; psi_x where the inertia refuses psi_s."""
+    assert chosen() == chosen(lw.Wrench(force=[1.0, 0.0, 0.0])) == chosen(lw.Drag()) == "psi_s"
+    assert chosen(lw.BodyLift(matrix=0.1 * np.ones((6, 6)))) == "psi_s"
+    coupled = dataclasses.replace(lw.Scene.named("remus_100"), terms=[])
+    assert planned(coupled).method.name == "psi_x"
+    bare = dataclasses.replace(scene, run=RunSettings())
+    a, b = (lw.solve(lw.Ensemble(bare, 2), method, h=0.1, t1=1.0) for method in (None, "psi_s"))
+    assert all(np.array_equal(a.samples[name], b.samples[name]) for name in a.samples)
+
+
+def test_what_runge_kutta_methods_do_not_take():
+    noise = lw.GaussMarkovCurrent(standard_deviation=[0.1, 0.1, 0.0], time_constant=20.0)
+    assert chosen(DRAG, noise) == chosen(DRAG, dtype="float32_compensated") == "psi_x"
+    assert chosen(DRAG, on_failure="substep") == "psi_s"
+    spinning = dataclasses.replace(AHEAD, angular_velocity=[8.0, 0.0, 0.0])
+    assert [chosen(DRAG, start=spinning, h=h) for h in (0.1, 0.2, 0.5)] == ["rk4", "rk8", "psi_s"]
+
+
+@pytest.mark.parametrize(("strength", "name"), [(1.0, "rk4"), (1e3, "rkw3"), (1e6, "psi_x")])
+def test_strong_damping(strength, name):
+    assert chosen(lw.DragMatrix(linear=strength * MATRIX.linear)) == name
+
+
+def test_a_law_that_does_not_tell_how_it_brakes_is_advanced_implicitly(monkeypatch):
+    assert chosen(MATRIX) == "rk4"
+    monkeypatch.setattr(lw.DragMatrix, "braking", lw.Term.braking)
+    assert chosen(MATRIX) == "rkw3"
+
+
+def test_what_is_named_is_never_changed():
+    assert planned(torpedo(DRAG, run=RunSettings(method="psi"))).method == lw.Method("psi")
+    assert planned(torpedo(DRAG), method="psi_x").method == lw.Method("psi_x")
+    # Options of a method are those of psi_s, as before.
+    assert planned(torpedo(DRAG, run=RunSettings(solver="newton"))).method == lw.Method("psi_s", "newton")
+    assert not planned(torpedo(DRAG), method="psi_x").method.reason
+
+
+def test_psi_s_and_psi_x_bear_oscillations_no_longer():
+    """So no oscillation that they resolve forbids the other methods."""
+    for table in (limits.MUNK, limits.RESTORING):
+        assert max(table[name] for name in default_method.OTHERWISE) < min(
+            table[name] for name in default_method.DAMPED
+        )
+
+
+@pytest.mark.parametrize("name", ["fins", "control fins", "control fins with rates", "cross-flow", "body lift"])
+def test_braking_bounds_the_twin(name, rng):
+    """Largest rate of the wrench's derivative by the velocity: never above that of `braking`."""
+    (term,), (law,) = CASES[name].terms, CASES[name].laws
+    numbers = {key: np.asarray(value)[None] for key, value in term.parameters().items()}
+    density = np.array([getattr(law, "density", 1000.0)])
+    inertia = np.diag([30.0, 65.0, 65.0, 0.3, 8.0, 8.0])
+
+    def rate(matrix):
+        return np.abs(np.linalg.eigvals(np.linalg.solve(inertia, matrix))).max()
+
+    for nu in rng.normal(size=(20, 6)) * [1.0, 0.2, 0.2, 0.2, 0.2, 0.2]:
+        bound = rate(term.braking(numbers, np.abs(nu)[None], density)[0])
+        assert rate(derivative(law, nu)) <= bound * (1.0 + 1e-6)
+
+
+@pytest.mark.parametrize("name", ["linear drag", "quadratic drag", "drag", "drag matrix"])
+def test_braking_of_drag_is_the_derivative(name, rng):
+    (term,), (law,) = CASES[name].terms, CASES[name].laws
+    numbers = {key: np.asarray(value)[None] for key, value in term.parameters().items()}
+    for nu in rng.uniform(0.1, 1.0, (5, 6)):
+        here = term.braking(numbers, nu[None], np.ones(1))[0]
+        assert np.allclose(here, derivative(law, nu), rtol=0.0, atol=1e-6)
+
+
+def test_terminal_speeds_balance(rng):
+    force, linear, quadratic = rng.uniform(0.0, 5.0, (3, 4, 6))
+    linear[0], quadratic[1] = 0.0, 0.0
+    speed = default_method.terminal_speeds(force, linear, quadratic)
+    assert np.allclose(linear * speed + quadratic * speed**2, force, rtol=1e-12)
+    assert not default_method.terminal_speeds(force, 0.0 * linear, 0.0 * quadratic).any()
+
+
+def test_a_drive_brings_speed_where_a_start_has_none():
+    """From rest quadratic drag has no rate; under thrust it has."""
+    drag = lw.Drag(quadratic=[5.0, 5.0, 5.0, 1.0, 1.0, 1.0])
+    rest = lw.Start(position=[0.0, 0.0, 10.0])
+    pushed = [chosen(drag, lw.Wrench(force=[x, 0.0, 0.0]), start=rest, h=1.0) for x in (1.0, 100.0, 1000.0)]
+    assert pushed == ["rk4", "rk8", "rkw3"]
+
+
+def test_it_is_told_and_kept():
+    plan = planned(torpedo(DRAG))
+    told = provenance(plan)
+    assert told["method"]["name"] == "rk4" and "method" not in told["scene"]["run"]
+    assert members_line(2, told).endswith("\nmethod      rk4, chosen since the scene is damped")
+    assert "chosen" not in provenance(planned(torpedo(DRAG), method="rk4"))["method"]
+    written = recipe.recipe(plan)
+    grid = plan.grid
+    again = recipe.plan_of(written, plan.ensemble, grid.sample_steps, grid.times)
+    assert again.method == plan.method and again.method.reason == plan.method.reason
+    # A store from before has no reason in its recipe.
+    del written["method"]["reason"]
+    assert recipe.plan_of(written, plan.ensemble, grid.sample_steps, grid.times).method == lw.Method("rk4")
+
+
+def test_a_prepared_run_chooses_once():
+    """Also for members that would choose another method by themselves."""
+    slow, fast = (
+        dataclasses.replace(AHEAD, velocity=[1.5, 0.3, 0.0], angular_velocity=[x, 0.0, 0.0]) for x in (1.0, 20.0)
+    )
+    run = lw.prepare(torpedo(MATRIX, start=slow), ["start.angular_velocity[0]"], of="position[1]", h=0.1, t1=0.5)
+    assert planned(torpedo(MATRIX, start=fast)).method.name == "rk8"
+    expected = lw.solve(torpedo(MATRIX, start=fast), "rk4", h=0.1, t1=0.5).position[-1, 0, 1]
+    assert run([[20.0]]) == expected != run([[1.0]])

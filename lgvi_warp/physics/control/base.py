@@ -387,9 +387,9 @@ class Allocation(Part):
         """What the channels make: a wrench for each, of the scene's own numbers.
 
         Returns:
-            (6, channels) [N, N m], of any size.
+            (6, channels) [N, N m], of any size. By default, for a part that does not know it, every component by itself.
         """
-        raise NotImplementedError
+        return np.eye(6)
 
 
 # Entries of a projector below this are round-off.

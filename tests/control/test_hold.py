@@ -44,8 +44,9 @@ def test_closed_loops_converge_with_their_order(method, order):
     def end(name, h):
         return ends(lw.solve(scene(LAG), name, h=h, t1=10.0, save=lw.SaveAt(every=10.0)))
 
-    exact = end("rk8", period / 20)
-    errors = np.array([np.abs(end(method, h) - exact).max() for h in (period / 4, period / 8, period / 16)])
+    exact = end("rk8", period / 32)
+    # Longer steps may take another side of a limit of an integral: that is no error of a step.
+    errors = np.array([np.abs(end(method, h) - exact).max() for h in (period / 8, period / 16, period / 32)])
     ratios = errors[:-1] / errors[1:]
     assert np.all(np.abs(np.log2(ratios) - order) < 0.35), (errors, ratios)
 

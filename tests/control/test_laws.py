@@ -7,6 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import lgvi_warp as lw
+from lgvi_kernels.advance import kernel
+from lgvi_kernels.lanes.flags import CPU_FLAGS
+from lgvi_warp.engine import plan
 from tests.support.loops import twin_states
 
 H, EVERY, STEPS = 0.05, 2, 400
@@ -160,6 +163,25 @@ def test_laws_act(run):
     ends = result.position[-1]
     gaps = np.linalg.norm(ends[:, None] - ends[None], axis=2) + 10.0 * np.eye(len(ends))
     assert gaps.min() > 1e-3
+
+
+@pytest.mark.slow
+def test_widths_give_the_same_bits_and_float32_is_near(scene, run, monkeypatch):
+    # As in tests/runs/test_same_bits.py: left free to fuse, the compiler joins other products at another width.
+    monkeypatch.setattr(kernel, "CPU_FLAGS", CPU_FLAGS.replace("-ffp-contract=fast", "-ffp-contract=off"))
+    monkeypatch.setattr(plan, "make_advance", kernel.make_advance.__wrapped__)
+    parameters, given, _ = run
+    # Within float32.
+    idle = parameters | {"heading_smc.nomoto_gain": np.minimum(parameters["heading_smc.nomoto_gain"], 1e30)}
+    ensemble = lw.Ensemble.from_states(scene, *given, idle)
+
+    def short(**words):
+        return lw.solve(ensemble, "psi_s", h=H, t1=5.0, save=lw.SaveAt(every=1.0), **words).position
+
+    first = short(width=1)
+    np.testing.assert_array_equal(short(width=8), first)
+    # 100 steps of round-off 1e-7 of numbers of size 10, which stable loops damp.
+    assert np.abs(short(dtype="float32") - first).max() < 1e-3
 
 
 @pytest.mark.slow

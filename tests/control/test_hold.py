@@ -37,7 +37,9 @@ def test_a_period_is_its_steps_under_the_held_wrench(method, dtype):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("method", "order", "parts"), [("psi_x", 2, 8), ("psi_s", 2, 8), ("psi_w", 2, 8), ("rk4", 4, 4)])
+@pytest.mark.parametrize(
+    ("method", "order", "parts"), [("psi_x", 2, 8), ("psi_s", 2, 8), ("psi_w", 2, 8), ("rk4", 4, 4)]
+)
 def test_closed_loops_converge_with_their_order(method, order, parts):
     period = 5 * H
 

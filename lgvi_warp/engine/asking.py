@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import accumulate
 from typing import Any
 
 import numpy as np
 
-from lgvi_kernels.advance.feeding import NOTED
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.physics.control.callback import Callback
 
@@ -50,20 +48,16 @@ def last_look(packets: Packets) -> tuple[Looks, Looks]:
     Returns:
         (measured, wanted), copies.
     """
-    control, controller = packets.plan.spec.control, packets.plan.kernel_choice.controller
-    assert control is not None and controller is not None
-    firsts = accumulate((NOTED[name] for name in control.noted), initial=controller.bus.rows)
-    places = dict(zip(control.noted, firsts, strict=False))
-    y, r = (_numbers(packets, places[name], NOTED[name]) for name in ("measured", "reference"))
+    y, r = (_numbers(packets, packets.plan.noted_rows[name]) for name in ("measured", "reference"))
     measured_attitude, wanted_attitude = (rows[:, 3:12].reshape(-1, 3, 3) for rows in (y, r))
     measured = Looks(y[:, :3], measured_attitude, y[:, 12:15], y[:, 18:21], y[:, 21], water_velocity=y[:, 15:18])
     return measured, Looks(r[:, :3], wanted_attitude, r[:, 12:15], r[:, 15:18], r[:, 18], speed=r[:, 19])
 
 
-def _numbers(packets: Packets, first: int, count: int) -> np.ndarray:
-    """Rows of the memory by member, (m, count) of float64."""
-    rows = packets.laws.memory.view[:, first : first + count]
-    return rows.transpose(0, 2, 1).reshape(-1, count)[: packets.members.count].astype(np.float64)
+def _numbers(packets: Packets, places: range) -> np.ndarray:
+    """Rows of the memory by member, (m, rows) of float64."""
+    rows = packets.laws.memory.view[:, places.start : places.stop]
+    return rows.transpose(0, 2, 1).reshape(-1, len(places))[: packets.members.count].astype(np.float64)
 
 
 def answer(packets: Packets, values: np.ndarray) -> None:

@@ -66,4 +66,4 @@ def judged(fleet, found, asked, rounds=5):
                 good.append(last)
     prices = tradeoffs.costs([one.plan for one in good], rounds)
     best = min(range(len(good)), key=prices.__getitem__)
-    return own.error(asked["of"]) / asked["error"], prices[0] / prices[best], good[best].setting
+    return own.error(asked["of"]) / asked["error"], prices[0] / prices[best], good[best].candidate

@@ -181,7 +181,7 @@ def test_start_and_run_may_be_objects():
     start, run = lw.Start(position=[0.0, 0.0, 5.0]), RunSettings(step=0.02)
     scene = lw.Scene.named("remus_100", start=start, run=run)
     assert scene.start is start and scene.run is run
-    with pytest.raises(lw.SceneError, match="start = .* is not a table"):
+    with pytest.raises(lw.SceneError, match="is not a table"):
         lw.Scene.named("remus_100", start=run)
 
 

@@ -62,8 +62,7 @@ def plot(runs, path):
         ylim=(0.0, 12.0),
         title="The integral brings the vehicle back to each long leg",
     )
-    depth.set(xlabel="time [s]", ylabel="depth [m]", title="Two crossings change the depth")
-    depth.invert_yaxis()
+    depth.set(xlabel="time [s]", ylabel="depth [m]", ylim=(28.0, 2.0), title="Two crossings change the depth")
     above.legend(loc="upper left")
     figure.savefig(path, dpi=100)
     return path

@@ -10,15 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_kernels import built_in
-from lgvi_kernels.advance.examine_part import OUT_FIELDS, SPEED
 from lgvi_warp.common.errors import SceneError
-from lgvi_warp.engine import kernel_choice
 from lgvi_warp.engine.laws.bench import simple_scene
 from lgvi_warp.engine.laws.part_bench import (
     COLUMNS,
     EVERY,
     LOOKS,
+    OUT_FIELDS,
+    SPEED,
     Answers,
     PartBench,
     RandomLooks,
@@ -137,8 +136,7 @@ def check_controller(
     (wired,) = (one for one in whole.controller.parts if one.key == part.key)
     numbers = {name: np.asarray(value)[None] for name, value in wired.parameters().items()}
     wired = wired.with_features(frozenset(f"{part.key}.{word}" for word in wired.features(numbers)))
-    module = kernel_choice.device_module(wired, wired.device_in(False), built_in)
-    bench = PartBench(wired, module, whole, samples, seed)
+    bench = PartBench(wired, whole, samples, seed)
     with np.errstate(all="ignore"):  # what is not finite is found by its check
         packed, checks = packed_numbers(wired, bench.Params, bench.packed)
         if packed is None or not all(check.ok for check in checks):

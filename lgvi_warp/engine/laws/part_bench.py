@@ -10,12 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import warp as wp
 
+from lgvi_kernels import built_in
 from lgvi_kernels.advance import examine_part
 from lgvi_kernels.advance.examine_part import LOOK_FIELDS, OUT_FIELDS, make_examine_part
 from lgvi_kernels.maps.in_turn import ROLES
 from lgvi_warp.common import warp_setup
 from lgvi_warp.common.machine import register_width
 from lgvi_warp.common.warp_setup import build_lock
+from lgvi_warp.engine import kernel_choice
 from lgvi_warp.engine.arrays import Lanes, LawArrays, memory_rows, put_rows
 from lgvi_warp.engine.laws import bench
 from lgvi_warp.engine.laws.bench import packing_context, short, sizes
@@ -34,6 +36,8 @@ REMEDY = (
     "return what the role was given; name fields as Measurement, Reference, Wrench and params() do; import the operators of "
     "lanes that are used; no `if` on a lane, no plain number times a lane: docs/develop/add_a_controller.md"
 )
+# Column of the wanted speed.
+SPEED = examine_part.SPEED
 # First columns of the vectors of a look, by group and name.
 COLUMNS = {
     (group, name): 3 * i
@@ -150,7 +154,6 @@ class PartBench:
 
     Args:
         part: the part, of a scene.
-        module: its device code.
         scene: scene with the part.
         samples: least number of members.
         seed: seed of the random looks.
@@ -163,11 +166,12 @@ class PartBench:
         looks: random looks.
 
     Raises:
-        SceneError: if the device code does not compile.
+        SceneError: if the device code lacks something, has a wrong signature or does not compile.
     """
 
-    def __init__(self, part: Part, module: Any, scene: Scene, samples: int, seed: int):
-        self.part, self.module, self.seed = part, module, seed
+    def __init__(self, part: Part, scene: Scene, samples: int, seed: int):
+        self.part, self.seed = part, seed
+        module = kernel_choice.device_module(part, part.device_in(False), built_in)
         assert part.bus is not None
         self.bus = part.bus
         self.roles = tuple(role for role in ROLES if hasattr(module, role))

@@ -168,6 +168,11 @@ class Part(Term):
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The numbers as they are: a controller works in the user's axes."""
+        if self.lanes() is None:
+            name = type(self).__name__
+            raise NotImplementedError(
+                f"{name} must define packed(numbers, context): see docs/develop/add_a_controller.md"
+            )
         return Packed({item.name: numbers[word_of(item)] for item in self.number_fields() if word_of(item) in numbers})
 
 

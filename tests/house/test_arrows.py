@@ -92,6 +92,7 @@ def test_only_eight_files_of_the_engine_know_the_kernels():
         "lgvi_warp.engine.laws.bench",
         "lgvi_warp.engine.laws.check",
         "lgvi_warp.engine.laws.part_bench",
+        "lgvi_warp.engine.laws.part_bench",
     }
     assert importers("lgvi_kernels") == those
 

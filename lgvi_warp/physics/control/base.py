@@ -39,20 +39,20 @@ class Bus(NamedTuple):
         report: First of as many rows as there are commands, where actuators say where they are.
         acting: First row of the commands that act, where commands are delayed. As many rows of the commands before follow, and
             the row of the step from which the former act.
-        answer: First of the rows into which a `Callback` writes; as many as it returns numbers.
         rows: Number of rows.
         delayed: Whether the commands of some member are delayed.
         period: Time between two looks [s].
+        answer: First of the rows into which a `Callback` writes; as many as it returns numbers.
     """
 
     commands: Mapping[str, tuple[int, int]]
     unmet: int
     report: int
     acting: int
-    answer: int
     rows: int
     delayed: bool = False
     period: float = 1.0
+    answer: int = 0
 
     @property
     def channels(self) -> int:
@@ -75,7 +75,8 @@ class Bus(NamedTuple):
         for key, count in channels.items():
             commands[key] = (row, count)
             row += count
-        return cls(commands, row, row + 6, 2 * row + 6, 4 * row + 7, 4 * row + 7 + answers, period=period)
+        rows = 4 * row + 7
+        return cls(commands, row, row + 6, 2 * row + 6, rows + answers, period=period, answer=rows)
 
     def values_of(self, key: str) -> dict[str, Any]:
         """What the device code of an actuator reads.

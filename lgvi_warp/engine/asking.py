@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import accumulate
 from typing import Any
 
 import numpy as np
 
-from lgvi_kernels.advance.feeding import NOTED
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.physics.control.callback import Callback
 
@@ -51,24 +49,20 @@ def last_look(packets: Packets, members: np.ndarray | None = None) -> tuple[Look
     Returns:
         (measured, wanted), copies.
     """
-    control, controller = packets.plan.spec.control, packets.plan.kernel_choice.controller
-    assert control is not None and controller is not None
-    firsts = accumulate((NOTED[name] for name in control.noted), initial=controller.bus.rows)
-    places = dict(zip(control.noted, firsts, strict=False))
-    y, r = (_numbers(packets, places[name], NOTED[name], members) for name in ("measured", "reference"))
+    y, r = (_numbers(packets, packets.plan.noted_rows[name], members) for name in ("measured", "reference"))
     measured_attitude, wanted_attitude = (rows[:, 3:12].reshape(-1, 3, 3) for rows in (y, r))
     measured = Looks(y[:, :3], measured_attitude, y[:, 12:15], y[:, 18:21], y[:, 21], water_velocity=y[:, 15:18])
     return measured, Looks(r[:, :3], wanted_attitude, r[:, 12:15], r[:, 15:18], r[:, 18], speed=r[:, 19])
 
 
-def _numbers(packets: Packets, first: int, count: int, members: np.ndarray | None) -> np.ndarray:
-    """Rows of the memory by member, (m, count) of float64."""
-    rows = packets.laws.memory.view[:, first : first + count]
+def _numbers(packets: Packets, places: range, members: np.ndarray | None) -> np.ndarray:
+    """Rows of the memory by member, (m, rows) of float64."""
+    rows = packets.laws.memory.view[:, places.start : places.stop]
     if members is not None:
         packet, lane = np.divmod(members, rows.shape[2])
         return rows[packet, :, lane].astype(np.float64)
-    copied = np.ascontiguousarray(rows.transpose(0, 2, 1), np.float64)
-    return copied.reshape(-1, count)[: packets.members.count]
+    copied = np.array(rows.transpose(0, 2, 1), np.float64, order="C")
+    return copied.reshape(-1, len(places))[: packets.members.count]
 
 
 def answer(packets: Packets, values: np.ndarray) -> None:

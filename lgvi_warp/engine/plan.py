@@ -384,15 +384,22 @@ class Plan:
         return tuple(name for name in self.fields if name in SIGNALS)
 
     @functools.cached_property
+    def noted_rows(self) -> dict[str, range]:
+        """Rows of the memory in which looks note something, by its name among NOTED."""
+        control, controller = self.spec.control, self.kernel_choice.controller
+        if control is None or controller is None:
+            return {}
+        firsts = accumulate((NOTED[name] for name in control.noted), initial=controller.bus.rows)
+        return {name: range(first, first + NOTED[name]) for name, first in zip(control.noted, firsts, strict=False)}
+
+    @functools.cached_property
     def signal_rows(self) -> tuple[int, ...]:
         """Rows of the memory that are saved with each sample: those of each signal in turn."""
         controller = self.kernel_choice.controller
         if controller is None or controller.bus is None:
             return ()
         # A part of a run may save less than the kernel notes.
-        names = self.spec.control.noted
-        firsts = accumulate((NOTED[name] for name in names), initial=controller.bus.rows)
-        noted = dict(zip(names, firsts, strict=False))
+        noted = {name: rows.start for name, rows in self.noted_rows.items()}
         begins = ((row_of(name, controller.bus, noted), self.sample_fields[name]) for name in self.signals)
         return tuple(row + i for row, size in begins for i in range(size))
 

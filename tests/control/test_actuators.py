@@ -202,7 +202,12 @@ def solved(name, method, h, steps, every):
     return result.position
 
 
-@pytest.mark.slow_but("rov-psi_s-100", "auv-rk4-100")
+# Round-off of 1e-15 a step, of loops that damp it. Near the turn of the polynomial a command is known to half of its digits:
+# its thrust to all, its torque and its losses to 1e-8.
+ROUND_OFF = {"rov": 1e-8, "auv": 1e-9}
+
+
+@pytest.mark.slow_but("rov-psi_s-100", "auv-psi_s-100")
 @pytest.mark.parametrize("steps", [100, 1000])
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 @pytest.mark.parametrize("name", SCENES)
@@ -210,8 +215,7 @@ def test_the_loop_is_the_twins(name, method, steps):
     kernel = solved(name, method, H, steps, EVERY)
     for i in range(len(STIFF)):
         positions, rests = twin(name, method, i, steps)
-        # Round-off of 1e-15 a step, of loops that damp it.
-        assert np.abs(kernel[:, i] - positions).max() < 1e-9
+        assert np.abs(kernel[:, i] - positions).max() < ROUND_OFF[name]
         assert np.any(rests[:, 5] != 0.0), "the limits are not reached"
 
 

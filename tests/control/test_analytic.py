@@ -165,8 +165,10 @@ def test_the_lyapunov_function_rises_no_more_than_a_held_torque_lets_it():
     assert np.all(np.diff(V, axis=0) <= bound[:-1] + 1e-14)
     # It does rise: the bound is no idle one.
     assert np.max(np.diff(V, axis=0) / (bound[:-1] + 1e-9)) > 0.1
-    # All come back, those from 179.9 degrees too.
-    assert V[-1].max() < 0.3 * V[0].max(), V[-1].max()
+    assert np.all(V[-1] < V[0])
+    # Those from 179.9 degrees leave it as e^0.31 t at the slowest, and settle as e^-0.136 t: in 200 s to e^-20.
+    slow = run(scene(period), [member] * 20, period / 10, 200.0, 200.0, [x[:20] for x in (zero, attitudes, zero, zero)])
+    assert np.abs(slow.attitude[-1, :20] - np.eye(3)).max() < np.exp(-20.0)
 
 
 def test_an_integral_waits_while_the_actuators_deliver_no_more():

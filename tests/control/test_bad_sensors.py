@@ -1,10 +1,20 @@
 """Sensors, estimators and faults that are wrong get a sentence with key, value and remedy."""
 
+import re
+import tomllib
+
 import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from tests.conftest import ROOT
 from tests.control.bench import scene
+
+CONTROLLER = {
+    "period": 0.1,
+    "laws": [{"type": "heading_pid", "kp": 1.0}],
+    "guidance": [{"type": "set_point", "heading": 0.0}],
+}
 
 
 def refused(make):
@@ -15,13 +25,7 @@ def refused(make):
 
 def of_table(**tables):
     """A scene from tables as in a file."""
-    controller = {
-        "period": 0.1,
-        "laws": [{"type": "heading_pid", "kp": 1.0}],
-        "guidance": [{"type": "set_point", "heading": 0.0}],
-    }
-    base = scene([]).to_dict()
-    return lw.Scene.from_dict(base | {"controller": controller | tables})
+    return lw.Scene.from_dict(scene([]).to_dict() | {"controller": CONTROLLER | tables})
 
 
 @pytest.mark.parametrize(
@@ -88,6 +92,17 @@ def test_a_wrong_fault(fault, words):
     assert all(word in text for word in words), text
 
 
+def test_the_examples_of_the_pages():
+    pages = [(ROOT / "docs" / "controllers" / name).read_text() for name in ("sensors.md", "faults.md")]
+    text = "\n".join(block for page in pages for block in re.findall(r"```toml\n(.*?)```", page, re.DOTALL))
+    tables = tomllib.loads(text)["controller"]
+    matrix = [[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]]
+    controller = CONTROLLER | {"allocation": [{"type": "matrix", "to": "control_fins", "matrix": matrix}]} | tables
+    scene = lw.Scene.from_dict({"vehicle": {"name": "remus_100"}, "controller": controller})
+    assert [part.key for part in scene.controller.faults] == ["stuck_rudder", "blind"]
+    assert scene.parameters()["log.noise"].tolist() == [0.01, 0.01, 0.02]
+
+
 def test_two_faults_without_names_are_told_to_have_some():
     faults = [{"of": "cell", "time": 1.0}, {"of": "control_wrench", "time": 2.0}]
     text = refused(lambda: of_table(sensors=[CELL], faults=faults))
@@ -108,11 +123,8 @@ def test_all_faults_at_once():
 
 def test_a_scene_with_sensors_is_its_own_file():
     sensors = [lw.Sensor(name="cell", of="depth", noise=0.1), lw.Sensor(name="log", of="velocity", bias=0.2, latency=2)]
-    sensors += [
-        lw.DeadReckoning(rule="euler"),
-        lw.LowPass(of="heading", time_constant=1.0),
-        lw.ComplementaryFilter(time_constant=2),
-    ]
+    sensors += [lw.DeadReckoning(rule="euler"), lw.LowPass(of="heading", time_constant=1.0)]
+    sensors += [lw.ComplementaryFilter(time_constant=2.0)]
     first = scene(sensors, [lw.Fault(of="log", channel=2, time=np.inf)])
     again = lw.Scene.from_dict(first.to_dict())
     assert again.to_dict() == first.to_dict()

@@ -11,12 +11,15 @@ J, KP, KD, H, EVERY, STEPS = 4.5, 2.0, 3.0, 0.02, 5, 120
 DELAYS = np.array([0, 1, 4, 5, 7, 10, 22, 48])
 
 
-def members(delays, faults=(), parameters=None, start=0.3):
+def members(delays, times=np.inf):
+    """Members with these delays in steps, and with a fault from these times on: one kernel for all."""
     vehicle = lw.Vehicle(20.0, (1.5, 4.0, J), (5.0, 22.0, 25.0), 196.0, (0.0, 0.0, -0.02))
-    guidance = [lw.SetPoint(heading=start)]
+    guidance = [lw.SetPoint(heading=0.3)]
+    faults = [lw.Fault(of="control_wrench", channel=5, gain=0.5, offset=0.05)]
     controller = lw.Controller(period=EVERY * H, guidance=guidance, laws=[lw.HeadingPID(kp=KP, kd=KD)], faults=faults)
     scene = lw.Scene(vehicle, lw.Environment(9.8), [lw.ControlWrench()], controller=controller)
-    return of_members(scene, len(delays), {"controller.delay": np.asarray(delays) * H} | (parameters or {}))
+    times = np.broadcast_to(times, len(delays))
+    return of_members(scene, len(delays), {"controller.delay": np.asarray(delays) * H, "fault.time": times})
 
 
 def wanted(delay, fault=(np.inf, 1.0, 0.0)):
@@ -44,8 +47,8 @@ def test_a_delay_is_whole_periods_and_steps(method):
     result = lw.solve(fleet, method, h=H, t1=STEPS * H, save=lw.SaveAt(every=H))
     heading = np.arctan2(result.attitude[..., 1, 0], result.attitude[..., 0, 0])
     for i, delay in enumerate(DELAYS):
-        # A held moment about a principal axis is exact for rk4; the turn of psi_s follows equation (24), with an error of order
-        # h^2 of the angle in a step: (rate h)^2 / 24 of it, a rate of at most 0.2 rad/s.
+        # A held moment about a principal axis is exact for rk4; the turn of psi_s follows equation (24), with an error of
+        # (rate h)^2 / 24 of the angle of a step at most: here the rate stays below 0.2 rad/s.
         allowed = 1e-11 if method == "rk4" else 0.3 * (0.2 * H) ** 2
         assert np.abs(heading[:, i] - wanted(delay)).max() < allowed, delay
         assert np.all(heading[: delay + 1, i] == 0.0) and heading[delay + 1, i] > 0.0
@@ -62,9 +65,8 @@ def test_a_delay_that_varies_is_that_of_the_nearest_step():
 def test_a_fault_begins_at_the_first_look_at_or_after_its_time():
     # Looks at 0.5 and 0.6 s; a time on a look, one after it, never.
     times = np.array([0.5, 0.51, 0.6, np.inf, 0.0])
-    fault = [lw.Fault(of="control_wrench", channel=5, gain=0.5, offset=0.05)]
     delays = np.repeat((0, 7), len(times))
-    result = lw.solve(members(delays, fault, {"fault.time": np.tile(times, 2)}), "psi_s", h=H, t1=STEPS * H,
+    result = lw.solve(members(delays, np.tile(times, 2)), "psi_s", h=H, t1=STEPS * H,
                       save=lw.SaveAt(every=H))  # fmt: skip
     heading = np.arctan2(result.attitude[..., 1, 0], result.attitude[..., 0, 0])
     for i, (delay, time) in enumerate(zip(delays, np.tile(times, 2), strict=True)):

@@ -1,10 +1,15 @@
 """Laws against their twins, each in a member of its own: a single kernel has them all."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 import lgvi_warp as lw
+from lgvi_kernels.advance import kernel
+from lgvi_kernels.lanes.flags import CPU_FLAGS
+from lgvi_warp.engine import plan
 from tests.support.loops import twin_states
 
 H, EVERY, STEPS = 0.05, 2, 400
@@ -96,8 +101,7 @@ def states(n):
     return np.array((0.4, -0.3, 3.0)) + rng.normal(size=(n, 3)), attitudes, *velocities
 
 
-@pytest.fixture(scope="module")
-def run(scene):
+def solved(scene):
     """(parameters, states, result): member i has the law i alone."""
     parameters = {
         f"{law}.{name}": np.array([ACTING[law][name] if law == other else IDLE[law][name] for other in NAMES], float)
@@ -109,9 +113,28 @@ def run(scene):
     return parameters, given, lw.solve(ensemble, "psi_s", h=H, t1=STEPS * H, save=lw.SaveAt(every=EVERY * H))
 
 
-@pytest.mark.parametrize("steps", [60, pytest.param(STEPS, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("law", NAMES)
-def test_a_law_is_its_twin(law, steps, scene, run):
+@pytest.fixture(scope="module")
+def run(scene):
+    return solved(scene)
+
+
+@pytest.fixture(scope="module")
+def other(scene):
+    """The same kernel with other words: straight pieces, speeds, two numbers filtered, another policy, no waiting."""
+    guidance = [
+        lw.Trajectory(times=(0.0, 1.0, 2.0, 2.5), positions=[(0, 0, 3), (1, 1, 4), (1, -2, 6), (1, 0, 5)],
+                      headings=(0.3, 2.0, -2.5, 1.0), speed=(0.5, 1.0, 0.8, 0.2)),
+        lw.ReferenceModel(natural_frequency=(2.0, 1.5)),
+    ]  # fmt: skip
+    words = {"policy": {"activation": "relu", "output_activation": "clip"}, "pose_pid": {"anti_windup": "none"}}
+    laws = [dataclasses.replace(law, **words.get(law.key, {})) for law in scene.controller.laws]
+    controller = lw.Controller(period=EVERY * H, guidance=guidance, laws=laws)
+    changed = dataclasses.replace(scene, controller=controller)
+    return changed, solved(changed)
+
+
+def check(law, steps, scene, run):
+    """A member is the twin's, so many steps long."""
     parameters, given, result = run
     i = NAMES.index(law)
     numbers = {name: values[i] for name, values in parameters.items()}
@@ -123,9 +146,55 @@ def test_a_law_is_its_twin(law, steps, scene, run):
         assert error[1] < 1e-12 and error.max() < 1e-9
 
 
+@pytest.mark.parametrize("steps", [60, pytest.param(STEPS, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("law", NAMES)
+def test_a_law_is_its_twin(law, steps, scene, run):
+    check(law, steps, scene, run)
+
+
+@pytest.mark.parametrize("law", ["speed_pid", "pose_pid", "policy", "heading_smc"])
+def test_so_it_is_with_other_words(law, other):
+    check(law, 60, *other)
+
+
 def test_laws_act(run):
     # Each member goes a way of its own.
     result = run[2]
     ends = result.position[-1]
     gaps = np.linalg.norm(ends[:, None] - ends[None], axis=2) + 10.0 * np.eye(len(ends))
     assert gaps.min() > 1e-3
+
+
+@pytest.mark.slow
+def test_widths_give_the_same_bits_and_float32_is_near(scene, run, monkeypatch):
+    # As in tests/runs/test_same_bits.py: left free to fuse, the compiler joins other products at another width.
+    monkeypatch.setattr(kernel, "CPU_FLAGS", CPU_FLAGS.replace("-ffp-contract=fast", "-ffp-contract=off"))
+    monkeypatch.setattr(plan, "make_advance", kernel.make_advance.__wrapped__)
+    parameters, given, _ = run
+    # Within float32.
+    idle = parameters | {"heading_smc.nomoto_gain": np.minimum(parameters["heading_smc.nomoto_gain"], 1e30)}
+    ensemble = lw.Ensemble.from_states(scene, *given, idle)
+
+    def short(**words):
+        return lw.solve(ensemble, "psi_s", h=H, t1=5.0, save=lw.SaveAt(every=1.0), **words).position
+
+    first = short(width=1)
+    np.testing.assert_array_equal(short(width=8), first)
+    # 100 steps of round-off 1e-7 of numbers of size 10, which stable loops damp.
+    assert np.abs(short(dtype="float32") - first).max() < 1e-3
+
+
+@pytest.mark.slow
+def test_guidance_keeps_what_others_want():
+    # A kernel of its own: the set-point's heading and the trajectory's place, whatever their order.
+    point = lw.SetPoint(heading=0.7)
+    places = lw.Trajectory(times=(0.0, 3.0), positions=[(0, 0, 3), (2, 1, 4)])
+    for guidance in ([point, places], [places, point]):
+        gains = {**dict.fromkeys(("kp", "kd"), (20.0, 25.0, 30.0)), **dict.fromkeys(("kr", "kw"), (6.0, 7.0, 8.0))}
+        vehicle = lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 20.5 * 9.8, (0.01, 0.005, -0.02))
+        controller = lw.Controller(period=EVERY * H, guidance=guidance, laws=[lw.PosePID(**gains)])
+        way = lw.Scene(vehicle, lw.Environment(gravity=9.8), [lw.ControlWrench(limit=LIMIT)], controller=controller)
+        given = states(1)
+        result = lw.solve(lw.Ensemble.from_states(way, *given), "psi_s", h=H, t1=6.0, save=lw.SaveAt(every=EVERY * H))
+        b, R = twin_states(way, {}, [x[0] for x in given], EVERY, H, 120)
+        assert np.abs(result.position[:, 0] - b).max() < 1e-10 and np.abs(result.attitude[:, 0] - R).max() < 1e-10

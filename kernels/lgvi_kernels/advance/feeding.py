@@ -191,6 +191,9 @@ def make_feed(spec, types, method, at_step, opened):
         if wp.static(notes_demand):
             put3(c.memory, c.packet, monitor.bus, w.force)
             put3(c.memory, c.packet, monitor.bus + 3, w.torque)
+        # An allocation may lose what is no number: a limit is a comparison.
+        v = w.force + w.torque
+        total = v.x + v.y + v.z
         if wp.static(allocate is not None):
             w = allocate(w, r, y, c.loop)
         # What was not delivered lies behind the commands.
@@ -201,10 +204,9 @@ def make_feed(spec, types, method, at_step, opened):
         if wp.static(checked):
             unity = ones(y.position.x)
             zero = unity - unity
-            total = zero
             for j in range(monitor.commands):
                 total = total + remembered(y, j)
-            # 1 where all commands are finite; where one is not it is NaN, and positive() takes its last argument.
+            # 1 where demand and commands are finite; where one is not it is NaN, and positive() takes its last argument.
             well = unity - (total - total)
             bad = positive(well, zero, real(wp.static(float(CONTROL_NON_FINITE))) * unity)
             if any_positive(bad):

@@ -296,7 +296,7 @@ def restoring(nominal: Numbers) -> tuple[np.ndarray, np.ndarray]:
     return weight - buoyancy, weight[:, None] * centers[0] - buoyancy[:, None] * centers[1]
 
 
-# A step beyond any run, and within float32. A time and a whole number of steps that differ by less than the second, as a part of
+# A step beyond any run, within float32. A time and a number of steps that differ by less than the second, as a part of
 # the step, are the same.
 NEVER, SAME_TIME = 1e30, 1e-6
 
@@ -387,9 +387,9 @@ class Allocation(Part):
         """What the channels make: a wrench for each, of the scene's own numbers.
 
         Returns:
-            (6, channels) [N, N m], of any size.
+            (6, channels) [N, N m], of any size. By default, for a part that does not know it, every component by itself.
         """
-        raise NotImplementedError
+        return np.eye(6)
 
 
 # Entries of a projector below this are round-off.

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.physics.control.base import Allocation, ControlLaw
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext
@@ -60,6 +62,10 @@ class CallbackCommands(Allocation):
     """The allocation by which the answer of a `Callback` with `to` reaches its actuator; a `Controller` makes it."""
 
     device: ClassVar[str] = "callback_commands"
+
+    def reach(self) -> np.ndarray:
+        """Everything: no law asks it for a demand."""
+        return np.eye(6)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Where the answer is, and the limits of the commands."""

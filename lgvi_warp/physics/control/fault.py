@@ -25,7 +25,7 @@ class Fault(Sending):
         time: When it begins [s]; 0 by default; inf for never.
         gain: Factor of the command or reading; 0 by default.
         offset: Added to it, in its unit; 0 by default.
-        known: Whether the allocation knows the fault of an actuator, and leaves the channel out from then on; False by default.
+        known: Of an actuator: whether the allocation leaves the channel out from then on; False by default.
 
     Raises:
         SceneError: Where `of` is no text, `channel` no whole number, or `known` neither true nor false; and as `Term`.

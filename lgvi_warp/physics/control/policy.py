@@ -108,6 +108,7 @@ class Policy(ControlLaw):
             )
         wishes = dict.fromkeys(PLACES[name][1] for name in names)
         known = {
+            "file": os.fspath(self.file),
             "layers": layers,
             "places": np.array([PLACES[name][0] for name in names]),
             "needs": tuple(wish for wish in wishes if wish),

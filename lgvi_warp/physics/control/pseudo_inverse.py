@@ -20,10 +20,10 @@ from lgvi_warp.physics.terms.thrusters import side_of_table
 class PseudoInverse(Allocation):
     """Commands for the efforts t of least sum of weight t^2 whose wrench B t is nearest to the demand (Fossen 2021, 11.2).
 
-    t = W^-1 B^T (B W^-1 B^T)^+ w. Components for which no law asks do not count. Effort is thrust of thrusters, by the inverse of their curve; angle of fins, whose effect B
-    is that at `speed`; force or moment of a control_wrench. Thrust is that at rest: what it loses by the advance speed is not
-    made up for, and counts as delivered. Thrusters with a polynomial need a `limit`, up to which, or to where the polynomial
-    turns, it is inverted.
+    t = W^-1 B^T (B W^-1 B^T)^+ w. Components for which no law asks do not count. Effort is thrust of thrusters, by the
+    inverse of their curve; angle of fins, whose effect B is that at `speed`; force or moment of a control_wrench. Thrust is
+    that at rest: what it loses by the advance speed is not made up for, and counts as delivered. Thrusters with a polynomial
+    need a `limit`, up to which, or to where the polynomial turns, it is inverted.
 
     Args:
         to: Key of the term that takes the commands.

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.control.base import Guidance, Numbers, Packed, PackingContext
@@ -75,6 +74,8 @@ def _pieces(t: np.ndarray, values: np.ndarray, interpolation: str) -> np.ndarray
     coefficients = np.zeros((k, 4, d))
     coefficients[:, 0] = values
     if interpolation == "cubic":
+        from scipy.interpolate import CubicSpline
+
         coefficients[:-1] = CubicSpline(t, values, bc_type="natural").c[::-1].transpose(1, 0, 2)
     else:
         coefficients[:-1, 1] = np.diff(values, axis=0) / np.diff(t)[:, None]

@@ -80,7 +80,7 @@ class Thrusters(Term):
     def __post_init__(self) -> None:
         if self.coefficient is None:
             if self.polynomial is None and self.table_commands is None:
-                fault, remedy = "is missing", "give (n,) [N per unit^2], or a polynomial or a table [N]"
+                fault, remedy = "is missing", "give (n,) [N per unit^2], a table [N], or a polynomial [N]"
                 raise refusal(f"{self.key}.coefficient", None, fault, remedy)
             object.__setattr__(self, "coefficient", np.ones(rows_of(self.position)))
         for name, value in (("polynomial", SQUARE), ("polynomial_astern", self.polynomial)):
@@ -110,6 +110,9 @@ class Thrusters(Term):
                 object.__setattr__(self, name, value)
         self.repeat(n, *(defaults.keys() - {"command_schedule"}))
         object.__setattr__(self, "_both", both)
+        if self.torque_loss is not None:
+            # The torque is not along the velocity that it falls with.
+            object.__setattr__(self, "dissipative", False)
         super().__post_init__()
 
     @property

@@ -18,8 +18,8 @@ class HeavePID(Part):
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
         """Z = kp e + ki I + kd (wanted - measured rate of the depth)."""
         e = r.position[2] - y.position[2]
-        I = self.integral.at_look(y.period, self.integral_limit, unmet[2], self.anti_windup == "conditional")
+        total = self.integral.at_look(y.period, self.integral_limit, unmet[2], self.anti_windup == "conditional")
         self.integral.error = e
         w = w.copy()
-        w[2] += self.kp * e + self.ki * I + self.kd * (r.velocity[2] - (y.R @ y.velocity)[2])
+        w[2] += self.kp * e + self.ki * total + self.kd * (r.velocity[2] - (y.R @ y.velocity)[2])
         return w

@@ -3,10 +3,19 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import expm
 
 from lgvi_warp.reference.control import Measurement, Part, Reference, heading_error, upright
 from lgvi_warp.reference.rotation import Array
+
+
+def exponential(A: Array) -> Array:
+    """e^A of a square matrix: the series of a part of A so small that it ends soon, squared as often as A was halved."""
+    halvings = 3 + max(0, int(np.ceil(np.log2(np.abs(A).max()))))
+    term = total = np.eye(len(A))
+    for k in range(1, 16):
+        term = term @ A / (k * 2.0**halvings)
+        total = total + term
+    return np.asarray(np.linalg.matrix_power(total, 2**halvings))
 
 
 class ReferenceModel(Part):
@@ -25,7 +34,7 @@ class ReferenceModel(Part):
         b = 2.0 * zeta + 1.0
         A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-(omega**3), -b * omega**2, -b * omega]])
         shift = np.array([target, 0.0, 0.0])
-        z = shift + expm(A * period) @ (self.z[i] - shift)
+        z = shift + exponential(A * period) @ (self.z[i] - shift)
         limit = np.inf if self.rate_limit is None else self.rate_limit[i]
         if abs(z[1]) > limit:
             rate = np.sign(z[1]) * limit

@@ -11,7 +11,7 @@ from lgvi_kernels.laws.control.readings import remember3, remembered3
 
 @functools.cache
 def params(width, real):
-    """Params: error of the start; weights of the last velocity and of this one; what it takes; first of its rows of the memory.
+    """Params: error of the start; weights of the last velocity and of this; what it takes; first of its rows of memory.
 
     These are position (3) and velocity (3), inertial.
     """

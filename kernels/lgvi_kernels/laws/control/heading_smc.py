@@ -37,10 +37,10 @@ def control(w: Any, r: Any, y: Any, p: Any):
     r_v = r_d + 2 lambda e + lambda^2 I, sigma = r - r_v; e and its rate are wanted less measured.
     """
     e = heading_error(r, y)
-    I = integral(y, p.memory, p.integral_limit, remembered(y, p.unmet + 5), p.conditional)
+    total = integral(y, p.memory, p.integral_limit, remembered(y, p.unmet + 5), p.conditional)
     keep_error(y, p.memory, e)
     slower = r.angular_velocity.z - y.angular_velocity.z
-    virtual = r.angular_velocity.z + p.rate * (e + e + p.rate * I)
+    virtual = r.angular_velocity.z + p.rate * (e + e + p.rate * total)
     acceleration = r.angular_acceleration.z + p.rate * (slower + slower + p.rate * e)
     sigma = y.angular_velocity.z - virtual
     unity = ones(sigma)

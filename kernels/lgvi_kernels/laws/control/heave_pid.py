@@ -20,8 +20,8 @@ def params(width, real):
 def control(w: Any, r: Any, y: Any, p: Any):
     """Z = kp e + ki I + kd (wanted - measured rate of the depth)."""
     e = r.position.z - y.position.z
-    I = integral(y, p.memory, p.integral_limit, remembered(y, p.unmet + 2), p.conditional)
-    Z = p.kp * e + p.ki * I + p.kd * (r.velocity.z - dot(y.down, y.velocity))
+    total = integral(y, p.memory, p.integral_limit, remembered(y, p.unmet + 2), p.conditional)
+    Z = p.kp * e + p.ki * total + p.kd * (r.velocity.z - dot(y.down, y.velocity))
     keep_error(y, p.memory, e)
     w.force = vec3(w.force.x, w.force.y, w.force.z + Z)
     return w

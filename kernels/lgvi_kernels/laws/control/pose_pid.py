@@ -28,8 +28,8 @@ def control(w: Any, r: Any, y: Any, p: Any):
     """f = R^T (kp e_b + ki I) + kd (R^T v_d - nu); tau = -kr e_R + kw (R^T R_d Omega_d - Omega) - ki_r I_R."""
     e = r.position - y.position
     e_R = attitude_error(r, y)
-    I = position_integral(y, p, e)
+    total = position_integral(y, p, e)
     I_R = attitude_integral(y, p, e_R)
-    force = to_body(y, p.kp * e + p.ki * I) + p.kd * velocity_error(r, y)
+    force = to_body(y, p.kp * e + p.ki * total) + p.kd * velocity_error(r, y)
     torque = p.kw * rate_error(r, y) - p.kr * e_R - p.ki_r * I_R
     return balance(w, y, p, force, torque)

@@ -33,9 +33,9 @@ def saturated(v: Any):
 
 
 @wp.func
-def sliding(rate: Any, velocity: Any, e: Any, I: Any):
+def sliding(rate: Any, velocity: Any, e: Any, total: Any):
     """s = velocity + 2 lambda e + lambda^2 I, all of them wanted less measured, in body axes."""
-    return velocity + rate * (e + e + rate * I)
+    return velocity + rate * (e + e + rate * total)
 
 
 @wp.func
@@ -43,9 +43,9 @@ def control(w: Any, r: Any, y: Any, p: Any):
     """f = k_d s + k_sigma sat(s / boundary); the same of the attitude."""
     e = r.position - y.position
     e_R = attitude_error(r, y)
-    I = position_integral(y, p, e)
+    total = position_integral(y, p, e)
     I_R = attitude_integral(y, p, e_R)
-    s = sliding(p.rate, velocity_error(r, y), to_body(y, e), to_body(y, I))
+    s = sliding(p.rate, velocity_error(r, y), to_body(y, e), to_body(y, total))
     force = p.k_d * s + p.k_sigma * saturated(s / p.boundary)
     s = sliding(p.lambda_r, rate_error(r, y), neg(e_R), neg(I_R))
     torque = p.k_d_r * s + p.k_sigma_r * saturated(s / p.boundary_r)

@@ -123,9 +123,10 @@ def made(features):
                     effort = positive(here, other_effort, effort)
             c = positive(effort, row1(y, at + 7), row1(y, at + 8))
             # A side without thrust has the coefficient 0, and gets no command.
-            t = positive(c, absolute(effort) / c, zero)
+            t = positive(c, absolute(effort) / c, effort - effort)
             band = row1(y, at + 9)
-            size = least(positive(t, size_for(y, p, i, t, effort) + band, zero), row1(y, at + 6))
+            # In this order what is no number stays so, and the look sees it.
+            size = least(row1(y, at + 6), positive(t, size_for(y, p, i, t, effort) + band, t))
             u = positive(effort, size, -size)
             remember(y, p.commands + i, u)
             cut = effort - c * effort_of(y, p, i, beyond(u, band))

@@ -20,8 +20,8 @@ def params(width, real):
 def control(w: Any, r: Any, y: Any, p: Any):
     """X = kp e + ki I + drag u_d |u_d|."""
     e = r.speed - y.water_velocity.x
-    I = integral(y, p.memory, p.integral_limit, remembered(y, p.unmet), p.conditional)
-    X = p.kp * e + p.ki * I + p.drag * (r.speed * absolute(r.speed))
+    total = integral(y, p.memory, p.integral_limit, remembered(y, p.unmet), p.conditional)
+    X = p.kp * e + p.ki * total + p.drag * (r.speed * absolute(r.speed))
     keep_error(y, p.memory, e)
     w.force = vec3(w.force.x + X, w.force.y, w.force.z)
     return w

@@ -1,0 +1,149 @@
+"""Parts of a controller that are wrong: each says key, value and remedy. No kernel is needed."""
+
+import pickle
+import re
+import zipfile
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+
+ONE = dict(weights_0=np.ones((1, 1)), biases_0=np.zeros(1))
+POINTS = [(0.0, 0.0, 1.0), (5.0, 0.0, 1.0)]
+THREE = (1.0, 1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (
+            lambda: lw.Waypoints(points=POINTS[:1], speed=1.0, look_ahead=1.0, radius=1.0),
+            "waypoints.points.*less than two",
+        ),
+        (
+            lambda: lw.Waypoints(points=[*POINTS, (5.0, 0.0, 9.0)], speed=1.0, look_ahead=1.0, radius=1.0),
+            r"waypoints.points\[2\].*same place.*leave it out",
+        ),
+        (
+            lambda: lw.Waypoints(points=POINTS, speed=1.0, look_ahead=0.0, radius=1.0),
+            "waypoints.look_ahead.*not positive",
+        ),
+        (lambda: lw.Waypoints(points=POINTS, speed=1.0, look_ahead=1.0, radius=1.0, method="lose"), "method.*los"),
+        (lambda: lw.Trajectory(times=(0.0, 2.0, 1.0), positions=[THREE] * 3), "trajectory.times.*not rising"),
+        (lambda: lw.Trajectory(times=(0.0, 2.0), positions=[THREE] * 3), "trajectory.positions.*give 2 x 3 numbers"),
+        (lambda: lw.Trajectory(times=(0.0,), positions=[THREE]), "trajectory.times.*less than two"),
+        (
+            lambda: lw.ReferenceModel(natural_frequency=THREE),
+            "natural_frequency.*has 3 numbers.*2 numbers, of depth and heading",
+        ),
+        (lambda: lw.ReferenceModel(natural_frequency=(1.0, 0.0)), "natural_frequency.*not positive"),
+        (lambda: lw.HeadingSMC(lambda_=-1.0, boundary=0.1, k_sigma=1.0, nomoto_gain=1.0), r"heading_smc.lambda = -1"),
+        (
+            lambda: lw.PosePID(kp=THREE, kd=THREE, kr=THREE, kw=THREE, feedforward="restore"),
+            "pose_pid.feedforward.*restoring",
+        ),
+        (
+            lambda: lw.PosePID(kp=THREE, kd=THREE, kr=THREE, kw=THREE, anti_windup="on"),
+            "pose_pid.anti_windup = .*not known",
+        ),
+        (lambda: lw.StateFeedback(K=np.ones((6, 11))), "state_feedback.K.*shape"),
+    ],
+)
+def test_what_is_wrong_is_said(make, said):
+    with pytest.raises(lw.SceneError, match=said):
+        make()
+
+
+def test_lambda_is_a_key_of_scenes_and_of_members():
+    law = lw.HeadingSMC(lambda_=0.4, boundary=0.1, k_sigma=1.0, nomoto_gain=1.0)
+    assert law.to_dict()["lambda"] == 0.4 and "lambda" in law.parameters() and "lambda_" not in law.to_dict()
+    controller = lw.Controller(period=0.1, guidance=[{"type": "set_point", "heading": 1.0}], laws=[law.to_dict()])
+    assert controller.laws[0].lambda_ == 0.4
+    with pytest.raises(lw.SceneError, match=r"lambda_.*unknown key.*lambda"):
+        lw.Controller(period=0.1, guidance=controller.guidance, laws=[law.to_dict() | {"lambda_": 0.4}])
+
+
+def test_a_law_says_what_it_needs_of_guidance():
+    law = lw.PosePID(kp=THREE, kd=THREE, kr=THREE, kw=THREE)
+    with pytest.raises(lw.SceneError, match=r"pose_pid.*needs a wanted position"):
+        lw.Controller(period=0.1, guidance=[lw.SetPoint(depth=1.0, heading=0.0)], laws=[law])
+
+
+def policy(tmp_path, arrays=ONE, **words):
+    np.savez(tmp_path / "policy.npz", **arrays)
+    return lw.Policy(**dict(file=tmp_path / "policy.npz", inputs=["depth_error"], outputs=["Z"]) | words)
+
+
+@pytest.mark.parametrize(
+    ("arrays", "words", "said"),
+    [
+        (ONE, {"inputs": ["dept_error"]}, r"policy.inputs\[0\] = 'dept_error'.*depth_error"),
+        (ONE, {"inputs": "depth"}, "policy.inputs.*no list of names"),
+        (ONE, {"inputs": ["velocity"]}, "policy.inputs.*are 3 numbers.*name the 1 of"),
+        (ONE, {"outputs": ["Z", "Z"]}, r"policy.outputs\[1\].*named twice"),
+        (ONE, {"outputs": ["Z", "N"]}, "policy.outputs.*are 2 numbers"),
+        (ONE, {"scale": (1.0, 2.0)}, "policy.scale.*give 1"),
+        (ONE, {"activation": "gelu"}, "policy.activation.*relu"),
+        (ONE, {"checksum": 1}, "policy.checksum.*is not that of"),
+        ({"weights_0": np.ones((1, 1))}, {}, "policy.file.*has weights_0; save it by np.savez"),
+        ({}, {}, "policy.file.*has no arrays"),
+        (ONE | {"biases_0": np.zeros(2)}, {}, r"policy.file.*weights_0 of shape \(1, 1\)"),
+        (ONE | dict(weights_1=np.ones((1, 2)), biases_1=np.zeros(1)), {}, r"policy.file.*weights_1.*give \(n, 1\)"),
+        (ONE | {"biases_0": np.array([np.nan])}, {}, "policy.file.*other than finite numbers"),
+        (ONE | {"biases_0": np.array(["a"])}, {}, "policy.file.*other than finite numbers"),
+    ],
+)
+def test_a_policy_that_does_not_fit(arrays, words, said, tmp_path):
+    with pytest.raises(lw.SceneError, match=re.compile(said, re.S)):
+        policy(tmp_path, arrays, **words)
+
+
+def test_a_policy_knows_its_file_again(tmp_path):
+    law = policy(tmp_path)
+    told = law.to_dict()
+    assert (
+        told["checksum"] == law.checksum
+        and lw.Policy(**{k: v for k, v in told.items() if k != "type"}).to_dict() == told
+    )
+    with pytest.raises(lw.SceneError, match="checksum"):
+        policy(tmp_path, ONE | {"biases_0": np.ones(1)}, checksum=law.checksum)
+
+
+def test_no_file_of_a_stranger_runs_code(tmp_path):
+    class Bomb:
+        def __reduce__(self):
+            return (open, (str(tmp_path / "ran"), "w"))
+
+    pickled = tmp_path / "policy.npz"
+    np.savez(pickled, weights_0=np.array([Bomb()], dtype=object), biases_0=np.zeros(1))
+    words = dict(file=pickled, inputs=["depth"], outputs=["Z"])
+    with pytest.raises(lw.SceneError, match=r"policy.file"):
+        lw.Policy(**words)
+    pickled.write_bytes(pickle.dumps(Bomb()))
+    with pytest.raises(lw.SceneError, match=r"policy.file"):
+        lw.Policy(**words)
+    for other in (tmp_path, tmp_path / "missing.npz", 3, "\0"):
+        with pytest.raises(lw.SceneError, match=r"policy.file"):
+            lw.Policy(**words | {"file": other})
+    np.savez_compressed(pickled, **ONE)
+    with pytest.raises(lw.SceneError, match="compressed"):
+        lw.Policy(**words)
+    with zipfile.ZipFile(pickled, "w") as archive:
+        archive.writestr(
+            "weights_0.npy", b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order': False, 'shape': (10**12, 1), }"
+        )
+        archive.writestr("biases_0.npy", b"")
+    with pytest.raises(lw.SceneError, match=r"policy.file"):
+        lw.Policy(**words)
+    assert not (tmp_path / "ran").exists()
+
+
+def test_a_policy_lies_beside_its_scene(tmp_path):
+    policy(tmp_path)
+    (tmp_path / "scene.toml").write_text(
+        "[vehicle]\nmass = 1.0\ninertia = [1.0, 1.0, 1.0]\n[[terms]]\ntype = 'control_wrench'\nlimit = [1, 1, 1, 1, 1, 1]\n"
+        "[controller]\nperiod = 0.1\n[[controller.guidance]]\ntype = 'set_point'\ndepth = 1.0\n"
+        "[[controller.laws]]\ntype = 'policy'\nfile = 'policy.npz'\ninputs = ['depth_error']\noutputs = ['Z']\n"
+    )
+    assert lw.Scene.load(tmp_path / "scene.toml").controller.laws[0].file == str(tmp_path / "policy.npz")

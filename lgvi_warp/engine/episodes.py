@@ -170,9 +170,10 @@ class Episodes:
         """Steps after which those that start are looked at besides: late readings, and what is wanted at times, need it."""
         late = [int(np.max(part.latency)) for part in self._controller.sensors if isinstance(part, Sensor)]
         timed = any(isinstance(part, Trajectory) for part in self._controller.guidance)
+        most = max(late, default=0)
+        looks = most + 1 if most or timed else 0
         last = self.steps // self.every
-        first = max(1, last + 1 - max([*late, int(timed)]))
-        return range(first * self.every, self.steps + 1, self.every)
+        return range(max(1, last + 1 - looks) * self.every, self.steps + 1, self.every)
 
     def _copy(self, source: list[np.ndarray], of: np.ndarray, target: list[np.ndarray], to: np.ndarray) -> None:
         """Copy lanes with all that belongs to them."""

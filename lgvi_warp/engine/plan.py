@@ -248,11 +248,9 @@ class Plan:
             NotSurveyed: if a member needs what the kernel does not have.
         """
         self.ensemble.check_block(block.first, block.stop, members.parameters)
-        if not self.survey_all and block.stop > SURVEYED and self._whole is None:
-            if not self.serves(self.ensemble, block, members):
-                raise NotSurveyed(
-                    f"a member of {block.first} to {block.stop - 1} needs what the first {SURVEYED} do not"
-                )
+        unseen = not self.survey_all and block.stop > SURVEYED and self._whole is None
+        if unseen and not self.serves(self.ensemble, block, members):
+            raise NotSurveyed(f"a member of {block.first} to {block.stop - 1} needs what the first {SURVEYED} do not")
 
     def serves(self, ensemble: Ensemble, block: Block, members: Members) -> bool:
         """Whether the kernel has all that some members need, which may be others than those it was chosen by.

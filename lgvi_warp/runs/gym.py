@@ -58,8 +58,8 @@ class Vehicles:
         duration: Length of an episode [s], after which it is truncated; default the scene's [run] duration, else without end.
         num_envs: Number of environments; default the members of the ensemble.
         outputs: Which of the demands "X", "Y", "Z", "K", "M", "N" the actions are; all by default.
-        scale: What an action of 1 is, a number or one for each: actions then lie in [-1, 1]. None (default): actions are in N and
-            N m, without bounds; or in the unit of the commands, within their limits.
+        scale: What an action of 1 is, a number or one for each; actions then lie in [-1, 1]. None (default): actions are in N
+            and N m, without bounds; or in the unit of the commands, within their limits.
         instead_of: Keys of laws that the actions stand in for. A `Callback` always gives way. None by default.
         autoreset_mode: gymnasium.vector.AutoresetMode or its value: "NextStep" (default), "SameStep" or "Disabled".
         method: A name or a Method; default that of the scene.
@@ -130,12 +130,7 @@ class Vehicles:
         self._noise_seed = ensemble.seed
         self._seed(ensemble.seed)
         self._plan = self._planned(method, h, dtype, width)
-        every = controller.every(self._plan.grid.h)
-        periods = np.inf if duration is None else float(duration) / (every * self._plan.grid.h)
-        self._periods = round(periods) if np.isfinite(periods) else np.inf
-        if np.isfinite(periods) and abs(periods - self._periods) > 1e-6 or self._periods < 1:
-            period = every * self._plan.grid.h
-            raise refusal("duration", duration, f"is no whole number of periods of {period:.9g} s", "give a multiple")
+        self._periods = _whole_periods(duration, controller.every(self._plan.grid.h) * self._plan.grid.h)
         # Whose episode has ended, and how many periods each has lasted.
         self._begun, self._done = False, np.zeros(self.num_envs, bool)
         self._made = np.zeros(self.num_envs, np.int64)
@@ -178,7 +173,7 @@ class Vehicles:
             faults.raise_if_any()
             self._scale, most = value, np.ones(size)
         elif to:
-            most = np.broadcast_to(controller.actuators[to].limit, size)
+            most = np.broadcast_to(controller.actuators[to].parameters()["limit"], size)
         else:
             most = np.full(size, np.inf)
         kind = np.dtype(DTYPES[self._plan.dtype])
@@ -221,12 +216,14 @@ class Vehicles:
         """Index of each environment's member, where it has begun so many episodes before."""
         return (self._index + numbers * self.num_envs) % self._source.members
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[np.ndarray, dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
         """Begin new episodes: of all environments, with the time at 0, or of those in options["reset_mask"].
 
         Args:
-            seed: Seed of the draws from now on, with which the episodes are counted anew. None (default): the next members, the
-                first ones by the seed of the ensemble.
+            seed: Seed of the draws from now on, with which the episodes are counted anew. None (default): the next members,
+                the first ones by the seed of the ensemble.
             options: {"reset_mask": truth values (num_envs,)}; None (default) for all.
 
         Returns:
@@ -262,9 +259,7 @@ class Vehicles:
         self._begun = True
         return self._observed.copy(), {}
 
-    def step(
-        self, actions: Any
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+    def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Hold the actions for a period.
 
         Args:
@@ -276,7 +271,7 @@ class Vehicles:
 
         Raises:
             ValueError: Where the actions have another shape.
-            gymnasium.error.ResetNeeded: Before the first `reset`; with autoreset "Disabled" where an episode has ended; and after
+            ResetNeeded: Before the first `reset`; with autoreset "Disabled" where an episode has ended; and after
                 2^31 integration steps, when all environments must be reset.
         """
         last, episodes = self._done, self._episodes
@@ -316,7 +311,12 @@ class Vehicles:
             again = np.flatnonzero(self._done)
             final = np.full(self.num_envs, None, dtype=object)
             final[again] = list(observed[again])
-            infos = {"final_obs": final, "_final_obs": self._done.copy(), "final_info": infos, "_final_info": self._done.copy()}
+            infos = {
+                "final_obs": final,
+                "_final_obs": self._done.copy(),
+                "final_info": infos,
+                "_final_info": self._done.copy(),
+            }
             self._begin_next(again)
             observed[again] = self._restarted(again)
             self._done = np.zeros(self.num_envs, bool)
@@ -349,7 +349,7 @@ class Vehicles:
 
     def _seen(self, y: Looks, r: Looks) -> np.ndarray:
         """Observations of some environments."""
-        observed = np.asarray(self._observe(self.time, y, r), dtype=self._kind)
+        observed = np.array(self._observe(self.time, y, r), dtype=self._kind)
         if observed.ndim != 2 or len(observed) != len(y.heading):
             raise ValueError(f"observe: returned shape {observed.shape}; return ({len(y.heading)}, k), a row for each")
         return observed
@@ -399,6 +399,16 @@ def __getattr__(name: str) -> Any:
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
+def _whole_periods(duration: float | None, period: float) -> float:
+    """Number of periods of an episode; infinite without a duration."""
+    if duration is None:
+        return np.inf
+    count = round(duration / period)
+    if count < 1 or abs(duration - count * period) > 1e-9 * duration:
+        raise refusal("duration", duration, f"is no whole number of periods of {period:.9g} s", "give a multiple")
+    return count
+
+
 def _nothing(size: int, t: float, y: Looks, r: Looks, members: np.ndarray) -> np.ndarray:
     """The answer of a callback where no environment gives one."""
     return np.zeros((len(members), size))
@@ -418,7 +428,7 @@ def _actuator(faults: Faults, act: Any, scene: Any) -> str | None:
 
 def _acted(fleet: Ensemble, names: Sequence[str], to: str | None) -> Ensemble:
     """The same members, on which actions act."""
-    scene = fleet.scene
+    scene: Any = fleet.scene
     controller = scene.controller
     channels = {term.key: term.channels for term in scene.terms}
     callback = Callback(functools.partial(_nothing, channels[to] if to else len(COMPONENTS)), to=to, name="actions")

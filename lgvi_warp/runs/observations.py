@@ -106,9 +106,7 @@ OBSERVATIONS |= {
 }
 
 
-def observer(
-    faults: Faults, names: Any, wishes: Sequence[str]
-) -> Callable[[float, Looks, Looks], np.ndarray]:
+def observer(faults: Faults, names: Any, wishes: Sequence[str]) -> Callable[[float, Looks, Looks], np.ndarray]:
     """The function that gathers named numbers.
 
     Args:

@@ -6,8 +6,13 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
+from scipy.spatial.transform import Rotation
 
 import lgvi_warp as lw
+from lgvi_warp.physics.control.policy import INPUTS
+from lgvi_warp.reference.control import Measurement, Reference
+from lgvi_warp.reference.control.policy import Policy as PolicyTwin
+from lgvi_warp.runs.observations import OBSERVATIONS
 from tests.control.test_callback import GAINS, H, heading, scene
 
 N, PERIOD = 20, 5 * H
@@ -97,7 +102,7 @@ def test_the_next_step_begins_anew():
 
 
 def test_the_same_step_begins_anew():
-    env, _, steps = episodes(AutoresetMode.SAME_STEP)
+    _, _, steps = episodes(AutoresetMode.SAME_STEP)
     assert [step[3].all() for step in steps] == [False, False, True] * 2
     assert [step[1][0] for step in steps] == [1.5] * 6
     usual = episodes("NextStep")[2]
@@ -173,15 +178,32 @@ def test_gymnasiums_own_wrappers():
     assert np.array_equal(steps[2][4]["episode"]["r"], np.full(N, 3.0))
 
 
+def test_named_numbers_are_those_of_a_policy():
+    """The twin of `lw.Policy` sees the same of random motions, to the round-off of sums of six products."""
+    rng, twin = np.random.default_rng(0), PolicyTwin()
+    R = Rotation.random(2 * N, rng=rng).as_matrix()
+    vectors = iter(rng.normal(size=(7, N, 3)))
+    heading = np.arctan2(R[:, 1, 0], R[:, 0, 0])
+    y = lw.Looks(next(vectors), R[:N], next(vectors), next(vectors), heading[:N], water_velocity=next(vectors))
+    r = lw.Looks(next(vectors), R[N:], next(vectors), next(vectors), heading[N:], speed=rng.normal(size=N))
+    assert {name: OBSERVATIONS[name][:2] for name in INPUTS} == INPUTS
+    for name in INPUTS:
+        seen = np.reshape(OBSERVATIONS[name].of(y, r), (N, -1))
+        for i in range(N):
+            measured = Measurement(
+                y.position[i], y.attitude[i], y.velocity[i], y.water_velocity[i], y.angular_velocity[i]
+            )
+            wanted = Reference(r.position[i], r.velocity[i], r.attitude[i], r.angular_velocity[i], r.speed[i])
+            assert np.abs(seen[i] - twin.seen(name, wanted, measured)).max() < 1e-14, name
+
+
 def test_names_show_what_functions_do():
-    names = ["heading_error", "down[1]", "position_error", "attitude_error", "measured_heading", "reference_heading"]
-    env, same = environment(observe=names), environment()
-    for observed, seen in ((env.reset(seed=1)[0], same.reset(seed=1)[0]),) * 1:
-        R, wanted = seen[:, 4:13].reshape(-1, 3, 3), np.array([[np.cos(0.8), -np.sin(0.8), 0.0], [np.sin(0.8), np.cos(0.8), 0.0], [0.0, 0.0, 1.0]])  # fmt: skip
-        skew = 0.5 * (wanted.T @ R - np.swapaxes(R, 1, 2) @ wanted)
-        expected = [0.8 - np.arctan2(R[:, 1, 0], R[:, 0, 0]), R[:, 2, 1], *np.einsum("nji,nj->in", R, -seen[:, 1:4]),
-                    skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0], np.arctan2(R[:, 1, 0], R[:, 0, 0]), np.full(N, 0.8)]  # fmt: skip
-        assert np.abs(observed - np.stack(expected, axis=1)).max() < 1e-14
+    names = ["heading_error", "down[1]", "measured_heading", "reference_heading", "measured_attitude[3]"]
+    seen = environment().reset(seed=1)[0]
+    R = seen[:, 4:13].reshape(-1, 3, 3)
+    heading = np.arctan2(R[:, 1, 0], R[:, 0, 0])
+    expected = np.stack([0.8 - heading, R[:, 2, 1], heading, np.full(N, 0.8), R[:, 1, 0]], axis=1)
+    assert np.abs(environment(observe=names).reset(seed=1)[0] - expected).max() < 1e-14
 
 
 WRONG = {
@@ -223,7 +245,7 @@ def test_bad_input_to_calls(env):
 
 @pytest.fixture(scope="module")
 def falling():
-    """Vehicles that sink onto a floor at different times, seen by a late sensor and through a filter; commands are late too."""
+    """Vehicles that sink onto a floor at different times, seen by a late sensor and through a filter; commands are late."""
     controller = lw.Controller(
         period=PERIOD,
         delay=0.04,

@@ -1,5 +1,7 @@
 """Vehicles as an environment of Gymnasium: the motion is that of a run, lane by lane, whenever an episode begins."""
 
+import re
+
 import gymnasium
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from lgvi_warp.physics.control.policy import INPUTS
 from lgvi_warp.reference.control import Measurement, Reference
 from lgvi_warp.reference.control.policy import Policy as PolicyTwin
 from lgvi_warp.runs.observations import OBSERVATIONS
+from tests.conftest import ROOT
 from tests.control.test_callback import GAINS, H, heading, scene
 
 N, PERIOD = 20, 5 * H
@@ -58,7 +61,13 @@ def test_the_bits_of_a_run(env):
     assert np.array_equal(observed[:, 1:], solved(scene([lw.Callback(heading)]), 50))
 
 
-def test_members_that_start_while_others_go_on(env):
+def test_members_that_start_while_others_go_on():
+    def varied(law):
+        numbers = {"vehicle.mass": lw.Normal(std=0.5), "drag.linear[5]": lw.Uniform(low=0.05, high=0.2)}
+        fleet = scene([law])
+        return lw.Ensemble(fleet.scene, N, 3, fleet.vary | numbers)
+
+    env = environment(varied(*LAW))
     first, _ = env.reset(seed=7)
     later = steer(env, first, 10)[0]
     mask = np.zeros(N, bool)
@@ -67,7 +76,7 @@ def test_members_that_start_while_others_go_on(env):
     assert np.array_equal(both[~mask], later[~mask])
     assert env.members[[0, 1, 9, 19]].tolist() == [20, 1, 29, 39]
     last = steer(env, both, 30)[0][:, 1:]
-    drawn = scene([lw.Callback(heading)]).with_seed(7, 2 * N)
+    drawn = varied(lw.Callback(heading)).with_seed(7, 2 * N)
     assert np.array_equal(last[~mask], solved(drawn.subset(np.flatnonzero(~mask)), 40))
     assert np.array_equal(last[mask], solved(drawn.subset(env.members[mask]), 30))
 
@@ -195,6 +204,15 @@ def test_named_numbers_are_those_of_a_policy():
             )
             wanted = Reference(r.position[i], r.velocity[i], r.attitude[i], r.angular_velocity[i], r.speed[i])
             assert np.abs(seen[i] - twin.seen(name, wanted, measured)).max() < 1e-14, name
+
+
+def test_the_page_lists_all_names():
+    page = (ROOT / "docs" / "controllers" / "gym.md").read_text()
+    rows = "".join(row for row in page.splitlines() if row.startswith("| `"))
+    listed = set(re.findall(r"`(\w+)`", rows)) | {
+        f"measured_{name}" for name in ("velocity", "water_velocity", "angular_velocity")
+    }
+    assert set(OBSERVATIONS) <= listed
 
 
 def test_names_show_what_functions_do():

@@ -38,6 +38,7 @@ from lgvi_warp.engine.widths import default_width
 from lgvi_warp.methods.gauss import gauss
 from lgvi_warp.methods.method import KINDS, Method
 from lgvi_warp.methods.saveat import TimeGrid, divisors
+from lgvi_warp.physics.control.base import Part
 from lgvi_warp.physics.control.signals import SIGNALS, check, ordered, row_of, saved_fields
 from lgvi_warp.physics.fields import Field
 from lgvi_warp.physics.terms.base import Term
@@ -430,13 +431,18 @@ class Plan:
         except OSError:  # of the kernel cache
             raise
         except Exception as error:
-            acting = (*self.kernel_choice.laws, *self.kernel_choice.events)
-            user_laws = [term.key for term, module in acting if not is_built_in(module)]
-            if not user_laws:
+            choice = self.kernel_choice
+            acting = (*choice.laws, *choice.events, *choice.parts_of_control)
+            own = [term for term, module in acting if not is_built_in(module)]
+            if not own:
                 raise
             problem = f"one of them does not compile ({type(error).__name__}: {error})"
-            remedy = "lw.check_law(term) says where, docs/develop/add_a_force.md how"
-            raise SceneError([f"law {', '.join(user_laws)}: {problem}; {remedy}"]) from error
+            remedies = {
+                False: "lw.check_law(term) says where, docs/develop/add_a_force.md how",
+                True: "lw.check_controller(part) says where, docs/develop/add_a_controller.md how",
+            }
+            remedy = " and ".join(remedies[kind] for kind in sorted({isinstance(term, Part) for term in own}))
+            raise SceneError([f"law {', '.join(term.key for term in own)}: {problem}; {remedy}"]) from error
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the settings alone: a kernel cannot be pickled, and the other process finds it in Warp's cache."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics import vehicle
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, word_of
 
 # What guidance may give, and laws may need.
 WISHES = ("depth", "position", "velocity", "heading", "attitude", "angular_velocity", "speed")
@@ -166,6 +166,15 @@ class Part(Term):
             h: Step of the run [s].
         """
 
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        """The numbers as they are: a controller works in the user's axes."""
+        if self.lanes() is None:
+            name = type(self).__name__
+            raise NotImplementedError(
+                f"{name} must define packed(numbers, context): see docs/develop/add_a_controller.md"
+            )
+        return Packed({item.name: numbers[word_of(item)] for item in self.number_fields() if word_of(item) in numbers})
+
 
 AnyPart = TypeVar("AnyPart", bound=Part)
 
@@ -211,10 +220,6 @@ class ControlLaw(Part):
         law = copy.copy(self)
         object.__setattr__(law, "nominal", nominal)
         return law
-
-    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The numbers as they are: a controller works in the user's axes."""
-        return Packed(dict(numbers))
 
 
 # How a law's integral is kept from growing while actuators are at their limits.

@@ -71,6 +71,7 @@ from lgvi_warp.physics.terms.wrench import Wrench as Wrench
 from lgvi_warp.physics.terms.wrench import WrenchSchedule as WrenchSchedule
 from lgvi_warp.physics.terms.wrench_noise import WrenchNoise as WrenchNoise
 from lgvi_warp.physics.vehicle import Vehicle as Vehicle
+from lgvi_warp.runs import gym as gym
 from lgvi_warp.runs.predict import predict as predict
 from lgvi_warp.runs.prepared import Prepared as Prepared
 from lgvi_warp.runs.prepared import prepare as prepare

@@ -249,12 +249,23 @@ class Plan:
             NotSurveyed: if a member needs what the kernel does not have.
         """
         self.ensemble.check_block(block.first, block.stop, members.parameters)
-        if not self.survey_all and block.stop > SURVEYED and self._whole is None:
-            seen = survey_of(members.parameters, self.ensemble, self.method, self.grid.h, self.shared, block)
-            if not self._facts.covers(seen):
-                raise NotSurveyed(
-                    f"a member of {block.first} to {block.stop - 1} needs what the first {SURVEYED} do not"
-                )
+        unseen = not self.survey_all and block.stop > SURVEYED and self._whole is None
+        if unseen and not self.serves(self.ensemble, block, members):
+            raise NotSurveyed(f"a member of {block.first} to {block.stop - 1} needs what the first {SURVEYED} do not")
+
+    def serves(self, ensemble: Ensemble, block: Block, members: Members) -> bool:
+        """Whether the kernel has all that some members need, which may be others than those it was chosen by.
+
+        Args:
+            ensemble: the ensemble that they are of, of the same scene and with the same names that vary.
+            block: where they are in it.
+            members: the members.
+
+        Returns:
+            False where they need more.
+        """
+        seen = survey_of(members.parameters, ensemble, self.method, self.grid.h, self.shared, block)
+        return self._facts.covers(seen)
 
     def with_neighbours(self, indices: np.ndarray) -> np.ndarray:
         """The members whose run gives these members the bits of the whole run.

@@ -8,7 +8,18 @@ import pytest
 from tests.house.graph import MODULES, arrows_up, circle, closure, imports
 
 # What pyproject.toml declares, by import name; the optional ones take long to import, or may be absent.
-OPTIONAL = {"SALib", "matplotlib", "rerun", "xarray", "zarr", "google_crc32c", "distributed", "netCDF4", "pyarrow"}
+OPTIONAL = {
+    "SALib",
+    "matplotlib",
+    "rerun",
+    "xarray",
+    "zarr",
+    "google_crc32c",
+    "distributed",
+    "netCDF4",
+    "pyarrow",
+    "gymnasium",
+}
 DEPENDENCIES = {"numpy", "scipy", "warp"} | OPTIONAL
 
 

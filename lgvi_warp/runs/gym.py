@@ -117,10 +117,12 @@ class Vehicles:
         self._reward, self._terminated = reward, terminated
         self._with_actions = reward is not None and callable(reward) and _arguments(reward) > 3
         self.num_envs = ensemble.members if num_envs is None else num_envs
-        if not isinstance(self.num_envs, int) or not 1 <= self.num_envs < MOST_MEMBERS:
+        if not isinstance(self.num_envs, int | np.integer) or not 1 <= self.num_envs < MOST_MEMBERS:
             faults.add("num_envs", num_envs, "is no number of environments", "give a whole number from 1")
         for i, name in enumerate(outputs):
             faults.choice(f"outputs[{i}]", name, COMPONENTS)
+            if name in outputs[:i]:
+                faults.add(f"outputs[{i}]", name, "is named twice", "leave one of them out")
         duration = ensemble.scene.run.duration if duration is None else duration
         if duration is not None:
             faults.positive("duration", duration)

@@ -232,6 +232,7 @@ WRONG = {
     "duration": (dict(duration=0.25), "no whole number of periods of 0.1 s"),
     "number": (dict(num_envs=0), "give a whole number from 1"),
     "outputs": (dict(outputs=["yaw"]), "is not known"),
+    "twice": (dict(outputs=["N", "N"]), "is named twice"),
     "scale": (dict(scale=[1.0, 2.0]), r"has shape \(2,\)"),
     "mode": (dict(autoreset_mode="now"), "is not known"),
     "reward": (dict(reward=1.0), "is no function"),

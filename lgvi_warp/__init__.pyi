@@ -7,13 +7,16 @@ from lgvi_warp.common.status import Status as Status
 from lgvi_warp.common.status import Warnings as Warnings
 from lgvi_warp.engine.asking import Looks as Looks
 from lgvi_warp.engine.laws.check import check_law as check_law
+from lgvi_warp.engine.laws.check_controller import check_controller as check_controller
 from lgvi_warp.engine.plan import Plan as Plan
 from lgvi_warp.methods.method import Method as Method
 from lgvi_warp.methods.saveat import SaveAt as SaveAt
 from lgvi_warp.physics import notation as notation
 from lgvi_warp.physics import terms as terms
+from lgvi_warp.physics.control.base import Allocation as Allocation
 from lgvi_warp.physics.control.base import ControlLaw as ControlLaw
 from lgvi_warp.physics.control.base import Guidance as Guidance
+from lgvi_warp.physics.control.base import MeasuringPart as MeasuringPart
 from lgvi_warp.physics.control.callback import Callback as Callback
 from lgvi_warp.physics.control.complementary_filter import ComplementaryFilter as ComplementaryFilter
 from lgvi_warp.physics.control.controller import Controller as Controller
@@ -68,6 +71,7 @@ from lgvi_warp.physics.terms.wrench import Wrench as Wrench
 from lgvi_warp.physics.terms.wrench import WrenchSchedule as WrenchSchedule
 from lgvi_warp.physics.terms.wrench_noise import WrenchNoise as WrenchNoise
 from lgvi_warp.physics.vehicle import Vehicle as Vehicle
+from lgvi_warp.runs import gym as gym
 from lgvi_warp.runs.predict import predict as predict
 from lgvi_warp.runs.prepared import Prepared as Prepared
 from lgvi_warp.runs.prepared import prepare as prepare

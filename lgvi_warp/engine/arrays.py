@@ -174,6 +174,7 @@ class LawArrays:
         table: rows that the laws read.
         memory: what laws and method remember from step to step; the second half is a backup.
         loop: the structs of a controller's parts; None without one.
+        places: where in table and memory each law's rows lie, and how many there are; None before `write`.
     """
 
     table: Lanes
@@ -191,7 +192,7 @@ class LawArrays:
         self._packets, self._Lane, self._Number = packets, Lane, Number or Lane
         self.params = Structs(struct, dtype)
         self.loop = Structs(*loop) if loop else None
-        self._places: Any = None
+        self.places: Any = None
 
     def write(
         self, laws: Sequence[Packed], shared: Sequence[bool], scratch: int = 0, parts: int = 0, bus: int = 0
@@ -213,13 +214,13 @@ class LawArrays:
             wanted = ("first", row, law.rows), ("memory", memory, law.memory), ("work", work, law.work or None)
             places.append({name: place for name, place, part in wanted if part is not None})
             row, memory = row + part.shape[1], memory + memory_rows(law)
-        moved = self._places != (places, row, memory)
+        moved = self.places != (places, row, memory)
         if moved:
             # A law may have as many rows as its members need: those after it, though shared, then lie elsewhere.
             self.params.forget()
             if self.loop is not None:
                 self.loop.forget()
-            self._places = places, row, memory
+            self.places = places, row, memory
         n = len(laws) - parts
         self.params.write(self._packets, nested(laws[:n], shared[:n], places[:n]))
         if self.loop is not None:

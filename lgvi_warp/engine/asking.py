@@ -39,25 +39,30 @@ class Looks:
         return self.position[:, 2]
 
 
-def last_look(packets: Packets) -> tuple[Looks, Looks]:
+def last_look(packets: Packets, members: np.ndarray | None = None) -> tuple[Looks, Looks]:
     """What was measured and what was wanted at the last look.
 
     Args:
         packets: packets of a plan that asks, after a launch.
+        members: which of their members (m,); default None for all.
 
     Returns:
         (measured, wanted), copies.
     """
-    y, r = (_numbers(packets, packets.plan.noted_rows[name]) for name in ("measured", "reference"))
+    y, r = (_numbers(packets, packets.plan.noted_rows[name], members) for name in ("measured", "reference"))
     measured_attitude, wanted_attitude = (rows[:, 3:12].reshape(-1, 3, 3) for rows in (y, r))
     measured = Looks(y[:, :3], measured_attitude, y[:, 12:15], y[:, 18:21], y[:, 21], water_velocity=y[:, 15:18])
     return measured, Looks(r[:, :3], wanted_attitude, r[:, 12:15], r[:, 15:18], r[:, 18], speed=r[:, 19])
 
 
-def _numbers(packets: Packets, places: range) -> np.ndarray:
+def _numbers(packets: Packets, places: range, members: np.ndarray | None) -> np.ndarray:
     """Rows of the memory by member, (m, rows) of float64."""
     rows = packets.laws.memory.view[:, places.start : places.stop]
-    return rows.transpose(0, 2, 1).reshape(-1, len(places))[: packets.members.count].astype(np.float64)
+    if members is not None:
+        packet, lane = np.divmod(members, rows.shape[2])
+        return rows[packet, :, lane].astype(np.float64)
+    copied = np.array(rows.transpose(0, 2, 1), np.float64, order="C")
+    return copied.reshape(-1, len(places))[: packets.members.count]
 
 
 def answer(packets: Packets, values: np.ndarray) -> None:

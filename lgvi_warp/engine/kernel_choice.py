@@ -264,19 +264,20 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
         SceneError: if the module is not known, lacks a struct or all roles, or a role has a wrong signature.
     """
     folder, roles = _folder_and_roles(term)
+    page = f"see docs/develop/add_a_{'controller' if isinstance(term, Part) else 'force'}.md"
     module = built_in(folder, device) if isinstance(device, str) else device
     faults = Faults()
     if module is None:
         faults.add(f"{term.key}.device", device, "is not known", "give a module, or the name of a built-in one")
     elif getattr(module, "params", None) is None and term.lanes() is None:
-        faults.add(f"{term.key}.device", module, "has no params(width, real)", "see docs/develop/add_a_force.md")
+        faults.add(f"{term.key}.device", module, "has no params(width, real)", page)
     elif not any(hasattr(module, role) for role in roles):
-        faults.add(f"{term.key}.device", module, f"has none of {', '.join(roles)}", "see docs/develop/add_a_force.md")
+        faults.add(f"{term.key}.device", module, f"has none of {', '.join(roles)}", page)
     else:
         for role in roles:
             _check_signature(faults, term, module, role)
         if hasattr(module, "follow") and not hasattr(module, "evolve"):
-            faults.add(f"{term.key}.device", module, "has follow and no evolve", "see docs/develop/add_a_force.md")
+            faults.add(f"{term.key}.device", module, "has follow and no evolve", page)
         if isinstance(term, NoisyTerm) and not getattr(module, "NOISE", False):
             faults.add(f"{term.key}.device", module, "does not say that it is noise", "write NOISE = True")
         flow = getattr(module, "FLOW", "none")

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import warp as wp
 
 from lgvi_kernels import built_in
 from lgvi_kernels.advance.rows import STATE_FIELDS
@@ -233,8 +234,14 @@ class Packing:
         return None if total is None else notation.rotate_into(m.attitude, total)
 
 
+# Half of the fastest cache of common processors [bytes]: a smaller table is as fast with a copy for each lane.
+LARGE_TABLE = 16_384
+
+
 def rows_shared(plan: Plan) -> bool:
-    """Whether some law, or part of a controller, has rows in the table, and all members share every such row.
+    """Whether all members share the rows of the laws and of the controller's parts, and these are many.
+
+    Few rows have a copy for each lane, whoever shares them: so one kernel serves scenes in which other numbers vary.
 
     Args:
         plan: a plan whose spec is chosen but for this.
@@ -244,8 +251,11 @@ def rows_shared(plan: Plan) -> bool:
     """
     packing = Packing(plan, plan.ensemble.select(0, 1))
     each = (("law", packing.laws()), ("part", packing.control()))
-    with_rows = [(kind, i) for kind, packed in each for i, one in enumerate(packed) if one.rows is not None]
-    return bool(with_rows) and all(map(plan.shared.keeps, with_rows))
+    sizes = {
+        (kind, i): one.rows.shape[1] for kind, packed in each for i, one in enumerate(packed) if one.rows is not None
+    }
+    number = 8 if plan.spec.real == wp.float64 else 4
+    return sum(sizes.values()) * plan.spec.width * number > LARGE_TABLE and all(map(plan.shared.keeps, sizes))
 
 
 def _once(values: np.ndarray) -> np.ndarray:

@@ -38,6 +38,7 @@ from lgvi_warp.engine.widths import default_width
 from lgvi_warp.methods.gauss import gauss
 from lgvi_warp.methods.method import KINDS, Method
 from lgvi_warp.methods.saveat import TimeGrid, divisors
+from lgvi_warp.physics.control.base import Part
 from lgvi_warp.physics.control.signals import SIGNALS, check, ordered, row_of, saved_fields
 from lgvi_warp.physics.fields import Field
 from lgvi_warp.physics.terms.base import Term
@@ -248,12 +249,23 @@ class Plan:
             NotSurveyed: if a member needs what the kernel does not have.
         """
         self.ensemble.check_block(block.first, block.stop, members.parameters)
-        if not self.survey_all and block.stop > SURVEYED and self._whole is None:
-            seen = survey_of(members.parameters, self.ensemble, self.method, self.grid.h, self.shared, block)
-            if not self._facts.covers(seen):
-                raise NotSurveyed(
-                    f"a member of {block.first} to {block.stop - 1} needs what the first {SURVEYED} do not"
-                )
+        unseen = not self.survey_all and block.stop > SURVEYED and self._whole is None
+        if unseen and not self.serves(self.ensemble, block, members):
+            raise NotSurveyed(f"a member of {block.first} to {block.stop - 1} needs what the first {SURVEYED} do not")
+
+    def serves(self, ensemble: Ensemble, block: Block, members: Members) -> bool:
+        """Whether the kernel has all that some members need, which may be others than those it was chosen by.
+
+        Args:
+            ensemble: the ensemble that they are of, of the same scene and with the same names that vary.
+            block: where they are in it.
+            members: the members.
+
+        Returns:
+            False where they need more.
+        """
+        seen = survey_of(members.parameters, ensemble, self.method, self.grid.h, self.shared, block)
+        return self._facts.covers(seen)
 
     def with_neighbours(self, indices: np.ndarray) -> np.ndarray:
         """The members whose run gives these members the bits of the whole run.
@@ -419,13 +431,18 @@ class Plan:
         except OSError:  # of the kernel cache
             raise
         except Exception as error:
-            acting = (*self.kernel_choice.laws, *self.kernel_choice.events)
-            user_laws = [term.key for term, module in acting if not is_built_in(module)]
-            if not user_laws:
+            choice = self.kernel_choice
+            acting = (*choice.laws, *choice.events, *choice.parts_of_control)
+            own = [term for term, module in acting if not is_built_in(module)]
+            if not own:
                 raise
             problem = f"one of them does not compile ({type(error).__name__}: {error})"
-            remedy = "lw.check_law(term) says where, docs/develop/add_a_force.md how"
-            raise SceneError([f"law {', '.join(user_laws)}: {problem}; {remedy}"]) from error
+            remedies = {
+                False: "lw.check_law(term) says where, docs/develop/add_a_force.md how",
+                True: "lw.check_controller(part) says where, docs/develop/add_a_controller.md how",
+            }
+            remedy = " and ".join(remedies[kind] for kind in sorted({isinstance(term, Part) for term in own}))
+            raise SceneError([f"law {', '.join(term.key for term in own)}: {problem}; {remedy}"]) from error
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the settings alone: a kernel cannot be pickled, and the other process finds it in Warp's cache."""

@@ -160,7 +160,7 @@ class Scene:
         """Build a scene from tables in the form of a scene file, such as the importers return.
 
         Args:
-            content: Tables by section name: "vehicle", "environment", "terms", ...
+            content: Tables by section name: "vehicle", "environment", "terms", ...; objects of "start" and "run" as well.
 
         Returns:
             The scene.
@@ -178,6 +178,7 @@ class Scene:
             name: Name of the vehicle, such as "remus_100".
             **sections: Sections as in a scene file. Keys of vehicle={...} and environment={...} replace single values.
                 An entry of terms=[...] replaces the vehicle's term of the same name or type, or is added to its terms.
+                start may be lw.Start(...) as well, controller lw.Controller(...).
 
         Returns:
             The scene, with the vehicle's own terms and the water that its numbers were found in.
@@ -243,7 +244,9 @@ def from_dict(content: Mapping[str, Any]) -> Scene:
     faults = Faults()
     faults.keys("", content, SECTIONS)
     tables: dict[str, Any] = {}
-    for name in SECTIONS[:5]:
+    # Not so vehicle and environment: where a vehicle is named, keys of theirs replace single numbers.
+    objects = {name: content[name] for name in ("start", "run") if isinstance(content.get(name), KINDS[name])}
+    for name in (name for name in SECTIONS[:5] if name not in objects):
         tables[name] = content.get(name, {})
         if not isinstance(tables[name], Mapping):
             faults.add(name, tables[name], "is not a table", f"write [{name}] and its keys below")
@@ -251,7 +254,7 @@ def from_dict(content: Mapping[str, Any]) -> Scene:
     if not tables["vehicle"] and isinstance(content.get("vehicle", {}), Mapping):
         faults.add("vehicle", "", "is missing", "write [vehicle] with mass and inertia")
     sections = {name: kind for name, kind in KINDS.items() if name != "vehicle" or tables["vehicle"]}
-    built = {name: _build(faults, name, kind, tables[name]) for name, kind in sections.items()}
+    built = {name: objects.get(name) or _build(faults, name, kind, tables[name]) for name, kind in sections.items()}
     sound = {name: section for name, section in built.items() if section is not None}
     distributions = _distributions(faults, tables["ensemble"].get("vary", {}))
     settings = _build(faults, "ensemble", EnsembleSettings, {**tables["ensemble"], "vary": distributions})

@@ -77,3 +77,29 @@ def test_an_exception_says_where():
 def test_no_code_in_files():
     with pytest.raises(lw.SceneError, match="runs no code"):
         lw.Controller(period=0.1, laws=[{"type": "callback"}])
+
+
+def mended(t, y, r, members):
+    """The heading law, which knows no answer for later blocks until it is mended."""
+    if members[0] > 0 and t > 0.5 and not mended.now:
+        raise RuntimeError("no solution")
+    return heading(t, y, r, members)
+
+
+def test_a_stopped_run_goes_on_with_the_mended_function(tmp_path):
+    settings, mended.now = dict(method="psi_s", h=H, t1=1.0, threads=1), False
+    with pytest.raises(RuntimeError, match="no solution"):
+        lw.solve(scene([lw.Callback(mended)], 300), **settings, store=tmp_path / "run.zarr")
+    with pytest.raises(lw.SceneError, match=r"lw\.resume\(path, fleet\)"):
+        lw.resume(tmp_path / "run.zarr")
+    mended.now = True
+    resumed = lw.resume(tmp_path / "run.zarr", scene([lw.Callback(mended)], 300), threads=1)
+    whole = lw.solve(scene([lw.Callback(heading)], 300), **settings)
+    assert np.array_equal(resumed.position, whole.position)
+
+
+@pytest.mark.slow
+def test_other_processes_call_it():
+    fleet, settings = scene([lw.Callback(heading)], 300), dict(method="psi_s", h=H, t1=1.0)
+    apart = lw.solve(fleet, **settings, executor="processes", threads=2)
+    assert np.array_equal(apart.position, lw.solve(fleet, **settings).position)

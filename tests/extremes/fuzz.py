@@ -1,7 +1,8 @@
 """Broken scene files: every one is accepted, or refused with SceneError naming a key; and never anything else.
 
 python -m tests.extremes.fuzz KIND FIRST STOP KERNELS writes one line of JSON per case, so that the last line tells which
-case hung or killed the process. Kinds: "files" (bytes and tokens of scene files), "set" (--set of the command line).
+case hung or killed the process. Kinds: "files" (bytes and tokens of scene files), "set" (--set of the command line),
+"controllers" (bytes and tokens of the controller section of scene files).
 KERNELS: accepted scenes are run for two steps if they need the paper's kernel or one of so many others: each takes seconds.
 """
 
@@ -94,6 +95,209 @@ def sources():
     return [*texts, named, matrices + "weight = 299.0\nbuoyancy = 300.0\n" + start + run]
 
 
+# A vehicle, its actuators, and its controller: all parts that a scene file may name stand in one of these.
+CONTROLLED = [
+    (
+        """
+[vehicle]
+name = "remus_100"
+buoyancy = 299.0
+[start]
+velocity = [1.54, 0.0, 0.0]
+[run]
+step = 0.01
+duration = 0.5
+[ensemble]
+members = 8
+[ensemble.vary]
+"vehicle.buoyancy" = { uniform = { low = 297.0, high = 302.0 } }
+""",
+        """
+[controller]
+period = 0.1
+delay = 0.02
+[[controller.sensors]]
+type = "sensor"
+name = "depth_cell"
+of = "depth"
+noise = 0.02
+quantum = 0.005
+[[controller.sensors]]
+type = "sensor"
+name = "compass"
+of = "heading"
+noise = 0.01
+drift = 0.002
+latency = 2
+every = 3
+dropout = 0.1
+[[controller.guidance]]
+type = "set_point"
+depth = 10.0
+heading = 0.5
+speed = 1.5
+[[controller.guidance]]
+type = "reference_model"
+natural_frequency = [0.2, 0.3, 0.2, 0.3]
+damping_ratio = [1.0, 1.0, 1.0, 1.0]
+[[controller.laws]]
+type = "depth_pid"
+kp = 0.1
+ki = 0.001
+pitch_limit = 0.5
+kp_pitch = 5.0
+ki_pitch = 0.3
+kd_pitch = 2.0
+integral_limit = [20.0, 20.0]
+[[controller.laws]]
+type = "heading_pid"
+kp = 1.0
+ki = 0.02
+kd = 2.0
+anti_windup = "none"
+[[controller.allocation]]
+type = "matrix"
+to = "control_fins"
+matrix = [[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]]
+[[controller.faults]]
+name = "stuck_rudder"
+of = "control_fins"
+channel = 0
+time = 40.0
+gain = 0.0
+offset = 0.1
+""",
+    ),
+    (
+        """
+[vehicle]
+name = "bluerov2_heavy"
+[run]
+step = 0.01
+duration = 0.5
+""",
+        """
+[controller]
+period = 0.05
+[[controller.sensors]]
+type = "sensor"
+of = "velocity"
+bias = [0.01, 0.0, 0.0]
+[[controller.sensors]]
+type = "dead_reckoning"
+[[controller.guidance]]
+type = "waypoints"
+points = [[0.0, 0.0, 5.0], [10.0, 0.0, 5.0], [10.0, 10.0, 6.0]]
+speed = 1.0
+look_ahead = 3.0
+radius = 1.0
+[[controller.guidance]]
+type = "set_point"
+position = [0.0, 0.0, 5.0]
+heading = 0.0
+[[controller.laws]]
+type = "pose_pid"
+kp = [40.0, 40.0, 60.0]
+ki = [4.0, 4.0, 6.0]
+kd = [60.0, 60.0, 80.0]
+kr = [10.0, 10.0, 10.0]
+kw = [4.0, 4.0, 4.0]
+feedforward = "restoring"
+[[controller.allocation]]
+type = "pseudo_inverse"
+to = "thrusters"
+weights = [1, 1, 1, 1, 2, 2, 2, 2]
+[[controller.faults]]
+of = "thrusters"
+channel = 4
+time = 20.0
+gain = 0.0
+known = true
+""",
+    ),
+    (
+        """
+[vehicle]
+mass = 30.0
+added_mass = [1.0, 30.0, 30.0]
+inertia = [0.2, 3.5, 3.5]
+buoyancy = 296.0
+[[terms]]
+type = "control_wrench"
+limit = [25.0, 20.0, 15.0, 2.0, 2.5, 3.0]
+[run]
+step = 0.05
+duration = 0.5
+""",
+        """
+[controller]
+period = 0.1
+[[controller.sensors]]
+type = "low_pass"
+of = "velocity"
+time_constant = 0.5
+[[controller.sensors]]
+type = "complementary_filter"
+time_constant = 5.0
+[[controller.sensors]]
+type = "sensor"
+name = "gyroscope"
+of = "angular_velocity"
+noise = [0.001, 0.001, 0.002]
+[[controller.guidance]]
+type = "trajectory"
+times = [0.5, 3.0, 8.0]
+positions = [[0, 0, 3], [2, 1, 4], [5, -2, 6]]
+headings = [0.3, 2.0, -2.5]
+interpolation = "cubic"
+[[controller.guidance]]
+type = "set_point"
+speed = 1.0
+[[controller.laws]]
+type = "heave_pid"
+kp = 20.0
+[[controller.laws]]
+type = "speed_pid"
+kp = 30.0
+drag = 4.0
+[[controller.laws]]
+type = "heading_smc"
+lambda = 0.4
+boundary = 0.1
+k_sigma = 0.2
+k_d = 0.8
+nomoto_gain = 0.25
+nomoto_time = 1.5
+[[controller.laws]]
+type = "pose_smc"
+lambda = [0.3, 0.4, 0.5]
+boundary = [0.1, 0.2, 0.3]
+lambda_r = [0.5, 0.6, 0.7]
+boundary_r = [0.1, 0.2, 0.3]
+k_sigma = [3.0, 4.0, 5.0]
+k_d = [30.0, 40.0, 50.0]
+k_sigma_r = [0.5, 0.6, 0.7]
+k_d_r = [3.0, 4.0, 5.0]
+[[controller.laws]]
+type = "state_feedback"
+K = [[1,0,0,0,0,0,1,0,0,0,0,0],[0,1,0,0,0,0,0,1,0,0,0,0],[0,0,1,0,0,0,0,0,1,0,0,0],[0,0,0,1,0,0,0,0,0,1,0,0],
+     [0,0,0,0,1,0,0,0,0,0,1,0],[0,0,0,0,0,1,0,0,0,0,0,1]]
+[[controller.faults]]
+of = "gyroscope"
+channel = 1
+offset = 0.1
+""",
+    ),
+]
+CONTROLLED_WORDS = [
+    "controller", "controller.laws", "sensors", "guidance", "laws", "allocation", "faults", "period", "delay", "type",
+    "name", "to", "of", "sensor", "heading_pid", "pose_pid", "policy", "callback", "matrix", "pseudo_inverse", "fault",
+    "waypoints", "trajectory", "set_point", "reference_model", "thrusters", "control_fins", "control_wrench", "gravity",
+    "vehicle", "start", "position", "depth", "heading", "kp", "ki", "integral_limit", "weights", "channel", "time", "gain",
+    "known", "file", "inputs", "every", "[[", "]]", "[", "]", "{", "}", "=", ",", ".", '"', "#",
+]  # fmt: skip
+
+
 def pick(rng, items):
     return items[int(rng.integers(len(items)))]
 
@@ -120,7 +324,7 @@ def mutated_bytes(rng, data, others):
     return bytes(data)
 
 
-def mutated_tokens(rng, text):
+def mutated_tokens(rng, text, words=WORDS):
     """Numbers, words and lines replaced, swapped, dropped or repeated: most of these are TOML still."""
     for _ in range(pick(rng, (1, 1, 1, 2, 3))):
         numbers, tokens = list(NUMBER.finditer(text)), TOKEN.findall(text)
@@ -134,7 +338,7 @@ def mutated_tokens(rng, text):
                 lines[i] = lines[i].split("=")[0] + "= " + pick(rng, NUMBERS)
                 text = "\n".join(lines)
             case 4 if tokens:
-                tokens[int(rng.integers(len(tokens)))] = pick(rng, WORDS)
+                tokens[int(rng.integers(len(tokens)))] = pick(rng, words)
                 text = "".join(tokens)
             case 5:
                 lines[i], lines[j] = lines[j], lines[i]
@@ -156,6 +360,15 @@ def case_of_file(seed):
     if rng.random() < 0.3:
         return mutated_bytes(rng, text.encode(), texts)
     return mutated_tokens(rng, text).encode("utf-8", "surrogateescape")
+
+
+def case_of_controller(seed):
+    """The bytes of this case: only the controller is broken."""
+    rng = np.random.default_rng([7, seed])
+    rest, section = pick(rng, CONTROLLED)
+    if rng.random() < 0.2:
+        return rest.encode() + mutated_bytes(rng, section.encode(), [section for _, section in CONTROLLED])
+    return (rest + mutated_tokens(rng, section, CONTROLLED_WORDS)).encode("utf-8", "surrogateescape")
 
 
 def case_of_set(seed):
@@ -226,9 +439,8 @@ def run_two_steps(plan):
     return ""
 
 
-def judged_file(seed):
-    """What becomes of a broken file."""
-    data = case_of_file(seed)
+def judged_file(data):
+    """What becomes of the bytes of a file."""
     with tempfile.NamedTemporaryFile(suffix=".toml") as file:
         Path(file.name).write_bytes(data)
         return judged(lambda: lw.Scene.load(file.name), data.decode("utf-8", "replace"))
@@ -238,6 +450,13 @@ def judged_set(seed):
     """What becomes of broken --set arguments."""
     chosen = cli.parser().parse_args(case_of_set(seed))
     return judged(lambda: lw.Scene.load(chosen.scene, cli.overrides(chosen)), " ".join(chosen.set))
+
+
+JUDGES = {
+    "files": lambda seed: judged_file(case_of_file(seed)),
+    "controllers": lambda seed: judged_file(case_of_controller(seed)),
+    "set": judged_set,
+}
 
 
 def work(kind, first, stop, most):
@@ -253,7 +472,7 @@ def work(kind, first, stop, most):
         faulthandler.dump_traceback_later(SECONDS, exit=True)
         print(json.dumps([seed, "begun", ""]), flush=True)
         try:
-            outcome, detail, scene = judged_file(seed) if kind == "files" else judged_set(seed)
+            outcome, detail, scene = JUDGES[kind](seed)
             plan = None if scene is None or lw.Ensemble.from_scene(scene).members > MOST_PLANNED else planned(scene)
             if (
                 plan is not None

@@ -67,7 +67,7 @@ def test_energy_never_grows_by_a_drag_matrix(dtype):
     fleet = lw.Ensemble.from_states(
         scene, b, R, nu, Om, {"drag_matrix.linear": linear, "drag_matrix.quadratic": quadratic}
     )
-    result = lw.solve(fleet, h=h, t1=20.0, save=lw.SaveAt(every=h), dtype=dtype)
+    result = lw.solve(fleet, "psi_s", h=h, t1=20.0, save=lw.SaveAt(every=h), dtype=dtype)
     assert (np.asarray(result.status) == Status.OK).all()
     energy = 5.0 * (result.velocity.astype(float) ** 2).sum(-1) + 0.5 * (
         result.angular_velocity.astype(float) ** 2
@@ -88,7 +88,7 @@ def test_a_linear_drag_matrix_step(kappa):
     fleet = lw.Ensemble.from_states(scene, [[0.0] * 3], [np.eye(3)], [[2.0, 0.0, 0.0]], [[0.0] * 3],
                                     {"drag_matrix.linear": [kappa * M / h * np.eye(6)],
                                      "drag_matrix.quadratic": np.zeros((1, 6, 6))})  # fmt: skip
-    u = lw.solve(fleet, h=h, t1=h).velocity[-1, 0, 0]
+    u = lw.solve(fleet, "psi_s", h=h, t1=h).velocity[-1, 0, 0]
     factor = (1.0 + (2.0 * GAMMA - 1.0) * kappa) / (1.0 + GAMMA * kappa) ** 2
     # The difference 1 - ... loses digits where little is left: absolute, in units of what there was.
     assert u == pytest.approx(2.0 * factor, rel=1e-13, abs=1e-15)
@@ -129,7 +129,7 @@ def test_falling_and_rising_for_a_day(dtype):
         Case("righted", Br=(0.0, 0.0, -1.0), linear=(1.0,) * 6, quadratic=(1.0,) * 6),
     )
     fleet = ensemble(Group("", h, steps, cases, dragged=True))
-    result = lw.solve(fleet, h=h, t1=h * steps, dtype=dtype)
+    result = lw.solve(fleet, "psi_s", h=h, t1=h * steps, dtype=dtype)
     assert result.status.counts() == {"ok": len(cases)}
     unit = UNIT[dtype]
     for i, case in enumerate(cases):
@@ -183,7 +183,7 @@ def test_many_steps_of_a_free_spheroid(steps, dtype):
     cases = tuple(Case("", M=case.M, J=case.J, Om=case.Om, R=one) for one in turned)
     fleet = ensemble(Group("", h, steps, cases))
     samples = lw.SaveAt(every=h * steps / 10)
-    result = lw.solve(fleet, h=h, t1=h * steps, save=samples, dtype=dtype)
+    result = lw.solve(fleet, "psi_s", h=h, t1=h * steps, save=samples, dtype=dtype)
     assert result.status.counts() == {"ok": 8}
     Q, unit = result.attitude.astype(float), UNIT[dtype]
     orthogonal = np.abs(np.swapaxes(Q, -1, -2) @ Q - np.eye(3)).max()

@@ -27,6 +27,7 @@ DOORS = {
     "stores: xarray": (needed, "xarray", "store"),
     "stores: zarr": (needed, "zarr", "store"),
     "clusters": (lambda: executor_of("dask", 1, "tcp://127.0.0.1:1"), "distributed", "cluster"),
+    "environments": (lambda: lw.gym.VectorEnv(None, observe=[]), "gymnasium", "gym"),
     "YAML": (lambda: yaml_text.parsed("a: 1"), "yaml", "yaml"),
     "plots": (plots.figure_class, "matplotlib.figure", "viz"),
     "recordings": (lambda: rerun.log_rerun(None, "x"), "rerun", "viz"),

@@ -23,6 +23,7 @@ HEAVY = {
     "netCDF4",
     "pyarrow",
     "SALib",
+    "gymnasium",
 }
 PRINT = "; import sys, json; print(json.dumps(sorted(sys.modules)))"
 

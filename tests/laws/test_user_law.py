@@ -41,7 +41,7 @@ START = {"b": (0.0, 0.0, 2.0), "nu": (0.5, 0.2, 0.1), "Om": (0.1, 0.3, -0.2)}
 
 def solve(laws, h=0.05, t1=5.0, vehicle=own_law.vehicle, **named):
     scene = lw.Scene(vehicle, lw.Environment(gravity=9.8), terms=laws)
-    return lw.solve(one(scene, **START), h=h, t1=t1, **named)
+    return lw.solve(one(scene, **START), "psi_s", h=h, t1=t1, **named)
 
 
 def test_each_law_is_right():

@@ -209,7 +209,7 @@ def test_solve_prints_nothing(scene, capfd):
 
 def test_method_is_data():
     settings = {"solver": "quartic", "iterations": None, "tolerance": None, "alpha": 0.5, "beta": 0.5}
-    settings |= {"rtol": None, "atol": None}
+    settings |= {"rtol": None, "atol": None, "reason": ""}
     assert dataclasses.asdict(Method()) == {"name": "psi_s"} | settings
     assert Method("kl8(psi_1)").order == 8 and len(Method("kl8(psi_1)").stages) == 17
     for name in ("tj4", "su4", "kl6", "kl8"):

@@ -115,7 +115,7 @@ def test_any_width(name, method, dtype, monkeypatch):
     assert all(same(reference, solve(width)) for width in ((1, 32) if quick else WIDTHS))
 
 
-TABLED = (problems.current_profile, problems.current_harmonics, problems.waves, problems.thrusters)
+TABLED = (problems.current_harmonics, problems.waves, problems.fins, problems.control_fins, problems.thrusters)
 EACH_OF_THEM = [pytest.param(problems.ALL, dtype, marks=pytest.mark.slow) for dtype in ("float64", "float32")]
 
 

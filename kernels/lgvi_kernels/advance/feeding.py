@@ -141,7 +141,8 @@ def make_feed(spec, types, method, at_step, opened):
         set_element(memory, i, row + 18, 0, heading_error(r, upright(r.position.x)))
         set_element(memory, i, row + 19, 0, r.speed)
 
-    @wp.func
+    # Not inlined: what samples note of it must not change how the compiler joins the products and sums of the rest.
+    @wp.func(inline=False)
     def seen(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real):
         """What is measured and what is wanted after k steps, both noted where they are asked for."""
         z = opened(at_step(x, k, h), c, -opening)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -146,7 +146,7 @@ class Bench:
         self.views = random_views(packets, self.width, seed, around)
         self.corners = tuple(corner_views(packets, self.width, around))
         warp_setup.start()
-        self.examine = _built(term, module, self.width)
+        self.examine = built(term, module, self.width)
         self.Params = np.dtype(self.examine.Params.numpy_dtype())
 
     def context(self, parameters: Mapping[str, np.ndarray], elsewhere: bool = False) -> PackingContext:
@@ -159,13 +159,7 @@ class Bench:
         Returns:
             The context for `count` members.
         """
-        M, _, Js = inertia.schur(inertia.blocks(vehicle.inertia6(parameters)))
-        n, none = len(M), np.zeros((len(M), 3, 3))
-        Q = np.broadcast_to(TURN if elsewhere else np.eye(3), (n, 3, 3))
-        origin = np.broadcast_to(ORIGIN if elsewhere else np.zeros(3), (n, 3))
-        M, Js = (np.swapaxes(Q, 1, 2) @ A @ Q for A in (M, Js))
-        frame = Frame(Q, origin, origin, M, np.einsum("nii->ni", Js), none, none)
-        return PackingContext(parameters, frame, np.arange(self.count), self.seed, KICK)
+        return packing_context(parameters, self.count, self.seed, KICK, elsewhere)
 
     def at(self, views: Views) -> dict[str, np.ndarray]:
         """Evaluate every role of the law.
@@ -238,21 +232,61 @@ class Bank:
         return np.asarray(out.numpy().transpose(0, 2, 1).reshape(-1, OUT_FIELDS))
 
 
-def _built(term: Term, module: Any, width: int) -> Any:
-    """The compiled kernel that evaluates a law. Raises SceneError with Warp's message where it does not compile."""
+def packing_context(
+    parameters: Mapping[str, np.ndarray], count: int, seed: int, h: float, elsewhere: bool = False
+) -> PackingContext:
+    """The context that packed() receives.
+
+    Args:
+        parameters: parameters of the scene by name, each (1, ...) or (n, ...).
+        count: number of members.
+        seed: seed of the ensemble.
+        h: step [s].
+        elsewhere: whether the kernel's axes are TURN at ORIGIN; by default they are the user's.
+
+    Returns:
+        The context.
+    """
+    M, _, Js = inertia.schur(inertia.blocks(vehicle.inertia6(parameters)))
+    n, none = len(M), np.zeros((len(M), 3, 3))
+    Q = np.broadcast_to(TURN if elsewhere else np.eye(3), (n, 3, 3))
+    origin = np.broadcast_to(ORIGIN if elsewhere else np.zeros(3), (n, 3))
+    M, Js = (np.swapaxes(Q, 1, 2) @ A @ Q for A in (M, Js))
+    frame = Frame(Q, origin, origin, M, np.einsum("nii->ni", Js), none, none)
+    return PackingContext(parameters, frame, np.arange(count), seed, h)
+
+
+REMEDY = (
+    "return what the role adds to (w, D, f, state); name fields as the View and params() do; import the operators of "
+    "lanes that are used; no `if` on a lane, no plain number times a lane: docs/develop/add_a_force.md"
+)
+
+
+def built(term: Term, module: Any, width: int, make: Callable[..., Any] = make_examine, remedy: str = REMEDY) -> Any:
+    """The compiled kernel that evaluates a law, or a part of a controller.
+
+    Args:
+        term: the term, or the part.
+        module: its device code.
+        width: lanes of a packet.
+        make: (module, numbers, width, real) -> kernel and types; by default `make_examine`.
+        remedy: what to look for where it does not compile; by default what laws get wrong.
+
+    Returns:
+        What `make` returns.
+
+    Raises:
+        SceneError: with Warp's message, where it does not compile.
+    """
     try:
         hash(module)
     except TypeError:
-        remedy = "give a module, or a class that holds the functions"
+        advice = "give a module, or a class that holds the functions"
         raise SceneError(
-            [f"{term.key}.device = {module!r}: is not hashable, as the key of a compiled kernel must be; {remedy}"]
+            [f"{term.key}.device = {module!r}: is not hashable, as the key of a compiled kernel must be; {advice}"]
         ) from None
-    remedy = (
-        "return what the role adds to (w, D, f, state); name fields as the View and params() do; import the operators of "
-        "lanes that are used; no `if` on a lane, no plain number times a lane: docs/develop/add_a_force.md"
-    )
     try:
-        examine = make_examine(module, declared(term, module), width, wp.float64)
+        examine = make(module, declared(term, module), width, wp.float64)
         kernel_cache.load(examine.kernel.module)
     except OSError:  # of the kernel cache
         raise

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,61 +13,14 @@ from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.machine import register_width
 from lgvi_warp.engine import kernel_choice
 from lgvi_warp.engine.laws.bench import ORIGIN, TURN, Bank, Bench, Views, short, simple_scene, sizes
+from lgvi_warp.engine.laws.report import EPS, ROUNDINGS, Check, LawReport, attempt, judged, packed_numbers, unpacked
 from lgvi_warp.physics import notation, terms
-from lgvi_warp.physics.terms.base import Packed, PackingContext, Term
+from lgvi_warp.physics.terms.base import PackingContext, Term
 from lgvi_warp.scene.scene import Scene
 
-EPS = float(np.finfo(np.float64).eps)
-# How many roundings of a law's largest number may add up in it.
-ROUNDINGS = 64.0
 # Length of the time over which a law follows [s].
 FOLLOWED = 0.4
 FLOWS = ("steady", "uniform", "varying")
-
-
-class Check(NamedTuple):
-    """The result of one check.
-
-    Attributes:
-        name: what was checked, such as "law: torque = -dU/dR".
-        worst: the worst deviation found, in the unit of what was checked.
-        allowed: the largest deviation allowed at that view, in the same unit.
-        ok: whether the check passed.
-        text: where it failed and the remedy, or a note; "" for none.
-    """
-
-    name: str
-    worst: float
-    allowed: float
-    ok: bool
-    text: str
-
-
-@dataclass(frozen=True)
-class LawReport:
-    """The checks of one law; printing it gives a table.
-
-    Attributes:
-        term: the term that was checked.
-        checks: one entry for each check, in the order they were made.
-    """
-
-    term: Term
-    checks: tuple[Check, ...]
-
-    @property
-    def ok(self) -> bool:
-        """Whether all checks of the law passed."""
-        return all(check.ok for check in self.checks)
-
-    def __str__(self) -> str:
-        head = f"{type(self.term).__name__} ({self.term.key}): {'ok' if self.ok else 'WRONG'}"
-        rows = [("check", "worst", "allowed", "", "")]
-        for name, worst, allowed, ok, text in self.checks:
-            rows.append((name, f"{worst:.2e}", f"{allowed:.2e}", "ok" if ok else "WRONG", text))
-        widths = [max(len(row[i]) for row in rows) for i in range(4)]
-        padded = ([*(text.ljust(n) for text, n in zip(row, widths, strict=False)), row[4]] for row in rows)
-        return "\n  ".join([head, *("  ".join(row).rstrip() for row in padded)])
 
 
 def check_law(
@@ -113,47 +66,21 @@ def check_law(
     return LawReport(term, tuple(checks))
 
 
-def _judged(name: str, difference: np.ndarray, allowed: np.ndarray | float, views: Views, remedy: str) -> Check:
-    """A Check of deviations (k,) or (k, d): the one that exceeds its limit by most, and the view where it occurs."""
-    k = len(difference)
-    worst = np.abs(difference).reshape(k, -1)
-    limit = np.broadcast_to(np.reshape(allowed, (-1, 1)) if np.ndim(allowed) == 1 else allowed, worst.shape)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(worst <= limit, worst / np.maximum(limit, 1e-300), 1.0 + worst)
-        ratio = np.where(np.isfinite(worst), ratio, np.inf)
-    i, j = np.unravel_index(ratio.argmax(), ratio.shape)
-    good = bool(np.all(worst <= limit) and np.isfinite(limit).all())
-    text = "" if good else f"{views.description(int(i))}; {remedy}"
-    return Check(name, float(worst[i, j]), float(limit[i, j]), good, text)
-
-
 def _numbers(bench: Bench, step: float) -> Iterator[Check]:
     """Whether packed() fills what params() names; then packs, and lets the law remember once."""
     term, context = bench.term, bench.context(bench.parameters)
-    try:
-        packed = term.packed(bench.own, context)
-    except Exception as error:
-        packed = f"fails: {type(error).__name__}: {error}"  # type: ignore[assignment]
-    if not isinstance(packed, Packed):
-        text = packed if isinstance(packed, str) else f"returns {packed!r:.60}"
-        remedy = "write packed(self, numbers, context) that returns lw.Packed({name: numbers}), names as in params()"
-        yield Check("packed", 1.0, 0.0, False, f"packed() {text}; {remedy}")
+    packed, checks = packed_numbers(term, bench.Params, lambda: term.packed(bench.own, context))
+    yield from checks
+    if packed is None:
         return
-    places = {"first": packed.rows is not None, "memory": packed.memory is not None, "work": packed.work}
-    filled = set(packed.values) | {name for name, present in places.items() if present}
-    wanted = set(bench.Params["own"].names or ()) - {"unused"}
-    wrong = [f"{name} is not in packed().values" for name in sorted(wanted - filled)]
-    wrong += [f"{name} is no field of params()" for name in sorted(filled - wanted - places.keys())]
-    yield Check("numbers", len(wrong), 0.0, not wrong, "; ".join(wrong))
     remembers = packed.memory is not None and packed.memory.size > 0
     good = remembers == bool(term.memory)
     text = "" if good else f"{type(term).__name__}.memory must say whether packed() gives memory"
     yield Check("memory", float(not good), 0.0, good, text)
-    if good and not wrong:
-        packets = _attempt(lambda: Bank(bench, context, bench.views), "with shared numbers")
+    if good and all(check.ok for check in checks):
+        packets = attempt(lambda: Bank(bench, context, bench.views), "with shared numbers")
         if isinstance(packets, str):
-            text = f"{packets}; give arrays (1,), (1, 3) or (n,), (n, 3), and whole numbers"
-            yield Check("packed", 1.0, 0.0, False, text)
+            yield unpacked(packets)
         else:
             bench.packets = packets
 
@@ -175,7 +102,7 @@ def _finite(bench: Bench, step: float) -> Iterator[Check]:
 def _all_finite(name: str, values: dict[str, np.ndarray], views: Views) -> Check:
     """Whether every role gives numbers at every view."""
     finite = np.all([np.isfinite(value).all(axis=1) for value in values.values()], axis=0)
-    return _judged(name, (~finite).astype(float), 0.0, views, "guard divisions and roots")
+    return judged(name, (~finite).astype(float), 0.0, views, "guard divisions and roots")
 
 
 def _whole(bench: Bench, step: float) -> Iterator[Check]:
@@ -186,10 +113,10 @@ def _whole(bench: Bench, step: float) -> Iterator[Check]:
     for role, value in here.items():
         if role != "damping":
             remedy = "only damping(D, view, p) may look at view.nu and view.Om"
-            yield _judged(f"{role}: blind to velocity", faster[role] - value, 0.0, views, remedy)
+            yield judged(f"{role}: blind to velocity", faster[role] - value, 0.0, views, remedy)
         if not bench.term.timed and not bench.noisy:
             remedy = f"write timed = True in {kind}, or it gets no time"
-            yield _judged(f"{role}: blind to time", later[role] - value, 0.0, views, remedy)
+            yield judged(f"{role}: blind to time", later[role] - value, 0.0, views, remedy)
     if not bench.noisy:
         yield from _packing(bench, here)
 
@@ -202,13 +129,13 @@ def _packing(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
     each = {name: np.repeat(value, bench.count, axis=0) for name, value in bench.parameters.items()}
     varied = _tried(bench, bench.context(each), views, "where numbers have one entry a member")
     for role, value in here.items():
-        yield _judged(f"{role}: lanes apart", mixed[role][back] - value, 0.0, views, "a lane must not look at others")
+        yield judged(f"{role}: lanes apart", mixed[role][back] - value, 0.0, views, "a lane must not look at others")
         if isinstance(varied, str):
             yield Check(f"{role}: varied numbers", np.inf, 0.0, False, varied)
         else:
             limit = ROUNDINGS * EPS * np.abs(value).max()
             remedy = "packed() must give n entries where its numbers have n"
-            yield _judged(f"{role}: varied numbers", varied[role] - value, limit, views, remedy)
+            yield judged(f"{role}: varied numbers", varied[role] - value, limit, views, remedy)
     # Weight and restoring moment keep their promise together, not each.
     if not any(isinstance(bench.term, type(implied)) for implied in terms.IMPLIED):
         yield from _axes(bench, here)
@@ -216,15 +143,7 @@ def _packing(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
 
 def _tried(bench: Bench, context: PackingContext, views: Views, where: str) -> dict[str, np.ndarray] | str:
     """The law's numbers by role in another context, or a message where packed() fails in it."""
-    return _attempt(lambda: Bank(bench, context, views).evaluate(views), where)
-
-
-def _attempt(make: Callable[[], Any], where: str) -> Any:
-    """The result of `make`, or a message where it fails."""
-    try:
-        return make()
-    except Exception as error:
-        return f"packed() fails {where}: {type(error).__name__}: {error}"
+    return attempt(lambda: Bank(bench, context, views).evaluate(views), where)
 
 
 def _axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
@@ -243,7 +162,7 @@ def _axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
         largest = max(np.abs(values).max() for values in (here[role], turned[role], wrench))
         limit = ROUNDINGS * EPS * largest * 100.0
         remedy = "turn vectors by context.frame.vector(), points by .point(), torques by .torque() in packed()"
-        yield _judged(f"{role}: any axes", difference, limit, views, remedy)
+        yield judged(f"{role}: any axes", difference, limit, views, remedy)
 
 
 def _wrench(role: str, value: np.ndarray, views: Views) -> np.ndarray:
@@ -298,14 +217,14 @@ def _potential(bench: Bench, step: float) -> Iterator[Check]:
     remedy = "is it the gradient of potential()?"
     if not np.any(U(views)):
         remedy = "potential() gives 0 everywhere: write it, or drop POTENTIAL"
-    yield _judged("law: force = -R^T dU/db", wrench[:, :3] - force, allowed, views, remedy)
+    yield judged("law: force = -R^T dU/db", wrench[:, :3] - force, allowed, views, remedy)
     limits = np.stack([slope.allowed for slope in turns], axis=1)
-    yield _judged("law: torque = -dU/dR", wrench[:, 3:] - torque, limits, views, remedy)
+    yield judged("law: torque = -dU/dR", wrench[:, 3:] - torque, limits, views, remedy)
     if hasattr(bench.module, "energy"):
         known, energy = U(views), bench.at(views)["energy"][:, 0]
         round_off = 100.0 * ROUNDINGS * EPS * max(np.abs(known).max(), np.abs(energy).max())
         difference = (energy - energy[0]) - (known - known[0])
-        yield _judged("energy: as potential()", difference, round_off, views, "is it u + U, with u as given?")
+        yield judged("energy: as potential()", difference, round_off, views, "is it u + U, with u as given?")
 
 
 def _damping(bench: Bench, step: float) -> Iterator[Check]:
@@ -355,11 +274,11 @@ def _flow(bench: Bench, step: float) -> Iterator[Check]:
     reach = np.linalg.norm(views.position, axis=1) + 1.0
     moves = [_slope(lambda by, i=i: u(views.moved(i, by)), step, reach) for i in range(3)]
     passes = _slope(lambda by: u(replace(views, time=views.time + by)), step, views.time + 1.0)
-    yield _judged("flow: rate = du/dt", flow[:, 3:6] - passes.value, passes.allowed, views, "add it to f.rate")
+    yield judged("flow: rate = du/dt", flow[:, 3:6] - passes.value, passes.allowed, views, "add it to f.rate")
     for i, name in enumerate(("by_north", "by_east", "by_depth")):
         gradient = flow[:, 6 + 3 * i : 9 + 3 * i]
         difference, allowed = gradient - moves[i].value, moves[i].allowed
-        yield _judged(f"flow: {name} = du/db{i + 1}", difference, allowed, views, f"add it to f.{name}")
+        yield judged(f"flow: {name} = du/db{i + 1}", difference, allowed, views, f"add it to f.{name}")
     yield _flow_kind(kind, moves, passes)
     yield _water(bench, u, sum(reach * np.abs(slope.value).max(axis=1) for slope in moves))
 
@@ -377,7 +296,7 @@ def _water(bench: Bench, u: Callable[[Views], np.ndarray], rounded: np.ndarray) 
     else:
         host = velocity[:, 0]
     limit = ROUNDINGS * EPS * (max(np.abs(host).max(), 1e-300) + rounded)
-    return _judged("flow: water()", u(views) - host, limit, views, "the host's water() must be what flow() gives")
+    return judged("flow: water()", u(views) - host, limit, views, "the host's water() must be what flow() gives")
 
 
 def _flow_kind(kind: Any, moves: list[Slope], passes: Slope) -> Check:
@@ -406,9 +325,9 @@ def _follow(bench: Bench, step: float) -> Iterator[Check]:
     whole = remembered((views, FOLLOWED))
     elsewhere = Views(views.attitude[::-1], views.position + 1.0, 1.0 - views.velocity, 1.0 - views.rate, views.time)
     remedy = "leave follow() out: what this law remembers depends on more than the time"
-    yield _judged("follow: blind to the state", remembered((elsewhere, FOLLOWED)) - whole, 0.0, views, remedy)
+    yield judged("follow: blind to the state", remembered((elsewhere, FOLLOWED)) - whole, 0.0, views, remedy)
     earlier = replace(views, time=views.time - 0.25 * FOLLOWED)
     apart = remembered((earlier, 0.75 * FOLLOWED), (views, 0.25 * FOLLOWED)) - whole
     limit = ROUNDINGS * EPS * (np.abs(whole).max() + 1e-300)
     remedy = "advance by the exact solution over view.h, which ends at view.t"
-    yield _judged("follow: exact", apart, limit, views, remedy)
+    yield judged("follow: exact", apart, limit, views, remedy)

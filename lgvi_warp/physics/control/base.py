@@ -12,7 +12,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics import vehicle
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, word_of
 
 # What guidance may give, and laws may need.
 WISHES = ("depth", "position", "velocity", "heading", "attitude", "angular_velocity", "speed")
@@ -39,20 +39,20 @@ class Bus(NamedTuple):
         report: First of as many rows as there are commands, where actuators say where they are.
         acting: First row of the commands that act, where commands are delayed. As many rows of the commands before follow, and
             the row of the step from which the former act.
-        answer: First of the rows into which a `Callback` writes; as many as it returns numbers.
         rows: Number of rows.
         delayed: Whether the commands of some member are delayed.
         period: Time between two looks [s].
+        answer: First of the rows into which a `Callback` writes; as many as it returns numbers.
     """
 
     commands: Mapping[str, tuple[int, int]]
     unmet: int
     report: int
     acting: int
-    answer: int
     rows: int
     delayed: bool = False
     period: float = 1.0
+    answer: int = 0
 
     @property
     def channels(self) -> int:
@@ -75,7 +75,8 @@ class Bus(NamedTuple):
         for key, count in channels.items():
             commands[key] = (row, count)
             row += count
-        return cls(commands, row, row + 6, 2 * row + 6, 4 * row + 7, 4 * row + 7 + answers, period=period)
+        rows = 4 * row + 7
+        return cls(commands, row, row + 6, 2 * row + 6, rows + answers, period=period, answer=rows)
 
     def values_of(self, key: str) -> dict[str, Any]:
         """What the device code of an actuator reads.
@@ -166,6 +167,15 @@ class Part(Term):
             h: Step of the run [s].
         """
 
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        """The numbers as they are: a controller works in the user's axes."""
+        if self.lanes() is None:
+            name = type(self).__name__
+            raise NotImplementedError(
+                f"{name} must define packed(numbers, context): see docs/develop/add_a_controller.md"
+            )
+        return Packed({item.name: numbers[word_of(item)] for item in self.number_fields() if word_of(item) in numbers})
+
 
 AnyPart = TypeVar("AnyPart", bound=Part)
 
@@ -211,10 +221,6 @@ class ControlLaw(Part):
         law = copy.copy(self)
         object.__setattr__(law, "nominal", nominal)
         return law
-
-    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The numbers as they are: a controller works in the user's axes."""
-        return Packed(dict(numbers))
 
 
 # How a law's integral is kept from growing while actuators are at their limits.

@@ -13,7 +13,7 @@ from lgvi_warp.physics.control.base import Allocation, ControlLaw
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext
 
 PROBLEM = "cannot stand in a scene file, which runs no code"
-REMEDY = "give lw.Callback(function) to lw.Controller in Python"
+REMEDY = "give lw.Callback(function) to lw.Controller in Python; lw.resume(path, fleet) goes on with such a run"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -13,7 +13,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.physics.control.base import READINGS, SECTIONS, Allocation, Bus, Part
 from lgvi_warp.physics.control.callback import Callback, CallbackCommands, refuse_second
-from lgvi_warp.physics.control.delay import Delay
+from lgvi_warp.physics.control.delay import MOST_PERIODS, Delay
 from lgvi_warp.physics.control.fault import Fault
 from lgvi_warp.physics.control.pseudo_inverse import PseudoInverse
 from lgvi_warp.physics.control.sensor import Sensor
@@ -65,6 +65,9 @@ class Controller:
         delay = faults.number("delay", self.delay, "s", 0.0)
         if delay is not None:
             object.__setattr__(self, "delay", np.asarray(delay))
+            if not faults and delay > MOST_PERIODS * self.period:
+                remedy = f"give at most {MOST_PERIODS * self.period:.9g} s, or a longer period"
+                faults.add("delay", float(delay), f"is more than {MOST_PERIODS} periods", remedy)
         for section, base in SECTIONS.items():
             with faults.including():
                 object.__setattr__(self, section, _parts(section, base, getattr(self, section)))
@@ -220,6 +223,11 @@ class Controller:
                 faults.add("allocation", "", fault, f"give [[controller.allocation]] to = {which}")
                 return ()
             given = (PseudoInverse(to=next(iter(able))),)
+        wrong = [part.to for part in given if not isinstance(part.to, str)]
+        for value in wrong:
+            faults.add("allocation.to", value, "is not a text", "give the name of a term that takes commands")
+        if wrong:
+            return ()
         counts = Counter(part.to for part in given)
         for part in given:
             if part.to not in able:
@@ -263,7 +271,8 @@ class Controller:
         """
         for name, value in (("period", float(self.period)), ("delay", float(self.delay))):
             low = int(value / h + ROUND_OFF)
-            if abs(value - round(value / h) * h) > ROUND_OFF * h:
+            none = name == "period" and value < 0.5 * h
+            if none or abs(value - round(value / h) * h) > ROUND_OFF * h:
                 near = " or ".join(f"{max(i, 1) * h:.9g}" for i in sorted({max(low, 1), low + 1}))
                 faults.add(
                     f"controller.{name}",
@@ -322,7 +331,7 @@ def _parts(section: str, base: type[Part], given: Any) -> tuple[Part, ...]:
         with faults.including():
             if isinstance(entry, Mapping):
                 word = entry.get("type", "fault" if section == "faults" else "")
-                if word not in known:
+                if not isinstance(word, str) or word not in known:
                     faults.add(f"{where}.type", word, "is not known", closest(str(word), known))
                 else:
                     parts.append(build(where, known[word], entry))

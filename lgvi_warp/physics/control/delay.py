@@ -10,6 +10,9 @@ import numpy as np
 from lgvi_warp.physics.control.base import Part
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 
+# Periods that a delay may last: the commands of each are kept.
+MOST_PERIODS = 1000
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Delay(Part):
@@ -25,6 +28,11 @@ class Delay(Part):
 
     period: float = 1.0
     delay: Any = number((), "s", 0.0, least=0.0)
+
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
+        """In addition, members whose delay is longer than so many commands are kept."""
+        outside = super().unphysical(numbers)
+        return {"delay": outside["delay"] | (numbers["delay"] > MOST_PERIODS * self.period)}
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Whole periods and whole steps of each member; a ring of as many sets of commands as some member needs.

@@ -13,6 +13,8 @@ from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.base import number
 
 INTERPOLATIONS = ("linear", "cubic")
+# The largest rate between two times, in the unit of the numbers / s: beyond it squares of float32 are infinite.
+FASTEST = 1e15
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -43,6 +45,15 @@ class Trajectory(Guidance):
         faults.choice("interpolation", self.interpolation, INTERPOLATIONS)
         if len(self.times) < 2:
             faults.add("times", self.times, "are less than two", "give when the trajectory begins and when it ends")
+        spans = np.diff(self.times)
+        for name in ("positions", "headings", "speed"):
+            values = getattr(self, name)
+            if values is not None:
+                with np.errstate(over="ignore", divide="ignore"):
+                    rates = np.abs(np.diff(values.reshape(len(self.times), -1), axis=0) / spans[:, None])
+                if np.any(rates > FASTEST):
+                    problem = f"change by more than {FASTEST:g} of their unit a second"
+                    faults.add(name, values, problem, "give places that a vehicle can reach, or times further apart")
 
     @property
     def gives(self) -> tuple[str, ...]:

@@ -26,12 +26,12 @@ IMPLIED: tuple[Term, ...] = (Weight(), Restoring())
 
 
 def register_term(kind: type[AnyTerm]) -> type[AnyTerm]:
-    """Check that scene files know a user's term or event by its `type`. It may be used as a decorator of the class.
+    """Check that scene files know a user's term, event or part of a controller by its `type`; a decorator of the class.
 
     A class is known as soon as it is made, if its `type` is not taken; this function says so where it is.
 
     Args:
-        kind: Subclass of `Term` or `Event` with a `type` of its own.
+        kind: Subclass of `Term`, of `Event` or of a part, such as `ControlLaw`, with a `type` of its own.
 
     Returns:
         The same class.
@@ -40,7 +40,9 @@ def register_term(kind: type[AnyTerm]) -> type[AnyTerm]:
         ValueError: Where `type` is empty or taken by another class.
     """
     if not registry.add(kind.kinds, kind):
-        raise ValueError(f"{kind.__name__}.type = {kind.type!r}: give a type that no other term has")
+        former = kind.kinds.get(kind.type)
+        problem = f"is that of {former.__module__}.{former.__qualname__}" if former else "is missing"
+        raise ValueError(f"{kind.__name__}.type = {kind.type!r}: {problem}; give a type that no other term has")
     return kind
 
 

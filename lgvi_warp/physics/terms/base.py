@@ -360,7 +360,9 @@ class Term:
             raise NotImplementedError(f"{name} must define packed(numbers, context): see docs/develop/add_a_force.md")
         frame = context.frame
         turned: dict[str | None, Any] = {"vector": frame.vector, "point": frame.point, None: np.asarray}
-        return Packed({item.name: turned[item.metadata["axes"]](numbers[item.name]) for item in self.number_fields()})
+        return Packed(
+            {item.name: turned[item.metadata["axes"]](numbers[word_of(item)]) for item in self.number_fields()}
+        )
 
     def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray | None:
         """Velocity of the water that this term moves; by default it moves none.
@@ -467,6 +469,9 @@ def _checked(
         lengths |= {size: got for size, got in zip(shape, array.shape, strict=True) if isinstance(size, str)}
     elif meta["infinite"]:
         array = faults.real(name, value)
+        if array is not None and array.shape != shape:
+            faults.add(name, value, f"has shape {array.shape}", f"give {_amount(shape)} [{unit}]")
+            return None
     else:
         array = faults.finite(name, value, shape, unit)
     if array is None:
@@ -481,6 +486,11 @@ def _checked(
     else:
         return array
     return None
+
+
+def _amount(shape: tuple[Any, ...]) -> str:
+    """How many numbers a shape asks for, in words."""
+    return f"numbers of shape {shape}" if shape else "a number"
 
 
 def _outside(one: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:

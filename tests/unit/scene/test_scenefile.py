@@ -10,6 +10,7 @@ import lgvi_warp as lw
 from lgvi_warp.physics import notation
 from lgvi_warp.scene import scene as scenes
 from lgvi_warp.scene.scene import from_dict
+from lgvi_warp.scene.settings import RunSettings
 
 PAPER = Path(__file__).parents[3] / "examples" / "paper.toml"
 SMALL = "[vehicle]\nmass = 10.0\ninertia = [1.0, 2.0, 2.5]\n"
@@ -174,6 +175,14 @@ def test_one_bad_line_is_one_fault(line, start):
 @pytest.mark.parametrize("section", ["environment", "start", "run", "ensemble"])
 def test_sections_must_be_tables(section):
     assert only_fault(f"{section} = 3\n{SMALL}").startswith(f"{section} = 3: is not a table")
+
+
+def test_start_and_run_may_be_objects():
+    start, run = lw.Start(position=[0.0, 0.0, 5.0]), RunSettings(step=0.02)
+    scene = lw.Scene.named("remus_100", start=start, run=run)
+    assert scene.start is start and scene.run is run
+    with pytest.raises(lw.SceneError, match="is not a table"):
+        lw.Scene.named("remus_100", start=run)
 
 
 def test_all_faults_of_all_sections_come_in_one_message():

@@ -1,0 +1,131 @@
+"""Closed loops beside the same scene without a controller, by processor time, in turn; a callback beside the fused loop."""
+
+import time
+
+import numpy as np
+
+import lgvi_warp as lw
+from lgvi_warp.engine.packets import Packets
+from lgvi_warp.runs.settle import make_plan
+
+H = 0.01
+HEADING = dict(kp=1.0, ki=0.02, kd=2.0, integral_limit=20.0)
+DEPTH = dict(kp=0.1, ki=0.001, kp_pitch=5.0, ki_pitch=0.3, kd_pitch=2.0, integral_limit=(20.0, 20.0))
+POSE = dict(kp=(40.0, 40.0, 60.0), ki=(4.0, 4.0, 6.0), kd=(60.0, 60.0, 80.0), kr=(10.0,) * 3, kw=(4.0,) * 3)
+
+
+def remus(every, **more):
+    """REMUS 100 with the autopilot of depth and heading; every: steps between looks, 0 for none."""
+    controller = None
+    if every:
+        controller = lw.Controller(
+            period=every * H,
+            guidance=[lw.SetPoint(depth=10.0, heading=0.5)],
+            laws=[lw.DepthPID(**DEPTH), lw.HeadingPID(**HEADING)],
+            allocation=[lw.AllocationMatrix(to="control_fins", matrix=((0, 0, 0, 0, 0, -1), (0, 0, 0, 0, -1, 0)))],
+            **more,
+        )
+    return lw.Scene.named("remus_100", start={"velocity": [1.54, 0.0, 0.0]}, controller=controller)
+
+
+def bluerov2(every):
+    """BlueROV2 heavy that keeps its station with eight thrusters."""
+    controller = None
+    if every:
+        controller = lw.Controller(
+            period=every * H,
+            guidance=[lw.SetPoint(position=(0.0, 0.0, 5.0), heading=0.0)],
+            laws=[lw.PosePID(**POSE, feedforward="restoring")],
+        )
+    return lw.Scene.named("bluerov2_heavy", controller=controller)
+
+
+def packets_of(scene, method, dtype, members, steps):
+    """Packets of members that start a little apart."""
+    vary = {"start.velocity": lw.Normal(std=0.02), "start.angular_velocity": lw.Normal(std=0.02)}
+    plan = make_plan(lw.Ensemble(scene, members, 1, vary), method, h=H, t1=H * steps, dtype=dtype)
+    plan.compile()
+    return Packets(plan, plan.ensemble.select(0, members))
+
+
+def seconds(packets, k0, k1):
+    """Processor time of steps [s]."""
+    begun = time.thread_time()
+    packets.launch(k0, k1)
+    return time.thread_time() - begun
+
+
+def ratios(name, scenes, method, dtype, quick):
+    """Loops beside the scene without one, the least of several rounds."""
+    members, steps, rounds = (64, 300, 2) if quick else (512, 1000, 7)
+    all_packets = [packets_of(scene, method, dtype, members, steps) for scene in scenes.values()]
+    times = np.empty((rounds, len(scenes)))
+    for i in range(rounds):
+        for j, packets in enumerate(all_packets):
+            packets.refill(packets.members)
+            times[i, j] = seconds(packets, 0, steps)
+    least = times.min(axis=0) * 1e9 / (members * steps)
+    for label, ns in zip(scenes, least, strict=True):
+        yield {"vehicle": name, "method": method, "dtype": dtype, "loop": label, "ns": round(ns, 1),
+               "over_none": round(ns / least[0], 3)}  # fmt: skip
+
+
+def settled(quick):
+    """A loop at the start and once it has settled: products of its rates are subnormal numbers then."""
+    members, part = (64, 500) if quick else (256, 1000)
+    for dtype in ("float64", "float32"):
+        packets = packets_of(bluerov2(10), "psi_s", dtype, members, 8 * part)
+        each = [seconds(packets, k, k + part) for k in range(0, 8 * part, part)]
+        yield {"vehicle": "bluerov2_heavy", "dtype": dtype, "late_over_early": round(min(each[-3:]) / min(each[:3]), 3)}
+
+
+def callback(quick):
+    """The heading law as a Python function beside the one in the kernel, ten steps a period."""
+    members, t1 = (256, 2.0) if quick else (4096, 10.0)
+
+    def heading(t, y, r, members):
+        s, c = r.attitude[:, :2, 0], y.attitude[:, :2, 0]
+        demand = np.zeros((len(members), 6))
+        demand[:, 5] = HEADING["kp"] * np.arctan2(s[:, 1] * c[:, 0] - s[:, 0] * c[:, 1], np.sum(s * c, axis=1))
+        demand[:, 5] -= HEADING["kd"] * y.angular_velocity[:, 2]
+        return demand
+
+    laws = {"fused": lw.HeadingPID(kp=HEADING["kp"], kd=HEADING["kd"]), "callback": lw.Callback(heading)}
+    times = {}
+    for label, law in laws.items():
+        controller = lw.Controller(
+            period=10 * H,
+            guidance=[lw.SetPoint(heading=0.5)],
+            laws=[law],
+            allocation=[lw.AllocationMatrix(to="control_fins", matrix=((0, 0, 0, 0, 0, -1), (0,) * 6))],
+        )
+        scene = lw.Scene.named("remus_100", start={"velocity": [1.54, 0.0, 0.0]}, controller=controller)
+        fleet = lw.Ensemble(scene, members, 1, {"start.angular_velocity": lw.Normal(std=0.02)})
+        best = np.inf
+        for _ in range(2 if quick else 4):
+            begun = time.process_time()
+            lw.solve(fleet, "psi_x", h=H, t1=t1, threads=1)
+            best = min(best, time.process_time() - begun)
+        times[label] = best
+    yield {"vehicle": "remus_100", "loop": "callback", "members": members, "steps_a_period": 10,
+           "over_fused": round(times["callback"] / times["fused"], 3)}  # fmt: skip
+
+
+def run(quick):
+    delay_and_faults = dict(
+        delay=0.05,
+        sensors=[
+            lw.Sensor(name="cell", of="depth", noise=0.02, quantum=0.005),
+            lw.Sensor(name="compass", of="heading", noise=0.01),
+        ],
+        faults=[lw.Fault(of="control_fins", channel=0, time=5.0, gain=0.5)],
+    )
+    for dtype in ("float64", "float32"):
+        scenes = {"none": remus(0), "every 10": remus(10), "every step": remus(1)}
+        if dtype == "float64":
+            scenes["every 10, sensors, delay, fault"] = remus(10, **delay_and_faults)
+        yield from ratios("remus_100", scenes, "psi_x", dtype, quick)
+        scenes = {"none": bluerov2(0), "every 10": bluerov2(10), "every step": bluerov2(1)}
+        yield from ratios("bluerov2_heavy", scenes, "psi_s", dtype, quick)
+    yield from settled(quick)
+    yield from callback(quick)

@@ -1,0 +1,156 @@
+"""Vehicles as environments of Gymnasium, and a law in Python, beside the law in the kernel and a loop over Python vehicles."""
+
+import time
+
+import gymnasium
+import numpy as np
+
+import lgvi_warp as lw
+from lgvi_warp.engine.episodes import Episodes
+from lgvi_warp.runs.settle import make_plan
+
+# Ten steps a period, as in a training.
+STEP, EVERY, EPISODE = 0.01, 10, 20.0
+VARY = {"vehicle.buoyancy": lw.Uniform(low=297.0, high=302.0), "start.position[2]": lw.Uniform(low=5.0, high=15.0)}
+GAINS = dict(kp=1.0, kd=2.0)
+PLANES = lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])
+DEPTH = lw.DepthPID(
+    kp=0.1, ki=0.001, pitch_limit=0.5, kp_pitch=5.0, ki_pitch=0.3, kd_pitch=2.0, integral_limit=[20, 20]
+)
+
+
+def scene(*laws, every=EVERY):
+    """REMUS 100 with these laws; every: steps a period."""
+    wanted = lw.SetPoint(depth=10.0, heading=0.5)
+    controller = lw.Controller(period=every * STEP, guidance=[wanted], laws=laws, allocation=[PLANES])
+    return lw.Scene.named("remus_100", start={"velocity": [1.54, 0.0, 0.0]}, controller=controller)
+
+
+def heading(t, y, r, members):
+    """The heading law in NumPy."""
+    s, c = r.attitude[:, :2, 0], y.attitude[:, :2, 0]
+    e = np.arctan2(s[:, 1] * c[:, 0] - s[:, 0] * c[:, 1], np.sum(s * c, axis=1))
+    demand = np.zeros((len(members), 6))
+    demand[:, 5] = GAINS["kp"] * e + GAINS["kd"] * (r.angular_velocity[:, 2] - y.angular_velocity[:, 2])
+    return demand
+
+
+def least(call, rounds):
+    """The least processor time of a call [s]."""
+    best = np.inf
+    for _ in range(rounds):
+        begun = time.process_time()
+        call()
+        best = min(best, time.process_time() - begun)
+    return best
+
+
+def environments(members, steps, rounds):
+    """Steps of environments whose episodes end at different times, beside a run with all laws in the kernel."""
+    fleet = lw.Ensemble(scene(DEPTH, lw.HeadingPID(**GAINS)), members, 1, VARY)
+    env = lw.gym.VectorEnv(
+        fleet,
+        observe=["depth_error", "down[0]", "velocity", "angular_velocity"],
+        reward=lambda t, y, r: -np.abs(r.depth - y.depth),
+        terminated=lambda t, y, r: np.random.default_rng(round(t / STEP)).random(members) < EVERY * STEP / EPISODE,
+        instead_of="depth_pid",
+        outputs=["M"],
+        scale=0.35,
+        method="psi_x",
+        h=STEP,
+    )
+    actions = np.zeros((members, 1))
+
+    def act():
+        for _ in range(steps):
+            env.step(actions)
+
+    whole = lw.Ensemble(scene(DEPTH, lw.HeadingPID(**GAINS)), members, 1, VARY)
+    begun = dict(method="psi_x", h=STEP, t1=STEP * EVERY * steps, threads=1, save=lw.SaveAt(fields=("position",)))
+    lw.solve(whole, **begun)
+    env.reset(seed=1)
+    act()
+    times = [(least(act, 1), least(lambda: lw.solve(whole, **begun), 1)) for _ in range(rounds)]
+    taken, fused = np.min(times, axis=0)
+    return {"environments": members, "steps_a_period": EVERY, "environment_steps_per_s": round(members * steps / taken),
+            "to_a_run_of_the_same_loop": round(taken / fused, 2)}  # fmt: skip
+
+
+def looks(members, steps, rounds):
+    """What an exchange with the host takes beside the launches: answers written, looks read."""
+    fleet = lw.Ensemble(scene(lw.Callback(heading), lw.HeadingPID(**GAINS)), members, 1, VARY)
+    plan = make_plan(fleet, "psi_x", STEP, STEP * EVERY * steps * (2 * rounds + 2), lw.SaveAt(fields=("position",)))
+    plan.compile()
+    episodes, values = Episodes(plan, fleet.select(0, members)), np.zeros((members, 6))
+
+    def launch():
+        for _ in range(steps):
+            episodes.packets.launch(episodes.steps, episodes.steps + EVERY)
+            episodes.steps += EVERY
+
+    def exchanged():
+        for _ in range(steps):
+            episodes.advance(values)
+            episodes.look()
+
+    alone, both = np.min([(least(launch, 1), least(exchanged, 1)) for _ in range(rounds)], axis=0)
+    return {"members": members, "steps_a_period": EVERY, "part_of_the_exchange": round(1.0 - alone / both, 3)}
+
+
+def exchange(members, every, steps, rounds):
+    """A run whose heading law is in NumPy, beside the same law in the kernel; every: steps a period."""
+    laws = {"callback": lw.Callback(heading), "fused": lw.HeadingPID(**GAINS)}
+    settings = dict(method="psi_x", h=STEP, t1=STEP * steps, threads=1, save=lw.SaveAt(fields=("position",)))
+    fleets = {name: lw.Ensemble(scene(DEPTH, law, every=every), members, 1, VARY) for name, law in laws.items()}
+    for fleet in fleets.values():
+        lw.solve(fleet, **settings)
+    times = [[least(lambda: lw.solve(fleet, **settings), 1) for fleet in fleets.values()] for _ in range(rounds)]  # noqa: B023
+    asked, fused = np.min(times, axis=0)
+    return {"members": members, "steps_a_period": every, "callback_to_fused": round(asked / fused, 2)}
+
+
+class Plain(gymnasium.Env):
+    """A vehicle that sinks and pitches, in Python: less than a tenth of the numbers of ours."""
+
+    action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,))
+    observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (4,))
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.state = [self.np_random.uniform(5.0, 15.0), 0.0, 0.0, 0.0]
+        return np.array(self.state, np.float32), {}
+
+    def step(self, action):
+        z, pitch, w, q = self.state
+        moment = float(action[0])
+        for _ in range(EVERY):
+            z += STEP * (w - 1.54 * pitch)
+            pitch += STEP * q
+            w -= STEP * (2.0 * w + 3.0 * abs(w) * w)
+            q += STEP * (moment - 2.0 * q - 3.0 * abs(q) * q - 0.5 * pitch)
+        self.state = [z, pitch, w, q]
+        return np.array(self.state, np.float32), -abs(z - 10.0), False, False, {}
+
+
+def python_vehicles(members, steps, rounds):
+    """Steps of Gymnasium's own vector environment."""
+    env = gymnasium.vector.SyncVectorEnv([Plain] * members)
+    env.reset(seed=1)
+    actions = np.zeros((members, 1), np.float32)
+
+    def act():
+        for _ in range(steps):
+            env.step(actions)
+
+    speed = members * steps / least(act, rounds)
+    return {"sync_vector_env_of_python_vehicles": members, "environment_steps_per_s": round(speed)}
+
+
+def run(quick):
+    rounds, steps = (2, 5) if quick else (6, 100)
+    for members in (256,) if quick else (1024, 4096):
+        yield environments(members, steps, rounds)
+        yield looks(members, steps, rounds)
+    for members, every in ((256, EVERY),) if quick else ((256, EVERY), (1024, EVERY), (4096, EVERY), (4096, 1)):
+        yield exchange(members, every, steps * EVERY if members > 1024 else steps * EVERY * 4, rounds)
+    yield python_vehicles(64, steps, 2)

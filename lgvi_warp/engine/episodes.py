@@ -1,0 +1,202 @@
+"""Members that start anew in some lanes while the others go on, between two looks of a controller that asks the host."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import refusal
+from lgvi_warp.engine.asking import Looks, answer, last_look
+from lgvi_warp.engine.packets import Packets
+from lgvi_warp.engine.plan import Plan
+from lgvi_warp.physics.control.sensor import Sensor
+from lgvi_warp.physics.control.trajectory import Trajectory
+from lgvi_warp.sampling.members import Members
+
+
+class Episodes:
+    """One block of members, of which any may be replaced after a look.
+
+    Those that come next are packed and looked at ahead, many at once, in packets of their own. When one starts, its lane is
+    copied. So a start costs little, and no bit of the others changes.
+
+    Args:
+        plan: a plan that asks.
+        members: the m members of the block.
+
+    Attributes:
+        packets: the members' packets.
+        steps: number of steps made.
+    """
+
+    def __init__(self, plan: Plan, members: Members):
+        assert plan.asks and plan.kernel_choice.controller is not None
+        self.plan, self.packets, self.steps = plan, Packets(plan, members), 0
+        self._controller = plan.kernel_choice.controller
+        self.every = self._controller.every(plan.grid.h)
+        # Packets by the number of their members, for a while.
+        self._aside: dict[int, Packets] = {}
+        self.begin(members)
+
+    def begin(self, members: Members) -> None:
+        """Start all members anew, at t = 0. Nothing is prepared any more.
+
+        Args:
+            members: m members.
+        """
+        self.packets.refill(members)
+        self.packets.launch(0, 0)
+        self.steps = 0
+        self._lanes = _lanes_of(self.packets)
+        # The others hold what all members share.
+        width = self.plan.spec.width
+        self._varied = [len(each) == self.packets.count and each.shape[-1] == width for each in self._lanes]
+        self._next: Packets | None = None
+        self._next_lanes: list[np.ndarray] = []
+
+    def advance(self, values: np.ndarray) -> None:
+        """Answer the last look, and go on to the next one.
+
+        Args:
+            values: demands (m, 6), or commands (m, channels).
+        """
+        answer(self.packets, values)
+        self.packets.launch(self.steps, self.steps + self.every)
+        self.steps += self.every
+
+    def look(self) -> tuple[Looks, Looks]:
+        """What is measured and what is wanted now.
+
+        Returns:
+            (measured, wanted).
+        """
+        return last_look(self.packets)
+
+    def status(self) -> np.ndarray:
+        """The status of each member.
+
+        Returns:
+            (m,), 0 for those that go on.
+        """
+        if not self.packets.status.numpy().any():
+            return np.zeros(self.packets.members.count, np.uint8)
+        return self.packets.ended()[0]
+
+    def room_for(self, count: int) -> int:
+        """How many members to draw for some that are prepared: few different numbers, for each of which packets are kept.
+
+        Args:
+            count: number of those that are prepared.
+
+        Returns:
+            A number from `count`, with which all lanes are full.
+        """
+        width = self.plan.spec.width
+        return width << (-(-count // width) - 1).bit_length()
+
+    def prepare(self, lanes: np.ndarray, members: Members) -> None:
+        """Prepare the members that are to start next in some lanes.
+
+        Args:
+            lanes: (r,), which of the m lanes.
+            members: `room_for(r)` members, of which the first r are prepared.
+
+        Raises:
+            SceneError: where they need other rows of table or memory than those that they will replace.
+        """
+        aside = self._aside_for(members.count, lambda count: members)
+        aside.refill(members)
+        if aside.laws.places != self.packets.laws.places:
+            problem = "has members that remember more or fewer numbers than others, such as a delay that varies"
+            raise refusal("fleet", "", problem, "let the same number of periods or looks serve all members")
+        aside.launch(0, 0)
+        if self._next is None:
+            self._next = Packets(self.plan, self.packets.members)
+            self._next_lanes = _lanes_of(self._next)
+        self._copy(_lanes_of(aside), np.arange(len(lanes)), self._next_lanes, lanes)
+
+    def restart(self, lanes: np.ndarray) -> tuple[Looks, Looks]:
+        """Start the prepared members.
+
+        Args:
+            lanes: (r,), which of the m lanes.
+
+        Returns:
+            What is measured of them and wanted, (r, ...).
+        """
+        assert self._next is not None
+        rehearsals = self._rehearsals()
+        if not rehearsals:
+            self._copy(self._next_lanes, lanes, self._lanes, lanes)
+            return last_look(self._next, lanes)
+        places = np.arange(len(lanes))
+        aside = self._aside_for(self.room_for(len(lanes)), self._any)
+        self._copy(self._next_lanes, lanes, _lanes_of(aside), places)
+        for k in rehearsals:
+            aside.launch(k, k)
+        self._copy(_lanes_of(aside), places, self._lanes, lanes)
+        return last_look(aside, places)
+
+    def look_at(self, lanes: np.ndarray) -> tuple[Looks, Looks]:
+        """Look at members that have ended, in the state in which they did; in the block itself they rest meanwhile.
+
+        Args:
+            lanes: (r,), which of the m lanes.
+
+        Returns:
+            What is measured of them and wanted, (r, ...).
+        """
+        places = np.arange(len(lanes))
+        aside = self._aside_for(self.room_for(len(lanes)), self._any)
+        self._copy(self._lanes, lanes, _lanes_of(aside), places)
+        aside.status.zero_()
+        aside.launch(self.steps, self.steps)
+        return last_look(aside, places)
+
+    def _aside_for(self, count: int, members: Callable[[int], Members]) -> Packets:
+        """Packets of so many members."""
+        if count not in self._aside:
+            self._aside[count] = Packets(self.plan, members(count))
+        return self._aside[count]
+
+    def _any(self, count: int) -> Members:
+        """Some members of the run."""
+        chosen = np.arange(count) % self.plan.ensemble.members
+        return self.plan.ensemble.subset(chosen).select(0, count)
+
+    def _rehearsals(self) -> range:
+        """Steps after which those that start are looked at besides: late readings, and what is wanted at times, need it."""
+        late = [int(np.max(part.latency)) for part in self._controller.sensors if isinstance(part, Sensor)]
+        timed = any(isinstance(part, Trajectory) for part in self._controller.guidance)
+        most = max(late, default=0)
+        looks = most + 1 if most or timed else 0
+        last = self.steps // self.every
+        return range(max(1, last + 1 - looks) * self.every, self.steps + 1, self.every)
+
+    def _copy(self, source: list[np.ndarray], of: np.ndarray, target: list[np.ndarray], to: np.ndarray) -> None:
+        """Copy lanes with all that belongs to them."""
+        width = self.plan.spec.width
+        p, i = np.divmod(of, width)
+        q, j = np.divmod(to, width)
+        for old, new, varied in zip(source, target, self._varied, strict=True):
+            if varied:
+                new[q, ..., j] = old[p, ..., i]
+
+
+def _lanes_of(packets: Packets) -> list[np.ndarray]:
+    """The arrays in which lanes have numbers, (packets, ..., width), or (1, ..., width or 1) where members share them."""
+    laws = packets.laws
+    structs = (each for each in (packets.inertia, laws.params, packets.events, laws.loop) if each is not None)
+    lanes = [leaf for each in structs for leaf in _leaves(each.view)]
+    lanes += [each.view for each in (laws.table, laws.memory, packets.state_lanes)]
+    return lanes + [each.numpy() for each in (packets.status, packets.failed_step, packets.failed_size)]
+
+
+def _leaves(view: Any) -> Iterator[np.ndarray]:
+    """The lanes in an array of structs."""
+    for name in view.dtype.names or ():
+        yield from _leaves(view[name])
+    if not view.dtype.names and view.ndim > 1:
+        yield view

@@ -1,0 +1,152 @@
+"""What a check of device code finds: single checks, and the report that lists them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from lgvi_warp.physics.terms.base import Packed, Term
+
+EPS = float(np.finfo(np.float64).eps)
+# How many roundings of a law's largest number may add up in it.
+ROUNDINGS = 64.0
+
+
+class Check(NamedTuple):
+    """The result of one check.
+
+    Attributes:
+        name: what was checked, such as "law: torque = -dU/dR".
+        worst: the worst deviation found, in the unit of what was checked.
+        allowed: the largest deviation allowed at that view, in the same unit.
+        ok: whether the check passed.
+        text: where it failed and the remedy, or a note; "" for none.
+    """
+
+    name: str
+    worst: float
+    allowed: float
+    ok: bool
+    text: str
+
+
+@dataclass(frozen=True)
+class LawReport:
+    """The checks of one law, or part of a controller; printing it gives a table.
+
+    Attributes:
+        term: the term, or the part, that was checked.
+        checks: one entry for each check, in the order they were made.
+    """
+
+    term: Term
+    checks: tuple[Check, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether all checks passed."""
+        return all(check.ok for check in self.checks)
+
+    def __str__(self) -> str:
+        head = f"{type(self.term).__name__} ({self.term.key}): {'ok' if self.ok else 'WRONG'}"
+        rows = [("check", "worst", "allowed", "", "")]
+        for name, worst, allowed, ok, text in self.checks:
+            rows.append((name, f"{worst:.2e}", f"{allowed:.2e}", "ok" if ok else "WRONG", text))
+        widths = [max(len(row[i]) for row in rows) for i in range(4)]
+        padded = ([*(text.ljust(n) for text, n in zip(row, widths, strict=False)), row[4]] for row in rows)
+        return "\n  ".join([head, *("  ".join(row).rstrip() for row in padded)])
+
+
+class Described(Protocol):
+    """Views, or looks, that a message can describe."""
+
+    def description(self, i: int) -> str:
+        """One of them in words.
+
+        Args:
+            i: its index.
+
+        Returns:
+            Its numbers, with their units.
+        """
+
+
+def judged(name: str, difference: np.ndarray, allowed: np.ndarray | float, views: Described, remedy: str) -> Check:
+    """A check of deviations: the one that exceeds its limit by most, and the view where it occurs.
+
+    Args:
+        name: what was checked.
+        difference: (k,) or (k, d), deviations at k views.
+        allowed: largest deviation that is allowed; for each view (k,) where it is an array.
+        views: the k views.
+        remedy: what to do where one is too large.
+
+    Returns:
+        The check.
+    """
+    k = len(difference)
+    worst = np.abs(difference).reshape(k, -1)
+    limit = np.broadcast_to(np.reshape(allowed, (-1, 1)) if np.ndim(allowed) == 1 else allowed, worst.shape)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(worst <= limit, worst / np.maximum(limit, 1e-300), 1.0 + worst)
+        ratio = np.where(np.isfinite(worst), ratio, np.inf)
+    i, j = np.unravel_index(ratio.argmax(), ratio.shape)
+    good = bool(np.all(worst <= limit) and np.isfinite(limit).all())
+    text = "" if good else f"{views.description(int(i))}; {remedy}"
+    return Check(name, float(worst[i, j]), float(limit[i, j]), good, text)
+
+
+def attempt(make: Callable[[], Any], where: str) -> Any:
+    """Pack, or say what fails.
+
+    Args:
+        make: packs, and may do more.
+        where: with which numbers, for the message.
+
+    Returns:
+        What `make` returns, or a message where it raises.
+    """
+    try:
+        return make()
+    except Exception as error:
+        return f"packed() fails {where}: {type(error).__name__}: {error}"
+
+
+def packed_numbers(term: Term, Params: np.dtype, pack: Callable[[], Any]) -> tuple[Packed | None, list[Check]]:
+    """Whether packed() fills what params() names.
+
+    Args:
+        term: the term, or the part.
+        Params: NumPy type of the struct, whose numbers are `own`.
+        pack: calls packed().
+
+    Returns:
+        What was packed, None where that fails; and the check.
+    """
+    packed = attempt(pack, "with shared numbers")
+    if not isinstance(packed, Packed):
+        text = packed if isinstance(packed, str) else f"packed() returns {packed!r:.60}"
+        remedy = "write packed(self, numbers, context) that returns lw.Packed({name: numbers}), names as in params()"
+        return None, [Check("packed", 1.0, 0.0, False, f"{text}; {remedy}")]
+    places = {"first": packed.rows is not None, "memory": packed.memory is not None, "work": packed.work}
+    filled = set(packed.values) | {name for name, present in places.items() if present}
+    wanted = set(Params["own"].names or ()) - {"unused"}
+    wrong = [f"{name} is not in packed().values" for name in sorted(wanted - filled)]
+    wrong += [f"{name} is no field of params()" for name in sorted(filled - wanted - places.keys())]
+    return packed, [Check("numbers", len(wrong), 0.0, not wrong, "; ".join(wrong))]
+
+
+def unpacked(problem: str) -> Check:
+    """The check of numbers that the device cannot take.
+
+    Args:
+        problem: what failed.
+
+    Returns:
+        A failed check with its remedy.
+    """
+    text = f"{problem}; give arrays (1,), (1, 3) or (n,), (n, 3), and whole numbers"
+    return Check("packed", 1.0, 0.0, False, text)

@@ -219,3 +219,14 @@ def test_the_same_bits_for_any_number_of_threads(dtype):
     runs = [lw.solve(fleet, h=0.02, t1=0.5, dtype=dtype, threads=threads) for threads in (1, 2, 4)]
     for name in ("position", "attitude", "velocity", "angular_velocity"):
         assert len({getattr(run, name).tobytes() for run in runs}) == 1
+
+
+def test_a_controller_that_is_absent_is_no_code(tmp_path):
+    plain = lw.Scene.named("remus_100")
+    wanted = lw.Controller(period=0.1, guidance=[lw.SetPoint(heading=0.5)], laws=[lw.HeadingPID(kp=1.0)])
+    texts = {}
+    for name, scene in {"plain": plain, "steered": lw.Scene.named("remus_100", controller=wanted)}.items():
+        (tmp_path / name).mkdir()
+        texts[name] = source(scene, tmp_path / name, "psi_x")
+    for word in ("feed", "held", "Measurement", "heading_error", "signals"):
+        assert word not in texts["plain"] and word in texts["steered"], word

@@ -51,8 +51,9 @@ def last_look(packets: Packets, members: np.ndarray | None = None) -> tuple[Look
     """
     y, r = (_numbers(packets, packets.plan.noted_rows[name], members) for name in ("measured", "reference"))
     measured_attitude, wanted_attitude = (rows[:, 3:12].reshape(-1, 3, 3) for rows in (y, r))
-    measured = Looks(y[:, :3], measured_attitude, y[:, 12:15], y[:, 18:21], y[:, 21], water_velocity=y[:, 15:18])
-    return measured, Looks(r[:, :3], wanted_attitude, r[:, 12:15], r[:, 15:18], r[:, 18], speed=r[:, 19])
+    headings = [np.arctan2(R[:, 1, 0], R[:, 0, 0]) for R in (measured_attitude, wanted_attitude)]
+    measured = Looks(y[:, :3], measured_attitude, y[:, 12:15], y[:, 18:21], headings[0], water_velocity=y[:, 15:18])
+    return measured, Looks(r[:, :3], wanted_attitude, r[:, 12:15], r[:, 15:18], headings[1], speed=r[:, 19])
 
 
 def _numbers(packets: Packets, places: range, members: np.ndarray | None) -> np.ndarray:

@@ -361,10 +361,12 @@ class Plan:
         parts = self.kernel_choice.parts_of_control
         if self.kernel_choice.controller is None:
             return None
-        groups = {SIGNALS[name].group for name in self.signals} | ({"measured", "reference"} if self.asks else set())
+        groups = {SIGNALS[name].group for name in self.signals}
         numbers = tuple(declared(part, module) for part, module in parts)
-        noted = tuple(name for name in NOTED if name in groups)
-        return Control(tuple(module for _, module in parts), numbers, noted, "actuator" in groups, self.asks)
+        # Whatever is saved: so that it changes no code, and with it no bit. It costs some stores a look.
+        noted = tuple(NOTED)
+        headings = any(name.endswith("_heading") for name in self.signals)
+        return Control(tuple(module for _, module in parts), numbers, noted, "actuator" in groups, self.asks, headings)
 
     @property
     def asks(self) -> bool:

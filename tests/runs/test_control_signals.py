@@ -175,9 +175,11 @@ def test_threads_launches_and_blocks_give_the_same_bits(whole, monkeypatch):
 def test_signals_change_nothing_of_the_motion_and_cost_nothing_where_nobody_asks(whole):
     settings = SETTINGS | {"save": lw.SaveAt(every=H)}
     plan = make_plan(fleet(), "psi_s", **settings)
-    assert plan.spec.control.noted == () and not plan.spec.control.reports and plan.signal_rows == ()
+    assert not plan.spec.control.reports and not plan.spec.control.headings and plan.signal_rows == ()
     assert same(whole, lw.solve(fleet(), "psi_s", **settings), names=FIELDS)
-    # What the bus holds anyway needs no other kernel.
+    # What a look writes anyway needs no other kernel.
+    everything = SETTINGS | {"save": lw.SaveAt(every=H, fields=("demand", "measured_position", "reference_attitude"))}
+    assert make_plan(fleet(), "psi_s", **everything).spec == plan.spec
     held = SETTINGS | {"save": lw.SaveAt(every=H, fields=("command", "unmet"))}
     assert make_plan(fleet(), "psi_s", **held).spec == plan.spec
     result = lw.solve(fleet(), "psi_s", **held)

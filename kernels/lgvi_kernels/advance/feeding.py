@@ -128,7 +128,8 @@ def make_feed(spec, types, method, at_step, opened):
         put3(memory, i, row + 12, y.velocity)
         put3(memory, i, row + 15, y.water_velocity)
         put3(memory, i, row + 18, y.angular_velocity)
-        set_element(memory, i, row + 21, 0, heading_error(y, upright(y.position.x)))
+        if wp.static(control.headings):
+            set_element(memory, i, row + 21, 0, heading_error(y, upright(y.position.x)))
 
     @wp.func
     def put_reference(r: Any, memory: wp.array2d(dtype=Lane), i: int, row: int):
@@ -138,11 +139,11 @@ def make_feed(spec, types, method, at_step, opened):
         put3(memory, i, row + 9, r.down)
         put3(memory, i, row + 12, r.velocity)
         put3(memory, i, row + 15, r.angular_velocity)
-        set_element(memory, i, row + 18, 0, heading_error(r, upright(r.position.x)))
+        if wp.static(control.headings):
+            set_element(memory, i, row + 18, 0, heading_error(r, upright(r.position.x)))
         set_element(memory, i, row + 19, 0, r.speed)
 
-    # Not inlined: what samples note of it must not change how the compiler joins the products and sums of the rest.
-    @wp.func(inline=False)
+    @wp.func
     def seen(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real):
         """What is measured and what is wanted after k steps, both noted where they are asked for."""
         z = opened(at_step(x, k, h), c, -opening)

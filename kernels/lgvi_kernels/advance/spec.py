@@ -23,6 +23,7 @@ class Control(NamedTuple):
     numbers: the declared numbers of each part (see params_of).
     noted: what each look notes for samples, among NOTED.
     reports: whether samples show where actuators are.
+    headings: whether the headings among what is noted are computed: others read attitudes.
     asked: whether a function of the host answers each look: a look then ends with the measurement and the wanted motion, and
         the next launch begins with the commands. Such a kernel has no lead.
     """
@@ -32,6 +33,7 @@ class Control(NamedTuple):
     noted: tuple = ()
     reports: bool = False
     asked: bool = False
+    headings: bool = False
 
 
 class Spec(NamedTuple):

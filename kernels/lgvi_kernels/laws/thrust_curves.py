@@ -28,7 +28,7 @@ from lgvi_kernels.law import (  # noqa: F401
 
 # Knots of the inverse of a polynomial less one, and rows of one side of it: 1 / its largest value, that value, its place,
 # the least slope, and the table.
-INVERSE_KNOTS = 32
+INVERSE_KNOTS = 12
 INVERSE_ROWS = 4 + 1 + 3 * INVERSE_KNOTS
 
 

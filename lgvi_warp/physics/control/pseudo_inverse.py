@@ -93,8 +93,12 @@ class PseudoInverse(Allocation):
         curves, size = self._curves(own)
         assert self.bus is not None
         first, count = self.bus.commands[self.to]
-        words = {"commands": first, "count": count, "sets": 1 << len(lost), "size": size}
+        words = {"commands": first, "count": count, "sets": 1 << len(lost), "size": size, "sided": self._sided(own)}
         return Packed(words | {"shared": sum(block.shape[1] for block in rows)}, side_by_side(*rows, curves))
+
+    def _sided(self, own: Numbers) -> int:
+        """1 where the thrusters have polynomials, and some of those astern are others than those ahead; else 0."""
+        return int(self.shape == "polynomial" and not np.array_equal(own["polynomial"], own["polynomial_astern"]))
 
     def _curves(self, own: Numbers) -> tuple[np.ndarray, int]:
         """Rows of the curves and of their inverses, and how many there are of a kind."""
@@ -142,7 +146,7 @@ def rising_knots(at: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 # Points at which a polynomial is looked at for its turn, and knots of its inverse (lgvi_kernels.laws.thrust_curves).
-POINTS, KNOTS = 1025, 33
+POINTS, KNOTS = 1025, 13
 
 
 def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
@@ -155,7 +159,7 @@ def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
         reach: Largest arguments (1 or n,).
 
     Returns:
-        Rows (1 or n, 101): 1 / largest value, that value, its argument, least slope, and the table.
+        Rows (1 or n, 41): 1 / largest value, that value, its argument, least slope, and the table.
     """
     polynomial, reach = repeated(polynomial, reach)
     points = reach[:, None] * np.linspace(0.0, 1.0, POINTS)

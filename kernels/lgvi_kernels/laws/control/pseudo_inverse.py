@@ -44,8 +44,11 @@ MISSING = 1e-5
 
 @functools.cache
 def params(width, real):
-    """Params: first rows of the table and of the commands; count; sets; shared: rows before the curves; size: of a curve."""
-    words = ("first", "commands", "count", "sets", "shared", "size")
+    """Params: first rows of the table and of the commands; count; sets; shared: rows before the curves; size: of a curve.
+
+    sided: whether polynomials astern are others than those ahead.
+    """
+    words = ("first", "commands", "count", "sets", "shared", "size", "sided")
     return struct("PseudoInverse", **dict.fromkeys(words, wp.int32))
 
 
@@ -72,9 +75,10 @@ def made(features):
         if wp.static(polynomials):
             first = p.first + p.shared
             inverse = first + 2 * p.size
-            ahead = polynomial_inverse(y, inverse, p.size, first, t)
-            astern = polynomial_inverse(y, inverse + wp.static(INVERSE_ROWS), p.size, first + p.size, t)
-            w = positive(side, ahead, astern)
+            w = polynomial_inverse(y, inverse, p.size, first, t)
+            if p.sided > 0:
+                astern = polynomial_inverse(y, inverse + wp.static(INVERSE_ROWS), p.size, first + p.size, t)
+                w = positive(side, w, astern)
         elif wp.static(tables):
             inverse = p.first + p.shared + (p.count + 2 * i) * (1 + 3 * p.size)
             w = positive(side, table1(y, inverse, p.size, t), table1(y, inverse + 1 + 3 * p.size, p.size, t))

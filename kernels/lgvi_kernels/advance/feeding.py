@@ -22,11 +22,12 @@ from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
     sub,
     vec3,
 )
+from lgvi_kernels.lanes.functions import arctangent2
 from lgvi_kernels.lanes.look import measurement_struct, reference_struct
 from lgvi_kernels.lanes.matrix3 import apply
 from lgvi_kernels.lanes.state import wrench_struct
 from lgvi_kernels.lanes.sums import place
-from lgvi_kernels.lanes.view import heading_error, remember, remembered
+from lgvi_kernels.lanes.view import remember, remembered
 from lgvi_kernels.maps.compose import superpose
 from lgvi_kernels.maps.in_turn import ROLES, in_turn
 from lgvi_kernels.maps.submaps import look, rotate
@@ -119,6 +120,13 @@ def make_feed(spec, types, method, at_step, opened):
         r.down = vec3(zero, zero, ones(like))
         return r
 
+    # Not inlined: what more is computed of what is noted must not change how the compiler joins products and sums before.
+    @wp.func(inline=False)
+    def put_heading(memory: wp.array2d(dtype=Lane), i: int, attitude: int, row: int):
+        """The heading of an attitude of which the rows are noted."""
+        north = element(memory, i, attitude, 0)
+        set_element(memory, i, row, 0, arctangent2(element(memory, i, attitude + 3, 0), north))
+
     @wp.func
     def put_measured(y: Any, memory: wp.array2d(dtype=Lane), i: int, row: int):
         put3(memory, i, row, y.position)
@@ -129,7 +137,7 @@ def make_feed(spec, types, method, at_step, opened):
         put3(memory, i, row + 15, y.water_velocity)
         put3(memory, i, row + 18, y.angular_velocity)
         if wp.static(control.headings):
-            set_element(memory, i, row + 21, 0, heading_error(y, upright(y.position.x)))
+            put_heading(memory, i, row + 3, row + 21)
 
     @wp.func
     def put_reference(r: Any, memory: wp.array2d(dtype=Lane), i: int, row: int):
@@ -140,7 +148,7 @@ def make_feed(spec, types, method, at_step, opened):
         put3(memory, i, row + 12, r.velocity)
         put3(memory, i, row + 15, r.angular_velocity)
         if wp.static(control.headings):
-            set_element(memory, i, row + 18, 0, heading_error(r, upright(r.position.x)))
+            put_heading(memory, i, row + 3, row + 18)
         set_element(memory, i, row + 19, 0, r.speed)
 
     @wp.func

@@ -141,10 +141,10 @@ class Packets:
 
     def _bus(self) -> tuple[int, int]:
         """Rows of the controller's bus, and the first of those where frozen lanes keep their signals."""
-        controller, control = self.plan.kernel_choice.controller, self.plan.spec.control
-        if controller is None or control is None:
+        controller = self.plan.kernel_choice.controller
+        if controller is None:
             return 0, 0
-        kept = controller.bus.rows + sum(NOTED[name] for name in control.noted)
+        kept = controller.bus.rows + sum(NOTED.values())
         return kept + len(self.plan.signal_rows), kept
 
     def _monitor(self) -> Any:

@@ -363,10 +363,8 @@ class Plan:
             return None
         groups = {SIGNALS[name].group for name in self.signals}
         numbers = tuple(declared(part, module) for part, module in parts)
-        # Whatever is saved: so that it changes no code, and with it no bit. It costs some stores a look.
-        noted = tuple(NOTED)
         headings = any(name.endswith("_heading") for name in self.signals)
-        return Control(tuple(module for _, module in parts), numbers, noted, "actuator" in groups, self.asks, headings)
+        return Control(tuple(module for _, module in parts), numbers, "actuator" in groups, self.asks, headings)
 
     @property
     def asks(self) -> bool:
@@ -386,12 +384,12 @@ class Plan:
 
     @functools.cached_property
     def noted_rows(self) -> dict[str, range]:
-        """Rows of the memory in which looks note something, by its name among NOTED."""
-        control, controller = self.spec.control, self.kernel_choice.controller
-        if control is None or controller is None:
+        """Rows of the memory in which looks note something, by its name in NOTED."""
+        controller = self.kernel_choice.controller
+        if controller is None:
             return {}
-        firsts = accumulate((NOTED[name] for name in control.noted), initial=controller.bus.rows)
-        return {name: range(first, first + NOTED[name]) for name, first in zip(control.noted, firsts, strict=False)}
+        firsts = accumulate(NOTED.values(), initial=controller.bus.rows)
+        return {name: range(first, first + size) for (name, size), first in zip(NOTED.items(), firsts, strict=False)}
 
     @functools.cached_property
     def signal_rows(self) -> tuple[int, ...]:
@@ -399,7 +397,6 @@ class Plan:
         controller = self.kernel_choice.controller
         if controller is None or controller.bus is None:
             return ()
-        # A part of a run may save less than the kernel notes.
         noted = {name: rows.start for name, rows in self.noted_rows.items()}
         begins = ((row_of(name, controller.bus, noted), self.sample_fields[name]) for name in self.signals)
         return tuple(row + i for row, size in begins for i in range(size))

@@ -34,10 +34,13 @@ from lgvi_kernels.maps.submaps import look, rotate
 
 CONTROL_NON_FINITE = 8
 
-# What a look may note in rows of the memory, in this order, and how many it takes: the demand X Y Z K M N; the measurement:
+# What each look notes in rows of the memory, in this order, and how many it takes: the demand X Y Z K M N; the measurement:
 # position, attitude row by row, velocities over ground and through the water, angular velocity, heading; the reference:
-# position, attitude, velocity, angular velocity, heading, speed.
-NOTED = {"demand": 6, "measured": 22, "reference": 20}
+# position, attitude, velocity, angular velocity, heading, speed, angular acceleration. It does so whatever is saved: so that
+# what is saved changes no code, and with it no bit.
+NOTED = {"demand": 6, "measured": 22, "reference": 23}
+MEASURED_ROW = NOTED["demand"]
+REFERENCE_ROW = MEASURED_ROW + NOTED["measured"]
 
 
 def make_feed(spec, types, method, at_step, opened):
@@ -54,11 +57,6 @@ def make_feed(spec, types, method, at_step, opened):
     velocities, momentum, water_velocity = method.velocities, method.momentum, method.water_velocity
     drifts = superpose(spec.laws, "flow") is not None
     turned, moved, checked = "axes" in spec.parts, "origin" in spec.parts, spec.checked
-    notes_demand, notes_measured, notes_reference = (
-        name in control.noted for name in ("demand", "measured", "reference")
-    )
-    measured_row = NOTED["demand"] * notes_demand
-    reference_row = measured_row + NOTED["measured"] * notes_measured
 
     @wp.func
     def put3(memory: wp.array2d(dtype=Lane), i: int, row: int, v: Any):
@@ -150,10 +148,11 @@ def make_feed(spec, types, method, at_step, opened):
         if wp.static(control.headings):
             put_heading(memory, i, row + 3, row + 18)
         set_element(memory, i, row + 19, 0, r.speed)
+        put3(memory, i, row + 20, r.angular_acceleration)
 
     @wp.func
     def seen(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real):
-        """What is measured and what is wanted after k steps, both noted where they are asked for."""
+        """What is measured and what is wanted after k steps, both noted."""
         z = opened(at_step(x, k, h), c, -opening)
         if wp.static(momentum is not None):
             z.p = momentum(z)
@@ -163,17 +162,15 @@ def make_feed(spec, types, method, at_step, opened):
             y = measure(y, r, y, c.loop)
         if wp.static(guide is not None):
             r = guide(r, r, y, c.loop)
-        if wp.static(notes_measured):
-            put_measured(y, c.memory, c.packet, monitor.bus + wp.static(measured_row))
-        if wp.static(notes_reference):
-            put_reference(r, c.memory, c.packet, monitor.bus + wp.static(reference_row))
+        put_measured(y, c.memory, c.packet, monitor.bus + wp.static(MEASURED_ROW))
+        put_reference(r, c.memory, c.packet, monitor.bus + wp.static(REFERENCE_ROW))
         return y, r
 
     @wp.func
     def noted(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64):
         """The measurement and the wanted motion that the last look noted."""
         y = truth(x, c, monitor, k, h)
-        row = monitor.bus + wp.static(measured_row)
+        row = monitor.bus + wp.static(MEASURED_ROW)
         y.position = get3(c.memory, c.packet, row)
         y.north = get3(c.memory, c.packet, row + 3)
         y.east = get3(c.memory, c.packet, row + 6)
@@ -182,7 +179,7 @@ def make_feed(spec, types, method, at_step, opened):
         y.water_velocity = get3(c.memory, c.packet, row + 15)
         y.angular_velocity = get3(c.memory, c.packet, row + 18)
         r = Reference()
-        row = monitor.bus + wp.static(reference_row)
+        row = monitor.bus + wp.static(REFERENCE_ROW)
         r.position = get3(c.memory, c.packet, row)
         r.north = get3(c.memory, c.packet, row + 3)
         r.east = get3(c.memory, c.packet, row + 6)
@@ -190,6 +187,7 @@ def make_feed(spec, types, method, at_step, opened):
         r.velocity = get3(c.memory, c.packet, row + 12)
         r.angular_velocity = get3(c.memory, c.packet, row + 15)
         r.speed = element(c.memory, c.packet, row + 19, 0)
+        r.angular_acceleration = get3(c.memory, c.packet, row + 20)
         return y, r
 
     @wp.func
@@ -198,9 +196,8 @@ def make_feed(spec, types, method, at_step, opened):
         w = Wrench()
         if wp.static(act is not None):
             w = act(w, r, y, c.loop)
-        if wp.static(notes_demand):
-            put3(c.memory, c.packet, monitor.bus, w.force)
-            put3(c.memory, c.packet, monitor.bus + 3, w.torque)
+        put3(c.memory, c.packet, monitor.bus, w.force)
+        put3(c.memory, c.packet, monitor.bus + 3, w.torque)
         # An allocation may lose what is no number: a limit is a comparison.
         v = w.force + w.torque
         total = v.x + v.y + v.z

@@ -21,7 +21,6 @@ class Control(NamedTuple):
 
     parts: modules of its parts, sensors first, then guidance, laws, allocation, and what commands pass on their way.
     numbers: the declared numbers of each part (see params_of).
-    noted: what each look notes for samples, among NOTED.
     reports: whether samples show where actuators are.
     headings: whether the headings among what is noted are computed: others read attitudes.
     asked: whether a function of the host answers each look: a look then ends with the measurement and the wanted motion, and
@@ -30,7 +29,6 @@ class Control(NamedTuple):
 
     parts: tuple
     numbers: tuple
-    noted: tuple = ()
     reports: bool = False
     asked: bool = False
     headings: bool = False

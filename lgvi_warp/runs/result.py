@@ -138,7 +138,7 @@ class Result:
     measured_depth, measured_heading = _Signal(), _Signal()
     reference_position, reference_attitude, reference_velocity = _Signal(), _Signal(), _Signal()
     reference_angular_velocity, reference_depth = _Signal(), _Signal()
-    reference_heading, reference_speed = _Signal(), _Signal()
+    reference_heading, reference_speed, reference_angular_acceleration = _Signal(), _Signal(), _Signal()
 
     @functools.cached_property
     def quaternion_wxyz(self) -> np.ndarray:

@@ -142,6 +142,7 @@ def test_measured_and_wanted(whole):
     c, s = np.cos(0.5), np.sin(0.5)
     wanted = {"attitude": [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], "depth": 10.0, "heading": 0.5, "speed": 0.0}
     wanted |= {"position": [0.0, 0.0, 10.0], "velocity": [0.0] * 3, "angular_velocity": [0.0] * 3}
+    wanted["angular_acceleration"] = [0.0] * 3
     assert {f"reference_{name}" for name in wanted} | {f"measured_{name}" for name in truth} == {
         name for name in SIGNALS if "_" in name
     }

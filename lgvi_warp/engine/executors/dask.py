@@ -61,7 +61,7 @@ class Dask:
             client.subscribe_topic(topic, lambda event: advanced(Block(*event[1][:2]), event[1][2]))
             waiting = {client.submit(_work, held, block, topic, kind, pure=False, retries=0): block for block in blocks}
             try:
-                for future in as_completed(list(waiting)):
+                for future in as_completed(list(waiting), loop=client.loop):
                     block = waiting.pop(future)
                     value = future.result()
                     advanced(block, block.count * work.plan.grid.steps)
@@ -91,6 +91,7 @@ class Dask:
 
     @contextlib.contextmanager
     def _client(self) -> Iterator[Any]:
+        # Not the default one of this process: Dask collections and xarray's locks of the caller must not come to depend on it.
         try:
             import distributed
         except ImportError as error:
@@ -100,7 +101,7 @@ class Dask:
             return
         if self.scheduler is not None:
             try:
-                client = distributed.Client(self.scheduler, timeout=TIMEOUT)
+                client = distributed.Client(self.scheduler, timeout=TIMEOUT, set_as_default=False)
             except (OSError, ValueError, MemoryError) as error:  # memory: what answers is no scheduler
                 problem = f"does not answer ({type(error).__name__}: {error})"
                 remedy = "give the address that dask scheduler prints"
@@ -116,7 +117,7 @@ class Dask:
                 # The scheduler's own pages: any free port, and of this machine alone.
                 scheduler_kwargs={"dashboard_address": "127.0.0.1:0"}, silence_logs=logging.CRITICAL,
             )  # fmt: skip
-        with cluster, distributed.Client(cluster) as client:
+        with cluster, distributed.Client(cluster, set_as_default=False) as client:
             yield client
 
 

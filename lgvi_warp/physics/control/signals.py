@@ -39,7 +39,7 @@ _OF_ACTUATORS = (
 # Rows of a measurement and of a reference, as lgvi_kernels/advance/feeding.py writes them.
 _VECTORS = {"position": 0, "attitude": 3}
 _MEASURED = _VECTORS | {"velocity": 12, "water_velocity": 15, "angular_velocity": 18, "depth": 2, "heading": 21}
-_WANTED = _VECTORS | {"velocity": 12, "angular_velocity": 15, "depth": 2, "heading": 18, "speed": 19}
+_WANTED = _VECTORS | {"velocity": 12, "angular_velocity": 15, "depth": 2, "heading": 18, "speed": 19, "angular_acceleration": 20}
 _KINDS = TABLE | {
     "water_velocity": replace(TABLE["velocity"], meaning="velocity through the water in body axes"),
     "heading": Field("heading", (), "rad", "heading, from north to east"),
@@ -48,6 +48,9 @@ _REFERENCE = _KINDS | {
     "velocity": TABLE["velocity_inertial"],
     "angular_velocity": replace(TABLE["angular_velocity"], meaning="angular velocity in axes of the wanted attitude"),
     "speed": replace(TABLE["speed"], meaning="speed ahead through the water"),
+    "angular_acceleration": Field(
+        "angular_acceleration", (3,), "rad/s^2", "angular acceleration in axes of the wanted attitude"
+    ),
 }
 
 

@@ -1,6 +1,7 @@
 """Blocks in threads, processes and Dask workers: the same bytes from each, also where a worker is killed on the way."""
 
 import ast
+import itertools
 import os
 import queue
 import signal
@@ -213,10 +214,10 @@ def test_the_client_of_a_run_is_not_the_default_one(memory):
 class Overlapping:
     """Work that notes how many blocks run at once and which run to their end; it is sent as itself within one process.
 
-    The first block ends once another runs beside it, the others when they are halted.
+    The block that begins first ends once another runs beside it, the others when they are halted.
     """
 
-    whole, running, most = [], 0, 0
+    whole, order, running, most = [], itertools.count(), 0, 0
 
     class plan:  # noqa: N801
         class grid:  # noqa: N801
@@ -228,14 +229,15 @@ class Overlapping:
 
     def __call__(self, block, halted, advanced):
         cls = type(self)
+        number = next(cls.order)
         cls.running += 1
         cls.most = max(cls.most, cls.running)
         for _ in range(3000):
-            if halted() or (block.first == 0 and cls.most > 1):
+            if halted() or (number == 0 and cls.most > 1):
                 break
             time.sleep(0.02)
         if not halted():
-            cls.whole.append(block.first)
+            cls.whole.append(number)
         cls.running -= 1
         return block.first
 

@@ -39,7 +39,8 @@ _OF_ACTUATORS = (
 # Rows of a measurement and of a reference, as lgvi_kernels/advance/feeding.py writes them.
 _VECTORS = {"position": 0, "attitude": 3}
 _MEASURED = _VECTORS | {"velocity": 12, "water_velocity": 15, "angular_velocity": 18, "depth": 2, "heading": 21}
-_WANTED = _VECTORS | {"velocity": 12, "angular_velocity": 15, "depth": 2, "heading": 18, "speed": 19, "angular_acceleration": 20}
+_WANTED = _VECTORS | {"velocity": 12, "angular_velocity": 15, "depth": 2}
+_WANTED |= {"heading": 18, "speed": 19, "angular_acceleration": 20}
 _KINDS = TABLE | {
     "water_velocity": replace(TABLE["velocity"], meaning="velocity through the water in body axes"),
     "heading": Field("heading", (), "rad", "heading, from north to east"),

@@ -12,7 +12,7 @@ from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.control.base import Allocation, rest_rows
 from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.actuators import UNLIMITED
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number, side_by_side
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number, side_by_side
 from lgvi_warp.physics.terms.thrusters import side_of_table
 
 
@@ -145,21 +145,26 @@ def rising_knots(at: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.concatenate([values[:, :1], steps.reshape(len(at), -1)], axis=1)
 
 
-# Points at which a polynomial is looked at for its turn, and knots of its inverse (lgvi_kernels.laws.thrust_curves).
-POINTS, KNOTS = 1025, 13
+# Points at which a polynomial is looked at for its turn, and coefficients of the start of its inverse.
+POINTS, START_SIZE = 1025, 16
+# Chebyshev's points for the start of its inverse, both ends among them: there it is exact, where Newton's steps crawl. And
+# from the values there to the coefficients.
+POINTS_OF_START = np.cos(np.pi * np.arange(START_SIZE) / (START_SIZE - 1))
+TO_COEFFICIENTS = np.linalg.inv(np.polynomial.polynomial.polyvander(POINTS_OF_START, START_SIZE - 1))
 
 
 def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
-    """The inverse of polynomials f without a constant as a table, from 0 to where they turn, or to their reach.
+    """The start of the inverse of polynomials f without a constant, from 0 to where they turn, or to their reach.
 
-    It is over x, f = (largest f) sin^2(pi x / 2), in which it is smooth where f begins as a square, and where it turns.
+    It is a polynomial in 2 s - 1, f = (largest f) (1 - (1 - s^2)^2), in which the inverse is smooth where f begins as a square
+    and where it turns (lgvi_kernels.laws.thrust_curves).
 
     Args:
         polynomial: Coefficients (1 or n, powers) from the first power up.
         reach: Largest arguments (1 or n,).
 
     Returns:
-        Rows (1 or n, 41): 1 / largest value, that value, its argument, least slope, and the table.
+        Rows (1 or n, 20): 1 / largest value, that value, its argument, least slope, and the coefficients.
     """
     polynomial, reach = repeated(polynomial, reach)
     points = reach[:, None] * np.linspace(0.0, 1.0, POINTS)
@@ -173,13 +178,12 @@ def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
     peak = _last(lambda w: _values(slopes, w) > 0.0, before[:, None], after[:, None])[:, 0]
     highest = np.where(turns, np.where(turn > 0, peak, 0.0), reach)
     most = _values(polynomial, highest[:, None])[:, 0]
-    places = np.broadcast_to(np.linspace(0.0, 1.0, KNOTS), (len(points), KNOTS))
-    wanted = most[:, None] * np.sin(0.5 * np.pi * places) ** 2
+    wanted = most[:, None] * (1.0 - (1.0 - (0.5 * (POINTS_OF_START + 1.0)) ** 2) ** 2)
     inverses = _last(lambda w: _values(polynomial, w) < wanted, np.zeros_like(wanted), highest[:, None] + 0.0 * wanted)
     acts = most > 0.0
     inverse = np.divide(1.0, most, out=np.zeros_like(most), where=acts)
     slope = np.where(acts, 1e-3 * most / np.where(acts, highest, 1.0), 1.0)
-    return side_by_side(*(x[:, None] for x in (inverse, most, highest, slope)), knots(places, inverses[..., None]))
+    return side_by_side(*(x[:, None] for x in (inverse, most, highest, slope)), inverses @ TO_COEFFICIENTS.T)
 
 
 def _last(holds: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray) -> np.ndarray:

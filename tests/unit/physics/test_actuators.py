@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_kernels.laws.thrust_curves import START_SIZE
 from lgvi_warp.common.errors import SceneError
-from lgvi_warp.physics.control.pseudo_inverse import KNOTS, inverse_rows
+from lgvi_warp.physics.control import pseudo_inverse
+from lgvi_warp.physics.control.pseudo_inverse import inverse_rows
 from lgvi_warp.physics.terms.thrusters import side_of_table
 from lgvi_warp.scene import plausibility
 
@@ -123,11 +125,13 @@ def test_the_inverse_of_a_polynomial():
     rows = inverse_rows(np.array([[1.0, 3.0], [1.0, -1.0], [-1.0, 0.0]]), np.array([2.0, 2.0, 2.0]))
     np.testing.assert_allclose(rows[:2, 1:3], [[14.0, 2.0], [0.25, 0.5]], rtol=1e-15)
     assert rows[2, 0] == rows[2, 1] == 0.0
-    at = np.cumsum(rows[:2, 4 + 3 :: 3], axis=1)
-    value = rows[:2, 1:2] * np.sin(0.5 * np.pi * np.arange(1, KNOTS) / (KNOTS - 1)) ** 2
-    # At the turn half of the digits are lost.
-    np.testing.assert_allclose(at[0] + 3.0 * at[0] ** 2, value[0], rtol=1e-13)
-    np.testing.assert_allclose(at[1] - at[1] ** 2, value[1], rtol=1e-13)
+    assert rows.shape == (3, 4 + START_SIZE) and pseudo_inverse.START_SIZE == START_SIZE
+    s = np.linspace(0.0, 1.0, 101)
+    start = np.polynomial.polynomial.polyval(2.0 * s - 1.0, rows[:2, 4:].T)
+    exact = np.sqrt(1.0 + 12.0 * 14.0 * (1.0 - (1.0 - s**2) ** 2)) - 1.0, 3.0 * (1.0 - (1.0 - s**2))
+    # What a polynomial of this degree leaves: Newton's steps square it. The second inverse is a polynomial itself.
+    np.testing.assert_allclose(start[0], exact[0] / 6.0, atol=3e-4)
+    np.testing.assert_allclose(start[1], exact[1] / 6.0, atol=1e-9)
 
 
 def test_effect_of_a_table_of_lift():

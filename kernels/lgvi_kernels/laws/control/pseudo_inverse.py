@@ -29,7 +29,7 @@ from lgvi_kernels.laws import thrust_curves
 from lgvi_kernels.laws.control.lost import since
 from lgvi_kernels.laws.control.rest import ROWS as rest_rows
 from lgvi_kernels.laws.control.rest import rest
-from lgvi_kernels.laws.thrust_curves import INVERSE_ROWS, beyond, polynomial_inverse
+from lgvi_kernels.laws.thrust_curves import beyond, polynomial_inverse
 
 # For each set of channels that may be lost together, the empty one first: rows of rest.py, and the lines (6) of the
 # pseudo-inverse, one a channel. Then for each channel: the wrench of a unit of effort (6), limit of the command, coefficient
@@ -74,11 +74,7 @@ def made(features):
         w = t
         if wp.static(polynomials):
             first = p.first + p.shared
-            inverse = first + 2 * p.size
-            w = polynomial_inverse(y, inverse, p.size, first, t)
-            if p.sided > 0:
-                astern = polynomial_inverse(y, inverse + wp.static(INVERSE_ROWS), p.size, first + p.size, t)
-                w = positive(side, w, astern)
+            w = polynomial_inverse(y, first + 2 * p.size, p.size, first, t, side, p.sided)
         elif wp.static(tables):
             inverse = p.first + p.shared + (p.count + 2 * i) * (1 + 3 * p.size)
             w = positive(side, table1(y, inverse, p.size, t), table1(y, inverse + 1 + 3 * p.size, p.size, t))

@@ -77,6 +77,29 @@ def row_of_side(view: Any, row: int, astern: int, side: Any):
     return value
 
 
+# A polynomial by Estrin's scheme, whose sums need not wait for each other.
+@wp.func
+def two(view: Any, row: int, astern: int, side: Any, z: Any):
+    """a + b z."""
+    return row_of_side(view, row, astern, side) + row_of_side(view, row + 1, astern, side) * z
+
+
+@wp.func
+def four(view: Any, row: int, astern: int, side: Any, z: Any, z2: Any):
+    """A polynomial with four coefficients."""
+    return two(view, row, astern, side, z) + two(view, row + 2, astern, side, z) * z2
+
+
+@wp.func
+def sixteen(view: Any, row: int, astern: int, side: Any, z: Any):
+    """A polynomial with sixteen coefficients, from the lowest power up."""
+    z2 = z * z
+    z4 = z2 * z2
+    low = four(view, row, astern, side, z, z2) + four(view, row + 4, astern, side, z, z2) * z4
+    high = four(view, row + 8, astern, side, z, z2) + four(view, row + 12, astern, side, z, z2) * z4
+    return low + high * (z4 * z4)
+
+
 @wp.func
 def polynomial_inverse(view: Any, first: int, size: int, powers: int, t: Any, side: Any, sided: int):
     """The w at which a polynomial, which rises up to a largest value, has the value t or that largest one.
@@ -93,10 +116,7 @@ def polynomial_inverse(view: Any, first: int, size: int, powers: int, t: Any, si
     part = least(value * row_of_side(view, first, other, side), unity)
     s = root(part / (unity + root(unity - part)))
     z = s + s - unity
-    w = row_of_side(view, first + wp.static(INVERSE_ROWS - 1), other, side)
-    for i in range(wp.static(START_SIZE - 1)):
-        w = w * z + row_of_side(view, first + wp.static(INVERSE_ROWS - 2) - i, other, side)
-    w = clamp(w, zero, highest)
+    w = clamp(sixteen(view, first + 4, other, side, z), zero, highest)
     for step in range(wp.static(NEWTON_STEPS)):
         # The polynomial is w g, and its slope g + w g'.
         g = row_of_side(view, powers + size - 1, sided * size, side)

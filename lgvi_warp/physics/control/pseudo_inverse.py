@@ -87,7 +87,7 @@ class PseudoInverse(Allocation):
         curve = [own.get(key, value) for key, value in keys.items()]
         share = np.zeros((1, B.shape[2]))
         share[0, list(lost)] = 2.0 ** np.arange(len(lost))
-        columns = (limit, *curve, self.steps_of_loss(context), share)
+        columns = (limit, *curve, self.steps_of_loss(context), share, *self._largest(own, limit - curve[2]))
         channels = side_by_side(np.swapaxes(B, -1, -2), *(column[..., None] for column in columns))
         rows.append(channels.reshape(len(channels), -1))
         curves, size = self._curves(own)
@@ -99,6 +99,18 @@ class PseudoInverse(Allocation):
     def _sided(self, own: Numbers) -> int:
         """1 where the thrusters have polynomials, and some of those astern are others than those ahead; else 0."""
         return int(self.shape == "polynomial" and not np.array_equal(own["polynomial"], own["polynomial_astern"]))
+
+    def _largest(self, own: Numbers, reach: np.ndarray) -> tuple[np.ndarray, ...]:
+        """The largest efforts (1 or n, channels) ahead and astern, without the coefficient; reach: of commands."""
+        reach = np.maximum(reach, 0.0)
+        if self.shape == "table":
+            at, values = own["table_commands"], own["table_thrusts"]
+            return tuple(side * _at(at, values, side * reach) for side in (1.0, -1.0))
+        if self.shape == "polynomial":
+            curves = [own[key] for key in ("polynomial", "polynomial_astern")]
+            turns = (highest(curve, np.max(reach, axis=-1))[:, None] for curve in curves)
+            return tuple(_values(curve, np.minimum(reach, turn)) for curve, turn in zip(curves, turns, strict=True))
+        return (reach if self.shape == "linear" else reach**2,) * 2
 
     def _curves(self, own: Numbers) -> tuple[np.ndarray, int]:
         """Rows of the curves and of their inverses, and how many there are of a kind."""
@@ -167,6 +179,27 @@ def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
         Rows (1 or n, 20): 1 / largest value, that value, its argument, least slope, and the coefficients.
     """
     polynomial, reach = repeated(polynomial, reach)
+    top = highest(polynomial, reach)
+    most = _values(polynomial, top[:, None])[:, 0]
+    wanted = most[:, None] * (1.0 - (1.0 - (0.5 * (POINTS_OF_START + 1.0)) ** 2) ** 2)
+    inverses = _last(lambda w: _values(polynomial, w) < wanted, np.zeros_like(wanted), top[:, None] + 0.0 * wanted)
+    acts = most > 0.0
+    inverse = np.divide(1.0, most, out=np.zeros_like(most), where=acts)
+    slope = np.where(acts, 1e-3 * most / np.where(acts, top, 1.0), 1.0)
+    return side_by_side(*(x[:, None] for x in (inverse, most, top, slope)), inverses @ TO_COEFFICIENTS.T)
+
+
+def highest(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
+    """Where polynomials without a constant cease to rise.
+
+    Args:
+        polynomial: Coefficients (1 or n, powers) from the first power up.
+        reach: Largest arguments (1 or n,).
+
+    Returns:
+        Where each turns first (1 or n,), or its reach.
+    """
+    polynomial, reach = repeated(polynomial, reach)
     points = reach[:, None] * np.linspace(0.0, 1.0, POINTS)
     values = _values(polynomial, points)
     falls = np.diff(values, axis=1) <= 0.0
@@ -176,14 +209,13 @@ def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
     row, slopes = np.arange(len(points)), polynomial * np.arange(1, polynomial.shape[1] + 1)
     before, after = points[row, np.maximum(turn - 1, 0)], points[row, np.minimum(turn + 1, POINTS - 1)]
     peak = _last(lambda w: _values(slopes, w) > 0.0, before[:, None], after[:, None])[:, 0]
-    highest = np.where(turns, np.where(turn > 0, peak, 0.0), reach)
-    most = _values(polynomial, highest[:, None])[:, 0]
-    wanted = most[:, None] * (1.0 - (1.0 - (0.5 * (POINTS_OF_START + 1.0)) ** 2) ** 2)
-    inverses = _last(lambda w: _values(polynomial, w) < wanted, np.zeros_like(wanted), highest[:, None] + 0.0 * wanted)
-    acts = most > 0.0
-    inverse = np.divide(1.0, most, out=np.zeros_like(most), where=acts)
-    slope = np.where(acts, 1e-3 * most / np.where(acts, highest, 1.0), 1.0)
-    return side_by_side(*(x[:, None] for x in (inverse, most, highest, slope)), inverses @ TO_COEFFICIENTS.T)
+    return np.where(turns, np.where(turn > 0, peak, 0.0), reach)
+
+
+def _at(at: np.ndarray, values: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """Tables with knots at (1 or n, t) and values (1 or n, t, channels), at w (1 or n, channels)."""
+    share = np.clip((w[:, None] - at[:, :-1, None]) / np.diff(at, axis=1)[..., None], 0.0, 1.0)
+    return np.asarray(values[:, 0] + np.sum(share * np.diff(values, axis=1), axis=1))
 
 
 def _last(holds: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray) -> np.ndarray:

@@ -25,21 +25,17 @@ from lgvi_kernels.law import (  # noqa: F401
     table1,
     vec3,
 )
-from lgvi_kernels.laws import thrust_curves
 from lgvi_kernels.laws.control.lost import since
 from lgvi_kernels.laws.control.rest import ROWS as rest_rows
 from lgvi_kernels.laws.control.rest import rest
-from lgvi_kernels.laws.thrust_curves import beyond, polynomial_inverse
+from lgvi_kernels.laws.thrust_curves import polynomial_inverse
 
 # For each set of channels that may be lost together, the empty one first: rows of rest.py, and the lines (6) of the
 # pseudo-inverse, one a channel. Then for each channel: the wrench of a unit of effort (6), limit of the command, coefficient
-# ahead and astern, dead band, the time from which it is known to be lost, and what this adds to the number of the set. Then
-# the curves and their inverses.
-ROWS = 12
+# ahead and astern, dead band, the time from which it is known to be lost, what this adds to the number of the set, and the
+# largest effort ahead and astern, without the coefficient. Then the curves and their inverses.
+ROWS = 14
 REST = rest_rows
-# An effort counts as delivered if less than this part of it is missing: inverses of curves have an error, and anti-windup
-# looks at the sign of what is left.
-MISSING = 1e-5
 
 
 @functools.cache
@@ -66,7 +62,6 @@ def made(features):
     """
     loses, linear = "lost" in features, "linear" in features
     tables, polynomials = "table" in features, "polynomial" in features
-    curve = getattr(thrust_curves, f"{'table' if tables else 'polynomial' if polynomials else 'square'}_curve")
 
     @wp.func
     def size_for(y: Any, p: Any, i: int, t: Any, side: Any):
@@ -81,17 +76,6 @@ def made(features):
         elif wp.static(not linear):
             w = root(t)
         return w
-
-    @wp.func
-    def effort_of(y: Any, p: Any, i: int, n: Any):
-        """The effort of a command less the dead band, without the coefficient."""
-        t = n
-        if wp.static(not linear):
-            first = p.first + p.shared
-            if wp.static(tables):
-                first += i * (1 + 3 * p.size)
-            t = curve(y, first, p.size, n)
-        return t
 
     @wp.func
     def allocate_efforts(w: Any, y: Any, p: Any):
@@ -123,14 +107,16 @@ def made(features):
                     effort = positive(here, other_effort, effort)
             c = positive(effort, row1(y, at + 7), row1(y, at + 8))
             # A side without thrust has the coefficient 0, and gets no command.
-            t = positive(c, absolute(effort) / c, effort - effort)
-            band = row1(y, at + 9)
+            wanted = positive(c, absolute(effort) / c, zero)
+            t = least(positive(effort, row1(y, at + 12), row1(y, at + 13)), wanted)
             # In this order what is no number stays so, and the look sees it.
-            size = least(row1(y, at + 6), positive(t, size_for(y, p, i, t, effort) + band, t))
-            u = positive(effort, size, -size)
-            remember(y, p.commands + i, u)
-            cut = effort - c * effort_of(y, p, i, beyond(u, band))
-            cut = positive(absolute(cut) - y.h.dtype(wp.static(MISSING)) * absolute(effort), cut, zero)
+            size = least(row1(y, at + 6), positive(t, size_for(y, p, i, t, effort) + row1(y, at + 9), t))
+            remember(y, p.commands + i, positive(effort, size, -size))
+            # Nothing is cut off, to the last digit, where the curve reaches the effort: anti-windup looks at the sign.
+            cut = absolute(effort) - c * t
+            cut = positive(wanted - t, cut, zero)
+            cut = positive(c, cut, absolute(effort))
+            cut = positive(effort, cut, -cut)
             left.force = left.force + cut * row3(y, at)
             left.torque = left.torque + cut * row3(y, at + 3)
         return left

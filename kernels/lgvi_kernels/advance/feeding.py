@@ -160,10 +160,12 @@ def make_feed(spec, types, method, at_step, opened):
         r = upright(y.position.x)
         if wp.static(measure is not None):
             y = measure(y, r, y, c.loop)
+        # Each as soon as it is known, so that what is noted alone need not be kept in registers.
+        if monitor.noting > 0:
+            put_measured(y, c.memory, c.packet, monitor.bus + wp.static(MEASURED_ROW))
         if wp.static(guide is not None):
             r = guide(r, r, y, c.loop)
         if monitor.noting > 0:
-            put_measured(y, c.memory, c.packet, monitor.bus + wp.static(MEASURED_ROW))
             put_reference(r, c.memory, c.packet, monitor.bus + wp.static(REFERENCE_ROW))
         return y, r
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_kernels.laws.thrust_curves import START_SIZE
+from lgvi_kernels.laws.thrust_curves import NEWTON_STEPS, START_SIZE
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.physics.control import pseudo_inverse
 from lgvi_warp.physics.control.pseudo_inverse import inverse_rows
@@ -132,6 +132,20 @@ def test_the_inverse_of_a_polynomial():
     # What a polynomial of this degree leaves: Newton's steps square it. The second inverse is a polynomial itself.
     np.testing.assert_allclose(start[0], exact[0] / 6.0, atol=3e-4)
     np.testing.assert_allclose(start[1], exact[1] / 6.0, atol=1e-9)
+
+
+def test_the_inverse_of_bluerov2s_polynomial():
+    """As the kernel does it: the start, and Newton's steps."""
+    curve = np.array([8.9, 0.0, 176.0, 0.0, -404.1, 0.0, 389.9, 0.0, -140.3])
+    value, slope = np.polynomial.Polynomial([0.0, *curve]), np.polynomial.Polynomial([0.0, *curve]).deriv()
+    (inverse, most, top, floor, *start) = inverse_rows(curve[None], np.ones(1))[0]
+    t = most * np.linspace(0.0, 1.0, 2001)
+    w = np.clip(np.polynomial.Polynomial(start)(2.0 * np.sqrt(1.0 - np.sqrt(1.0 - t * inverse)) - 1.0), 0.0, top)
+    for _ in range(NEWTON_STEPS):
+        w = np.clip(w + (t - value(w)) / np.maximum(slope(w), floor), 0.0, top)
+    assert np.abs(value(w) - t).max() < 1e-8 * most
+    # The polynomial turns before its limit: beyond the largest thrust the command is that of the turn.
+    assert 0.97 < w[-1] < 0.972 and abs(slope(w[-1])) < 1e-6 * most
 
 
 def test_effect_of_a_table_of_lift():

@@ -134,6 +134,7 @@ from lgvi_warp.studies.stability.map import StabilityMap as StabilityMap
 from lgvi_warp.studies.stability.map import stability_map as stability_map
 from lgvi_warp.studies.suggest import suggest as suggest
 from lgvi_warp.studies.tradeoff import tradeoff as tradeoff
+from lgvi_warp.views.choice import shown as shown
 from lgvi_warp.views.plots import plot as plot
 from lgvi_warp.views.plots import plot_stability as plot_stability
 from lgvi_warp.views.plots import plot_statistics as plot_statistics

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli.writing import Written, side_by_side
+from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.safe_files import size_below
 from lgvi_warp.common.write_lock import write_lock
 
@@ -55,28 +56,33 @@ def print_faults(faults: list[str]) -> list[str]:
     return faults
 
 
-# Most numbers in pictures and drift, which then cover the first members: a store may be larger than the memory.
+# Most numbers in the picture and the drift, which then cover some members: a store may be larger than the memory.
 MOST_DRAWN = 30_000_000
 
 
 def shown_members(result: Any) -> Any:
-    """Select the members that pictures and drift are made of.
+    """Select the members that the picture and the drift are made of.
 
     Args:
         result: The run's result.
 
     Returns:
-        The result itself; the first members of a large one in a store, in memory; without samples, the kept members, or
-        None where there are none.
+        The result itself; members of a large one in a store, in memory, as `lw.shown` chooses them; without samples, the kept
+        members, or None where there are none.
     """
     if not result.samples:
         return result.kept and shown_members(result.kept)
     if result.store is None:
         return result
     from lgvi_warp.runs.store.open import chosen
+    from lgvi_warp.views.choice import shown
 
     most = max(1, MOST_DRAWN // (18 * len(result.time)))
-    return chosen(result, range(min(most, result.members)))
+    members: Any = range(min(most, result.members))
+    if result.members > most:
+        with contextlib.suppress(NothingToDraw):  # each picture says so
+            members = shown(result, most).members
+    return chosen(result, members)
 
 
 def write(result: Any, drawn: Any, out: Path) -> Written:
@@ -173,11 +179,12 @@ def energy_lines(result: Any, drawn: Any) -> list[str]:
     import math
 
     from lgvi_warp.physics import energy as invariants
+    from lgvi_warp.views.choice import of_members
 
     drift, conserved = invariants.drift(drawn), invariants.conserved(drawn)
     if math.isnan(drift["energy"]):
         return []
-    whose = "all members" if drawn.members == result.members else f"the first {drawn.members:,} members"
+    whose = "all members" if drawn.members == result.members else of_members(drawn.members, result.members)
     if "energy" not in conserved:
         names = ", ".join(invariants.at_work(drawn))
         return [f"work        energy changed by up to {drift['energy']:.2g} J, through {names} (largest of {whose})"]

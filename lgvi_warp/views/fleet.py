@@ -10,6 +10,7 @@ import numpy as np
 
 from lgvi_warp.common.status import Status, stop_time
 from lgvi_warp.physics import energy as invariants
+from lgvi_warp.views.choice import of_members
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
@@ -117,11 +118,24 @@ def title(result: Result) -> str:
         One line of text.
     """
     method, step = result.provenance["method"]["name"], result.provenance["step"]
-    text = f"{result.members:,} members, {method}, step {step:g} s"
+    text = f"{of_members(result.members, members_of_run(result))}, {method}, step {step:g} s"
     counts = result.status.counts()
     if set(counts) == {"ok"}:
         return text
     return f"{text}: " + ", ".join(f"{number:,} {name}" for name, number in counts.items())
+
+
+def members_of_run(result: Result) -> int:
+    """Count the members of the run that a result is of, or a part of.
+
+    Args:
+        result: A result.
+
+    Returns:
+        The number of members that were run.
+    """
+    planned = result.provenance["ensemble"].get("members") or 0
+    return max(result.members, int(result.provenance.get("members", planned)))
 
 
 def identity(result: Result) -> str:

@@ -184,7 +184,7 @@ def _survey(result: Result, frames: np.ndarray) -> tuple[np.ndarray, list[int]]:
 
 
 def _ended(result: Result, rank: np.ndarray, places: int) -> list[int]:
-    """Members that did not end ok, at most as many as the places, which the outcomes share as evenly as their numbers allow."""
+    """Members that did not end ok, at most as many as the places, which the outcomes share as evenly as they can."""
     status = np.asarray(result.status)[rank]
     groups = [rank[status == code] for code in outcomes(result) if code != Status.OK]
     chosen: list[int] = []

@@ -90,19 +90,18 @@ def write(result: Any, drawn: Any, out: Path) -> Written:
 
     Args:
         result: The run's result; a stored one is written already.
-        drawn: The members of the pictures, from `shown_members`; None for no pictures.
+        drawn: The members of the picture, from `shown_members`; None for neither picture nor recording.
         out: Folder of the files.
 
     Returns:
         What was written, and what failed.
     """
     from lgvi_warp.views.plots import drawable, plot, plot_statistics
-    from lgvi_warp.views.rerun import log_rerun
 
     written = Written([result.store] if result.store else [])
     writers: dict[str, Callable[[Path], Path]] = {} if result.store else {"result.npz": result.save}
     if drawn is not None:
-        writers |= {"fleet.png": lambda path: plot(drawn, path), "fleet.rrd": lambda path: log_rerun(drawn, path)}
+        writers |= {"fleet.png": lambda path: plot(drawn, path), "fleet.rrd": lambda path: _record(result, path)}
     if drawable(result):
         writers["statistics.png"] = lambda path: plot_statistics(result, path)
     with contextlib.ExitStack() as stack:
@@ -113,6 +112,14 @@ def write(result: Any, drawn: Any, out: Path) -> Written:
     for path, job in jobs.items():
         written.take(path, job.result)
     return written
+
+
+def _record(result: Any, path: Path) -> Path:
+    """Write the recording of a result."""
+    from lgvi_warp.views.rerun import log_rerun
+
+    log_rerun(result, path)
+    return path
 
 
 def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:

@@ -39,7 +39,9 @@ class Shape:
                 else:
                     object.__setattr__(self, name, faults.positive(name, size, "m"))
         elif not isinstance(self.mesh, str) or not self.mesh.lower().endswith(".glb"):
-            faults.add("mesh", self.mesh, "is no name of a .glb file", "give a binary glTF file, or length and diameter")
+            faults.add(
+                "mesh", self.mesh, "is no name of a .glb file", "give a binary glTF file, or length and diameter"
+            )
         elif any(size is not None for size in sizes.values()):
             faults.add("mesh", self.mesh, "stands beside a length or a diameter", REMEDY)
         faults.raise_if_any()

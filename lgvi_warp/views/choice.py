@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -148,21 +148,26 @@ def pieces(result: Result, fields: tuple[str, ...]) -> Iterator[tuple[slice, Map
         yield members, samples_of(result, fields, members)
 
 
-def samples_of(result: Result, fields: tuple[str, ...], members: slice | np.ndarray) -> dict[str, np.ndarray]:
+def samples_of(
+    result: Result, fields: tuple[str, ...], members: slice | np.ndarray, frames: np.ndarray | None = None
+) -> dict[str, np.ndarray]:
     """Read samples of some members.
 
     Args:
         result: The result.
         fields: Names of the samples.
         members: The members.
+        frames: Indices of the samples' times; default None, all.
 
     Returns:
-        Samples by name, shape (k, members, ...); views where the result is in memory and members are a slice.
+        Samples by name, shape (k, members, ...); views where the result is in memory, members are a slice and times are all.
     """
-    if result.store is None:
-        return {name: result.samples[name][:, members] for name in fields}
-    stored = result.samples.part(members)  # type: ignore[attr-defined]
-    return {name: stored[name] for name in fields}
+    at: Any = slice(None) if frames is None else frames
+    if result.store is not None:
+        stored = result.samples.part(members)  # type: ignore[attr-defined]
+        return {name: stored[name][at] for name in fields}
+    index = (at, members) if frames is None or isinstance(members, slice) else np.ix_(frames, members)
+    return {name: result.samples[name][index] for name in fields}
 
 
 def _survey(result: Result, frames: np.ndarray) -> tuple[np.ndarray, list[int]]:
@@ -171,16 +176,30 @@ def _survey(result: Result, frames: np.ndarray) -> tuple[np.ndarray, list[int]]:
     best: dict[tuple[int, int], tuple[float, int]] = {}
     counted = under_way(result)[frames]
     for members, samples in pieces(result, ("position",)):
-        position = samples["position"]
-        finite[members] = np.isfinite(position[0]).all(axis=-1)
-        counts = counted[:, members] & np.isfinite(position[frames]).all(axis=-1)
+        position = samples["position"] if len(frames) == len(result.time) else samples["position"][frames]
+        whole = finite_rows(position)
+        finite[members] = whole[0]
         for axis in range(3):
-            for sign in (-1, 1):
-                reach = np.where(counts, sign * position[frames][..., axis], -np.inf).max(axis=0)
-                i = int(reach.argmax())
-                if reach[i] > best.get((axis, sign), (-np.inf, 0))[0]:
-                    best[axis, sign] = float(reach[i]), members.start + i
+            values = np.where(counted[:, members] & whole, position[..., axis], np.nan)
+            for sign, extremes in ((-1, -np.fmin.reduce(values, axis=0)), (1, np.fmax.reduce(values, axis=0))):
+                i = int(np.where(np.isnan(extremes), -np.inf, extremes).argmax())
+                if extremes[i] > best.get((axis, sign), (-np.inf, 0))[0]:
+                    best[axis, sign] = float(extremes[i]), members.start + i
     return finite, [member for _, member in best.values() if finite[member]]
+
+
+def finite_rows(vectors: np.ndarray) -> np.ndarray:
+    """Tell which vectors are finite.
+
+    Args:
+        vectors: Numbers, shape (..., 3).
+
+    Returns:
+        Mask (...).
+    """
+    # One sum and one test: reducing a short axis takes several times as long.
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.isfinite(0.0 * vectors[..., 0] + 0.0 * vectors[..., 1] + 0.0 * vectors[..., 2])
 
 
 def _ended(result: Result, rank: np.ndarray, places: int) -> list[int]:

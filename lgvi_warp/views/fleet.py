@@ -10,7 +10,7 @@ import numpy as np
 
 from lgvi_warp.common.status import Status, stop_time
 from lgvi_warp.physics import energy as invariants
-from lgvi_warp.views.choice import of_members
+from lgvi_warp.views.choice import of_members, pieces
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
@@ -150,7 +150,8 @@ def identity(result: Result) -> str:
         16 hexadecimal digits, the same for the same run.
     """
     digest = hashlib.sha256(json.dumps(result.provenance, sort_keys=True).encode())
-    for array in (result.time, np.asarray(result.status), stop_time(result), result.position[0], result.position[-1]):
+    arrays = [result.time, np.asarray(result.status), stop_time(result)]
+    for array in (*arrays, *(samples["position"][[0, -1]] for _, samples in pieces(result, ("position",)))):
         digest.update(f"{array.shape} {array.dtype.str}\n".encode())
         digest.update(np.ascontiguousarray(array).data)
     return digest.hexdigest()[:16]

@@ -73,7 +73,7 @@ def test_a_mesh_lies_in_the_folder_of_its_scene(tmp_path):
         with pytest.raises(lw.SceneError, match="lies outside the scene file's folder; put the mesh beside"):
             load(folder, name)
     for name in ("none.glb", "a\\0.glb", "meshes"):
-        with pytest.raises(lw.SceneError, match="vehicle.shape.mesh"):
+        with pytest.raises(lw.SceneError, match=r"vehicle\.shape\.mesh"):
             load(folder, name)
     # What a run's provenance names is its own.
     assert lw.Scene.from_dict(load(folder, "in.glb").to_dict()).vehicle.shape.mesh == str(folder / "in.glb")

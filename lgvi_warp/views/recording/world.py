@@ -258,8 +258,8 @@ def _axes(recording: Any, run: Drawn, box: Box) -> None:
     """Log arrows to the north, to the east and down, at a corner of the box."""
     import rerun as rr
 
-    # The corner farthest from the eye, where they hide nothing.
-    corner = np.array([box.high[0], box.high[1], box.low[2]])
+    # At the left of what the eye sees, where they hide little.
+    corner = np.array([box.high[0], box.low[1], box.low[2]])
     labels, colors = zip(*AXES, strict=True)
     arrows = rr.Arrows3D(origins=[corner] * 3, vectors=0.08 * box.size * np.eye(3), colors=colors, labels=labels,
                          radii=rr.Radius.ui_points(1.5))  # fmt: skip

@@ -177,7 +177,8 @@ def _poses(
 
     empty = ~visible.any(axis=1)
     posed = visible.copy()
-    posed[empty, finite_rows(position)[empty].argmax(axis=1)] = True
+    posed[empty, 0] = True
+    position, quaternion = (np.nan_to_num(values) for values in (position, quaternion))
     for first in range(0, len(time), CHUNK):
         frames = slice(first, first + CHUNK)
         at = posed[frames]

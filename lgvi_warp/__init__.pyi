@@ -130,6 +130,12 @@ from lgvi_warp.statistics.path import PathTime as PathTime
 from lgvi_warp.statistics.quantity import Quantity as Quantity
 from lgvi_warp.statistics.until import Until as Until
 from lgvi_warp.studies import sensitivity as uq
+from lgvi_warp.studies.linear.linearize import LinearModel as LinearModel
+from lgvi_warp.studies.linear.linearize import linearize as linearize
+from lgvi_warp.studies.linear.lqr import Regulator as Regulator
+from lgvi_warp.studies.linear.lqr import lqr as lqr
+from lgvi_warp.studies.linear.trim import Trim as Trim
+from lgvi_warp.studies.linear.trim import trim as trim
 from lgvi_warp.studies.stability.map import StabilityMap as StabilityMap
 from lgvi_warp.studies.stability.map import stability_map as stability_map
 from lgvi_warp.studies.suggest import suggest as suggest

@@ -505,6 +505,22 @@ class Ensemble:
         ensemble._check_physical()
         return ensemble
 
+    def in_scene(self, scene: SceneLike, columns: Mapping[str, np.ndarray] | None = None) -> Ensemble:
+        """Return the same members, in a scene with other terms, events or parts of the controller.
+
+        Args:
+            scene: The scene; what varies of it has the names that it had, or is no more.
+            columns: Values of the whole ensemble's members (n, ...) by name, of what the former scene had not; None for none
+                (default).
+
+        Returns:
+            The ensemble.
+        """
+        ensemble = copy.copy(self)
+        ensemble.scene, ensemble._base = scene, scene.parameters()
+        ensemble._columns = [*self._columns, *((Target(name), column) for name, column in (columns or {}).items())]
+        return ensemble
+
     def with_seed(self, seed: int, members: int | None = None) -> Ensemble:
         """Return these members, drawn from the same distributions by another seed.
 

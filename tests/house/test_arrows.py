@@ -19,6 +19,7 @@ OPTIONAL = {
     "netCDF4",
     "pyarrow",
     "gymnasium",
+    "control",
 }
 DEPENDENCIES = {"numpy", "scipy", "warp"} | OPTIONAL
 

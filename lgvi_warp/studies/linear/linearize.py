@@ -124,8 +124,8 @@ def linearize(
 ) -> LinearModel:
     """The linear model of one period: of the plant from commands that are held, or of the closed loop.
 
-    Central differences of the run's own steps, all in one launch: the model holds the method, the lags of actuators and the hold
-    as they are in a run. Its error is step^2 times a third derivative, and round-off / step: some 1e-10.
+    Central differences of the run's own steps, all in one launch: the model holds the method, the lags of actuators and the
+    hold as they are in a run. Its error is step^2 times a third derivative, and round-off / step: some 1e-10.
 
     Args:
         scene: The scene, without waves and noise.
@@ -191,6 +191,9 @@ def _plant_model(
             if key in memory:
                 memory[key][0, :count] = values
     rows = remembered(bench, memory, terms=True)
+    if inputs == "wrench":
+        # Actuators stay where they are: of what they remember nothing moves.
+        rows = [row for row in rows if row.key not in commands]
     pushed = [name] if inputs == "wrench" else list(commands)
     held_rows = [
         Row("", begin + i, COMPONENTS[i] if inputs == "wrench" else f"{key}[{i}]")

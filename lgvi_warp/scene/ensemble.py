@@ -505,20 +505,21 @@ class Ensemble:
         ensemble._check_physical()
         return ensemble
 
-    def in_scene(self, scene: SceneLike, columns: Mapping[str, np.ndarray] | None = None) -> Ensemble:
+    def in_scene(self, scene: SceneLike, by_member: Sequence[str] = ()) -> Ensemble:
         """Return the same members, in a scene with other terms, events or parts of the controller.
 
         Args:
             scene: The scene; what varies of it has the names that it had, or is no more.
-            columns: Values of the whole ensemble's members (n, ...) by name, of what the former scene had not; None for none
-                (default).
+            by_member: Names of more numbers that count as varied, since the caller sets them; none by default.
 
         Returns:
-            The ensemble.
+            The ensemble, whose members have the scene's values of these.
         """
         ensemble = copy.copy(self)
         ensemble.scene, ensemble._base = scene, scene.parameters()
-        ensemble._columns = [*self._columns, *((Target(name), column) for name, column in (columns or {}).items())]
+        shared = ((name, ensemble._base[name]) for name in by_member)
+        columns = [(Target(name), np.broadcast_to(value, (self._whole, *np.shape(value)))) for name, value in shared]
+        ensemble._columns = [*self._columns, *columns]
         return ensemble
 
     def with_seed(self, seed: int, members: int | None = None) -> Ensemble:

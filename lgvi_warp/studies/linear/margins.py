@@ -137,7 +137,7 @@ def margins(
     """Find how much gain and delay the loop of each member bears.
 
     By eigenvalues: those of the sampled loop about the motion that the member has after `about` seconds. It is affine in the
-    factor on the law's demand, so that brackets of all members are halved without a run; each delay within a period is linearised.
+    factor on the law's demand, and each delay within a period is linearised: so brackets of all members are halved without a run.
 
     By runs: every member has a factor, or a delay, of its own in a lane; each run divides all brackets at once. From the same
     motion, turned by `tilt`, a loop settles if what its rates and commands swing shrinks from the second to the last
@@ -318,5 +318,7 @@ def _group(loops: _Loops, of: Sequence[str], by: Sequence[str], most: float, lon
             answers[way]["delay"] = np.where(steady, held * h, np.nan)
     if not ways:
         names = (("gain_lower", "gain_upper") if "gain" in of else ()) + (("delay",) if "delay" in of else ())
-        answers = {way: {name: np.full(n, np.nan) for name in names} for way in by} | {w: {} for w in WAYS if w not in by}
+        answers = {way: {name: np.full(n, np.nan) for name in names} for way in by} | {
+            w: {} for w in WAYS if w not in by
+        }
     return steady, answers["eigenvalues"], answers["runs"]

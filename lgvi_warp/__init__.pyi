@@ -138,6 +138,11 @@ from lgvi_warp.studies.linear.margins import Margins as Margins
 from lgvi_warp.studies.linear.margins import margins as margins
 from lgvi_warp.studies.linear.trim import Trim as Trim
 from lgvi_warp.studies.linear.trim import trim as trim
+from lgvi_warp.studies.search.risk import CVaR as CVaR
+from lgvi_warp.studies.search.tune import Tuned as Tuned
+from lgvi_warp.studies.search.tune import tune as tune
+from lgvi_warp.studies.search.worst_case import WorstCase as WorstCase
+from lgvi_warp.studies.search.worst_case import worst_case as worst_case
 from lgvi_warp.studies.stability.map import StabilityMap as StabilityMap
 from lgvi_warp.studies.stability.map import stability_map as stability_map
 from lgvi_warp.studies.suggest import suggest as suggest

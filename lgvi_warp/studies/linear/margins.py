@@ -137,7 +137,7 @@ def margins(
     """Find how much gain and delay the loop of each member bears.
 
     By eigenvalues: those of the sampled loop about the motion that the member has after `about` seconds. It is affine in the
-    factor on the law's demand, and each delay within a period is linearised: so brackets of all members are halved without a run.
+    factor on the law's demand, and each delay within a period is linearised: so all brackets are halved without a run.
 
     By runs: every member has a factor, or a delay, of its own in a lane; each run divides all brackets at once. From the same
     motion, turned by `tilt`, a loop settles if what its rates and commands swing shrinks from the second to the last

@@ -131,8 +131,8 @@ class _Asked:
 def search(cost: Cost, d: int, most: int, seed: int, restarts: int, good_enough: float = -math.inf) -> Found:
     """Find the least cost in the unit cube.
 
-    Evolution (Storn & Price 1997) several times, each from other places; then all corners where they are few; then a walk along
-    the axes from the best place, with steps that shrink where none is better.
+    Evolution (Storn & Price 1997) several times, each from other places; then all corners where they are few; then a walk
+    along the axes from the best place, with steps that shrink where none is better.
 
     Args:
         cost: cost of candidates.

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.prepared import Prepared, prepare, scene_value
 from lgvi_warp.runs.quantities import OfInterest
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.search.box import LEAST, POPULATION, Box, search
-from lgvi_warp.studies.search.risk import CVaR, risk_of
+from lgvi_warp.studies.search.risk import risk_of
 from lgvi_warp.studies.search.worst_case import one_number
 
 
@@ -107,7 +108,8 @@ def tune(
         SceneError: If an argument is at fault.
     """
     ensemble = Ensemble.from_scene(fleet) if isinstance(fleet, Scene) else fleet
-    scene, n, faults = ensemble.scene, ensemble.members, Faults()
+    scene: Any = ensemble.scene
+    n, faults = ensemble.members, Faults()
     measure, box = risk_of(faults, risk), None
     with faults.including():
         box = Box.of("over", over, scene)
@@ -149,8 +151,19 @@ def tune(
     label = minimise if isinstance(minimise, str) else getattr(minimise, "__name__", str(minimise))
     runs = found.asked * n + (2 * count if drawn else 0)
     return Tuned(
-        values, dict(zip(box.names, map(float, before[0]), strict=True)), found.cost, *map(float, fresh_costs), label,
-        str(measure), n, count if drawn else 0, at_bounds, found.restarts, runs)  # fmt: skip
+        parameters=values,
+        before=dict(zip(box.names, map(float, before[0]), strict=True)),
+        cost=found.cost,
+        fresh_cost=float(fresh_costs[0]),
+        fresh_before=float(fresh_costs[1]),
+        of=label,
+        risk=str(measure),
+        members=n,
+        fresh=count if drawn else 0,
+        at_bounds=at_bounds,
+        restarts=found.restarts,
+        runs=runs,
+    )
 
 
 class _Costs:
@@ -168,9 +181,11 @@ class _Costs:
         members, k = self._members, len(candidates)
         n = members.count
         every = np.tile(np.arange(n), k)
-        states = members.position, members.attitude, members.velocity, members.angular_velocity
+        states: Any = (
+            v[every] for v in (members.position, members.attitude, members.velocity, members.angular_velocity)
+        )
         parameters = {name: v[every] for name, v in self._own.items()}
         parameters |= dict(zip(self._box.names, np.repeat(candidates, n, axis=0).T, strict=True))
-        noise = {"indices": members.indices[every], "seed": members.seed}
-        values = one_number(self._run.states(*(v[every] for v in states), parameters, **noise))
-        return np.where(np.isnan(values), np.inf, values).reshape(k, n)
+        answer = self._run.states(**states, parameters=parameters, indices=members.indices[every], seed=members.seed)
+        costs = one_number(answer)
+        return np.where(np.isnan(costs), np.inf, costs).reshape(k, n)

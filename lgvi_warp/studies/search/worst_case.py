@@ -91,7 +91,7 @@ def worst_case(
     Raises:
         SceneError: If an argument is at fault.
     """
-    scene = fleet.scene if isinstance(fleet, Ensemble) else fleet
+    scene: Any = fleet.scene if isinstance(fleet, Ensemble) else fleet
     faults = Faults()
     faults.choice("worst", worst, WORST)
     box = None

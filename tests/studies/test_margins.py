@@ -1,13 +1,16 @@
 """Margins of loops: beside those of the sampled system written by hand, and by runs in lanes; one kernel."""
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp.scene.settings import RunSettings
 from lgvi_warp.studies.linear import margins as study
 from lgvi_warp.studies.linear.edges import edges
+from tests.conftest import ROOT
 
 J, PERIOD, H, EVERY = 11.0, 0.1, 0.02, 5
 MEMBERS = 6
@@ -164,18 +167,37 @@ def test_scenes_without_margins():
         lw.margins(dataclasses.replace(whole, controller=noisy), h=H)
 
 
-@pytest.mark.slow
-def test_the_heading_loop_of_remus():
+def autopilot():
+    """REMUS 100, ballasted, on a straight way."""
     start = lw.Start(velocity=(1.54, 0.0, 0.0))
     controller = lw.Controller(
         period=0.1, guidance=[lw.SetPoint(heading=0.0, depth=0.0)],
         laws=[lw.HeadingPID(kp=1.0, kd=2.0, ki=0.02),
               lw.DepthPID(kp=0.1, ki=0.001, kp_pitch=5.0, ki_pitch=0.3, kd_pitch=2.0, pitch_limit=0.5)],
         allocation=[lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])])  # fmt: skip
-    scene = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0}, start=start, controller=controller)
-    fleet = lw.Ensemble(scene, 64, 1, {"heading_pid.kp": lw.Uniform(0.7, 1.3), "heading_pid.kd": lw.Uniform(1.5, 3.0)})
-    found = lw.margins(fleet, "heading_pid", by=("eigenvalues", "runs"), method="psi_x", h=0.01)
+    run = RunSettings(method="psi_x", step=0.01, duration=20.0, save_every=1.0)
+    return lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0}, start=start, controller=controller, run=run)
+
+
+@pytest.mark.slow
+def test_the_heading_loop_of_remus():
+    vary = {"heading_pid.kp": lw.Uniform(0.7, 1.3), "heading_pid.kd": lw.Uniform(1.5, 3.0)}
+    found = lw.margins(lw.Ensemble(autopilot(), 64, 1, vary), "heading_pid", by=("eigenvalues", "runs"))
     assert found.steady.all()
     for name in ("gain_lower", "gain_upper"):
         np.testing.assert_allclose(found.by_runs[name], found.values[name], rtol=1e-2)
     assert np.abs(found.by_runs["delay"] - found.values["delay"]).max() < 0.01 * 1.001
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", ["controllers/margins.md", "guide/worst_case.md"])
+def test_the_snippets_of_a_page(page):
+    pytest.importorskip("control")
+    names = {"lw": lw, "autopilot": autopilot(), "scene": autopilot()}
+    # In a page's ensembles are more members, and budgets are larger, than a test needs.
+    short = {"256": "8", "200": "4", "20_000": "200", "save=lw": "budget=300, save=lw"}
+    for text in re.findall(r"```python\n(.*?)```", (ROOT / "docs" / page).read_text(), re.DOTALL):
+        for long, brief in short.items():
+            text = text.replace(long, brief)
+        exec(text, names)
+    assert isinstance(names["found"], lw.Margins if "margins" in page else lw.Tuned)

@@ -181,9 +181,7 @@ class _Costs:
         members, k = self._members, len(candidates)
         n = members.count
         every = np.tile(np.arange(n), k)
-        states: Any = (
-            v[every] for v in (members.position, members.attitude, members.velocity, members.angular_velocity)
-        )
+        states: Any = {name: getattr(members, name)[every] for name in FIELDS}
         parameters = {name: v[every] for name, v in self._own.items()}
         parameters |= dict(zip(self._box.names, np.repeat(candidates, n, axis=0).T, strict=True))
         answer = self._run.states(**states, parameters=parameters, indices=members.indices[every], seed=members.seed)

@@ -5,8 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 from scipy.linalg import expm, solve_discrete_lyapunov
+from scipy.spatial.transform import Rotation
 
 import lgvi_warp as lw
+from lgvi_warp.reference.control import Measurement, Reference, pose_errors
 from lgvi_warp.studies.linear.bench import Bench, plant
 
 MASS, INERTIA, GRAVITY, PERIOD, LAG = 20.0, np.array((5.0, 8.0, 11.0)), 10.0, 0.1, 0.3
@@ -15,12 +17,18 @@ DRAG = np.array((4.0, 9.0, 12.0, 1.0, 2.0, 3.0))
 NONE = (0.0, 0.0, 0.0)
 
 
-def hover(drag=DRAG, buoyancy=BUOYANCY, center=CENTER, velocity=NONE):
+LAGS = (LAG, 0.0, 0.0, 0.0, 0.0, LAG)
+
+
+def hover(drag=DRAG, buoyancy=BUOYANCY, center=CENTER, lags=LAGS, velocity=NONE):
     """A body with drag, whose actuator lags in X and N alone."""
-    lag = (LAG, 0.0, 0.0, 0.0, 0.0, LAG)
-    terms = [lw.ControlWrench(limit=1e3, time_constant=lag), lw.Drag(quadratic=drag)]
+    terms = [lw.ControlWrench(limit=1e3, time_constant=lags), lw.Drag(quadratic=drag)]
     vehicle = lw.Vehicle(MASS, INERTIA, (5.0, 22.0, 25.0), buoyancy, center)
     return lw.Scene(vehicle, lw.Environment(GRAVITY), terms, lw.Start(velocity=velocity))
+
+
+# Weight and buoyancy that act, far below what is compared: so the kernel stays the same.
+NEUTRAL = {"buoyancy": MASS * GRAVITY + 1e-12, "center": (0.0, 0.0, -1e-14)}
 
 
 def at(names, *wanted):
@@ -79,8 +87,8 @@ def test_waves_and_noise_let_nothing_be_steady():
 
 
 def neutral():
-    """At rest, with no force but the actuator's, and a drag far below round-off, which keeps the kernel."""
-    return hover(buoyancy=MASS * GRAVITY, center=NONE, drag=1e-12 * DRAG)
+    """At rest, with no force but the actuator's."""
+    return hover(drag=1e-12 * DRAG, **NEUTRAL)
 
 
 def lagged(inertia, lag, period):
@@ -119,7 +127,7 @@ def test_a_double_integrator_and_a_lag():
 def test_the_error_of_the_differences_goes_with_their_square():
     """Drag stops |v| v exactly: after T a speed v is v / (1 + q v T), whose derivative is 1 / (1 + q v T)^2."""
     speed, q = 1.5, DRAG[0] / (MASS + 5.0)
-    scene = hover(buoyancy=MASS * GRAVITY, center=NONE, velocity=(speed, 0.0, 0.0))
+    scene = hover(**NEUTRAL, velocity=(speed, 0.0, 0.0))
     errors = []
     for step in (0.04, 0.02):
         linear = lw.linearize(scene, period=PERIOD, method="psi_s", h=0.02, step=step)
@@ -148,21 +156,23 @@ def test_a_part_and_a_state_space():
 WEIGHTS = np.repeat((4.0, 9.0, 1.0, 2.0), 3), np.full(6, 0.02)
 
 
-def regulated(law=None, start=None):
-    """A free body under a state feedback: with gains of 0 the kernel of its plant."""
+def regulated(law=None):
+    """A free body under a state feedback, whose actuator follows at once: its kernel is that of the plant above."""
     law = law or lw.StateFeedback(K=np.zeros((6, 12)))
     controller = lw.Controller(
         period=PERIOD, guidance=[lw.SetPoint(position=NONE, heading=0.0)], laws=[law],
         allocation=[lw.AllocationMatrix(to="control_wrench", matrix=np.eye(6))])  # fmt: skip
-    vehicle = lw.Vehicle(MASS, INERTIA, NONE, MASS * GRAVITY, NONE)
-    return lw.Scene(vehicle, lw.Environment(GRAVITY), [lw.ControlWrench()], start or lw.Start(), controller)
+    free = hover(drag=1e-12 * DRAG, lags=(1e-9,) * 6, **NEUTRAL)
+    return dataclasses.replace(free, controller=controller)
 
 
 @pytest.fixture(scope="module")
 def regulator():
     linear = lw.linearize(regulated(), method="psi_s", h=0.02)
-    plant = dataclasses.replace(linear, inputs=("X", "Y", "Z", "K", "M", "N"))
-    return lw.lqr(plant, *WEIGHTS)
+    # Nothing depends on where an actuator was that follows at once.
+    assert not linear.A[:, 12:].any()
+    motion = linear.part(("position", "rotation", "velocity", "angular_velocity"))
+    return lw.lqr(dataclasses.replace(motion, inputs=("X", "Y", "Z", "K", "M", "N")), *WEIGHTS)
 
 
 def test_a_regulator_in_the_loop(regulator):
@@ -174,6 +184,24 @@ def test_a_regulator_in_the_loop(regulator):
     assert np.abs(closed.poles).max() < 1.0
 
 
+def test_the_law_of_a_moving_vehicle_has_the_gains_of_the_model(regulator):
+    """The law's error of velocity is taken in the axes of the vehicle, and that of the model in those of the steady motion."""
+    rng = np.random.default_rng(7)
+    R, v, K = Rotation.from_rotvec((0.3, -0.5, 1.0)).as_matrix(), np.array((1.5, -0.2, 0.4)), rng.normal(size=(6, 12))
+    moving = dataclasses.replace(regulator.model, about=regulator.model.about | {"velocity": v, "attitude": R})
+    law = dataclasses.replace(regulator, K=K, model=moving).law("steady")
+    assert law.key == "steady"
+    wanted = Reference(np.zeros(3), R @ v, R, np.zeros(3), 0.0)
+    left = []
+    for size in (1e-3, 5e-4):
+        x = size * np.array((0.3, -0.2, 0.5, 0.7, -0.4, 0.2, 0.1, 0.6, -0.3, 0.2, 0.4, -0.8))
+        turned = R @ Rotation.from_rotvec(x[3:6]).as_matrix()
+        e, e_R, velocity, rate = pose_errors(wanted, Measurement(x[:3], turned, v + x[6:9], v + x[6:9], x[9:]))
+        left.append(np.abs(law.K @ np.concatenate([-e, e_R, -velocity, -rate]) - K @ x).max())
+    # Errors of second order: a quarter at half the size.
+    assert left[0] < 1e-5 and 3.8 < left[0] / left[1] < 4.2
+
+
 def cost(result, start=0):
     """The sum over looks of x^T Q x + u^T R u of each member."""
     skew = [result.attitude[:, :, i, j] - result.attitude[:, :, j, i] for i, j in ((2, 1), (0, 2), (1, 0))]
@@ -182,7 +210,7 @@ def cost(result, start=0):
 
 
 def test_the_cost_of_a_run_is_that_of_the_matrix_and_no_other_gains_have_less(regulator):
-    x = np.random.default_rng(3).normal(size=12) * 1e-3
+    x = np.random.default_rng(3).normal(size=12) * 1e-4
     R = np.eye(3) + np.array([[0.0, -x[5], x[4]], [x[5], 0.0, -x[3]], [-x[4], x[3], 0.0]])
     u, _, v = np.linalg.svd(R)
     scene = regulated(regulator.law())
@@ -195,7 +223,7 @@ def test_the_cost_of_a_run_is_that_of_the_matrix_and_no_other_gains_have_less(re
     save = lw.SaveAt(every=PERIOD, fields=("position", "attitude", "velocity", "angular_velocity", "command"))
     costs = cost(lw.solve(fleet, "psi_s", h=0.02, t1=40.0, save=save))
     least = x @ regulator.P @ x
-    # What is not linear is of the size of the angles, 1e-3, squared and less; the end at 40 s is e^-20 of the start.
+    # What is not linear is of the size of the state, 1e-4, beside 1; the end at 40 s is e^-20 of the start.
     assert abs(costs[0] / least - 1.0) < 1e-4
     for factor, of_run in zip(factors[1:], costs[1:], strict=True):
         gain = factor * regulator.K

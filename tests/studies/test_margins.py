@@ -97,6 +97,20 @@ def test_margins_by_runs_are_those_at_which_the_envelope_shrinks(fleet, found):
     assert np.abs(found.by_runs["delay"] - found.values["delay"]).max() <= H * (1.0 + 1e-9)
 
 
+@pytest.mark.slow
+def test_the_poles_of_a_closed_loop_with_a_delay_are_those_of_the_system_by_hand():
+    for steps in (0, 3, 11):
+        closed = lw.linearize(scene(delay=steps * H), 80.0, closed=True, method="psi_s", h=H)
+        turning = [name for name in closed.states if not name.startswith(("position", "velocity"))]
+        # Beside roll and pitch, which nothing turns: two integrators each, at 1.
+        others = [f"{word}[{i}]" for word in ("rotation", "angular_velocity") for i in (0, 1)]
+        yaw = closed.part([name for name in turning if name not in others])
+        assert abs(np.abs(yaw.poles[0]) - radius(6.0, 0.8, 9.0, 1.0, steps)) < 1e-8
+        assert closed.inputs == tuple(f"control_wrench[{i}]" for i in range(6))
+        torque, rate = closed.inputs.index("control_wrench[5]"), closed.states.index("angular_velocity[2]")
+        assert abs(closed.B[rate, torque] - PERIOD / J) < 1e-9
+
+
 def test_a_distribution(found):
     table = found.percentiles((0.0, 100.0))
     assert table["gain_upper"].tolist() == [found.values["gain_upper"].min(), found.values["gain_upper"].max()]
@@ -151,6 +165,7 @@ def test_edges_beside_known_ones():
         ({"of": "phase"}, "of = 'phase'"),
         ({"by": "guess"}, "by = 'guess'"),
         ({"seconds": 0.0}, "seconds"),
+        ({"seconds": 1.0}, "is less than 30 looks"),
     ],
 )
 def test_bad_arguments(words, message):

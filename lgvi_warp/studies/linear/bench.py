@@ -153,8 +153,6 @@ class Bench:
         controller = plan.kernel_choice.controller
         self.bus = controller.bus if controller else None
         self.every = controller.every(plan.grid.h) if controller else 1
-        # Kept from run to run, by the number of members: packets take long to make.
-        self._packets: dict[int, Packets] = {}
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -175,7 +173,9 @@ class Bench:
         packets = self._filled(places, None, numbers or {})
         start = packets.members
         motion: Any = {name: getattr(start, name) for name in FIELDS}
-        return Motion(**motion, memory=self._memory(packets))
+        memory = self._memory(packets)
+        packets.leave()
+        return Motion(**motion, memory=memory)
 
     def run(
         self,
@@ -213,7 +213,9 @@ class Bench:
         failed = packets.ended()[0] != 0
         last = {name: values[name][-1] for name in FIELDS}
         states: Any = {name: np.where(failed.reshape(-1, *(1,) * (v.ndim - 1)), np.nan, v) for name, v in last.items()}
-        return Motion(**states, memory=self._memory(packets))
+        memory = self._memory(packets)
+        packets.leave()
+        return Motion(**states, memory=memory)
 
     def _filled(self, places: np.ndarray, motion: Motion | None, numbers: Mapping[str, np.ndarray]) -> Packets:
         """Packets of members in these motions."""
@@ -223,11 +225,7 @@ class Bench:
         if motion is not None:
             members = replace(members, **{name: getattr(motion, name) for name in FIELDS})
         subset.check_block(0, m, members.parameters)
-        if m in self._packets:
-            packets = self._packets[m]
-            packets.refill(members)
-        else:
-            packets = self._packets[m] = Packets(self.plan, members)
+        packets = Packets.of(self.plan, members)
         if motion is not None:
             self._remember(packets, motion.memory)
         return packets

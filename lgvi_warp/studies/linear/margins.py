@@ -30,6 +30,8 @@ NARROW = {"eigenvalues": 1e-6, "runs": 2e-3}
 SHRINKS = 0.97
 # What swings by less than this part of its first third has settled: what is left is round-off.
 SETTLED = 1e-6
+# Looks of a run below which its thirds show no envelope.
+LEAST_LOOKS = 30
 PERCENTILES = (0.0, 5.0, 25.0, 50.0, 75.0, 95.0, 100.0)
 UNITS = {"gain_lower": "", "gain_upper": "", "delay": "s"}
 
@@ -179,6 +181,11 @@ def margins(
         faults.add("fleet", "the scene", "has no controller", "give [controller]")
     elif loop is not None and loop not in (keys := [law.key for law in scene.controller.laws]):
         faults.add("loop", loop, "is no law of the controller", closest(loop, keys))
+    elif not faults and seconds < LEAST_LOOKS * scene.controller.period:
+        least = LEAST_LOOKS * scene.controller.period
+        faults.add(
+            "seconds", seconds, f"is less than {LEAST_LOOKS} looks", f"give {least:g} or more, to see an envelope"
+        )
     faults.raise_if_any()
     calm(scene, "margins")
     if "eigenvalues" in by:

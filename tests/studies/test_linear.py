@@ -157,13 +157,16 @@ WEIGHTS = np.repeat((4.0, 9.0, 1.0, 2.0), 3), np.full(6, 0.02)
 
 
 def regulated(law=None):
-    """A free body under a state feedback, whose actuator follows at once: its kernel is that of the plant above."""
+    """A free body under a state feedback, whose actuator follows at once; with an event that never comes.
+
+    So the kernel of its runs is that of the models above, which have no merged lead.
+    """
     law = law or lw.StateFeedback(K=np.zeros((6, 12)))
     controller = lw.Controller(
         period=PERIOD, guidance=[lw.SetPoint(position=NONE, heading=0.0)], laws=[law],
         allocation=[lw.AllocationMatrix(to="control_wrench", matrix=np.eye(6))])  # fmt: skip
     free = hover(drag=1e-12 * DRAG, lags=(1e-9,) * 6, **NEUTRAL)
-    return dataclasses.replace(free, controller=controller)
+    return dataclasses.replace(free, controller=controller, events=[lw.StopTime(at=1e9)])
 
 
 @pytest.fixture(scope="module")

@@ -20,6 +20,7 @@ OPTIONAL = {
     "pyarrow",
     "gymnasium",
     "control",
+    "tomlkit",
 }
 DEPENDENCIES = {"numpy", "scipy", "warp"} | OPTIONAL
 

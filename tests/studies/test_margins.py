@@ -10,6 +10,7 @@ import lgvi_warp as lw
 from lgvi_warp.scene.settings import RunSettings
 from lgvi_warp.studies.linear import margins as study
 from lgvi_warp.studies.linear.edges import edges
+from lgvi_warp.studies.linear.sampled_loop import SampledLoop
 from tests.conftest import ROOT
 
 J, PERIOD, H, EVERY = 11.0, 0.1, 0.02, 5
@@ -171,6 +172,24 @@ def test_edges_beside_known_ones():
 def test_bad_arguments(words, message):
     with pytest.raises(lw.SceneError, match=message):
         lw.margins(scene(), **words, h=H)
+
+
+def test_what_is_no_scene():
+    for ask, words in (
+        (lw.trim, {}), (lw.linearize, {}), (lw.margins, {}), (lw.worst_case, {"within": {}, "of": "depth"}),
+        (lw.tune, {"over": {}, "minimise": "depth"}),
+    ):  # fmt: skip
+        with pytest.raises(lw.SceneError, match="is neither"):
+            ask("scene.toml", **words)
+
+
+def test_a_copy_that_fails_does_not_settle(fleet):
+    """Beside a motion at the edge of what a step can solve, one of two copies is beyond it."""
+    loops = study.Study(fleet, None, 1.0, 10.0, 1e-3, "psi_s", H).at(np.arange(2))
+    motion = loops.motion.of(np.arange(2))
+    motion.angular_velocity[1] = (0.0, 0.0, 2.0 / H)
+    sampled = SampledLoop(loops.study.bench, np.arange(2), motion, loops.study.begin)
+    assert sampled.stable(np.ones(2), loops.delay, np.arange(2)).tolist() == [True, False]
 
 
 def test_scenes_without_margins():

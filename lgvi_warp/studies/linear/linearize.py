@@ -18,6 +18,7 @@ from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.linear.bench import COORDINATES, Bench, Motion, calm, plant
 from lgvi_warp.studies.linear.differences import STEP, Row, differences, names_of
 from lgvi_warp.studies.linear.trim import Trim, step_of
+from lgvi_warp.studies.members import scene_of
 
 INPUTS = ("commands", "wrench")
 
@@ -128,7 +129,7 @@ def linearize(
     hold as they are in a run. Its error is step^2 times a third derivative, and round-off / step: some 1e-10.
 
     Args:
-        scene: The scene, without waves and noise.
+        scene: The scene, without waves and noise; of an Ensemble, its scene.
         about: The motion: what `lw.trim` returns; for a closed loop also the time [s] after which the run has it. None, the
             default: the start of the scene, with commands of 0; a closed loop after its first period.
         inputs: "commands" of the actuators, the default; or "wrench": X, Y, Z [N], K, M, N [N m], body axes about its origin,
@@ -146,6 +147,7 @@ def linearize(
         SceneError: If an argument is at fault, a part of the controller acts by chance or at some looks only, or a member that
             is a little beside the motion fails.
     """
+    scene = scene_of(scene)
     calm(scene, "linear models")
     faults = Faults()
     faults.choice("inputs", inputs, INPUTS)

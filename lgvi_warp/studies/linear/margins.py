@@ -20,6 +20,7 @@ from lgvi_warp.studies.linear.edges import edges
 from lgvi_warp.studies.linear.linearize import check_parts
 from lgvi_warp.studies.linear.sampled_loop import DELAY, SampledLoop, delayed
 from lgvi_warp.studies.linear.trim import step_of
+from lgvi_warp.studies.members import ensemble_of
 
 OF, WAYS = ("gain", "delay"), ("eigenvalues", "runs")
 # Members whose margins are sought together.
@@ -166,7 +167,7 @@ def margins(
     Raises:
         SceneError: If an argument or the scene is at fault.
     """
-    ensemble = Ensemble.from_scene(fleet) if isinstance(fleet, Scene) else fleet
+    ensemble = ensemble_of(fleet)
     scene: Any = ensemble.scene
     of, by = ((each,) if isinstance(each, str) else tuple(each) for each in (of, by))
     faults = Faults()
@@ -191,7 +192,7 @@ def margins(
     if "eigenvalues" in by:
         check_parts(scene.controller, 'margins by="eigenvalues"')
     h = step_of(scene, h)
-    study = _Study(ensemble, loop, about, seconds, tilt, method, h)
+    study = Study(ensemble, loop, about, seconds, tilt, method, h)
     parts = []
     for first in range(0, ensemble.members, GROUP):
         places = np.arange(first, min(first + GROUP, ensemble.members))
@@ -203,8 +204,23 @@ def margins(
     return Margins(loop or "all laws", values, by_runs, steady, study.bench.plan.grid.h)
 
 
-class _Study:
-    """The members, whose factor and delay are their own."""
+class Study:
+    """Members whose factor and delay are their own.
+
+    Args:
+        fleet: the members.
+        loop: key of the law; None for all laws.
+        about: time after which loops are looked at [s].
+        seconds: length of the runs [s].
+        tilt: angle by which runs begin aside [rad].
+        method: as of `lw.solve`.
+        h: step [s].
+
+    Attributes:
+        bench: what makes the steps.
+        begin: steps until loops are looked at.
+        steps: steps of a run.
+    """
 
     def __init__(
         self, fleet: Ensemble, loop: str | None, about: float, seconds: float, tilt: float, method: Any, h: float
@@ -223,22 +239,37 @@ class _Study:
         actuators = controller.actuators.values()
         self.limits = np.concatenate([np.maximum(term.limit, 1e-12) for term in actuators])
 
-    def at(self, places: np.ndarray) -> _Loops:
-        """The loops of some members, at their steady motions."""
-        return _Loops(self, places)
+    def at(self, places: np.ndarray) -> Loops:
+        """The loops of some members.
+
+        Args:
+            places: (n,), which members.
+
+        Returns:
+            Their loops, at their steady motions.
+        """
+        return Loops(self, places)
 
 
-class _Loops:
-    """Loops at their steady motions, to be asked whether they settle with other numbers."""
+class Loops:
+    """Loops at their steady motions, to be asked whether they settle with other numbers.
 
-    def __init__(self, study: _Study, places: np.ndarray):
+    Args:
+        study: the members.
+        places: (n,), which of them.
+
+    Attributes:
+        delay: (n,), their own delays, in steps.
+        motion: their motions after `study.begin` steps; NaN where a member failed.
+    """
+
+    def __init__(self, study: Study, places: np.ndarray):
         self.study, self.places, bench = study, places, study.bench
         n, h = len(places), bench.plan.grid.h
         delay = study.fleet.subset(places).parameters(0, n)[DELAY] if study.own_delay else study.nominal
         self.delay = np.broadcast_to(np.rint(np.asarray(delay) / h).astype(np.int64), (n,))
         numbers = {FACTOR: np.ones(n), DELAY: self.delay * h}
         self.motion: Motion = bench.run(places, None, 0, study.begin, numbers)
-        self.runs = 0
 
     def settle(self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray) -> np.ndarray:
         """Whether loops settle, by a run.
@@ -270,7 +301,6 @@ class _Loops:
                 lowest[w] = np.fmin(lowest[w], signals[at].min(axis=0))
 
         after = bench.run(self.places[some], motion, k0, k1, numbers, watch)
-        self.runs += 1
         swing = highest - lowest
         well = np.isfinite(after.position).all(axis=1)
         for each in (swing[..., :3], swing[..., 3:]):
@@ -282,7 +312,7 @@ class _Loops:
 Group = tuple[np.ndarray, dict[str, np.ndarray], dict[str, np.ndarray]]
 
 
-def _group(loops: _Loops, of: Sequence[str], by: Sequence[str], most: float, longest: float) -> Group:
+def _group(loops: Loops, of: Sequence[str], by: Sequence[str], most: float, longest: float) -> Group:
     """(whether each settles as it is, margins by eigenvalues, margins by runs)."""
     bench, n = loops.study.bench, len(loops.places)
     alive = np.isfinite(loops.motion.position).all(axis=1)

@@ -63,12 +63,13 @@ class SampledLoop:
         commands = [Row("", i, f"command {i}") for i in range(C)]
         acting = [Row("", bus.acting + i, f"acting {i}") for i in range(C)]
         s = 12 + len(terms)
-        looks = []
+        looks, self._whole = [], np.ones(n, bool)
         for factor in (0.0, 1.0):
             numbers = {FACTOR: zero + factor, DELAY: zero}
             whole = differences(
                 bench, places, still, k, bench.every, [*terms, *acting, *parts], [*terms, *commands, *parts],
                 numbers=numbers)  # fmt: skip
+            whole = self._without_failed(whole)
             # A look sees the motion alone: what it does of x is found behind the period that was between.
             of_motion = np.linalg.solve(np.swapaxes(whole[:, :12, :12], 1, 2), np.swapaxes(whole[:, s:, :12], 1, 2))
             looks.append(np.concatenate([np.swapaxes(of_motion, 1, 2), whole[:, s:, s + C :]], axis=2))
@@ -80,8 +81,14 @@ class SampledLoop:
             later = delayed(bench, motion, k, np.full(n, steps))
             numbers = {FACTOR: zero + 1.0, DELAY: zero + steps * bench.plan.grid.h}
             late = differences(bench, places, later, k, bench.every, acting, terms, motion=False, numbers=numbers)
-            self._late.append(late)
+            self._late.append(self._without_failed(late))
         self._C, self._s, self._m = C, s, len(parts)
+
+    def _without_failed(self, derived: np.ndarray) -> np.ndarray:
+        """The same, with other numbers for members of which a copy failed: their loops do not settle."""
+        well = np.isfinite(derived).all(axis=(1, 2))
+        self._whole &= well
+        return np.where(well[:, None, None], derived, np.eye(*derived.shape[1:]))
 
     def stable(self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray) -> np.ndarray:
         """Whether loops settle.
@@ -100,7 +107,7 @@ class SampledLoop:
             size = self._s + self._m + self._C * (q + 2)
             for each in np.array_split(at, max(1, len(at) * size**2 // ENTRIES)):
                 answer[each] = _settles(self._matrices(factor[each], int(q), steps[each] % self.every, some[each]))
-        return answer
+        return answer & self._whole[some]
 
     def _matrices(self, factor: np.ndarray, q: int, late: np.ndarray, some: np.ndarray) -> np.ndarray:
         """The loops' matrices: motion and actuators, parts, commands from the newest to the oldest."""

@@ -15,6 +15,7 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import Start
 from lgvi_warp.studies.linear.bench import Bench, Motion, calm, plant
+from lgvi_warp.studies.members import scene_of
 
 # Largest acceleration of a steady motion [m/s2, rad/s2]: far above round-off over a step, some 1e-12.
 STEADY = 1e-8
@@ -79,7 +80,7 @@ def trim(
     from the steady motion of the equations by the method's error of one step. The controller of the scene is left out.
 
     Args:
-        scene: The scene.
+        scene: The scene; of an Ensemble, its scene.
         speed: Speed over ground [m/s]; None, the default, where it is free, as with a propeller of constant thrust.
         free: Names of what may be chosen, of "roll", "pitch", "drift" (course less heading), "speed", and commands, such as
             "thrusters[0]", or "thrusters" for all of a term; None, the default, for all. The others are 0.
@@ -95,6 +96,7 @@ def trim(
     """
     from scipy.optimize import least_squares
 
+    scene = scene_of(scene)
     calm(scene, "steady motions")
     h = step_of(scene, h)
     bench = Bench(Ensemble(plant(replace(scene, events=()), h), 1), method, h, 2.0 * h, h)

@@ -14,6 +14,7 @@ from lgvi_warp.runs.prepared import Prepared, prepare, scene_value
 from lgvi_warp.runs.quantities import OfInterest
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
+from lgvi_warp.studies.members import ensemble_of
 from lgvi_warp.studies.search.box import LEAST, POPULATION, Box, search
 from lgvi_warp.studies.search.risk import risk_of
 from lgvi_warp.studies.search.worst_case import one_number
@@ -107,7 +108,7 @@ def tune(
     Raises:
         SceneError: If an argument is at fault.
     """
-    ensemble = Ensemble.from_scene(fleet) if isinstance(fleet, Scene) else fleet
+    ensemble = ensemble_of(fleet)
     scene: Any = ensemble.scene
     n, faults = ensemble.members, Faults()
     measure, box = risk_of(faults, risk), None

@@ -15,6 +15,7 @@ from lgvi_warp.runs.quantities import OfInterest
 from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
+from lgvi_warp.studies.members import scene_of
 from lgvi_warp.studies.search.box import LEAST, POPULATION, Box, search
 
 WORST = ("largest", "smallest")
@@ -91,7 +92,7 @@ def worst_case(
     Raises:
         SceneError: If an argument is at fault.
     """
-    scene: Any = fleet.scene if isinstance(fleet, Ensemble) else fleet
+    scene = scene_of(fleet)
     faults = Faults()
     faults.choice("worst", worst, WORST)
     box = None

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common import machine
-from lgvi_warp.common.errors import Faults, SceneError, shown
+from lgvi_warp.common.errors import Faults, SceneError, refusal, shown
 from lgvi_warp.common.labelled import columns_by_name, is_labelled
 from lgvi_warp.common.status import Status, failed
 from lgvi_warp.engine.executors import executor_of
@@ -239,7 +239,11 @@ class Prepared:
         fleet = Ensemble.from_states(self._fleet.scene, *given)
         fleet.seed = seed
         if indices is not None:
-            fleet.indices = np.asarray(indices, dtype=np.int64)
+            keys = np.asarray(indices)
+            if keys.shape != (fleet.members,) or keys.dtype.kind not in "iu":
+                problem = "are not one whole number for each member"
+                raise refusal("indices", indices, problem, f"give an array of shape ({fleet.members},)")
+            fleet.indices = keys.astype(np.int64)
         return self._answer(fleet, None)
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 import lgvi_warp as lw
 from lgvi_warp.reference.control import Measurement, Reference, pose_errors
 from lgvi_warp.studies.linear.bench import Bench, plant
+from tests.laws import test_remus_100 as equations
 
 MASS, INERTIA, GRAVITY, PERIOD, LAG = 20.0, np.array((5.0, 8.0, 11.0)), 10.0, 0.1, 0.3
 BUOYANCY, CENTER = MASS * GRAVITY + 6.0, np.array((0.02, 0.0, -0.05))
@@ -261,3 +262,40 @@ def test_what_cannot_be_linearised(words, message):
         lw.linearize(regulated(), **words, method="psi_s", h=0.02)
     with pytest.raises(lw.SceneError, match="needs a controller"):
         lw.linearize(neutral(), closed=True, h=0.02)
+
+
+def by_equations(start, rudder):
+    """Continuous (F, G): rates of position, rotation, velocity and angular velocity, by these and by the rudder."""
+    R, nu = start.attitude, start.velocity
+
+    def rates(x, deflection):
+        turned = R @ Rotation.from_rotvec(x[3:6]).as_matrix()
+        velocity = np.concatenate([nu + x[6:9], x[9:]])
+        pushed = equations.acceleration(velocity, turned[2], deflection, equations.LEVER, equations.TORQUE)
+        # Without rates a rotation vector moves as they do.
+        return np.concatenate([turned @ velocity[:3], x[9:], pushed])
+
+    delta = 1e-6
+    F = [(rates(x, rudder) - rates(-x, rudder)) / (2.0 * delta) for x in delta * np.eye(12)]
+    G = (rates(np.zeros(12), rudder + delta) - rates(np.zeros(12), rudder - delta)) / (2.0 * delta)
+    return np.array(F).T, G, rates(np.zeros(12), rudder)[6:]
+
+
+@pytest.mark.slow
+def test_trim_and_model_of_remus_beside_equations_written_once_more():
+    scene = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0}, start=lw.Start(velocity=(1.5, 0.0, 0.0)))
+    left, errors = [], []
+    for h in (0.02, 0.01):
+        found = lw.trim(scene, method="psi_x", h=h)
+        F, G, rates = by_equations(found.start, found.commands["control_fins"][0])
+        left.append(np.abs(rates).max())
+        whole = expm(np.block([[F, G[:, None]], [np.zeros((1, 13))]]) * PERIOD)
+        linear = lw.linearize(scene, found, period=PERIOD)
+        errors.append([np.abs(linear.A - whole[:12, :12]).max(), np.abs(linear.B[:, 0] - whole[:12, 12]).max()])
+    # The steady speed is known, and so is the roll that the propeller's torque holds.
+    assert abs(found.values["speed"] - equations.CRUISE) < 1e-4
+    roll = np.arcsin(equations.TORQUE / (equations.LEVER * equations.WEIGHT))
+    assert abs(found.values["roll"] - roll) < 1e-4 and left[1] < 1e-4
+    # Order 2 of the steps, but for the differences of |v| v, which are first order in their own size, 1e-5.
+    ratios = np.array(errors[0]) / np.array(errors[1])
+    assert np.all(ratios > 3.5) and np.all(ratios < 4.5) and np.max(errors[1]) < 1e-2

@@ -47,7 +47,9 @@ def test_what_is_refused():
     noisy = scene(NONE)
     noise = lw.WrenchNoise(force=(0.1, 0.1, 0.1))
     noisy = lw.Scene(noisy.vehicle, noisy.environment, [*noisy.terms, noise], noisy.start, noisy.controller)
-    with pytest.raises(lw.SceneError, match="cannot choose its steps where noise is drawn once a step; leave out rtol and atol"):
+    with pytest.raises(
+        lw.SceneError, match="cannot choose its steps where noise is drawn once a step; leave out rtol and atol"
+    ):
         lw.solve(noisy, chosen(1e-6), h=PERIOD, t1=1.0)
     # Looks are at whole steps of the run, whatever steps are chosen within.
     sentence = "controller.period = 0.1: is no whole number of steps of 0.04 s; give 0.08 or 0.12 s, or another step"

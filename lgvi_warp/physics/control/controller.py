@@ -80,13 +80,13 @@ class Controller:
 
     def _check_wishes(self, faults: Faults) -> None:
         """Require that what laws and guidance read of the wanted motion is given."""
-        given: set[str] = set()
+        wishes: set[str] = set()
         for part in (*self.guidance, *self.laws):
             for wish in part.needs:
-                if wish not in given:
+                if wish not in wishes:
                     remedy = 'give guidance that wants it, such as [[controller.guidance]] type = "set_point"'
                     faults.add(part.section, part.key, f"needs a wanted {wish}, which no guidance gives", remedy)
-            given |= set(part.gives)
+            wishes |= set(part.gives)
 
     @property
     def parts(self) -> tuple[Part, ...]:
@@ -147,14 +147,14 @@ class Controller:
         actuators = {key: term for key, term in able.items() if key in {part.to for part in allocation}}
         self._check_faults(faults, actuators)
         faults.raise_if_any()
-        whole = copy.copy(self)
-        object.__setattr__(whole, "allocation", tuple(part.informed(self.faults, self.asked) for part in allocation))
-        object.__setattr__(whole, "actuators", actuators)
-        object.__setattr__(whole, "laws", tuple(part.of_vehicle(nominal or {}) for part in self.laws))
+        wired = copy.copy(self)
+        object.__setattr__(wired, "allocation", tuple(part.informed(self.faults, self.asked) for part in allocation))
+        object.__setattr__(wired, "actuators", actuators)
+        object.__setattr__(wired, "laws", tuple(part.of_vehicle(nominal or {}) for part in self.laws))
         channels = {key: term.channels for key, term in actuators.items()}
         callback = self.callback
         answers = 0 if callback is None else channels[callback.to] if callback.to else 6
-        controller = whole.on(Bus.of(channels, self.period, answers))
+        controller = wired.on(Bus.of(channels, self.period, answers))
         for part in controller.allocation:
             part.check_actuator(faults)
         faults.raise_if_any()
@@ -213,23 +213,23 @@ class Controller:
 
     def _allocation(self, faults: Faults, able: Mapping[str, Term]) -> tuple[Allocation, ...]:
         """The allocation, or the default one, checked."""
-        given = tuple(self.allocation)
+        parts = tuple(self.allocation)
         if self.callback is not None and self.callback.to:
-            given = (CallbackCommands(to=self.callback.to), *(part for part in given if part.type))
-        if not given:
+            parts = (CallbackCommands(to=self.callback.to), *(part for part in parts if part.type))
+        if not parts:
             if len(able) != 1:
                 fault = "is missing" if able else "has no actuator: no term of the scene takes commands"
                 which = " or ".join(map(repr, able)) if able else "thrusters, control_fins or control_wrench"
                 faults.add("allocation", "", fault, f"give [[controller.allocation]] to = {which}")
                 return ()
-            given = (PseudoInverse(to=next(iter(able))),)
-        wrong = [part.to for part in given if not isinstance(part.to, str)]
+            parts = (PseudoInverse(to=next(iter(able))),)
+        wrong = [part.to for part in parts if not isinstance(part.to, str)]
         for value in wrong:
             faults.add("allocation.to", value, "is not a text", "give the name of a term that takes commands")
         if wrong:
             return ()
-        counts = Counter(part.to for part in given)
-        for part in given:
+        counts = Counter(part.to for part in parts)
+        for part in parts:
             if part.to not in able:
                 faults.add("allocation.to", part.to, "is no term that takes commands", closest(part.to, able))
             elif able[part.to].own_commands:
@@ -237,7 +237,7 @@ class Controller:
                 faults.add("allocation.to", part.to, problem, f"leave {part.to}.command and its schedule out")
         for key in (key for key, count in counts.items() if count > 1):
             faults.add("allocation.to", key, f"is named by {counts[key]} allocations", "keep one of them")
-        return given
+        return parts
 
     def _check_faults(self, faults: Faults, actuators: Mapping[str, Term]) -> None:
         counts = {part.key: READINGS[part.of] for part in self.sensors if isinstance(part, Sensor)}

@@ -100,9 +100,9 @@ def saved_fields(controller: Controller | None) -> dict[str, Field]:
     fields = {name: TABLE[name] for name in FIELDS}
     if controller is None or controller.bus is None:
         return fields
-    own = {name: signal.field for name, signal in SIGNALS.items()}
+    signals = {name: signal.field for name, signal in SIGNALS.items()}
     channels = sum(count for _, count in controller.bus.commands.values())
-    return fields | own | {name: replace(own[name], shape=(channels,)) for name in CHANNELS}
+    return fields | signals | {name: replace(signals[name], shape=(channels,)) for name in CHANNELS}
 
 
 def has_shape(name: str, shape: tuple[int, ...]) -> bool:

@@ -52,6 +52,30 @@ def export(chosen: argparse.Namespace) -> int:
     return 0
 
 
+def report(chosen: argparse.Namespace) -> int:
+    """Run the verb report: write one HTML file about a run or a study.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 0.
+
+    Raises:
+        SceneError: The folder holds no run and no study.
+    """
+    import webbrowser
+
+    from lgvi_warp.views.report import report as write_report
+
+    path = write_report(chosen.dir, chosen.out or chosen.dir / "report.html")
+    if not chosen.quiet:
+        print(file_line(path))
+    if chosen.open:
+        webbrowser.open(path.resolve().as_uri())
+    return 0
+
+
 # Most lines on damage.
 MOST_SAID = 20
 

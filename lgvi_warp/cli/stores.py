@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from lgvi_warp.cli.report import file_line, members_line, print_faults
+from lgvi_warp.cli.report import controller_lines, file_line, members_line, print_faults
 
 
 def merge(chosen: argparse.Namespace) -> int:
@@ -95,7 +95,7 @@ def info_of_run(path: Path) -> int:
     provenance = contents["provenance"]
     version = provenance["versions"]["lgvi-warp"]
     print(f"run         {contents['path']} ({contents['bytes'] / 1e6:.1f} MB), lgvi-warp {version}")
-    print(members_line(contents["members"], provenance))
+    print("\n".join([members_line(contents["members"], provenance), *controller_lines(provenance["scene"])]))
     fields = ", ".join(contents["fields"])
     print(f"samples     {contents['samples']} times" + (f" of {fields}" if fields else ", not of all members"))
     if contents["keepers"]:

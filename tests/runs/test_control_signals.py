@@ -102,6 +102,21 @@ def looked():
     return np.arange(STEPS + 1) // EVERY * EVERY
 
 
+def test_a_scene_names_what_is_saved(whole):
+    names = ("position", "command")
+    run = lw.Scene.from_dict({**scene().to_dict(), "run": {"save_every": H, "save_fields": list(names)}})
+    assert lw.Scene.from_dict(run.to_dict()).run.save_fields == list(names)
+    members = fleet()
+    members.scene = run
+    result = lw.solve(members, "psi_s", h=H, t1=STEPS * H)
+    assert tuple(result.samples) == names and same(result, whole, names=names)
+    # The call decides, where it says something.
+    assert lw.solve(members, "psi_s", h=H, t1=H, save=lw.SaveAt(fields=("velocity",))).samples.keys() == {"velocity"}
+    bare = lw.Scene.from_dict({**scene(controller=False).to_dict(), "run": {"save_fields": ["command"]}})
+    with pytest.raises(lw.SceneError, match=r"run.save_fields = 'command': is a signal of a controller"):
+        lw.solve(bare, "psi_s", h=H, t1=H)
+
+
 def free(result):
     """Members that no event stopped."""
     return np.flatnonzero(result.status == 0)

@@ -23,6 +23,7 @@ class LoopBegin(ControlLaw):
     """
 
     device: ClassVar[str] = "loop_gain:begin"
+    shared_rows: ClassVar[int] = 6
 
     asks: Sequence[str] = ()
 
@@ -32,9 +33,9 @@ class LoopBegin(ControlLaw):
         return tuple(self.asks)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The rows where a look notes the whole demand, once all laws have acted."""
+        """The rows that both share."""
         assert self.bus is not None
-        return Packed(dict(numbers) | {"demand": self.bus.rows})
+        return Packed(dict(numbers) | {"demand": self.bus.answer})
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -15,7 +15,7 @@ def made(features):
     ends = "end" in features
 
     def params(width, real):
-        """Params: the factor; first of six rows of the memory that lie idle while laws act."""
+        """Params: the factor; first of six rows of the memory that both share."""
         return struct("LoopGain", **({"factor": lane(width, real)} if ends else {}), demand=wp.int32)
 
     @wp.func

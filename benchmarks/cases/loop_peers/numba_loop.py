@@ -114,7 +114,11 @@ def make_advance(numbers, h, every, looks):
     @nb.njit(fastmath=False, error_model="numpy")
     def advance(bs, qs, nus, Oms, kps, krs, nets, ds):
         for i in range(len(bs)):
-            b, nu, Om = (bs[i, 0], bs[i, 1], bs[i, 2]), (nus[i, 0], nus[i, 1], nus[i, 2]), (Oms[i, 0], Oms[i, 1], Oms[i, 2])
+            b, nu, Om = (
+                (bs[i, 0], bs[i, 1], bs[i, 2]),
+                (nus[i, 0], nus[i, 1], nus[i, 2]),
+                (Oms[i, 0], Oms[i, 1], Oms[i, 2]),
+            )
             q, net = (qs[i, 0], qs[i, 1], qs[i, 2], qs[i, 3]), nets[i]
             kp, kr = (kps[i, 0], kps[i, 1], kps[i, 2]), (krs[i, 0], krs[i, 1], krs[i, 2])
             d = ds[i, 0], ds[i, 1], ds[i, 2]
@@ -157,7 +161,7 @@ def make(problem):
     numbers = problem.numbers
     starts = numbers["b"], notation.quaternion_from_matrix(numbers["R"]), numbers["nu"], numbers["Om"]
     states = [np.array(x, order="C") for x in starts]
-    own = [np.ascontiguousarray(numbers[name]) for name in ("kp", "kr", "net", "d")]
+    varied = [np.ascontiguousarray(numbers[name]) for name in ("kp", "kr", "net", "d")]
     compiled = make_advance(numbers, problem.h, problem.every, problem.looks)
 
     def begin():
@@ -167,4 +171,4 @@ def make(problem):
     def end():
         return states[0].copy(), notation.matrix_from_quaternion(states[1])
 
-    return Way(begin, lambda: compiled(*states, *own), end)
+    return Way(begin, lambda: compiled(*states, *varied), end)

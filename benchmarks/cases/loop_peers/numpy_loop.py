@@ -1,9 +1,9 @@
 """The loop over arrays of members in NumPy, as an expert would write it.
 
 A row is one number of all members of a block, so that every operation runs over contiguous memory; results go into arrays
-that are there already; a block is as large as the processor's second cache holds. Crosswise products are differences of
-shifted rows: the first two of three rows stand once more after the third. The attitude is three columns, which a step
-turns like any other numbers.
+that exist already; a block is so large that calls cost little, and so small that a few rows stay in the caches. Cross products
+are differences of shifted rows: the first two of three rows stand once more after the third. The attitude is three columns,
+which a step turns like any other numbers.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from benchmarks.cases.loop_peers.problem import LIMITS, Way
 
 # Rows of a state: b, the columns of R, nu, Om.
 ROWS, COLUMNS, NU, OM, VELOCITIES = 18, slice(3, 12), slice(12, 15), slice(15, 18), slice(12, 18)
-BLOCK = 1024
+BLOCK = 2048
 LIMIT, LIMIT_R = LIMITS
 
 
@@ -43,8 +43,8 @@ class Block:
         self.linear, self.quadratic = numbers["linear"][:, None], numbers["quadratic"][:, None]
         self.y, self.stage, self.rate, self.sum, self.moved = (np.empty((ROWS, n)) for _ in range(5))
         self.momentum, self.velocity, self.down = np.empty((2, 5, n)), np.empty((2, 5, n)), np.empty((5, n))
-        self.wrench, self.six, self.pairs, self.three = np.empty((6, n)), np.empty((6, n)), np.empty((2, 3, n)), np.empty((3, n))
-        self.integral, self.error = np.empty((6, n)), np.empty((6, n))
+        self.wrench, self.six, self.integral, self.error = (np.empty((6, n)) for _ in range(4))
+        self.pairs, self.three = np.empty((2, 3, n)), np.empty((3, n))
 
     def begin(self):
         """The start, and no error before it."""
@@ -76,7 +76,7 @@ class Block:
 
     def rates(self, y):
         """The rates of a state, into self.rate."""
-        k, c, V = self.rate, y[COLUMNS].reshape(3, 3, -1), self.velocity
+        rate, c, V = self.rate, y[COLUMNS].reshape(3, 3, -1), self.velocity
         V[:, :3] = y[VELOCITIES].reshape(2, 3, -1)
         V[:, 3:] = V[:, :2]
         nu, Om = V
@@ -84,13 +84,13 @@ class Block:
         self.momentum[:, 3:] = self.momentum[:, :2]
         self.down[:3] = y[5:12:3]
         self.down[3:] = self.down[:2]
-        self.turned(k[:3], c, nu)
-        turning = k[COLUMNS].reshape(3, 3, -1)
-        for i, j, l in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-            np.multiply(c[j], Om[l], out=turning[i])
-            np.multiply(c[l], Om[j], out=self.three)
+        self.turned(rate[:3], c, nu)
+        turning = rate[COLUMNS].reshape(3, 3, -1)
+        for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            np.multiply(c[j], Om[k], out=turning[i])
+            np.multiply(c[k], Om[j], out=self.three)
             turning[i] -= self.three
-        push, six = k[VELOCITIES], self.six
+        push, six = rate[VELOCITIES], self.six
         np.abs(y[VELOCITIES], out=six)
         six *= self.quadratic
         six += self.linear
@@ -132,9 +132,9 @@ class Block:
         np.subtract(self.goal, y[:3], out=error[:3])
         # Rows of R are directions of inertial axes in the body; half the sum of R_i x R_d,i.
         e_R = error[3:]
-        for i, j, l in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-            np.matmul(0.5 * self.R_d[:, l], c[j], out=e_R[i])
-            np.matmul(0.5 * self.R_d[:, j], c[l], out=moved[0])
+        for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            np.matmul(0.5 * self.R_d[:, k], c[j], out=e_R[i])
+            np.matmul(0.5 * self.R_d[:, j], c[k], out=moved[0])
             e_R[i] -= moved[0]
         force, torque, down = self.wrench[:3], self.wrench[3:], y[5:12:3]
         np.multiply(self.kp, error[:3], out=moved[:3])
@@ -150,9 +150,9 @@ class Block:
         torque += six[:3]
         np.multiply(self.kw, y[OM], out=six[:3])
         torque += six[:3]
-        for i, j, l in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-            np.multiply(down[l], self.d0[j], out=six[i])
-            np.multiply(down[j], self.d0[l], out=six[3])
+        for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            np.multiply(down[k], self.d0[j], out=six[i])
+            np.multiply(down[j], self.d0[k], out=six[3])
             six[i] -= six[3]
         np.subtract(six[:3], torque, out=torque)
 

@@ -25,6 +25,8 @@ class Shared:
     R_d: wp.mat33d
     M: wp.vec3d
     J: wp.vec3d
+    M_inverse: wp.vec3d
+    J_inverse: wp.vec3d
     net0: wp.float64
     d0: wp.vec3d
     linear_force: wp.vec3d
@@ -73,8 +75,8 @@ def rates(y: State, force: wp.vec3d, torque: wp.vec3d, net: wp.float64, d: wp.ve
     tau = tau - dragged(c.linear_torque, c.quadratic_torque, y.Om)
     k.b = wp.quat_rotate(y.q, y.nu)
     k.q = half * (y.q * wp.quatd(y.Om[0], y.Om[1], y.Om[2], zero))
-    k.nu = wp.cw_div(f, c.M)
-    k.Om = wp.cw_div(tau, c.J)
+    k.nu = wp.cw_mul(c.M_inverse, f)
+    k.Om = wp.cw_mul(c.J_inverse, tau)
     return k
 
 
@@ -138,6 +140,8 @@ def make(problem):
     c = Shared()
     for name in SHARED:
         setattr(c, name, wp.vec3d(*numbers[name]))
+    for name in ("M", "J"):
+        setattr(c, f"{name}_inverse", wp.vec3d(*(1.0 / numbers[name])))
     for name in ("linear", "quadratic"):
         for part, values in zip(("force", "torque"), np.split(numbers[name], 2), strict=True):
             setattr(c, f"{name}_{part}", wp.vec3d(*values))
@@ -145,9 +149,9 @@ def make(problem):
     starts = [array(numbers["b"], wp.vec3d), array(last(notation.quaternion_from_matrix(numbers["R"])), wp.quatd)]
     starts += [array(numbers[name], wp.vec3d) for name in ("nu", "Om")]
     states = [wp.clone(x) for x in starts]
-    own = [array(numbers["kp"], wp.vec3d), array(numbers["kr"], wp.vec3d)]
-    own += [array(numbers["net"], wp.float64), array(numbers["d"], wp.vec3d)]
-    inputs = [*states, *own, c, wp.float64(problem.h), problem.every, problem.looks]
+    varied = [array(numbers["kp"], wp.vec3d), array(numbers["kr"], wp.vec3d)]
+    varied += [array(numbers["net"], wp.float64), array(numbers["d"], wp.vec3d)]
+    inputs = [*states, *varied, c, wp.float64(problem.h), problem.every, problem.looks]
     launch = wp.launch(loop, problem.members, inputs=inputs, device="cpu", record_cmd=True)
 
     def begin():

@@ -138,6 +138,7 @@ from lgvi_warp.views.plots import plot as plot
 from lgvi_warp.views.plots import plot_stability as plot_stability
 from lgvi_warp.views.plots import plot_statistics as plot_statistics
 from lgvi_warp.views.plots import plot_tradeoff as plot_tradeoff
+from lgvi_warp.views.report import report as report
 from lgvi_warp.views.rerun import log_rerun as log_rerun
 from lgvi_warp.views.sensitivity import plot_sensitivity as plot_sensitivity
 

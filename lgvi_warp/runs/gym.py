@@ -281,10 +281,10 @@ class Vehicles:
             raise needed().error.ResetNeeded("an episode has ended, or none has begun: call reset first")
         if episodes.steps + episodes.every > self._plan.grid.steps:
             raise needed().error.ResetNeeded("steps are counted up to 2^31: reset all environments")
-        given = np.asarray(actions, dtype=np.float64)
-        if given.shape != self.action_space.shape:
-            raise ValueError(f"actions: have shape {given.shape}; give {self.action_space.shape}")
-        scaled = given if self._scale is None else given * self._scale
+        wanted = np.asarray(actions, dtype=np.float64)
+        if wanted.shape != self.action_space.shape:
+            raise ValueError(f"actions: have shape {wanted.shape}; give {self.action_space.shape}")
+        scaled = wanted if self._scale is None else wanted * self._scale
         if self._columns is None:
             self._answer = scaled
         else:

@@ -19,6 +19,7 @@ OPTIONAL = {
     "netCDF4",
     "pyarrow",
     "gymnasium",
+    "tomlkit",
 }
 DEPENDENCIES = {"numpy", "scipy", "warp"} | OPTIONAL
 

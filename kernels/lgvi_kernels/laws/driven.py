@@ -55,9 +55,9 @@ def approached(n: Any, u: Any, length: Any, lag: Any, rate: Any):
     # How long the rate limits; where it is 0 it does so for ever.
     fast = positive(rate, (size - rate / lag) / positive(rate, rate, unity), length)
     fast = positive(size, least(greatest(fast, zero), length), zero)
-    left = size - fast * rate
-    left = left * exponential(-((length - fast) * lag))
-    return u - positive(gap, left, -left)
+    gap_left = size - fast * rate
+    gap_left = gap_left * exponential(-((length - fast) * lag))
+    return u - positive(gap, gap_left, -gap_left)
 
 
 def make_driven(name, rows, limit, lag, rate, features):
@@ -94,9 +94,9 @@ def make_driven(name, rows, limit, lag, rate, features):
     def move(state: Any, view: Any, p: Any, length: Any):
         if wp.static(moves):
             time = length * ones(view.b.x)
-            left = time
+            remaining = time
             if wp.static(not limited):
-                left = left_after(time, row1(view, p.first + wp.static(lag)))
+                remaining = left_after(time, row1(view, p.first + wp.static(lag)))
             for i in range(p.count):
                 at = p.first + wp.static(rows) * i
                 n = remembered(view, p.memory + i)
@@ -108,8 +108,8 @@ def make_driven(name, rows, limit, lag, rate, features):
                     n = n + clamp(u - n, -most, most)
                 else:
                     if p.alike == 0:
-                        left = left_after(time, row1(view, at + wp.static(lag)))
-                    n = u + left * (n - u)
+                        remaining = left_after(time, row1(view, at + wp.static(lag)))
+                    n = u + remaining * (n - u)
                 remember(view, p.memory + i, n)
         return state
 

@@ -109,14 +109,14 @@ def polynomial_inverse(view: Any, first: int, size: int, powers: int, t: Any, si
     """
     unity = ones(t)
     zero = unity - unity
-    other = sided * wp.static(INVERSE_ROWS)
-    highest = row_of_side(view, first + 2, other, side)
-    slope_floor = row_of_side(view, first + 3, other, side)
-    value = least(t, row_of_side(view, first + 1, other, side))
-    part = least(value * row_of_side(view, first, other, side), unity)
+    astern = sided * wp.static(INVERSE_ROWS)
+    highest = row_of_side(view, first + 2, astern, side)
+    slope_floor = row_of_side(view, first + 3, astern, side)
+    value = least(t, row_of_side(view, first + 1, astern, side))
+    part = least(value * row_of_side(view, first, astern, side), unity)
     s = root(part / (unity + root(unity - part)))
     z = s + s - unity
-    w = clamp(sixteen(view, first + 4, other, side, z), zero, highest)
+    w = clamp(sixteen(view, first + 4, astern, side, z), zero, highest)
     for step in range(wp.static(NEWTON_STEPS)):
         # The polynomial is w g, and its slope g + w g'.
         g = row_of_side(view, powers + size - 1, sided * size, side)

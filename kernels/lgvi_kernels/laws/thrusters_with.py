@@ -25,9 +25,9 @@ def made(features):
     tables = "table" in features
     shape = "table" if tables else "polynomial" if "polynomial" in features else "square"
     curve = getattr(thrust_curves, f"{shape}_curve")
-    own = PROPELLER_ROWS if propeller else ROWS
-    rows = own + 3
-    name, places = f"Thrusters_{'_'.join(features)}", (rows, own, own + 1, own + 2)
+    first_of_motion = PROPELLER_ROWS if propeller else ROWS
+    rows = first_of_motion + 3
+    name, places = f"Thrusters_{'_'.join(features)}", (rows, first_of_motion, first_of_motion + 1, first_of_motion + 2)
     following = make_driven(name, *places, features) if driven else make_scheduled(name, *places)
     place = following.place
 

@@ -75,25 +75,37 @@ class PseudoInverse(Allocation):
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """For each set of losses the lines of the pseudo-inverse; each channel's wrench and numbers; curves and inverses."""
-        own = context.own(self.actuator)
-        B = self.asked[:, None] * self.actuator.effect(own, context.parameters, numbers["speed"])
+        actuator_numbers = context.own(self.actuator)
+        B = self.asked[:, None] * self.actuator.effect(actuator_numbers, context.parameters, numbers["speed"])
         weights = numbers.get("weights", np.ones((1, B.shape[2])))
-        lost, limit = self.lost_channels, own["limit"]
+        lost, limit = self.lost_channels, actuator_numbers["limit"]
         rows = []
         for s in range(1 << len(lost)):
             lines = _lines(B, weights, [channel for j, channel in enumerate(lost) if s >> j & 1])
             rows += [rest_rows(B @ lines), lines.reshape(len(lines), -1)]
         keys = {"coefficient": np.ones_like(limit), "coefficient_astern": np.ones_like(limit), "dead_band": 0.0 * limit}
-        curve = [own.get(key, value) for key, value in keys.items()]
+        curve = [actuator_numbers.get(key, value) for key, value in keys.items()]
         share = np.zeros((1, B.shape[2]))
         share[0, list(lost)] = 2.0 ** np.arange(len(lost))
-        columns = (limit, *curve, self.steps_of_loss(context), share, *self._largest(own, limit - curve[2]))
+        columns = (
+            limit,
+            *curve,
+            self.steps_of_loss(context),
+            share,
+            *self._largest(actuator_numbers, limit - curve[2]),
+        )
         channels = side_by_side(np.swapaxes(B, -1, -2), *(column[..., None] for column in columns))
         rows.append(channels.reshape(len(channels), -1))
-        curves, size = self._curves(own)
+        curves, size = self._curves(actuator_numbers)
         assert self.bus is not None
         first, count = self.bus.commands[self.to]
-        words = {"commands": first, "count": count, "sets": 1 << len(lost), "size": size, "sided": self._sided(own)}
+        words = {
+            "commands": first,
+            "count": count,
+            "sets": 1 << len(lost),
+            "size": size,
+            "sided": self._sided(actuator_numbers),
+        }
         return Packed(words | {"shared": sum(block.shape[1] for block in rows)}, side_by_side(*rows, curves))
 
     def _sided(self, own: Numbers) -> int:

@@ -79,8 +79,8 @@ def made(features):
 
     @wp.func
     def allocate_efforts(w: Any, y: Any, p: Any):
-        """t = W^-1 B^T (B W^-1 B^T)^+ w; left of w are (I - B B^+) w and B times what the commands cannot deliver of t."""
-        left = rest(w, y, p.first)
+        """t = W^-1 B^T (B W^-1 B^T)^+ w; undelivered are (I - B B^+) w and B times what the commands cannot deliver of t."""
+        undelivered = rest(w, y, p.first)
         stride = wp.static(REST) + 6 * p.count
         channels = p.first + p.sets * stride
         unity = ones(y.position.x)
@@ -93,8 +93,8 @@ def made(features):
             for s in range(1, p.sets):
                 other = rest(w, y, p.first + s * stride)
                 chosen = y.h.dtype(0.5) * unity - absolute(lost - y.h.dtype(s) * unity)
-                left.force = positive3(chosen, other.force, left.force)
-                left.torque = positive3(chosen, other.torque, left.torque)
+                undelivered.force = positive3(chosen, other.force, undelivered.force)
+                undelivered.torque = positive3(chosen, other.torque, undelivered.torque)
         for i in range(p.count):
             at = channels + wp.static(ROWS) * i
             line = p.first + wp.static(REST) + 6 * i
@@ -117,8 +117,8 @@ def made(features):
             cut = positive(wanted - t, cut, zero)
             cut = positive(c, cut, absolute(effort))
             cut = positive(effort, cut, -cut)
-            left.force = left.force + cut * row3(y, at)
-            left.torque = left.torque + cut * row3(y, at + 3)
-        return left
+            undelivered.force = undelivered.force + cut * row3(y, at)
+            undelivered.torque = undelivered.torque + cut * row3(y, at + 3)
+        return undelivered
 
     return device(__name__, features, params=params, allocate=allocate_efforts)

@@ -19,6 +19,7 @@ OPTIONAL = {
     "netCDF4",
     "pyarrow",
     "gymnasium",
+    "control",
     "tomlkit",
 }
 DEPENDENCIES = {"numpy", "scipy", "warp"} | OPTIONAL

@@ -218,7 +218,7 @@ def autopilot():
 @pytest.mark.slow
 @pytest.mark.parametrize("loop", ["depth_pid", None])
 def test_a_factor_of_1_changes_nothing(loop):
-    """Two of six components have actuators, and both laws have integrals: no row of the memory is another's."""
+    """Laws with integrals of their own, whose demands are added: the factor is that of one, or of both."""
     scene = dataclasses.replace(autopilot(), start=lw.Start(velocity=(1.54, 0.0, 0.0), position=(0.0, 0.0, 1.0)))
     fleet = lw.Ensemble(scene, 3, 1, {"heading_pid.ki": lw.Uniform(0.1, 0.3), "depth_pid.ki": lw.Uniform(0.01, 0.03)})
     motion = study.Study(fleet, loop, 20.0, 10.0, 1e-3, None, 0.01).at(np.arange(3)).motion

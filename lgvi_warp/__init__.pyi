@@ -147,12 +147,14 @@ from lgvi_warp.studies.stability.map import StabilityMap as StabilityMap
 from lgvi_warp.studies.stability.map import stability_map as stability_map
 from lgvi_warp.studies.suggest import suggest as suggest
 from lgvi_warp.studies.tradeoff import tradeoff as tradeoff
+from lgvi_warp.views.choice import shown as shown
 from lgvi_warp.views.plots import plot as plot
 from lgvi_warp.views.plots import plot_stability as plot_stability
 from lgvi_warp.views.plots import plot_statistics as plot_statistics
 from lgvi_warp.views.plots import plot_tradeoff as plot_tradeoff
 from lgvi_warp.views.report import report as report
 from lgvi_warp.views.rerun import log_rerun as log_rerun
+from lgvi_warp.views.rerun import show as show
 from lgvi_warp.views.sensitivity import plot_sensitivity as plot_sensitivity
 
 __version__: str

@@ -64,7 +64,7 @@ def test_the_recording_holds_every_pose(finished):
     from rerun.chunk import RrdReader
 
     rows = 0
-    for chunk in RrdReader(finished[0] / "fleet.rrd").stream().filter(content="/world/fleet/**"):
+    for chunk in RrdReader(finished[0] / "fleet.rrd").stream().filter(content="/world/bodies/**"):
         batch = chunk.to_record_batch()
         column = next((name for name in batch.schema.names if name.endswith("translations")), None)
         if column and "sim_time" in batch.schema.names:

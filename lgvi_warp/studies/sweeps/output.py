@@ -1,0 +1,152 @@
+"""Files of a sweep: tables, its provenance, and a summary in words."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common import files as durable
+from lgvi_warp.common import machine
+from lgvi_warp.common.tables import write_csv
+from lgvi_warp.studies.files import finite_or_none
+from lgvi_warp.studies.sweeps.found import SUCCESS, Compared, Sweep
+from lgvi_warp.studies.sweeps.success import none_text
+
+# Worst members that are listed.
+LISTED = 20
+
+
+def save(found: Sweep, folder: str | os.PathLike[str]) -> list[Path]:
+    """Write table.csv, comparison.csv, ranking.csv, worst.csv, sweep.json and summary.md.
+
+    Args:
+        found: the sweep.
+        folder: of the files, made if needed.
+
+    Returns:
+        Paths of the files.
+
+    Raises:
+        OSError: they cannot be written.
+    """
+    target = Path(folder)
+    target.mkdir(parents=True, exist_ok=True)
+    tables = {"table": found.rows(), "comparison": [row.row() for row in against_baseline(found)], "ranking": found.ranking(),
+              "worst": found.worst(LISTED)}  # fmt: skip
+    files = [write_csv(rows, target / f"{name}.csv") for name, rows in tables.items()]
+    texts = {"sweep.json": json.dumps(finite_or_none(provenance(found)), indent=1), "summary.md": summary(found)}
+    for name, text in texts.items():
+        with durable.placed(target / name) as beside:
+            beside.write_text(text, encoding="utf-8")
+        files.append(target / name)
+    return files
+
+
+def against_baseline(found: Sweep) -> list[Compared]:
+    """Return the comparisons of all other cases with the baseline.
+
+    Args:
+        found: the sweep.
+    """
+    others = [case for case in found.cases if case != found.baseline]
+    rows = [row for case in others for row in found.compare(found.baseline, case)]
+    return found.corrected_for_number(rows)
+
+
+def provenance(found: Sweep) -> dict[str, Any]:
+    """Return all that the sweep follows from, of plain types.
+
+    Args:
+        found: the sweep.
+    """
+    setup = found.setup
+    cells = [{"case": cell.case.name, "at": {name: _plain(value) for name, value in cell.point.items()}, "key": cell.key,
+              "fixed": list(cell.fixed), "refused": found.record(cell).refused, "messages": list(found.record(cell).messages)}
+             for cell in found.cells]  # fmt: skip
+    scene = setup.scene.to_dict()
+    scene.pop("ensemble", None)
+    metrics = {name: metric.to_dict() | {"unit": found.unit(name)} for name, metric in setup.metrics.items()}
+    return {"scene": scene, "ensemble": setup.members.to_dict(), "metrics": metrics, "success": found.conditions.to_dict(),
+            "baseline": found.baseline, "confidence": found.confidence, "interval": found.interval,
+            "settings": {name: _plain(value) for name, value in setup.settings.items()}, "cells": cells,
+            "versions": machine.versions()}  # fmt: skip
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, float) and not np.isfinite(value):
+        return str(value)
+    return value if isinstance(value, int | float | str | bool | list | None) else str(value)
+
+
+def percent(value: float) -> str:
+    """Return a fraction in percent, as text.
+
+    Args:
+        value: the fraction.
+    """
+    return f"{100.0 * value:.4g}"
+
+
+def summary(found: Sweep) -> str:
+    """Return the sweep in words, as Markdown.
+
+    Args:
+        found: the sweep.
+    """
+    count, level = found.members_count, f"{found.confidence:.0%}"
+    lines = [
+        "# Sweep",
+        "",
+        f"{count:,} members, the same in {len(found.cells)} cells; intervals at {level}.",
+        "",
+        "## Success",
+        "",
+    ]
+    lines += [f"- {_cell_text(found, cell)}" for cell in found.cells]
+    if len(found.cases) > 1:
+        lines += ["", "## Rank", ""]
+        for row in found.ranking():
+            better = f"; really better than {row['better_than']}" if row["better_than"] else ""
+            lines.append(f"{row['rank']}. {row['case']}: {percent(row['value'])} % "
+                         f"({percent(row['lower'])} to {percent(row['upper'])}){better}")  # fmt: skip
+        lines += ["", f"## Against {found.baseline}", ""]
+        # With a grid metrics would be too many for a page.
+        real = [row for row in against_baseline(found) if row.real and (row.of == SUCCESS or not found.setup.axes)]
+        lines += [f"- {_compared_text(found, row)}" for row in real] or ["- No difference of success is real."]
+        lines += ["", "comparison.csv has the differences of all metrics."]
+    lines += ["", "## Worst members", ""]
+    for row in found.worst(5):
+        at = ", ".join(f"{name} = {row[name]}" for name in found.setup.axes)
+        lines.append(f"- member {row['member']} of {row['case']}{' at ' + at if at else ''}, status {row['status']}")
+    return "\n".join(lines) + "\n"
+
+
+def _cell_text(found: Sweep, cell: Any) -> str:
+    record = found.record(cell)
+    if record.refused:
+        return f"{cell.name}: refused: {record.refused}"
+    passed = found.passed(cell)
+    value, lower, upper = found.success(cell.case.name, cell.point)
+    counts = f"{int(passed.sum()):,} of {len(passed):,}, {percent(value)} %"
+    text = f"{cell.name}: passes {percent(lower)} to {percent(upper)} % ({counts})"
+    more = none_text(int(passed.sum()), len(passed), found.confidence)
+    return f"{text}; {more}" if more else text
+
+
+def _compared_text(found: Sweep, row: Compared) -> str:
+    d, at = row.difference, ", ".join(f"{name} = {value}" for name, value in row.point.items())
+    where = f" at {at}" if at else ""
+    if row.of == SUCCESS:
+        word = "better" if d.value > 0.0 else "worse"
+        ends = sorted((abs(d.lower), abs(d.upper)))
+        seen = f"{row.only[1]:,} pass only there, {row.only[0]:,} only with {row.first}" if row.only else ""
+        points = f"{percent(ends[0])} to {percent(ends[1])} points"
+        return f"{row.second}{where}: {word} by {points}, seen on the same members ({seen})"
+    unit = "" if found.unit(row.of) == "1" else f" {found.unit(row.of)}"
+    return f"{row.second}{where}: {row.of} {d.value:+.4g}{unit} ({d.lower:+.4g} to {d.upper:+.4g}), from {row.values[0]:.4g}"

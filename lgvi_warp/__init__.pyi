@@ -154,7 +154,7 @@ from lgvi_warp.studies.stability.map import StabilityMap as StabilityMap
 from lgvi_warp.studies.stability.map import stability_map as stability_map
 from lgvi_warp.studies.suggest import suggest as suggest
 from lgvi_warp.studies.sweeps.cases import Case as Case
-from lgvi_warp.studies.sweeps.found import Sweep as Sweep
+from lgvi_warp.studies.sweeps.output import Sweep as Sweep
 from lgvi_warp.studies.sweeps.sweep import sweep as sweep
 from lgvi_warp.studies.tradeoff import tradeoff as tradeoff
 from lgvi_warp.views.plots import plot as plot

@@ -11,8 +11,8 @@ import numpy as np
 
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import failed
-from lgvi_warp.studies.sweeps.found import SUCCESS, Sweep
-from lgvi_warp.studies.sweeps.output import against_baseline
+from lgvi_warp.studies.sweeps.found import SUCCESS
+from lgvi_warp.studies.sweeps.output import Sweep, against_baseline
 from lgvi_warp.studies.sweeps.setup import END, Cell
 from lgvi_warp.views.plots import figure_class, save_figure
 

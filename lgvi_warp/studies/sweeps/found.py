@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import itertools
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -77,8 +75,8 @@ class Compared:
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep:
-    """What a sweep found.
+class Findings:
+    """What a sweep found, without its files.
 
     Attributes:
         setup: what was run.
@@ -463,28 +461,6 @@ class Sweep:
             row |= {f"{name} {word}": float(np.quantile(good, at)) if some else np.nan for word, at in LEVELS.items()}
             row |= {f"{name} missing": len(x) - len(good)}
         return row
-
-    def save(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write table.csv, comparison.csv, ranking.csv, worst.csv, sweep.json and summary.md into a folder.
-
-        Args:
-            folder: of the files, made if needed.
-
-        Returns:
-            Paths of the files.
-
-        Raises:
-            OSError: they cannot be written.
-        """
-        from lgvi_warp.studies.sweeps import output
-
-        return output.save(self, folder)
-
-    def __str__(self) -> str:
-        """Return the sweep in words."""
-        from lgvi_warp.studies.sweeps import output
-
-        return output.summary(self)
 
     @property
     def table(self) -> xarray.Dataset:

@@ -13,40 +13,61 @@ from lgvi_warp.common import files as durable
 from lgvi_warp.common import machine
 from lgvi_warp.common.tables import write_csv
 from lgvi_warp.studies.files import finite_or_none
-from lgvi_warp.studies.sweeps.found import SUCCESS, Compared, Sweep
+from lgvi_warp.studies.sweeps.found import SUCCESS, Compared, Findings
 from lgvi_warp.studies.sweeps.success import none_text
 
 # Worst members that are listed.
 LISTED = 20
 
 
-def save(found: Sweep, folder: str | os.PathLike[str]) -> list[Path]:
-    """Write table.csv, comparison.csv, ranking.csv, worst.csv, sweep.json and summary.md.
+class Sweep(Findings):
+    """What a sweep found: success, comparisons, ranks, the worst members; as tables, files and words.
 
-    Args:
-        found: the sweep.
-        folder: of the files, made if needed.
-
-    Returns:
-        Paths of the files.
-
-    Raises:
-        OSError: they cannot be written.
+    Attributes:
+        setup: what was run.
+        cells: its cells, cases times points of the grid, in order.
+        records: what their members showed.
+        conditions: what a member must fulfil to pass.
+        baseline: name of the case that others are compared with.
+        confidence: confidence level of all intervals.
+        interval: how intervals of probabilities are formed.
     """
-    target = Path(folder)
-    target.mkdir(parents=True, exist_ok=True)
-    tables = {"table": found.rows(), "comparison": [row.row() for row in against_baseline(found)], "ranking": found.ranking(),
-              "worst": found.worst(LISTED)}  # fmt: skip
-    files = [write_csv(rows, target / f"{name}.csv") for name, rows in tables.items()]
-    texts = {"sweep.json": json.dumps(finite_or_none(provenance(found)), indent=1), "summary.md": summary(found)}
-    for name, text in texts.items():
-        with durable.placed(target / name) as beside:
-            beside.write_text(text, encoding="utf-8")
-        files.append(target / name)
-    return files
+
+    def save(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write table.csv, comparison.csv, ranking.csv, worst.csv, sweep.json and summary.md into a folder.
+
+        Args:
+            folder: of the files, made if needed.
+
+        Returns:
+            Paths of the files.
+
+        Raises:
+            OSError: they cannot be written.
+        """
+        target = Path(folder)
+        target.mkdir(parents=True, exist_ok=True)
+        comparison = [row.row() for row in against_baseline(self)]
+        tables = {
+            "table": self.rows(),
+            "comparison": comparison,
+            "ranking": self.ranking(),
+            "worst": self.worst(LISTED),
+        }
+        files = [write_csv(rows, target / f"{name}.csv") for name, rows in tables.items()]
+        texts = {"sweep.json": json.dumps(finite_or_none(provenance(self)), indent=1), "summary.md": summary(self)}
+        for name, text in texts.items():
+            with durable.placed(target / name) as beside:
+                beside.write_text(text, encoding="utf-8")
+            files.append(target / name)
+        return files
+
+    def __str__(self) -> str:
+        """Return the sweep in words."""
+        return summary(self)
 
 
-def against_baseline(found: Sweep) -> list[Compared]:
+def against_baseline(found: Findings) -> list[Compared]:
     """Return the comparisons of all other cases with the baseline.
 
     Args:
@@ -57,7 +78,7 @@ def against_baseline(found: Sweep) -> list[Compared]:
     return found.corrected_for_number(rows)
 
 
-def provenance(found: Sweep) -> dict[str, Any]:
+def provenance(found: Findings) -> dict[str, Any]:
     """Return all that the sweep follows from, of plain types.
 
     Args:
@@ -93,7 +114,7 @@ def percent(value: float) -> str:
     return f"{100.0 * value:.4g}"
 
 
-def summary(found: Sweep) -> str:
+def summary(found: Findings) -> str:
     """Return the sweep in words, as Markdown.
 
     Args:
@@ -127,7 +148,7 @@ def summary(found: Sweep) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _cell_text(found: Sweep, cell: Any) -> str:
+def _cell_text(found: Findings, cell: Any) -> str:
     record = found.record(cell)
     if record.refused:
         return f"{cell.name}: refused: {record.refused}"
@@ -139,7 +160,7 @@ def _cell_text(found: Sweep, cell: Any) -> str:
     return f"{text}; {more}" if more else text
 
 
-def _compared_text(found: Sweep, row: Compared) -> str:
+def _compared_text(found: Findings, row: Compared) -> str:
     d, at = row.difference, ", ".join(f"{name} = {value}" for name, value in row.point.items())
     where = f" at {at}" if at else ""
     if row.of == SUCCESS:

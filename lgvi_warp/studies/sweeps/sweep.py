@@ -10,7 +10,7 @@ from typing import Any
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
-from lgvi_warp.studies.sweeps.found import Sweep
+from lgvi_warp.studies.sweeps.output import Sweep
 from lgvi_warp.studies.sweeps.record import Record, Records
 from lgvi_warp.studies.sweeps.setup import Cell, Setup, made
 from lgvi_warp.studies.sweeps.success import INTERVALS, success_of

@@ -180,6 +180,40 @@ def plot_differences(found: Sweep, path: str | os.PathLike[str]) -> Path:
     return save_figure(figure, path, 150)
 
 
+def plot_causes(found: Sweep, path: str | os.PathLike[str]) -> Path:
+    """Draw which members pass over the two inputs that explain most of it, in the cell where most is open.
+
+    Args:
+        found: the sweep.
+        path: of the picture.
+
+    Returns:
+        The path.
+
+    Raises:
+        NothingToDraw: in no cell some members pass and some do not, or nothing varies.
+        ImportError: matplotlib is not installed (extra: viz).
+    """
+    open_ = [(abs(found.passed(cell).mean() - 0.5), cell.index, cell) for cell in _ran(found)]
+    off, _, cell = min(open_)
+    rows = found.causes(cell.case.name, cell.point)[:2]
+    if off == 0.5 or not rows:
+        raise NothingToDraw("in no case some members pass and some do not, or nothing varies")
+    passed, inputs = found.passed(cell)[:MOST_POINTS], found.inputs(cell)
+    x = inputs[rows[0]["input"]][:MOST_POINTS]
+    y = inputs[rows[1]["input"]][:MOST_POINTS] if len(rows) > 1 else np.arange(len(x))
+    figure = figure_class()(figsize=(6.5, 5.0), layout="constrained")
+    panel = figure.add_subplot()
+    for chosen, label, color in ((passed, "passes", "C0"), (~passed, "fails", "C3")):
+        panel.plot(x[chosen], y[chosen], ".", color=color, markersize=3.0, label=f"{label}: {int(chosen.sum()):,}")
+    panel.set_xlabel(f"{rows[0]['input']}: explains {100.0 * rows[0]['share']:.3g} % of success")
+    if len(rows) > 1:
+        panel.set_ylabel(f"{rows[1]['input']}: {100.0 * rows[1]['share']:.3g} %")
+    panel.set_title(cell.name, fontsize=9)
+    panel.legend()
+    return save_figure(figure, path, 150)
+
+
 def _point(point: Any) -> str:
     return ", ".join(f"{name} = {value}" for name, value in point.items())
 
@@ -188,4 +222,5 @@ PICTURES: dict[str, Callable[[Any, Path], Path]] = {
     "success.png": plot_success,
     "metrics.png": plot_metrics,
     "differences.png": plot_differences,
+    "causes.png": plot_causes,
 }

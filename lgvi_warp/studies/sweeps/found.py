@@ -14,6 +14,7 @@ from lgvi_warp.common.status import failed, stopped
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.runs.result import Result
 from lgvi_warp.statistics import paired
+from lgvi_warp.statistics.given_data import explained
 from lgvi_warp.studies.sweeps import setup as setups
 from lgvi_warp.studies.sweeps.record import Record, Records
 from lgvi_warp.studies.sweeps.setup import Cell, Setup
@@ -409,6 +410,36 @@ class Findings:
                 numbers |= dict(zip(labels, flat.T, strict=True))
         return numbers
 
+    def causes(self, case: str, at: Mapping[str, Any] | None = None, of: str = SUCCESS) -> list[dict[str, Any]]:
+        """Return which of the inputs that vary explain success or a metric, the most important first.
+
+        share: the part of the variance over members that the mean over this input explains, from the members at hand (by bins;
+        see `statistics.given_data`), with its interval and the F test's p, corrected for the number of inputs by Holm. slope:
+        the standardised coefficient of a linear regression on all inputs. Inputs are meant to be drawn independently.
+
+        Args:
+            case: name of the case.
+            at: values of the grid by name; may be left out where there is no grid.
+            of: "success" (default), or the name of a metric, over members that did not fail.
+
+        Returns:
+            Records with input, share, lower, upper, p, slope, and the input's median where members pass and where they do not.
+
+        Raises:
+            SceneError: there is no such case, point or metric, or it was refused.
+        """
+        cell = self.cell(case, at)
+        passed, inputs = self.passed(cell), self.inputs(cell)
+        y = passed.astype(np.float64)
+        if of != SUCCESS:
+            y = np.where(failed(self.record(cell).status), np.nan, self.values(case, of, at))
+        found = explained(inputs, y, self.confidence)
+        p = paired.holm(np.array([one.p for one in found.values()]))
+        rows = [{"input": name, **one._asdict(), "p": float(corrected), "median_passed": _median(inputs[name][passed]),
+                 "median_failed": _median(inputs[name][~passed])}
+                for (name, one), corrected in zip(found.items(), p, strict=True)]  # fmt: skip
+        return sorted(rows, key=lambda row: -np.nan_to_num(row["share"], nan=-1.0))
+
     def again(
         self,
         case: str,
@@ -485,6 +516,10 @@ class Findings:
                 np.array(values, dtype=object if name == "refused" else np.float64).reshape(shape),
             )
         return xr.Dataset(data, {"case": list(self.cases), **{name: _labels(values) for name, values in axes.items()}})
+
+
+def _median(x: np.ndarray) -> float:
+    return float(np.median(x)) if len(x) else np.nan
 
 
 def _labels(values: Sequence[Any]) -> list[Any]:

@@ -14,6 +14,7 @@ from lgvi_warp.common import machine
 from lgvi_warp.common.tables import write_csv
 from lgvi_warp.studies.files import finite_or_none
 from lgvi_warp.studies.sweeps.found import SUCCESS, Compared, Findings
+from lgvi_warp.studies.sweeps.setup import END
 from lgvi_warp.studies.sweeps.success import none_text
 
 # Worst members that are listed.
@@ -34,7 +35,7 @@ class Sweep(Findings):
     """
 
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write table.csv, comparison.csv, ranking.csv, worst.csv, sweep.json and summary.md into a folder.
+        """Write table.csv, comparison.csv, ranking.csv, worst.csv, causes.csv, sweep.json and summary.md into a folder.
 
         Args:
             folder: of the files, made if needed.
@@ -54,6 +55,9 @@ class Sweep(Findings):
             "ranking": self.ranking(),
             "worst": self.worst(LISTED),
         }
+        tables["causes"] = [{"case": cell.case.name, **cell.point, "of": of, **row} for cell in self.cells
+                            if not self.record(cell).refused for of in (SUCCESS, *self.metrics) if of != END
+                            for row in self.causes(cell.case.name, cell.point, of)]  # fmt: skip
         files = [write_csv(rows, target / f"{name}.csv") for name, rows in tables.items()]
         texts = {"sweep.json": json.dumps(finite_or_none(provenance(self)), indent=1), "summary.md": summary(self)}
         for name, text in texts.items():
@@ -141,11 +145,27 @@ def summary(found: Findings) -> str:
         real = [row for row in against_baseline(found) if row.real and (row.of == SUCCESS or not found.setup.axes)]
         lines += [f"- {_compared_text(found, row)}" for row in real] or ["- No difference of success is real."]
         lines += ["", "comparison.csv has the differences of all metrics."]
+    lines += ["", "## What failures go with", ""]
+    lines += [text for cell in found.cells if (text := _causes_text(found, cell))] or [
+        "- With nothing that varies, as far as seen."
+    ]
     lines += ["", "## Worst members", ""]
     for row in found.worst(5):
         at = ", ".join(f"{name} = {row[name]}" for name in found.setup.axes)
         lines.append(f"- member {row['member']} of {row['case']}{' at ' + at if at else ''}, status {row['status']}")
     return "\n".join(lines) + "\n"
+
+
+def _causes_text(found: Findings, cell: Any) -> str:
+    """The inputs that really explain success in a cell; "" for none."""
+    if found.record(cell).refused:
+        return ""
+    rows = [row for row in found.causes(cell.case.name, cell.point) if row["p"] < 1.0 - found.confidence]
+    texts = []
+    for row in rows[:3]:
+        medians = f"median {row['median_failed']:.4g} where it fails, {row['median_passed']:.4g} where it passes"
+        texts.append(f"{row['input']} (explains {percent(row['lower'])} to {percent(row['upper'])} %; {medians})")
+    return f"- {cell.name}: {'; '.join(texts)}" if texts else ""
 
 
 def _cell_text(found: Findings, cell: Any) -> str:

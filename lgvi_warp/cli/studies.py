@@ -151,7 +151,7 @@ def sweep(chosen: argparse.Namespace) -> int:
     from lgvi_warp.studies.sweeps.file import arguments_of_file
     from lgvi_warp.studies.sweeps.setup import made, plan_text
     from lgvi_warp.studies.sweeps.sweep import sweep as run_sweep
-    from lgvi_warp.views.sweeps import PICTURES
+    from lgvi_warp.views.sweeps import pictures
 
     arguments = arguments_of_file(chosen.scene)
     for name in ("members", "seed"):
@@ -171,7 +171,7 @@ def sweep(chosen: argparse.Namespace) -> int:
     with shown(chosen.quiet) as progress:
         found = run_sweep(**arguments, **executor, out=out, progress=progress)
     written = Written(found.save(out))
-    for name, draw in PICTURES.items():
+    for name, draw in pictures(found).items():
         written.draw(draw, found, out / name)
     if chosen.record:
         _record_worst(found, chosen.record, out, written)

@@ -229,5 +229,5 @@ def check(key: str, of: Any, known: tuple[str, ...]) -> str:
     """
     if isinstance(of, str) and of in known:
         return of
-    why = "is a distance, which has no goal beyond" if of in _DISTANCES else "is nothing that is tracked"
+    why = "is a distance, which has no goal beyond" if of in tuple(_DISTANCES) else "is nothing that is tracked"
     raise refusal(key, of, why, closest(str(of), known))

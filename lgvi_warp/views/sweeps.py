@@ -218,9 +218,11 @@ def _point(point: Any) -> str:
     return ", ".join(f"{name} = {value}" for name, value in point.items())
 
 
-PICTURES: dict[str, Callable[[Any, Path], Path]] = {
-    "success.png": plot_success,
-    "metrics.png": plot_metrics,
-    "differences.png": plot_differences,
-    "causes.png": plot_causes,
-}
+def pictures(found: Sweep) -> dict[str, Callable[[Any, Path], Path]]:
+    """Return the functions that draw a sweep, by the name of the file; paired differences where there are cases to compare.
+
+    Args:
+        found: the sweep.
+    """
+    differences = {"differences.png": plot_differences} if len(found.cases) > 1 else {}
+    return {"success.png": plot_success, "metrics.png": plot_metrics, **differences, "causes.png": plot_causes}

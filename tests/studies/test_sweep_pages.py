@@ -1,5 +1,6 @@
 """The snippets of the pages on metrics and sweeps run as they stand, and so do the examples of sweeps, with fewer members."""
 
+import random
 import re
 
 import numpy as np
@@ -7,6 +8,8 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.studies.sweeps.file import arguments_of_file
+from lgvi_warp.studies.sweeps.setup import made
+from lgvi_warp.studies.sweeps.success import success_of
 from tests.conftest import ROOT
 
 pytestmark = pytest.mark.kernel
@@ -50,3 +53,37 @@ def test_examples(path):
     arguments = arguments_of_file(path)
     found = lw.sweep(**{**arguments, "members": 8})
     assert not any(row["refused"] for row in found.rows()) and len(str(found)) > 100
+
+
+@pytest.mark.slow
+def test_mutated_files_are_refused_in_words(tmp_path):
+    """Lines dropped, keys misspelt and values replaced: a sweep, or a SceneError, and nothing else."""
+    rng = random.Random(1)
+    junk = ["1", "-1", '"x"', "[]", "{}", "true", "nan", "inf", "[[1]]", '""', "{ a = 1 }", '["a", "b"]', "2020-01-01"]
+    path = ROOT / "examples" / "sweeps" / "heading_laws.toml"
+    lines = path.read_text().replace("../scenes", str(SCENE.parent)).splitlines()
+    refused = 0
+    for _ in range(400):
+        mutated = list(lines)
+        for _ in range(rng.choice([1, 1, 2])):
+            i, how = rng.randrange(len(mutated)), rng.random()
+            if how < 0.3:
+                del mutated[i]
+            elif how < 0.9 and "=" in mutated[i]:
+                mutated[i] = mutated[i].split("=")[0] + "= " + rng.choice(junk)
+            else:
+                mutated[i] = mutated[i].replace("e", "q", 1)
+        (tmp_path / "sweep.toml").write_text("\n".join(mutated))
+        try:
+            arguments = arguments_of_file(tmp_path / "sweep.toml")
+            about = {
+                name: arguments.pop(name, None) for name in ("cases", "grid", "vary", "members", "seed", "sampling")
+            }
+            success = arguments.pop("success", None)
+            setup = made(arguments["scene"], metrics=arguments.get("metrics", ()), settings={}, **about)
+            success_of(success, tuple(setup.metrics))
+            for case, point in setup.cells:
+                setup.fleet(case, point)
+        except lw.SceneError:
+            refused += 1
+    assert 100 < refused < 400

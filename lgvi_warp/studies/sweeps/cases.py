@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, closest, refusal
+from lgvi_warp.physics import terms
 from lgvi_warp.physics.control.base import SECTIONS
 from lgvi_warp.physics.vehicle import Vehicle
 from lgvi_warp.scene import variations
@@ -32,7 +33,8 @@ class Case:
         name: its name.
         set: numbers that differ from those of the scene, by name: {"heading_pid.kp": 2.0, "drag.quadratic[0]": 3.0}. A number
             that varies is fixed by that.
-        replace: lists that differ: {"laws": [...]}, of a controller's lists, "terms", "events"; or "controller" itself.
+        replace: lists that differ: {"laws": [...]}, of a controller's lists, or "events"; "controller" itself; and "terms",
+            whose entries replace those of the same name and are added otherwise.
         vehicle: another vehicle: lw.Vehicle(...), or numbers of it by field; None (default) for that of the scene.
         scene: another scene, to which the rest is applied; None (default) for that of the sweep.
 
@@ -155,7 +157,7 @@ def with_lists(scene: Scene, lists: Mapping[str, Any]) -> Scene:
 
     Args:
         scene: the scene.
-        lists: name of a list -> its new content.
+        lists: name of a list -> its new content; of "terms", entries replace those of the same name and are added otherwise.
 
     Raises:
         SceneError: there is no such list, or its content is at fault.
@@ -169,6 +171,9 @@ def with_lists(scene: Scene, lists: Mapping[str, Any]) -> Scene:
             faults.add(name, "...", "is a list of a controller, which this scene has not", "give the whole controller")
     faults.raise_if_any()
     whole = {name: value for name, value in lists.items() if name in LISTS}
+    if "terms" in whole:
+        own = terms.from_list(whole["terms"])
+        whole["terms"] = (*(term for term in scene.terms if term.key not in {other.key for other in own}), *own)
     if whole:
         scene = replace(scene, **whole)
     parts = {name: value for name, value in lists.items() if name in SECTIONS}
@@ -232,6 +237,15 @@ def _changed(scene: Scene, changes: Mapping[str, Mapping[str, Any]]) -> Scene:
     return replace(scene, **sections, controller=controller)
 
 
+def known_names(scene: Scene) -> set[str]:
+    """Return the names of all that may vary in a scene.
+
+    Args:
+        scene: the scene.
+    """
+    return {*scene.parameters(), *(f"start.{name}" for name in NAMES)}
+
+
 def ensemble_of(
     scene: Scene, numbers: Mapping[str, Any], vary: Mapping[Any, Any], like: Ensemble
 ) -> tuple[Ensemble, list[str]]:
@@ -249,7 +263,7 @@ def ensemble_of(
     Raises:
         SceneError: the members do not fit, or a sampling other than random would give other members.
     """
-    known = {*scene.parameters(), *(f"start.{name}" for name in NAMES)}
+    known = known_names(scene)
     fixed = {target.name for name in numbers for target in variations.targets(name)}
     dropped = [name for name in vary if any(t.name in fixed or t.name not in known for t in variations.targets(name))]
     if dropped and like.sampling.kind != "random":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +16,7 @@ from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.runs.predict import Prediction, predict
 from lgvi_warp.runs.result import Result
 from lgvi_warp.runs.solve import solve
+from lgvi_warp.scene import variations
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.statistics import TYPES
@@ -23,7 +25,7 @@ from lgvi_warp.statistics.each import Each
 from lgvi_warp.statistics.functional import functional
 from lgvi_warp.statistics.metrics_of_actuators import TimeToFailure
 from lgvi_warp.statistics.then import Then
-from lgvi_warp.studies.sweeps.cases import Case, cases_of, ensemble_of, grid_of, points_of, with_numbers
+from lgvi_warp.studies.sweeps.cases import Case, cases_of, ensemble_of, grid_of, known_names, points_of, with_numbers
 from lgvi_warp.studies.sweeps.record import Record, key_of
 
 # Most cells, cases times points of the grid, of a sweep.
@@ -43,6 +45,7 @@ class Setup:
         members: the members, of the sweep's own scene.
         metrics: metrics by name, each with the number of every member.
         settings: arguments of `solve`.
+        vary: distributions by name, those of numbers that only some cases have among them.
     """
 
     scene: Scene
@@ -51,6 +54,7 @@ class Setup:
     members: Ensemble
     metrics: dict[str, Statistic]
     settings: dict[str, Any]
+    vary: dict[Any, Any]
 
     @property
     def cells(self) -> list[tuple[Case, dict[str, Any]]]:
@@ -74,7 +78,7 @@ class Setup:
         numbers = {**case.set, **point}
         if isinstance(case.vehicle, Mapping):
             numbers |= {f"vehicle.{name}": value for name, value in case.vehicle.items()}
-        return ensemble_of(scene, numbers, self.members.vary, self.members)
+        return ensemble_of(scene, numbers, self.vary, self.members)
 
     def key(self, fleet: Ensemble) -> str:
         """Return the key of a cell's record.
@@ -161,7 +165,7 @@ def made(
         SceneError: arguments are at fault.
     """
     faults = Faults()
-    whole = _fleet(scene, vary, members, seed, sampling)
+    base, together = _given(scene, vary)
     parts: dict[str, Any] = {"cases": (), "axes": {}, "metrics": {}}
     for name, read, given in (("cases", cases_of, cases), ("axes", grid_of, grid), ("metrics", metrics_of, metrics)):
         with faults.including():
@@ -170,8 +174,9 @@ def made(
         if name in settings:
             faults.add(name, "...", "is what a sweep decides", "leave it out")
     faults.raise_if_any()
-    assert isinstance(whole.scene, Scene)
-    setup = Setup(whole.scene, members=whole, settings=dict(settings), **parts)
+    assert isinstance(base.scene, Scene)
+    whole = _fleet(base, members, seed, sampling, together, parts["cases"])
+    setup = Setup(base.scene, members=whole, settings=dict(settings), vary=together, **parts)
     count = len(setup.cases) * int(np.prod([len(values) for values in setup.axes.values()], dtype=object))
     if count > MOST_CELLS:
         raise refusal(
@@ -222,27 +227,42 @@ def plan_text(setup: Setup, threads: int | None = None) -> str:
     return "\n".join(lines)
 
 
-def _fleet(scene: Any, vary: Any, members: Any, seed: Any, sampling: Any) -> Ensemble:
-    """The members of the sweep, of its own scene."""
+def _fleet(
+    scene: Any, members: Any, seed: Any, sampling: Any, vary: Mapping[Any, Any], cases: Sequence[Case]
+) -> Ensemble:
+    """The members of the sweep, of its own scene; what of `vary` only some case has does not vary in it."""
+    own, known = scene.scene, known_names(scene.scene)
+    elsewhere = [name for name in vary if any(target.name not in known for target in variations.targets(name))]
+    if elsewhere:
+        others = set[str]()
+        for case in cases:
+            with contextlib.suppress(SceneError):  # the case will say so itself
+                others |= known_names(case.of(own))
+        elsewhere = [name for name in elsewhere if all(target.name in others for target in variations.targets(name))]
+    here = {name: distribution for name, distribution in vary.items() if name not in elsewhere}
+    return Ensemble(
+        own,
+        scene.members if members is None else members,
+        scene.seed if seed is None else seed,
+        here,
+        scene.sampling if sampling is None else sampling,
+    )
+
+
+def _given(scene: Any, vary: Any) -> tuple[Ensemble, dict[Any, Any]]:
+    """The ensemble that a sweep starts from, and all that varies."""
     if isinstance(scene, str | os.PathLike):
         scene = Scene.load(scene)
     if isinstance(scene, Scene):
         scene = Ensemble.from_scene(scene)
     if not isinstance(scene, Ensemble):
         raise refusal("scene", scene, "is neither a scene nor an ensemble", "give lw.Scene.load(path)")
-    if scene.explicit() or len(scene.indices) != scene.members or scene.to_dict().get("indices") is not None:
+    if scene.explicit() or scene.to_dict().get("indices") is not None:
         problem = "has members that were given or chosen one by one"
         raise refusal("scene", "...", problem, "give an Ensemble that draws its members, or a table as its sampling")
     if vary is not None and not isinstance(vary, Mapping):
         raise refusal("vary", vary, "does not map names to distributions", 'give {"vehicle.mass": lw.Normal(...)}')
-    changed = sampling is not None
-    return Ensemble(
-        scene.scene,
-        scene.members if members is None else members,
-        scene.seed if seed is None else seed,
-        {**scene.vary, **(vary or {})},
-        sampling if changed else scene.sampling,
-    )
+    return scene, {**scene.vary, **(vary or {})}
 
 
 def metrics_of(given: Any) -> dict[str, Statistic]:

@@ -227,7 +227,9 @@ def unpacked(
     """
     samples = _divided(fields, raw, table)
     if not np.array_equal(frame.Q, np.broadcast_to(np.eye(3), frame.Q.shape)):
-        turns = {"attitude": lambda R: R @ np.swapaxes(frame.Q, -1, -2)}
+        # Products of contiguous matrices take half the time, and have the same bits.
+        back = np.ascontiguousarray(np.swapaxes(frame.Q, -1, -2))
+        turns = {"attitude": lambda R: np.ascontiguousarray(R) @ back}
         for name in samples.keys() - {"position", *SIGNALS}:
             turn = turns.get(name, lambda v: notation.rotate_out(frame.Q, v))
             samples[name] = turn(samples[name])

@@ -175,7 +175,7 @@ def plot_differences(found: Sweep, path: str | os.PathLike[str]) -> Path:
     labels = [f"{row.second}{' at ' + at if (at := _point(row.point)) else ''}" for row in rows]
     panel.set_yticks(range(len(rows)), labels, fontsize=7)
     panel.axvline(0.0, color="0.3", linewidth=0.8)
-    panel.set_xlabel(f"passes more than {found.baseline} [points], same members; grey: not real")
+    panel.set_xlabel(f"passes more than {found.baseline} [points]; grey: not real")
     panel.grid(alpha=0.3, axis="x")
     return save_figure(figure, path, 150)
 

@@ -1,6 +1,10 @@
 """Sweeps: common random numbers, closed answers, stops and files, worst members to the bit, what is asked wrongly."""
 
 import json
+import signal
+import subprocess
+import sys
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -344,3 +348,50 @@ def test_a_grid_of_a_million_cells_is_refused_with_its_time(scene):
 def test_other_samplings_refuse_what_would_change_the_members(scene):
     rows = swept(scene, sampling="sobol", cases=CASES[:2], grid=None, members=256).rows()
     assert not rows[0]["refused"] and "the other numbers would be others too" in rows[1]["refused"]
+
+
+@pytest.mark.slow
+def test_a_command_that_is_killed_goes_on_with_the_same_bytes(tmp_path):
+    text = """
+scene = "scene.toml"
+members = 20000
+[vary]
+"start.position[0]" = { normal = { std = 0.8 } }
+[grid]
+"heading_pid.ki" = [0.05, 0.1, 0.15, 0.2, 0.25, 0.3]
+[[metrics]]
+type = "rms"
+of = "heading"
+"""
+    (tmp_path / "scene.toml").write_text(SCENE)
+    (tmp_path / "sweep.toml").write_text(text)
+    command = [sys.executable, "-m", "lgvi_warp.cli", "sweep", str(tmp_path / "sweep.toml"), "--quiet", "--out"]
+    process = subprocess.Popen([*command, str(tmp_path / "killed")])
+    cells = tmp_path / "killed" / "cells"
+    while process.poll() is None and not (cells.is_dir() and any(cells.glob("*.npz"))):
+        time.sleep(0.005)
+    process.send_signal(signal.SIGKILL)
+    assert process.wait() == -signal.SIGKILL
+    done = {path.name for path in cells.glob("*.npz")}
+    assert 0 < len(done) < 6
+    before = {name: (cells / name).stat().st_mtime_ns for name in done}
+    for name in ("killed", "whole"):
+        subprocess.run([*command, str(tmp_path / name)], check=True)
+    assert before == {name: (cells / name).stat().st_mtime_ns for name in done}
+    drawn = {name: {path: data for path, data in files_of(tmp_path / name).items() if not path.endswith(".png")}
+             for name in ("killed", "whole")}  # fmt: skip
+    assert drawn["killed"] == drawn["whole"] and len(drawn["whole"]) == 6 + 7
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "settings", [{"threads": 1}, {"threads": 3}, {"executor": "processes", "threads": 2}, {"width": 4}]
+)
+def test_executors_and_threads_change_no_bit(scene, found, settings):
+    again = swept(scene, cases=CASES[:1], members=MEMBERS, **settings)
+    for metric in found.metrics:
+        at = {"controller.delay": 0.04}
+        same = again.values("soft", metric, at).tobytes() == found.values("soft", metric, at).tobytes()
+        # Another width is another kernel: the same to round-off.
+        assert same or ("width" in settings and np.allclose(
+            again.values("soft", metric, at), found.values("soft", metric, at), rtol=1e-9, atol=1e-9))  # fmt: skip

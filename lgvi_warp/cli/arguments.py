@@ -19,6 +19,7 @@ EPILOG = """examples:
   lgvi-warp tradeoff examples/paper.toml --out runs/tradeoff
   lgvi-warp sensitivity examples/paper.toml --of "position[2]" --out runs/sensitivity
   lgvi-warp stability examples/paper.toml --out runs/stability
+  lgvi-warp sweep examples/sweeps/heading_laws.toml --out runs/heading_laws
   lgvi-warp info
 
 exit codes: 0 done; 1 members, files or the disk failed, or info or merge found a run that is not whole; 2 refused: a scene,
@@ -85,6 +86,7 @@ def parser() -> argparse.ArgumentParser:
     _add_tradeoff(verbs)
     _add_sensitivity(verbs)
     _add_stability(verbs)
+    _add_sweep(verbs)
     info = verbs.add_parser(
         "info", help="what a run's folder holds; without one, the machine, versions, the core's peak"
     )
@@ -181,6 +183,23 @@ def _add_sensitivity(verbs: Any) -> None:
         seed="seed of the design",
         quiet="no progress and no table",
     )
+
+
+def _add_sweep(verbs: Any) -> None:
+    """Add the verb sweep with its arguments."""
+    verb = verbs.add_parser(
+        "sweep",
+        help="cases of a controller on the same members: what holds, which is better, the worst members; tables, pictures",
+    )
+    add = verb.add_argument
+    add("scene", metavar="SWEEP", help="sweep file (TOML)")
+    _add_shared(
+        verb, "--out", out="folder for the files; what is finished there is not run again (default: runs/NAME_sweep)"
+    )
+    add("--plan", action="store_true", help="say what the sweep would take, and run nothing")
+    add("--record", metavar="N", type=int, default=0, help="run the N worst members again into recordings (default 0)")
+    _add_shared(verb, "--members --seed --quiet")
+    _add_shared(verb, EXECUTOR, threads=WORKERS)
 
 
 def _add_stability(verbs: Any) -> None:

@@ -19,6 +19,7 @@ EPILOG = """examples:
   lgvi-warp tradeoff examples/paper.toml --out runs/tradeoff
   lgvi-warp sensitivity examples/paper.toml --of "position[2]" --out runs/sensitivity
   lgvi-warp stability examples/paper.toml --out runs/stability
+  lgvi-warp sweep examples/sweeps/heading_laws.toml --out runs/heading_laws
   lgvi-warp info
 
 exit codes: 0 done; 1 members, files or the disk failed, or info or merge found a run that is not whole; 2 refused: a scene,
@@ -85,6 +86,7 @@ def parser() -> argparse.ArgumentParser:
     _add_tradeoff(verbs)
     _add_sensitivity(verbs)
     _add_stability(verbs)
+    _add_sweep(verbs)
     info = verbs.add_parser(
         "info", help="what a run's folder holds; without one, the machine, versions, the core's peak"
     )
@@ -183,6 +185,23 @@ def _add_sensitivity(verbs: Any) -> None:
     )
 
 
+def _add_sweep(verbs: Any) -> None:
+    """Add the verb sweep with its arguments."""
+    verb = verbs.add_parser(
+        "sweep",
+        help="cases of a controller on the same members: what holds, which is better, the worst members; tables, pictures",
+    )
+    add = verb.add_argument
+    add("scene", metavar="SWEEP", help="sweep file (TOML)")
+    _add_shared(
+        verb, "--out", out="folder for the files; what is finished there is not run again (default: runs/NAME_sweep)"
+    )
+    add("--plan", action="store_true", help="say what the sweep would take, and run nothing")
+    add("--record", metavar="N", type=int, default=0, help="run the N worst members again into recordings (default 0)")
+    _add_shared(verb, "--members --seed --quiet")
+    _add_shared(verb, EXECUTOR, threads=WORKERS)
+
+
 def _add_stability(verbs: Any) -> None:
     """Add the verb stability with its arguments."""
     verb = verbs.add_parser(
@@ -252,6 +271,13 @@ def _add_store_verbs(verbs: Any) -> None:
     _add_shared(merge, "--overwrite --quiet", quiet="no summary")
     export = verbs.add_parser("export", help="write a run as one NetCDF or Parquet file")
     _add_shared(export, "dir")
+    page = verbs.add_parser("report", help="one HTML file about a run or a study: report.html")
+    page.add_argument("dir", metavar="DIR", type=Path, help="folder that run, tradeoff, stability or sensitivity wrote")
+    page.add_argument(
+        "--out", metavar="FILE", type=Path, help="the file, replaced if it exists (default: DIR/report.html)"
+    )
+    page.add_argument("--open", action="store_true", help="show it in the browser")
+    _add_shared(page, "--quiet", quiet="no summary")
     export.add_argument("--to", required=True, help="netcdf or parquet")
     export.add_argument(
         "--out", metavar="FILE", type=Path, help="the file, replaced if it exists (default: beside the store)"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +56,8 @@ def print_faults(faults: list[str]) -> list[str]:
     return faults
 
 
-# Most numbers in the picture and the drift, which then cover some members: a store may be larger than the memory.
+# Most numbers that the picture, the drift and the summary look at; the picture and the drift then cover some members: a store
+# may be larger than the memory.
 MOST_DRAWN = 30_000_000
 
 
@@ -68,10 +69,12 @@ def shown_members(result: Any) -> Any:
 
     Returns:
         The result itself; members of a large one in a store, in memory, as `lw.shown` chooses them; without samples, the kept
-        members, or None where there are none.
+        members, or None where there are none, or where a field of the motion was not saved.
     """
     if not result.samples:
         return result.kept and shown_members(result.kept)
+    if unsaved(result):
+        return None
     if result.store is None:
         return result
     from lgvi_warp.runs.store.open import chosen
@@ -83,6 +86,20 @@ def shown_members(result: Any) -> Any:
         with contextlib.suppress(NothingToDraw):  # each picture says so
             members = shown(result, most).members
     return chosen(result, members)
+
+
+def unsaved(result: Any) -> list[str]:
+    """Name the fields of the motion that a run did not save, though it has samples.
+
+    Args:
+        result: The run's result.
+
+    Returns:
+        Their names.
+    """
+    from lgvi_warp.physics.fields import FIELDS
+
+    return [name for name in FIELDS if result.samples and name not in result.samples]
 
 
 def write(result: Any, drawn: Any, out: Path) -> Written:
@@ -142,10 +159,13 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
     lines = [
         *(f"note        {message}" for message in result.messages),
         members_line(result.members, settings),
+        *controller_lines(settings["scene"]),
         *_speed(result, seconds),
         "status      " + ", ".join(f"{name} {number:,}" for name, number in result.status.counts().items()),
     ]
-    if result.samples:
+    if missing := unsaved(result):
+        lines.append(f"pictures    none, and no energy: {', '.join(missing)} not saved")
+    elif result.samples:
         lines += energy_lines(result, drawn)
     elif result.kept is not None:
         lines.append(f"kept        {result.kept.members:,} members' samples, run again")
@@ -153,6 +173,9 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
         lines.append("kept        no samples: no member failed")
     lines += [f"  {outcome_text(result, code)}" for code in outcomes(result) if code != Status.OK]
     lines += _warning_lines(result)
+    if "unmet" in result.samples and 6 * len(result.time) * result.members <= MOST_DRAWN:
+        short = int((result.samples["unmet"] != 0.0).any(axis=(0, 2)).sum())
+        lines.append(f"unmet       {short:,} members asked at some sample for more than their actuators deliver")
     if result.substeps.any():
         divided = result.substeps > 0
         lines.append(
@@ -246,6 +269,26 @@ def members_line(members: int, provenance: dict[str, Any]) -> str:
         f"{provenance['steps']:,} steps"
     )
     return f"{line}\nmethod      {name}, chosen {chosen}" if chosen else line
+
+
+def controller_lines(scene: Mapping[str, Any]) -> list[str]:
+    """Say what a controller consists of.
+
+    Args:
+        scene: The scene, as a table.
+
+    Returns:
+        One line; none for a scene without a controller.
+    """
+    section = scene.get("controller")
+    if not section:
+        return []
+    delay = f", {section['delay']:g} s until they act" if section.get("delay") else ""
+    lists = {
+        word: section[word] for word in ("sensors", "guidance", "laws", "allocation", "faults") if section.get(word)
+    }
+    texts = [f"{word} {', '.join(part.get('name') or part['type'] for part in parts)}" for word, parts in lists.items()]
+    return [f"controller  looks every {section['period']:g} s{delay}; {'; '.join(texts)}"]
 
 
 def file_line(path: Path) -> str:

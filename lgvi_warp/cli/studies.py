@@ -1,13 +1,14 @@
-"""The verbs tradeoff, sensitivity and stability."""
+"""The verbs tradeoff, sensitivity, stability and sweep."""
 
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli.progress import part_of, shown
 from lgvi_warp.cli.report import print_faults
-from lgvi_warp.cli.settings import folder, load_scene
+from lgvi_warp.cli.settings import folder, load_scene, whole
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.errors import SceneError
@@ -133,3 +134,61 @@ def stability(chosen: argparse.Namespace) -> int:
             texts.append(report_text(regions))
             written.draw(plot_stability, regions, out / f"{name}.png")
     return finish(written, "\n\n".join(texts), chosen.quiet)
+
+
+def sweep(chosen: argparse.Namespace) -> int:
+    """Run the verb sweep: cases of a closed loop on the same members, what holds and which is better.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 1 if all cells were refused or a file failed, otherwise 0.
+
+    Raises:
+        SceneError: The sweep file or an argument is refused.
+    """
+    from lgvi_warp.studies.sweeps.file import arguments_of_file
+    from lgvi_warp.studies.sweeps.setup import made, plan_text
+    from lgvi_warp.studies.sweeps.sweep import sweep as run_sweep
+    from lgvi_warp.views.sweeps import pictures
+
+    arguments = arguments_of_file(chosen.scene)
+    for name in ("members", "seed"):
+        text = getattr(chosen, name)
+        if text is not None:
+            digits = whole(text)
+            arguments[name] = int(digits) if digits.lstrip("+-").isdigit() else text
+    if chosen.plan:
+        about = {name: arguments.pop(name, None) for name in ("cases", "grid", "vary", "members", "seed", "sampling")}
+        for name in ("success", "baseline", "confidence", "interval"):
+            arguments.pop(name, None)
+        asked = {"scene": arguments.pop("scene"), "metrics": arguments.pop("metrics", ())}
+        print(plan_text(made(**asked, **about, settings=arguments), chosen.threads))
+        return 0
+    out = folder(chosen, "_sweep")
+    executor = {"threads": chosen.threads, "executor": chosen.executor, "scheduler": chosen.scheduler}
+    with shown(chosen.quiet) as progress:
+        found = run_sweep(**arguments, **executor, out=out, progress=progress)
+    written = Written(found.save(out))
+    for name, draw in pictures(found).items():
+        written.draw(draw, found, out / name)
+    if chosen.record:
+        _record_worst(found, chosen.record, out, written)
+    code = finish(written, str(found), chosen.quiet)
+    return 1 if all(found.record(cell).refused for cell in found.cells) else code
+
+
+def _record_worst(found: Any, count: int, out: Path, written: Written) -> None:
+    """Run the worst members again, those of each cell together, and write a recording of them."""
+    from lgvi_warp.views.rerun import log_rerun
+
+    members: dict[int, list[int]] = {}
+    for row in found.worst(count):
+        at = {name: row[name] for name in found.setup.axes}
+        members.setdefault(found.cell(row["case"], at).index, []).append(row["member"])
+    for index, chosen in members.items():
+        cell = found.cells[index]
+        path = out / f"worst_{index:04d}.rrd"
+        result = found.again(cell.case.name, sorted(chosen), cell.point)
+        written.draw(lambda result, path: log_rerun(result, path) or path, result, path)

@@ -10,7 +10,7 @@ from fractions import Fraction
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.control.signals import SAVED
+from lgvi_warp.physics.control.signals import check_names
 from lgvi_warp.physics.fields import FIELDS
 
 # A grid whose step would be more than this many times shorter than the one asked for is refused.
@@ -48,8 +48,7 @@ class SaveAt:
             times = faults.finite("save.at", self.at)
             if times is not None and (times.ndim != 1 or np.any(times < 0.0) or np.any(np.diff(times) <= 0.0)):
                 faults.add("save.at", self.at, "is not a rising list of times >= 0", "sort it and drop repetitions")
-        for name in self.fields:
-            faults.choice("save.fields", name, SAVED)
+        check_names(faults, "save.fields", self.fields)
         faults.raise_if_any()
 
 
@@ -73,6 +72,20 @@ class TimeGrid:
     def steps(self) -> int:
         """Number of steps from the start to the end."""
         return int(self.sample_steps[-1])
+
+    def with_steps(self, steps: np.ndarray) -> TimeGrid:
+        """The same steps with samples after more of them.
+
+        Args:
+            steps: Numbers of steps (m,), none above those of the run.
+
+        Returns:
+            The grid; the times of the samples that there were stay the same.
+        """
+        step, together = exact(self.h), np.union1d(self.sample_steps, steps)
+        times = np.array([k * step.numerator / step.denominator for k in together.tolist()])
+        times[np.searchsorted(together, self.sample_steps)] = self.times
+        return TimeGrid(self.h, together.astype(np.int64), times, self.messages)
 
 
 def exact(x: float) -> Fraction:

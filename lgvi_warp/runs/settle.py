@@ -15,9 +15,11 @@ from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt, time_grid
 from lgvi_warp.physics.control.signals import check
+from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.default_method import planned
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.settings import RunSettings
 
 
 def blocks_there(only: range | None, plan: Plan) -> range | None:
@@ -56,6 +58,7 @@ def make_plan(
     on_failure: str | None = None,
     fields: Callable[[Sequence[str]], tuple[str, ...]] = tuple,
     survey_all: bool = True,
+    looks: bool = False,
 ) -> Plan:
     """Settle the settings of a run, from the arguments and, where they are None, from the scene's [run] section.
 
@@ -71,6 +74,7 @@ def make_plan(
         on_failure: "freeze", "raise" or "substep".
         fields: Function from the names of the fields that `save` asks for to those that the kernel writes; default the same.
         survey_all: As of `Plan`; default True.
+        looks: As of `Plan`; default False.
 
     Returns:
         The plan, with a fixed number of Newton steps where the method says iterations="auto".
@@ -96,9 +100,10 @@ def make_plan(
     every = settings.save_every
     # The scene's save_every is meant for its own duration; a shorter run ignores it.
     dropped = save is None and every is not None and every > float(t1)  # type: ignore[arg-type]
+    key = "run.save_fields" if save is None else "save.fields"
     if save is None:
-        save = SaveAt(every=None if dropped else every)
-    check(faults, "save.fields", save.fields, ensemble.scene.controller)
+        save = SaveAt(every=None if dropped else every, fields=fields_of(save, settings))
+    check(faults, key, save.fields, ensemble.scene.controller)
     faults.raise_if_any()
     grid = time_grid(float(h), float(t1), save)  # type: ignore[arg-type]
     if dropped:
@@ -107,7 +112,7 @@ def make_plan(
     dtype, checks = dtype or settings.dtype, checks or settings.checks
     on_failure = on_failure or settings.on_failure
     if method is None and settings.method is None and not settings.method_options:
-        others = fields(save.fields), dtype, width, checks, on_failure, survey_all
+        others = fields(save.fields), dtype, width, checks, on_failure, survey_all, looks
         return planned(ensemble, grid.h, lambda one: Plan(ensemble, one, grid, *others))
     chosen = method if isinstance(method, Method) else settings.method_of(method)
     if chosen.iterations == "auto":
@@ -116,7 +121,22 @@ def make_plan(
         number = f"{n} a solve, enough for" if n is not None else f"to the tolerance: {MOST_FIXED} are too few for"
         text = f"Newton steps {number} every member's start at twice the step"
         grid = replace(grid, messages=(*grid.messages, text))
-    return Plan(ensemble, chosen, grid, fields(save.fields), dtype, width, checks, on_failure, survey_all)
+    return Plan(ensemble, chosen, grid, fields(save.fields), dtype, width, checks, on_failure, survey_all, looks)
+
+
+def fields_of(save: SaveAt | None, settings: RunSettings) -> tuple[str, ...]:
+    """Names of the samples that a run keeps.
+
+    Args:
+        save: What the call says; None where it says nothing.
+        settings: What the scene says.
+
+    Returns:
+        The names of the call, else those of the scene, else those of the motion.
+    """
+    if save is not None:
+        return save.fields
+    return FIELDS if settings.save_fields is None else tuple(settings.save_fields)
 
 
 # With more Newton steps than this, a fixed number gains nothing over iterating to the tolerance.

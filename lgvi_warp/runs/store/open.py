@@ -14,8 +14,8 @@ from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.status import Status
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.keepers.observation import Observation, Observing, observation_of, replicates_of
+from lgvi_warp.physics.control.controller import terms_of
 from lgvi_warp.physics.control.signals import IN_FILES
-from lgvi_warp.physics.terms import from_list
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.runs.provenance import at_end
 from lgvi_warp.runs.result import END_TIME, Result
@@ -265,7 +265,7 @@ def result_of(
     if observing is not None:
         estimates, remarks = observing.read(provenance["ensemble"], small["status"])
     with understood(folder.path / ROOT):
-        of_scene = tuple(from_list(provenance["scene"].get("terms", ())) if terms is None else terms)
+        of_scene = tuple(terms_of(provenance["scene"]) if terms is None else terms)
     indices, kept = kept_of(folder, of_scene) if members is None else (np.empty(0, np.int64), None)
     return Result(
         time=time,

@@ -16,11 +16,13 @@ from lgvi_warp.cli.settings import RUN, out_of
 from lgvi_warp.cli.signals import Ended, Signals, Streams
 from lgvi_warp.cli.stores import export, merge, report
 from lgvi_warp.cli.studies import sensitivity, stability, sweep, tradeoff
+from lgvi_warp.cli.view import view
 from lgvi_warp.cli.warm import warm
 from lgvi_warp.common.errors import SceneError
 
 _VERBS = (
-    run, check, resume, predict, merge, export, report, tradeoff, sensitivity, stability, sweep, info, bench, tune, warm
+    run, check, resume, predict, merge, export, report, tradeoff, sensitivity, stability, sweep, info, bench, tune,
+    warm, view,
 )  # fmt: skip
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {verb.__name__: verb for verb in _VERBS}
 VERBS["plan"] = predict  # its name before
@@ -86,7 +88,7 @@ def left(chosen: argparse.Namespace) -> str:
     Returns:
         One sentence, with the way to go on where there is one.
     """
-    if chosen.verb in ("info", "check", "predict", "plan", "bench", "tune", "warm"):
+    if chosen.verb in ("info", "check", "predict", "plan", "bench", "tune", "warm", "view"):
         return "nothing was to be written"
     if chosen.verb == "sweep":
         return "finished cells are kept: the same command goes on" if not chosen.plan else "nothing was to be written"

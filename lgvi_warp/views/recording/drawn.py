@@ -105,6 +105,11 @@ class Drawn:
         """Positions drawn [m], float32, shape (f, m, 3)."""
         return self.few.position.astype(np.float32)
 
+    @property
+    def watered(self) -> bool:
+        """Whether the water has a surface: no member is a metre above it."""
+        return not np.nanmax(self.fans[0].levels, initial=-np.inf) > 1.0
+
     def color(self, code: Status) -> tuple[int, int, int]:
         """Choose the colour of members.
 
@@ -173,7 +178,7 @@ def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[in
     energy = energy_curve(few) if set(FIELDS) <= set(few.samples) else None
     if energy is not None and np.isfinite(energy.values).any():
         levels = at_levels(energy.values, counted, LEVELS)
-        fans = (*fans, Fan("energy", f"{energy.label} of the {choice.text} drawn", "J", levels))
+        fans = (*fans, Fan("energy", f"{energy.name} [J] of {choice.text}", "J", levels))
     depth = np.where(count, position[..., 2], np.nan)
     low, high = fans[0].levels[[-1, 0]] * -1.0
     bins = np.linspace(*_range(low, high), 41)

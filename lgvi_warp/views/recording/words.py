@@ -101,7 +101,7 @@ def water_text(run: Drawn, box: Box) -> str:
     if not run.above:
         return f"no event at the surface, {floor}; {grid}"
     many = of_members(run.above, run.result.members)
-    return f"unbounded water: {many} pass{'es' * (run.above == 1 == run.result.members)} above depth 0; {floor}; {grid}"
+    return f"unbounded water: {many} pass{'es' * (run.result.members == 1)} above depth 0"
 
 
 def energy_text(run: Drawn) -> str:

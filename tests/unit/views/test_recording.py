@@ -223,11 +223,14 @@ def test_extremes_are_of_all_members_and_quantiles_of_many(monkeypatch):
 
 
 def test_the_water_is_said_to_be_unbounded_where_members_leave_it(tmp_path):
-    up = np.linspace(5.0, -1.0, 5)[:, None, None] * np.ones((1, 4, 3))
+    up = np.linspace(5.0, -0.5, 5)[:, None, None] * np.ones((1, 4, 3))
     up[:, 0, 2] = 5.0
     path = lw.log_rerun(made(up), tmp_path / "up.rrd")
-    assert "unbounded water: 3 of 4 members pass above depth 0; no floor" in text_of(path, "/run/summary")
-    assert "/world/water/surface" in entities(path) and "/world/water/floor" not in entities(path)
+    assert "| unbounded water: 3 of 4 members pass above depth 0 |" in text_of(path, "/run/summary")
+    # Half a metre above the surface a vehicle floats; beyond, there is no surface, but a grid at depth 0.
+    names = [entities(path), entities(lw.log_rerun(made(3.0 * up), tmp_path / "far.rrd"))]
+    assert ["/world/water/surface" in one for one in names] == [True, False]
+    assert all("/world/water/surface_grid" in one and "/world/water/floor" not in one for one in names)
 
 
 def test_forces_balance_the_momentum():
@@ -411,11 +414,32 @@ def test_nothing_to_draw_is_said(mixed, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_show_starts_a_viewer(mixed, monkeypatch):
-    started = []
-    monkeypatch.setattr(rr.RecordingStream, "spawn", lambda self, **named: started.append(named))
-    lw.show(mixed)
-    assert list(started[0]) == ["default_blueprint"]
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("exec sleep 0.5", None),
+        ("exec sleep 30", None),
+        ("echo no display >&2; exit 1", r"did not start \(no display\); the recording is .*fleet.rrd: open it"),
+        (None, "cannot be started .* the recording is"),
+    ],
+)
+def test_show_starts_a_viewer(mixed, tmp_path, monkeypatch, text, words):
+    from lgvi_warp.views import rerun as recordings
+
+    program = tmp_path / "viewer"
+    if text is not None:
+        program.write_text(f'#!/bin/sh\necho "$1" > "{tmp_path}/opened"\n{text}\n')
+        program.chmod(0o755)
+    monkeypatch.setattr(recordings, "_program", lambda: program)
+    monkeypatch.setattr(recordings, "STARTED", 0.7)
+    monkeypatch.setattr(recordings.tempfile, "mkdtemp", lambda prefix: str(tmp_path))
+    if words is None:
+        lw.show(mixed, members=[3])
+        opened = Path((tmp_path / "opened").read_text().strip())
+        assert "1 of 40 drawn" in text_of(opened, "/run/summary")
+    else:
+        with pytest.raises(OSError, match=words):
+            lw.show(mixed)
 
 
 def test_no_viewer_is_loaded_before_it_is_needed():

@@ -1,0 +1,81 @@
+"""The verb view: look at a run that is there."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from lgvi_warp.cli.report import file_line
+from lgvi_warp.cli.runs import RESULT
+from lgvi_warp.common.errors import MissingExtra, NothingToDraw, SceneError
+
+
+def view(chosen: argparse.Namespace) -> int:
+    """Run the verb view: open a run in the rerun viewer, or write its recording.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 0.
+
+    Raises:
+        SceneError: There is no run, no such member, or nothing to draw.
+        OSError: The viewer cannot be started, or the file cannot be written.
+    """
+    result, members = result_in(chosen.dir), indices(chosen.members)
+    from lgvi_warp.views.rerun import log_rerun, show
+
+    try:
+        if chosen.out is None:
+            show(result, members=members)
+        else:
+            log_rerun(result, chosen.out, members=members)
+            print(file_line(chosen.out))
+    except (MissingExtra, NothingToDraw) as error:
+        raise SceneError([str(error)]) from None
+    return 0
+
+
+def result_in(path: Path) -> Any:
+    """Read the run at a path.
+
+    Args:
+        path: A result.npz, a store, or a folder with one of these.
+
+    Returns:
+        Its result.
+
+    Raises:
+        SceneError: There is none, or it is damaged.
+    """
+    from lgvi_warp.runs.result import Result
+    from lgvi_warp.runs.store.open import open_run
+
+    if path.suffix == ".npz" or (path / RESULT).is_file():
+        try:
+            return Result.load(path if path.suffix == ".npz" else path / RESULT)
+        except OSError as error:
+            raise SceneError([f"{path}: {error.strerror or error}; give the folder of a run"]) from None
+    return open_run(path)
+
+
+def indices(text: str | None) -> list[int] | None:
+    """Read the indices of members.
+
+    Args:
+        text: Numbers with commas, as "3,17"; None for none.
+
+    Returns:
+        The indices; None for none.
+
+    Raises:
+        SceneError: The text is no list of indices.
+    """
+    if text is None:
+        return None
+    words = [word.strip() for word in text.split(",")]
+    if not all(word.isdigit() for word in words):
+        raise SceneError([f"--members {text}: is no list of members; write --members 3,17"])
+    return [int(word) for word in words]

@@ -137,7 +137,7 @@ def _runs(result: Result | Mapping[str, Result], members: Any) -> list[Drawn]:
 def _write(runs: list[Drawn], connect: Any) -> None:
     """Write a recording of its own to where `connect` leads. Raises OSError."""
     rr = _rerun()
-    names = [identity(run.result) for run in runs]
+    names = [identity(run.source) for run in runs]
     name = names[0] if len(runs) == 1 else hashlib.sha256(" ".join(names).encode()).hexdigest()[:16]
     box = box_of(runs)
     first_layout = layout(runs, box, scale_of(runs[0], box))

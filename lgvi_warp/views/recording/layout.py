@@ -158,7 +158,7 @@ def _world(run: Drawn, box: Box, scale: int, aspect: float) -> Any:
     now = rrb.TimeRangeBoundary.cursor_relative(seconds=0)
     past = rrb.VisibleTimeRange(TIMELINE, start=rrb.TimeRangeBoundary.infinite(), end=now)
     hulls = f", hulls {scale} times their size" if scale > 1 else ""
-    name = f"{run.label}: {run.choice.text}" if run.label else run.choice.text
+    name = f"{run.label}: {run.text}" if run.label else run.text
     return rrb.Spatial3DView(
         origin=run.path("world"), name=f"{name}{hulls}, grid {box.grid:g} m", background=BACKGROUND,
         line_grid=rrb.LineGrid3D(visible=False),

@@ -21,7 +21,7 @@ CHUNK = 20
 # Scale of a hidden body: an entity without any pose would show a body at the origin.
 UNSEEN = 1e-6
 # A hull is drawn at least this share of the scene long.
-SEEN = 0.025
+SEEN = 0.02
 TRAIL, WATER, SAND, CURRENT = (150, 165, 180, 150), (90, 170, 230, 40), (150, 120, 80, 90), (0, 200, 200)
 # Axes are labelled at the corner of the grid.
 AXES = (("north", (230, 90, 90)), ("east", (90, 200, 90)), ("down", (110, 140, 255)))

@@ -3,30 +3,37 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from typing import Any
 
+from lgvi_warp.cli import documents
+from lgvi_warp.cli.folders import text_of
+from lgvi_warp.cli.output import print_faults, tell
 from lgvi_warp.cli.progress import part_of, shown
-from lgvi_warp.cli.report import print_faults
+from lgvi_warp.cli.report import file_line
 from lgvi_warp.cli.settings import folder, load_scene
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.errors import SceneError
 
 
-def finish(written: Written, report: str, quiet: bool) -> int:
+def finish(written: Written, chosen: argparse.Namespace, studies: Mapping[str, Any]) -> int:
     """Print a study's report, its files and its notes, and say what failed.
 
     Args:
         written: The study's files.
-        report: The report's text.
-        quiet: Whether to print failures only.
+        chosen: The command's parsed arguments.
+        studies: What was found, by the name of its files.
 
     Returns:
         The exit code: 1 if a file failed, otherwise 0.
     """
-    if not quiet:
-        files = (f"file        {path}" for path in written.files)
-        print("\n".join([report, "", *written.note_lines(), *files]))
+    reports = "\n\n".join(text_of(chosen.verb, found) for found in studies.values())
+    tell(
+        chosen,
+        lambda: {"content": {name: found.to_dict() for name, found in studies.items()}} | documents.of_files(written),
+        lambda: "\n".join([reports, "", *written.note_lines(), *map(file_line, written.files)]),
+    )
     print_faults(written.empty)
     return 1 if print_faults(written.faults) else 0
 
@@ -45,15 +52,15 @@ def tradeoff(chosen: argparse.Namespace) -> int:
     """
     scene = load_scene(chosen)
     out = folder(chosen, "_tradeoff")
-    from lgvi_warp.studies.tradeoff import report_text
     from lgvi_warp.studies.tradeoff import tradeoff as measure
     from lgvi_warp.views.plots import plot_tradeoff
 
     with shown(chosen.quiet) as progress:
         measurements = measure(scene, of=chosen.of, methods=chosen.methods, seconds=chosen.seconds, progress=progress)
-    written = Written(measurements.save(out))
-    written.draw(plot_tradeoff, measurements, out / "tradeoff.png")
-    return finish(written, report_text(measurements), chosen.quiet)
+    with shown(chosen.quiet, "writing"):
+        written = Written(measurements.save(out))
+        written.draw(plot_tradeoff, measurements, out / "tradeoff.png")
+    return finish(written, chosen, {"tradeoff": measurements})
 
 
 def sensitivity(chosen: argparse.Namespace) -> int:
@@ -83,9 +90,10 @@ def sensitivity(chosen: argparse.Namespace) -> int:
             )  # fmt: skip
     except (uq.FailedMembers, ImportError) as error:
         return len(print_faults([str(error)]))
-    written = Written(indices.save(out))
-    written.draw(plot_sensitivity, indices, out / "sensitivity.png")
-    return finish(written, str(indices), chosen.quiet)
+    with shown(chosen.quiet, "writing"):
+        written = Written(indices.save(out))
+        written.draw(plot_sensitivity, indices, out / "sensitivity.png")
+    return finish(written, chosen, {"sensitivity": indices})
 
 
 def stability(chosen: argparse.Namespace) -> int:
@@ -109,7 +117,7 @@ def stability(chosen: argparse.Namespace) -> int:
     # Seed of the random directions, the only setting of the scene's ensemble that is used here.
     seed = scene.ensemble_settings.seed if scene.ensemble_settings else 0
     out = folder(chosen, "_stability")
-    from lgvi_warp.studies.stability.map import GRIDS, report_text, stability_map
+    from lgvi_warp.studies.stability.map import GRIDS, stability_map
     from lgvi_warp.views.plots import plot_stability
 
     maps = {"stability": (chosen.x or "h", chosen.y or "angular_velocity")}
@@ -117,11 +125,11 @@ def stability(chosen: argparse.Namespace) -> int:
         names = GRIDS if chosen.grid == "all" else (chosen.grid,)
         maps = {f"stability_{name}": GRIDS[name] for name in names}
     t1 = scene.run.duration if chosen.duration is not None else None
-    written, texts = Written(), []
+    written, found = Written(), {}
     with shown(chosen.quiet) as progress:
         for i, (name, (x, y)) in enumerate(maps.items()):
             try:
-                regions = stability_map(
+                found[name] = stability_map(
                     scene, x, y, chosen.methods, points=chosen.points, t1=t1, error=chosen.error, of=chosen.of, seed=seed,
                     progress=part_of(progress, i, len(maps)),
                 )  # fmt: skip
@@ -129,7 +137,6 @@ def stability(chosen: argparse.Namespace) -> int:
                 if not written.files:
                     raise
                 raise Ended(f"{i} of {len(maps)} maps are finished, in {out}") from error
-            written.files += regions.save(out, name)
-            texts.append(report_text(regions))
-            written.draw(plot_stability, regions, out / f"{name}.png")
-    return finish(written, "\n\n".join(texts), chosen.quiet)
+            written.files += found[name].save(out, name)
+            written.draw(plot_stability, found[name], out / f"{name}.png")
+    return finish(written, chosen, found)

@@ -17,6 +17,8 @@ R = TypeVar("R")
 
 # Characters of the bar on a terminal.
 BAR = 24
+# Time between two looks at what takes long [s].
+TICK = 1.0
 
 
 class Progress:
@@ -73,7 +75,7 @@ class Progress:
 
     def _tick(self) -> None:
         """Show what takes long without a fraction."""
-        while not self._closed.wait(max(self._interval, 1.0)):
+        while not self._closed.wait(TICK):
             with self._lock, contextlib.suppress(OSError, ValueError):
                 now = time.perf_counter()
                 if not self._closed.is_set() and now - self._last >= self._interval:

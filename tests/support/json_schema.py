@@ -10,7 +10,8 @@ KINDS = {
 }
 
 KNOWN = {"type", "properties", "required", "additionalProperties", "items", "anyOf", "enum", "const", "minItems", "maxItems",
-         "minimum", "maximum", "exclusiveMinimum", "minProperties", "maxProperties", "description", "$schema", "title"}  # fmt: skip
+         "minimum", "maximum", "exclusiveMinimum", "minProperties", "maxProperties", "description", "title",
+         "$schema"}  # fmt: skip
 
 
 def is_a(value, kind):

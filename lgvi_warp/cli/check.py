@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from lgvi_warp.cli.output import tell
+from lgvi_warp.cli.report import controller_lines
 from lgvi_warp.cli.settings import load_scene
 
 
@@ -30,7 +31,8 @@ def check(chosen: argparse.Namespace) -> int:
     head, messages = _settings(ensemble)
     messages += (*scene.vehicle.warnings, *plausibility.of_ensemble(ensemble).messages(ensemble.members))
     end = "can run, with notes: nothing is refused for them" if messages else "can run"
-    lines = [f"scene       {chosen.scene}, {head}", *(f"note        {text}" for text in messages), f"result      {end}"]
+    lines = [f"scene       {chosen.scene}, {head}", *controller_lines(scene.to_dict())]
+    lines += [*(f"note        {text}" for text in messages), f"result      {end}"]
     document = {"scene": chosen.scene, "members": ensemble.members, "notes": messages}
     tell(chosen, lambda: document, lambda: "\n".join(lines))
     return 0

@@ -10,11 +10,11 @@ from typing import Any
 
 from lgvi_warp.cli import documents
 from lgvi_warp.cli.output import tell
-from lgvi_warp.cli.report import file_line, how_lines, members_line, summary
+from lgvi_warp.cli.report import controller_lines, file_line, how_lines, members_line, shown_members, summary
 from lgvi_warp.common.errors import SceneError
 
 # Endings of what verbs write beside the numbers.
-OTHERS = (".png", ".rrd", ".csv", ".txt", ".nc", ".parquet")
+OTHERS = (".png", ".rrd", ".html", ".csv", ".txt", ".nc", ".parquet")
 # Most lines on damage.
 MOST_SAID = 20
 
@@ -131,7 +131,9 @@ def _part(content: Content, chosen: argparse.Namespace) -> tuple[dict[str, Any],
     found = content.load()
     if content.kind == "result":
         size = file_line(content.path)
-        return head | documents.of_result(found), lambda: f"{size}\n{summary(found, found, [], verbose=chosen.verbose)}"
+        return head | documents.of_result(
+            found
+        ), lambda: f"{size}\n{summary(found, shown_members(found), [], verbose=chosen.verbose)}"
     return head | {"content": found.to_dict()}, lambda: f"{file_line(content.path)}\n{text_of(content.kind, found)}"
 
 
@@ -161,6 +163,7 @@ def _store_lines(found: dict[str, Any], chosen: argparse.Namespace) -> Iterator[
     provenance = found["provenance"]
     yield f"run         {found['path']} ({found['bytes'] / 1e6:.1f} MB), lgvi-warp {provenance['versions']['lgvi-warp']}"
     yield members_line(found["members"], provenance)
+    yield from controller_lines(provenance["scene"])
     if chosen.verbose:
         yield from how_lines(provenance)
     fields = ", ".join(found["fields"])

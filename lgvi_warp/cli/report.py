@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from lgvi_warp.cli import documents
 from lgvi_warp.cli.output import print_faults, tell
 from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.writing import Written, side_by_side
+from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.safe_files import size_below
 from lgvi_warp.common.write_lock import write_lock
 
@@ -52,28 +53,50 @@ def report(result: Any, out: Path, chosen: argparse.Namespace, begun: float, fai
     return faults
 
 
-# Most numbers in pictures and drift, which then cover the first members: a store may be larger than the memory.
+# Most numbers that the picture, the drift and the summary look at; the picture and the drift then cover some members: a store
+# may be larger than the memory.
 MOST_DRAWN = 30_000_000
 
 
 def shown_members(result: Any) -> Any:
-    """Select the members that pictures and drift are made of.
+    """Select the members that the picture and the drift are made of.
 
     Args:
         result: The run's result.
 
     Returns:
-        The result itself; the first members of a large one in a store, in memory; without samples, the kept members, or
-        None where there are none.
+        The result itself; members of a large one in a store, in memory, as `lw.shown` chooses them; without samples, the kept
+        members, or None where there are none, or where a field of the motion was not saved.
     """
     if not result.samples:
         return result.kept and shown_members(result.kept)
+    if unsaved(result):
+        return None
     if result.store is None:
         return result
     from lgvi_warp.runs.store.open import chosen
+    from lgvi_warp.views.choice import shown
 
     most = max(1, MOST_DRAWN // (18 * len(result.time)))
-    return chosen(result, range(min(most, result.members)))
+    members: Any = range(min(most, result.members))
+    if result.members > most:
+        with contextlib.suppress(NothingToDraw):  # each picture says so
+            members = shown(result, most).members
+    return chosen(result, members)
+
+
+def unsaved(result: Any) -> list[str]:
+    """Name the fields of the motion that a run did not save, though it has samples.
+
+    Args:
+        result: The run's result.
+
+    Returns:
+        Their names.
+    """
+    from lgvi_warp.physics.fields import FIELDS
+
+    return [name for name in FIELDS if result.samples and name not in result.samples]
 
 
 def write(result: Any, drawn: Any, out: Path) -> Written:
@@ -81,7 +104,7 @@ def write(result: Any, drawn: Any, out: Path) -> Written:
 
     Args:
         result: The run's result; a stored one is written already.
-        drawn: The members of the pictures, from `shown_members`; None for no pictures.
+        drawn: The members of the picture, from `shown_members`; None for neither picture nor recording.
         out: Folder of the files.
 
     Returns:
@@ -100,23 +123,31 @@ def write(result: Any, drawn: Any, out: Path) -> Written:
     return written
 
 
+def _record(result: Any, path: Path) -> Path:
+    """Write the recording of a result."""
+    from lgvi_warp.views.rerun import log_rerun
+
+    log_rerun(result, path)
+    return path
+
+
 def pictures(result: Any, drawn: Any) -> dict[str, Callable[[Path], Path]]:
     """The pictures that a run has.
 
     Args:
         result: The run's result.
-        drawn: The members of the pictures, from `shown_members`; None for none.
+        drawn: The members of the picture, from `shown_members`; None for neither picture nor recording.
 
     Returns:
         Name of each file -> function of its path that draws it.
     """
-    from lgvi_warp.views import plots, rerun
+    from lgvi_warp.views import plots
 
     drawings: dict[str, Callable[[Path], Path]] = {}
     if drawn is not None:
         drawings |= {
             "fleet.png": lambda path: plots.plot(drawn, path),
-            "fleet.rrd": lambda path: rerun.log_rerun(drawn, path),
+            "fleet.rrd": lambda path: _record(result, path),
         }
     if plots.drawable(result):
         drawings["statistics.png"] = lambda path: plots.plot_statistics(result, path)
@@ -145,10 +176,13 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float = 0.0, ve
         *(f"note        {message}" for message in result.messages),
         members_line(result.members, settings),
         *(how_lines(settings) if verbose else ()),
+        *controller_lines(settings["scene"]),
         *_speed(result, seconds),
         "status      " + ", ".join(f"{name} {number:,}" for name, number in result.status.counts().items()),
     ]
-    if result.samples:
+    if missing := unsaved(result):
+        lines.append(f"pictures    none, and no energy: {', '.join(missing)} not saved")
+    elif result.samples:
         lines += energy_lines(result, drawn)
     elif result.kept is not None:
         lines.append(f"kept        {result.kept.members:,} members' samples, run again")
@@ -156,6 +190,9 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float = 0.0, ve
         lines.append("kept        no samples: no member failed")
     lines += [f"  {outcome_text(result, code)}" for code in outcomes(result) if code != Status.OK]
     lines += _warning_lines(result)
+    if "unmet" in result.samples and 6 * len(result.time) * result.members <= MOST_DRAWN:
+        short = int((result.samples["unmet"] != 0.0).any(axis=(0, 2)).sum())
+        lines.append(f"unmet       {short:,} members asked at some sample for more than their actuators deliver")
     if result.substeps.any():
         divided = result.substeps > 0
         lines.append(
@@ -224,11 +261,12 @@ def energy_lines(result: Any, drawn: Any) -> list[str]:
     import math
 
     from lgvi_warp.physics import energy as invariants
+    from lgvi_warp.views.choice import of_members
 
     drift, conserved = invariants.drift(drawn), invariants.conserved(drawn)
     if math.isnan(drift["energy"]):
         return []
-    whose = "all members" if drawn.members == result.members else f"the first {drawn.members:,} members"
+    whose = "all members" if drawn.members == result.members else of_members(drawn.members, result.members)
     if "energy" not in conserved:
         names = ", ".join(invariants.at_work(drawn))
         return [f"work        energy changed by up to {drift['energy']:.2g} J, through {names} (largest of {whose})"]
@@ -283,6 +321,26 @@ def members_line(members: int, provenance: dict[str, Any]) -> str:
         f"{provenance['steps']:,} steps"
     )
     return f"{line}\nmethod      {name}, chosen {chosen}" if chosen else line
+
+
+def controller_lines(scene: Mapping[str, Any]) -> list[str]:
+    """Say what a controller consists of.
+
+    Args:
+        scene: The scene, as a table.
+
+    Returns:
+        One line; none for a scene without a controller.
+    """
+    section = scene.get("controller")
+    if not section:
+        return []
+    delay = f", {section['delay']:g} s until they act" if section.get("delay") else ""
+    lists = {
+        word: section[word] for word in ("sensors", "guidance", "laws", "allocation", "faults") if section.get(word)
+    }
+    texts = [f"{word} {', '.join(part.get('name') or part['type'] for part in parts)}" for word, parts in lists.items()]
+    return [f"controller  looks every {section['period']:g} s{delay}; {'; '.join(texts)}"]
 
 
 def file_line(path: Path) -> str:

@@ -1,4 +1,4 @@
-"""The verbs merge and export."""
+"""The verbs merge, export and report."""
 
 from __future__ import annotations
 
@@ -53,4 +53,28 @@ def export(chosen: argparse.Namespace) -> int:
     with shown(chosen.quiet, "writing"):
         path = write_as(chosen.dir, chosen.to, chosen.out)
     tell(chosen, lambda: {"file": path, "bytes": path.stat().st_size}, lambda: file_line(path))
+    return 0
+
+
+def report(chosen: argparse.Namespace) -> int:
+    """Run the verb report: write one HTML file about a run or a study.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 0.
+
+    Raises:
+        SceneError: The folder holds no run and no study.
+    """
+    import webbrowser
+
+    from lgvi_warp.views.report import report as write_report
+
+    with shown(chosen.quiet, "drawing"):
+        path = write_report(chosen.dir, chosen.out or chosen.dir / "report.html")
+    tell(chosen, lambda: {"file": path, "bytes": path.stat().st_size}, lambda: file_line(path))
+    if chosen.open:
+        webbrowser.open(path.resolve().as_uri())
     return 0

@@ -20,6 +20,8 @@ OPTIONAL = {
     "pyarrow",
     "gymnasium",
     "tqdm",
+    "control",
+    "tomlkit",
 }
 DEPENDENCIES = {"numpy", "scipy", "warp"} | OPTIONAL
 

@@ -25,6 +25,7 @@ HEAVY = {
     "SALib",
     "gymnasium",
     "tqdm",
+    "control",
 }
 PRINT = "; import sys, json; print(json.dumps(sorted(sys.modules)))"
 

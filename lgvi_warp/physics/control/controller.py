@@ -17,6 +17,7 @@ from lgvi_warp.physics.control.delay import MOST_PERIODS, Delay
 from lgvi_warp.physics.control.fault import Fault
 from lgvi_warp.physics.control.pseudo_inverse import PseudoInverse
 from lgvi_warp.physics.control.sensor import Sensor
+from lgvi_warp.physics.terms import from_list
 from lgvi_warp.physics.terms.base import Term, build, check_list
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS
 
@@ -154,7 +155,8 @@ class Controller:
         channels = {key: term.channels for key, term in actuators.items()}
         callback = self.callback
         answers = 0 if callback is None else channels[callback.to] if callback.to else 6
-        controller = wired.on(Bus.of(channels, self.period, answers))
+        shared = max(law.shared_rows for law in self.laws)
+        controller = wired.on(Bus.of(channels, self.period, max(answers, shared)))
         for part in controller.allocation:
             part.check_actuator(faults)
         faults.raise_if_any()
@@ -319,6 +321,28 @@ def from_table(given: Any) -> Controller | None:
         faults.add("controller.period", "", "is missing", "give the time between two looks [s]")
     faults.raise_if_any()
     return Controller(**given)
+
+
+def terms_of(scene: Mapping[str, Any]) -> tuple[Term, ...]:
+    """The terms of a scene from its content, each of which knows whether a controller drives it.
+
+    The controller itself is not built: a law may be a function, of which the content has the name alone.
+
+    Args:
+        scene: The content of a scene, as `Scene.to_dict` gives it.
+
+    Returns:
+        The terms.
+
+    Raises:
+        SceneError: Where a table is no term.
+    """
+    terms, table = from_list(scene.get("terms", ())), scene.get("controller")
+    lists = (table.get(section) for section in ("laws", "allocation")) if isinstance(table, Mapping) else ()
+    parts = [part for entries in lists if isinstance(entries, list) for part in entries if isinstance(part, Mapping)]
+    actuators = {to for part in parts if isinstance(to := part.get("to"), str)}
+    bus = Bus.of({term.key: term.channels for term in terms if term.key in actuators}, 1.0)
+    return tuple(term.driven_by(bus if term.key in actuators else None) for term in terms)
 
 
 def _parts(section: str, base: type[Part], given: Any) -> tuple[Part, ...]:

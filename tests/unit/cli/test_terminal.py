@@ -108,7 +108,7 @@ def test_verbose_says_where_an_error_came_from(capsys):
 
 
 def test_every_verb_is_of_those_that_write_or_of_those_that_do_not():
-    writing = {"run", "resume", "merge", "export", "tradeoff", "sensitivity", "stability", "new", "plot"}
+    writing = {"run", "resume", "merge", "export", "tradeoff", "sensitivity", "stability", "new", "plot", "report"}
     assert writing | set(command.READING) == set(command.VERBS) == set(cli.parser().verbs)
     assert not writing & set(command.READING)
 
@@ -225,7 +225,7 @@ def bash(tmp_path_factory):
 
 
 def test_bash_completes_verbs_options_values_and_files(bash):
-    assert bash("re") == ["resume"] and set(bash("")) >= set(cli.parser().verbs) | {"--version"}
+    assert bash("res") == ["resume"] and set(bash("")) >= set(cli.parser().verbs) | {"--version"}
     assert bash("run", "x", "--store-") == ["--store-dtype"]
     assert bash("run", "x", "--store", "") == ["npz", "zarr"] and bash("list", "ve") == ["vehicles"]
     assert bash("--json", "check", "--colo") == ["--color"] and bash("-q", "run", "--color", "a") == ["auto", "always"]
@@ -338,6 +338,7 @@ def test_documents_of_a_run_and_its_folder(tmp_path, capsys):
     assert next(entry for entry in ran["statistics"] if "maximum" in entry["label"])["lower"] is None
     (held,) = document(["info", out], capsys, name="info of a folder")["holds"]
     assert {key: held[key] for key in ran.keys() & held.keys()} == {key: ran[key] for key in ran.keys() & held.keys()}
+    assert document(["report", out], capsys)["file"] == f"{out}/report.html"
     (tmp_path / "paper" / "fleet.png").unlink()
     drawn = document(["plot", out], capsys)["files"]
     assert sorted(path.rpartition("/")[2] for path in drawn) == ["fleet.png", "fleet.rrd", "statistics.png"]

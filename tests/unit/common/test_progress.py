@@ -176,9 +176,24 @@ def test_the_real_bar_of_tqdm_takes_the_same_calls():
 
 @pytest.mark.parametrize(
     "call",
-    [lw.solve, lw.resume, lw.suggest, lw.tradeoff, lw.stability_map, lw.uq.evaluate, lw.Prepared.__call__],
+    [
+        lw.solve,
+        lw.resume,
+        lw.suggest,
+        lw.tradeoff,
+        lw.stability_map,
+        lw.uq.evaluate,
+        lw.tune,
+        lw.worst_case,
+        lw.Prepared.__call__,
+    ],
     ids=lambda call: call.__qualname__,
 )
 def test_every_long_call_takes_true(call):
     with pytest.raises(lw.SceneError, match="progress = 7: is no function"):
-        call(None, *[None] * (call is lw.uq.evaluate), *[1.0] * (call is lw.suggest), progress=7)
+        call(
+            None,
+            *[None] * (2 if call in (lw.tune, lw.worst_case) else call is lw.uq.evaluate),
+            *[1.0] * (call is lw.suggest),
+            progress=7,
+        )

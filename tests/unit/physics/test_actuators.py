@@ -164,3 +164,12 @@ def test_absent_numbers_are_no_parameters():
         new = ("table", "advance", "torque", "lift_a", "lift_c", "flow", "rate_limit", "time_constant")
         given = {key for key in term.to_dict() if key.startswith(new)}
         assert given == ({"time_constant"} if device == "thrusters" else {"rate_limit"})
+
+
+@pytest.mark.parametrize(
+    ("has", "varied"), [({"time_constant": 0.2}, "rate_limit"), ({"rate_limit": 5.0}, "time_constant")]
+)
+def test_members_bring_in_no_lag_or_limit_that_the_scene_has_not(has, varied):
+    looped = scene([lw.ControlWrench(**has)], laws=[HEADING])
+    with pytest.raises(SceneError, match=f"control_wrench.{varied} = .*: does not act: the scene has none; give"):
+        lw.Ensemble(looped, 4, 1, {f"control_wrench.{varied}": lw.Uniform(low=1.0, high=2.0)})

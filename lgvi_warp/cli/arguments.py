@@ -25,6 +25,7 @@ EPILOG = """examples:
   lgvi-warp tradeoff examples/paper.toml --out runs/tradeoff
   lgvi-warp sensitivity examples/paper.toml --of "position[2]" --out runs/sensitivity
   lgvi-warp stability examples/paper.toml --out runs/stability
+  lgvi-warp sweep examples/sweeps/heading_laws.toml --out runs/heading_laws
   lgvi-warp info runs/large
   lgvi-warp run examples/paper.toml --json -q
 
@@ -145,6 +146,7 @@ def parser() -> Parser:
     _add_tradeoff(verbs)
     _add_sensitivity(verbs)
     _add_stability(verbs)
+    _add_sweep(verbs)
     info = _verb(
         verbs, "info", help="what a folder of any verb holds; without one, the machine, versions, the core's peak"
     )
@@ -253,6 +255,24 @@ def _add_sensitivity(verbs: Any) -> None:
         dtype="float64, float32, or float32_compensated",
         seed="seed of the design",
     )
+
+
+def _add_sweep(verbs: Any) -> None:
+    """Add the verb sweep with its arguments."""
+    verb = _verb(
+        verbs,
+        "sweep",
+        help="cases of a controller on the same members: what holds, which is better, the worst members; tables, pictures",
+    )
+    add = verb.add_argument
+    add("scene", metavar="SWEEP", help="sweep file (TOML)")
+    _add_shared(
+        verb, "--out", out="folder for the files; what is finished there is not run again (default: runs/NAME_sweep)"
+    )
+    add("--plan", action="store_true", help="say what the sweep would take, and run nothing")
+    add("--record", metavar="N", type=int, default=0, help="run the N worst members again into recordings (default 0)")
+    _add_shared(verb, "--members --seed")
+    _add_shared(verb, EXECUTOR, threads=WORKERS)
 
 
 def _add_stability(verbs: Any) -> None:

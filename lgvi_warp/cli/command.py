@@ -20,12 +20,12 @@ from lgvi_warp.cli.runs import predict, resume, run
 from lgvi_warp.cli.settings import RUN, out_of
 from lgvi_warp.cli.signals import Ended, Signals, Streams
 from lgvi_warp.cli.stores import export, merge, report
-from lgvi_warp.cli.studies import sensitivity, stability, tradeoff
+from lgvi_warp.cli.studies import sensitivity, stability, sweep, tradeoff
 from lgvi_warp.cli.warm import warm
 from lgvi_warp.common.errors import SceneError
 
-_VERBS = (run, check, resume, predict, merge, export, tradeoff, sensitivity, stability, info, bench, tune, warm, new, schema,
-          plot, report, completion)  # fmt: skip
+_VERBS = (run, check, resume, predict, merge, export, tradeoff, sensitivity, stability, sweep, info, bench, tune, warm,
+          new, schema, plot, report, completion)  # fmt: skip
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {verb.__name__: verb for verb in _VERBS}
 # The second is the name of predict before.
 VERBS |= {"list": list_names, "plan": predict}
@@ -102,6 +102,8 @@ def left(chosen: argparse.Namespace) -> str:
     """
     if chosen.verb in READING:
         return "nothing was to be written"
+    if chosen.verb == "sweep":
+        return "finished cells are kept: the same command goes on" if not chosen.plan else "nothing was to be written"
     store = chosen.dir if chosen.verb == "resume" else None
     if chosen.verb == "run" and chosen.store == "zarr" and (out_of(chosen) / RUN).exists():
         store = out_of(chosen)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +25,7 @@ class Content:
     """Numbers in a folder.
 
     Args:
-        kind: "store", "result", "tradeoff", "sensitivity" or "stability".
+        kind: "store", "result", "tradeoff", "sensitivity", "stability" or "sweep".
         path: The file, or the store.
     """
 
@@ -35,7 +36,7 @@ class Content:
         """Read the numbers.
 
         Returns:
-            A result, or what a study found.
+            A result, or what a study found; of a sweep the content of its file.
 
         Raises:
             SceneError: The file is damaged.
@@ -52,6 +53,8 @@ class Content:
 
             return Result.load(self.path)
         with understood(self.path):
+            if self.kind == "sweep":
+                return json.loads(self.path.read_text(encoding="utf-8"))
             return _study(self.kind).load(self.path)
 
 
@@ -83,7 +86,7 @@ def contents(folder: Path) -> list[Content]:
         SceneError: The folder holds nothing that a verb wrote.
     """
     patterns = {"result": "result*.npz", "tradeoff": "tradeoff.json", "sensitivity": "sensitivity.json",
-                "stability": "stability*.json"}  # fmt: skip
+                "stability": "stability*.json", "sweep": "sweep.json"}  # fmt: skip
     found: list[Content] = []
     if folder.suffix != ".zarr" and folder.is_dir():
         found = [Content(kind, path) for kind, pattern in patterns.items() for path in sorted(folder.glob(pattern))]
@@ -134,7 +137,12 @@ def _part(content: Content, chosen: argparse.Namespace) -> tuple[dict[str, Any],
         return head | documents.of_result(
             found
         ), lambda: f"{size}\n{summary(found, shown_members(found), [], verbose=chosen.verbose)}"
-    return head | {"content": found.to_dict()}, lambda: f"{file_line(content.path)}\n{text_of(content.kind, found)}"
+    if content.kind == "sweep":
+        return head | {
+            "content": found
+        }, lambda: content.path.with_name("summary.md").read_text(encoding="utf-8").rstrip()
+    report = f"{file_line(content.path)}\n{text_of(content.kind, found)}"
+    return head | {"content": found.to_dict()}, lambda: report
 
 
 def text_of(kind: str, found: Any) -> str:

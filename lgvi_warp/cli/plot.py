@@ -50,6 +50,11 @@ def _draw(content: Content, written: Written, out: Path) -> None:
         for name, draw in pictures(numbers, shown_members(numbers)).items():
             written.take(out / name, partial(draw, out / name))
         return
+    if content.kind == "sweep":
+        written.empty.append(
+            f"{content.path}: its pictures are drawn again by the same lgvi-warp sweep, which runs nothing twice"
+        )
+        return
     from lgvi_warp.views import plots, sensitivity
 
     drawings: dict[str, Callable[[Any, Path], Path]] = {

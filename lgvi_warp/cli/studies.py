@@ -1,9 +1,11 @@
-"""The verbs tradeoff, sensitivity and stability."""
+"""The verbs tradeoff, sensitivity, stability and sweep."""
 
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli import documents
@@ -11,28 +13,28 @@ from lgvi_warp.cli.folders import text_of
 from lgvi_warp.cli.output import print_faults, tell
 from lgvi_warp.cli.progress import part_of, shown
 from lgvi_warp.cli.report import file_line
-from lgvi_warp.cli.settings import folder, load_scene
+from lgvi_warp.cli.settings import folder, load_scene, whole
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.errors import SceneError
 
 
-def finish(written: Written, chosen: argparse.Namespace, studies: Mapping[str, Any]) -> int:
+def finish(written: Written, chosen: argparse.Namespace, content: Mapping[str, Any], text: str) -> int:
     """Print a study's report, its files and its notes, and say what failed.
 
     Args:
         written: The study's files.
         chosen: The command's parsed arguments.
-        studies: What was found, by the name of its files.
+        content: What was found, as in its JSON files, by their names.
+        text: The report.
 
     Returns:
         The exit code: 1 if a file failed, otherwise 0.
     """
-    reports = "\n\n".join(text_of(chosen.verb, found) for found in studies.values())
     tell(
         chosen,
-        lambda: {"content": {name: found.to_dict() for name, found in studies.items()}} | documents.of_files(written),
-        lambda: "\n".join([reports, "", *written.note_lines(), *map(file_line, written.files)]),
+        lambda: {"content": content} | documents.of_files(written),
+        lambda: "\n".join([text, "", *written.note_lines(), *map(file_line, written.files)]),
     )
     print_faults(written.empty)
     return 1 if print_faults(written.faults) else 0
@@ -60,7 +62,7 @@ def tradeoff(chosen: argparse.Namespace) -> int:
     with shown(chosen.quiet, "writing"):
         written = Written(measurements.save(out))
         written.draw(plot_tradeoff, measurements, out / "tradeoff.png")
-    return finish(written, chosen, {"tradeoff": measurements})
+    return finish(written, chosen, {"tradeoff": measurements.to_dict()}, text_of("tradeoff", measurements))
 
 
 def sensitivity(chosen: argparse.Namespace) -> int:
@@ -93,7 +95,7 @@ def sensitivity(chosen: argparse.Namespace) -> int:
     with shown(chosen.quiet, "writing"):
         written = Written(indices.save(out))
         written.draw(plot_sensitivity, indices, out / "sensitivity.png")
-    return finish(written, chosen, {"sensitivity": indices})
+    return finish(written, chosen, {"sensitivity": indices.to_dict()}, str(indices))
 
 
 def stability(chosen: argparse.Namespace) -> int:
@@ -139,4 +141,66 @@ def stability(chosen: argparse.Namespace) -> int:
                 raise Ended(f"{i} of {len(maps)} maps are finished, in {out}") from error
             written.files += found[name].save(out, name)
             written.draw(plot_stability, found[name], out / f"{name}.png")
-    return finish(written, chosen, found)
+    text = "\n\n".join(text_of("stability", regions) for regions in found.values())
+    return finish(written, chosen, {name: regions.to_dict() for name, regions in found.items()}, text)
+
+
+def sweep(chosen: argparse.Namespace) -> int:
+    """Run the verb sweep: cases of a closed loop on the same members, what holds and which is better.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 1 if all cells were refused or a file failed, otherwise 0.
+
+    Raises:
+        SceneError: The sweep file or an argument is refused.
+    """
+    from lgvi_warp.studies.sweeps.file import arguments_of_file
+    from lgvi_warp.studies.sweeps.setup import made, plan_text
+    from lgvi_warp.studies.sweeps.sweep import sweep as run_sweep
+    from lgvi_warp.views.sweeps import pictures
+
+    arguments = arguments_of_file(chosen.scene)
+    for name in ("members", "seed"):
+        text = getattr(chosen, name)
+        if text is not None:
+            digits = whole(text)
+            arguments[name] = int(digits) if digits.lstrip("+-").isdigit() else text
+    if chosen.plan:
+        about = {name: arguments.pop(name, None) for name in ("cases", "grid", "vary", "members", "seed", "sampling")}
+        for name in ("success", "baseline", "confidence", "interval"):
+            arguments.pop(name, None)
+        asked = {"scene": arguments.pop("scene"), "metrics": arguments.pop("metrics", ())}
+        with shown(chosen.quiet, "measuring"):
+            text = plan_text(made(**asked, **about, settings=arguments), chosen.threads)
+        tell(chosen, lambda: {"plan": text.splitlines()}, lambda: text)
+        return 0
+    out = folder(chosen, "_sweep")
+    executor = {"threads": chosen.threads, "executor": chosen.executor, "scheduler": chosen.scheduler}
+    with shown(chosen.quiet) as progress:
+        found = run_sweep(**arguments, **executor, out=out, progress=progress)
+    with shown(chosen.quiet, "writing"):
+        written = Written(found.save(out))
+        for name, draw in pictures(found).items():
+            written.draw(draw, found, out / name)
+        if chosen.record:
+            _record_worst(found, chosen.record, out, written)
+    code = finish(written, chosen, {"sweep": json.loads((out / "sweep.json").read_text())}, str(found))
+    return 1 if all(found.record(cell).refused for cell in found.cells) else code
+
+
+def _record_worst(found: Any, count: int, out: Path, written: Written) -> None:
+    """Run the worst members again, those of each cell together, and write a recording of them."""
+    from lgvi_warp.views.rerun import log_rerun
+
+    members: dict[int, list[int]] = {}
+    for row in found.worst(count):
+        at = {name: row[name] for name in found.setup.axes}
+        members.setdefault(found.cell(row["case"], at).index, []).append(row["member"])
+    for index, chosen in members.items():
+        cell = found.cells[index]
+        path = out / f"worst_{index:04d}.rrd"
+        result = found.again(cell.case.name, sorted(chosen), cell.point)
+        written.draw(lambda result, path: log_rerun(result, path) or path, result, path)

@@ -108,7 +108,9 @@ class Runner:
             plan = kind.plans.get((method, survey(fleet, method, h, kind.shared, odd=False, most=SURVEYED).decisive))
             if plan is not None:
                 return plan.of(fleet)
-        plan = make_plan(fleet, **self.settings, fields=self.observed.fields, survey_all=False)
+        plan = make_plan(
+            fleet, **self.settings, fields=self.observed.fields, survey_all=False, looks=self.observed.looks
+        )
         plan.compile()
         if plan.method.reason:  # chosen once, by the members of the first plan
             self.settings["method"] = plan.method

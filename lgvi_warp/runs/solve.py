@@ -108,7 +108,7 @@ def solve(
     assert runner is not None
     plan = make_plan(
         ensemble, method, h, t1, save, dtype, width=width, checks=checks, on_failure=on_failure, fields=observed.fields,
-        survey_all=store is not None)  # fmt: skip
+        survey_all=store is not None, looks=observed.looks)  # fmt: skip
     fields, count = fields_of(save, ensemble.scene.run), threads or machine.thread_count()
     if store is None:
         return completed(plan, count, observed, fields, progress=callback(progress), executor=runner, partial=True)

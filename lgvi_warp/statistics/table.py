@@ -119,6 +119,8 @@ _LINES: dict[str, Callable[[Estimate], Iterator[Line]]] = {
     "outcome": _outcome,
     "mean_attitude": _attitude,
     "histogram": _histogram,
+    # As many as there are members.
+    "each": lambda one: iter(()),
 }
 
 # Number of members behind an estimate, for types where it is not the count at the end.

@@ -45,7 +45,9 @@ def recipe(plan: Plan) -> dict[str, Any]:
     }
 
 
-def plan_of(made: Mapping[str, Any], ensemble: Ensemble, sample_steps: np.ndarray, times: np.ndarray) -> Plan:
+def plan_of(
+    made: Mapping[str, Any], ensemble: Ensemble, sample_steps: np.ndarray, times: np.ndarray, looks: bool = False
+) -> Plan:
     """Build the plan of a recipe.
 
     Args:
@@ -53,6 +55,7 @@ def plan_of(made: Mapping[str, Any], ensemble: Ensemble, sample_steps: np.ndarra
         ensemble: The members.
         sample_steps: Number of steps made until each sample, shape (k,).
         times: Times of the samples [s], shape (k,).
+        looks: As of `Plan`; default False.
 
     Returns:
         The plan.
@@ -64,8 +67,8 @@ def plan_of(made: Mapping[str, Any], ensemble: Ensemble, sample_steps: np.ndarra
 
     grid = TimeGrid(made["step"], sample_steps, times, tuple(made["messages"]))
     method, fields = Method(**made["method"]), tuple(made["fields"])
-    settings = (made[name] for name in ("dtype", "width", "checks", "on_failure"))
-    return Plan(ensemble, method, grid, fields, *settings)
+    settings = {name: made[name] for name in ("dtype", "width", "checks", "on_failure")}
+    return Plan(ensemble, method, grid, fields, **settings, looks=looks)
 
 
 # Key in the stored provenance of an ensemble: SHA-256 of the arrays that it was given, which lie in the group "explicit".

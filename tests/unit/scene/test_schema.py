@@ -13,7 +13,11 @@ from tests.conftest import ROOT
 from tests.support.json_schema import faults
 
 SCHEMA = schema()
-FILES = [*sorted((ROOT / "examples").rglob("*.toml")), *map(vehicle_file, vehicles())]
+FILES = [
+    *sorted((ROOT / "examples").glob("*.toml")),
+    *sorted((ROOT / "examples" / "scenes").glob("*.toml")),
+    *map(vehicle_file, vehicles()),
+]
 PAPER = tomllib.loads((ROOT / "examples" / "paper.toml").read_text())
 
 

@@ -27,7 +27,7 @@ fleet = lw.Ensemble(
 )
 
 if __name__ == "__main__":
-    result = lw.solve(fleet, method="psi_s", h=0.02, t1=60.0, save=lw.SaveAt(every=0.5))
+    result = lw.solve(fleet, h=0.02, t1=60.0, save=lw.SaveAt(every=0.5))
     depth = result.position[-1, :, 2]
     print(result.status.counts())
     print(f"depth after 60 s: {depth.mean():.2f} m on average, from {depth.min():.2f} to {depth.max():.2f} m")

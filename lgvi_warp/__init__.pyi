@@ -150,6 +150,19 @@ from lgvi_warp.statistics.path import PathTime as PathTime
 from lgvi_warp.statistics.quantity import Quantity as Quantity
 from lgvi_warp.statistics.until import Until as Until
 from lgvi_warp.studies import sensitivity as uq
+from lgvi_warp.studies.linear.linearize import LinearModel as LinearModel
+from lgvi_warp.studies.linear.linearize import linearize as linearize
+from lgvi_warp.studies.linear.lqr import Regulator as Regulator
+from lgvi_warp.studies.linear.lqr import lqr as lqr
+from lgvi_warp.studies.linear.margins import Margins as Margins
+from lgvi_warp.studies.linear.margins import margins as margins
+from lgvi_warp.studies.linear.trim import Trim as Trim
+from lgvi_warp.studies.linear.trim import trim as trim
+from lgvi_warp.studies.search.risk import CVaR as CVaR
+from lgvi_warp.studies.search.tune import Tuned as Tuned
+from lgvi_warp.studies.search.tune import tune as tune
+from lgvi_warp.studies.search.worst_case import WorstCase as WorstCase
+from lgvi_warp.studies.search.worst_case import worst_case as worst_case
 from lgvi_warp.studies.stability.map import StabilityMap as StabilityMap
 from lgvi_warp.studies.stability.map import stability_map as stability_map
 from lgvi_warp.studies.suggest import suggest as suggest
@@ -157,11 +170,14 @@ from lgvi_warp.studies.sweeps.cases import Case as Case
 from lgvi_warp.studies.sweeps.output import Sweep as Sweep
 from lgvi_warp.studies.sweeps.sweep import sweep as sweep
 from lgvi_warp.studies.tradeoff import tradeoff as tradeoff
+from lgvi_warp.views.choice import shown as shown
 from lgvi_warp.views.plots import plot as plot
 from lgvi_warp.views.plots import plot_stability as plot_stability
 from lgvi_warp.views.plots import plot_statistics as plot_statistics
 from lgvi_warp.views.plots import plot_tradeoff as plot_tradeoff
+from lgvi_warp.views.report import report as report
 from lgvi_warp.views.rerun import log_rerun as log_rerun
+from lgvi_warp.views.rerun import show as show
 from lgvi_warp.views.sensitivity import plot_sensitivity as plot_sensitivity
 
 __version__: str

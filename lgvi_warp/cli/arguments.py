@@ -271,6 +271,13 @@ def _add_store_verbs(verbs: Any) -> None:
     _add_shared(merge, "--overwrite --quiet", quiet="no summary")
     export = verbs.add_parser("export", help="write a run as one NetCDF or Parquet file")
     _add_shared(export, "dir")
+    page = verbs.add_parser("report", help="one HTML file about a run or a study: report.html")
+    page.add_argument("dir", metavar="DIR", type=Path, help="folder that run, tradeoff, stability or sensitivity wrote")
+    page.add_argument(
+        "--out", metavar="FILE", type=Path, help="the file, replaced if it exists (default: DIR/report.html)"
+    )
+    page.add_argument("--open", action="store_true", help="show it in the browser")
+    _add_shared(page, "--quiet", quiet="no summary")
     export.add_argument("--to", required=True, help="netcdf or parquet")
     export.add_argument(
         "--out", metavar="FILE", type=Path, help="the file, replaced if it exists (default: beside the store)"

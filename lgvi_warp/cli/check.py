@@ -6,6 +6,7 @@ import argparse
 from dataclasses import replace
 from typing import Any
 
+from lgvi_warp.cli.report import controller_lines
 from lgvi_warp.cli.settings import load_scene
 
 
@@ -29,7 +30,7 @@ def check(chosen: argparse.Namespace) -> int:
     head, messages = _settings(ensemble)
     messages += (*scene.vehicle.warnings, *plausibility.of_ensemble(ensemble).messages(ensemble.members))
     if not chosen.quiet:
-        print(f"scene       {chosen.scene}, {head}")
+        print("\n".join([f"scene       {chosen.scene}, {head}", *controller_lines(scene.to_dict())]))
         for message in messages:
             print(f"note        {message}")
         print("result      can run, with notes: nothing is refused for them" if messages else "result      can run")

@@ -14,12 +14,28 @@ from lgvi_warp.cli.machine import bench, info, tune
 from lgvi_warp.cli.runs import predict, resume, run
 from lgvi_warp.cli.settings import RUN, out_of
 from lgvi_warp.cli.signals import Ended, Signals, Streams
-from lgvi_warp.cli.stores import export, merge
+from lgvi_warp.cli.stores import export, merge, report
 from lgvi_warp.cli.studies import sensitivity, stability, sweep, tradeoff
 from lgvi_warp.cli.warm import warm
 from lgvi_warp.common.errors import SceneError
 
-_VERBS = (run, check, resume, predict, merge, export, tradeoff, sensitivity, stability, sweep, info, bench, tune, warm)
+_VERBS = (
+    run,
+    check,
+    resume,
+    predict,
+    merge,
+    export,
+    report,
+    tradeoff,
+    sensitivity,
+    stability,
+    sweep,
+    info,
+    bench,
+    tune,
+    warm,
+)
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {verb.__name__: verb for verb in _VERBS}
 VERBS["plan"] = predict  # its name before
 

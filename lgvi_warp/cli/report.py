@@ -5,11 +5,12 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli.writing import Written, side_by_side
+from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.safe_files import size_below
 from lgvi_warp.common.write_lock import write_lock
 
@@ -55,28 +56,50 @@ def print_faults(faults: list[str]) -> list[str]:
     return faults
 
 
-# Most numbers in pictures and drift, which then cover the first members: a store may be larger than the memory.
+# Most numbers that the picture, the drift and the summary look at; the picture and the drift then cover some members: a store
+# may be larger than the memory.
 MOST_DRAWN = 30_000_000
 
 
 def shown_members(result: Any) -> Any:
-    """Select the members that pictures and drift are made of.
+    """Select the members that the picture and the drift are made of.
 
     Args:
         result: The run's result.
 
     Returns:
-        The result itself; the first members of a large one in a store, in memory; without samples, the kept members, or
-        None where there are none.
+        The result itself; members of a large one in a store, in memory, as `lw.shown` chooses them; without samples, the kept
+        members, or None where there are none, or where a field of the motion was not saved.
     """
     if not result.samples:
         return result.kept and shown_members(result.kept)
+    if unsaved(result):
+        return None
     if result.store is None:
         return result
     from lgvi_warp.runs.store.open import chosen
+    from lgvi_warp.views.choice import shown
 
     most = max(1, MOST_DRAWN // (18 * len(result.time)))
-    return chosen(result, range(min(most, result.members)))
+    members: Any = range(min(most, result.members))
+    if result.members > most:
+        with contextlib.suppress(NothingToDraw):  # each picture says so
+            members = shown(result, most).members
+    return chosen(result, members)
+
+
+def unsaved(result: Any) -> list[str]:
+    """Name the fields of the motion that a run did not save, though it has samples.
+
+    Args:
+        result: The run's result.
+
+    Returns:
+        Their names.
+    """
+    from lgvi_warp.physics.fields import FIELDS
+
+    return [name for name in FIELDS if result.samples and name not in result.samples]
 
 
 def write(result: Any, drawn: Any, out: Path) -> Written:
@@ -84,19 +107,18 @@ def write(result: Any, drawn: Any, out: Path) -> Written:
 
     Args:
         result: The run's result; a stored one is written already.
-        drawn: The members of the pictures, from `shown_members`; None for no pictures.
+        drawn: The members of the picture, from `shown_members`; None for neither picture nor recording.
         out: Folder of the files.
 
     Returns:
         What was written, and what failed.
     """
     from lgvi_warp.views.plots import drawable, plot, plot_statistics
-    from lgvi_warp.views.rerun import log_rerun
 
     written = Written([result.store] if result.store else [])
     writers: dict[str, Callable[[Path], Path]] = {} if result.store else {"result.npz": result.save}
     if drawn is not None:
-        writers |= {"fleet.png": lambda path: plot(drawn, path), "fleet.rrd": lambda path: log_rerun(drawn, path)}
+        writers |= {"fleet.png": lambda path: plot(drawn, path), "fleet.rrd": lambda path: _record(result, path)}
     if drawable(result):
         writers["statistics.png"] = lambda path: plot_statistics(result, path)
     with contextlib.ExitStack() as stack:
@@ -107,6 +129,14 @@ def write(result: Any, drawn: Any, out: Path) -> Written:
     for path, job in jobs.items():
         written.take(path, job.result)
     return written
+
+
+def _record(result: Any, path: Path) -> Path:
+    """Write the recording of a result."""
+    from lgvi_warp.views.rerun import log_rerun
+
+    log_rerun(result, path)
+    return path
 
 
 def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
@@ -129,10 +159,13 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
     lines = [
         *(f"note        {message}" for message in result.messages),
         members_line(result.members, settings),
+        *controller_lines(settings["scene"]),
         *_speed(result, seconds),
         "status      " + ", ".join(f"{name} {number:,}" for name, number in result.status.counts().items()),
     ]
-    if result.samples:
+    if missing := unsaved(result):
+        lines.append(f"pictures    none, and no energy: {', '.join(missing)} not saved")
+    elif result.samples:
         lines += energy_lines(result, drawn)
     elif result.kept is not None:
         lines.append(f"kept        {result.kept.members:,} members' samples, run again")
@@ -140,6 +173,9 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
         lines.append("kept        no samples: no member failed")
     lines += [f"  {outcome_text(result, code)}" for code in outcomes(result) if code != Status.OK]
     lines += _warning_lines(result)
+    if "unmet" in result.samples and 6 * len(result.time) * result.members <= MOST_DRAWN:
+        short = int((result.samples["unmet"] != 0.0).any(axis=(0, 2)).sum())
+        lines.append(f"unmet       {short:,} members asked at some sample for more than their actuators deliver")
     if result.substeps.any():
         divided = result.substeps > 0
         lines.append(
@@ -173,11 +209,12 @@ def energy_lines(result: Any, drawn: Any) -> list[str]:
     import math
 
     from lgvi_warp.physics import energy as invariants
+    from lgvi_warp.views.choice import of_members
 
     drift, conserved = invariants.drift(drawn), invariants.conserved(drawn)
     if math.isnan(drift["energy"]):
         return []
-    whose = "all members" if drawn.members == result.members else f"the first {drawn.members:,} members"
+    whose = "all members" if drawn.members == result.members else of_members(drawn.members, result.members)
     if "energy" not in conserved:
         names = ", ".join(invariants.at_work(drawn))
         return [f"work        energy changed by up to {drift['energy']:.2g} J, through {names} (largest of {whose})"]
@@ -232,6 +269,26 @@ def members_line(members: int, provenance: dict[str, Any]) -> str:
         f"{provenance['steps']:,} steps"
     )
     return f"{line}\nmethod      {name}, chosen {chosen}" if chosen else line
+
+
+def controller_lines(scene: Mapping[str, Any]) -> list[str]:
+    """Say what a controller consists of.
+
+    Args:
+        scene: The scene, as a table.
+
+    Returns:
+        One line; none for a scene without a controller.
+    """
+    section = scene.get("controller")
+    if not section:
+        return []
+    delay = f", {section['delay']:g} s until they act" if section.get("delay") else ""
+    lists = {
+        word: section[word] for word in ("sensors", "guidance", "laws", "allocation", "faults") if section.get(word)
+    }
+    texts = [f"{word} {', '.join(part.get('name') or part['type'] for part in parts)}" for word, parts in lists.items()]
+    return [f"controller  looks every {section['period']:g} s{delay}; {'; '.join(texts)}"]
 
 
 def file_line(path: Path) -> str:

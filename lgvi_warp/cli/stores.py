@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from lgvi_warp.cli.report import file_line, members_line, print_faults
+from lgvi_warp.cli.report import controller_lines, file_line, members_line, print_faults
 
 
 def merge(chosen: argparse.Namespace) -> int:
@@ -52,6 +52,30 @@ def export(chosen: argparse.Namespace) -> int:
     return 0
 
 
+def report(chosen: argparse.Namespace) -> int:
+    """Run the verb report: write one HTML file about a run or a study.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 0.
+
+    Raises:
+        SceneError: The folder holds no run and no study.
+    """
+    import webbrowser
+
+    from lgvi_warp.views.report import report as write_report
+
+    path = write_report(chosen.dir, chosen.out or chosen.dir / "report.html")
+    if not chosen.quiet:
+        print(file_line(path))
+    if chosen.open:
+        webbrowser.open(path.resolve().as_uri())
+    return 0
+
+
 # Most lines on damage.
 MOST_SAID = 20
 
@@ -71,7 +95,7 @@ def info_of_run(path: Path) -> int:
     provenance = contents["provenance"]
     version = provenance["versions"]["lgvi-warp"]
     print(f"run         {contents['path']} ({contents['bytes'] / 1e6:.1f} MB), lgvi-warp {version}")
-    print(members_line(contents["members"], provenance))
+    print("\n".join([members_line(contents["members"], provenance), *controller_lines(provenance["scene"])]))
     fields = ", ".join(contents["fields"])
     print(f"samples     {contents['samples']} times" + (f" of {fields}" if fields else ", not of all members"))
     if contents["keepers"]:

@@ -23,6 +23,8 @@ class Looks:
         heading: Headings (m,) [rad].
         water_velocity: Measured velocities through the water (m, 3) [m/s], body axes; None, the default, of what is wanted.
         speed: Wanted speed ahead (m,) [m/s]; None, the default, of what is measured.
+        angular_acceleration: Wanted angular accelerations (m, 3) [rad/s^2], axes of the wanted attitude; None, the default, of
+            what is measured.
     """
 
     position: np.ndarray
@@ -32,6 +34,7 @@ class Looks:
     heading: np.ndarray
     water_velocity: np.ndarray | None = None
     speed: np.ndarray | None = None
+    angular_acceleration: np.ndarray | None = None
 
     @property
     def depth(self) -> np.ndarray:
@@ -53,7 +56,8 @@ def last_look(packets: Packets, members: np.ndarray | None = None) -> tuple[Look
     measured_attitude, wanted_attitude = (rows[:, 3:12].reshape(-1, 3, 3) for rows in (y, r))
     headings = [np.arctan2(R[:, 1, 0], R[:, 0, 0]) for R in (measured_attitude, wanted_attitude)]
     measured = Looks(y[:, :3], measured_attitude, y[:, 12:15], y[:, 18:21], headings[0], water_velocity=y[:, 15:18])
-    return measured, Looks(r[:, :3], wanted_attitude, r[:, 12:15], r[:, 15:18], headings[1], speed=r[:, 19])
+    rates = {"speed": r[:, 19], "angular_acceleration": r[:, 20:23]}
+    return measured, Looks(r[:, :3], wanted_attitude, r[:, 12:15], r[:, 15:18], headings[1], **rates)
 
 
 def _numbers(packets: Packets, places: range, members: np.ndarray | None) -> np.ndarray:

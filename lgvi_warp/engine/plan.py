@@ -396,6 +396,11 @@ class Plan:
         controller = self.kernel_choice.controller
         return controller is not None and controller.callback is not None
 
+    @property
+    def notes(self) -> bool:
+        """Whether looks note what they measure, want and demand: where some of it is saved, or the host is asked."""
+        return self.asks or any(SIGNALS[name].group in NOTED for name in self.signals)
+
     @functools.cached_property
     def table(self) -> dict[str, Field]:
         """The fields that the run may save, by name."""

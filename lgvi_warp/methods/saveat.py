@@ -10,7 +10,7 @@ from fractions import Fraction
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.control.signals import SAVED
+from lgvi_warp.physics.control.signals import check_names
 from lgvi_warp.physics.fields import FIELDS
 
 # A grid whose step would be more than this many times shorter than the one asked for is refused.
@@ -48,8 +48,7 @@ class SaveAt:
             times = faults.finite("save.at", self.at)
             if times is not None and (times.ndim != 1 or np.any(times < 0.0) or np.any(np.diff(times) <= 0.0)):
                 faults.add("save.at", self.at, "is not a rising list of times >= 0", "sort it and drop repetitions")
-        for name in self.fields:
-            faults.choice("save.fields", name, SAVED)
+        check_names(faults, "save.fields", self.fields)
         faults.raise_if_any()
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics import inertia as inertias
 from lgvi_warp.physics import notation
+from lgvi_warp.physics.shape import shape_from
 
 Numbers = Mapping[str, np.ndarray]
 
@@ -61,6 +62,8 @@ class Vehicle:
             numbers.
         warnings: Texts about what is unusual but allowed, as importers give them. The vehicle adds what it finds itself;
             all are among the messages of a run.
+        shape: How the vehicle is drawn, a table with `length` and `diameter` [m] or with `mesh`, the path of a .glb file; by
+            default a hull of the displaced volume. No part of the dynamics.
 
     Raises:
         SceneError: Where a number is not finite, not positive, of the wrong shape, not symmetric or not positive definite.
@@ -78,6 +81,7 @@ class Vehicle:
     center_of_gravity: Any = None
     inertia_tolerance: float = 0.0
     warnings: Sequence[str] = ()
+    shape: Any = None
 
     def __post_init__(self) -> None:
         faults = Faults("vehicle.")
@@ -90,6 +94,8 @@ class Vehicle:
         object.__setattr__(self, "inertia_tolerance", tolerance or 0.0)
         values |= self._full(faults) if self.full else self._simple(faults)
         values["warnings"] = (*user_warnings, *map(Seen, values["warnings"]))
+        with faults.including():
+            values["shape"] = shape_from(self.shape)
         faults.raise_if_any()
         for name, value in values.items():
             if isinstance(value, np.ndarray):
@@ -204,7 +210,8 @@ class Vehicle:
         """The vehicle as a table of a scene file.
 
         Returns:
-            Numbers by name; 3x3 matrices that are diagonal as their diagonal. Of the warnings, only those of the user.
+            Numbers by name; 3x3 matrices that are diagonal as their diagonal. Of the warnings, only those of the user. The
+            shape, where there is one.
         """
         content = {}
         for name, value in self.parameters().items():
@@ -212,7 +219,8 @@ class Vehicle:
             content[name] = compact(value) if value.shape == (3, 3) and not full else value.tolist()
         user_warnings = [text for text in self.warnings if not isinstance(text, Seen)]
         content |= {"inertia_tolerance": self.inertia_tolerance} if self.inertia_tolerance else {}
-        return content | ({"warnings": user_warnings} if user_warnings else {})
+        content |= {"warnings": user_warnings} if user_warnings else {}
+        return content | ({"shape": self.shape.to_dict()} if self.shape else {})
 
 
 def _texts(faults: Faults, given: Any) -> tuple[str, ...]:

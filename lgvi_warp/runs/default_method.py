@@ -115,6 +115,7 @@ def is_damped(ensemble: Ensemble) -> bool:
     return any(term.present(ensemble.own(term, parameters)) for term in terms)
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def h_rates(ensemble: Ensemble, h: float) -> dict[str, float]:
     """Compute the step times the rates of the fastest of the first members under way.
 
@@ -142,7 +143,9 @@ def h_rates(ensemble: Ensemble, h: float) -> dict[str, float]:
         force = sum((term.drive() for term in ensemble.scene.terms), np.zeros(6)) + abs(net(p))[:, None] * FORCES
         speeds = np.maximum(speeds, terminal_speeds(force, linear, 0.5 * (both - linear)))
         speeds = np.maximum(speeds, ASIDE * np.maximum(np.linalg.norm(speeds[:, :3], axis=1, keepdims=True), UNDER_WAY))
-        drag = float(h * np.abs(np.linalg.eigvals(np.linalg.solve(vehicle.inertia6(p), matrices(speeds)))).max())
+        rates = np.linalg.solve(vehicle.inertia6(p), matrices(speeds))
+        # Drag beyond float64 brakes faster than any step.
+        drag = float(h * np.abs(np.linalg.eigvals(rates)).max()) if np.isfinite(rates).all() else np.inf
     return {"drag": drag, "rotation": float(h * np.linalg.norm(members.angular_velocity, axis=1).max())}
 
 

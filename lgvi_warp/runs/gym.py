@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import functools
 import inspect
 from collections.abc import Callable, Mapping, Sequence
@@ -281,10 +280,10 @@ class Vehicles:
             raise needed().error.ResetNeeded("an episode has ended, or none has begun: call reset first")
         if episodes.steps + episodes.every > self._plan.grid.steps:
             raise needed().error.ResetNeeded("steps are counted up to 2^31: reset all environments")
-        given = np.asarray(actions, dtype=np.float64)
-        if given.shape != self.action_space.shape:
-            raise ValueError(f"actions: have shape {given.shape}; give {self.action_space.shape}")
-        scaled = given if self._scale is None else given * self._scale
+        wanted = np.asarray(actions, dtype=np.float64)
+        if wanted.shape != self.action_space.shape:
+            raise ValueError(f"actions: have shape {wanted.shape}; give {self.action_space.shape}")
+        scaled = wanted if self._scale is None else wanted * self._scale
         if self._columns is None:
             self._answer = scaled
         else:
@@ -436,9 +435,7 @@ def _acted(fleet: Ensemble, names: Sequence[str], to: str | None) -> Ensemble:
     callback = Callback(functools.partial(_nothing, channels[to] if to else len(COMPONENTS)), to=to, name="actions")
     laws = [law for law in controller.laws if law.key not in names and not isinstance(law, Callback)]
     allocation = [part for part in controller.allocation if part.type and part.to != to]
-    acted = copy.copy(fleet)
-    acted.scene = replace(scene, controller=replace(controller, laws=[*laws, callback], allocation=allocation))
-    return acted
+    return fleet.in_scene(replace(scene, controller=replace(controller, laws=[*laws, callback], allocation=allocation)))
 
 
 def _wishes(controller: Any) -> tuple[str, ...]:

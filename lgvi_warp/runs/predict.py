@@ -26,7 +26,7 @@ from lgvi_warp.engine.keepers.observation import Observation, Observing, observe
 from lgvi_warp.engine.keepers.protocol import Keeper
 from lgvi_warp.engine.plan import SEGMENT_SAMPLE_BYTES, NotSurveyed, Plan
 from lgvi_warp.engine.work import Work
-from lgvi_warp.methods.saveat import SaveAt, TimeGrid
+from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.runs import member_fields
 from lgvi_warp.runs.sizes import Sizes, sizes
 from lgvi_warp.runs.store.block_files import BlockFiles, marker
@@ -131,7 +131,7 @@ def predict(
     Raises:
         SceneError: If arguments are at fault.
     """
-    from lgvi_warp.runs.settle import make_plan
+    from lgvi_warp.runs.settle import fields_of, make_plan
     from lgvi_warp.runs.store.solve import settled
 
     faults = Faults()
@@ -141,7 +141,7 @@ def predict(
     statistics, keep, until = (settings.pop(name, None) for name in ("statistics", "keep", "until"))
     scene = ensemble.scene
     observed = observe(ensemble.members, scene.run, statistics, keep, until, scene.events)
-    fields = (settings.get("save") or SaveAt()).fields
+    fields = fields_of(settings.get("save"), scene.run)
     plan = make_plan(ensemble, **settings, fields=observed.fields, survey_all=False, looks=observed.looks)
     count = threads or machine.thread_count()
     asked_store = store if isinstance(store, Store) or store is None else Store(store)

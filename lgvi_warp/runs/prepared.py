@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common import machine
-from lgvi_warp.common.errors import Faults, SceneError, shown
+from lgvi_warp.common.errors import Faults, SceneError, refusal, shown
 from lgvi_warp.common.labelled import columns_by_name, is_labelled
 from lgvi_warp.common.status import Status, failed
 from lgvi_warp.engine.executors import executor_of
@@ -207,7 +207,17 @@ class Prepared:
             raise SceneError(["X: is given beside seed or members, which draw the numbers; leave out one of them"])
         return self._answer(self._drawn(seed, members) if X is None else self._members(X), progress)
 
-    def states(self, position: Any, attitude: Any, velocity: Any, angular_velocity: Any, parameters: Any = None) -> Any:
+    def states(
+        self,
+        position: Any,
+        attitude: Any,
+        velocity: Any,
+        angular_velocity: Any,
+        parameters: Any = None,
+        *,
+        indices: Any = None,
+        seed: int = 0,
+    ) -> Any:
         """Run members from given states.
 
         Args:
@@ -216,6 +226,9 @@ class Prepared:
             velocity: (n, 3) [m/s], body axes.
             angular_velocity: (n, 3) [rad/s], body axes.
             parameters: arrays (n, ...) by name, as of `Ensemble.from_states`; default None.
+            indices: (n,), whole numbers that key the noise of each member, such as its index in another ensemble; members with
+                the same index have the same noise. Default None for 0 to n - 1.
+            seed: the seed of the noise. Default 0.
 
         Returns:
             As of a call.
@@ -225,7 +238,15 @@ class Prepared:
             FailedMembers: if members failed, unless failed="nan".
         """
         given = position, attitude, velocity, angular_velocity, parameters
-        return self._answer(Ensemble.from_states(self._fleet.scene, *given), None)
+        fleet = Ensemble.from_states(self._fleet.scene, *given)
+        fleet.seed = seed
+        if indices is not None:
+            keys = np.asarray(indices)
+            if keys.shape != (fleet.members,) or keys.dtype.kind not in "iu":
+                problem = "are not one whole number for each member"
+                raise refusal("indices", indices, problem, f"give an array of shape ({fleet.members},)")
+            fleet.indices = keys.astype(np.int64)
+        return self._answer(fleet, None)
 
     def __reduce__(self) -> tuple[Any, ...]:
         arguments, settings = self._arguments

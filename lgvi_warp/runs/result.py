@@ -19,9 +19,9 @@ from lgvi_warp.common.phases import Phases
 from lgvi_warp.common.status import StatusArray, WarningArray
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
+from lgvi_warp.physics.control.controller import terms_of
 from lgvi_warp.physics.control.signals import IN_FILES, SIGNALS
 from lgvi_warp.physics.fields import FIELDS, TABLE, dims_of
-from lgvi_warp.physics.terms import from_list
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.runs import member_fields, result_file
 from lgvi_warp.statistics.estimate import Estimates
@@ -299,7 +299,7 @@ class Result:
             parameters=_below("parameters/", content),
             messages=tuple(texts["messages"]),
             provenance=provenance,
-            terms=from_list(provenance["scene"].get("terms", ())),
+            terms=terms_of(provenance["scene"]),
             statistics=estimates,
         )
         kept = _below("kept/", content)

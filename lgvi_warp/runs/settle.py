@@ -15,9 +15,11 @@ from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt, time_grid
 from lgvi_warp.physics.control.signals import check
+from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.default_method import planned
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.settings import RunSettings
 
 
 def blocks_there(only: range | None, plan: Plan) -> range | None:
@@ -98,9 +100,10 @@ def make_plan(
     every = settings.save_every
     # The scene's save_every is meant for its own duration; a shorter run ignores it.
     dropped = save is None and every is not None and every > float(t1)  # type: ignore[arg-type]
+    key = "run.save_fields" if save is None else "save.fields"
     if save is None:
-        save = SaveAt(every=None if dropped else every)
-    check(faults, "save.fields", save.fields, ensemble.scene.controller)
+        save = SaveAt(every=None if dropped else every, fields=fields_of(save, settings))
+    check(faults, key, save.fields, ensemble.scene.controller)
     faults.raise_if_any()
     grid = time_grid(float(h), float(t1), save)  # type: ignore[arg-type]
     if dropped:
@@ -119,6 +122,21 @@ def make_plan(
         text = f"Newton steps {number} every member's start at twice the step"
         grid = replace(grid, messages=(*grid.messages, text))
     return Plan(ensemble, chosen, grid, fields(save.fields), dtype, width, checks, on_failure, survey_all, looks)
+
+
+def fields_of(save: SaveAt | None, settings: RunSettings) -> tuple[str, ...]:
+    """Names of the samples that a run keeps.
+
+    Args:
+        save: What the call says; None where it says nothing.
+        settings: What the scene says.
+
+    Returns:
+        The names of the call, else those of the scene, else those of the motion.
+    """
+    if save is not None:
+        return save.fields
+    return FIELDS if settings.save_fields is None else tuple(settings.save_fields)
 
 
 # With more Newton steps than this, a fixed number gains nothing over iterating to the tolerance.

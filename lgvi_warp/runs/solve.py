@@ -15,7 +15,7 @@ from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.runs.result import Result
 from lgvi_warp.runs.run import completed, finished
-from lgvi_warp.runs.settle import blocks_there, make_plan
+from lgvi_warp.runs.settle import blocks_there, fields_of, make_plan
 from lgvi_warp.runs.store.settings import Store
 from lgvi_warp.runs.store.solve import run_stored
 from lgvi_warp.scene.ensemble import Ensemble
@@ -106,7 +106,7 @@ def solve(
     plan = make_plan(
         ensemble, method, h, t1, save, dtype, width=width, checks=checks, on_failure=on_failure, fields=observed.fields,
         survey_all=store is not None, looks=observed.looks)  # fmt: skip
-    fields, count = (save or SaveAt()).fields, threads or machine.thread_count()
+    fields, count = fields_of(save, ensemble.scene.run), threads or machine.thread_count()
     if store is None:
         return completed(plan, count, observed, fields, progress=progress, executor=runner, partial=True)
     only = blocks_there(only, plan)

@@ -505,6 +505,23 @@ class Ensemble:
         ensemble._check_physical()
         return ensemble
 
+    def in_scene(self, scene: SceneLike, by_member: Sequence[str] = ()) -> Ensemble:
+        """Return the same members, in a scene with other terms, events or parts of the controller.
+
+        Args:
+            scene: The scene; what varies of it has the names that it had, or is no more.
+            by_member: Names of more numbers that count as varied, since the caller sets them; none by default.
+
+        Returns:
+            The ensemble, whose members have the scene's values of these.
+        """
+        ensemble = copy.copy(self)
+        ensemble.scene, ensemble._base = scene, scene.parameters()
+        shared = ((name, ensemble._base[name]) for name in by_member)
+        columns = [(Target(name), np.broadcast_to(value, (self._whole, *np.shape(value)))) for name, value in shared]
+        ensemble._columns = [*self._columns, *columns]
+        return ensemble
+
     def with_seed(self, seed: int, members: int | None = None) -> Ensemble:
         """Return these members, drawn from the same distributions by another seed.
 

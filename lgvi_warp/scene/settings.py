@@ -53,6 +53,7 @@ class RunSettings:
         step: Length of a step [s]; None leaves it to the call of solve.
         duration: Simulated time [s]; None leaves it to the call of solve.
         save_every: Time between samples [s]; None leaves it to the call of solve.
+        save_fields: Names of the samples, as `fields` of SaveAt; None (default) for those of the motion.
         dtype: Number type of the computation; by default "float64".
         solver: As in Method.
         iterations: As in Method.
@@ -73,6 +74,7 @@ class RunSettings:
     step: float | None = None
     duration: float | None = None
     save_every: float | None = None
+    save_fields: Sequence[str] | None = None
     dtype: str = "float64"
     solver: str | None = None
     iterations: int | str | None = None
@@ -88,6 +90,10 @@ class RunSettings:
     def __post_init__(self) -> None:
         faults = Faults("run.")
         check_keep(faults, "keep", self.keep)
+        if self.save_fields is not None:
+            from lgvi_warp.physics.control.signals import check_names
+
+            check_names(faults, "save_fields", self.save_fields)
         # Most scenes have neither statistics nor a stopping rule: their import is a quarter of that of a scene.
         if self.statistics or not isinstance(self.statistics, tuple):
             from lgvi_warp.statistics.base import from_list
@@ -155,6 +161,8 @@ class RunSettings:
             content["statistics"] = [statistic.to_dict() for statistic in self.statistics]
         if "until" in content:
             content["until"] = self.until.to_dict()
+        if "save_fields" in content:
+            content["save_fields"] = list(content["save_fields"])
         return content
 
 

@@ -60,7 +60,7 @@ def tune(rounds: int = ROUNDS) -> Iterator[Reading]:
             if width in widths.WIDTHS
         }
         seconds = speed.least([speed.stepper(plan) for plan in plans.values()], rounds)
-        ns = {width: 1e9 * one / (MEMBERS * STEPS) for width, one in zip(plans, seconds, strict=True)}
+        ns = {width: 1e9 * spent / (MEMBERS * STEPS) for width, spent in zip(plans, seconds, strict=True)}
         before = widths.of_table(kind, dtype).lanes
         fastest = min(ns, key=lambda width: ns[width])
         better = ns[fastest] < (1.0 - WORTH) * ns[before]

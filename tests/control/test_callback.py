@@ -98,6 +98,51 @@ def test_a_stopped_run_goes_on_with_the_mended_function(tmp_path):
     assert np.array_equal(resumed.position, whole.position)
 
 
+SMC = dict(lambda_=0.4, boundary=0.1, k_sigma=0.05, k_d=0.5, nomoto_time=1.5, anti_windup="none")
+
+
+class Sliding:
+    """The sliding mode of `heading_smc` in NumPy."""
+
+    def __init__(self, members, gain):
+        self.total, self.gain = np.zeros(members), gain
+
+    def __call__(self, t, y, r, members):
+        rate = SMC["lambda_"]
+        error = np.remainder(y.heading - r.heading + np.pi, 2.0 * np.pi) - np.pi
+        turn = y.angular_velocity[:, 2] - r.angular_velocity[:, 2]
+        sigma = turn + 2.0 * rate * error + rate**2 * self.total[members]
+        self.total[members] += 5 * H * error
+        change = r.angular_acceleration[:, 2] - 2.0 * rate * turn - rate**2 * error
+        switched = SMC["k_sigma"] * np.clip(sigma / SMC["boundary"], -1.0, 1.0)
+        demand = np.zeros((len(members), 6))
+        wanted = SMC["nomoto_time"] * change + y.angular_velocity[:, 2] - sigma - SMC["k_d"] * sigma - switched
+        demand[:, 5] = wanted / self.gain
+        return demand
+
+
+@pytest.mark.slow
+def test_the_wanted_acceleration_reaches_the_function_and_the_laws_beside_it():
+    """Half of the sliding mode in the kernel and half in Python are the whole; a reference model wants the acceleration."""
+
+    def turned(laws):
+        fleet = scene(laws)
+        loop = fleet.scene.controller
+        led = (*loop.guidance, lw.ReferenceModel(natural_frequency=(1.0, 1.0)))
+        loop = lw.Controller(period=loop.period, guidance=led, laws=laws)
+        terms = [lw.ControlWrench(), *fleet.scene.terms[1:]]
+        whole = lw.Scene(fleet.scene.vehicle, terms=terms, controller=loop)
+        fields = ("attitude", "reference_angular_acceleration")
+        fleet = lw.Ensemble(whole, fleet.members, 3, fleet.vary)
+        return lw.solve(fleet, "psi_s", h=H, t1=5.0, save=lw.SaveAt(every=0.5, fields=fields))
+
+    fused = turned([lw.HeadingSMC(nomoto_gain=0.4, **SMC)])
+    halves = turned([lw.HeadingSMC(nomoto_gain=0.8, **SMC), lw.Callback(Sliding(20, 0.8))])
+    assert np.abs(halves.attitude - fused.attitude).max() < 1e-12
+    # It is felt: some 0.1 rad/s^2 times the time of Nomoto's model.
+    assert np.abs(fused.reference_angular_acceleration[:, :, 2]).max() > 0.05
+
+
 @pytest.mark.slow
 def test_other_processes_call_it():
     fleet, settings = scene([lw.Callback(heading)], 300), dict(method="psi_s", h=H, t1=1.0)

@@ -1,6 +1,7 @@
 """The scene files of examples/scenes load and run as they stand: an autopilot with sensors, and a thruster that dies."""
 
 import numpy as np
+import pytest
 
 import lgvi_warp as lw
 from tests.conftest import ROOT
@@ -18,6 +19,17 @@ def solved(name, duration, **overrides):
     return result
 
 
+@pytest.mark.parametrize("path", sorted((ROOT / "examples" / "scenes").glob("*.toml")), ids=lambda path: path.stem)
+def test_a_scene_file_is_its_own_tables(path):
+    scene = lw.Scene.load(path)
+    again = lw.Scene.from_dict(scene.to_dict())
+    assert again.to_dict() == scene.to_dict()
+    assert {name: value.tolist() for name, value in again.parameters().items()} == {
+        name: value.tolist() for name, value in scene.parameters().items()
+    }
+
+
+@pytest.mark.slow
 def test_remus_dives_by_what_its_sensors_say_and_its_rudder_sticks():
     result = solved("remus_100_autopilot", 42.0, **{"ensemble.members": 8})
     rudder, depth = result.command[:, :, 0], result.position[:, :, 2]
@@ -36,6 +48,7 @@ def test_remus_dives_by_what_its_sensors_say_and_its_rudder_sticks():
     assert abs(noise / np.hypot(0.02, 0.005 / np.sqrt(12.0)) - 1.0) < 5.0 / np.sqrt(2.0 * off.size)
 
 
+@pytest.mark.slow
 def test_bluerov2_holds_its_place_though_a_thruster_dies():
     result = solved("bluerov2_dead_thruster", 30.0)
     dead = result.time >= 20.0

@@ -55,6 +55,7 @@ def across(result):
     return abs(result.position[-1, 0, 1])
 
 
+@pytest.mark.slow
 def test_a_current_drives_off_the_way_and_the_integral_comes_back():
     ends = {}
     for method in ("los", "ilos", "alos"):

@@ -77,7 +77,7 @@ def twin(method, lag, steps, delay=0, faults=()):
     return np.array([s.b for s in states]), np.array([s.R for s in states])
 
 
-@pytest.mark.slow_but("psi_s-0.3-0", "rk4-0.3-3")
+@pytest.mark.slow_but("rk4-0.3-3")
 @pytest.mark.parametrize("delay", [0, 3, 7])
 @pytest.mark.parametrize("lag", [0.0, 0.3])
 @pytest.mark.parametrize("method", ["psi_s", "rk4", "rk8"])

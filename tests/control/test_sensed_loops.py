@@ -116,6 +116,7 @@ J, KP, KD, PERIOD = 4.5, 2.0, 4.0, 0.2
 HEADING_NOISE, RATE_NOISE = 0.01, 0.004
 
 
+@pytest.mark.slow
 def test_the_variance_under_white_noise_is_that_of_the_lyapunov_equation():
     sensors = [lw.Sensor(of="heading", name="compass", noise=HEADING_NOISE)]
     sensors += [lw.Sensor(of="angular_velocity", name="gyro", noise=RATE_NOISE)]

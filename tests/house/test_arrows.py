@@ -19,6 +19,8 @@ OPTIONAL = {
     "netCDF4",
     "pyarrow",
     "gymnasium",
+    "control",
+    "tomlkit",
 }
 DEPENDENCIES = {"numpy", "scipy", "warp"} | OPTIONAL
 

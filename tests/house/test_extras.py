@@ -13,6 +13,7 @@ from lgvi_warp.sampling.designs.space import Space
 from lgvi_warp.statistics.estimate import Estimate
 from lgvi_warp.studies.sensitivity import analyses
 from lgvi_warp.views import plots, rerun
+from lgvi_warp.views import report as views_report
 
 ESTIMATE = Estimate("mean x", {}, "m", 0.95, "", {"value": ("time",)}, {"value": np.zeros(2)}, {"time": np.arange(2.0)})
 DOORS = {
@@ -28,8 +29,14 @@ DOORS = {
     "stores: zarr": (needed, "zarr", "store"),
     "clusters": (lambda: executor_of("dask", 1, "tcp://127.0.0.1:1"), "distributed", "cluster"),
     "environments": (lambda: lw.gym.VectorEnv(None, observe=[]), "gymnasium", "gym"),
+    "state spaces": (
+        lambda: lw.LinearModel(*np.zeros((4, 12, 12)), 0.1, (), (), {}).state_space(),
+        "control",
+        "control",
+    ),
     "YAML": (lambda: yaml_text.parsed("a: 1"), "yaml", "yaml"),
     "plots": (plots.figure_class, "matplotlib.figure", "viz"),
+    "reports": (lambda: views_report.toml_of({}), "tomlkit", "viz"),
     "recordings": (lambda: rerun.log_rerun(None, "x"), "rerun", "viz"),
 }
 

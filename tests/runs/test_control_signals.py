@@ -11,6 +11,7 @@ import lgvi_warp as lw
 from lgvi_kernels.law import div, mul, neg, ones, positive, sub, vec3  # noqa: F401
 from lgvi_warp.common.status import Status, under_way
 from lgvi_warp.engine import plan as plans
+from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics.control.base import ControlLaw
 from lgvi_warp.physics.control.signals import SAVED, SIGNALS
 from lgvi_warp.physics.fields import FIELDS
@@ -99,6 +100,21 @@ def same(x, y, members=slice(None), names=SAVED):
 def looked():
     """The steps at which samples were taken, by the look that holds for each."""
     return np.arange(STEPS + 1) // EVERY * EVERY
+
+
+def test_a_scene_names_what_is_saved(whole):
+    names = ("position", "command")
+    run = lw.Scene.from_dict({**scene().to_dict(), "run": {"save_every": H, "save_fields": list(names)}})
+    assert lw.Scene.from_dict(run.to_dict()).run.save_fields == list(names)
+    members = fleet()
+    members.scene = run
+    result = lw.solve(members, "psi_s", h=H, t1=STEPS * H)
+    assert tuple(result.samples) == names and same(result, whole, names=names)
+    # The call decides, where it says something.
+    assert lw.solve(members, "psi_s", h=H, t1=H, save=lw.SaveAt(fields=("velocity",))).samples.keys() == {"velocity"}
+    bare = lw.Scene.from_dict({**scene(controller=False).to_dict(), "run": {"save_fields": ["command"]}})
+    with pytest.raises(lw.SceneError, match=r"run.save_fields = 'command': is a signal of a controller"):
+        lw.solve(bare, "psi_s", h=H, t1=H)
 
 
 def free(result):
@@ -273,6 +289,23 @@ def test_a_store_holds_them_and_goes_on(whole, tmp_path):
         assert (here.dims, here.attrs) == (there.dims, there.attrs), name
     loaded = lw.Result.load(whole.save(tmp_path / "result.npz"))
     assert same(whole, loaded) and set(loaded.samples) == set(SAVED)
+
+
+@pytest.mark.parametrize(
+    "laws", [[lw.HeadingPID(kp=KP)], [lw.Callback(lambda t, y, r, members: np.zeros((len(members), 6)))]]
+)
+def test_a_file_knows_which_terms_the_controller_drives(laws, tmp_path):
+    """Fins that are driven have no command of their own: energies and pictures of a file must not ask for it."""
+    wanted = lw.SetPoint(heading=0.5)
+    loop = lw.Controller(period=0.1, guidance=[wanted], laws=laws, allocation=[lw.PseudoInverse(to="control_fins")])
+    driven = lw.Scene.named("remus_100", start={"velocity": [1.54, 0.0, 0.0]}, controller=loop)
+    result = lw.solve(driven, "rk4", h=0.1, t1=0.5)
+    loaded = lw.Result.load(result.save(tmp_path / "result.npz"))
+    lw.solve(driven, "rk4", h=0.1, t1=0.5, store=tmp_path / "run.zarr")
+    for other in (loaded, lw.open_run(tmp_path / "run.zarr")):
+        assert other.energy.tobytes() == result.energy.tobytes()
+        assert invariants.at_work(other) == invariants.at_work(result)
+        assert lw.plot(other, tmp_path / "fleet.png").stat().st_size > 0
 
 
 def test_members_that_are_kept_after_all_have_them(whole, tmp_path):

@@ -166,3 +166,10 @@ def test_a_prepared_run_chooses_once():
     assert planned(torpedo(MATRIX, start=fast)).method.name == "rk8"
     expected = lw.solve(torpedo(MATRIX, start=fast), "rk4", h=0.1, t1=0.5).position[-1, 0, 1]
     assert run([[20.0]]) == expected != run([[1.0]])
+
+
+def test_drag_beyond_float64_leaves_what_is_stable_for_any():
+    fins = lw.Scene.named("remus_100").terms[1].to_dict()
+    scene = lw.Scene.named("remus_100", terms=[fins | {"drag": [0.0, 1e308]}])
+    assert np.isinf(default_method.h_rates(lw.Ensemble.from_scene(scene), 0.01)["drag"])
+    assert next(default_method.choices(lw.Ensemble.from_scene(scene), 0.01)).name in default_method.OTHERWISE

@@ -82,8 +82,9 @@ def monitor_struct(width, real, rows, energy, backward, substep, still, loop=Non
     energy: rows of ENERGY_FIELDS. backward: the part of h that stages go back at once. substeps: steps that were divided.
     still: R^T u where and when a lane was frozen, three rows.
     loop: of a controller, the struct given, one entry or one a packet; every: steps between its looks; commands: how many are
-    in the first rows of the memory; bus: the first row of what looks note. signals: rows of the memory that are saved with a
-    sample; kept: the first of as many rows, what frozen lanes save; first_signals: what they are at the start.
+    in the first rows of the memory; bus: the first row of what looks note; noting: whether they do. signals: rows of the
+    memory that are saved with a sample; kept: the first of as many rows, what frozen lanes save; first_signals: what they are
+    at the start.
     """
     Lane, Ints = lane(width, real), int_lane(width)
     fields = {}
@@ -101,7 +102,7 @@ def monitor_struct(width, real, rows, energy, backward, substep, still, loop=Non
         fields["still"] = wp.array2d(dtype=Lane)
     if loop is not None:
         fields |= {"loop": wp.array(dtype=loop), "every": wp.int32, "commands": wp.int32, "bus": wp.int32}
-        fields["kept"] = wp.int32
+        fields |= {"noting": wp.int32, "kept": wp.int32}
         fields |= {"signals": wp.array(dtype=wp.int32), "first_signals": wp.array2d(dtype=Lane)}
     return struct("Monitor", **fields) if fields else struct("NoMonitor", unused=wp.uint8)
 

@@ -143,14 +143,14 @@ def make_pursuit(solved):
         return x
 
     @wp.func
-    def over_ramp(x: Any, left: Any, value: Any, since: Any, steepness: Any, change: Any, limit: Any, rate: Any):
+    def over_ramp(x: Any, time_left: Any, value: Any, since: Any, steepness: Any, change: Any, limit: Any, rate: Any):
         """x after a ramp, and the time that is left then. The ramp goes from `value`, `since` before the whole time ends."""
         unity = ones(limit)
         zero = unity - unity
-        begin = clamp(since, zero, left)
-        end = clamp(since - unity / steepness, zero, left)
+        begin = clamp(since, zero, time_left)
+        end = clamp(since - unity / steepness, zero, time_left)
         held = clamp(value, -limit, limit)
-        x = over_piece(x, held, held, left - begin, rate)
+        x = over_piece(x, held, held, time_left - begin, rate)
         a = value + clamp((since - begin) * steepness, zero, unity) * change
         b = value + clamp((since - end) * steepness, zero, unity) * change
         start = clamp(a, -limit, limit)
@@ -158,8 +158,8 @@ def make_pursuit(solved):
         # At its limit before, within, and at its limit after: as long as the command would go on beyond it.
         before = absolute(a - start)
         after = absolute(b - stop)
-        whole = before + absolute(stop - start) + after
-        pace = positive(whole, (begin - end) / whole, zero)
+        ramp_time = before + absolute(stop - start) + after
+        pace = positive(ramp_time, (begin - end) / ramp_time, zero)
         x = over_piece(x, start, start, pace * before, rate)
         x = over_piece(x, start, stop, begin - end - pace * before - pace * after, rate)
         return over_piece(x, stop, stop, pace * after, rate), end
@@ -169,7 +169,7 @@ def make_pursuit(solved):
     def walked(table: Any, entry: int, t: Any, h: Any, x: Any, first: int, count: int, limit: Any, rate: Any):
         unity = ones(limit)
         # Times count back from t: within one piece its length is then h to the last digit.
-        left = h * unity
+        time_left = h * unity
         value = entry_of(limit, table, entry, first, 0)
         for i in range(count):
             at = first + 1 + 3 * i
@@ -177,14 +177,14 @@ def make_pursuit(solved):
             steepness = entry_of(limit, table, entry, at, 1)
             change = entry_of(limit, table, entry, at, 2)
             # Ramps that ended before are nothing but their change.
-            due = positive(left, unity - (since - left) * steepness, unity - unity)
+            due = positive(time_left, unity - (since - time_left) * steepness, unity - unity)
             if any_positive(due):
-                after, end = over_ramp(x, left, value, since, steepness, change, limit, rate)
+                after, end = over_ramp(x, time_left, value, since, steepness, change, limit, rate)
                 x = positive(due, after, x)
-                left = positive(due, end, left)
+                time_left = positive(due, end, time_left)
             value = value + change
         held = clamp(value, -limit, limit)
-        return over_piece(x, held, held, left, rate)
+        return over_piece(x, held, held, time_left, rate)
 
     @wp.func
     def pursued(view: Any, x: Any, first: int, count: int, limit: Any, rate: Any):

@@ -36,12 +36,15 @@ STRAIGHT_ROWS = fins.MATRICES[0]
 
 @functools.cache
 def made(features):
-    """The law of control fins with these features: "driven", "lag", "lift" (a table), "straight" (no angle of the flow)."""
+    """The law of control fins with these features: "driven", "lag", "rate", "lift" (a table), "straight" (no flow angle)."""
     lift, straight = "lift" in features, "straight" in features
-    own = STRAIGHT_ROWS if straight else fins.ROWS
-    rows = own + 3
-    make = make_driven if "driven" in features else make_scheduled
-    following = make(f"ControlFins_{'_'.join(features)}", rows, own, own + 1, own + 2)
+    first_of_motion = STRAIGHT_ROWS if straight else fins.ROWS
+    rows = first_of_motion + 3
+    name, places = (
+        f"ControlFins_{'_'.join(features)}",
+        (rows, first_of_motion, first_of_motion + 1, first_of_motion + 2),
+    )
+    following = make_driven(name, *places, features) if "driven" in features else make_scheduled(name, *places)
     place = following.place
 
     @wp.func

@@ -38,6 +38,13 @@ class Driven(NamedTuple):
     report: Any
 
 
+# Not inlined: an actuator whose channels all have one lag computes it once, with the same bits.
+@wp.func(inline=False)
+def left_after(length: Any, lag: Any):
+    """The part of a gap that is left after a time."""
+    return exponential(-(length * lag))
+
+
 @wp.func
 def approached(n: Any, u: Any, length: Any, lag: Any, rate: Any):
     """n' = (u - n) lag, no faster than the rate, after a time in which u is held: at the rate, then by the exponential."""
@@ -48,21 +55,24 @@ def approached(n: Any, u: Any, length: Any, lag: Any, rate: Any):
     # How long the rate limits; where it is 0 it does so for ever.
     fast = positive(rate, (size - rate / lag) / positive(rate, rate, unity), length)
     fast = positive(size, least(greatest(fast, zero), length), zero)
-    left = size - fast * rate
-    left = left * exponential(-((length - fast) * lag))
-    return u - positive(gap, left, -left)
+    gap_left = size - fast * rate
+    gap_left = gap_left * exponential(-((length - fast) * lag))
+    return u - positive(gap, gap_left, -gap_left)
 
 
-def make_driven(name, rows, limit, lag, rate):
+def make_driven(name, rows, limit, lag, rate, features):
     """The functions of an actuator with `rows` rows a channel; limit, lag and rate: places of 1 / lag and of two limits.
 
-    Rows that all channels share follow from `first + shared` on; `size` says how many there are of a kind.
+    features: "lag" where some channel lags, "rate" where the rate of some is limited; with neither it is where it is
+    commanded. Rows that all channels share follow from `first + shared` on; `size` says how many there are of a kind.
     """
+    lags, limited = "lag" in features, "rate" in features
+    moves = lags or limited
 
     def params(width, real, commands):
-        """Params: commands, see lanes/look.py; first rows of the table, of the memory if `moving`, of the report; count."""
+        """Params: commands, see lanes/look.py; first rows of the table, the memory, the report; count; alike: one lag."""
         words = {"first": wp.int32, "memory": wp.int32, "work": wp.int32, "report": wp.int32}
-        words |= dict.fromkeys(("count", "moving", "shared", "size"), wp.int32)
+        words |= dict.fromkeys(("count", "moving", "alike", "shared", "size"), wp.int32)
         return struct(name, commands=commands, **words)
 
     @wp.func
@@ -74,7 +84,7 @@ def make_driven(name, rows, limit, lag, rate):
     @wp.func
     def place(view: Any, p: Any, i: int):
         n = ones(view.b.x)
-        if p.moving > 0:
+        if wp.static(moves):
             n = remembered(view, p.memory + i)
         else:
             n = wanted(view, p, i)
@@ -82,13 +92,24 @@ def make_driven(name, rows, limit, lag, rate):
 
     @wp.func
     def move(state: Any, view: Any, p: Any, length: Any):
-        if p.moving > 0:
+        if wp.static(moves):
+            time = length * ones(view.b.x)
+            remaining = time
+            if wp.static(not limited):
+                remaining = left_after(time, row1(view, p.first + wp.static(lag)))
             for i in range(p.count):
                 at = p.first + wp.static(rows) * i
                 n = remembered(view, p.memory + i)
-                time = length * ones(n)
-                lag_here = row1(view, at + wp.static(lag))
-                n = approached(n, wanted(view, p, i), time, lag_here, row1(view, at + wp.static(rate)))
+                u = wanted(view, p, i)
+                if wp.static(lags and limited):
+                    n = approached(n, u, time, row1(view, at + wp.static(lag)), row1(view, at + wp.static(rate)))
+                elif wp.static(limited):
+                    most = time * row1(view, at + wp.static(rate))
+                    n = n + clamp(u - n, -most, most)
+                else:
+                    if p.alike == 0:
+                        remaining = left_after(time, row1(view, at + wp.static(lag)))
+                    n = u + remaining * (n - u)
                 remember(view, p.memory + i, n)
         return state
 

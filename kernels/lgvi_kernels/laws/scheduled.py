@@ -50,17 +50,17 @@ def chased(n: Any, start: Any, end: Any, length: Any, pace: Any):
     outside = absolute(gap) - band
     before = positive(outside, positive(closing, least(outside / closing, length), length), zero)
     gap = gap + before * (slope - side * rate)
-    left = length - before
-    gap = positive(left, clamp(gap, -band, band), gap)
+    time_left = length - before
+    gap = positive(time_left, clamp(gap, -band, band), gap)
     # Where the command is faster than the rate, the lag holds until the gap has the band's width again.
     side = positive(slope, unity, -unity)
     faster = absolute(slope) - rate
     growth = greatest((absolute(slope) - lag * (side * gap)) / faster, unity)
-    within = positive(faster, logarithm(growth) / lag, left)
-    within = clamp(within, zero, left)
+    within = positive(faster, logarithm(growth) / lag, time_left)
+    within = clamp(within, zero, time_left)
     x = lag * within
     gap = exponential(-x) * gap + slope * (within * decay(x))
-    gap = gap + (left - within) * (slope - side * rate)
+    gap = gap + (time_left - within) * (slope - side * rate)
     return end - gap
 
 

@@ -8,11 +8,9 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.functions import PI
 from lgvi_kernels.law import (  # noqa: F401
     absolute,
     add,
-    arctangent2,
     clamp,
     div,
     greatest,
@@ -20,16 +18,18 @@ from lgvi_kernels.law import (  # noqa: F401
     mul,
     neg,
     ones,
+    positive,
     root,
     row1,
     sub,
     table1,
 )
 
-# Knots of the inverse of a polynomial less one, and rows of one side of it: 1 / its largest value, that value, its place,
-# the least slope, and the table.
-INVERSE_KNOTS = 12
-INVERSE_ROWS = 4 + 1 + 3 * INVERSE_KNOTS
+# Coefficients of the start of a polynomial's inverse, and rows of one side of it: 1 / its largest value, that value, its
+# place, the least slope, and the coefficients from the lowest power up.
+START_SIZE = 16
+INVERSE_ROWS = 4 + START_SIZE
+NEWTON_STEPS = 2
 
 
 @wp.func
@@ -69,25 +69,61 @@ def table_curve(view: Any, first: int, size: int, w: Any):
 
 
 @wp.func
-def polynomial_inverse(view: Any, first: int, size: int, powers: int, t: Any):
+def row_of_side(view: Any, row: int, astern: int, side: Any):
+    """A number of the curve ahead where side > 0, else of that astern, `astern` rows behind; 0: both are the same."""
+    value = row1(view, row)
+    if astern > 0:
+        value = positive(side, value, row1(view, row + astern))
+    return value
+
+
+# A polynomial by Estrin's scheme, whose sums need not wait for each other.
+@wp.func
+def two(view: Any, row: int, astern: int, side: Any, z: Any):
+    """a + b z."""
+    return row_of_side(view, row, astern, side) + row_of_side(view, row + 1, astern, side) * z
+
+
+@wp.func
+def four(view: Any, row: int, astern: int, side: Any, z: Any, z2: Any):
+    """A polynomial with four coefficients."""
+    return two(view, row, astern, side, z) + two(view, row + 2, astern, side, z) * z2
+
+
+@wp.func
+def sixteen(view: Any, row: int, astern: int, side: Any, z: Any):
+    """A polynomial with sixteen coefficients, from the lowest power up."""
+    z2 = z * z
+    z4 = z2 * z2
+    low = four(view, row, astern, side, z, z2) + four(view, row + 4, astern, side, z, z2) * z4
+    high = four(view, row + 8, astern, side, z, z2) + four(view, row + 12, astern, side, z, z2) * z4
+    return low + high * (z4 * z4)
+
+
+@wp.func
+def polynomial_inverse(view: Any, first: int, size: int, powers: int, t: Any, side: Any, sided: int):
     """The w at which a polynomial, which rises up to a largest value, has the value t or that largest one.
 
-    From a table over x, t = (largest value) sin^2(pi x / 2), by three steps of Newton's. powers: first row of the polynomial.
+    It begins with a polynomial in s, t = (largest value) (1 - (1 - s^2)^2), in which w is smooth where t begins as a square
+    and where it turns; Newton's steps follow. powers: first row of the polynomial; sided: whether it is another one astern.
     """
     unity = ones(t)
     zero = unity - unity
-    highest = row1(view, first + 2)
-    value = least(t, row1(view, first + 1))
-    part = least(value * row1(view, first), unity)
-    x = t.dtype(wp.static(2.0 / PI)) * arctangent2(root(part), root(unity - part))
-    w = table1(view, first + 4, wp.static(INVERSE_KNOTS), x)
-    for step in range(3):
-        f = zero
-        slope = zero
-        for i in range(size):
-            # f = w g, f' = g + w g'
-            g = f + row1(view, powers + size - 1 - i)
-            slope = slope * w + g
-            f = g * w
-        w = clamp(w + (value - f) / greatest(slope, row1(view, first + 3)), zero, highest)
+    astern = sided * wp.static(INVERSE_ROWS)
+    highest = row_of_side(view, first + 2, astern, side)
+    slope_floor = row_of_side(view, first + 3, astern, side)
+    value = least(t, row_of_side(view, first + 1, astern, side))
+    part = least(value * row_of_side(view, first, astern, side), unity)
+    s = root(part / (unity + root(unity - part)))
+    z = s + s - unity
+    w = clamp(sixteen(view, first + 4, astern, side, z), zero, highest)
+    for step in range(wp.static(NEWTON_STEPS)):
+        # The polynomial is w g, and its slope g + w g'.
+        g = row_of_side(view, powers + size - 1, sided * size, side)
+        g_slope = zero
+        for i in range(size - 1):
+            g_slope = g_slope * w + g
+            g = g * w + row_of_side(view, powers + size - 2 - i, sided * size, side)
+        slope = greatest(g + w * g_slope, slope_floor)
+        w = clamp(w + (value - w * g) / slope, zero, highest)
     return w

@@ -20,15 +20,15 @@ PROPELLER_ROWS = 16
 
 @functools.cache
 def made(features):
-    """The law of thrusters with these features: "driven", "rate", "polynomial" or "table", "propeller"."""
+    """The law of thrusters with these features: "driven", "lag", "rate", "polynomial" or "table", "propeller"."""
     propeller, driven = "propeller" in features, "driven" in features
     tables = "table" in features
     shape = "table" if tables else "polynomial" if "polynomial" in features else "square"
     curve = getattr(thrust_curves, f"{shape}_curve")
-    own = PROPELLER_ROWS if propeller else ROWS
-    rows = own + 3
-    make = make_driven if driven else make_scheduled
-    following = make(f"Thrusters_{'_'.join(features)}", rows, own, own + 1, own + 2)
+    first_of_motion = PROPELLER_ROWS if propeller else ROWS
+    rows = first_of_motion + 3
+    name, places = f"Thrusters_{'_'.join(features)}", (rows, first_of_motion, first_of_motion + 1, first_of_motion + 2)
+    following = make_driven(name, *places, features) if driven else make_scheduled(name, *places)
     place = following.place
 
     @wp.func

@@ -50,17 +50,17 @@ def in_turn(parts, role):
             return rest(s, r, y, p.rest)
 
         return others
-    own = _with_all(function, role)
+    first_function = _with_all(function, role)
     if rest is None:
 
         @wp.func
         def alone(s: Any, r: Any, y: Any, p: Any):
-            return own(s, r, y, p.own)
+            return first_function(s, r, y, p.own)
 
         return alone
 
     @wp.func
     def each(s: Any, r: Any, y: Any, p: Any):
-        return rest(own(s, r, y, p.own), r, y, p.rest)
+        return rest(first_function(s, r, y, p.own), r, y, p.rest)
 
     return each

@@ -209,10 +209,10 @@ class PartBench:
         Returns:
             What it made of them.
         """
-        given = _Launch(self, packed, looks, width or self.widths[0])
-        out = np.stack([given.look(k) for k in range(LOOKS)], axis=1)
+        launch = _Launch(self, packed, looks, width or self.widths[0])
+        out = np.stack([launch.look(k) for k in range(LOOKS)], axis=1)
         first = self.bus.rows
-        return Answers(out.reshape(self.count, -1), given.memory(), (first, first + memory_rows(packed)))
+        return Answers(out.reshape(self.count, -1), launch.memory(), (first, first + memory_rows(packed)))
 
     def nanoseconds(self, packed: Any) -> float:
         """Processor time of the part for a member and a look, less that of a kernel that only copies.
@@ -223,12 +223,12 @@ class PartBench:
         Returns:
             The time [ns], at least 0; the least of some rounds.
         """
-        given, spent = _Launch(self, packed, self.looks, self.widths[0]), []
+        bench_launch, spent = _Launch(self, packed, self.looks, self.widths[0]), []
         for acts in (1, 0):
             rounds = []
             for _ in range(ROUNDS):
                 begin = time.process_time_ns()
-                given.launch(0, acts, REPEATS)
+                bench_launch.launch(0, acts, REPEATS)
                 rounds.append(time.process_time_ns() - begin)
             spent.append(min(rounds) / (REPEATS * self.count))
         return max(0.0, spent[0] - spent[1])

@@ -17,6 +17,7 @@ from lgvi_warp.physics.control.delay import MOST_PERIODS, Delay
 from lgvi_warp.physics.control.fault import Fault
 from lgvi_warp.physics.control.pseudo_inverse import PseudoInverse
 from lgvi_warp.physics.control.sensor import Sensor
+from lgvi_warp.physics.terms import from_list
 from lgvi_warp.physics.terms.base import Term, build, check_list
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS
 
@@ -80,13 +81,13 @@ class Controller:
 
     def _check_wishes(self, faults: Faults) -> None:
         """Require that what laws and guidance read of the wanted motion is given."""
-        given: set[str] = set()
+        wishes: set[str] = set()
         for part in (*self.guidance, *self.laws):
             for wish in part.needs:
-                if wish not in given:
+                if wish not in wishes:
                     remedy = 'give guidance that wants it, such as [[controller.guidance]] type = "set_point"'
                     faults.add(part.section, part.key, f"needs a wanted {wish}, which no guidance gives", remedy)
-            given |= set(part.gives)
+            wishes |= set(part.gives)
 
     @property
     def parts(self) -> tuple[Part, ...]:
@@ -147,14 +148,15 @@ class Controller:
         actuators = {key: term for key, term in able.items() if key in {part.to for part in allocation}}
         self._check_faults(faults, actuators)
         faults.raise_if_any()
-        whole = copy.copy(self)
-        object.__setattr__(whole, "allocation", tuple(part.informed(self.faults, self.asked) for part in allocation))
-        object.__setattr__(whole, "actuators", actuators)
-        object.__setattr__(whole, "laws", tuple(part.of_vehicle(nominal or {}) for part in self.laws))
+        wired = copy.copy(self)
+        object.__setattr__(wired, "allocation", tuple(part.informed(self.faults, self.asked) for part in allocation))
+        object.__setattr__(wired, "actuators", actuators)
+        object.__setattr__(wired, "laws", tuple(part.of_vehicle(nominal or {}) for part in self.laws))
         channels = {key: term.channels for key, term in actuators.items()}
         callback = self.callback
         answers = 0 if callback is None else channels[callback.to] if callback.to else 6
-        controller = whole.on(Bus.of(channels, self.period, answers))
+        shared = max(law.shared_rows for law in self.laws)
+        controller = wired.on(Bus.of(channels, self.period, max(answers, shared)))
         for part in controller.allocation:
             part.check_actuator(faults)
         faults.raise_if_any()
@@ -213,23 +215,23 @@ class Controller:
 
     def _allocation(self, faults: Faults, able: Mapping[str, Term]) -> tuple[Allocation, ...]:
         """The allocation, or the default one, checked."""
-        given = tuple(self.allocation)
+        parts = tuple(self.allocation)
         if self.callback is not None and self.callback.to:
-            given = (CallbackCommands(to=self.callback.to), *(part for part in given if part.type))
-        if not given:
+            parts = (CallbackCommands(to=self.callback.to), *(part for part in parts if part.type))
+        if not parts:
             if len(able) != 1:
                 fault = "is missing" if able else "has no actuator: no term of the scene takes commands"
                 which = " or ".join(map(repr, able)) if able else "thrusters, control_fins or control_wrench"
                 faults.add("allocation", "", fault, f"give [[controller.allocation]] to = {which}")
                 return ()
-            given = (PseudoInverse(to=next(iter(able))),)
-        wrong = [part.to for part in given if not isinstance(part.to, str)]
+            parts = (PseudoInverse(to=next(iter(able))),)
+        wrong = [part.to for part in parts if not isinstance(part.to, str)]
         for value in wrong:
             faults.add("allocation.to", value, "is not a text", "give the name of a term that takes commands")
         if wrong:
             return ()
-        counts = Counter(part.to for part in given)
-        for part in given:
+        counts = Counter(part.to for part in parts)
+        for part in parts:
             if part.to not in able:
                 faults.add("allocation.to", part.to, "is no term that takes commands", closest(part.to, able))
             elif able[part.to].own_commands:
@@ -237,7 +239,7 @@ class Controller:
                 faults.add("allocation.to", part.to, problem, f"leave {part.to}.command and its schedule out")
         for key in (key for key, count in counts.items() if count > 1):
             faults.add("allocation.to", key, f"is named by {counts[key]} allocations", "keep one of them")
-        return given
+        return parts
 
     def _check_faults(self, faults: Faults, actuators: Mapping[str, Term]) -> None:
         counts = {part.key: READINGS[part.of] for part in self.sensors if isinstance(part, Sensor)}
@@ -319,6 +321,28 @@ def from_table(given: Any) -> Controller | None:
         faults.add("controller.period", "", "is missing", "give the time between two looks [s]")
     faults.raise_if_any()
     return Controller(**given)
+
+
+def terms_of(scene: Mapping[str, Any]) -> tuple[Term, ...]:
+    """The terms of a scene from its content, each of which knows whether a controller drives it.
+
+    The controller itself is not built: a law may be a function, of which the content has the name alone.
+
+    Args:
+        scene: The content of a scene, as `Scene.to_dict` gives it.
+
+    Returns:
+        The terms.
+
+    Raises:
+        SceneError: Where a table is no term.
+    """
+    terms, table = from_list(scene.get("terms", ())), scene.get("controller")
+    lists = (table.get(section) for section in ("laws", "allocation")) if isinstance(table, Mapping) else ()
+    parts = [part for entries in lists if isinstance(entries, list) for part in entries if isinstance(part, Mapping)]
+    actuators = {to for part in parts if isinstance(to := part.get("to"), str)}
+    bus = Bus.of({term.key: term.channels for term in terms if term.key in actuators}, 1.0)
+    return tuple(term.driven_by(bus if term.key in actuators else None) for term in terms)
 
 
 def _parts(section: str, base: type[Part], given: Any) -> tuple[Part, ...]:

@@ -66,11 +66,11 @@ class Fault(Sending):
         """The numbers, and the rows of the command or the channel of the reading."""
         assert self.bus is not None
         begin = first_step(numbers["time"], context.h)
-        own = {"begin": begin, "gain": numbers["gain"], "offset": numbers["offset"]}
+        members_numbers = {"begin": begin, "gain": numbers["gain"], "offset": numbers["offset"]}
         if self.sensor is not None:
-            return Packed(own | {"channel": self.channel})
+            return Packed(members_numbers | {"channel": self.channel})
         fresh = self.bus.commands[self.of][0] + self.channel
         rows = {"fresh": fresh, "acting": 0, "before": 0, "delayed": int(self.bus.delayed)}
         if self.bus.delayed:
             rows |= {"acting": self.bus.acting + fresh, "before": self.bus.acting + self.bus.channels + fresh}
-        return Packed(own | rows)
+        return Packed(members_numbers | rows)

@@ -12,7 +12,7 @@ from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.control.base import Allocation, rest_rows
 from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.actuators import UNLIMITED
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number, side_by_side
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number, side_by_side
 from lgvi_warp.physics.terms.thrusters import side_of_table
 
 
@@ -75,30 +75,54 @@ class PseudoInverse(Allocation):
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """For each set of losses the lines of the pseudo-inverse; each channel's wrench and numbers; curves and inverses."""
-        own = context.own(self.actuator)
-        B = self.asked[:, None] * self.actuator.effect(own, context.parameters, numbers["speed"])
+        actuator_numbers = context.own(self.actuator)
+        B = self.asked[:, None] * self.actuator.effect(actuator_numbers, context.parameters, numbers["speed"])
         weights = numbers.get("weights", np.ones((1, B.shape[2])))
-        lost, limit = self.lost_channels, own["limit"]
+        lost, limit = self.lost_channels, actuator_numbers["limit"]
         rows = []
         for s in range(1 << len(lost)):
             lines = _lines(B, weights, [channel for j, channel in enumerate(lost) if s >> j & 1])
             rows += [rest_rows(B @ lines), lines.reshape(len(lines), -1)]
         keys = {"coefficient": np.ones_like(limit), "coefficient_astern": np.ones_like(limit), "dead_band": 0.0 * limit}
-        curve = [own.get(key, value) for key, value in keys.items()]
+        curve = [actuator_numbers.get(key, value) for key, value in keys.items()]
         share = np.zeros((1, B.shape[2]))
         share[0, list(lost)] = 2.0 ** np.arange(len(lost))
-        columns = (limit, *curve, self.steps_of_loss(context), share)
+        columns = (
+            limit,
+            *curve,
+            self.steps_of_loss(context),
+            share,
+            *self._largest(actuator_numbers, limit - curve[2]),
+        )
         channels = side_by_side(np.swapaxes(B, -1, -2), *(column[..., None] for column in columns))
         rows.append(channels.reshape(len(channels), -1))
-        curves, size = self._curves(own)
+        curves, size = self._curves(actuator_numbers)
         assert self.bus is not None
         first, count = self.bus.commands[self.to]
-        words = {"commands": first, "count": count, "sets": 1 << len(lost), "size": size, "sided": self._sided(own)}
+        words = {
+            "commands": first,
+            "count": count,
+            "sets": 1 << len(lost),
+            "size": size,
+            "sided": self._sided(actuator_numbers),
+        }
         return Packed(words | {"shared": sum(block.shape[1] for block in rows)}, side_by_side(*rows, curves))
 
     def _sided(self, own: Numbers) -> int:
         """1 where the thrusters have polynomials, and some of those astern are others than those ahead; else 0."""
         return int(self.shape == "polynomial" and not np.array_equal(own["polynomial"], own["polynomial_astern"]))
+
+    def _largest(self, own: Numbers, reach: np.ndarray) -> tuple[np.ndarray, ...]:
+        """The largest efforts (1 or n, channels) ahead and astern, without the coefficient; reach: of commands."""
+        reach = np.maximum(reach, 0.0)
+        if self.shape == "table":
+            at, values = own["table_commands"], own["table_thrusts"]
+            return tuple(side * _at(at, values, side * reach) for side in (1.0, -1.0))
+        if self.shape == "polynomial":
+            curves = [own[key] for key in ("polynomial", "polynomial_astern")]
+            turns = (highest(curve, np.max(reach, axis=-1))[:, None] for curve in curves)
+            return tuple(_values(curve, np.minimum(reach, turn)) for curve, turn in zip(curves, turns, strict=True))
+        return (reach if self.shape == "linear" else reach**2,) * 2
 
     def _curves(self, own: Numbers) -> tuple[np.ndarray, int]:
         """Rows of the curves and of their inverses, and how many there are of a kind."""
@@ -145,21 +169,47 @@ def rising_knots(at: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.concatenate([values[:, :1], steps.reshape(len(at), -1)], axis=1)
 
 
-# Points at which a polynomial is looked at for its turn, and knots of its inverse (lgvi_kernels.laws.thrust_curves).
-POINTS, KNOTS = 1025, 13
+# Points at which a polynomial is looked at for its turn, and coefficients of the start of its inverse.
+POINTS, START_SIZE = 1025, 16
+# Chebyshev's points for the start of its inverse, both ends among them: there it is exact, where Newton's steps crawl. And
+# from the values there to the coefficients.
+POINTS_OF_START = np.cos(np.pi * np.arange(START_SIZE) / (START_SIZE - 1))
+TO_COEFFICIENTS = np.linalg.inv(np.polynomial.polynomial.polyvander(POINTS_OF_START, START_SIZE - 1))
 
 
 def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
-    """The inverse of polynomials f without a constant as a table, from 0 to where they turn, or to their reach.
+    """The start of the inverse of polynomials f without a constant, from 0 to where they turn, or to their reach.
 
-    It is over x, f = (largest f) sin^2(pi x / 2), in which it is smooth where f begins as a square, and where it turns.
+    It is a polynomial in 2 s - 1, f = (largest f) (1 - (1 - s^2)^2), in which the inverse is smooth where f begins as a square
+    and where it turns (lgvi_kernels.laws.thrust_curves).
 
     Args:
         polynomial: Coefficients (1 or n, powers) from the first power up.
         reach: Largest arguments (1 or n,).
 
     Returns:
-        Rows (1 or n, 41): 1 / largest value, that value, its argument, least slope, and the table.
+        Rows (1 or n, 20): 1 / largest value, that value, its argument, least slope, and the coefficients.
+    """
+    polynomial, reach = repeated(polynomial, reach)
+    top = highest(polynomial, reach)
+    most = _values(polynomial, top[:, None])[:, 0]
+    wanted = most[:, None] * (1.0 - (1.0 - (0.5 * (POINTS_OF_START + 1.0)) ** 2) ** 2)
+    inverses = _last(lambda w: _values(polynomial, w) < wanted, np.zeros_like(wanted), top[:, None] + 0.0 * wanted)
+    acts = most > 0.0
+    inverse = np.divide(1.0, most, out=np.zeros_like(most), where=acts)
+    slope = np.where(acts, 1e-3 * most / np.where(acts, top, 1.0), 1.0)
+    return side_by_side(*(x[:, None] for x in (inverse, most, top, slope)), inverses @ TO_COEFFICIENTS.T)
+
+
+def highest(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
+    """Where polynomials without a constant cease to rise.
+
+    Args:
+        polynomial: Coefficients (1 or n, powers) from the first power up.
+        reach: Largest arguments (1 or n,).
+
+    Returns:
+        Where each turns first (1 or n,), or its reach.
     """
     polynomial, reach = repeated(polynomial, reach)
     points = reach[:, None] * np.linspace(0.0, 1.0, POINTS)
@@ -171,15 +221,13 @@ def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
     row, slopes = np.arange(len(points)), polynomial * np.arange(1, polynomial.shape[1] + 1)
     before, after = points[row, np.maximum(turn - 1, 0)], points[row, np.minimum(turn + 1, POINTS - 1)]
     peak = _last(lambda w: _values(slopes, w) > 0.0, before[:, None], after[:, None])[:, 0]
-    highest = np.where(turns, np.where(turn > 0, peak, 0.0), reach)
-    most = _values(polynomial, highest[:, None])[:, 0]
-    places = np.broadcast_to(np.linspace(0.0, 1.0, KNOTS), (len(points), KNOTS))
-    wanted = most[:, None] * np.sin(0.5 * np.pi * places) ** 2
-    inverses = _last(lambda w: _values(polynomial, w) < wanted, np.zeros_like(wanted), highest[:, None] + 0.0 * wanted)
-    acts = most > 0.0
-    inverse = np.divide(1.0, most, out=np.zeros_like(most), where=acts)
-    slope = np.where(acts, 1e-3 * most / np.where(acts, highest, 1.0), 1.0)
-    return side_by_side(*(x[:, None] for x in (inverse, most, highest, slope)), knots(places, inverses[..., None]))
+    return np.where(turns, np.where(turn > 0, peak, 0.0), reach)
+
+
+def _at(at: np.ndarray, values: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """Tables with knots at (1 or n, t) and values (1 or n, t, channels), at w (1 or n, channels)."""
+    share = np.clip((w[:, None] - at[:, :-1, None]) / np.diff(at, axis=1)[..., None], 0.0, 1.0)
+    return np.asarray(values[:, 0] + np.sum(share * np.diff(values, axis=1), axis=1))
 
 
 def _last(holds: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray) -> np.ndarray:

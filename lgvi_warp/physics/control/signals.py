@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.fields import FIELDS, TABLE, Field
@@ -100,9 +100,9 @@ def saved_fields(controller: Controller | None) -> dict[str, Field]:
     fields = {name: TABLE[name] for name in FIELDS}
     if controller is None or controller.bus is None:
         return fields
-    own = {name: signal.field for name, signal in SIGNALS.items()}
+    signals = {name: signal.field for name, signal in SIGNALS.items()}
     channels = sum(count for _, count in controller.bus.commands.values())
-    return fields | own | {name: replace(own[name], shape=(channels,)) for name in CHANNELS}
+    return fields | signals | {name: replace(signals[name], shape=(channels,)) for name in CHANNELS}
 
 
 def has_shape(name: str, shape: tuple[int, ...]) -> bool:
@@ -134,6 +134,21 @@ def row_of(name: str, bus: Bus, noted: Mapping[str, int]) -> int:
     signal = SIGNALS[name]
     firsts = {"command": 0, "unmet": bus.unmet, "actuator": bus.report}
     return firsts[name] if name in firsts else noted[signal.group] + signal.row
+
+
+def check_names(faults: Faults, key: str, names: Any) -> None:
+    """Add a fault for each name that no sample has.
+
+    Args:
+        faults: Collects the faults.
+        key: Who asks for them.
+        names: Names of samples, as the user gave them.
+    """
+    if isinstance(names, str) or not isinstance(names, Collection):
+        faults.add(key, names, "is no list of names", 'give one, such as ["position", "attitude"]')
+        return
+    for name in names:
+        faults.choice(key, name, SAVED)
 
 
 def check(faults: Faults, key: str, names: Iterable[str], controller: Controller | None) -> None:

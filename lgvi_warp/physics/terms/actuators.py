@@ -6,11 +6,50 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.terms.base import Numbers, Packed, knots, side_by_side
 from lgvi_warp.physics.terms.wrench import at_start, commands
 
 # 1 / time constant of a channel without lag: faster than any step, and within float32. A limit of a rate that counts as none.
 FAST, UNLIMITED = 1e20, 1e6
+
+
+def motion(term: Any) -> dict[str, bool]:
+    """How the channels of an actuator that a controller drives follow their commands, by the scene's own numbers.
+
+    Args:
+        term: The term, with `time_constant` and `rate_limit`, each None or (channels,).
+
+    Returns:
+        Features of its device code: whether "lag" and "rate" are among them.
+    """
+    lag, rate = term.time_constant, term.rate_limit
+    return {
+        "lag": lag is not None and bool(np.any(lag > 0.0)),
+        "rate": rate is not None and bool(np.any(rate < UNLIMITED)),
+    }
+
+
+def refuse_unread(term: Any, numbers: Numbers) -> None:
+    """Refuse members' lags and limits of rates of a driven actuator where the scene has none: its kernel reads none.
+
+    Args:
+        term: The term.
+        numbers: Members' numbers by field, each (n, channels).
+
+    Raises:
+        SceneError: Where some member has one.
+    """
+    faults, features = Faults(f"{term.key}."), motion(term)
+    acting = {"lag": ("time_constant", lambda x: x > 0.0), "rate": ("rate_limit", lambda x: x < UNLIMITED)}
+    for feature, (name, acts) in acting.items():
+        values = numbers.get(name)
+        if values is not None and not features[feature] and np.any(acts(values)):
+            fault = "does not act: the scene has none"
+            faults.add(
+                name, values[np.any(acts(values), axis=-1)][0], fault, f"give {term.key}.{name} in the scene as well"
+            )
+    faults.raise_if_any()
 
 
 def packed_following(
@@ -43,7 +82,7 @@ def packed_following(
     values = {"count": count, "moving": int(term.memory)} | ({} if work else {"work": 0})
     start = np.zeros((1, count))
     if term.driver is not None:
-        values |= term.driver.values_of(term.key)
+        values |= term.driver.values_of(term.key) | {"alike": int(np.all(lag == lag[:, :1]))}
     else:
         times, schedule = commands(numbers)
         rows += [knots(times, schedule[:, :, i : i + 1]) for i in range(count)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.physics.notation import repeated
-from lgvi_warp.physics.terms.actuators import UNLIMITED, packed_following
+from lgvi_warp.physics.terms.actuators import UNLIMITED, motion, packed_following, refuse_unread
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number, rows_of, side_by_side
 from lgvi_warp.physics.terms.fins import Fins, fin_rows
 from lgvi_warp.physics.terms.wrench import at_start, commands, first_row, refuse_idle
@@ -135,12 +135,15 @@ class ControlFins(Fins):
 
     def device_in(self, aligned: bool) -> str:
         """The code for what these fins have."""
-        features = {
-            "driven": self.driver is not None,
-            "lag": self.driver is None and self.time_constant is not None,
-            "lift": self.lift_angles is not None,
-            "straight": not self.flow_angle,
-        }
+        driven = self.driver is not None
+        features = (
+            {"driven": driven}
+            | (motion(self) if driven else {"lag": self.time_constant is not None})
+            | {
+                "lift": self.lift_angles is not None,
+                "straight": not self.flow_angle,
+            }
+        )
         chosen = [name for name, present in features.items() if present]
         return f"control_fins_with:{','.join(chosen)}" if chosen else "control_fins"
 
@@ -148,6 +151,8 @@ class ControlFins(Fins):
         """In addition, raises SceneError for members' numbers that would have no effect."""
         remedy = f"give {self.key}.rate_limit below {UNLIMITED:g} rad/s in the scene as well"
         refuse_idle(self, numbers, "rate_limit", numbers["rate_limit"] < UNLIMITED, remedy)
+        if self.driver is not None:
+            refuse_unread(self, numbers)
         bad = super().unphysical(numbers)
         for name in ("lift_angles", "lift_coefficients"):
             if name in bad:

@@ -7,9 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.physics.terms.actuators import UNLIMITED, packed_following
+from lgvi_warp.physics.terms.actuators import UNLIMITED, motion, packed_following, refuse_unread
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
-from lgvi_warp.physics.terms.wrench import refuse_idle
 
 # Components of a wrench: forces along the body's axes and moments about them.
 COMPONENTS = ("X", "Y", "Z", "K", "M", "N")
@@ -48,7 +47,11 @@ class ControlWrench(Term):
     @property
     def memory(self) -> bool:
         """Whether it follows its commands with a lag or at a limited rate."""
-        return bool(np.any(self.time_constant > 0.0) or np.any(self.rate_limit < UNLIMITED))
+        return any(motion(self).values())
+
+    def device_in(self, aligned: bool) -> str:
+        """The code for how it follows its commands."""
+        return f"control_wrench:{','.join(['driven', *(name for name, acts in motion(self).items() if acts)])}"
 
     def present(self, numbers: Numbers) -> bool:
         """Whether a controller drives it."""
@@ -57,9 +60,7 @@ class ControlWrench(Term):
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         """In addition, raises SceneError for members' numbers that would have no effect."""
         if self.driver is not None:
-            moving = {"time_constant": numbers["time_constant"] > 0.0, "rate_limit": numbers["rate_limit"] < UNLIMITED}
-            for name, remembers in moving.items():
-                refuse_idle(self, numbers, name, remembers, f"give {self.key}.{name} in the scene as well")
+            refuse_unread(self, numbers)
         return super().unphysical(numbers)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:

@@ -9,7 +9,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.physics.notation import repeated
-from lgvi_warp.physics.terms.actuators import FAST, packed_following
+from lgvi_warp.physics.terms.actuators import FAST, motion, packed_following, refuse_unread
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number, rows_of, side_by_side
 from lgvi_warp.physics.terms.wrench import at_start, commands, first_row, refuse_idle
 
@@ -160,12 +160,15 @@ class Thrusters(Term):
 
     def device_in(self, aligned: bool) -> str:
         """The code for what these thrusters have."""
-        features = {
-            "driven": self.driver is not None,
-            "rate": self.driver is None and self.rate_limit is not None,
-            self.shape: self.shape != "square",
-            "propeller": self.propels,
-        }
+        driven = self.driver is not None
+        features = (
+            {"driven": driven}
+            | (motion(self) if driven else {"rate": self.rate_limit is not None})
+            | {
+                self.shape: self.shape != "square",
+                "propeller": self.propels,
+            }
+        )
         chosen = [name for name, present in features.items() if present]
         if chosen in ([], ["polynomial"]):
             return "thrusters_polynomial" if chosen else "thrusters"
@@ -259,6 +262,8 @@ class Thrusters(Term):
             bad["table_thrusts"] = bad["table_thrusts"] | _unfit(numbers["table_commands"], numbers["table_thrusts"])
         refuse_idle(self, numbers, "time_constant", numbers["time_constant"] > 0.0, remedy)
         self._refuse_idle_polynomial(numbers)
+        if self.driver is not None:
+            refuse_unread(self, numbers)
         return bad
 
     def _refuse_idle_polynomial(self, numbers: Numbers) -> None:
@@ -273,6 +278,8 @@ class Thrusters(Term):
     @property
     def memory(self) -> bool:
         """Whether thrusters have a limited rate, or one of them a lag."""
+        if self.driver is not None:
+            return any(motion(self).values())
         return bool(self.rate_limit is not None or np.any(self.time_constant > 0.0))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:

@@ -15,7 +15,7 @@ class DepthPID(Part):
     anti_windup = "conditional"
 
     def begin(self) -> None:
-        """Both integrals are 0."""
+        """Set the integrals of depth and pitch to 0."""
         self.of_depth, self.of_pitch, self.beyond = Integral(), Integral(), 0.0
 
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:

@@ -23,7 +23,7 @@ class LowPass(Part):
     """Numbers as those of `lw.LowPass`."""
 
     def begin(self) -> None:
-        """No reading yet."""
+        """Begin without a reading: the first one passes whole."""
         self.last: Measurement | None = None
 
     def measure(self, y: Measurement) -> Measurement:

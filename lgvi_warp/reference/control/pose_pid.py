@@ -15,7 +15,7 @@ class PosePID(Part):
     anti_windup = "conditional"
 
     def begin(self) -> None:
-        """The integrals are 0."""
+        """Set the integrals of force and torque to 0."""
         self.integrals = PoseIntegrals()
 
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:

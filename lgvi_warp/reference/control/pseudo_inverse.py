@@ -34,5 +34,6 @@ class PseudoInverse(Part):
         wanted = actuator.command_for(t)
         actuator.command = np.clip(wanted, -actuator.limit, actuator.limit)
         cut = t - actuator.effort(actuator.command)
+        # The inverse of a curve has an error; what a limit cuts off is more.
         cut = np.where(np.abs(cut) > 1e-5 * np.abs(t), cut, 0.0)
         return np.asarray(cannot(B @ inverse) @ w + B @ cut)

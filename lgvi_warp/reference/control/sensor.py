@@ -43,7 +43,7 @@ class Sensor(Part):
         lost = 0.5 * math.erfc(-first[3] / math.sqrt(2.0)) < self.dropout
         old = y.look % self.every != 0
         self.arrived.append(self.arrived[-1] if self.arrived and (old or lost) else z)
-        seen = self.arrived[max(y.look - self.latency, 0)]
+        delayed = self.arrived[max(y.look - self.latency, 0)]
         if self.of == "attitude":
-            return replace(y, R=seen.R)
-        return with_values(y, self.of, values(seen, self.of))
+            return replace(y, R=delayed.R)
+        return with_values(y, self.of, values(delayed, self.of))

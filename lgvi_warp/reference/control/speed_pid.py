@@ -12,7 +12,7 @@ class SpeedPID(Part):
     anti_windup = "conditional"
 
     def begin(self) -> None:
-        """The integral is 0."""
+        """Set the integral to 0, and remember no error."""
         self.integral = Integral()
 
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:

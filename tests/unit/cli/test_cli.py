@@ -64,7 +64,7 @@ def test_the_recording_holds_every_pose(finished):
     from rerun.chunk import RrdReader
 
     rows = 0
-    for chunk in RrdReader(finished[0] / "fleet.rrd").stream().filter(content="/world/fleet"):
+    for chunk in RrdReader(finished[0] / "fleet.rrd").stream().filter(content="/world/bodies/**"):
         batch = chunk.to_record_batch()
         column = next((name for name in batch.schema.names if name.endswith("translations")), None)
         if column and "sim_time" in batch.schema.names:
@@ -348,3 +348,36 @@ def test_a_step_is_chosen_by_options(tmp_path, capsys):
     assert (method["name"], method["rtol"], method["atol"]) == ("rk8", 1e-9, 1e-9)
     assert cli.main(["run", PAPER, "--out", str(tmp_path), *SMALL, "--rtol", "1e-9"]) == 2
     assert "run.rtol" in capsys.readouterr().err
+
+
+AUTOPILOT = str(ROOT / "examples" / "scenes" / "remus_100_autopilot.toml")
+LOOP = (
+    "controller  looks every 0.1 s, 0.02 s until they act; sensors depth_cell, compass; guidance set_point, reference_model; "
+    "laws depth_pid, heading_pid; allocation matrix; faults stuck_rudder\n"
+)
+
+
+def test_check_names_the_parts_of_a_controller(capsys):
+    assert cli.main(["check", AUTOPILOT]) == 0
+    assert LOOP in capsys.readouterr().out
+    assert cli.main(["check", PAPER]) == 0
+    assert "controller" not in capsys.readouterr().out
+
+
+@pytest.mark.slow
+@pytest.mark.kernel
+def test_a_run_saves_what_the_scene_names(tmp_path, capsys):
+    # Gains at which the rudder goes from limit to limit: all ask for more than it delivers.
+    more = ["--set", 'run.save_fields=["position", "unmet"]', "--set", "run.save_every=1.0"]
+    arguments = [AUTOPILOT, "--members", "20", "--duration", "3", *more]
+    arguments += ["--set", 'ensemble.vary={ "heading_pid.kp" = { uniform = { low = 1e4, high = 2e4 } } }']
+    for store in ("npz", "zarr"):
+        out = tmp_path / store
+        assert cli.main(["run", *arguments, "--out", str(out), "--store", store]) == 0
+        said = capsys.readouterr().out
+        assert LOOP in said and "unmet       20 members asked" in said
+        assert "pictures    none, and no energy: attitude, velocity, angular_velocity not saved" in said
+        assert [path.name for path in out.iterdir()] == ["result.npz" if store == "npz" else "run.zarr"]
+    assert cli.main(["info", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert LOOP in said and "of position, unmet\n" in said

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_kernels.laws.thrust_curves import NEWTON_STEPS, START_SIZE
 from lgvi_warp.common.errors import SceneError
-from lgvi_warp.physics.control.pseudo_inverse import KNOTS, inverse_rows
+from lgvi_warp.physics.control import pseudo_inverse
+from lgvi_warp.physics.control.pseudo_inverse import inverse_rows
 from lgvi_warp.physics.terms.thrusters import side_of_table
 from lgvi_warp.scene import plausibility
 
@@ -123,11 +125,27 @@ def test_the_inverse_of_a_polynomial():
     rows = inverse_rows(np.array([[1.0, 3.0], [1.0, -1.0], [-1.0, 0.0]]), np.array([2.0, 2.0, 2.0]))
     np.testing.assert_allclose(rows[:2, 1:3], [[14.0, 2.0], [0.25, 0.5]], rtol=1e-15)
     assert rows[2, 0] == rows[2, 1] == 0.0
-    at = np.cumsum(rows[:2, 4 + 3 :: 3], axis=1)
-    value = rows[:2, 1:2] * np.sin(0.5 * np.pi * np.arange(1, KNOTS) / (KNOTS - 1)) ** 2
-    # At the turn half of the digits are lost.
-    np.testing.assert_allclose(at[0] + 3.0 * at[0] ** 2, value[0], rtol=1e-13)
-    np.testing.assert_allclose(at[1] - at[1] ** 2, value[1], rtol=1e-13)
+    assert rows.shape == (3, 4 + START_SIZE) and pseudo_inverse.START_SIZE == START_SIZE
+    s = np.linspace(0.0, 1.0, 101)
+    start = np.polynomial.polynomial.polyval(2.0 * s - 1.0, rows[:2, 4:].T)
+    exact = np.sqrt(1.0 + 12.0 * 14.0 * (1.0 - (1.0 - s**2) ** 2)) - 1.0, 3.0 * (1.0 - (1.0 - s**2))
+    # What a polynomial of this degree leaves: Newton's steps square it. The second inverse is a polynomial itself.
+    np.testing.assert_allclose(start[0], exact[0] / 6.0, atol=3e-4)
+    np.testing.assert_allclose(start[1], exact[1] / 6.0, atol=1e-9)
+
+
+def test_the_inverse_of_bluerov2s_polynomial():
+    """As the kernel does it: the start, and Newton's steps."""
+    curve = np.array([8.9, 0.0, 176.0, 0.0, -404.1, 0.0, 389.9, 0.0, -140.3])
+    value, slope = np.polynomial.Polynomial([0.0, *curve]), np.polynomial.Polynomial([0.0, *curve]).deriv()
+    (inverse, most, top, floor, *start) = inverse_rows(curve[None], np.ones(1))[0]
+    t = most * np.linspace(0.0, 1.0, 2001)
+    w = np.clip(np.polynomial.Polynomial(start)(2.0 * np.sqrt(1.0 - np.sqrt(1.0 - t * inverse)) - 1.0), 0.0, top)
+    for _ in range(NEWTON_STEPS):
+        w = np.clip(w + (t - value(w)) / np.maximum(slope(w), floor), 0.0, top)
+    assert np.abs(value(w) - t).max() < 1e-8 * most
+    # The polynomial turns before its limit: beyond the largest thrust the command is that of the turn.
+    assert 0.97 < w[-1] < 0.972 and abs(slope(w[-1])) < 1e-6 * most
 
 
 def test_effect_of_a_table_of_lift():
@@ -146,3 +164,12 @@ def test_absent_numbers_are_no_parameters():
         new = ("table", "advance", "torque", "lift_a", "lift_c", "flow", "rate_limit", "time_constant")
         given = {key for key in term.to_dict() if key.startswith(new)}
         assert given == ({"time_constant"} if device == "thrusters" else {"rate_limit"})
+
+
+@pytest.mark.parametrize(
+    ("has", "varied"), [({"time_constant": 0.2}, "rate_limit"), ({"rate_limit": 5.0}, "time_constant")]
+)
+def test_members_bring_in_no_lag_or_limit_that_the_scene_has_not(has, varied):
+    looped = scene([lw.ControlWrench(**has)], laws=[HEADING])
+    with pytest.raises(SceneError, match=f"control_wrench.{varied} = .*: does not act: the scene has none; give"):
+        lw.Ensemble(looped, 4, 1, {f"control_wrench.{varied}": lw.Uniform(low=1.0, high=2.0)})

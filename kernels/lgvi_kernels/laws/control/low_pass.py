@@ -41,8 +41,8 @@ def made(features):
         else:
             e = values(y) - values(z)
             if wp.static(of == "heading"):
-                whole = y.h.dtype(wp.static(TURN)) * ones(a)
-                e = vec3(e.x - whole * rounded(e.x / whole), e.y, e.z)
+                turn = y.h.dtype(wp.static(TURN)) * ones(a)
+                e = vec3(e.x - turn * rounded(e.x / turn), e.y, e.z)
             z = with_values(z, values(z) + a * e)
         return z
 

@@ -30,8 +30,8 @@ def made(features):
 
     @wp.func
     def allocate_by_matrix(w: Any, y: Any, p: Any):
-        """u = A w within the limits; left of w are (I - A^+ A) w and A^+ of what the limits and losses cut off."""
-        left = rest(w, y, p.first)
+        """u = A w within the limits; undelivered are (I - A^+ A) w and A^+ of what the limits and losses cut off."""
+        undelivered = rest(w, y, p.first)
         for i in range(p.count):
             at = p.first + wp.static(REST) + wp.static(ROWS) * i
             most = row1(y, at + 12)
@@ -40,8 +40,8 @@ def made(features):
             if wp.static(loses):
                 u = positive(since(y, row1(y, at + 13)), u - u, u)
             remember(y, p.commands + i, u)
-            left.force = left.force + (wanted - u) * row3(y, at + 6)
-            left.torque = left.torque + (wanted - u) * row3(y, at + 9)
-        return left
+            undelivered.force = undelivered.force + (wanted - u) * row3(y, at + 6)
+            undelivered.torque = undelivered.torque + (wanted - u) * row3(y, at + 9)
+        return undelivered
 
     return device(__name__, features, params=params, allocate=allocate_by_matrix)

@@ -25,21 +25,17 @@ from lgvi_kernels.law import (  # noqa: F401
     table1,
     vec3,
 )
-from lgvi_kernels.laws import thrust_curves
 from lgvi_kernels.laws.control.lost import since
 from lgvi_kernels.laws.control.rest import ROWS as rest_rows
 from lgvi_kernels.laws.control.rest import rest
-from lgvi_kernels.laws.thrust_curves import INVERSE_ROWS, beyond, polynomial_inverse
+from lgvi_kernels.laws.thrust_curves import polynomial_inverse
 
 # For each set of channels that may be lost together, the empty one first: rows of rest.py, and the lines (6) of the
 # pseudo-inverse, one a channel. Then for each channel: the wrench of a unit of effort (6), limit of the command, coefficient
-# ahead and astern, dead band, the time from which it is known to be lost, and what this adds to the number of the set. Then
-# the curves and their inverses.
-ROWS = 12
+# ahead and astern, dead band, the time from which it is known to be lost, what this adds to the number of the set, and the
+# largest effort ahead and astern, without the coefficient. Then the curves and their inverses.
+ROWS = 14
 REST = rest_rows
-# An effort counts as delivered if less than this part of it is missing: inverses of curves have an error, and anti-windup
-# looks at the sign of what is left.
-MISSING = 1e-5
 
 
 @functools.cache
@@ -66,7 +62,6 @@ def made(features):
     """
     loses, linear = "lost" in features, "linear" in features
     tables, polynomials = "table" in features, "polynomial" in features
-    curve = getattr(thrust_curves, f"{'table' if tables else 'polynomial' if polynomials else 'square'}_curve")
 
     @wp.func
     def size_for(y: Any, p: Any, i: int, t: Any, side: Any):
@@ -74,11 +69,7 @@ def made(features):
         w = t
         if wp.static(polynomials):
             first = p.first + p.shared
-            inverse = first + 2 * p.size
-            w = polynomial_inverse(y, inverse, p.size, first, t)
-            if p.sided > 0:
-                astern = polynomial_inverse(y, inverse + wp.static(INVERSE_ROWS), p.size, first + p.size, t)
-                w = positive(side, w, astern)
+            w = polynomial_inverse(y, first + 2 * p.size, p.size, first, t, side, p.sided)
         elif wp.static(tables):
             inverse = p.first + p.shared + (p.count + 2 * i) * (1 + 3 * p.size)
             w = positive(side, table1(y, inverse, p.size, t), table1(y, inverse + 1 + 3 * p.size, p.size, t))
@@ -87,20 +78,9 @@ def made(features):
         return w
 
     @wp.func
-    def effort_of(y: Any, p: Any, i: int, n: Any):
-        """The effort of a command less the dead band, without the coefficient."""
-        t = n
-        if wp.static(not linear):
-            first = p.first + p.shared
-            if wp.static(tables):
-                first += i * (1 + 3 * p.size)
-            t = curve(y, first, p.size, n)
-        return t
-
-    @wp.func
     def allocate_efforts(w: Any, y: Any, p: Any):
-        """t = W^-1 B^T (B W^-1 B^T)^+ w; left of w are (I - B B^+) w and B times what the commands cannot deliver of t."""
-        left = rest(w, y, p.first)
+        """t = W^-1 B^T (B W^-1 B^T)^+ w; undelivered are (I - B B^+) w and B times what the commands cannot deliver of t."""
+        undelivered = rest(w, y, p.first)
         stride = wp.static(REST) + 6 * p.count
         channels = p.first + p.sets * stride
         unity = ones(y.position.x)
@@ -113,8 +93,8 @@ def made(features):
             for s in range(1, p.sets):
                 other = rest(w, y, p.first + s * stride)
                 chosen = y.h.dtype(0.5) * unity - absolute(lost - y.h.dtype(s) * unity)
-                left.force = positive3(chosen, other.force, left.force)
-                left.torque = positive3(chosen, other.torque, left.torque)
+                undelivered.force = positive3(chosen, other.force, undelivered.force)
+                undelivered.torque = positive3(chosen, other.torque, undelivered.torque)
         for i in range(p.count):
             at = channels + wp.static(ROWS) * i
             line = p.first + wp.static(REST) + 6 * i
@@ -127,16 +107,18 @@ def made(features):
                     effort = positive(here, other_effort, effort)
             c = positive(effort, row1(y, at + 7), row1(y, at + 8))
             # A side without thrust has the coefficient 0, and gets no command.
-            t = positive(c, absolute(effort) / c, effort - effort)
-            band = row1(y, at + 9)
+            wanted = positive(c, absolute(effort) / c, zero)
+            t = least(positive(effort, row1(y, at + 12), row1(y, at + 13)), wanted)
             # In this order what is no number stays so, and the look sees it.
-            size = least(row1(y, at + 6), positive(t, size_for(y, p, i, t, effort) + band, t))
-            u = positive(effort, size, -size)
-            remember(y, p.commands + i, u)
-            cut = effort - c * effort_of(y, p, i, beyond(u, band))
-            cut = positive(absolute(cut) - y.h.dtype(wp.static(MISSING)) * absolute(effort), cut, zero)
-            left.force = left.force + cut * row3(y, at)
-            left.torque = left.torque + cut * row3(y, at + 3)
-        return left
+            size = least(row1(y, at + 6), positive(t, size_for(y, p, i, t, effort) + row1(y, at + 9), t))
+            remember(y, p.commands + i, positive(effort, size, -size))
+            # Nothing is cut off, to the last digit, where the curve reaches the effort: anti-windup looks at the sign.
+            cut = absolute(effort) - c * t
+            cut = positive(wanted - t, cut, zero)
+            cut = positive(c, cut, absolute(effort))
+            cut = positive(effort, cut, -cut)
+            undelivered.force = undelivered.force + cut * row3(y, at)
+            undelivered.torque = undelivered.torque + cut * row3(y, at + 3)
+        return undelivered
 
     return device(__name__, features, params=params, allocate=allocate_efforts)

@@ -78,14 +78,14 @@ def guide(r: Any, y: Any, p: Any):
     leg = remembered(y, p.memory)
     begin, end = leg_at(y, p, leg)
     tx, ty, length, along, aside = way_along(begin, end, y.position)
-    left = length - along
+    ahead = length - along
     # Positive where the end is within the radius, or abeam.
-    near = p.radius * p.radius - left * left - aside * aside
+    near = p.radius * p.radius - ahead * ahead - aside * aside
     legs = y.h.dtype(p.legs) * unity
     last = legs - unity
     if p.stops > 0:
         last = legs
-    leg = positive(greatest(near, -left), least(leg + unity, last), leg)
+    leg = positive(greatest(near, -ahead), least(leg + unity, last), leg)
     remember(y, p.memory, leg)
     begin, end = leg_at(y, p, leg)
     tx, ty, length, along, aside = way_along(begin, end, y.position)

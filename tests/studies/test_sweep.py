@@ -346,7 +346,9 @@ def test_a_grid_of_a_million_cells_is_refused_with_its_time(scene):
 
 
 def test_other_samplings_refuse_what_would_change_the_members(scene):
-    rows = swept(scene, sampling="sobol", cases=CASES[:2], grid=None, members=256).rows()
+    found = swept(scene, sampling="sobol", cases=CASES[:2], grid=None, members=256)
+    rows = found.rows()
+    assert "which a sobol does not give" in str(found) and repr(found) == "Sweep(2 cases, 1 points, 256 members)"
     assert not rows[0]["refused"] and "the other numbers would be others too" in rows[1]["refused"]
 
 

@@ -20,22 +20,8 @@ from lgvi_warp.cli.warm import warm
 from lgvi_warp.common.errors import SceneError
 
 _VERBS = (
-    run,
-    check,
-    resume,
-    predict,
-    merge,
-    export,
-    report,
-    tradeoff,
-    sensitivity,
-    stability,
-    sweep,
-    info,
-    bench,
-    tune,
-    warm,
-)
+    run, check, resume, predict, merge, export, report, tradeoff, sensitivity, stability, sweep, info, bench, tune, warm
+)  # fmt: skip
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {verb.__name__: verb for verb in _VERBS}
 VERBS["plan"] = predict  # its name before
 

@@ -191,4 +191,4 @@ def _record_worst(found: Any, count: int, out: Path, written: Written) -> None:
         cell = found.cells[index]
         path = out / f"worst_{index:04d}.rrd"
         result = found.again(cell.case.name, sorted(chosen), cell.point)
-        written.take(path, lambda result=result, path=path: log_rerun(result, path) or path)  # type: ignore[misc]
+        written.draw(lambda result, path: log_rerun(result, path) or path, result, path)

@@ -303,6 +303,8 @@ baseline = "stiff"
         "success.png",
         "metrics.png",
         "differences.png",
+        "causes.png",
+        "responses.png",
         "summary.md",
     } <= names
     assert any(name.startswith("worst_") and name.endswith(".rrd") for name in names)

@@ -15,6 +15,7 @@ import lgvi_warp as lw
 from lgvi_warp.cli.command import main
 from lgvi_warp.common.status import failed
 from lgvi_warp.runs.settle import make_plan
+from tests.support.json_page import differing
 
 pytestmark = pytest.mark.kernel
 
@@ -309,6 +310,17 @@ baseline = "stiff"
     } <= names
     assert any(name.startswith("worst_") and name.endswith(".rrd") for name in names)
     assert json.loads((out / "sweep.json").read_text())["baseline"] == "stiff"
+    # For programs: the same cells again, the folder, and the plan.
+    capsys.readouterr()
+    for name, code, given in (
+        ("sweep", 0, ["sweep", str(tmp_path / "sweep.toml"), "--out", str(out), "--seed", "4"]),
+        ("info of a folder", 0, ["info", str(out)]),
+        ("sweep with plan", 0, ["sweep", str(tmp_path / "sweep.toml"), "--plan"]),
+    ):
+        assert main([*given, "--json", "-q"]) == code
+        assert differing(json.loads(capsys.readouterr().out), name) == []
+    assert main(["info", str(out)]) == 0 and "# Sweep" in capsys.readouterr().out
+    assert main(["plot", str(out)]) == 0 and "by the same lgvi-warp sweep" in capsys.readouterr().err
     (tmp_path / "sweep.toml").write_text(text.replace('overshoot heading" = { below', 'overshot heading" = { below'))
     assert main(["sweep", str(tmp_path / "sweep.toml"), "--out", str(out)]) == 2
     assert "did you mean 'overshoot heading'" in capsys.readouterr().err

@@ -36,7 +36,9 @@ def faults_of(paths, times, folder, rgbs=None):
         if key[0] == "3D":
             faults += [f"{key}: nothing moves"] * (len(times) > 1 and moved(pictures[0], pictures[-1]) < LEAST_MOVED)
             bodies = [sum(colored(picture, rgb) for rgb in rgbs or COLORS) for picture in pictures]
-            faults += [f"{key}: no body at {t:g} s" for t, count in zip(times, bodies, strict=True) if count < LEAST_BODY]
+            faults += [
+                f"{key}: no body at {t:g} s" for t, count in zip(times, bodies, strict=True) if count < LEAST_BODY
+            ]
     return faults
 
 
@@ -55,8 +57,10 @@ RUNS = {
     "some of each outcome": lambda: fleet(200),
     "floor all": lambda: made(
         np.minimum(5.0 + np.arange(9.0)[:, None, None] * np.ones((9, 50, 3)), 11.0),
-        status=np.full(50, Status.FLOOR), end=np.full(50, 6.0), scene=lw.Scene.named("torpedo"),
-    ),  # fmt: skip
+        status=np.full(50, Status.FLOOR),
+        end=np.full(50, 6.0),
+        scene=lw.Scene.named("torpedo"),
+    ),
     "one vehicle, two samples": lambda: made(np.array([[[0.0, 0.0, 5.0]], [[6.0, 2.0, 8.0]]])),
     "one vehicle, 600 samples": lambda: fleet(1, 600),
     "a grid of 1,000": many,
@@ -93,7 +97,11 @@ def test_a_mesh_is_seen(tmp_path):
 
 
 BROKEN = {
-    "poses that are not finite": (world, "quaternion_xyzw", lambda attitude: np.full((*attitude.shape[:-2], 4), np.nan)),
+    "poses that are not finite": (
+        world,
+        "quaternion_xyzw",
+        lambda attitude: np.full((*attitude.shape[:-2], 4), np.nan),
+    ),
     "an eye that looks elsewhere": (layout, "SIGHT", -np.array([0.0, 0.6, -0.8])),
     "a wrong mesh": (world, "hull_of", lambda length, diameter: world_hull(1e-4, 1e-4)),
 }

@@ -304,6 +304,8 @@ baseline = "stiff"
         "success.png",
         "metrics.png",
         "differences.png",
+        "causes.png",
+        "responses.png",
         "summary.md",
     } <= names
     assert any(name.startswith("worst_") and name.endswith(".rrd") for name in names)
@@ -349,7 +351,7 @@ def test_what_is_asked_wrongly_gets_one_sentence(scene, more, text):
 
 def test_a_grid_of_a_million_cells_is_refused_with_its_time(scene):
     grid = {
-        "controller.delay": [0.02 * i for i in range(100)],
+        "controller.delay": [0.02 * i for i in range(1, 101)],
         "vehicle.mass": list(range(40, 140)),
         "heading_pid.ki": list(range(100)),
     }
@@ -358,7 +360,9 @@ def test_a_grid_of_a_million_cells_is_refused_with_its_time(scene):
 
 
 def test_other_samplings_refuse_what_would_change_the_members(scene):
-    rows = swept(scene, sampling="sobol", cases=CASES[:2], grid=None, members=256).rows()
+    found = swept(scene, sampling="sobol", cases=CASES[:2], grid=None, members=256)
+    rows = found.rows()
+    assert "which a sobol does not give" in str(found) and repr(found) == "Sweep(2 cases, 1 points, 256 members)"
     assert not rows[0]["refused"] and "the other numbers would be others too" in rows[1]["refused"]
 
 

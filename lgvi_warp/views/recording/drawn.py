@@ -116,18 +116,19 @@ class Drawn:
         """
         return self.rgb or LOOKS[code].rgb
 
-    def path(self, *parts: str) -> str:
+    def path(self, head: str, *parts: str) -> str:
         """Name an entity of this run.
 
         Args:
-            *parts: Parts of its name.
+            head: First parts of its name, as "curves/height".
+            *parts: The others.
 
         Returns:
-            A path; under the run's label where runs are compared.
+            A path; where runs are compared, with the run's label after the head.
         """
         import rerun as rr
 
-        return str(rr.new_entity_path([*parts[:1], *([self.label] if self.label else []), *parts[1:]]))
+        return str(rr.new_entity_path([*head.split("/"), *([self.label] if self.label else []), *parts]))
 
     def groups(self) -> list[tuple[Status, np.ndarray]]:
         """Divide the members drawn by what became of them until each time.

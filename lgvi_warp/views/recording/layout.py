@@ -13,6 +13,29 @@ from lgvi_warp.views.recording.world import TIMELINE, Box
 # The whole run is played in this time [s].
 PLAYED = 20.0
 BACKGROUND = (9, 24, 38)
+# Where the eye looks: to the north-east, a little down. Half its field of view upward, as a tangent, and the width of the
+# view over its height, on a window of usual size.
+SIGHT = np.array([0.48, 0.82, 0.31]) / np.linalg.norm([0.48, 0.82, 0.31])
+FIELD, ASPECT = 0.9 * np.tan(np.radians(27.5)), 1.3
+
+
+def distance(box: Box, aspect: float) -> float:
+    """How far from the middle of a box the eye must be to see all of it.
+
+    Args:
+        box: The box.
+        aspect: Width of the view over its height.
+
+    Returns:
+        Distance [m].
+    """
+    across = np.cross(SIGHT, (0.0, 0.0, -1.0))
+    across /= np.linalg.norm(across)
+    above = np.cross(across, SIGHT)
+    half = 0.5 * (box.high - box.low)
+    corners = half * np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
+    needed = np.maximum(np.abs(corners @ across) / (FIELD * aspect), np.abs(corners @ above) / FIELD)
+    return float((needed - corners @ SIGHT).max())
 
 
 def layout(runs: list[Drawn], box: Box, scale: int) -> Any:
@@ -32,7 +55,7 @@ def layout(runs: list[Drawn], box: Box, scale: int) -> Any:
     time = runs[0].time
     ends = [max(float(run.time[-1]) for run in runs), min(float(run.time[0]) for run in runs)]
     played = ends[0] - ends[1]
-    worlds = [_world(run, box, scale) for run in runs]
+    worlds = [_world(run, box, scale, ASPECT / len(runs)) for run in runs]
     below = rrb.Horizontal(
         _curve("members", "Members by outcome [%]", _whole(time), (0.0, 102.0), True),
         rrb.TextLogView(
@@ -68,9 +91,12 @@ def _right(runs: list[Drawn]) -> Any:
     angles = rrb.Tabs(*(views[name] for name in ("pitch", "roll", "heading")), active_tab=0)
     commands = [_curve_of_channels(whole)] if any(name in runs[0].few.samples for name in CHANNELS) else []
     facts = rrb.Tabs(
-        rrb.TextDocumentView(origin="/run/summary", name="Run"),
+        *(rrb.TextDocumentView(origin=run.path("run/summary"), name=run.label or "Run") for run in runs),
         rrb.BarChartView(origin="/histogram", name="Depths [m] at the cursor"),
-        rrb.TextDocumentView(origin="/run/provenance", name="Provenance"),
+        *(
+            rrb.TextDocumentView(origin=run.path("run/provenance"), name=f"Provenance {run.label}".strip())
+            for run in runs
+        ),
         active_tab=0,
     )
     shares = [2.6, 2.0, 2.0, *[2.0 for _ in commands], 4.0]
@@ -115,12 +141,12 @@ def _whole(time: np.ndarray) -> Any:
     return rrb.TimeAxis(view_range=rrb.TimeRange(start=start, end=end))
 
 
-def _world(run: Drawn, box: Box, scale: int) -> Any:
+def _world(run: Drawn, box: Box, scale: int, aspect: float) -> Any:
     """The view of one run's world: across the fleet's way, from a little above; trails up to the cursor."""
     import rerun.blueprint as rrb
 
     middle = 0.5 * (box.low + box.high)
-    eye = middle + box.size * np.array([-0.41, -0.69, -0.24])
+    eye = middle - distance(box, aspect) * SIGHT
     now = rrb.TimeRangeBoundary.cursor_relative(seconds=0)
     past = rrb.VisibleTimeRange(TIMELINE, start=rrb.TimeRangeBoundary.infinite(), end=now)
     hulls = f", hulls {scale} times their size" if scale > 1 else ""

@@ -6,8 +6,10 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from lgvi_warp.cli.folders import Content, contents
+from lgvi_warp.cli.output import tell
+from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.report import file_line
-from lgvi_warp.cli.runs import RESULT
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw, SceneError
 
 
@@ -24,21 +26,23 @@ def view(chosen: argparse.Namespace) -> int:
         SceneError: There is no run, no such member, or nothing to draw.
         OSError: The viewer cannot be started, or the file cannot be written.
     """
-    result, members = result_in(chosen.dir), indices(chosen.members)
+    members, result = indices(chosen.members), run_in(chosen.dir)
     from lgvi_warp.views.rerun import log_rerun, show
 
     try:
-        if chosen.out is None:
-            show(result, members=members)
-        else:
-            log_rerun(result, chosen.out, members=members)
-            print(file_line(chosen.out))
+        with shown(chosen.quiet, "drawing"):
+            if chosen.out is None:
+                show(result, members=members)
+            else:
+                log_rerun(result, chosen.out, members=members)
     except (MissingExtra, NothingToDraw) as error:
         raise SceneError([str(error)]) from None
+    files = [] if chosen.out is None else [chosen.out]
+    tell(chosen, lambda: {"files": files}, lambda: "\n".join(map(file_line, files)))
     return 0
 
 
-def result_in(path: Path) -> Any:
+def run_in(path: Path) -> Any:
     """Read the run at a path.
 
     Args:
@@ -49,16 +53,13 @@ def result_in(path: Path) -> Any:
 
     Raises:
         SceneError: There is none, or it is damaged.
+        OSError: It cannot be read.
     """
-    from lgvi_warp.runs.result import Result
-    from lgvi_warp.runs.store.open import open_run
-
-    if path.suffix == ".npz" or (path / RESULT).is_file():
-        try:
-            return Result.load(path if path.suffix == ".npz" else path / RESULT)
-        except OSError as error:
-            raise SceneError([f"{path}: {error.strerror or error}; give the folder of a run"]) from None
-    return open_run(path)
+    found = [Content("result", path)] if path.suffix == ".npz" else contents(path)
+    runs = [content for content in found if content.kind in ("result", "store")]
+    if not runs:
+        raise SceneError([f"{path}: holds a study, and no run; give the folder of a run"])
+    return runs[-1].load()
 
 
 def indices(text: str | None) -> list[int] | None:

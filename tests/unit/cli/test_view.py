@@ -1,5 +1,7 @@
 """The verb view: a run that is there, in the viewer or as a recording."""
 
+import json
+
 import pytest
 
 from lgvi_warp.cli import main
@@ -41,11 +43,22 @@ def test_bad_members_are_refused(folder, tmp_path, capsys, arguments, words):
     assert words in said and said.count("\n") == 1 and not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(("name", "words"), [("none", "is not there"), ("none.npz", "No such file")])
-def test_a_folder_without_a_run_is_refused(tmp_path, capsys, name, words):
-    assert main(["view", str(tmp_path / name)]) == 2
+@pytest.mark.parametrize(
+    ("name", "words", "code"), [("none", "is not there", 2), ("none.npz", "No such file", 1), ("study", "no run", 2)]
+)
+def test_a_folder_without_a_run_is_refused(tmp_path, capsys, name, words, code):
+    (tmp_path / "study").mkdir()
+    (tmp_path / "study" / "sweep.json").write_text("{}")
+    assert main(["view", str(tmp_path / name)]) == code
     said = capsys.readouterr().err
     assert words in said and said.count("\n") == 1
+
+
+def test_json_names_the_file(folder, tmp_path, capsys):
+    path = tmp_path / "few.rrd"
+    assert main(["view", str(folder), "--out", str(path), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["verb"], document["files"]) == ("view", [str(path)])
 
 
 def test_no_rerun_is_one_line_with_the_remedy(folder, tmp_path, capsys, monkeypatch):

@@ -385,7 +385,10 @@ def test_a_mesh_is_drawn_times_a_whole_number(tmp_path):
     run = drawn.drawn_of(result)
     box = world.box_of([run])
     scale = world.scale_of(run, box)
-    assert scale == np.ceil(world.SEEN * box.size / 0.5) > 5.0 and rows(path, "/world/bodies/ok", "scales")[1.0][0] == [scale] * 3
+    assert (
+        scale == np.ceil(world.SEEN * box.size / 0.5) > 5.0
+        and rows(path, "/world/bodies/ok", "scales")[1.0][0] == [scale] * 3
+    )
     assert f"drawn {scale} times their size" in text_of(path, "/run/summary")
     mesh.unlink()
     with pytest.raises(lw.SceneError, match=r"vehicle\.shape\.mesh = 'hull\.glb': cannot be read"):

@@ -32,7 +32,7 @@ VERBS: dict[str, Callable[[argparse.Namespace], int]] = {verb.__name__: verb for
 VERBS |= {"list": list_names, "plan": predict}
 
 # Verbs that write no files of the user's.
-READING = ("info", "check", "predict", "plan", "bench", "tune", "warm", "list", "schema", "completion", "view")
+READING = ("info", "check", "predict", "plan", "bench", "tune", "warm", "list", "schema", "completion")
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -18,12 +18,11 @@ import lgvi_warp as lw  # noqa: E402
 
 project = "lgvi_warp"
 version = release = lw.__version__
-project_copyright = ""
 extensions = ["myst_parser", "sphinx.ext.autodoc"]
 exclude_patterns = ["index.md"]
 html_theme = "furo"
 html_title = f"lgvi_warp {release}"
-html_show_sphinx = False
+html_show_sphinx = html_show_copyright = False
 html_copy_source = False
 add_module_names = False
 autodoc_typehints = "none"
@@ -70,6 +69,13 @@ def link_public_names(app: Sphinx, tree: nodes.document) -> None:
             link += literal
 
 
+def use_dashes(app: Sphinx, tree: nodes.document) -> None:
+    """Put a dash between a parameter and its text, where Sphinx writes two hyphens."""
+    for text in list(tree.findall(nodes.Text)):
+        if text == " -- ":
+            text.parent.replace(text, nodes.Text(" \N{EN DASH} "))
+
+
 def setup(app: Sphinx) -> None:
     """Write the reference, then build."""
     pages.write(DOCS / "reference" / "built")
@@ -77,3 +83,4 @@ def setup(app: Sphinx) -> None:
     app.connect("autodoc-process-docstring", document)
     app.connect("autodoc-process-signature", shorten)
     app.connect("doctree-read", link_public_names)
+    app.connect("doctree-read", use_dashes)

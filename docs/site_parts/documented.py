@@ -16,6 +16,10 @@ from lgvi_warp.statistics.base import Statistic
 # Users give the parameters of what scene files name by type, and call no methods of it.
 NAMED_IN_FILES = (lw.Term, Distribution, Sampling, Statistic)
 SECTION = r"^(Args|Attributes|Returns|Yields|Raises):\n((?:    .*(?:\n|\Z)|\n)+)"
+# A line that begins an item of a list, or any space.
+SPACE = re.compile(r"\n\s*(\* )|\s+")
+# What stands for the text of a base.
+AS_OF = re.compile(r"As of `\w+`")
 ENTRY = r"^(\*{0,2}\w[\w, *.]*):\s+(.+(?:\n(?: .*)?)*)"
 
 
@@ -41,9 +45,16 @@ def sections(docstring: str) -> tuple[str, dict[str, str]]:
 
 
 def entries(section: str) -> dict[str, str]:
-    """Name -> text of each entry of a section; entries such as "b, R: ..." are of each of their names."""
+    """Name -> text of each entry of a section, one line, and one for each item of a list.
+
+    An entry such as "b, R: ..." is of each of its names.
+    """
     pairs = re.findall(ENTRY, section, re.MULTILINE)
-    return {name.strip(" *"): " ".join(text.split()) for names, text in pairs for name in names.split(",")}
+    return {
+        name.strip(" *"): SPACE.sub(lambda found: "\n* " if found[1] else " ", text).strip()
+        for names, text in pairs
+        for name in names.split(",")
+    }
 
 
 def described(subject: Any) -> dict[str, str]:
@@ -51,7 +62,9 @@ def described(subject: Any) -> dict[str, str]:
     texts: dict[str, str] = {}
     for owner in reversed(inspect.getmro(subject)) if inspect.isclass(subject) else [subject]:
         _, found = sections(inspect.cleandoc(owner.__doc__ or ""))
-        texts |= entries(found.get("Args", "")) | entries(found.get("Attributes", ""))
+        for name, text in {**entries(found.get("Args", "")), **entries(found.get("Attributes", ""))}.items():
+            of_base = AS_OF.match(text) if name in texts else None
+            texts[name] = texts[name].rstrip(".") + text[of_base.end() :] if of_base else text
     return texts
 
 

@@ -118,7 +118,8 @@ def _table(kind: Any) -> list[str]:
     rows = [("key", "type, shape, unit", "default", "meaning")]
     for item in documented.parameters(kind):
         default = "required" if item.default is None else f"``{item.default}``"
-        rows.append((f"``{words.get(item.name, item.name)}``", escaped(item.type), default, escaped(item.text)))
+        text = escaped(item.text.replace("\n", " "))
+        rows.append((f"``{words.get(item.name, item.name)}``", escaped(item.type), default, text))
     if len(rows) == 1:
         return ["It has no keys.", ""]
     cells = [f"   {'* -' if place == 0 else '  -'} {cell}" for row in rows for place, cell in enumerate(row)]
@@ -168,16 +169,23 @@ def fields(subject: Any, docstring: str) -> list[str]:
     given = documented.parameters(subject) if described else []
     constructed = "Attributes" not in found or "Args" in found
     if constructed:
-        lines += [f":param {item.name}: ({linked(item.note)}) {escaped(item.text)}" for item in given]
+        lines += [f":param {item.name}: ({linked(item.note)}) {indented(item.text)}" for item in given]
     types = {item.name: f"({linked(item.type)}) " for item in given if item.type}
     lines += [":Attributes:", ""] if attributes else []
-    lines += [f"   * **{name}** -- {types.get(name, '')}{escaped(value)}" for name, value in attributes.items()]
+    lines += [f"   * **{name}** -- {types.get(name, '')}{indented(value)}" for name, value in attributes.items()]
     lines += [""] if attributes else []
     for title in ("Returns", "Yields"):
         if title in found:
             lines += [f":{title.lower()}: {escaped(' '.join(found[title].split()))}"]
     raised = documented.entries(found.get("Raises", ""))
-    return [*lines, *(f":raises {name}: {escaped(value)}" for name, value in raised.items()), ""]
+    lines += [f":raises {name}: {escaped(value)}" for name, value in raised.items()]
+    return "\n".join([*lines, ""]).splitlines()
+
+
+def indented(text: str) -> str:
+    """The text of an entry within a field of reStructuredText: its list stands apart."""
+    first, *items = escaped(text).split("\n")
+    return "\n".join([first, "", *(f"     {item.strip()}" for item in items)]) if items else first
 
 
 def linked(note: str) -> str:

@@ -51,6 +51,7 @@ class Heir(Base):
 
     Args:
         a, b: Two [m].
+        told: As of `Base`; and more.
 
     Returns:
         silent: no parameter.
@@ -70,7 +71,7 @@ class Heir(Base):
 def test_the_check_sees_what_is_not_described():
     assert undescribed("Heir", Heir) == ["Heir: silent", "Heir.method: rest"]
     told, _, a, b = documented.parameters(Heir)
-    assert told.text == "The inherited one, in two lines." and told.note == "int; required"
+    assert told.text == "The inherited one, in two lines; and more." and told.note == "int; required"
     assert (
         (a.text, b.text) == ("Two [m].",) * 2 and a.note == "default ()" and b.note == "lw.Scene | None; default None"
     )

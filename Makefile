@@ -4,7 +4,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: run quick test test-long coverage mutants lint docs bench bench-peers clean
+.PHONY: run quick test test-long coverage mutants lint docs bench bench-peers bench-loops clean
 
 run: $(VENV)/.run
 	$(BIN)/lgvi-warp run examples/paper.toml --out runs/paper
@@ -45,7 +45,7 @@ docs: $(VENV)/.dev
 bench: $(VENV)/.dev
 	$(BIN)/python -m benchmarks run
 
-# Other systems on the same problem; their packages go into an environment of their own.
+# Other systems; their packages go into environments of their own.
 bench-peers: .venv-peers/.done
 	.venv-peers/bin/python -m benchmarks peers --out runs/peers_1
 	.venv-peers/bin/python -m benchmarks peers --threads $$(nproc) --out runs/peers_all
@@ -56,8 +56,16 @@ bench-peers: .venv-peers/.done
 	.venv-peers/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[viz]' --requirement $<
 	touch $@
 
+bench-loops: .venv-loops/.done
+	.venv-loops/bin/python -m benchmarks run loop_peers environments
+
+.venv-loops/.done: benchmarks/cases/environments/requirements.txt pyproject.toml
+	$(PYTHON) -m venv .venv-loops
+	.venv-loops/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[gym]' --requirement $<
+	touch $@
+
 clean:
-	rm -rf $(VENV) .venv-peers .mutants runs build dist .mypy_cache .ruff_cache .pytest_cache
+	rm -rf $(VENV) .venv-peers .venv-loops .mutants runs build dist .mypy_cache .ruff_cache .pytest_cache
 
 # Each stamp stands for an installed set of extras; a change of pyproject.toml installs anew.
 $(VENV)/bin/python:

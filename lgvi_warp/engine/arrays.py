@@ -175,10 +175,12 @@ class LawArrays:
         memory: what laws and method remember from step to step; the second half is a backup.
         loop: the structs of a controller's parts; None without one.
         places: where in table and memory each law's rows lie, and how many there are; None before `write`.
+        remembered: rows of the memory that each law has, without scratch rows.
     """
 
     table: Lanes
     memory: Lanes
+    remembered: list[slice]
 
     def __init__(
         self,
@@ -209,10 +211,12 @@ class LawArrays:
         rows = [_present(law.rows) for law in laws]
         starts = [part for law in laws for part in (_present(law.memory), np.zeros((1, law.work)))]
         row, memory, places = 1, bus, []
+        self.remembered = []
         for law, part in zip(laws, rows, strict=True):
             work = memory + memory_rows(law) - law.work
             wanted = ("first", row, law.rows), ("memory", memory, law.memory), ("work", work, law.work or None)
             places.append({name: place for name, place, part in wanted if part is not None})
+            self.remembered.append(slice(memory, work))
             row, memory = row + part.shape[1], memory + memory_rows(law)
         moved = self.places != (places, row, memory)
         if moved:

@@ -76,6 +76,7 @@ class Plan:
         on_failure: "freeze" (default), "raise" or "substep".
         survey_all: whether the kernel is chosen by all members (default), or by the first SURVEYED. Then a run looks at the
             others as it comes to them, and begins anew, with all members looked at, if any of them needs more.
+        looks: whether samples are taken at all looks of the controller as well, for statistics that want them; default False.
 
     Attributes:
         kernel_choice: the laws that act and the method's program for them.
@@ -96,6 +97,7 @@ class Plan:
     checks: str = "safe"
     on_failure: str = "freeze"
     survey_all: bool = True
+    looks: bool = False
     kernel_choice: KernelChoice = field(init=False)
     spec: Spec = field(init=False)
     width_source: str = field(init=False, default="asked for", compare=False)
@@ -147,6 +149,27 @@ class Plan:
         """The kernel and its types, made when first asked for: many plans are never run."""
         with build_lock, self._laws_compile():
             return make_advance(self.spec)
+
+    @functools.cached_property
+    def taken(self) -> TimeGrid:
+        """All samples that are taken: those to keep, and with `looks` those at the controller's looks."""
+        controller = self.kernel_choice.controller
+        if not self.looks or controller is None:
+            return self.grid
+        return self.grid.with_steps(np.arange(0, self.grid.steps + 1, controller.every(self.grid.h)))
+
+    def kept(self, when: slice) -> tuple[slice, np.ndarray]:
+        """Which of some samples that are taken are to keep.
+
+        Args:
+            when: slice of the samples that are taken.
+
+        Returns:
+            The slice of the grid's samples, and their places within `when`.
+        """
+        steps, grid = self.taken.sample_steps[when], self.grid.sample_steps
+        first, stop = np.searchsorted(grid, [steps[0], steps[-1] + 1])
+        return slice(int(first), int(stop)), np.searchsorted(steps, grid[first:stop])
 
     @functools.cached_property
     def shared(self) -> Shared:
@@ -297,10 +320,11 @@ class Plan:
             A plan for m members.
         """
         subplan = self._copy()
-        for name in ("shared", "idle", "sample_fields", "signal_rows"):
+        for name in ("shared", "idle", "sample_fields", "signal_rows", "taken", "times"):
             subplan.__dict__.pop(name, None)
         object.__setattr__(subplan, "ensemble", self.ensemble.subset(indices))
         object.__setattr__(subplan, "fields", ordered(fields))
+        object.__setattr__(subplan, "looks", False)
         object.__setattr__(subplan, "_whole", (self, indices, fields))
         return subplan
 
@@ -504,7 +528,7 @@ class Plan:
             are due.
         """
         stages, leads = (np.array(fractions) * self.grid.h for fractions in self.lengths)
-        due = np.append(self.grid.sample_steps, 2**31 - 1).astype(np.int32)
+        due = np.append(self.taken.sample_steps, 2**31 - 1).astype(np.int32)
         return (
             wp.array(stages, dtype=self.spec.real, device="cpu"),
             wp.array(leads, dtype=self.spec.real, device="cpu"),
@@ -521,7 +545,7 @@ class Plan:
         Returns:
             (s0, s1): samples s0 to s1 - 1 are due after step k0 and no later than step k1.
         """
-        s0, s1 = np.searchsorted(self.grid.sample_steps, (k0, k1), side="right")
+        s0, s1 = np.searchsorted(self.taken.sample_steps, (k0, k1), side="right")
         return int(s0), int(s1)
 
     def segments(self, count: int) -> Iterator[tuple[int, int]]:
@@ -536,7 +560,7 @@ class Plan:
         if self.asks:
             yield from self._periods()
             return
-        due = self.grid.sample_steps
+        due = self.taken.sample_steps
         per_sample = sum(self.sample_fields.values()) * count * np.dtype(DTYPES[self.dtype]).itemsize
         most_samples = max(1, SEGMENT_SAMPLE_BYTES // max(per_sample, 1))
         most_steps = max(CHUNK, SEGMENT_VEHICLE_STEPS // count // CHUNK * CHUNK)

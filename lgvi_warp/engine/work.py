@@ -128,10 +128,20 @@ def run_block(
         packets = Packets.of(plan, members)
         block_keepers = [keeper.open(plan, block, members) for keeper in keepers]
 
+        lookers = (
+            [looker for keeper in block_keepers if (looker := getattr(keeper, "look", None))] if plan.looks else []
+        )
+
         def keep(when: slice, values: Mapping[str, np.ndarray], ends: Ends) -> None:
             samples = samples_of(plan, when, values, ends)
+            for look in lookers:
+                look(when, samples)
+            kept, places = plan.kept(when)
+            if kept.start == kept.stop:
+                return
+            samples = samples if plan.taken is plan.grid else samples.at(places)
             for block_keeper in block_keepers:
-                block_keeper.take(when, samples)
+                block_keeper.take(kept, samples)
 
         def keep_start() -> None:
             running = np.zeros(block.count, np.uint8), np.zeros(block.count, np.int64)
@@ -217,7 +227,9 @@ def unpacked(
     """
     samples = _divided(fields, raw, table)
     if not np.array_equal(frame.Q, np.broadcast_to(np.eye(3), frame.Q.shape)):
-        turns = {"attitude": lambda R: R @ np.swapaxes(frame.Q, -1, -2)}
+        # Products of contiguous matrices take half the time, and have the same bits.
+        back = np.ascontiguousarray(np.swapaxes(frame.Q, -1, -2))
+        turns = {"attitude": lambda R: np.ascontiguousarray(R) @ back}
         for name in samples.keys() - {"position", *SIGNALS}:
             turn = turns.get(name, lambda v: notation.rotate_out(frame.Q, v))
             samples[name] = turn(samples[name])
@@ -249,12 +261,12 @@ def samples_of(plan: Plan, when: slice, fields: Mapping[str, np.ndarray], ends: 
 
     Args:
         plan: the plan of the run.
-        when: slice of the sample times.
+        when: slice of the samples that are taken.
         fields: values by field, (times, members, ...).
         ends: returns status and last own step of each member (see `Fields`).
 
     Returns:
         The samples as keepers receive them.
     """
-    grid = plan.grid
-    return Fields(fields, grid.times[when], grid.sample_steps[when], plan.ensemble.scene.terms, ends)
+    grid, scene = plan.taken, plan.ensemble.scene
+    return Fields(fields, grid.times[when], grid.sample_steps[when], scene.terms, ends, scene.controller)

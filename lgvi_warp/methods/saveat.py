@@ -73,6 +73,20 @@ class TimeGrid:
         """Number of steps from the start to the end."""
         return int(self.sample_steps[-1])
 
+    def with_steps(self, steps: np.ndarray) -> TimeGrid:
+        """The same steps with samples after more of them.
+
+        Args:
+            steps: Numbers of steps (m,), none above those of the run.
+
+        Returns:
+            The grid; the times of the samples that there were stay the same.
+        """
+        step, together = exact(self.h), np.union1d(self.sample_steps, steps)
+        times = np.array([k * step.numerator / step.denominator for k in together.tolist()])
+        times[np.searchsorted(together, self.sample_steps)] = self.times
+        return TimeGrid(self.h, together.astype(np.int64), times, self.messages)
+
 
 def exact(x: float) -> Fraction:
     """The number that was meant: 0.1 + 0.2 is 3/10, 0.3333333333333333 is 1/3, 1e-12 is itself.

@@ -8,9 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common import summaries
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.physics import inertia as inertias
 from lgvi_warp.physics import notation
+from lgvi_warp.physics.shape import shape_from
 
 Numbers = Mapping[str, np.ndarray]
 
@@ -37,8 +40,8 @@ class Seen(str):
     """A warning that a vehicle raises about its own numbers, and raises again when it is rebuilt from another's fields."""
 
 
-@dataclass(frozen=True, eq=False)
-class Vehicle:
+@dataclass(frozen=True, eq=False, repr=False)
+class Vehicle(Summarized):
     """A rigid body in water, in body axes (x ahead, y to starboard, z down), described in one of two forms.
 
     The simple form is about the centre of gravity: `mass`, `inertia`, `added_mass`. The 6x6 form is about any origin of the
@@ -61,6 +64,8 @@ class Vehicle:
             numbers.
         warnings: Texts about what is unusual but allowed, as importers give them. The vehicle adds what it finds itself;
             all are among the messages of a run.
+        shape: How the vehicle is drawn, a table with `length` and `diameter` [m] or with `mesh`, the path of a .glb file; by
+            default a hull of the displaced volume. No part of the dynamics.
 
     Raises:
         SceneError: Where a number is not finite, not positive, of the wrong shape, not symmetric or not positive definite.
@@ -78,6 +83,7 @@ class Vehicle:
     center_of_gravity: Any = None
     inertia_tolerance: float = 0.0
     warnings: Sequence[str] = ()
+    shape: Any = None
 
     def __post_init__(self) -> None:
         faults = Faults("vehicle.")
@@ -90,11 +96,19 @@ class Vehicle:
         object.__setattr__(self, "inertia_tolerance", tolerance or 0.0)
         values |= self._full(faults) if self.full else self._simple(faults)
         values["warnings"] = (*user_warnings, *map(Seen, values["warnings"]))
+        with faults.including():
+            values["shape"] = shape_from(self.shape)
         faults.raise_if_any()
         for name, value in values.items():
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
             object.__setattr__(self, name, value)
+
+    def summary_rows(self) -> tuple[str, summaries.Rows]:
+        """The numbers with their units, and the warnings."""
+        rows = [(name, summaries.numbers(value, UNITS[name])) for name, value in self.parameters().items()]
+        rows += [("warning", str(text)) for text in self.warnings]
+        return f"Vehicle, {'6x6' if self.full else 'simple'} form", rows
 
     @property
     def full(self) -> bool:
@@ -204,7 +218,8 @@ class Vehicle:
         """The vehicle as a table of a scene file.
 
         Returns:
-            Numbers by name; 3x3 matrices that are diagonal as their diagonal. Of the warnings, only those of the user.
+            Numbers by name; 3x3 matrices that are diagonal as their diagonal. Of the warnings, only those of the user. The
+            shape, where there is one.
         """
         content = {}
         for name, value in self.parameters().items():
@@ -212,7 +227,8 @@ class Vehicle:
             content[name] = compact(value) if value.shape == (3, 3) and not full else value.tolist()
         user_warnings = [text for text in self.warnings if not isinstance(text, Seen)]
         content |= {"inertia_tolerance": self.inertia_tolerance} if self.inertia_tolerance else {}
-        return content | ({"warnings": user_warnings} if user_warnings else {})
+        content |= {"warnings": user_warnings} if user_warnings else {}
+        return content | ({"shape": self.shape.to_dict()} if self.shape else {})
 
 
 def _texts(faults: Faults, given: Any) -> tuple[str, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import functools
 import inspect
 from collections.abc import Callable, Mapping, Sequence
@@ -436,9 +435,7 @@ def _acted(fleet: Ensemble, names: Sequence[str], to: str | None) -> Ensemble:
     callback = Callback(functools.partial(_nothing, channels[to] if to else len(COMPONENTS)), to=to, name="actions")
     laws = [law for law in controller.laws if law.key not in names and not isinstance(law, Callback)]
     allocation = [part for part in controller.allocation if part.type and part.to != to]
-    acted = copy.copy(fleet)
-    acted.scene = replace(scene, controller=replace(controller, laws=[*laws, callback], allocation=allocation))
-    return acted
+    return fleet.in_scene(replace(scene, controller=replace(controller, laws=[*laws, callback], allocation=allocation)))
 
 
 def _wishes(controller: Any) -> tuple[str, ...]:

@@ -142,7 +142,7 @@ def predict(
     scene = ensemble.scene
     observed = observe(ensemble.members, scene.run, statistics, keep, until, scene.events)
     fields = fields_of(settings.get("save"), scene.run)
-    plan = make_plan(ensemble, **settings, fields=observed.fields, survey_all=False)
+    plan = make_plan(ensemble, **settings, fields=observed.fields, survey_all=False, looks=observed.looks)
     count = threads or machine.thread_count()
     asked_store = store if isinstance(store, Store) or store is None else Store(store)
     into = settled(asked_store, plan, observed, fields) if asked_store else None

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common import machine
-from lgvi_warp.common.errors import Faults, SceneError, shown
+from lgvi_warp.common.errors import Faults, SceneError, refusal, shown
 from lgvi_warp.common.labelled import columns_by_name, is_labelled
+from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.status import Status, failed
 from lgvi_warp.engine.executors import executor_of
 from lgvi_warp.engine.keepers.observation import observe
@@ -107,7 +108,9 @@ class Runner:
             plan = kind.plans.get((method, survey(fleet, method, h, kind.shared, odd=False, most=SURVEYED).decisive))
             if plan is not None:
                 return plan.of(fleet)
-        plan = make_plan(fleet, **self.settings, fields=self.observed.fields, survey_all=False)
+        plan = make_plan(
+            fleet, **self.settings, fields=self.observed.fields, survey_all=False, looks=self.observed.looks
+        )
         plan.compile()
         if plan.method.reason:  # chosen once, by the members of the first plan
             self.settings["method"] = plan.method
@@ -176,13 +179,14 @@ class Prepared:
         self._fleet, self._table, self.names, self._of, self._runner = fleet, table, names, of, runner
         self._levels, self._refuse, self._common_noise = levels, refuse, common_noise
 
+    @shows_progress
     def __call__(
         self,
         X: Any = None,
         *,
         seed: int | None = None,
         members: int | None = None,
-        progress: Callable[[float], None] | None = None,
+        progress: Callable[[float], None] | bool | None = None,
     ) -> Any:
         """Run members with these numbers, from t = 0 to the end.
 
@@ -192,7 +196,8 @@ class Prepared:
                 Without X the members are drawn from the distributions.
             seed: seed of the members that are drawn; default that of the ensemble.
             members: number of members that are drawn, the first ones of the sampling; default those of the ensemble.
-            progress: called with the fraction of the work that is done, in [0, 1].
+            progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is
+                done, in [0, 1].
 
         Returns:
             The quantities, (n,) of a single number and (n, m) of several; a `Result` without `of`.
@@ -203,9 +208,19 @@ class Prepared:
         """
         if X is not None and (seed is not None or members is not None):
             raise SceneError(["X: is given beside seed or members, which draw the numbers; leave out one of them"])
-        return self._answer(self._drawn(seed, members) if X is None else self._members(X), progress)
+        return self._answer(self._drawn(seed, members) if X is None else self._members(X), callback(progress))
 
-    def states(self, position: Any, attitude: Any, velocity: Any, angular_velocity: Any, parameters: Any = None) -> Any:
+    def states(
+        self,
+        position: Any,
+        attitude: Any,
+        velocity: Any,
+        angular_velocity: Any,
+        parameters: Any = None,
+        *,
+        indices: Any = None,
+        seed: int = 0,
+    ) -> Any:
         """Run members from given states.
 
         Args:
@@ -214,6 +229,9 @@ class Prepared:
             velocity: (n, 3) [m/s], body axes.
             angular_velocity: (n, 3) [rad/s], body axes.
             parameters: arrays (n, ...) by name, as of `Ensemble.from_states`; default None.
+            indices: (n,), whole numbers that key the noise of each member, such as its index in another ensemble; members with
+                the same index have the same noise. Default None for 0 to n - 1.
+            seed: the seed of the noise. Default 0.
 
         Returns:
             As of a call.
@@ -223,7 +241,15 @@ class Prepared:
             FailedMembers: if members failed, unless failed="nan".
         """
         given = position, attitude, velocity, angular_velocity, parameters
-        return self._answer(Ensemble.from_states(self._fleet.scene, *given), None)
+        fleet = Ensemble.from_states(self._fleet.scene, *given)
+        fleet.seed = seed
+        if indices is not None:
+            keys = np.asarray(indices)
+            if keys.shape != (fleet.members,) or keys.dtype.kind not in "iu":
+                problem = "are not one whole number for each member"
+                raise refusal("indices", indices, problem, f"give an array of shape ({fleet.members},)")
+            fleet.indices = keys.astype(np.int64)
+        return self._answer(fleet, None)
 
     def __reduce__(self) -> tuple[Any, ...]:
         arguments, settings = self._arguments

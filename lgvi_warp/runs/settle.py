@@ -58,6 +58,7 @@ def make_plan(
     on_failure: str | None = None,
     fields: Callable[[Sequence[str]], tuple[str, ...]] = tuple,
     survey_all: bool = True,
+    looks: bool = False,
 ) -> Plan:
     """Settle the settings of a run, from the arguments and, where they are None, from the scene's [run] section.
 
@@ -73,6 +74,7 @@ def make_plan(
         on_failure: "freeze", "raise" or "substep".
         fields: Function from the names of the fields that `save` asks for to those that the kernel writes; default the same.
         survey_all: As of `Plan`; default True.
+        looks: As of `Plan`; default False.
 
     Returns:
         The plan, with a fixed number of Newton steps where the method says iterations="auto".
@@ -110,7 +112,7 @@ def make_plan(
     dtype, checks = dtype or settings.dtype, checks or settings.checks
     on_failure = on_failure or settings.on_failure
     if method is None and settings.method is None and not settings.method_options:
-        others = fields(save.fields), dtype, width, checks, on_failure, survey_all
+        others = fields(save.fields), dtype, width, checks, on_failure, survey_all, looks
         return planned(ensemble, grid.h, lambda one: Plan(ensemble, one, grid, *others))
     chosen = method if isinstance(method, Method) else settings.method_of(method)
     if chosen.iterations == "auto":
@@ -119,7 +121,7 @@ def make_plan(
         number = f"{n} a solve, enough for" if n is not None else f"to the tolerance: {MOST_FIXED} are too few for"
         text = f"Newton steps {number} every member's start at twice the step"
         grid = replace(grid, messages=(*grid.messages, text))
-    return Plan(ensemble, chosen, grid, fields(save.fields), dtype, width, checks, on_failure, survey_all)
+    return Plan(ensemble, chosen, grid, fields(save.fields), dtype, width, checks, on_failure, survey_all, looks)
 
 
 def fields_of(save: SaveAt | None, settings: RunSettings) -> tuple[str, ...]:

@@ -82,7 +82,13 @@ def _of_times(plan: Plan, statistics: Sequence[Statistic], count: int) -> Sizes:
     start = {name: np.repeat(values, count, axis=0) for name, values in at_start(plan, members, packets).items()}
     keeper = Gathered(time, plan.ensemble.members, statistics, plan.ensemble.replicates)
     gathers = keeper.open(plan, block, members)
-    _, taking = _peak(lambda: gathers.take(when, samples_of(plan, when, start, packets.ended)))
+
+    def take() -> None:
+        samples = samples_of(plan, when, start, packets.ended)
+        for looks_or_not in (gathers.look, gathers.take) if plan.looks else (gathers.take,):
+            looks_or_not(when, samples)
+
+    _, taking = _peak(take)
     part = gathers.close(packets.outcome())
     file = len(packed([keeper], [part]))
     joined, reading, estimates = 0, 0, 0

@@ -12,10 +12,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from lgvi_warp.common import machine
+from lgvi_warp.common import machine, summaries
 from lgvi_warp.common.errors import Faults, closest, cut, refusal, shown
 from lgvi_warp.common.labelled import columns_by_name, is_labelled, match
 from lgvi_warp.common.real_numbers import column_names
+from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.physics import notation
 from lgvi_warp.physics import vehicle as vehicles
 from lgvi_warp.physics.fields import FIELDS
@@ -29,7 +30,7 @@ from lgvi_warp.scene.start import ATTITUDES, NAMES, resolve_attitude
 from lgvi_warp.scene.variations import MATRICES, Target, Variation
 
 
-class Ensemble:
+class Ensemble(Summarized):
     """A scene and what varies in it from member to member.
 
     A member's numbers depend on the seed, its index and the varied names alone, not on the block, subset or order in
@@ -74,6 +75,13 @@ class Ensemble:
             faults.add("vary", vary, "does not map names to distributions", 'give {"vehicle.mass": lw.Normal(...)}')
         faults.raise_if_any()
         self._setup(scene, EnsembleSettings(members, seed, dict(vary or {}), sampling), {})
+
+    def summary_rows(self) -> tuple[str, summaries.Rows]:
+        """Sampling, what varies and the scene's own rows."""
+        varied = [(f"varies {name}", shown(one.to_dict())) for name, one in self.vary.items()]
+        rows = [("sampling", f"{self.sampling.kind}, seed {self.seed}"), *varied]
+        own = self.scene.summary_rows()[1] if isinstance(self.scene, Summarized) else ()
+        return f"Ensemble of {self.members:,} members", [*rows, *(row for row in own if row[0] != "ensemble")]
 
     @classmethod
     def of(cls, scene: SceneLike, settings: EnsembleSettings) -> Ensemble:
@@ -503,6 +511,23 @@ class Ensemble:
         ensemble._places = ensemble._indices = None
         ensemble._whole = ensemble.members = len(ensemble._columns[0][1])
         ensemble._check_physical()
+        return ensemble
+
+    def in_scene(self, scene: SceneLike, by_member: Sequence[str] = ()) -> Ensemble:
+        """Return the same members, in a scene with other terms, events or parts of the controller.
+
+        Args:
+            scene: The scene; what varies of it has the names that it had, or is no more.
+            by_member: Names of more numbers that count as varied, since the caller sets them; none by default.
+
+        Returns:
+            The ensemble, whose members have the scene's values of these.
+        """
+        ensemble = copy.copy(self)
+        ensemble.scene, ensemble._base = scene, scene.parameters()
+        shared = ((name, ensemble._base[name]) for name in by_member)
+        columns = [(Target(name), np.broadcast_to(value, (self._whole, *np.shape(value)))) for name, value in shared]
+        ensemble._columns = [*self._columns, *columns]
         return ensemble
 
     def with_seed(self, seed: int, members: int | None = None) -> Ensemble:

@@ -56,7 +56,10 @@ def tables_of_text(
 def _files_in(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
     """Return the content with the paths of files that it names, where they are relative, put below the folder.
 
-    These are a table of members, and the policies of a controller.
+    These are a table of members, the policies of a controller, and the mesh of a vehicle.
+
+    Raises:
+        SceneError: The mesh lies outside the folder, or is not there.
     """
     try:
         ensemble = content["ensemble"]
@@ -65,6 +68,13 @@ def _files_in(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
         if isinstance(table["file"], str):
             table = table | {"file": os.fspath(folder / table["file"])}
             content = content | {"ensemble": ensemble | {"sampling": sampling | {"table": table}}}
+    except (KeyError, TypeError):
+        pass
+    try:
+        vehicle = content["vehicle"]
+        shape = vehicle["shape"]
+        if isinstance(shape["mesh"], str):
+            content = content | {"vehicle": vehicle | {"shape": shape | {"mesh": _mesh_in(folder, shape["mesh"])}}}
     except (KeyError, TypeError):
         pass
     try:
@@ -79,6 +89,22 @@ def _files_in(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
 def _below(folder: Path, law: Any) -> Any:
     """Return the table of a law, with the path of its file put below the folder."""
     return law | {"file": os.fspath(folder / law["file"])} if isinstance(law.get("file"), str) else law
+
+
+def _mesh_in(folder: Path, name: str) -> str:
+    """Return the path of a mesh; raise SceneError if it leaves the folder of the scene, through a link too."""
+    key = "vehicle.shape.mesh"
+    try:
+        path = (folder / name).resolve()
+        inside = path.is_relative_to(folder.resolve())
+        there = inside and path.is_file()
+    except (OSError, ValueError, RuntimeError):  # a name with a null character, or a ring of links
+        inside, there = True, False
+    if not inside or Path(name).is_absolute():
+        raise refusal(key, name, "lies outside the scene file's folder", "put the mesh beside the scene file")
+    if not there:
+        raise refusal(key, name, "is not there", "put the mesh beside the scene file, or give length and diameter [m]")
+    return os.fspath(path)
 
 
 def override(content: dict[str, Any], key: str, value: Any) -> None:

@@ -104,6 +104,8 @@ class Statistic:
     of_numbers: ClassVar[bool] = True
     # Whether it reads how members end instead of samples.
     of_ends: ClassVar[bool] = False
+    # Whether it takes the samples at all looks of a controller, and not only those that are kept.
+    looks: ClassVar[bool] = False
 
     of: Any = None
     name: str | None = field(default=None, kw_only=True)

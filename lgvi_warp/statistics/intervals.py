@@ -98,6 +98,38 @@ def wilson(
     return lower, upper
 
 
+def clopper_pearson(hits: np.ndarray, count: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the interval of a probability whose two tails are below half of 1 - confidence each (Clopper & Pearson 1934).
+
+    It covers at least as often as it says, for any probability; so it is wider than Wilson's.
+
+    Args:
+        hits: number k of hits among the trials.
+        count: number n of trials.
+        confidence: confidence level, between 0 and 1.
+
+    Returns:
+        Lower and upper end; 0 and 1 without trials.
+    """
+    from scipy.special import betaincinv
+
+    k, n = np.broadcast_arrays(np.asarray(hits, np.float64), np.asarray(count, np.float64))
+    tail = 0.5 * (1.0 - confidence)
+    lower = np.where(k > 0.0, betaincinv(np.maximum(k, 1.0), np.maximum(n - k, 0.0) + 1.0, tail), 0.0)
+    upper = np.where(k < n, betaincinv(k + 1.0, np.maximum(n - k, 1.0), 1.0 - tail), 1.0)
+    return np.where(n > 0.0, lower, 0.0), np.where(n > 0.0, upper, 1.0)
+
+
+def none_of(count: int, confidence: float) -> float:
+    """Return the one-sided upper limit of a probability of which no hit was seen: 1 - (1 - confidence)^(1 / n).
+
+    Args:
+        count: number n of trials; 1 without trials.
+        confidence: confidence level, between 0 and 1.
+    """
+    return float(-np.expm1(np.log1p(-confidence) / count)) if count else 1.0
+
+
 def of_replicates(each: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
     """Return standard error and half width of the mean of R independent estimates, by Student's t with R - 1.
 

@@ -21,6 +21,7 @@ class Fields(dict[str, np.ndarray]):
         terms: the terms of the scene.
         ends: function that returns the status (n,) of the members, and the last step (n,) after which each was still
             running.
+        controller: the controller of the scene; None (the default) for none.
     """
 
     def __init__(
@@ -30,14 +31,24 @@ class Fields(dict[str, np.ndarray]):
         steps: np.ndarray,
         terms: Sequence[Any],
         ends: Callable[[], tuple[np.ndarray, np.ndarray]],
+        controller: Any = None,
     ):
         super().__init__(fields)
         self.time, self.terms, self._steps, self._when_ended = time, terms, steps, ends
+        self.controller = controller
 
     def last(self) -> Fields:
         """Return the samples at the last of these times."""
-        last = {name: values[-1:] for name, values in self.items()}
-        return Fields(last, self.time[-1:], self._steps[-1:], self.terms, self._when_ended)
+        return self.at(np.array([len(self.time) - 1]))
+
+    def at(self, places: np.ndarray) -> Fields:
+        """Return the samples at some of these times.
+
+        Args:
+            places: indices of the times (m,).
+        """
+        values = {name: values[places] for name, values in self.items()}
+        return Fields(values, self.time[places], self._steps[places], self.terms, self._when_ended, self.controller)
 
     @functools.cached_property
     def _ends(self) -> tuple[np.ndarray, np.ndarray] | None:

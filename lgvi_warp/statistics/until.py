@@ -189,7 +189,7 @@ def watch(until: Until, statistics: Sequence[Statistic], times: np.ndarray) -> W
         target = _target(until.statistic, _named(statistics))
     faults.raise_if_any()
     assert target is not None
-    if target[0].type == "extremes":
+    if target[0].type in ("extremes", "each"):
         raise refusal("until.statistic", until.statistic, "has no interval", "watch a quantile")
     return Watch(until, *target, rows)
 

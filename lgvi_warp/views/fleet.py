@@ -10,6 +10,7 @@ import numpy as np
 
 from lgvi_warp.common.status import Status, stop_time
 from lgvi_warp.physics import energy as invariants
+from lgvi_warp.views.choice import of_members, pieces
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
@@ -117,11 +118,24 @@ def title(result: Result) -> str:
         One line of text.
     """
     method, step = result.provenance["method"]["name"], result.provenance["step"]
-    text = f"{result.members:,} members, {method}, step {step:g} s"
+    text = f"{of_members(result.members, members_of_run(result))}, {method}, step {step:g} s"
     counts = result.status.counts()
     if set(counts) == {"ok"}:
         return text
     return f"{text}: " + ", ".join(f"{number:,} {name}" for name, number in counts.items())
+
+
+def members_of_run(result: Result) -> int:
+    """Count the members of the run that a result is of, or a part of.
+
+    Args:
+        result: A result.
+
+    Returns:
+        The number of members that were run.
+    """
+    planned = result.provenance["ensemble"].get("members") or 0
+    return max(result.members, int(result.provenance.get("members", planned)))
 
 
 def identity(result: Result) -> str:
@@ -136,7 +150,8 @@ def identity(result: Result) -> str:
         16 hexadecimal digits, the same for the same run.
     """
     digest = hashlib.sha256(json.dumps(result.provenance, sort_keys=True).encode())
-    for array in (result.time, np.asarray(result.status), stop_time(result), result.position[0], result.position[-1]):
+    arrays = [result.time, np.asarray(result.status), stop_time(result)]
+    for array in (*arrays, *(samples["position"][[0, -1]] for _, samples in pieces(result, ("position",)))):
         digest.update(f"{array.shape} {array.dtype.str}\n".encode())
         digest.update(np.ascontiguousarray(array).data)
     return digest.hexdigest()[:16]

@@ -12,6 +12,7 @@ from lgvi_warp.common import files as durable
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw
 from lgvi_warp.common.status import Status, failed, stop_time, under_way
 from lgvi_warp.runs.outcomes import outcomes
+from lgvi_warp.views.choice import shown
 from lgvi_warp.views.fleet import LOOKS, energy_curve, evenly, quantiles, title
 
 if TYPE_CHECKING:
@@ -269,11 +270,11 @@ _PANEL |= dict.fromkeys(_LINES, _lines_panel)
 
 def _paths(axes: Any, result: Result) -> None:
     """Draw a few members' paths from the side: depth against horizontal distance from the start."""
-    finite = np.flatnonzero(np.isfinite(result.position[0]).all(axis=-1))
-    chosen = evenly(finite, PATHS)
+    drawn = shown(result, PATHS)
+    finite = np.isfinite(result.position[0]).all(axis=-1)
     start = result.position[0, finite, :2].mean(axis=0)
     labelled: set[Status] = set()
-    for member in chosen:
+    for member in drawn.members:
         code, p = Status(int(result.status[member])), result.position[:, member]
         distance = np.hypot(*(p[:, :2] - start).T)
         label = None if code in labelled else code.name.lower()
@@ -281,8 +282,7 @@ def _paths(axes: Any, result: Result) -> None:
         axes.plot(distance, p[:, 2], color=LOOKS[code].color, linewidth=0.8, label=label)
         if code != Status.OK:
             axes.scatter(distance[-1], p[-1, 2], s=18, zorder=3, **_mark(code))
-    many = f"{len(chosen)} of {result.members:,}" if len(chosen) < result.members else f"{len(chosen)}"
-    axes.set(title=f"Paths of {many} members", xlabel="horizontal distance [m]", ylabel="depth b3 [m], down")
+    axes.set(title=f"Paths of {drawn.text}", xlabel="horizontal distance [m]", ylabel="depth b3 [m], down")
     if labelled != {Status.OK}:
         axes.legend(loc="best", fontsize="small")
     axes.invert_yaxis()

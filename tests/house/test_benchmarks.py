@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import own_process, pages
+from benchmarks import own_process, pages, timing
 
 FOLDER = Path(pages.__file__).parent
 CASES = sorted(path.parent.name for path in FOLDER.glob("cases/*/case.py"))
@@ -89,6 +89,13 @@ def test_a_call_in_a_process_of_its_own():
     assert own_process.call(divmod_of_pair, 17, "5") == [3, 2]
     with pytest.raises(RuntimeError, match="ZeroDivisionError"):
         own_process.call(divmod_of_pair, 1, "0")
+
+
+def test_the_least_time_of_calls_in_turn():
+    clock, order = iter([0.0, 3.0, 10.0, 11.0, 20.0, 22.0, 30.0, 35.0]), []
+    calls, begins = [lambda: order.append("a"), lambda: order.append("b")], [lambda: order.append("A"), lambda: None]
+    assert timing.least(calls, 2, begins, clock=lambda: next(clock)) == [2.0, 1.0]
+    assert order == ["A", "a", "b", "A", "a", "b"]
 
 
 def divmod_of_pair(x, text):

@@ -87,6 +87,15 @@ def test_a_vehicle_from_a_file(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
+def test_failed_members(monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
+    page = "guide/failed_members.md"
+    exec(blocks(page, "python")[0], {})
+    printed = "".join(f"    {line}\n" for line in capsys.readouterr().out.splitlines())
+    assert f"```\n\n{printed}\n1." in (ROOT / "docs" / page).read_text()
+
+
+@pytest.mark.slow
 def test_many_calls(monkeypatch):
     monkeypatch.chdir(ROOT)
     (text,) = blocks("guide/many_calls.md", "python")

@@ -29,6 +29,11 @@ DOORS = {
     "stores: zarr": (needed, "zarr", "store"),
     "clusters": (lambda: executor_of("dask", 1, "tcp://127.0.0.1:1"), "distributed", "cluster"),
     "environments": (lambda: lw.gym.VectorEnv(None, observe=[]), "gymnasium", "gym"),
+    "state spaces": (
+        lambda: lw.LinearModel(*np.zeros((4, 12, 12)), 0.1, (), (), {}).state_space(),
+        "control",
+        "control",
+    ),
     "YAML": (lambda: yaml_text.parsed("a: 1"), "yaml", "yaml"),
     "plots": (plots.figure_class, "matplotlib.figure", "viz"),
     "reports": (lambda: views_report.toml_of({}), "tomlkit", "viz"),

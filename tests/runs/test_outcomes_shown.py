@@ -307,8 +307,9 @@ def test_the_ids_are_those_of_the_saved_result(mixed, tmp_path):
 
 def test_a_recording_shows_each_member_by_its_outcome_from_then_on(mixed, tmp_path):
     path = lw.log_rerun(mixed, tmp_path / "fleet.rrd")
-    seen = {name: rows(path, f"/world/{name}", "translations") for name in ("fleet", "floor", "surface")}
-    scales = {name: rows(path, f"/world/{name}", "scales") for name in seen}
+    names = ("ok", "floor", "surface")
+    seen = {name: rows(path, f"/world/bodies/{name}", "translations") for name in names}
+    scales = {name: rows(path, f"/world/bodies/{name}", "scales") for name in seen}
     visible = {
         name: [
             sum(scale[0] == 1.0 for scale in scales[name][t]) if scales[name] else len(seen[name][t])
@@ -317,7 +318,7 @@ def test_a_recording_shows_each_member_by_its_outcome_from_then_on(mixed, tmp_pa
         for name in seen
     }
     under_way = status.under_way(mixed)
-    assert visible["fleet"] == under_way.sum(axis=1).tolist()
+    assert visible["ok"] == under_way.sum(axis=1).tolist()
     for name, code in (("floor", Status.FLOOR), ("surface", Status.SURFACE)):
         assert visible[name] == (~under_way & (mixed.status == code)).sum(axis=1).tolist()
     np.testing.assert_allclose(np.array(seen["floor"][20.0]), mixed.position[-1, :3], atol=1e-5)
@@ -326,26 +327,34 @@ def test_a_recording_shows_each_member_by_its_outcome_from_then_on(mixed, tmp_pa
 
 def test_the_curves_of_a_recording_are_of_those_under_way(sunk, mixed, tmp_path):
     path = lw.log_rerun(sunk, tmp_path / "sunk.rrd")
-    largest = rows(path, "/depth/largest", "scalars")
-    assert largest[2.0][0] == pytest.approx(7.0) and np.isnan(largest[15.0][0])
-    assert rows(path, "/members/floor", "scalars")[20.0] == [5.0] and rows(path, "/members/under_way", "scalars")[
-        0.0
-    ] == [5.0]
-    assert rows(path, "/energy_error/median", "scalars") and not rows(path, "/energy/median", "scalars")
+    median = rows(path, "/curves/height/median", "scalars")
+    assert median[2.0][0] == pytest.approx(-5.0 - 0.65 * 2.0) and np.isnan(median[15.0][0])
+    middle, variance = (rows(path, "/curves/height/all", ending)[2.0][0] for ending in (":values", "variances"))
+    assert middle - np.sqrt(variance) == pytest.approx(-7.0) and middle + np.sqrt(variance) == pytest.approx(-5.6)
+    shares = [rows(path, f"/members/{name}", "scalars") for name in ("floor", "under_way")]
+    assert shares[0][20.0] == [100.0] and shares[1][0.0] == [100.0]
+    assert rows(path, "/curves/energy/median", "scalars")
     driven = lw.log_rerun(acted_on(mixed, ACTING["thrust"][0]), tmp_path / "driven.rrd")
-    assert rows(driven, "/energy/median", "scalars") and not rows(driven, "/energy_error/median", "scalars")
+    said = [text_of(one, "/run/summary") for one in (path, driven)]
+    assert "| energy | drift " in said[0] and "| energy | not conserved: wrench do work |" in said[1]
+
+
+def text_of(path, entity):
+    """All text of an entity."""
+    return " ".join(
+        str(text)
+        for chunk in RrdReader(path).stream().filter(content=entity)
+        for column in chunk.to_record_batch().columns
+        for text in column.to_pylist()
+    )
 
 
 def test_a_recording_says_what_became_of_the_members(mixed, tmp_path):
     path = lw.log_rerun(mixed, tmp_path / "fleet.rrd")
-    words = [
-        text
-        for chunk in RrdReader(path).stream().filter(content="/run")
-        for column in chunk.to_record_batch().columns
-        for text in column.to_pylist()
-    ]
-    said = str(words)
-    for line in ("2 ok, 2 surface, 3 floor", "floor, 3 of 7 members (first: member 0 at 3 s)", "ok, 2 of 7 members"):
+    counts = ", ".join(f"{name} {number}" for name, number in mixed.status.counts().items())
+    assert f"| outcome | {counts} |" in text_of(path, "/run/summary")
+    said = text_of(path, "/log")
+    for line in ("floor, 3 of 7 members (first: member 0 at 3 s)", "ok, 2 of 7 members", "first: member 6 at 5 s"):
         assert line in said
 
 

@@ -1,4 +1,4 @@
-"""Closed loops beside the same scene without a controller, by processor time, in turn; a callback beside the fused loop."""
+"""Closed loops beside the same scene without a controller, by processor time, in turn; callbacks and metrics beside none."""
 
 import time
 
@@ -111,6 +111,28 @@ def callback(quick):
            "over_fused": round(times["callback"] / times["fused"], 3)}  # fmt: skip
 
 
+def metrics(quick):
+    """Whole runs that gather metrics at every look, ten steps a look, beside the same runs that gather nothing."""
+    members, t1 = (256, 5.0) if quick else (4096, 30.0)
+    fleet = lw.Ensemble(remus(10), members, 1, {"start.angular_velocity": lw.Normal(std=0.02)})
+    depth = [lw.Overshoot("depth"), lw.SettlingTime("depth", within=0.5)]
+    others = [lw.IAE("heading"), lw.Travel(), lw.SaturationShare()]
+    asked = {"none": [], "two of depth": depth, "five": depth + others}
+    times = dict.fromkeys(asked, np.inf)
+    for _ in range(2 if quick else 5):
+        for label, statistics in asked.items():
+            begun = time.process_time()
+            lw.solve(fleet, "psi_x", h=H, t1=t1, statistics=statistics, keep="none", threads=1)
+            times[label] = min(times[label], time.process_time() - begun)
+    for label in list(asked)[1:]:
+        yield {
+            "vehicle": "remus_100",
+            "metrics": label,
+            "members": members,
+            "over_none": round(times[label] / times["none"], 3),
+        }
+
+
 def run(quick):
     delay_and_faults = dict(
         delay=0.05,
@@ -129,3 +151,4 @@ def run(quick):
         yield from ratios("bluerov2_heavy", scenes, "psi_s", dtype, quick)
     yield from settled(quick)
     yield from callback(quick)
+    yield from metrics(quick)

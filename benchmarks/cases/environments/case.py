@@ -1,16 +1,18 @@
-"""Vehicles as environments of Gymnasium, and a law in Python, beside the law in the kernel and a loop over Python vehicles."""
+"""Vehicles as environments of Gymnasium, and a law in Python, beside the law in the kernel and environments of others."""
 
 import time
+from functools import partial
 
-import gymnasium
 import numpy as np
 
 import lgvi_warp as lw
+from benchmarks.cases.environments import others
+from benchmarks.cases.environments.others import EVERY, STEP
+from benchmarks.timing import least
 from lgvi_warp.engine.episodes import Episodes
 from lgvi_warp.runs.settle import make_plan
 
-# Ten steps a period, as in a training.
-STEP, EVERY, EPISODE = 0.01, 10, 20.0
+EPISODE = 20.0
 VARY = {"vehicle.buoyancy": lw.Uniform(low=297.0, high=302.0), "start.position[2]": lw.Uniform(low=5.0, high=15.0)}
 GAINS = dict(kp=1.0, kd=2.0)
 PLANES = lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])
@@ -33,16 +35,6 @@ def heading(t, y, r, members):
     demand = np.zeros((len(members), 6))
     demand[:, 5] = GAINS["kp"] * e + GAINS["kd"] * (r.angular_velocity[:, 2] - y.angular_velocity[:, 2])
     return demand
-
-
-def least(call, rounds):
-    """The least processor time of a call [s]."""
-    best = np.inf
-    for _ in range(rounds):
-        begun = time.process_time()
-        call()
-        best = min(best, time.process_time() - begun)
-    return best
 
 
 def environments(members, steps, rounds):
@@ -70,8 +62,7 @@ def environments(members, steps, rounds):
     lw.solve(whole, **begun)
     env.reset(seed=1)
     act()
-    times = [(least(act, 1), least(lambda: lw.solve(whole, **begun), 1)) for _ in range(rounds)]
-    taken, fused = np.min(times, axis=0)
+    taken, fused = least([act, lambda: lw.solve(whole, **begun)], rounds, clock=time.process_time)
     return {"environments": members, "steps_a_period": EVERY, "environment_steps_per_s": round(members * steps / taken),
             "to_a_run_of_the_same_loop": round(taken / fused, 2)}  # fmt: skip
 
@@ -93,7 +84,7 @@ def looks(members, steps, rounds):
             episodes.advance(values)
             episodes.look()
 
-    alone, both = np.min([(least(launch, 1), least(exchanged, 1)) for _ in range(rounds)], axis=0)
+    alone, both = least([launch, exchanged], rounds, clock=time.process_time)
     return {"members": members, "steps_a_period": EVERY, "part_of_the_exchange": round(1.0 - alone / both, 3)}
 
 
@@ -104,53 +95,19 @@ def exchange(members, every, steps, rounds):
     fleets = {name: lw.Ensemble(scene(DEPTH, law, every=every), members, 1, VARY) for name, law in laws.items()}
     for fleet in fleets.values():
         lw.solve(fleet, **settings)
-    times = [[least(lambda: lw.solve(fleet, **settings), 1) for fleet in fleets.values()] for _ in range(rounds)]  # noqa: B023
-    asked, fused = np.min(times, axis=0)
+    runs = [partial(lw.solve, fleet, **settings) for fleet in fleets.values()]
+    asked, fused = least(runs, rounds, clock=time.process_time)
     return {"members": members, "steps_a_period": every, "callback_to_fused": round(asked / fused, 2)}
-
-
-class Plain(gymnasium.Env):
-    """A vehicle that sinks and pitches, in Python: less than a tenth of the numbers of ours."""
-
-    action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,))
-    observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (4,))
-
-    def reset(self, *, seed=None, options=None):
-        super().reset(seed=seed)
-        self.state = [self.np_random.uniform(5.0, 15.0), 0.0, 0.0, 0.0]
-        return np.array(self.state, np.float32), {}
-
-    def step(self, action):
-        z, pitch, w, q = self.state
-        moment = float(action[0])
-        for _ in range(EVERY):
-            z += STEP * (w - 1.54 * pitch)
-            pitch += STEP * q
-            w -= STEP * (2.0 * w + 3.0 * abs(w) * w)
-            q += STEP * (moment - 2.0 * q - 3.0 * abs(q) * q - 0.5 * pitch)
-        self.state = [z, pitch, w, q]
-        return np.array(self.state, np.float32), -abs(z - 10.0), False, False, {}
-
-
-def python_vehicles(members, steps, rounds):
-    """Steps of Gymnasium's own vector environment."""
-    env = gymnasium.vector.SyncVectorEnv([Plain] * members)
-    env.reset(seed=1)
-    actions = np.zeros((members, 1), np.float32)
-
-    def act():
-        for _ in range(steps):
-            env.step(actions)
-
-    speed = members * steps / least(act, rounds)
-    return {"sync_vector_env_of_python_vehicles": members, "environment_steps_per_s": round(speed)}
 
 
 def run(quick):
     rounds, steps = (2, 5) if quick else (6, 100)
+    ours = 0.0
     for members in (256,) if quick else (1024, 4096):
-        yield environments(members, steps, rounds)
+        record = environments(members, steps, rounds)
+        ours = max(ours, record["environment_steps_per_s"])
+        yield record
         yield looks(members, steps, rounds)
     for members, every in ((256, EVERY),) if quick else ((256, EVERY), (1024, EVERY), (4096, EVERY), (4096, 1)):
         yield exchange(members, every, steps * EVERY if members > 1024 else steps * EVERY * 4, rounds)
-    yield python_vehicles(64, steps, 2)
+    yield from others.measure(quick, ours)

@@ -3,27 +3,15 @@
 Processor time, the least of all rounds: other work on the machine lengthens it least.
 """
 
-import time
-
 from benchmarks import problems
 from benchmarks.cases.ordinary_terms.kernel import command
+from benchmarks.timing import least
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.sampling.distributions.basic import Normal
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.studies import speed
 
 STEP = 0.01
-
-
-def least(calls, rounds):
-    """Least processor time of each call in turn [s]."""
-    best = [float("inf")] * len(calls)
-    for _ in range(rounds):
-        for i, call in enumerate(calls):
-            begun = time.thread_time()
-            call()
-            best[i] = min(best[i], time.thread_time() - begun)
-    return best
 
 
 def run(quick):

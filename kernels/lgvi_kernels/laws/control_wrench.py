@@ -9,6 +9,7 @@ from lgvi_kernels import device
 from lgvi_kernels.law import add, mul, row3  # noqa: F401
 from lgvi_kernels.laws.driven import make_driven
 
+CHANNELS = 6
 # Rows of one channel: force and torque of 1 N or 1 N m (6), limit, 1 / lag, limit of the rate.
 ROWS = 9
 
@@ -22,7 +23,7 @@ def made(features):
     @wp.func
     def actuator_law(w: Any, view: Any, p: Any):
         """The sum of the channels' wrenches."""
-        for i in range(p.count):
+        for i in range(wp.static(CHANNELS)):
             at = p.first + wp.static(ROWS) * i
             n = place(view, p, i)
             w.force = w.force + n * row3(view, at)

@@ -58,6 +58,11 @@ class Observation:
         """Whether the samples of all members are kept during the run."""
         return isinstance(self.keep, str) and self.keep == "all"
 
+    @property
+    def looks(self) -> bool:
+        """Whether some statistic takes the samples at all looks of a controller."""
+        return any(statistic.looks for statistic in self.statistics)
+
     def fields(self, asked: Sequence[str]) -> tuple[str, ...]:
         """The sample fields that the kernel must write: those to keep and those that statistics need.
 

@@ -28,6 +28,8 @@ class BlockKeeper(Protocol):
             samples: by field, (times, members of the block, ...).
         """
 
+    # One that has `look(when, samples)` as well receives with that the samples at all looks, before those to keep.
+
     def close(self, outcome: Outcome) -> Any:
         """Return the block's result, small and picklable.
 

@@ -166,12 +166,25 @@ class _BlockStatistics:
         self._plan, self._replicates, self._times = plan, run.replicates, len(run.time)
         # For statistics of members' ends: the quantity at the last sample.
         self._last: dict[Statistic, np.ndarray] = {}
-        self._open = [statistic.open(run.times_of(statistic), members.count) for statistic in run.statistics]
+        self._looking = plan.looks
+        times = {
+            statistic: plan.taken.times if statistic.looks else run.times_of(statistic) for statistic in run.statistics
+        }
+        self._open = [statistic.open(times[statistic], members.count) for statistic in run.statistics]
 
     def take(self, when: slice, samples: Fields) -> None:
         """Pass to each statistic the values of its quantity; statistics of the same quantity share them."""
+        self._pass(when, samples, looks=not self._looking)
+
+    def look(self, when: slice, samples: Fields) -> None:
+        """Pass the values at all looks to the statistics that want them."""
+        self._pass(when, samples, looks=True, others=False)
+
+    def _pass(self, when: slice, samples: Fields, looks: bool, others: bool = True) -> None:
         values: dict[Any, Values] = {}
         for statistic, gathers in zip(self._statistics, self._open, strict=True):
+            if not (looks if statistic.looks else others):
+                continue
             if statistic.at_end:
                 if when.stop == self._times and not statistic.of_ends:
                     self._last[statistic] = statistic.quantity(samples.last(), self._members)

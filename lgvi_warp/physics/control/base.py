@@ -42,7 +42,7 @@ class Bus(NamedTuple):
         rows: Number of rows.
         delayed: Whether the commands of some member are delayed.
         period: Time between two looks [s].
-        answer: First of the rows into which a `Callback` writes; as many as it returns numbers.
+        answer: First of the rows into which a `Callback` writes, as many as it returns numbers, or which laws share.
     """
 
     commands: Mapping[str, tuple[int, int]]
@@ -66,7 +66,7 @@ class Bus(NamedTuple):
         Args:
             channels: Number of commands of each, by the key of its term.
             period: Time between two looks [s]; 1 by default.
-            answers: Numbers that a function of the host writes at each look; 0 by default, for none.
+            answers: Numbers that a function of the host writes at each look, or laws share; 0 by default, for none.
 
         Returns:
             Rows for all of them.
@@ -206,6 +206,8 @@ class ControlLaw(Part):
     section: ClassVar[str] = "laws"
     kinds: ClassVar[dict[str, Any]] = {}
     demands: ClassVar[tuple[str, ...]] = ()
+    # Rows of the memory, from `Bus.answer` on, by which laws hand numbers on within a look.
+    shared_rows: ClassVar[int] = 0
     # Numbers of the vehicle by name, as the scene has them, whatever a member's are; set for a law of a scene.
     nominal: ClassVar[Numbers] = {}
 

@@ -155,7 +155,8 @@ class Controller:
         channels = {key: term.channels for key, term in actuators.items()}
         callback = self.callback
         answers = 0 if callback is None else channels[callback.to] if callback.to else 6
-        controller = wired.on(Bus.of(channels, self.period, answers))
+        shared = max(law.shared_rows for law in self.laws)
+        controller = wired.on(Bus.of(channels, self.period, max(answers, shared)))
         for part in controller.allocation:
             part.check_actuator(faults)
         faults.raise_if_any()

@@ -33,6 +33,7 @@ from lgvi_warp.runs.store.layout import StoreArray
 from lgvi_warp.runs.store.layout_check import understood
 from lgvi_warp.runs.store.recipe import ensemble_of, plan_of
 from lgvi_warp.runs.store.settings import needed
+from lgvi_warp.statistics import TYPES
 
 if TYPE_CHECKING:
     from lgvi_warp.engine.plan import Plan
@@ -181,7 +182,9 @@ class Folder:
             if ensemble is None:
                 noise, content = explicit.pop("indices", None), self.provenance
                 ensemble = ensemble_of(content["scene"], content["ensemble"], explicit, noise, self.path)
-            return plan_of(self.recipe, ensemble, steps, times)
+            gathered = (self.provenance.get("observed") or {}).get("statistics", ())
+            looks = any(TYPES[table["type"]].looks for table in gathered if table.get("type") in TYPES)
+            return plan_of(self.recipe, ensemble, steps, times, looks)
 
     def damage(self) -> list[str]:
         """List what is wrong with the files that belong to no block."""

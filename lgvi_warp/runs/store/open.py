@@ -38,14 +38,14 @@ class Arrays(Mapping[str, np.ndarray]):
         group: zarr group of the store.
         names: Names of the arrays.
         axis: Axis of the members.
-        members: Slice or indices of the members to read; None: all.
+        members: Slice with start, stop and step, or indices, of the members to read.
         whole: Further arrays by name, which are in memory.
     """
 
     group: Any
     names: tuple[str, ...]
     axis: int
-    members: Any = None
+    members: Any
     whole: Mapping[str, np.ndarray] | None = None
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -53,10 +53,26 @@ class Arrays(Mapping[str, np.ndarray]):
             return self.whole[name]
         if name not in self.names:
             raise KeyError(name)
-        chosen = slice(None) if self.members is None else self.members
-        at = (*(slice(None),) * self.axis, chosen)
+        at = (*(slice(None),) * self.axis, self.members)
         array = self.group[name]
-        return np.asarray(array[at] if isinstance(chosen, slice) else array.oindex[at])
+        return np.asarray(array[at] if isinstance(self.members, slice) else array.oindex[at])
+
+    def part(self, places: slice | np.ndarray) -> Arrays:
+        """Select members of those that these arrays read.
+
+        Args:
+            places: Slice or indices among them.
+
+        Returns:
+            Arrays of these members alone.
+        """
+        if not isinstance(self.members, slice):
+            return replace(self, members=self.members[places])
+        of_slice = range(self.members.start, self.members.stop, self.members.step)
+        if not isinstance(places, slice):
+            return replace(self, members=np.asarray(of_slice)[places])
+        chosen_range = of_slice[places]
+        return replace(self, members=slice(chosen_range.start, chosen_range.stop, chosen_range.step))
 
     def dataset(self, path: Path) -> xarray.Dataset:
         """Open the whole store as an xarray Dataset.

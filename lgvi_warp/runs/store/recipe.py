@@ -45,7 +45,9 @@ def recipe(plan: Plan) -> dict[str, Any]:
     }
 
 
-def plan_of(made: Mapping[str, Any], ensemble: Ensemble, sample_steps: np.ndarray, times: np.ndarray) -> Plan:
+def plan_of(
+    made: Mapping[str, Any], ensemble: Ensemble, sample_steps: np.ndarray, times: np.ndarray, looks: bool = False
+) -> Plan:
     """Build the plan of a recipe.
 
     Args:
@@ -53,6 +55,7 @@ def plan_of(made: Mapping[str, Any], ensemble: Ensemble, sample_steps: np.ndarra
         ensemble: The members.
         sample_steps: Number of steps made until each sample, shape (k,).
         times: Times of the samples [s], shape (k,).
+        looks: As of `Plan`; default False.
 
     Returns:
         The plan.
@@ -64,8 +67,8 @@ def plan_of(made: Mapping[str, Any], ensemble: Ensemble, sample_steps: np.ndarra
 
     grid = TimeGrid(made["step"], sample_steps, times, tuple(made["messages"]))
     method, fields = Method(**made["method"]), tuple(made["fields"])
-    settings = (made[name] for name in ("dtype", "width", "checks", "on_failure"))
-    return Plan(ensemble, method, grid, fields, *settings)
+    settings = {name: made[name] for name in ("dtype", "width", "checks", "on_failure")}
+    return Plan(ensemble, method, grid, fields, **settings, looks=looks)
 
 
 # Key in the stored provenance of an ensemble: SHA-256 of the arrays that it was given, which lie in the group "explicit".
@@ -197,8 +200,9 @@ def same_run(
 
 
 def _comparable(provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """Provenance without what changes no bit: threads, Python's version, the scene's [ensemble] and [run], a file's place."""
+    """Provenance without what changes no bit: threads, Python, the scene's [ensemble], [run] and shape, a file's place."""
     scene = {key: value for key, value in provenance["scene"].items() if key not in ("ensemble", "run")}
+    scene["vehicle"] = {key: value for key, value in scene["vehicle"].items() if key != "shape"}
     machine = {key: value for key, value in provenance["machine"].items() if key in ("cpu", "simd")}
     versions = {key: value for key, value in provenance["versions"].items() if key != "python"}
     ensemble = _without_place(provenance["ensemble"])

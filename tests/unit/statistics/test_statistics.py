@@ -747,12 +747,13 @@ OF_EVERY_KIND = {
     "path_range": lambda x: lw.PathRange(x),
     "path_mean": lambda x: lw.PathMean(x, [lw.Mean(), lw.Quantiles(size=64)]),
     "path_rms": lambda x: lw.PathRms(x),
+    "each": lambda x: lw.Each(x),
     "path_time": lambda x: lw.PathTime(x, above=(999.0, -1.0, -6.0), below=(1001.0, 1.0, -4.0)),
 }
 
 
-# Those of ends have no samples: tests/unit/statistics/test_outcomes.py.
-@pytest.mark.parametrize("kind", [name for name, one in TYPES.items() if not one.of_ends])
+# Those of ends have no samples: tests/unit/statistics/test_outcomes.py. Those of looks: test_metrics.py.
+@pytest.mark.parametrize("kind", [name for name, one in TYPES.items() if not (one.of_ends or one.looks)])
 def test_blocks_in_any_order_give_the_same_bits(kind, values):
     x, good = values
     x = {
@@ -792,7 +793,7 @@ def check_as_files_hold_it(found):
 
 
 @pytest.mark.parametrize("replicates", [1, 4])
-@pytest.mark.parametrize("kind", [name for name, one in TYPES.items() if not one.of_ends])
+@pytest.mark.parametrize("kind", [name for name, one in TYPES.items() if not (one.of_ends or one.looks)])
 def test_every_kind_is_the_same_from_a_file(kind, replicates, values):
     x, good = (array[:, :400] for array in values)
     x = {"first_passage": x[..., :1], "mean_attitude": rotations(0.1 * x).reshape(4, 400, 9)}.get(kind, x)

@@ -1,0 +1,41 @@
+"""A factor on the demand of the laws between two places of a controller's list: how margins are measured."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels import device
+from lgvi_kernels.law import add, lane, mul, remember, remembered, struct, sub, vec3  # noqa: F401
+
+
+@functools.cache
+def made(features):
+    """The code of the first place, "begin", which notes the demand so far, or of the second, "end"."""
+    ends = "end" in features
+
+    def params(width, real):
+        """Params: the factor; first of six rows of the memory that both share."""
+        return struct("LoopGain", **({"factor": lane(width, real)} if ends else {}), demand=wp.int32)
+
+    @wp.func
+    def begin(w: Any, r: Any, y: Any, p: Any):
+        at = p.demand
+        remember(y, at, w.force.x)
+        remember(y, at + 1, w.force.y)
+        remember(y, at + 2, w.force.z)
+        remember(y, at + 3, w.torque.x)
+        remember(y, at + 4, w.torque.y)
+        remember(y, at + 5, w.torque.z)
+        return w
+
+    @wp.func
+    def end(w: Any, r: Any, y: Any, p: Any):
+        at = p.demand
+        force = vec3(remembered(y, at), remembered(y, at + 1), remembered(y, at + 2))
+        torque = vec3(remembered(y, at + 3), remembered(y, at + 4), remembered(y, at + 5))
+        w.force = force + p.factor * (w.force - force)
+        w.torque = torque + p.factor * (w.torque - torque)
+        return w
+
+    return device(__name__, features, params=params, control=end if ends else begin)

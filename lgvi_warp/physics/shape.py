@@ -1,0 +1,77 @@
+"""The vehicle's outer shape: how it is drawn. No force depends on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+from lgvi_warp.common.errors import Faults, SceneError
+
+REMEDY = 'give length and diameter [m], or mesh = "hull.glb"'
+
+
+@dataclass(frozen=True)
+class Shape:
+    """How a vehicle is drawn: a hull of revolution along the body's x axis, or a mesh. It is no part of the dynamics.
+
+    Args:
+        length: Length of the hull [m].
+        diameter: Largest diameter of the hull [m].
+        mesh: In place of these, path of a binary glTF file (.glb) in body axes (x ahead, y to starboard, z down) [m]. In a
+            scene file it is relative to the file's folder, and must lie within it.
+
+    Raises:
+        SceneError: Where neither or both are given, or a number is not positive. The message lists every fault.
+    """
+
+    length: float | None = None
+    diameter: float | None = None
+    mesh: str | None = None
+
+    def __post_init__(self) -> None:
+        faults = Faults("vehicle.shape.")
+        sizes = {"length": self.length, "diameter": self.diameter}
+        if self.mesh is None:
+            for name, size in sizes.items():
+                if size is None:
+                    faults.add(name, size, "is missing", REMEDY)
+                else:
+                    object.__setattr__(self, name, faults.positive(name, size, "m"))
+        elif not isinstance(self.mesh, str) or not self.mesh.lower().endswith(".glb"):
+            faults.add(
+                "mesh", self.mesh, "is no name of a .glb file", "give a binary glTF file, or length and diameter"
+            )
+        elif any(size is not None for size in sizes.values()):
+            faults.add("mesh", self.mesh, "stands beside a length or a diameter", REMEDY)
+        faults.raise_if_any()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the table [vehicle.shape] of a scene file.
+
+        Returns:
+            What is given, by name.
+        """
+        return {key: value for key, value in vars(self).items() if value is not None}
+
+
+def shape_from(value: Any) -> Shape | None:
+    """Read the shape of a vehicle.
+
+    Args:
+        value: A table as in a scene file, a Shape, or None for none.
+
+    Returns:
+        The shape.
+
+    Raises:
+        SceneError: The table is at fault. The message lists every fault.
+    """
+    if value is None or isinstance(value, Shape):
+        return value
+    if not isinstance(value, Mapping):
+        raise SceneError([f"vehicle.shape = {value!r}: is no table; {REMEDY}"])
+    faults = Faults()
+    faults.keys("vehicle.shape", value, [field.name for field in fields(Shape)])
+    faults.raise_if_any()
+    return Shape(**value)

@@ -1,0 +1,1 @@
+"""Steady motions, linear models of a period, and how far a loop is from the edge."""

@@ -1,0 +1,300 @@
+"""Members in any motion and with any memory, some steps later: what linear models and margins stand on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import refusal
+from lgvi_warp.engine.packets import Packets
+from lgvi_warp.engine.work import unpacked
+from lgvi_warp.methods.method import Method
+from lgvi_warp.methods.saveat import SaveAt
+from lgvi_warp.physics import notation
+from lgvi_warp.physics.control.controller import Controller
+from lgvi_warp.physics.control.matrix import AllocationMatrix
+from lgvi_warp.physics.control.set_point import SetPoint
+from lgvi_warp.physics.control.state_feedback import StateFeedback
+from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.physics.terms.events import StopTime
+from lgvi_warp.physics.terms.noisy import NoisyTerm
+from lgvi_warp.physics.terms.waves import Waves
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+
+# A time that no run reaches [s].
+NEVER = 1e9
+# Members that run together: their packets take some 100 MB.
+AT_ONCE = 16_384
+# Names of the motion's twelve coordinates about a given one.
+COORDINATES = tuple(
+    f"{name}[{i}]" for name in ("position", "rotation", "velocity", "angular_velocity") for i in range(3)
+)
+
+Watch = Callable[[int, Mapping[str, np.ndarray]], None]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Motions of m members, and what they remember.
+
+    Args:
+        position: (m, 3) [m], inertial axes.
+        attitude: (m, 3, 3), body to inertial axes.
+        velocity: (m, 3) [m/s], body axes.
+        angular_velocity: (m, 3) [rad/s], body axes.
+        memory: by key of a term or a part, (m, rows); under "" that of the controller's bus.
+    """
+
+    position: np.ndarray
+    attitude: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+    memory: Mapping[str, np.ndarray]
+
+    @property
+    def count(self) -> int:
+        """The number of members, m."""
+        return len(self.position)
+
+    def of(self, places: np.ndarray) -> Motion:
+        """Some of them.
+
+        Args:
+            places: (k,), which.
+
+        Returns:
+            k motions.
+        """
+        memory = {key: rows[places] for key, rows in self.memory.items()}
+        states: Any = {name: getattr(self, name)[places] for name in FIELDS}
+        return Motion(**states, memory=memory)
+
+    def moved(self, by: np.ndarray) -> Motion:
+        """The motions a little beside these.
+
+        Args:
+            by: (m, 12): position [m], inertial axes; rotation vector [rad], body axes; velocity and angular velocity.
+
+        Returns:
+            m motions with the same memory.
+        """
+        place, turn, velocity, rate = np.split(by, 4, axis=1)
+        attitude = self.attitude @ notation.matrix_from_rotation_vector(turn)
+        return replace(
+            self, position=self.position + place, attitude=attitude, velocity=self.velocity + velocity,
+            angular_velocity=self.angular_velocity + rate)  # fmt: skip
+
+    def apart(self, other: Motion) -> np.ndarray:
+        """How far these are beside others, in the coordinates of `moved`.
+
+        Args:
+            other: m motions, whose attitudes differ by less than a quarter turn.
+
+        Returns:
+            (m, 12).
+        """
+        R = np.swapaxes(other.attitude, 1, 2) @ self.attitude
+        skew = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
+        sine = np.linalg.norm(skew, axis=1, keepdims=True)
+        turn = skew * np.where(sine > 0.0, np.arcsin(np.minimum(sine, 1.0)) / np.where(sine > 0.0, sine, 1.0), 1.0)
+        straight = ("position", "velocity", "angular_velocity")
+        place, velocity, rate = (getattr(self, name) - getattr(other, name) for name in straight)
+        return np.concatenate([place, turn, velocity, rate], axis=1)
+
+
+class Bench:
+    """A plan whose members start from any motion, with any memory, after any step but the first.
+
+    Its kernel has no merged lead: what lies in its state between two launches is the motion itself.
+
+    Args:
+        fleet: the members.
+        method: as of `lw.solve`.
+        h: step [s]; None for the scene's.
+        t1: the longest run [s].
+        spacing: time between two samples [s].
+        fields: names of the samples.
+
+    Attributes:
+        fleet: the members.
+        plan: the plan.
+        every: steps between two looks; 1 without a controller.
+
+    Raises:
+        SceneError: where the plan cannot be made, or a law is a Python function.
+    """
+
+    def __init__(
+        self,
+        fleet: Ensemble,
+        method: str | Method | None,
+        h: float | None,
+        t1: float,
+        spacing: float,
+        fields: Sequence[str] = FIELDS,
+    ):
+        settings = dict(method=method, h=h, t1=t1, save=SaveAt(every=spacing, fields=tuple(fields)), dtype="float64")
+        plan = make_plan(fleet, **settings)  # type: ignore[arg-type]
+        if plan.asks:
+            key = plan.kernel_choice.controller.callback.key  # type: ignore[union-attr]
+            raise refusal("laws", key, "is a Python function, of which no lane knows", "give a law with device code")
+        if plan.kernel_choice.lead is not None:
+            scene: Any = fleet.scene
+            # Kernels that look for events have no lead, and else the same method.
+            fleet = fleet.in_scene(replace(scene, events=[StopTime(at=NEVER)]))
+            plan = make_plan(fleet, **{**settings, "method": plan.method})  # type: ignore[arg-type]
+        plan.compile()
+        self.fleet, self.plan = fleet, plan
+        controller = plan.kernel_choice.controller
+        self.bus = controller.bus if controller else None
+        self.every = controller.every(plan.grid.h) if controller else 1
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Keys of the terms and the parts that act, in the order of their rows."""
+        choice = self.plan.kernel_choice
+        return tuple(term.key for term, _ in (*choice.laws, *choice.parts_of_control))
+
+    def start(self, places: np.ndarray, numbers: Mapping[str, np.ndarray] | None = None) -> Motion:
+        """The motions of members at t = 0, and what they remember before the first look.
+
+        Args:
+            places: (m,), which members.
+            numbers: Values (m, ...) by name that replace those of the members; None for none (default).
+
+        Returns:
+            m motions.
+        """
+        packets = self._filled(places, None, numbers or {})
+        start = packets.members
+        motion: Any = {name: getattr(start, name) for name in FIELDS}
+        memory = self._memory(packets)
+        packets.leave()
+        return Motion(**motion, memory=memory)
+
+    def run(
+        self,
+        places: np.ndarray,
+        motion: Motion | None,
+        k0: int,
+        k1: int,
+        numbers: Mapping[str, np.ndarray] | None = None,
+        watch: Watch | None = None,
+    ) -> Motion:
+        """Make the steps from k0 to k1.
+
+        Args:
+            places: (m,), which members.
+            motion: their motions after the look at step k0; None for their own at t = 0, with k0 = 0.
+            k0: number of steps made before; above 0 with a motion.
+            k1: number of steps made after.
+            numbers: Values (m, ...) by name that replace those of the members; None for none (default).
+            watch: called with the step of each sample and the sample; None for nobody (default).
+
+        Returns:
+            The motions after k1 steps, and what is remembered after a look at them. Where a member failed it is NaN.
+        """
+        plan, m = self.plan, len(places)
+        packets = self._filled(places, motion, numbers or {})
+        values: Mapping[str, np.ndarray] = {}
+        # Samples are due at each look: as many at once as take some 10 MB.
+        most = max(1, AT_ONCE // m) * 16 * self.every
+        for first in range(k0, k1, most):
+            stop = min(first + most, k1)
+            raw = packets.advance(first, stop)[:, :m]
+            values = unpacked(plan.sample_fields, raw, packets.frame, plan.table)
+            if watch:
+                watch(plan.due(first, stop)[0], values)
+        failed = packets.ended()[0] != 0
+        last = {name: values[name][-1] for name in FIELDS}
+        states: Any = {name: np.where(failed.reshape(-1, *(1,) * (v.ndim - 1)), np.nan, v) for name, v in last.items()}
+        memory = self._memory(packets)
+        packets.leave()
+        return Motion(**states, memory=memory)
+
+    def _filled(self, places: np.ndarray, motion: Motion | None, numbers: Mapping[str, np.ndarray]) -> Packets:
+        """Packets of members in these motions."""
+        subset, m = self.fleet.subset(places), len(places)
+        members = subset.select(0, m)
+        members = replace(members, parameters={**members.parameters, **numbers})
+        if motion is not None:
+            members = replace(members, **{name: getattr(motion, name) for name in FIELDS})
+        subset.check_block(0, m, members.parameters)
+        packets = Packets.of(self.plan, members)
+        if motion is not None:
+            self._remember(packets, motion.memory)
+        return packets
+
+    def _rows(self, packets: Packets) -> dict[str, slice]:
+        """Rows of the memory by key, as of `Motion`."""
+        each = zip(self.keys, packets.laws.remembered, strict=True)
+        rows = {key: rows for key, rows in each if rows.stop > rows.start}
+        return rows | ({"": slice(0, self.bus.rows)} if self.bus else {})
+
+    def _memory(self, packets: Packets) -> dict[str, np.ndarray]:
+        """What the members remember."""
+        view, m = packets.laws.memory.view, packets.members.count
+        return {
+            key: view[:, rows].transpose(0, 2, 1).reshape(-1, rows.stop - rows.start)[:m].copy()
+            for key, rows in self._rows(packets).items()
+        }
+
+    def _remember(self, packets: Packets, memory: Mapping[str, np.ndarray]) -> None:
+        view = packets.laws.memory.view
+        for key, rows in self._rows(packets).items():
+            values = memory[key]
+            padded = np.concatenate([values, np.repeat(values[-1:], len(view) * view.shape[2] - len(values), axis=0)])
+            view[:, rows] = padded.reshape(len(view), view.shape[2], -1).transpose(0, 2, 1)
+
+
+def calm(scene: Any, what: str) -> None:
+    """Refuse a scene in which something acts by chance or in waves: no motion of it is steady.
+
+    Args:
+        scene: the scene.
+        what: what is asked for.
+
+    Raises:
+        SceneError: where a term is noise or waves.
+    """
+    for term in scene.terms:
+        if isinstance(term, NoisyTerm | Waves):
+            raise refusal(
+                "terms", term.key, f"lets no motion be steady, as {what} need it", "leave it out of this scene"
+            )
+
+
+def plant(scene: Scene, period: float, extra: Sequence[Any] = ()) -> Scene:
+    """A scene whose actuators hold what they are commanded: no law acts on them.
+
+    Args:
+        scene: the scene; its controller is left out.
+        period: time between two commands [s].
+        extra: actuators beside those of the scene; none by default.
+
+    Returns:
+        The scene; without actuators it has no controller.
+    """
+    terms = [*scene.terms, *extra]
+    able = [term for term in terms if term.channels and not term.own_commands]
+    if not able:
+        return replace(scene, controller=None, terms=terms)
+    names = {term.key for term in (*terms, *scene.events)}
+
+    def free(name: str) -> str:
+        while name in names:
+            name += "_"
+        names.add(name)
+        return name
+
+    # Commands are rows of the memory, which a bench writes; laws speak after the last step.
+    allocation = [AllocationMatrix(to=t.key, matrix=np.eye(t.channels, 6), name=free("allocation")) for t in able]
+    guidance = [SetPoint(position=np.zeros(3), heading=0.0, name=free("set_point"))]
+    law = StateFeedback(K=np.zeros((6, 12)), name=free("state_feedback"))
+    controller = Controller(period=period, guidance=guidance, laws=[law], allocation=allocation)
+    return replace(scene, controller=controller, terms=terms)

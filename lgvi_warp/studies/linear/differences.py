@@ -1,0 +1,112 @@
+"""Central differences of some steps of many members, in lanes: every number that is moved has two copies of a member."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lgvi_warp.studies.linear.bench import AT_ONCE, COORDINATES, Bench, Motion
+
+# Half a difference, of numbers of size 1: what is cut off and round-off are then alike, 1e-10.
+STEP = 1e-5
+
+
+@dataclass(frozen=True)
+class Row:
+    """A number that is remembered.
+
+    Args:
+        key: of whose memory it is, as of `Motion`.
+        row: which of its rows.
+        name: its name among the states.
+    """
+
+    key: str
+    row: int
+    name: str
+
+
+def names_of(rows: Sequence[Row]) -> tuple[str, ...]:
+    """Names of the states: the motion, then what is remembered.
+
+    Args:
+        rows: what is remembered.
+
+    Returns:
+        12 + len(rows) names.
+    """
+    return (*COORDINATES, *(row.name for row in rows))
+
+
+def differences(
+    bench: Bench,
+    places: np.ndarray,
+    about: Motion,
+    k0: int,
+    steps: int,
+    moved: Sequence[Row],
+    seen: Sequence[Row] = (),
+    *,
+    motion: bool = True,
+    numbers: Mapping[str, np.ndarray] | None = None,
+    step: float = STEP,
+) -> np.ndarray:
+    """Derivatives of the motion and the memory after some steps, by those before.
+
+    Args:
+        bench: what makes the steps.
+        places: (n,), which members.
+        about: their n motions.
+        k0: number of steps made before, above 0.
+        steps: number of steps.
+        moved: rows of the memory by which it is derived.
+        seen: rows that are derived; none by default. Both may be the same.
+        motion: whether it is derived by the motion too (default True).
+        numbers: values (n, ...) by name that replace those of the members; None for none (default).
+        step: half a difference of numbers up to 1, and its ratio to larger ones (default 1e-5).
+
+    Returns:
+        (n, 12 + seen, 12 + moved), or (n, 12 + seen, moved) without the motion. NaN where a copy of a member failed.
+    """
+    count = 12 * motion + len(moved)
+    parts = []
+    most = max(1, AT_ONCE // (2 * max(count, 1)))
+    for first in range(0, len(places), most):
+        some = np.arange(first, min(first + most, len(places)))
+        own = {name: values[some] for name, values in (numbers or {}).items()}
+        parts.append(_differences(bench, places[some], about.of(some), k0, steps, moved, seen, motion, own, step))
+    return np.concatenate(parts)
+
+
+def _differences(
+    bench: Bench, places: np.ndarray, about: Motion, k0: int, steps: int, moved: Sequence[Row], seen: Sequence[Row],
+    motion: bool, numbers: Mapping[str, np.ndarray], step: float) -> np.ndarray:  # fmt: skip
+    n, head = len(places), 12 * motion
+    count = head + len(moved)
+    if count == 0:
+        return np.zeros((n, 12 + len(seen), 0))
+    ones = np.ones((n, 3))
+    size = np.concatenate([about.position, ones, about.velocity, about.angular_velocity], axis=1)[:, :head]
+    remembered = [about.memory[row.key][:, row.row, None] for row in moved]
+    delta = step * np.maximum(1.0, np.abs(np.concatenate([size, *remembered], axis=1)))
+    # (n, number, sign): the copies of a member side by side.
+    each = np.repeat(np.arange(n), 2 * count)
+    each_by = np.zeros((n, count, 2, count))
+    diagonal = np.arange(count)
+    each_by[:, diagonal, 0, diagonal], each_by[:, diagonal, 1, diagonal] = delta, -delta
+    by = each_by.reshape(-1, count)
+    copies = about.of(each)
+    memory = {key: rows.copy() for key, rows in copies.memory.items()}
+    for j, row in enumerate(moved):
+        memory[row.key][:, row.row] += by[:, head + j]
+    copies = Motion(copies.position, copies.attitude, copies.velocity, copies.angular_velocity, memory)
+    if motion:
+        copies = copies.moved(by[:, :12])
+    after = bench.run(places[each], copies, k0, k0 + steps, {name: v[each] for name, v in numbers.items()})
+    plus, minus = after.of(np.arange(0, len(each), 2)), after.of(np.arange(1, len(each), 2))
+    changed = [plus.apart(minus)]
+    changed += [(plus.memory[row.key] - minus.memory[row.key])[:, row.row, None] for row in seen]
+    derived = np.concatenate(changed, axis=1).reshape(n, count, -1) / (2.0 * delta[:, :, None])
+    return np.swapaxes(derived, 1, 2)

@@ -1,0 +1,75 @@
+"""Where members pass from one answer to the other: all brackets are divided at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+# Values of members (m,) and which members (m,) -> whether each holds.
+Holds = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+def edges(
+    holds: Holds, start: np.ndarray, last: np.ndarray, guess: np.ndarray, narrow: float, whole: bool = False
+) -> np.ndarray:
+    """Find, for each member, where an answer that holds at the start ceases to.
+
+    Brackets grow from the guess by steps that double, and are then halved: both in the distance from the start for whole
+    numbers, in the logarithm else.
+
+    Args:
+        holds: asks members at values.
+        start: (n,), where it holds; NaN for members that are not asked.
+        last: (n,), the farthest values asked, above or below the start.
+        guess: (n,), where the edge may be; NaN or infinite where nobody knows.
+        narrow: width of the brackets at the end: of the logarithm, or in whole numbers.
+        whole: whether values are whole numbers (default False).
+
+    Returns:
+        (n, 2): the value nearest to the edge where it holds, and where it does not; infinite or 0 (as `last` is above or
+        below) where it holds at the last one.
+    """
+    forward, backward = (lambda v: v, lambda v: v) if whole else (np.log, np.exp)
+    n, least = len(start), 1.0 if whole else narrow
+    with np.errstate(invalid="ignore", divide="ignore"):
+        begin = forward(np.asarray(start, float))
+        far, near = np.abs(forward(np.asarray(last, float)) - begin), np.abs(forward(guess) - begin)
+    up = np.where(np.asarray(last) >= np.asarray(start), 1.0, -1.0)
+    good, bad = np.zeros(n), np.full(n, np.inf)
+    asked = np.flatnonzero(np.isfinite(begin))
+    known = np.isfinite(near) & (near < far)
+
+    def ask(members: np.ndarray, distance: np.ndarray) -> None:
+        if not len(members):
+            return
+        well = holds(backward(begin[members] + up[members] * distance), members)
+        good[members] = np.where(well, np.maximum(good[members], distance), good[members])
+        bad[members] = np.where(well, bad[members], np.minimum(bad[members], distance))
+
+    def rounded(values: np.ndarray) -> np.ndarray:
+        return np.round(values) if whole else values
+
+    width = np.where(known, np.maximum(0.02 * near, least), np.where(whole, 1.0, 0.2))
+    centre = np.where(known, near, 0.0)
+    while True:
+        # Those whose bracket is open above, then those whose guess lay beyond the edge.
+        above = asked[np.isinf(bad[asked]) & (good[asked] < far[asked])]
+        if not len(above):
+            break
+        ask(above, rounded(np.minimum(np.maximum(centre, good)[above] + width[above], far[above])))
+        width[above] *= 2.0
+    width = np.maximum(0.02 * near, least)
+    while True:
+        below = asked[known[asked] & (good[asked] == 0.0) & (bad[asked] < np.inf) & (bad[asked] - width[asked] > 0.0)]
+        if not len(below):
+            break
+        ask(below, rounded(bad[below] - width[below]))
+        width[below] *= 2.0
+    while True:
+        open_ = asked[(bad[asked] < np.inf) & (bad[asked] - good[asked] > narrow * (1.0 + 1e-9))]
+        if not len(open_):
+            break
+        ask(open_, rounded(0.5 * (good + bad)[open_]))
+    with np.errstate(invalid="ignore"):
+        return np.stack([backward(begin + up * good), backward(begin + up * bad)], axis=1)

@@ -1,0 +1,347 @@
+"""`linearize`: the linear model of a period about a motion, with hold, lag and method as they are in the run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, MissingExtra, refusal
+from lgvi_warp.methods.method import Method
+from lgvi_warp.physics.control.sensor import Sensor
+from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.physics.terms.control_wrench import COMPONENTS, ControlWrench
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.studies.linear.bench import COORDINATES, Bench, Motion, calm, plant
+from lgvi_warp.studies.linear.differences import STEP, Row, differences, names_of
+from lgvi_warp.studies.linear.trim import Trim, step_of
+from lgvi_warp.studies.members import scene_of
+
+INPUTS = ("commands", "wrench")
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """x' = A x + B u after a period, y = C x + D u: deviations from a motion.
+
+    The first twelve states are position [m] in inertial axes, rotation vector [rad] about the body's axes, velocity [m/s] and
+    angular velocity [rad/s] in body axes; they are the outputs. What actuators and parts of a controller remember follows.
+
+    Attributes:
+        A: (n, n).
+        B: (n, m).
+        C: (12, n).
+        D: (12, m).
+        dt: the period [s].
+        states: names of the states (n,), such as "velocity[0]", "control_fins.place[1]", "heading_pid.memory[0]".
+        inputs: names of the inputs (m,), such as "control_fins[0]", or "X" to "N" of a wrench.
+        about: the motion: position, attitude, velocity and angular_velocity by name, after which the period begins.
+    """
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+    dt: float
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    about: Mapping[str, np.ndarray]
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs (12,)."""
+        return COORDINATES
+
+    @property
+    def poles(self) -> np.ndarray:
+        """Eigenvalues of A (n,), the largest first."""
+        values = np.linalg.eigvals(self.A)
+        return np.asarray(values[np.argsort(-np.abs(values))])
+
+    def part(self, states: Sequence[str], inputs: Sequence[str] | None = None) -> LinearModel:
+        """The model of some states by themselves, as if the others did not move.
+
+        Args:
+            states: names of the states to keep; a whole name, such as "velocity", keeps all of its entries.
+            inputs: names of the inputs to keep; None, the default, for all.
+
+        Returns:
+            The smaller model.
+
+        Raises:
+            SceneError: If a name is unknown.
+        """
+        faults = Faults()
+        keep = _chosen(faults, "states", states, self.states)
+        push = _chosen(faults, "inputs", self.inputs if inputs is None else inputs, self.inputs)
+        faults.raise_if_any()
+        return replace(
+            self, A=self.A[np.ix_(keep, keep)], B=self.B[np.ix_(keep, push)], C=self.C[:, keep], D=self.D[:, push],
+            states=tuple(self.states[i] for i in keep), inputs=tuple(self.inputs[i] for i in push))  # fmt: skip
+
+    def state_space(self) -> Any:
+        """The model for python-control, the extra `control`: its margins, its plots, its designs.
+
+        Returns:
+            A control.StateSpace with these names, dots in them as underscores.
+
+        Raises:
+            MissingExtra: If python-control is not installed.
+        """
+        try:
+            import control
+        except ImportError as error:
+            raise MissingExtra("state spaces", "control", "control") from error
+        names = {
+            kind: [name.replace(".", "_") for name in getattr(self, kind)] for kind in ("states", "inputs", "outputs")
+        }
+        return control.StateSpace(self.A, self.B, self.C, self.D, self.dt, **names)
+
+
+def _chosen(faults: Faults, key: str, wanted: Sequence[str], known: tuple[str, ...]) -> list[int]:
+    """Places of names, those of whole vectors too."""
+    places: list[int] = []
+    for name in wanted:
+        found = [i for i, each in enumerate(known) if each == name or each.startswith(f"{name}[")]
+        if not found:
+            faults.keys(key, [name], known)
+        places += found
+    return places
+
+
+def linearize(
+    scene: Scene,
+    about: Trim | float | None = None,
+    *,
+    inputs: str = "commands",
+    closed: bool = False,
+    period: float | None = None,
+    method: str | Method | None = None,
+    h: float | None = None,
+    step: float = STEP,
+) -> LinearModel:
+    """The linear model of one period: of the plant from commands that are held, or of the closed loop.
+
+    Central differences of the run's own steps, all in one launch: the model holds the method, the lags of actuators and the
+    hold as they are in a run. Its error is step^2 times a third derivative, and round-off / step: some 1e-10.
+
+    Args:
+        scene: The scene, without waves and noise; of an Ensemble, its scene.
+        about: The motion: what `lw.trim` returns; for a closed loop also the time [s] after which the run has it. None, the
+            default: the start of the scene, with commands of 0; a closed loop after its first period.
+        inputs: "commands" of the actuators, the default; or "wrench": X, Y, Z [N], K, M, N [N m], body axes about its origin,
+            held for a period beside actuators that keep their commands. Of a plant only.
+        closed: Whether the controller is part of the model. Its inputs then are added to the commands. Default False.
+        period: Period of a plant [s]; default that of the controller, else the step.
+        method: As of `lw.solve`; default that of the trim, else of the scene.
+        h: Step [s]; default that of the trim, else of the scene.
+        step: Half a difference of numbers up to 1, and its ratio to larger ones; default 1e-5.
+
+    Returns:
+        The model.
+
+    Raises:
+        SceneError: If an argument is at fault, a part of the controller acts by chance or at some looks only, or a member that
+            is a little beside the motion fails.
+    """
+    scene = scene_of(scene)
+    calm(scene, "linear models")
+    faults = Faults()
+    faults.choice("inputs", inputs, INPUTS)
+    faults.positive("step", step, "")
+    if period is not None:
+        faults.positive("period", period)
+    if closed and scene.controller is None:
+        faults.add("closed", closed, "needs a controller, which this scene has not", "give [controller]")
+    if closed and (period is not None or inputs != "commands"):
+        given = "period" if period is not None else "inputs"
+        faults.add(given, period or inputs, "is that of a plant", "leave it out, or closed=True")
+    if not (about is None or isinstance(about, Trim) or (closed and isinstance(about, int | float))):
+        remedy = "give what lw.trim returns" + (", or a time in seconds" if closed else ", or leave it out")
+        faults.add("about", about, "is no motion", remedy)
+    faults.raise_if_any()
+    if isinstance(about, Trim):
+        scene = replace(scene, start=about.start)
+        method, h = about.method if method is None else method, about.h if h is None else h
+    h = step_of(scene, h)
+    scene = replace(scene, events=())
+    if closed:
+        check_parts(scene.controller, "closed")
+        return _closed_model(scene, about if isinstance(about, int | float) else 0.0, method, h, step)
+    return _plant_model(scene, about if isinstance(about, Trim) else None, inputs, period, method, h, step)
+
+
+def _plant_model(
+    scene: Scene, about: Trim | None, inputs: str, period: float | None, method: Any, h: float, step: float
+) -> LinearModel:
+    length = period or (scene.controller.period if scene.controller else h)
+    name = "wrench_input"
+    held = plant(scene, length, [ControlWrench(name=name)] if inputs == "wrench" else [])
+    bench = Bench(Ensemble(held, 1), method, h, 2.0 * length, length)
+    every = bench.every if bench.bus else round(length / bench.plan.grid.h)
+    places = np.zeros(1, np.int64)
+    motion = bench.start(places)
+    memory = {key: rows.copy() for key, rows in motion.memory.items()}
+    commands = dict(bench.bus.commands) if bench.bus else {}
+    for key, values in (about.commands if about else {}).items():
+        if key in commands:
+            begin, count = commands[key]
+            memory[""][0, begin : begin + count] = values
+            if key in memory:
+                memory[key][0, :count] = values
+    rows = remembered(bench, memory, terms=True)
+    if inputs == "wrench":
+        # Actuators stay where they are: of what they remember nothing moves.
+        rows = [row for row in rows if row.key not in commands]
+    pushed = [name] if inputs == "wrench" else list(commands)
+    held_rows = [
+        Row("", begin + i, COMPONENTS[i] if inputs == "wrench" else f"{key}[{i}]")
+        for key, (begin, count) in commands.items()
+        if key in pushed
+        for i in range(count)
+    ]
+    motion = replace(motion, memory=memory)
+    whole = differences(bench, places, motion, every, every, [*rows, *held_rows], rows, step=step)[0]
+    n = 12 + len(rows)
+    return _model(
+        whole[:, :n], whole[:, n:], every * bench.plan.grid.h, names_of(rows), [r.name for r in held_rows], motion
+    )
+
+
+def _closed_model(scene: Scene, time: float, method: Any, h: float, step: float) -> LinearModel:
+    period = scene.controller.period
+    k = max(1, round(time / period))
+    bench = Bench(Ensemble(scene, 1), method, h, (k + 1) * period, period)
+    places, begin = np.zeros(1, np.int64), k * bench.every
+    motion = bench.run(places, None, 0, begin)
+    rows, after = loop_rows(bench, motion.memory, k)
+    whole = differences(bench, places, motion, begin, bench.every, rows, after, step=step)[0]
+    names = names_of(rows)
+    pushed, inputs = np.zeros((len(whole), 0)), list[str]()
+    for key, (first, count) in bench.bus.commands.items():  # type: ignore[union-attr]
+        for i in range(count):
+            acting = [j for j, row in enumerate(rows) if row.key == "" and row.row in command_rows(bench, first + i)]
+            pushed = np.column_stack([pushed, whole[:, [12 + j for j in acting]].sum(axis=1)])
+            inputs.append(f"{key}[{i}]")
+    keep = read(whole)
+    model = _model(whole[np.ix_(keep, keep)], pushed[keep], period, tuple(names[i] for i in keep), inputs, motion)
+    return model
+
+
+def command_rows(bench: Bench, row: int) -> tuple[int, ...]:
+    """Rows of the bus by which a command acts during a period.
+
+    Args:
+        bench: whose bus it is.
+        row: its first row.
+
+    Returns:
+        The row itself; with a delay those of the command that acts and of the one before.
+    """
+    bus: Any = bench.bus
+    return (bus.acting + row, bus.acting + bus.channels + row) if bus.delayed else (row,)
+
+
+def loop_rows(bench: Bench, memory: Mapping[str, np.ndarray], look: int) -> tuple[list[Row], list[Row]]:
+    """What a closed loop remembers after a look, and after the next one.
+
+    What looks note of themselves is left out, and what was not delivered: only its sign counts, for integrals that wait.
+
+    Args:
+        bench: the loop.
+        memory: as of `Motion`.
+        look: number of the look, by which the ring of delayed commands is turned.
+
+    Returns:
+        (rows, rows a look later), in the same order.
+    """
+    bus: Any = bench.bus
+    names = [f"{key}.command[{i}]" for key, (_, count) in bus.commands.items() for i in range(count)]
+    before = remembered(bench, memory, terms=True)
+    for i, name in enumerate(names):
+        words = ("acting", "before") if bus.delayed else ("",)
+        rows = zip(command_rows(bench, i), words, strict=True)
+        before += [Row("", row, f"{name} {word}".strip()) for row, word in rows]
+    before += [row for row in remembered(bench, memory, terms=False) if row.key != "controller"]
+    after = list(before)
+    if bus.delayed:
+        sets = memory["controller"].shape[1] // bus.channels
+        for age in range(sets):
+            for i, name in enumerate(names):
+                ago = f"{name} {age} ago"
+                before.append(Row("controller", (look - age) % sets * bus.channels + i, ago))
+                after.append(Row("controller", (look + 1 - age) % sets * bus.channels + i, ago))
+    return before, after
+
+
+def remembered(bench: Bench, memory: Mapping[str, np.ndarray], terms: bool) -> list[Row]:
+    """What is remembered beside the commands.
+
+    Args:
+        bench: by whom.
+        memory: as of `Motion`.
+        terms: whether of terms, else of the parts of the controller.
+
+    Returns:
+        Rows, in order.
+    """
+    choice = bench.plan.kernel_choice
+    each = (term for term, _ in (choice.laws if terms else choice.parts_of_control) if term.key in memory)
+    rows = []
+    for term in each:
+        count = memory[term.key].shape[1]
+        word = "place" if terms and term.channels == count else "memory"
+        rows += [Row(term.key, i, f"{term.key}.{word}[{i}]") for i in range(count)]
+    return rows
+
+
+def check_parts(controller: Any, what: str) -> None:
+    """Refuse parts of a controller that no linear model of one period has.
+
+    Args:
+        controller: the controller.
+        what: who needs the model.
+
+    Raises:
+        SceneError: where a sensor draws random numbers, rounds, is late or reads at some looks only. All are named.
+    """
+    faults = Faults()
+    for part in controller.sensors:
+        if isinstance(part, Sensor):
+            numbers = {name: np.asarray(value)[None] for name, value in part.parameters().items()}
+            for word in part.features(numbers):
+                if word != "bias":
+                    problem = f"has no linear model of one period, which {what} needs"
+                    faults.add(f"{part.key}.{word}", getattr(part, word), problem, "leave it out of this scene")
+    faults.raise_if_any()
+
+
+def read(A: np.ndarray) -> np.ndarray:
+    """States that something depends on, those of the motion always; the others decay within a look.
+
+    Args:
+        A: (n, n).
+
+    Returns:
+        Their numbers, rising.
+    """
+    keep = np.arange(len(A))
+    while True:
+        some = keep[(keep < 12) | np.any(A[np.ix_(keep, keep)] != 0.0, axis=0)]
+        if len(some) == len(keep):
+            return some
+        keep = some
+
+
+def _model(
+    A: np.ndarray, B: np.ndarray, dt: float, states: tuple[str, ...], inputs: Sequence[str], motion: Motion
+) -> LinearModel:
+    if not (np.all(np.isfinite(A)) and np.all(np.isfinite(B))):
+        what = "has no linear model: a member a little beside it fails within a period"
+        raise refusal("about", "the motion", what, "give another motion, or a shorter step")
+    about = {name: getattr(motion, name)[0] for name in FIELDS}
+    C = np.eye(12, len(A))
+    return LinearModel(A, B, C, np.zeros((12, B.shape[1])), dt, states, tuple(inputs), about)

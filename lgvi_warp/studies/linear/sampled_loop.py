@@ -1,0 +1,143 @@
+"""The linearised closed loops of many members: for any factor on the demand and any delay, from a few launches."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.physics.control.loop_gain import FACTOR
+from lgvi_warp.studies.linear.bench import Bench, Motion
+from lgvi_warp.studies.linear.differences import Row, differences
+from lgvi_warp.studies.linear.linearize import remembered
+
+DELAY = "controller.delay"
+# Matrices whose eigenvalues are sought at once, by the number of their entries.
+ENTRIES = 4_000_000
+
+
+def delayed(bench: Bench, motion: Motion, k: int, steps: np.ndarray) -> Motion:
+    """The motions as after a look at a steady motion, with a delay.
+
+    Args:
+        bench: the members.
+        motion: their motions.
+        k: number of steps made.
+        steps: (m,) delay, in steps.
+
+    Returns:
+        The same motions; all commands that are on their way are the last ones.
+    """
+    bus: Any = bench.bus
+    memory = {key: rows.copy() for key, rows in motion.memory.items()}
+    own, count = memory[""], bus.channels
+    commands = own[:, :count]
+    own[:, bus.acting : bus.acting + 2 * count] = np.tile(commands, 2)
+    own[:, bus.acting + 2 * count] = k + steps % bench.every
+    memory["controller"] = np.tile(commands, int((steps // bench.every).max()) + 2)
+    return Motion(motion.position, motion.attitude, motion.velocity, motion.angular_velocity, memory)
+
+
+class SampledLoop:
+    """x' = P x + Q1 u of q looks ago + Q0 u of the look before that; u' and what parts remember follow from x' at the look.
+
+    u' is affine in the factor. P, Q1, Q0 for each delay within a period, and what the look does, are differences in lanes.
+
+    Args:
+        bench: members whose factor and delay are by member, and whose commands may be delayed.
+        places: (n,), which members.
+        motion: their n motions.
+        k: number of steps made, at a look.
+
+    Attributes:
+        every: steps between two looks.
+    """
+
+    def __init__(self, bench: Bench, places: np.ndarray, motion: Motion, k: int):
+        bus: Any = bench.bus
+        n, C, self.every = len(places), bus.channels, bench.every
+        zero = np.zeros(n)
+        still = delayed(bench, motion, k, np.zeros(n, np.int64))
+        terms, parts = remembered(bench, still.memory, terms=True), remembered(bench, still.memory, terms=False)
+        parts = [row for row in parts if row.key != "controller"]
+        commands = [Row("", i, f"command {i}") for i in range(C)]
+        acting = [Row("", bus.acting + i, f"acting {i}") for i in range(C)]
+        s = 12 + len(terms)
+        looks, self._whole = [], np.ones(n, bool)
+        for factor in (0.0, 1.0):
+            numbers = {FACTOR: zero + factor, DELAY: zero}
+            whole = differences(
+                bench, places, still, k, bench.every, [*terms, *acting, *parts], [*terms, *commands, *parts],
+                numbers=numbers)  # fmt: skip
+            whole = self._without_failed(whole)
+            # A look sees the motion alone: what it does of x is found behind the period that was between.
+            of_motion = np.linalg.solve(np.swapaxes(whole[:, :12, :12], 1, 2), np.swapaxes(whole[:, s:, :12], 1, 2))
+            looks.append(np.concatenate([np.swapaxes(of_motion, 1, 2), whole[:, s:, s + C :]], axis=2))
+        self._P, total = whole[:, :s, :s], whole[:, :s, s : s + C]
+        # [u, parts] by [x, parts]: of the laws outside of the loop, and what the loop adds.
+        self._look, self._more = looks[0], looks[1] - looks[0]
+        self._late = [total]
+        for steps in range(1, bench.every):
+            later = delayed(bench, motion, k, np.full(n, steps))
+            numbers = {FACTOR: zero + 1.0, DELAY: zero + steps * bench.plan.grid.h}
+            late = differences(bench, places, later, k, bench.every, acting, terms, motion=False, numbers=numbers)
+            self._late.append(self._without_failed(late))
+        self._C, self._s, self._m = C, s, len(parts)
+
+    def _without_failed(self, derived: np.ndarray) -> np.ndarray:
+        """The same, with other numbers for members of which a copy failed: their loops do not settle."""
+        well = np.isfinite(derived).all(axis=(1, 2))
+        self._whole &= well
+        return np.where(well[:, None, None], derived, np.eye(*derived.shape[1:]))
+
+    def stable(self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray) -> np.ndarray:
+        """Whether loops settle.
+
+        Args:
+            factor: (m,), factors on the demand.
+            steps: (m,), delays in steps.
+            some: (m,), which of the members.
+
+        Returns:
+            (m,): whether all eigenvalues are within the unit circle, of states that something depends on.
+        """
+        answer = np.zeros(len(some), bool)
+        for q in np.unique(steps // self.every):
+            at = np.flatnonzero(steps // self.every == q)
+            size = self._s + self._m + self._C * (q + 2)
+            for each in np.array_split(at, max(1, len(at) * size**2 // ENTRIES)):
+                answer[each] = _settles(self._matrices(factor[each], int(q), steps[each] % self.every, some[each]))
+        return answer & self._whole[some]
+
+    def _matrices(self, factor: np.ndarray, q: int, late: np.ndarray, some: np.ndarray) -> np.ndarray:
+        """The loops' matrices: motion and actuators, parts, commands from the newest to the oldest."""
+        s, m, C = self._s, self._m, self._C
+        n = s + m + C * (q + 2)
+        A = np.zeros((len(some), n, n))
+        A[:, :s, :s] = self._P[some]
+        newer = np.stack([self._late[j][i] for i, j in zip(some, late, strict=True)])
+        first = s + m + C * q
+        A[:, :s, first : first + C] = newer
+        A[:, :s, first + C : first + 2 * C] = self._late[0][some] - newer
+        look = self._look[some] + factor[:, None, None] * self._more[some]
+        for rows, places in ((slice(0, C), slice(s + m, s + m + C)), (slice(C, C + m), slice(s, s + m))):
+            A[:, places] = look[:, rows, :12] @ A[:, :12]
+            A[:, places, s : s + m] += look[:, rows, 12:]
+        older = np.arange(C * (q + 1))
+        A[:, s + m + C + older, s + m + older] = 1.0
+        return A
+
+
+def _settles(A: np.ndarray) -> np.ndarray:
+    """Whether eigenvalues (m, n, n) are within the unit circle: without states, such as a place, that nothing depends on."""
+    used = np.any(A != 0.0, axis=0)
+    keep = np.arange(A.shape[1])
+    while True:
+        others = used[np.ix_(keep, keep)] & ~np.eye(len(keep), dtype=bool)
+        some = keep[others.any(axis=0)]
+        if len(some) == len(keep):
+            break
+        keep = some
+    if not len(keep):
+        return np.ones(len(A), bool)
+    return np.asarray(np.abs(np.linalg.eigvals(A[:, keep[:, None], keep])).max(axis=1) < 1.0)

@@ -1,0 +1,46 @@
+"""Whose members a study is about: of an Ensemble, or of a Scene and its section [ensemble]."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from lgvi_warp.common.errors import refusal
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+
+
+def ensemble_of(fleet: Any) -> Ensemble:
+    """The members that are meant.
+
+    Args:
+        fleet: An Ensemble, or a Scene, whose [ensemble] is meant.
+
+    Returns:
+        The ensemble.
+
+    Raises:
+        SceneError: If it is neither.
+    """
+    if isinstance(fleet, Ensemble):
+        return fleet
+    if not isinstance(fleet, Scene):
+        raise refusal("fleet", fleet, "is neither an Ensemble nor a Scene", "give lw.Scene(...) or lw.Ensemble(...)")
+    return Ensemble.from_scene(fleet)
+
+
+def scene_of(scene: Any) -> Scene:
+    """The scene that is meant.
+
+    Args:
+        scene: A Scene, or an Ensemble, whose scene is meant, without what varies.
+
+    Returns:
+        The scene.
+
+    Raises:
+        SceneError: If it is neither.
+    """
+    whole: Any = scene.scene if isinstance(scene, Ensemble) else scene
+    if not isinstance(whole, Scene):
+        raise refusal("scene", scene, "is neither a Scene nor an Ensemble", "give lw.Scene(...)")
+    return whole

@@ -1,0 +1,1 @@
+"""Searches in which a generation is an ensemble: the worst case within bounds, and the best gains for a risk."""

@@ -1,0 +1,177 @@
+"""A box of numbers with names, and the search of its least cost: evolution, restarts, corners, and a walk."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.runs.prepared import scene_value
+
+# Candidates of a generation for each number, at least so many.
+POPULATION, LEAST = 8, 16
+# The part of the budget that evolution has; corners have at most as much as the walk.
+EVOLUTION = 0.7
+# The walk begins with steps of this part of each width, and ends with the other.
+FIRST_STEP, LAST_STEP = 0.25, 1e-5
+
+# Candidates (k, d) -> cost of each (k,); infinite where a run failed.
+Cost = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Box:
+    """Bounds of numbers of a scene.
+
+    Attributes:
+        names: their names (d,).
+        low: (d,).
+        high: (d,).
+        log: (d,), whether the search goes by the logarithm.
+    """
+
+    names: tuple[str, ...]
+    low: np.ndarray
+    high: np.ndarray
+    log: np.ndarray
+
+    @classmethod
+    def of(cls, key: str, bounds: Any, scene: Any) -> Box:
+        """Read bounds.
+
+        Args:
+            key: the argument's name, for messages.
+            bounds: (low, high) or (low, high, "log") by name.
+            scene: the scene, which has these numbers.
+
+        Returns:
+            The box.
+
+        Raises:
+            SceneError: where bounds are at fault, or the scene has no such number; all of them are named.
+        """
+        faults, rows = Faults(), []
+        example = '{"heading_pid.kp": (0.5, 5.0)}'
+        if not isinstance(bounds, Mapping) or not bounds:
+            faults.add(key, bounds, "maps no names to bounds", f"give {example}")
+        for name, pair in bounds.items() if not faults else ():
+            with faults.including():
+                scene_value(scene, name)
+            values = tuple(pair) if isinstance(pair, list | tuple | np.ndarray) else ()
+            log = len(values) == 3 and values[2] == "log"
+            ends = faults.finite(f'{key}."{name}"', values[:2] if log or len(values) == 2 else pair, (2,))
+            if ends is None:
+                continue
+            if not ends[0] < ends[1]:
+                faults.add(f'{key}."{name}"', pair, "does not rise", "give (low, high)")
+            elif log and ends[0] <= 0.0:
+                faults.add(f'{key}."{name}"', pair, "has no logarithm", "give bounds above 0")
+            rows.append((name, *ends, log))
+        faults.raise_if_any()
+        names, low, high, logs = zip(*rows, strict=True)
+        return cls(names, np.array(low), np.array(high), np.array(logs, bool))
+
+    def values(self, inside: np.ndarray) -> np.ndarray:
+        """Numbers at places of the unit cube.
+
+        Args:
+            inside: (k, d), in [0, 1].
+
+        Returns:
+            (k, d); at 0 and 1 the bounds, to the last digit.
+        """
+        low, high = (np.log(np.where(self.log, end, 1.0)) for end in (self.low, self.high))
+        curved, straight = np.exp(low + inside * (high - low)), self.low + inside * (self.high - self.low)
+        return np.clip(np.where(self.log, curved, straight), self.low, self.high)
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search found.
+
+    Attributes:
+        at: (d,), place in the unit cube.
+        cost: its cost.
+        restarts: (r,), the least cost of each evolution.
+        asked: number of candidates that were asked.
+    """
+
+    at: np.ndarray
+    cost: float
+    restarts: np.ndarray
+    asked: int
+
+
+class _Asked:
+    """Counts candidates, and remembers the best."""
+
+    def __init__(self, cost: Cost, most: int, good_enough: float):
+        self.cost, self.most, self.good_enough, self.count = cost, most, good_enough, 0
+        self.best: np.ndarray | None = None
+        self.least = math.inf
+
+    @property
+    def left(self) -> int:
+        return 0 if self.least <= self.good_enough else self.most - self.count
+
+    def __call__(self, places: np.ndarray) -> np.ndarray:
+        costs = np.where(np.isnan(values := self.cost(places)), np.inf, values)
+        self.count += len(places)
+        first = int(np.argmin(costs))
+        if self.best is None or costs[first] < self.least:
+            self.best, self.least = places[first].copy(), float(costs[first])
+        return costs
+
+
+def search(cost: Cost, d: int, most: int, seed: int, restarts: int, good_enough: float = -math.inf) -> Found:
+    """Find the least cost in the unit cube.
+
+    Evolution (Storn & Price 1997) several times, each from other places; then all corners where they are few; then a walk
+    along the axes from the best place, with steps that shrink where none is better.
+
+    Args:
+        cost: cost of candidates.
+        d: number of dimensions.
+        most: number of candidates that may be asked, as many as a generation or more.
+        seed: seed of the random numbers.
+        restarts: number of evolutions, at least 1.
+        good_enough: cost at which the search ends (default: never).
+
+    Returns:
+        The best candidate.
+    """
+    from scipy.optimize import differential_evolution
+    from scipy.stats import qmc
+
+    ask = _Asked(cost, most, good_enough)
+    size = max(LEAST, POPULATION * d)
+    restarts = max(1, min(restarts, int(EVOLUTION * most / (4 * size))))
+    each, least = int(EVOLUTION * most / restarts), []
+    for i in range(restarts):
+        generations = min(each, ask.left) // size - 1
+        if generations < 0:
+            break
+        start = qmc.LatinHypercube(d, rng=np.random.default_rng((seed, i))).random(size)
+        try:
+            answer = differential_evolution(
+                lambda x: ask(x.T), [(0.0, 1.0)] * d, init=start, maxiter=generations, vectorized=True, updating="deferred",
+                polish=False, tol=1e-6, atol=0.0, rng=np.random.default_rng((seed, restarts + i)),
+                callback=lambda intermediate_result: ask.left == 0)  # fmt: skip
+        except RuntimeError as error:
+            # SciPy hides a ValueError of the cost behind one of its own.
+            raise error.__cause__ or error from None
+        least.append(answer.fun)
+    if ask.left and 2**d <= max(ask.left // 2, 1):
+        ask(np.array(list(itertools.product((0.0, 1.0), repeat=d))))
+    step = FIRST_STEP
+    while ask.best is not None and step > LAST_STEP and ask.left >= 2 * d:
+        before = ask.least
+        ask(np.clip(ask.best + step * np.concatenate([np.eye(d), -np.eye(d)]), 0.0, 1.0))
+        step = step if ask.least < before else 0.5 * step
+    assert ask.best is not None
+    return Found(ask.best, ask.least, np.array(least), ask.count)

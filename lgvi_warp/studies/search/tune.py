@@ -1,0 +1,193 @@
+"""`tune`: numbers of a controller for which the risk of a fleet is least."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.runs.prepared import Prepared, prepare, scene_value
+from lgvi_warp.runs.quantities import OfInterest
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.studies.members import ensemble_of
+from lgvi_warp.studies.search.box import LEAST, POPULATION, Box, search
+from lgvi_warp.studies.search.risk import risk_of
+from lgvi_warp.studies.search.worst_case import one_number
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """The numbers with the least risk that a search found.
+
+    Attributes:
+        parameters: the numbers by name.
+        before: those of the scene.
+        cost: their risk over the members that the search used: too good, since the numbers were chosen by them.
+        fresh_cost: their risk over members that the search did not see; NaN where none can be drawn.
+        fresh_before: that of the scene's numbers, over the same fresh members.
+        of: name of the quantity.
+        risk: what the risk is, in words.
+        members: number of members that the search used.
+        fresh: number of fresh members.
+        at_bounds: names of the numbers that lie at their bounds: these may be too narrow.
+        restarts: (r,), the least risk of each evolution.
+        runs: number of members that were run.
+    """
+
+    parameters: Mapping[str, float]
+    before: Mapping[str, float]
+    cost: float
+    fresh_cost: float
+    fresh_before: float
+    of: str
+    risk: str
+    members: int
+    fresh: int
+    at_bounds: tuple[str, ...]
+    restarts: np.ndarray
+    runs: int
+
+    @property
+    def optimism(self) -> float:
+        """How much less the risk seemed than it is of fresh members."""
+        return self.fresh_cost - self.cost
+
+    def __str__(self) -> str:
+        numbers = ", ".join(
+            f"{name} = {value:.6g} (was {self.before[name]:.6g})" for name, value in self.parameters.items()
+        )
+        lines = [
+            f"{self.risk} of {self.of}: {numbers}",
+            f"{self.cost:.6g} over the {self.members} members of the search, {self.fresh_cost:.6g} over {self.fresh} fresh "
+            f"ones (optimism {self.optimism:.3g}); the scene's numbers: {self.fresh_before:.6g}; {self.runs} runs",
+        ]
+        if self.at_bounds:
+            lines.append(f"at their bounds, which may be too narrow: {', '.join(self.at_bounds)}")
+        return "\n".join(lines)
+
+
+@shows_progress
+def tune(
+    fleet: Ensemble | Scene,
+    over: Mapping[str, Any],
+    minimise: OfInterest,
+    *,
+    risk: Any = "mean",
+    budget: int = 100_000,
+    fresh: int | None = None,
+    restarts: int = 1,
+    seed: int = 0,
+    progress: Callable[[float], None] | bool | None = None,
+    **settings: Any,
+) -> Tuned:
+    """Search numbers, such as gains, for which the risk of a fleet is least.
+
+    Every candidate meets the same members, with the same noise: a generation is an ensemble of candidates times members. Then
+    it is tried on fresh ones.
+
+    Args:
+        fleet: The members, drawn by distributions; or a Scene, whose [ensemble] is meant.
+        over: (low, high), or (low, high, "log"), of each number by name: {"heading_pid.kp": (0.1, 10.0, "log")}.
+        minimise: A quantity of one number of each member, as of `lw.prepare`: the cost.
+        risk: "mean", the default; the level of a quantity's quantile, such as 0.95; or `lw.CVaR(0.05)`, the mean of the worst
+            5 %. A member that fails has an infinite cost.
+        budget: Number of members that the search may run, those of all candidates together; 100,000 by default.
+        fresh: Number of fresh members; None, the default, for four times those of the fleet.
+        restarts: Number of evolutions; 1 by default.
+        seed: Seed of the search; 0 by default.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the part of the budget that is used.
+            None, the default, for nobody.
+        **settings: As of `lw.prepare`: method, h, t1, save, dtype, threads, ...
+
+    Returns:
+        The numbers, with their risk over the members of the search and over fresh ones.
+
+    Raises:
+        SceneError: If an argument is at fault.
+    """
+    ensemble = ensemble_of(fleet)
+    scene: Any = ensemble.scene
+    n, faults = ensemble.members, Faults()
+    measure, box = risk_of(faults, risk), None
+    with faults.including():
+        box = Box.of("over", over, scene)
+    varied = {name.split("[")[0] for name in ensemble.varied_names}
+    for name in box.names if box else ():
+        if name.split("[")[0] in varied:
+            faults.add(f'over."{name}"', over[name], "varies by member too", "leave it out of one of them")
+    least = n * max(LEAST, POPULATION * (len(box.names) if box else 1))
+    if not isinstance(budget, int) or budget < least:
+        faults.add("budget", budget, "is less than a generation of all members", f"give {least} or more")
+    if fresh is not None and (not isinstance(fresh, int) or fresh < 0):
+        faults.add("fresh", fresh, "is no number of members", "give a whole number, 0 for none")
+    faults.raise_if_any()
+    assert box is not None
+    run = prepare(scene, None, minimise, failed="nan", **settings)
+    costs, asked, report = _Costs(run, ensemble, box), 0, callback(progress)
+
+    def cost(inside: np.ndarray) -> np.ndarray:
+        nonlocal asked
+        answer = measure(costs(box.values(inside)))
+        asked += n * len(inside)
+        if report:
+            report(min(1.0, asked / budget))
+        return np.asarray(answer)
+
+    found = search(cost, len(box.names), budget // n, seed, restarts)
+    best = box.values(found.at[None])
+    before = np.array([[float(scene_value(scene, name)) for name in box.names]])
+    count = 4 * n if fresh is None else fresh
+    drawn = ensemble.sampling.kind == "random" and bool(ensemble.vary) and not ensemble.explicit()
+    fresh_costs = np.full(2, np.nan)
+    if drawn and count:
+        others = _Costs(run, ensemble.with_seed(ensemble.seed + 1, count), box)
+        fresh_costs = np.array([float(measure(others(numbers))[0]) for numbers in (best, before)])
+    values = dict(zip(box.names, map(float, best[0]), strict=True))
+    at_bounds = tuple(
+        name for name, v, low, high in zip(box.names, best[0], box.low, box.high, strict=True) if v in (low, high)
+    )
+    label = minimise if isinstance(minimise, str) else getattr(minimise, "__name__", str(minimise))
+    runs = found.asked * n + (2 * count if drawn else 0)
+    return Tuned(
+        parameters=values,
+        before=dict(zip(box.names, map(float, before[0]), strict=True)),
+        cost=found.cost,
+        fresh_cost=float(fresh_costs[0]),
+        fresh_before=float(fresh_costs[1]),
+        of=label,
+        risk=str(measure),
+        members=n,
+        fresh=count if drawn else 0,
+        at_bounds=at_bounds,
+        restarts=found.restarts,
+        runs=runs,
+    )
+
+
+class _Costs:
+    """Costs of candidates (k, d), of each member: (k, members)."""
+
+    def __init__(self, run: Prepared, fleet: Ensemble, box: Box):
+        self._run, self._box, self._members, n = run, box, fleet.select(0, fleet.members), fleet.members
+        self._own = {
+            name: np.broadcast_to(v, (n, *v.shape[1:]))
+            for name in fleet.varied()
+            for v in (self._members.parameters[name],)
+        }
+
+    def __call__(self, candidates: np.ndarray) -> np.ndarray:
+        members, k = self._members, len(candidates)
+        n = members.count
+        every = np.tile(np.arange(n), k)
+        states: Any = {name: getattr(members, name)[every] for name in FIELDS}
+        parameters = {name: v[every] for name, v in self._own.items()}
+        parameters |= dict(zip(self._box.names, np.repeat(candidates, n, axis=0).T, strict=True))
+        answer = self._run.states(**states, parameters=parameters, indices=members.indices[every], seed=members.seed)
+        costs = one_number(answer)
+        return np.where(np.isnan(costs), np.inf, costs).reshape(k, n)

@@ -1,0 +1,151 @@
+"""`worst_case`: numbers within bounds for which a quantity is worst."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.runs.prepared import prepare
+from lgvi_warp.runs.quantities import OfInterest
+from lgvi_warp.sampling.designs.table import Table
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.studies.members import scene_of
+from lgvi_warp.studies.search.box import LEAST, POPULATION, Box, search
+
+WORST = ("largest", "smallest")
+
+
+@dataclass(frozen=True)
+class WorstCase:
+    """The worst member that a search found: a lower bound of the true worst.
+
+    Attributes:
+        parameters: its numbers by name, those that were searched.
+        value: its quantity; infinite for a member that failed, of which it is the first that was found.
+        of: name of the quantity.
+        worst: "largest" or "smallest".
+        at_bounds: by name, "low", "high" or "" of the numbers.
+        restarts: (r,), the worst value of each evolution: where they differ, more may be found.
+        runs: number of members that were run.
+        fleet: the member, to run it again.
+    """
+
+    parameters: Mapping[str, float]
+    value: float
+    of: str
+    worst: str
+    at_bounds: Mapping[str, str]
+    restarts: np.ndarray
+    runs: int
+    fleet: Ensemble
+
+    def __str__(self) -> str:
+        where = ", ".join(
+            f"{name} = {value:.6g}" + (f" ({side})" if (side := self.at_bounds[name]) else "")
+            for name, value in self.parameters.items()
+        )
+        if math.isinf(self.value):
+            return f"a member fails: {where}; found in {self.runs} runs"
+        bound = "a lower bound of the largest" if self.worst == "largest" else "an upper bound of the smallest"
+        each = ", ".join(f"{value:.6g}" for value in self.restarts)
+        return f"{self.of} = {self.value:.6g} at {where}: {bound}, after {self.runs} runs; restarts: {each}"
+
+
+@shows_progress
+def worst_case(
+    fleet: Scene | Ensemble,
+    within: Mapping[str, Any],
+    of: OfInterest,
+    *,
+    worst: str = "largest",
+    budget: int = 20_000,
+    restarts: int = 3,
+    seed: int = 0,
+    progress: Callable[[float], None] | bool | None = None,
+    **settings: Any,
+) -> WorstCase:
+    """Search numbers within bounds for the member whose quantity is worst.
+
+    Differential evolution, in which a generation is an ensemble, several times from other places; then the corners, where they
+    are few; then a walk from the worst place. Noise is the same for all. What no member showed may be worse still.
+
+    Args:
+        fleet: A Scene or an Ensemble, whose scene is meant: numbers that are not searched are the scene's.
+        within: (low, high) of each number by name, such as {"vehicle.buoyancy": (297.0, 302.0)}; (low, high, "log") where
+            the search should go by the logarithm.
+        of: A quantity of one number, as of `lw.prepare`: "max(depth)", a Quantity, a function of a Result.
+        worst: "largest", the default, or "smallest". A member that fails is worse than all others, and ends the search.
+        budget: Number of members that may be run; 20,000 by default.
+        restarts: Number of evolutions; 3 by default, fewer where the budget is small.
+        seed: Seed of the search; 0 by default.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the part of the budget that is used.
+            None, the default, for nobody.
+        **settings: As of `lw.prepare`: method, h, t1, save, dtype, threads, ...
+
+    Returns:
+        The worst member.
+
+    Raises:
+        SceneError: If an argument is at fault.
+    """
+    scene = scene_of(fleet)
+    faults = Faults()
+    faults.choice("worst", worst, WORST)
+    box = None
+    with faults.including():
+        box = Box.of("within", within, scene)
+    least = max(LEAST, POPULATION * (len(box.names) if box else 1))
+    if not isinstance(budget, int) or budget < least:
+        faults.add("budget", budget, "is less than a generation", f"give {least} or more")
+    faults.raise_if_any()
+    assert box is not None
+    run = prepare(scene, list(box.names), of, failed="nan", common_noise=True, **settings)
+    sign, asked, report = (-1.0 if worst == "largest" else 1.0), 0, callback(progress)
+
+    def cost(inside: np.ndarray) -> np.ndarray:
+        nonlocal asked
+        values = one_number(run(box.values(inside)))
+        asked += len(inside)
+        if report:
+            report(min(1.0, asked / budget))
+        return np.where(np.isnan(values), -np.inf, sign * values)
+
+    found = search(cost, len(box.names), budget, seed, restarts, good_enough=-np.finfo(float).max)
+    numbers = box.values(found.at[None])[0]
+    sides = {
+        name: "low" if value == low else "high" if value == high else ""
+        for name, value, low, high in zip(box.names, numbers, box.low, box.high, strict=True)
+    }
+    parameters = dict(zip(box.names, map(float, numbers), strict=True))
+    member = Ensemble(scene, None, 0, None, Table(values={name: [value] for name, value in parameters.items()}))
+    label = of if isinstance(of, str) else getattr(of, "__name__", str(of))
+    # A search by the sign; a failure is infinite whatever is worst.
+    value = math.inf if math.isinf(found.cost) else sign * found.cost
+    return WorstCase(parameters, value, label, worst, sides, sign * found.restarts, found.asked, member)
+
+
+def one_number(values: Any) -> np.ndarray:
+    """The quantity of each member, refused where it has several numbers.
+
+    Args:
+        values: what a prepared run returns.
+
+    Returns:
+        (n,).
+
+    Raises:
+        SceneError: where members have several numbers.
+    """
+    array = np.asarray(values)
+    faults = Faults()
+    if array.ndim != 1:
+        faults.add("of", f"{array.shape[1]} numbers", "is not a single number", "name one of its entries")
+    faults.raise_if_any()
+    return array

@@ -1,0 +1,273 @@
+"""Cases of a sweep: one scene each, made of the sweep's by other numbers, other parts or another vehicle; and the grid."""
+
+from __future__ import annotations
+
+import itertools
+import keyword
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, closest, refusal
+from lgvi_warp.physics import terms
+from lgvi_warp.physics.control.base import SECTIONS
+from lgvi_warp.physics.vehicle import Vehicle
+from lgvi_warp.scene import variations
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.scene.start import NAMES
+
+# Numbers of a scene that are no parameters of members, and that a case may set all the same.
+SETTINGS = ("controller.period", "run.step", "run.duration")
+# Lists of a scene that a case may replace, beside those of the controller.
+LISTS = ("terms", "events", "controller")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One design of a sweep.
+
+    Args:
+        name: its name.
+        set: numbers that differ from those of the scene, by name: {"heading_pid.kp": 2.0, "drag.quadratic[0]": 3.0}. A number
+            that varies is fixed by that.
+        replace: lists that differ: {"laws": [...]}, of a controller's lists, or "events"; "controller" itself; and "terms",
+            whose entries replace those of the same name and are added otherwise.
+        vehicle: another vehicle: lw.Vehicle(...), or numbers of it by field; None (default) for that of the scene.
+        scene: another scene, to which the rest is applied; None (default) for that of the sweep.
+
+    Raises:
+        SceneError: something is of the wrong kind.
+    """
+
+    name: str
+    set: Mapping[str, Any] = field(default_factory=dict)
+    replace: Mapping[str, Any] = field(default_factory=dict)
+    vehicle: Any = None
+    scene: Scene | None = None
+
+    def __post_init__(self) -> None:
+        faults = Faults(f"case {self.name!r}: " if isinstance(self.name, str) else "cases: ")
+        if not isinstance(self.name, str) or not self.name:
+            faults.add("name", self.name, "is no name", 'give name = "pid"')
+        for key in ("set", "replace"):
+            if not isinstance(getattr(self, key), Mapping):
+                example = 'set = { "heading_pid.kp" = 2.0 }' if key == "set" else "replace = { laws = [...] }"
+                faults.add(key, getattr(self, key), "is no table", f"write {example}")
+        if self.scene is not None and not isinstance(self.scene, Scene):
+            faults.add("scene", self.scene, "is no Scene", "give lw.Scene.load(path)")
+        faults.raise_if_any()
+
+    def of(self, scene: Scene) -> Scene:
+        """Return the scene of this case.
+
+        Args:
+            scene: the sweep's scene.
+
+        Raises:
+            SceneError: the case does not fit the scene.
+        """
+        scene = scene if self.scene is None else self.scene
+        if isinstance(self.vehicle, Mapping):
+            scene = with_numbers(scene, {f"vehicle.{name}": value for name, value in self.vehicle.items()})
+        elif self.vehicle is not None:
+            if not isinstance(self.vehicle, Vehicle):
+                raise refusal("vehicle", self.vehicle, "is no Vehicle", "give lw.Vehicle(...), or numbers of it")
+            scene = replace(scene, vehicle=self.vehicle)
+        return with_numbers(with_lists(scene, self.replace), self.set)
+
+
+def cases_of(given: Any) -> tuple[Case, ...]:
+    """Return the cases of a sweep.
+
+    Args:
+        given: a list of `Case` and of tables with its arguments; a mapping of names to these tables, or to the numbers that a
+            case sets; None for one case, the scene itself.
+
+    Raises:
+        SceneError: with every fault.
+    """
+    if given is None:
+        return (Case("scene"),)
+    faults, cases = Faults(), list[Case]()
+    entries: list[Any]
+    if isinstance(given, Mapping):
+        arguments = set(Case.__dataclass_fields__) - {"name"}
+        entries = [{"name": name, **(table if isinstance(table, Mapping) and table.keys() <= arguments else {"set": table})}
+                   for name, table in given.items()]  # fmt: skip
+    elif isinstance(given, str) or not isinstance(given, Sequence) or not given:
+        example = 'give [{"name": "pid"}, {"name": "stiff", "set": {"heading_pid.kp": 2.0}}]'
+        raise refusal("cases", given, "is no list of cases", example)
+    else:
+        entries = list(given)
+    for i, entry in enumerate(entries):
+        if isinstance(entry, Case):
+            cases.append(entry)
+            continue
+        if not isinstance(entry, Mapping) or "name" not in entry:
+            faults.add(f"cases[{i}]", entry, "has no name", 'write [[cases]] and name = "pid" below')
+            continue
+        faults.keys(f"cases[{i}]", entry, Case.__dataclass_fields__)
+        with faults.including():
+            cases.append(Case(**{key: value for key, value in entry.items() if key in Case.__dataclass_fields__}))
+    names = [case.name for case in cases]
+    for name in sorted({name for name in names if names.count(name) > 1}):
+        faults.add("cases", name, f"is the name of {names.count(name)} cases", "give each a name of its own")
+    faults.raise_if_any()
+    return tuple(cases)
+
+
+def grid_of(given: Any) -> dict[str, list[Any]]:
+    """Return the axes of a sweep's grid.
+
+    Args:
+        given: name of a number -> its values; None for no grid.
+
+    Raises:
+        SceneError: an axis has no values, or the same one twice.
+    """
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        raise refusal("grid", given, "is no table", 'write [grid] and "controller.delay" = [0.0, 0.1] below')
+    faults = Faults("grid.")
+    axes = {name: values.tolist() if isinstance(values, np.ndarray) else values for name, values in given.items()}
+    for name, values in axes.items():
+        if isinstance(values, str) or not isinstance(values, Sequence) or not len(values):
+            faults.add(f'"{name}"', values, "is no list of values", "give [0.0, 0.1, 0.2]")
+        elif any(value in values[:i] for i, value in enumerate(values)):
+            faults.add(f'"{name}"', values, "has a value twice", "keep one of them")
+    faults.raise_if_any()
+    return {name: list(values) for name, values in axes.items()}
+
+
+def points_of(axes: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
+    """Return all combinations of the values of a grid, the last axis fastest; one without numbers where there is no axis.
+
+    Args:
+        axes: name -> values.
+    """
+    return [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())]
+
+
+def with_lists(scene: Scene, lists: Mapping[str, Any]) -> Scene:
+    """Return a scene with other parts.
+
+    Args:
+        scene: the scene.
+        lists: name of a list -> its new content; of "terms", entries replace those of the same name and are added otherwise.
+
+    Raises:
+        SceneError: there is no such list, or its content is at fault.
+    """
+    known = (*SECTIONS, *LISTS)
+    faults = Faults("replace.")
+    for name in lists:
+        if name not in known:
+            faults.add(name, "...", "is no list of a scene", closest(name, known))
+        elif name in SECTIONS and scene.controller is None and "controller" not in lists:
+            faults.add(name, "...", "is a list of a controller, which this scene has not", "give the whole controller")
+    faults.raise_if_any()
+    whole = {name: value for name, value in lists.items() if name in LISTS}
+    if "terms" in whole:
+        own = terms.from_list(whole["terms"])
+        whole["terms"] = (*(term for term in scene.terms if term.key not in {other.key for other in own}), *own)
+    if whole:
+        scene = replace(scene, **whole)
+    parts = {name: value for name, value in lists.items() if name in SECTIONS}
+    return replace(scene, controller=replace(scene.controller, **parts)) if parts else scene
+
+
+def with_numbers(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
+    """Return a scene with other numbers.
+
+    Args:
+        scene: the scene.
+        numbers: values by name, as scene.parameters() lists them; also "start.position", "controller.period", "run.step" and
+            "run.duration", and single entries, "drag.quadratic[0]".
+
+    Raises:
+        SceneError: a name is not known, or a value does not fit.
+    """
+    base, faults = scene.parameters(), Faults()
+    changes: dict[str, dict[str, Any]] = {}
+    for name, value in numbers.items():
+        target, *others = variations.targets(name)
+        key, _, attribute = target.name.rpartition(".")
+        known = (*base, *SETTINGS, *(f"start.{entry}" for entry in NAMES))
+        if others or target.name not in known:
+            faults.add(f'"{name}"', value, "is no number of this scene", closest(name, known))
+            continue
+        attribute += "_" * keyword.iskeyword(attribute)
+        place = changes.setdefault(key, {})
+        if target.index is None:
+            place[attribute] = value
+            continue
+        start = np.array(getattr(scene.start, attribute) if key == "start" else base[target.name], dtype=np.float64)
+        whole = np.array(place.get(attribute, start), dtype=np.float64)
+        try:
+            whole[target.index] = value
+        except (IndexError, ValueError, TypeError):
+            faults.add(
+                f'"{name}"', value, f"is no number of {target.name}, of shape {whole.shape}", "give one that there is"
+            )
+            continue
+        place[attribute] = whole
+    faults.raise_if_any()
+    return _changed(scene, changes)
+
+
+def _changed(scene: Scene, changes: Mapping[str, Mapping[str, Any]]) -> Scene:
+    """The scene with other values of fields, by the key of the part that has them."""
+    if not changes:
+        return scene
+
+    def part(entry: Any) -> Any:
+        return replace(entry, **changes[entry.key]) if entry.key in changes else entry
+
+    sections: dict[str, Any] = {name: replace(getattr(scene, name), **changes[name])
+                for name in ("vehicle", "environment", "start", "run") if name in changes}  # fmt: skip
+    controller = scene.controller
+    if controller is not None:
+        lists = {section: tuple(map(part, getattr(controller, section))) for section in SECTIONS}
+        controller = replace(controller, **lists, **changes.get("controller", {}))
+    sections |= {name: tuple(map(part, getattr(scene, name))) for name in ("terms", "events")}
+    return replace(scene, **sections, controller=controller)
+
+
+def known_names(scene: Scene) -> set[str]:
+    """Return the names of all that may vary in a scene.
+
+    Args:
+        scene: the scene.
+    """
+    return {*scene.parameters(), *(f"start.{name}" for name in NAMES)}
+
+
+def ensemble_of(
+    scene: Scene, numbers: Mapping[str, Any], vary: Mapping[Any, Any], like: Ensemble
+) -> tuple[Ensemble, list[str]]:
+    """Return the members of a case: those of all cases, as far as it has what varies and does not set it.
+
+    Args:
+        scene: the scene of the case.
+        numbers: what it sets.
+        vary: distributions by name.
+        like: members, seed and sampling.
+
+    Returns:
+        (members, names of what does not vary in this case).
+
+    Raises:
+        SceneError: the members do not fit, or a sampling other than random would give other members.
+    """
+    known = known_names(scene)
+    fixed = {target.name for name in numbers for target in variations.targets(name)}
+    dropped = [name for name in vary if any(t.name in fixed or t.name not in known for t in variations.targets(name))]
+    if dropped and like.sampling.kind != "random":
+        why = f"does not vary here, and with sampling {like.sampling.kind!r} the other numbers would be others too"
+        raise refusal("vary", ", ".join(map(str, dropped)), why, 'use sampling = "random", or leave it out of vary')
+    kept = {name: distribution for name, distribution in vary.items() if name not in dropped}
+    return Ensemble(scene, like.members, like.seed, kept, like.sampling), list(map(str, dropped))

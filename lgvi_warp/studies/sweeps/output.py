@@ -1,0 +1,196 @@
+"""Files of a sweep: tables, its provenance, and a summary in words."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common import files as durable
+from lgvi_warp.common import machine
+from lgvi_warp.common.tables import write_csv
+from lgvi_warp.studies.files import finite_or_none
+from lgvi_warp.studies.sweeps.found import SUCCESS, Compared, Findings
+from lgvi_warp.studies.sweeps.setup import END
+from lgvi_warp.studies.sweeps.success import none_text
+
+# Worst members that are listed.
+LISTED = 20
+
+
+class Sweep(Findings):
+    """What a sweep found: success, comparisons, ranks, the worst members; as tables, files and words.
+
+    Attributes:
+        setup: what was run.
+        cells: its cells, cases times points of the grid, in order.
+        records: what their members showed.
+        conditions: what a member must fulfil to pass.
+        baseline: name of the case that others are compared with.
+        confidence: confidence level of all intervals.
+        interval: how intervals of probabilities are formed.
+    """
+
+    def save(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write table.csv, comparison.csv, ranking.csv, worst.csv, causes.csv, sweep.json and summary.md into a folder.
+
+        Args:
+            folder: of the files, made if needed.
+
+        Returns:
+            Paths of the files.
+
+        Raises:
+            OSError: they cannot be written.
+        """
+        target = Path(folder)
+        target.mkdir(parents=True, exist_ok=True)
+        comparison = [row.row() for row in against_baseline(self)]
+        tables = {
+            "table": self.rows(),
+            "comparison": comparison,
+            "ranking": self.ranking(),
+            "worst": self.worst(LISTED),
+        }
+        tables["causes"] = [{"case": cell.case.name, **cell.point, "of": of, **row} for cell in self.cells
+                            if not self.record(cell).refused for of in (SUCCESS, *self.metrics) if of != END
+                            for row in self.causes(cell.case.name, cell.point, of)]  # fmt: skip
+        files = [write_csv(rows, target / f"{name}.csv") for name, rows in tables.items()]
+        texts = {"sweep.json": json.dumps(finite_or_none(provenance(self)), indent=1), "summary.md": summary(self)}
+        for name, text in texts.items():
+            with durable.placed(target / name) as beside:
+                beside.write_text(text, encoding="utf-8")
+            files.append(target / name)
+        return files
+
+    def __str__(self) -> str:
+        """Return the sweep in words."""
+        return summary(self)
+
+
+def against_baseline(found: Findings) -> list[Compared]:
+    """Return the comparisons of all other cases with the baseline.
+
+    Args:
+        found: the sweep.
+    """
+    others = [case for case in found.cases if case != found.baseline]
+    rows = [row for case in others for row in found.compare(found.baseline, case)]
+    return found.corrected_for_number(rows)
+
+
+def provenance(found: Findings) -> dict[str, Any]:
+    """Return all that the sweep follows from, of plain types.
+
+    Args:
+        found: the sweep.
+    """
+    setup = found.setup
+    cells = [{"case": cell.case.name, "at": {name: _plain(value) for name, value in cell.point.items()}, "key": cell.key,
+              "fixed": list(cell.fixed), "refused": found.record(cell).refused, "messages": list(found.record(cell).messages)}
+             for cell in found.cells]  # fmt: skip
+    scene = setup.scene.to_dict()
+    scene.pop("ensemble", None)
+    metrics = {name: metric.to_dict() | {"unit": found.unit(name)} for name, metric in setup.metrics.items()}
+    return {"scene": scene, "ensemble": setup.members.to_dict(), "metrics": metrics, "success": found.conditions.to_dict(),
+            "baseline": found.baseline, "confidence": found.confidence, "interval": found.interval,
+            "settings": {name: _plain(value) for name, value in setup.settings.items()}, "cells": cells,
+            "versions": machine.versions()}  # fmt: skip
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, float) and not np.isfinite(value):
+        return str(value)
+    return value if isinstance(value, int | float | str | bool | list | None) else str(value)
+
+
+def percent(value: float) -> str:
+    """Return a fraction in percent, as text.
+
+    Args:
+        value: the fraction.
+    """
+    return f"{100.0 * value:.4g}"
+
+
+def summary(found: Findings) -> str:
+    """Return the sweep in words, as Markdown.
+
+    Args:
+        found: the sweep.
+    """
+    count, level = found.members_count, f"{found.confidence:.0%}"
+    lines = [
+        "# Sweep",
+        "",
+        f"{count:,} members, the same in {len(found.cells)} cells; intervals at {level}.",
+        "",
+        "## Success",
+        "",
+    ]
+    kind = found.setup.members.sampling.kind
+    if kind != "random":
+        lines += [f"Intervals are those of independent members, which a {kind} does not give: they need not fit.", ""]
+    lines += [f"- {_cell_text(found, cell)}" for cell in found.cells]
+    if len(found.cases) > 1:
+        lines += ["", "## Rank", ""]
+        for row in found.ranking():
+            better = f"; really better than {row['better_than']}" if row["better_than"] else ""
+            lines.append(f"{row['rank']}. {row['case']}: {percent(row['value'])} % "
+                         f"({percent(row['lower'])} to {percent(row['upper'])}){better}")  # fmt: skip
+        lines += ["", f"## Against {found.baseline}", ""]
+        # With a grid metrics would be too many for a page.
+        real = [row for row in against_baseline(found) if row.real and (row.of == SUCCESS or not found.setup.axes)]
+        lines += [f"- {_compared_text(found, row)}" for row in real] or ["- No difference of success is real."]
+        lines += ["", "comparison.csv has the differences of all metrics."]
+    lines += ["", "## What failures go with", ""]
+    lines += [text for cell in found.cells if (text := _causes_text(found, cell))] or [
+        "- With nothing that varies, as far as seen."
+    ]
+    lines += ["", "## Worst members", ""]
+    for row in found.worst(5):
+        at = ", ".join(f"{name} = {row[name]}" for name in found.setup.axes)
+        lines.append(f"- member {row['member']} of {row['case']}{' at ' + at if at else ''}, status {row['status']}")
+    return "\n".join(lines) + "\n"
+
+
+def _causes_text(found: Findings, cell: Any) -> str:
+    """The inputs that really explain success in a cell; "" for none."""
+    if found.record(cell).refused:
+        return ""
+    rows = [row for row in found.causes(cell.case.name, cell.point) if row["p"] < 1.0 - found.confidence]
+    texts = []
+    for row in rows[:3]:
+        medians = f"median {row['median_failed']:.4g} where it fails, {row['median_passed']:.4g} where it passes"
+        texts.append(f"{row['input']} (explains {percent(row['lower'])} to {percent(row['upper'])} %; {medians})")
+    return f"- {cell.name}: {'; '.join(texts)}" if texts else ""
+
+
+def _cell_text(found: Findings, cell: Any) -> str:
+    record = found.record(cell)
+    if record.refused:
+        return f"{cell.name}: refused: {record.refused}"
+    passed = found.passed(cell)
+    value, lower, upper = found.success(cell.case.name, cell.point)
+    counts = f"{int(passed.sum()):,} of {len(passed):,}, {percent(value)} %"
+    text = f"{cell.name}: passes {percent(lower)} to {percent(upper)} % ({counts})"
+    more = none_text(int(passed.sum()), len(passed), found.confidence)
+    return f"{text}; {more}" if more else text
+
+
+def _compared_text(found: Findings, row: Compared) -> str:
+    d, at = row.difference, ", ".join(f"{name} = {value}" for name, value in row.point.items())
+    where = f" at {at}" if at else ""
+    if row.of == SUCCESS:
+        word = "better" if d.value > 0.0 else "worse"
+        ends = sorted((abs(d.lower), abs(d.upper)))
+        seen = f"{row.only[1]:,} pass only there, {row.only[0]:,} only with {row.first}" if row.only else ""
+        points = f"{percent(ends[0])} to {percent(ends[1])} points"
+        return f"{row.second}{where}: {word} by {points}, seen on the same members ({seen})"
+    unit = "" if found.unit(row.of) == "1" else f" {found.unit(row.of)}"
+    return f"{row.second}{where}: {row.of} {d.value:+.4g}{unit} ({d.lower:+.4g} to {d.upper:+.4g}), from {row.values[0]:.4g}"

@@ -1,0 +1,341 @@
+"""What a sweep runs: cases, grid, members and metrics; its cells, and their settings."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common import machine
+from lgvi_warp.common.errors import Faults, SceneError, refusal
+from lgvi_warp.methods.saveat import SaveAt
+from lgvi_warp.runs.predict import Prediction, predict
+from lgvi_warp.runs.result import Result
+from lgvi_warp.runs.solve import solve
+from lgvi_warp.scene import variations
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.statistics import TYPES
+from lgvi_warp.statistics.base import Statistic, from_list
+from lgvi_warp.statistics.each import Each
+from lgvi_warp.statistics.functional import functional
+from lgvi_warp.statistics.metrics_of_actuators import TimeToFailure
+from lgvi_warp.statistics.then import Then
+from lgvi_warp.studies.sweeps.cases import Case, cases_of, ensemble_of, grid_of, known_names, points_of, with_numbers
+from lgvi_warp.studies.sweeps.record import Record, key_of
+
+# Most cells, cases times points of the grid, of a sweep.
+MOST_CELLS = 10_000
+# Name of the metric that every sweep has.
+END = "time_to_failure"
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What is to be run: cells and the settings of their runs.
+
+    Args:
+        scene: the sweep's scene.
+        cases: its cases.
+        axes: axes of the grid.
+        members: the members, of the sweep's own scene.
+        metrics: metrics by name, each with the number of every member.
+        settings: arguments of `solve`.
+        vary: distributions by name, those of numbers that only some cases have among them.
+    """
+
+    scene: Scene
+    cases: tuple[Case, ...]
+    axes: dict[str, list[Any]]
+    members: Ensemble
+    metrics: dict[str, Statistic]
+    settings: dict[str, Any]
+    vary: dict[Any, Any]
+
+    @property
+    def cells(self) -> list[tuple[Case, dict[str, Any]]]:
+        """Cases and points of the grid, in the order in which they are run."""
+        return [(case, point) for case in self.cases for point in points_of(self.axes)]
+
+    def fleet(self, case: Case, point: Mapping[str, Any]) -> tuple[Ensemble, list[str]]:
+        """Return the members of a cell.
+
+        Args:
+            case: the case.
+            point: the point of the grid.
+
+        Returns:
+            (members, names of what does not vary in this cell).
+
+        Raises:
+            SceneError: the case does not fit.
+        """
+        scene = with_numbers(case.of(self.scene), point)
+        numbers = {**case.set, **point}
+        if isinstance(case.vehicle, Mapping):
+            numbers |= {f"vehicle.{name}": value for name, value in case.vehicle.items()}
+        return ensemble_of(scene, numbers, self.vary, self.members)
+
+    def key(self, fleet: Ensemble) -> str:
+        """Return the key of a cell's record.
+
+        Args:
+            fleet: its members.
+        """
+        scene = fleet.scene.to_dict()
+        scene.pop("ensemble", None)
+        asked = [metric.to_dict() for metric in self.metrics.values()]
+        functions = [metric.of for metric in self.metrics.values() if callable(metric.of)]
+        versions = machine.versions()
+        return key_of({"scene": scene, "ensemble": fleet.to_dict(), "metrics": asked, "functions": functions,
+                       "settings": self.settings, "versions": versions})  # fmt: skip
+
+    def kept(self, fleet: Ensemble) -> dict[str, Any]:
+        """Return the arguments of `solve` for what a run keeps: metrics alone, all of them at looks.
+
+        Args:
+            fleet: members of a cell.
+        """
+        asked, controller = list(self.metrics.values()), fleet.scene.controller
+        # Metrics come to looks by themselves; expressions over the path are of the samples.
+        by_samples = controller is not None and not all(metric.looks for metric in asked)
+        save = SaveAt(every=float(controller.period) if by_samples else None, fields=())
+        return {"save": save, "statistics": asked, "keep": "none"}
+
+    def run(self, fleet: Ensemble, **more: Any) -> Record:
+        """Run a cell.
+
+        Args:
+            fleet: its members.
+            **more: further arguments of `solve`.
+
+        Raises:
+            SceneError: it is refused.
+        """
+        result = solve(fleet, until=False, **self.kept(fleet), **self.settings, **more)
+        numbers = {name: result.statistics[f"each {name}"].value[0, 0] for name in self.metrics}
+        return Record(np.asarray(result.status), numbers, tuple(result.messages))
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """A case at a point of the grid.
+
+    Args:
+        index: its place among all cells.
+        case: the case.
+        point: values by name.
+        key: that of its record.
+        fleet: its members; None where it was refused before there were any.
+        fixed: names of what varies in the sweep and not here.
+    """
+
+    index: int
+    case: Case
+    point: dict[str, Any]
+    key: str
+    fleet: Ensemble | None
+    fixed: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """The case and the point, as text."""
+        at = ", ".join(f"{name} = {value}" for name, value in self.point.items())
+        return f"{self.case.name} at {at}" if at else self.case.name
+
+
+def made(
+    scene: Any,
+    cases: Any,
+    grid: Any,
+    vary: Any,
+    members: Any,
+    seed: Any,
+    sampling: Any,
+    metrics: Any,
+    settings: Mapping[str, Any],
+) -> Setup:
+    """Return what a sweep would run; see `sweep` for the arguments.
+
+    Raises:
+        SceneError: arguments are at fault.
+    """
+    faults = Faults()
+    base, together = _given(scene, vary)
+    parts: dict[str, Any] = {"cases": (), "axes": {}, "metrics": {}}
+    for name, read, given in (("cases", cases_of, cases), ("axes", grid_of, grid), ("metrics", metrics_of, metrics)):
+        with faults.including():
+            parts[name] = read(given)
+    for name in ("save", "statistics", "keep", "until", "store", "only"):
+        if name in settings:
+            faults.add(name, "...", "is what a sweep decides", "leave it out")
+    faults.raise_if_any()
+    assert isinstance(base.scene, Scene)
+    whole = _fleet(base, members, seed, sampling, together, parts["cases"])
+    setup = Setup(base.scene, members=whole, settings=dict(settings), vary=together, **parts)
+    count = len(setup.cases) * int(np.prod([len(values) for values in setup.axes.values()], dtype=object))
+    if count > MOST_CELLS:
+        raise refusal(
+            "grid", f"{count:,} cells", _too_many(setup, count), f"give at most {MOST_CELLS:,} cells, or vary a number"
+        )
+    return setup
+
+
+def _too_many(setup: Setup, count: int) -> str:
+    """What is wrong with so many cells: the time that they would take."""
+    try:
+        one = _prediction(setup, None)
+    except SceneError:
+        return f"are {setup.members.members:,} members each"
+    return f"are {setup.members.members:,} members each and would take {_duration(one.advance * count)} on this machine"
+
+
+def _prediction(setup: Setup, threads: int | None) -> Prediction:
+    """What the first cell would take."""
+    fleet, _ = setup.fleet(setup.cases[0], {name: values[0] for name, values in setup.axes.items()})
+    return predict(fleet, threads=threads, **setup.kept(fleet), **setup.settings)
+
+
+def _duration(seconds: float) -> str:
+    for unit, size in (("years", 3.15e7), ("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
+        if seconds >= 2.0 * size:
+            return f"{seconds / size:.2g} {unit}"
+    return f"{seconds:.2g} s"
+
+
+def plan_text(setup: Setup, threads: int | None = None) -> str:
+    """Return what a sweep would take, as lines of text, from a trial of its first cell.
+
+    Args:
+        setup: the sweep.
+        threads: number of threads; None (default) for all cores.
+
+    Raises:
+        SceneError: the first cell is refused.
+    """
+    one, count = _prediction(setup, threads), len(setup.cells)
+    points = count // len(setup.cases)
+    lines = [f"cells       {count:,}: {len(setup.cases)} cases at {points:,} points of the grid",
+             f"members     {setup.members.members:,} of each, the same in all",
+             f"time        about {_duration((one.advance + one.set_up) * count)}, and {one.compile:.1f} s for each kernel",
+             f"memory      {one.memory / 1e6:,.0f} MB",
+             f"disk        {8 * len(setup.metrics) * setup.members.members * count / 1e6:,.1f} MB"]  # fmt: skip
+    return "\n".join(lines)
+
+
+def _fleet(
+    scene: Any, members: Any, seed: Any, sampling: Any, vary: Mapping[Any, Any], cases: Sequence[Case]
+) -> Ensemble:
+    """The members of the sweep, of its own scene; what of `vary` only some case has does not vary in it."""
+    own, known = scene.scene, known_names(scene.scene)
+    elsewhere = [name for name in vary if any(target.name not in known for target in variations.targets(name))]
+    if elsewhere:
+        others = set[str]()
+        for case in cases:
+            with contextlib.suppress(SceneError):  # the case will say so itself
+                others |= known_names(case.of(own))
+        elsewhere = [name for name in elsewhere if all(target.name in others for target in variations.targets(name))]
+    here = {name: distribution for name, distribution in vary.items() if name not in elsewhere}
+    return Ensemble(
+        own,
+        scene.members if members is None else members,
+        scene.seed if seed is None else seed,
+        here,
+        scene.sampling if sampling is None else sampling,
+    )
+
+
+def _given(scene: Any, vary: Any) -> tuple[Ensemble, dict[Any, Any]]:
+    """The ensemble that a sweep starts from, and all that varies."""
+    if isinstance(scene, str | os.PathLike):
+        scene = Scene.load(scene)
+    if isinstance(scene, Scene):
+        scene = Ensemble.from_scene(scene)
+    if not isinstance(scene, Ensemble):
+        raise refusal("scene", scene, "is neither a scene nor an ensemble", "give lw.Scene.load(path)")
+    if scene.explicit() or scene.to_dict().get("indices") is not None:
+        problem = "has members that were given or chosen one by one"
+        raise refusal("scene", "...", problem, "give an Ensemble that draws its members, or a table as its sampling")
+    if vary is not None and not isinstance(vary, Mapping):
+        raise refusal("vary", vary, "does not map names to distributions", 'give {"vehicle.mass": lw.Normal(...)}')
+    return scene, {**scene.vary, **(vary or {})}
+
+
+def metrics_of(given: Any) -> dict[str, Statistic]:
+    """Return metrics by name, each with the number of every member; "time_to_failure" is added.
+
+    Args:
+        given: a list of statistics of one number of each member, tables of them, "iae heading", or expressions over the path.
+
+    Raises:
+        SceneError: with every fault.
+    """
+    if isinstance(given, str | Mapping) or not isinstance(given, Sequence):
+        raise refusal("metrics", given, "is no list", 'give ["overshoot depth", lw.IAE("heading")]')
+    faults, metrics = Faults(), dict[str, Statistic]()
+    for i, entry in enumerate((*given, TimeToFailure())):
+        with faults.including():
+            name, metric = _metric(f"metrics[{i}]", entry)
+            if name in metrics and name != END:
+                faults.add(
+                    f"metrics[{i}]", name, "is the name of another metric", 'give it a name of its own: name="..."'
+                )
+            metrics.setdefault(name, metric)
+    faults.raise_if_any()
+    return metrics
+
+
+def _metric(key: str, entry: Any) -> tuple[str, Statistic]:
+    """Name and statistic of one metric."""
+    if isinstance(entry, str):
+        word, _, of = entry.partition(" ")
+        if word in TYPES:
+            entry = {"type": word, **({"of": of} if of else {})}
+        elif functional(key, entry).over_path:
+            label = functional(key, entry).label
+            return label, Each(label)
+        else:
+            remedy = 'give "overshoot depth", "iae heading" or "max(depth)"'
+            raise refusal(key, entry, "is not one number of each member", remedy)
+    (statistic,) = from_list([entry], key, whole=False)
+    if not isinstance(statistic, Then):
+        remedy = 'give a metric such as lw.Overshoot("depth"), or "max(depth)"'
+        raise refusal(key, statistic.type, "is no metric: it is not one number of each member", remedy)
+    if getattr(statistic, "of", None) is not None:
+        quantity = statistic.quantity
+        if quantity.size != 1 and len(statistic.then_of(np.array([0.0, 1.0]))[0].quantity.labels) != 1:
+            raise refusal(key, statistic.key, f"is {quantity.size} numbers of each member", "give one component")
+    return statistic.key, replace(statistic, then=(Each(),))
+
+
+def again(setup: Setup, cell: Cell, indices: Sequence[int], save: SaveAt | None, threads: int | None) -> Result:
+    """Run some members of a cell alone, with the bits that they had in it.
+
+    Args:
+        setup: the sweep.
+        cell: the cell.
+        indices: the members.
+        save: what to save of them, and when; None: as the scene says.
+        threads: number of threads; None for all cores.
+
+    Raises:
+        SceneError: the cell was refused, or has no such members.
+    """
+    from lgvi_warp.engine.keepers.observation import Observation
+    from lgvi_warp.runs.run import again as run_again
+    from lgvi_warp.runs.settle import fields_of, make_plan
+
+    if cell.fleet is None:
+        raise refusal("case", cell.name, "was refused", "run a member of another one")
+    fields = fields_of(save, cell.fleet.scene.run)
+    settings = {name: value for name, value in setup.settings.items() if name != "checks"}
+    observed = Observation((*setup.metrics.values(),), tuple(int(i) for i in indices))
+    plan = make_plan(cell.fleet, save=save, **settings, checks=setup.settings.get("checks"), fields=lambda asked: tuple(
+        dict.fromkeys((*observed.fields(asked), *asked))))  # fmt: skip
+    _, result = run_again(plan, observed, np.zeros(cell.fleet.members, np.uint8), fields, threads)
+    assert result is not None
+    return result

@@ -1,0 +1,143 @@
+"""Success of a member: conditions on how it ended and on its metrics, and the probability of it with its interval."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, SceneError, closest, refusal
+from lgvi_warp.common.status import Status, failed
+from lgvi_warp.statistics import intervals
+
+# Words for how a member ended, beside the names of statuses: at the end of the run; there or stopped by an event.
+OK, NOT_FAILED = "ok", "not_failed"
+# Ways to form the interval of a probability.
+INTERVALS = ("wilson", "clopper_pearson")
+
+
+class Probability(NamedTuple):
+    """A probability with its interval.
+
+    Args:
+        value: the fraction of the members.
+        lower: lower end of the interval.
+        upper: upper end of the interval.
+    """
+
+    value: float
+    lower: float
+    upper: float
+
+
+def probability(hits: int, count: int, confidence: float, interval: str) -> Probability:
+    """Return the probability that some of the members show.
+
+    Args:
+        hits: number of members that do.
+        count: number of all members.
+        confidence: confidence level, between 0 and 1.
+        interval: one of `INTERVALS`.
+    """
+    if interval == "wilson":
+        ends = intervals.wilson(np.array(hits / max(count, 1)), np.array(count), confidence)
+    else:
+        ends = intervals.clopper_pearson(np.array(hits), np.array(count), confidence)
+    return Probability(hits / count if count else np.nan, float(ends[0]), float(ends[1]))
+
+
+def none_text(hits: int, count: int, confidence: float) -> str:
+    """Return what is known where all members passed, or none: a one-sided limit. "" where some did.
+
+    Args:
+        hits: number of members that passed.
+        count: number of all members.
+        confidence: confidence level, between 0 and 1.
+    """
+    if not count or 0 < hits < count:
+        return ""
+    what = "fails" if hits else "passes"
+    return f"none of {count:,} {what}: at most {100.0 * intervals.none_of(count, confidence):.3g} % do, at {confidence:.0%}"
+
+
+@dataclass(frozen=True)
+class Success:
+    """Conditions that a member must fulfil, all of them. A number that is NaN fulfils none; one that failed never passes.
+
+    Args:
+        status: how a member must end: "ok" (the default: neither failed nor stopped), "not_failed", or the name of a status
+            such as "floor"; or several of these, of which one must hold.
+        limits: name of a metric -> (above, below): the metric lies above the one and below the other.
+    """
+
+    status: tuple[str, ...] = (OK,)
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def passed(self, status: np.ndarray, numbers: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Return which members pass, (n,).
+
+        Args:
+            status: (n,), of `Status`.
+            numbers: metrics by name, (n,).
+        """
+        ended = np.zeros(len(status), bool)
+        for word in self.status:
+            ended |= {OK: status == 0, NOT_FAILED: ~failed(status)}.get(
+                word, status == Status.__members__.get(word.upper(), 0)
+            )
+        for name, (above, below) in self.limits.items():
+            ended &= (numbers[name] > above) & (numbers[name] < below)
+        return ended & ~failed(status)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the table of a sweep file that gives these conditions."""
+        limits = {
+            name: {word: value for word, value in zip(("above", "below"), ends, strict=True) if np.isfinite(value)}
+            for name, ends in self.limits.items()
+        }
+        return {"status": self.status[0] if len(self.status) == 1 else list(self.status), **limits}
+
+
+def success_of(given: Any, metrics: Sequence[str]) -> Success:
+    """Return the conditions of a table.
+
+    Args:
+        given: a `Success`, or {"status": "ok", "overshoot depth": {"below": 1.0}}; None for "ok" alone.
+        metrics: names of the sweep's metrics.
+
+    Raises:
+        SceneError: with every fault.
+    """
+    if given is None:
+        return Success()
+    if isinstance(given, Success):
+        given = given.to_dict()
+    if not isinstance(given, Mapping):
+        raise refusal("success", given, "is no table", 'write [success] and "overshoot depth" = { below = 1.0 } below')
+    faults = Faults("success.")
+    words = given.get("status", OK)
+    statuses = (words,) if isinstance(words, str) else tuple(words) if isinstance(words, list | tuple) else (words,)
+    known = (OK, NOT_FAILED, *(status.name.lower() for status in Status if status.stopped))
+    for word in statuses:
+        faults.choice("status", word, known)
+    limits: dict[str, tuple[float, float]] = {}
+    for name, table in given.items():
+        if name == "status":
+            continue
+        if name not in metrics:
+            remedy = closest(name, metrics) if metrics else "give metrics=[...]"
+            faults.add(f'"{name}"', "...", "is no metric of this sweep", remedy)
+        elif not isinstance(table, Mapping) or not table or not table.keys() <= {"above", "below"}:
+            faults.add(f'"{name}"', table, "is no condition", "write { below = 1.0 } or { above = 0.0, below = 1.0 }")
+        else:
+            ends = [faults.number(f'"{name}".{word}', table[word], "unit of the metric") if word in table else end
+                    for word, end in (("above", -np.inf), ("below", np.inf))]  # fmt: skip
+            if not any(end is None for end in ends):
+                limits[name] = (float(ends[0]), float(ends[1]))  # type: ignore[arg-type]
+    faults.raise_if_any()
+    return Success(statuses, limits)
+
+
+__all__ = ["INTERVALS", "Probability", "SceneError", "Success", "none_text", "probability", "success_of"]

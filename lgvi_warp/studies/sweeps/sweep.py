@@ -1,0 +1,117 @@
+"""`sweep`: cases of a closed loop at all points of a grid, on the same members."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.studies.sweeps.output import Sweep
+from lgvi_warp.studies.sweeps.record import Record, Records
+from lgvi_warp.studies.sweeps.setup import Cell, Setup, made
+from lgvi_warp.studies.sweeps.success import INTERVALS, success_of
+
+
+@shows_progress
+def sweep(
+    scene: Scene | Ensemble | str | os.PathLike[str],
+    cases: Any = None,
+    grid: Mapping[str, Any] | None = None,
+    *,
+    vary: Mapping[str, Any] | None = None,
+    members: int | None = None,
+    seed: int | None = None,
+    sampling: Any = None,
+    metrics: Sequence[Any] = (),
+    success: Any = None,
+    baseline: str | None = None,
+    confidence: float = 0.95,
+    interval: str = "wilson",
+    out: str | os.PathLike[str] | None = None,
+    threads: int | None = None,
+    executor: Any = "threads",
+    scheduler: str | None = None,
+    progress: Callable[[float], None] | bool | None = None,
+    **settings: Any,
+) -> Sweep:
+    """Run cases at all points of a grid on the same members, and say what holds and which case is better.
+
+    All cells have the same vehicles, starts, seas, sensor noise and faults: what is drawn depends on seed, member and name
+    alone. What a case sets does not vary in it; so does what it does not have. Cells that differ in numbers share a kernel. A
+    case that is refused or does not compile is noted, and the others go on.
+
+    In memory are the numbers of one cell at a time with `out`, 8 bytes for each member and metric; without it, of all cells.
+
+    Args:
+        scene: The scene, the path of a scene file, or an Ensemble whose scene, members, seed, vary and sampling are taken.
+        cases: Tables of `name`, `set` (numbers by name), `replace` (lists of parts, such as "laws"), `vehicle` (another one,
+            or numbers of it) and `scene` (another one); or {name: numbers that it sets}. Default: the scene alone.
+        grid: Name of a number -> its values: every case is run at all combinations. By default no grid.
+        vary: Distributions beside those of the scene, as for Ensemble; they replace those of the same name.
+        members: Number of members of every cell; default those of the scene.
+        seed: Seed of the members; default that of the scene.
+        sampling: As for Ensemble; default that of the scene.
+        metrics: One number of each member: lw.Overshoot("depth"), a table {"type": "iae", "of": "heading"}, "iae heading", or
+            an expression over the path, "max(norm(demand))". "time_to_failure" is always among them.
+        success: What a member must fulfil: {"status": "ok", "overshoot depth": {"below": 1.0}}. Default: reach the end.
+        baseline: Name of the case that others are compared with; default the first one.
+        confidence: Confidence level of all intervals, between 0 and 1; by default 0.95.
+        interval: Of probabilities: "wilson" (default) or "clopper_pearson".
+        out: Folder. What is finished is kept there, so that the same call goes on after a stop, with the same bytes; cells
+            whose numbers, metrics or settings have changed run anew.
+        threads: As of solve.
+        executor: As of solve.
+        scheduler: As of solve.
+        progress: As of solve.
+        **settings: Further arguments of solve, such as method, h, t1, dtype.
+
+    Returns:
+        What was found.
+
+    Raises:
+        SceneError: If arguments are at fault; the message names every fault.
+        OSError: If the folder cannot be written.
+    """
+    setup = made(scene, cases, grid, vary, members, seed, sampling, metrics, settings)
+    faults = Faults()
+    level = faults.number("confidence", confidence, "1")
+    if level is not None and not 0.0 < level < 1.0:
+        faults.add("confidence", confidence, "is not between 0 and 1", "give 0.95")
+    faults.choice("interval", interval, INTERVALS)
+    baseline = setup.cases[0].name if baseline is None else baseline
+    faults.choice("baseline", baseline, [case.name for case in setup.cases])
+    conditions = None
+    with faults.including():
+        conditions = success_of(success, tuple(setup.metrics))
+    faults.raise_if_any()
+    assert conditions is not None
+    records = Records(None if out is None else Path(out))
+    cells = list(_run(setup, records, threads, executor, scheduler, callback(progress)))
+    return Sweep(setup, cells, records, conditions, baseline, float(confidence), interval)
+
+
+def _run(
+    setup: Setup, records: Records, threads: int | None, executor: Any, scheduler: str | None, progress: Any
+) -> Iterator[Cell]:
+    """Run the cells that are not recorded yet, and note those that are refused."""
+    total = len(setup.cells)
+    for i, (case, point) in enumerate(setup.cells):
+        share = progress and (lambda part, i=i: progress((i + part) / total))
+        fleet, key, fixed = None, f"refused {i}", list[str]()
+        try:
+            fleet, fixed = setup.fleet(case, point)
+            key = setup.key(fleet)
+            if records.get(key) is None:
+                records.put(
+                    key, setup.run(fleet, threads=threads, executor=executor, scheduler=scheduler, progress=share)
+                )
+        except SceneError as error:
+            records.put(key, Record.of_refusal(" ".join(str(error).split())))
+        if share:
+            share(1.0)
+        yield Cell(i, case, point, key, fleet, tuple(fixed))

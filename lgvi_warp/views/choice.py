@@ -1,0 +1,213 @@
+"""What of a run is shown: which members are drawn, at which times, and which members quantiles are taken of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import NothingToDraw
+from lgvi_warp.common.status import Status, under_way
+from lgvi_warp.runs.outcomes import outcomes
+
+if TYPE_CHECKING:
+    from lgvi_warp.runs.result import Result
+
+# More bodies than this cannot be told apart in a window, and cost time and file size.
+MOST_BODIES = 1000
+# Most times that are drawn.
+MOST_FRAMES = 240
+# Most members that quantiles are taken of: their error is then below 0.4 % of the members.
+MOST_RANKED = 20_000
+# Most states of members that are read at once, at all times together.
+AT_ONCE = 2_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What a picture or a recording shows of a run.
+
+    Attributes:
+        members: Indices of the members that are drawn, rising, shape (m,).
+        frames: Indices of the samples that are drawn, rising, shape (f,); the first and the last are among them.
+        ranked: Indices of the members that quantiles are taken of, rising, shape (q,).
+        total: Number of members of the result.
+    """
+
+    members: np.ndarray
+    frames: np.ndarray
+    ranked: np.ndarray
+    total: int
+
+    @property
+    def text(self) -> str:
+        """How many members are drawn of how many, as "1,000 of 100,000 members"."""
+        return of_members(len(self.members), self.total)
+
+
+def of_members(count: int, total: int) -> str:
+    """Say how many members of how many.
+
+    Args:
+        count: Number of members.
+        total: Number that they are taken from.
+
+    Returns:
+        "1,000 of 100,000 members"; "1 member" and "7 members" where these are all.
+    """
+    if count < total:
+        return f"{count:,} of {total:,} members"
+    return f"{total:,} member{'s' * (total != 1)}"
+
+
+def shown(result: Result, most: int = MOST_BODIES) -> Shown:
+    """Choose what is shown of a run; every picture and recording that draws some members follows this rule.
+
+    Drawn are the members that reach farthest along each axis; then of those that did not end ok up to a third of the places,
+    shared among the outcomes; then members in the order of a hash of their index. The hash is as fair for grids, tables and
+    Sobol points as for random draws, and the same run always gives the same choice. Times are even, at most 240.
+    Quantiles are taken of all members up to 20,000, and of that many beyond, by the same hash.
+
+    Args:
+        result: A result with positions, in memory or in a store.
+        most: The most members to draw.
+
+    Returns:
+        Members and times.
+
+    Raises:
+        NothingToDraw: No samples were kept, or no member has a finite start.
+        ValueError: most is below 1.
+    """
+    if most < 1:
+        raise ValueError(f"most = {most}: draws no member; give a number from 1")
+    if "position" not in result.samples:
+        raise NothingToDraw(
+            'no positions were kept: there is nothing to draw; give keep="all", or indices of members to keep'
+        )
+    frames = frames_of(result.time)
+    finite, farthest = _survey(result, frames)
+    if not finite.any():
+        raise NothingToDraw("no member has a finite start: there is nothing to draw; see result.status")
+    rank = np.argsort(mixed(np.arange(result.members)), kind="stable")
+    rank = rank[finite[rank]]
+    first = list(dict.fromkeys([*farthest, *_ended(result, rank, most // 3), *rank.tolist()]))
+    return Shown(np.sort(first[:most]), frames, np.sort(rank[:MOST_RANKED]), result.members)
+
+
+def frames_of(time: np.ndarray, most: int = MOST_FRAMES) -> np.ndarray:
+    """Choose samples that are even in time.
+
+    Args:
+        time: Times of the samples [s], rising, shape (k,).
+        most: The most samples to choose.
+
+    Returns:
+        Indices, rising, the first and the last sample among them; all where there are no more.
+    """
+    if len(time) <= most:
+        return np.arange(len(time))
+    wanted = np.linspace(time[0], time[-1], most)
+    after = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
+    nearer = wanted - time[after - 1] < time[after] - wanted
+    return np.unique(np.where(nearer, after - 1, after))
+
+
+def mixed(index: np.ndarray) -> np.ndarray:
+    """Hash whole numbers so that neighbours are far apart: the finalizer of SplitMix64.
+
+    Steele, Lea & Flood 2014, Fast splittable pseudorandom number generators, OOPSLA.
+
+    Args:
+        index: Whole numbers from 0, shape (n,).
+
+    Returns:
+        uint64, shape (n,); different for different numbers.
+    """
+    z = (index.astype(np.uint64) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15)
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return z ^ (z >> np.uint64(31))
+
+
+def pieces(result: Result, fields: tuple[str, ...]) -> Iterator[tuple[slice, Mapping[str, np.ndarray]]]:
+    """Read samples of successive members, so that a large run in a store never lies in memory whole.
+
+    Args:
+        result: The result.
+        fields: Names of the samples to read.
+
+    Yields:
+        Pairs (members, samples): a slice of the members, and their samples by name, shape (k, members, ...).
+    """
+    many = max(1, AT_ONCE // len(result.time))
+    for first in range(0, result.members, many):
+        members = slice(first, min(first + many, result.members))
+        yield members, samples_of(result, fields, members)
+
+
+def samples_of(
+    result: Result, fields: tuple[str, ...], members: slice | np.ndarray, frames: np.ndarray | None = None
+) -> dict[str, np.ndarray]:
+    """Read samples of some members.
+
+    Args:
+        result: The result.
+        fields: Names of the samples.
+        members: The members.
+        frames: Indices of the samples' times; default None, all.
+
+    Returns:
+        Samples by name, shape (k, members, ...); views where the result is in memory, members are a slice and times are all.
+    """
+    at: Any = slice(None) if frames is None else frames
+    if result.store is not None:
+        stored = result.samples.part(members)  # type: ignore[attr-defined]
+        return {name: stored[name][at] for name in fields}
+    index = (at, members) if frames is None or isinstance(members, slice) else np.ix_(frames, members)
+    return {name: result.samples[name][index] for name in fields}
+
+
+def _survey(result: Result, frames: np.ndarray) -> tuple[np.ndarray, list[int]]:
+    """Mask (n,) of the members with a finite start, and the members that reach farthest along each axis while under way."""
+    finite = np.empty(result.members, bool)
+    best: dict[tuple[int, int], tuple[float, int]] = {}
+    counted = under_way(result)[frames]
+    for members, samples in pieces(result, ("position",)):
+        position = samples["position"] if len(frames) == len(result.time) else samples["position"][frames]
+        whole = finite_rows(position)
+        finite[members] = whole[0]
+        for axis in range(3):
+            values = np.where(counted[:, members] & whole, position[..., axis], np.nan)
+            for sign, extremes in ((-1, -np.fmin.reduce(values, axis=0)), (1, np.fmax.reduce(values, axis=0))):
+                i = int(np.where(np.isnan(extremes), -np.inf, extremes).argmax())
+                if extremes[i] > best.get((axis, sign), (-np.inf, 0))[0]:
+                    best[axis, sign] = float(extremes[i]), members.start + i
+    return finite, [member for _, member in best.values() if finite[member]]
+
+
+def finite_rows(vectors: np.ndarray) -> np.ndarray:
+    """Tell which vectors are finite.
+
+    Args:
+        vectors: Numbers, shape (..., 3).
+
+    Returns:
+        Mask (...).
+    """
+    # One sum and one test: reducing a short axis takes several times as long.
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.isfinite(0.0 * vectors[..., 0] + 0.0 * vectors[..., 1] + 0.0 * vectors[..., 2])
+
+
+def _ended(result: Result, rank: np.ndarray, places: int) -> list[int]:
+    """Members that did not end ok, at most as many as the places, which the outcomes share as evenly as they can."""
+    status = np.asarray(result.status)[rank]
+    groups = [rank[status == code] for code in outcomes(result) if code != Status.OK]
+    chosen: list[int] = []
+    for i, group in enumerate(groups := sorted(groups, key=len)):
+        share = -(-(places - len(chosen)) // (len(groups) - i))
+        chosen += group[:share].tolist()
+    return chosen

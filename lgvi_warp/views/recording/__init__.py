@@ -1,0 +1,1 @@
+"""The parts of a recording: what is drawn of a run, the world, the graphs, the words, and their layout."""

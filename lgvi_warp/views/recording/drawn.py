@@ -1,0 +1,362 @@
+"""What is drawn of one run: poses of the members shown at the times shown, and curves of all members."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import NothingToDraw, refusal
+from lgvi_warp.common.status import Status, stop_time, under_way
+from lgvi_warp.physics import notation
+from lgvi_warp.physics.control.signals import CHANNELS
+from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.runs import member_fields
+from lgvi_warp.runs.outcomes import outcomes
+from lgvi_warp.views.choice import Shown, finite_rows, pieces, samples_of, shown
+from lgvi_warp.views.fleet import LOOKS, energy_curve
+
+if TYPE_CHECKING:
+    from lgvi_warp.runs.result import Result
+
+NEEDED = ("position", "attitude", "velocity")
+# Levels of a fan: smallest, largest, and quantiles between.
+LEVELS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+# Levels of the spread along each axis of the covariance, as those of two standard deviations of a normal distribution.
+SPREAD = (0.025, 0.975)
+
+
+@dataclass(frozen=True, eq=False)
+class Fan:
+    """Quantiles of one number against time, over the members under way.
+
+    Attributes:
+        name: Name of its entity, as "height".
+        title: Name and unit in words.
+        unit: Unit.
+        levels: Values at LEVELS, shape (7, f); NaN at times when no member is under way.
+    """
+
+    name: str
+    title: str
+    unit: str
+    levels: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """Ellipsoids that hold the members under way, on the axes of their covariance.
+
+    Attributes:
+        at: Indices of the frames that have one, shape (e,).
+        center: Centres, shape (e, 3) [m].
+        half: Half sizes along the axes, shape (e, 3) [m].
+        axes: Axes as columns, a rotation each, shape (e, 3, 3).
+    """
+
+    at: np.ndarray
+    center: np.ndarray
+    half: np.ndarray
+    axes: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """What is drawn of one run.
+
+    Attributes:
+        result: The whole result, whose outcomes are told.
+        choice: Which members and times are drawn.
+        few: The members drawn at the times drawn, in memory.
+        label: Name of the run among those that are compared; "" for a single one.
+        rgb: Colour of the run among those that are compared; None for colours by outcome.
+        counted: Which of the members drawn are under way at each time, shape (f, m).
+        shares: Share of all members by status at each time, shape (f,) each; OK for those under way.
+        fans: Curves of the members under way.
+        spread: Where they are.
+        bins: Edges of the depths' histogram [m], shape (b + 1,).
+        heights: Members under way in each bin at each time, of those that quantiles are taken of, shape (f, b).
+        above: Members that pass above depth 0, of all.
+    """
+
+    result: Result
+    choice: Shown
+    few: Result
+    label: str
+    rgb: tuple[int, int, int] | None
+    counted: np.ndarray
+    shares: dict[Status, np.ndarray]
+    fans: tuple[Fan, ...]
+    spread: Spread
+    bins: np.ndarray
+    heights: np.ndarray
+    above: int
+
+    @property
+    def time(self) -> np.ndarray:
+        """Times drawn [s], shape (f,)."""
+        return self.few.time
+
+    @property
+    def position(self) -> np.ndarray:
+        """Positions drawn [m], float32, shape (f, m, 3)."""
+        return self.few.position.astype(np.float32)
+
+    def color(self, code: Status) -> tuple[int, int, int]:
+        """Choose the colour of members.
+
+        Args:
+            code: Their outcome; OK while they are under way.
+
+        Returns:
+            The run's colour where runs are compared, else the outcome's, 0 to 255 each.
+        """
+        return self.rgb or LOOKS[code].rgb
+
+    def path(self, head: str, *parts: str) -> str:
+        """Name an entity of this run.
+
+        Args:
+            head: First parts of its name, as "curves/height".
+            *parts: The others.
+
+        Returns:
+            A path; where runs are compared, with the run's label after the head.
+        """
+        import rerun as rr
+
+        return str(rr.new_entity_path([*head.split("/"), *([self.label] if self.label else []), *parts]))
+
+    def groups(self) -> list[tuple[Status, np.ndarray]]:
+        """Divide the members drawn by what became of them until each time.
+
+        Returns:
+            Pairs of a status and a mask (f, m); OK for those under way.
+        """
+        status = np.asarray(self.few.status)
+        whole = finite_rows(self.few.position)
+        ended = ((code, whole & ~self.counted & (status == code)) for code in outcomes(self.few) if code)
+        return [(Status.OK, whole & self.counted), *ended]
+
+
+def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[int, int, int] | None = None) -> Drawn:
+    """Read what is drawn of a run.
+
+    Args:
+        result: The run; where it kept samples of some members only, these are drawn.
+        members: Indices of the members to draw; default those of `lgvi_warp.shown`.
+        label: Name of the run among those that are compared; default "", a single one.
+        rgb: Its colour among them; default None.
+
+    Returns:
+        What is drawn.
+
+    Raises:
+        NothingToDraw: No samples were kept, or no member has a finite start.
+        SceneError: There are no such members.
+    """
+    if not result.samples and result.kept is not None:
+        result = result.kept
+    if missing := [name for name in NEEDED if result.samples and name not in result.samples]:
+        names = ", ".join(missing)
+        raise NothingToDraw(f"{names} were not kept: a recording needs them; add them to SaveAt(fields=...)")
+    choice = shown(result)
+    if members is not None:
+        choice = dataclasses.replace(choice, members=_of(members, result.members))
+    few = _few(result, choice)
+    counted = under_way(few)
+    fans, ranked, above = _survey(result, choice, _directions(few, counted))
+    position, count = ranked["position"], ranked["counted"]
+    energy = energy_curve(few) if set(FIELDS) <= set(few.samples) else None
+    if energy is not None and np.isfinite(energy.values).any():
+        levels = at_levels(energy.values, counted, LEVELS)
+        fans = (*fans, Fan("energy", f"{energy.label} of the {choice.text} drawn", "J", levels))
+    depth = np.where(count, position[..., 2], np.nan)
+    low, high = fans[0].levels[[-1, 0]] * -1.0
+    bins = np.linspace(*_range(low, high), 41)
+    heights = np.stack([np.histogram(row[np.isfinite(row)], bins)[0] for row in depth])
+    shares = _shares(result, choice.frames)
+    spread = _spread(position, count)
+    return Drawn(result, choice, few, label, rgb, counted, shares, fans, spread, bins, heights, above)
+
+
+def _of(members: Any, total: int) -> np.ndarray:
+    """The user's indices of members, rising, each once; SceneError where there are no such members."""
+    indices = np.asarray(members)
+    if indices.ndim != 1 or not indices.size or indices.dtype.kind not in "iu":
+        raise refusal("members", members, "is no list of members", "give indices: members=[3, 17]")
+    for index in (indices.min(), indices.max()):
+        if not 0 <= index < total:
+            raise refusal(
+                "members", int(index), f"is none of the {total:,} members", f"give indices from 0 to {total - 1}"
+            )
+    return np.unique(indices)
+
+
+def _few(result: Result, choice: Shown) -> Result:
+    """The members drawn at the times drawn, in memory."""
+    fields = tuple(name for name in (*FIELDS, *CHANNELS) if name in result.samples)
+    samples = samples_of(result, fields, choice.members, choice.frames)
+    of_members = {item.name: getattr(result, item.name)[choice.members] for item in member_fields.EVERY}
+    parameters = {
+        name: values[choice.members] if len(values) > 1 else values for name, values in result.parameters.items()
+    }
+    time = result.time[choice.frames]
+    return dataclasses.replace(
+        result, time=time, samples=samples, parameters=parameters, store=None, kept=None, **of_members
+    )
+
+
+def roll_pitch_heading(attitude: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Compute angles of attitudes.
+
+    Args:
+        attitude: Rotations from body to inertial axes, shape (..., 3, 3).
+
+    Returns:
+        Roll, pitch and heading [deg], float32, shape (...) each.
+    """
+    part = {place: attitude[..., *place].astype(np.float32) for place in ((0, 0), (1, 0), (2, 0), (2, 1), (2, 2))}
+    roll = np.degrees(np.arctan2(part[2, 1], part[2, 2]))
+    pitch = np.degrees(np.arcsin(np.clip(-part[2, 0], -1.0, 1.0)))
+    return roll, pitch, np.degrees(np.arctan2(part[1, 0], part[0, 0]))
+
+
+def _directions(few: Result, counted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean directions [deg] of roll and heading, shape (f, 1) each, continuous in time: angles are taken about them."""
+    directions = []
+    for angle in roll_pitch_heading(few.attitude)[::2]:
+        arm = np.where(counted & np.isfinite(angle), np.exp(1j * np.radians(angle)), 0.0).sum(axis=1)
+        directions.append(np.degrees(np.unwrap(np.angle(arm)))[:, None].astype(np.float32))
+    return directions[0], directions[1]
+
+
+def _about(angle: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Angles [deg] within half a turn of a direction."""
+    off = angle - direction
+    return np.asarray(direction + off - np.float32(360.0) * np.round(off / np.float32(360.0)))
+
+
+# Name, title and unit of the curves of all members.
+CURVES = (
+    ("height", "Height [m], 0 is the surface", "m"),
+    ("roll", "Roll [deg]", "deg"),
+    ("pitch", "Pitch [deg]", "deg"),
+    ("heading", "Heading [deg], from north to east", "deg"),
+    ("speed", "Speed [m/s]", "m/s"),
+)
+
+
+def _survey(
+    result: Result, choice: Shown, directions: tuple[np.ndarray, np.ndarray]
+) -> tuple[tuple[Fan, ...], dict[str, np.ndarray], int]:
+    """Fans of all members: extremes of all, quantiles of those ranked. Positions of these, and how many rise above depth 0."""
+    frames, counted = choice.frames, under_way(result)[choice.frames]
+    low, high = (np.full((len(CURVES), len(frames)), np.nan, np.float32) for _ in range(2))
+    rows: list[list[np.ndarray]] = [[] for _ in CURVES]
+    positions, counts, above = [], [], 0
+    for members, samples in pieces(result, NEEDED):
+        at = {name: values[frames] if len(frames) < len(result.time) else values for name, values in samples.items()}
+        # A path that is not finite any more counts as little as one that has ended.
+        position = at["position"].astype(np.float32)
+        counts_here = counted[:, members] & finite_rows(position)
+        roll, pitch, heading = roll_pitch_heading(at["attitude"])
+        speed = np.sqrt(sum(np.square(at["velocity"][..., axis], dtype=np.float32) for axis in range(3)))
+        values = (-position[..., 2], _about(roll, directions[0]), pitch, _about(heading, directions[1]), speed)
+        above += int(np.count_nonzero(np.logical_or.reduce(counts_here & (position[..., 2] < 0.0), axis=0)))
+        ranked = choice.ranked[(choice.ranked >= members.start) & (choice.ranked < members.stop)] - members.start
+        for i, value in enumerate(values):
+            masked = np.where(counts_here, value, np.float32(np.nan))
+            low[i] = np.fmin(low[i], np.fmin.reduce(masked, axis=1))
+            high[i] = np.fmax(high[i], np.fmax.reduce(masked, axis=1))
+            rows[i].append(value[:, ranked])
+        positions.append(position[:, ranked])
+        counts.append(counts_here[:, ranked])
+    count = np.concatenate(counts, axis=1)
+    fans = []
+    for i, curve in enumerate(CURVES):
+        levels = at_levels(np.concatenate(rows[i], axis=1), count, LEVELS)
+        levels[0], levels[-1] = low[i], high[i]
+        fans.append(Fan(*curve, levels))
+    return tuple(fans), {"position": np.concatenate(positions, axis=1), "counted": count}, above
+
+
+def at_levels(values: np.ndarray, counted: np.ndarray, levels: Sequence[float]) -> np.ndarray:
+    """Quantiles over the members that count at each time, linear between neighbours.
+
+    Args:
+        values: Numbers of the members, shape (f, n).
+        counted: Mask (f, n) of the members that count; a value that is not finite never does.
+        levels: m numbers from 0 to 1.
+
+    Returns:
+        Quantiles, float64, shape (m, f); NaN at times when no member counts.
+    """
+    ranked = np.sort(np.where(counted & np.isfinite(values), values, np.inf), axis=1)
+    counts = np.isfinite(ranked).sum(axis=1)
+    place = np.multiply.outer(np.asarray(levels), np.maximum(counts - 1, 0))
+    below = place.astype(int)
+    above = np.minimum(below + 1, np.maximum(counts - 1, 0))
+    row = np.arange(len(values))
+    lower, upper = ranked[row, below].astype(np.float64), ranked[row, above].astype(np.float64)
+    with np.errstate(invalid="ignore"):
+        return np.where(counts > 0, lower + (place - below) * (upper - lower), np.nan)
+
+
+def _spread(position: np.ndarray, counted: np.ndarray) -> Spread:
+    """Ellipsoids of the members under way, wherever there are four: half sizes from quantiles along the covariance's axes."""
+    at = np.flatnonzero(counted.sum(axis=1) >= 4)
+    center, half, axes = np.empty((len(at), 3)), np.empty((len(at), 3)), np.empty((len(at), 3, 3))
+    for i, k in enumerate(at):
+        points = position[k, counted[k]]
+        mean = points.mean(axis=0, dtype=np.float64)
+        points = points - mean.astype(np.float32)
+        _, turn = np.linalg.eigh(points.T @ points)
+        turn[:, 0] *= np.sign(np.linalg.det(turn))
+        low, high = at_levels((points @ turn).T, np.ones((3, len(points)), bool), SPREAD)
+        center[i], half[i], axes[i] = mean + turn @ (0.5 * (low + high)), 0.5 * (high - low), turn
+    return Spread(at, center, half, axes)
+
+
+def _shares(result: Result, frames: np.ndarray) -> dict[Status, np.ndarray]:
+    """Share of all members under way at each time, as OK, and of those that ended, by outcome."""
+    counted = under_way(result)[frames]
+    status = np.asarray(result.status)
+    ended = {code: (~counted[:, status == code]).sum(axis=1) for code in outcomes(result) if code}
+    return {code: sums / result.members for code, sums in ({Status.OK: counted.sum(axis=1)} | ended).items()}
+
+
+def _range(low: np.ndarray, high: np.ndarray) -> tuple[float, float]:
+    """Limits of a histogram: those of all times, at least a little apart."""
+    finite = np.isfinite(low)
+    first, last = (float(low[finite].min()), float(high[finite].max())) if finite.any() else (0.0, 1.0)
+    wide = max(last - first, 1e-3 * max(abs(first), abs(last)), 1e-6)
+    return first - 0.01 * wide, last + 0.01 * wide
+
+
+def first_ended(result: Result, code: Status) -> float:
+    """When the first member ended so.
+
+    Args:
+        result: The result.
+        code: A status that some member has, other than OK.
+
+    Returns:
+        Time [s].
+    """
+    return float(stop_time(result)[np.asarray(result.status) == code].min())
+
+
+def quaternion_xyzw(attitude: np.ndarray) -> np.ndarray:
+    """Quaternions as the viewer takes them.
+
+    Args:
+        attitude: Rotations from body to inertial axes, shape (..., 3, 3).
+
+    Returns:
+        float32, scalar last, shape (..., 4).
+    """
+    return notation.quaternion_from_matrix(attitude)[..., [1, 2, 3, 0]].astype(np.float32)

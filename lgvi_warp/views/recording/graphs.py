@@ -1,0 +1,157 @@
+"""The graphs of a recording: fans, shares by outcome, commands and actuators, the log, and the histogram at the cursor."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.status import Status
+from lgvi_warp.physics.control.signals import CHANNELS
+from lgvi_warp.runs.outcomes import outcome_text, outcomes
+from lgvi_warp.views.choice import frames_of
+from lgvi_warp.views.fleet import LOOKS
+from lgvi_warp.views.recording.drawn import LEVELS, Drawn, Fan, at_levels, first_ended
+from lgvi_warp.views.recording.world import TIMELINE
+
+# Bands of a fan, outermost first: name, places of its levels, and opacity.
+BANDS = (("all", 0, 6, 60), ("90 %", 1, 5, 110), ("50 %", 2, 4, 170))
+MEDIAN, WHITE, GREY = LEVELS.index(0.5), (255, 255, 255), (130, 130, 130)
+# Fewer samples than this are drawn with a marker each.
+MARKED = 3
+# Most histograms: each takes a message of its own.
+HISTOGRAMS = 60
+# Colours of channels: those of all outcomes, failures once.
+COLORS = list(dict.fromkeys(look.rgb for look in LOOKS.values()))
+
+
+def log_graphs(recording: Any, run: Drawn) -> None:
+    """Log all curves of one run, the log of its outcomes and the histogram of its depths.
+
+    Args:
+        recording: The stream.
+        run: What is drawn.
+    """
+    for fan in run.fans:
+        _fan(recording, run, fan)
+    _shares(recording, run)
+    _channels(recording, run)
+    _log(recording, run)
+    _histogram(recording, run)
+
+
+def _send(recording: Any, entity: str, time: np.ndarray, columns: Any) -> None:
+    import rerun as rr
+
+    recording.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=time)], columns, strict=True)
+
+
+def _fan(recording: Any, run: Drawn, fan: Fan) -> None:
+    """Log the bands of a fan and its median; of one member, its curve."""
+    import rerun as rr
+
+    rgb, one = run.rgb or LOOKS[Status.OK].rgb, run.result.members == 1
+    bands = BANDS[1:2] if run.label else BANDS
+    for name, low, high, opacity in () if one else bands:
+        entity = run.path(f"curves/{fan.name}", name.replace(" %", "_percent"))
+        style = rr.Measurements.from_fields(colors=[(*rgb, opacity)], widths=[0.0], names=[name], units=[fan.unit])
+        recording.log(entity, style, static=True, strict=True)
+        middle, half = 0.5 * (fan.levels[low] + fan.levels[high]), 0.5 * (fan.levels[high] - fan.levels[low])
+        _send(recording, entity, run.time, rr.Measurements.columns(values=middle, variances=half**2))
+    name = run.label or ("the member" if one else "median")
+    color = rgb if one or run.label else WHITE
+    _series(recording, run.path(f"curves/{fan.name}", "median"), run.time, fan.levels[MEDIAN], name, color)
+
+
+def _series(
+    recording: Any, entity: str, time: np.ndarray, values: np.ndarray, name: str, color: tuple[int, int, int],
+    width: float = 2.0,
+) -> None:  # fmt: skip
+    """Log one curve, broken where its values are not finite; with markers where there are few."""
+    import rerun as rr
+
+    recording.log(entity, rr.SeriesLines(names=name, colors=color, widths=width), static=True, strict=True)
+    if len(time) < MARKED:
+        recording.log(entity, rr.SeriesPoints(names=name, colors=color, marker_sizes=4.0), static=True, strict=True)
+    _send(recording, entity, time, rr.Scalars.columns(scalars=np.asarray(values, np.float64)))
+
+
+def _shares(recording: Any, run: Drawn) -> None:
+    """Log which share of all members is under way, and which has ended, by outcome."""
+    for code, share in run.shares.items():
+        name = code.name.lower() if code else "under way"
+        label = f"{run.label}: {name}" if run.label else name
+        entity = run.path("members", name.replace(" ", "_"))
+        _series(recording, entity, run.time, 100.0 * share, label, run.color(code))
+
+
+def channel_names(run: Drawn) -> list[tuple[str, np.ndarray]]:
+    """Name the channels of a run's actuators.
+
+    Args:
+        run: The run.
+
+    Returns:
+        A name and the limits (2,) of each, by their number; NaN where they are not known.
+    """
+    from lgvi_warp.scene.scene import Scene
+
+    count = next((run.few.samples[name].shape[-1] for name in CHANNELS if name in run.few.samples), 0)
+    unknown = [(f"channel {i}", np.full(2, np.nan)) for i in range(count)]
+    tables = {key: value for key, value in run.result.provenance["scene"].items() if key not in ("ensemble", "run")}
+    try:
+        scene = Scene.from_dict(tables)
+    except SceneError:  # laws of a user's own, whose names are not known here
+        return unknown
+    bus = scene.controller.bus if scene.controller is not None else None
+    names: list[tuple[str, np.ndarray]] = []
+    for key, (_, many) in bus.commands.items() if bus else ():
+        limit = run.few.parameters.get(f"{key}.limit", np.full((1, 1), np.nan))
+        most = np.broadcast_to(limit.reshape(len(limit), -1).max(axis=0), many)
+        names += [(f"{key}[{i}]", np.array([-most[i], most[i]])) for i in range(many)]
+    return names if len(names) == count else unknown
+
+
+def _channels(recording: Any, run: Drawn) -> None:
+    """Log medians of commands and actuators over the members drawn that are under way, and the actuators' limits."""
+    for field in CHANNELS:
+        if field not in run.few.samples:
+            continue
+        values = run.few.samples[field]
+        for i, (name, limits) in enumerate(channel_names(run)):
+            (row,) = at_levels(values[..., i], run.counted, [0.5])
+            label = f"{run.label}: {name} {field}" if run.label else f"{name} {field}"
+            entity, color = run.path(field, str(i)), COLORS[i % len(COLORS)]
+            _series(recording, entity, run.time, row, label, color, 1.0 if field == "command" else 2.5)
+            # A limit far from what is seen would flatten the curves.
+            near = np.isfinite(limits).all() and limits[1] < 20.0 * max(np.nanmax(np.abs(row), initial=0.0), 1e-9)
+            for side, limit in zip(("lower", "upper"), limits, strict=True) if near and field == "command" else ():
+                at = run.path("limit", str(i), side)
+                _series(recording, at, run.time, np.full(len(run.time), limit), f"{name} limit", GREY, 1.0)
+
+
+def _log(recording: Any, run: Drawn) -> None:
+    """Log each outcome when its first member has it: how many have it, which was the first, when, and its value."""
+    import rerun as rr
+
+    entity = run.path("log")
+    for code in outcomes(run.result):
+        when = first_ended(run.result, code) if code else float(run.time[-1])
+        text = f"{run.label}: {outcome_text(run.result, code)}" if run.label else outcome_text(run.result, code)
+        level = "INFO" if code == Status.OK or code.stopped else "ERROR"
+        columns = rr.TextLog.columns(text=[text], level=[level], color=[run.color(code)])
+        _send(recording, entity, np.array([when]), columns)
+
+
+def _histogram(recording: Any, run: Drawn) -> None:
+    """Log the depths of the members under way as bars, at some times."""
+    import rerun as rr
+
+    centers, widths = 0.5 * (run.bins[1:] + run.bins[:-1]), np.diff(run.bins).astype(np.float32)
+    color, entity = run.rgb or LOOKS[Status.OK].rgb, run.path("histogram", "depth")
+    for frame in frames_of(run.time, HISTOGRAMS):
+        recording.set_time(TIMELINE, duration=float(run.time[frame]))
+        counts = run.heights[frame].astype(np.int64)
+        recording.log(entity, rr.BarChart(counts, abscissa=centers, widths=widths, color=color), strict=True)
+    recording.reset_time()

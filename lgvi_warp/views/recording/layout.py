@@ -1,0 +1,160 @@
+"""The first layout of the viewer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.physics.control.signals import CHANNELS
+from lgvi_warp.views.recording.drawn import Drawn
+from lgvi_warp.views.recording.world import TIMELINE, Box
+
+# The whole run is played in this time [s].
+PLAYED = 20.0
+BACKGROUND = (9, 24, 38)
+# Where the eye looks: to the north-east, a little down. Half its field of view upward, as a tangent, and the width of the
+# view over its height, on a window of usual size.
+SIGHT = np.array([0.48, 0.82, 0.31]) / np.linalg.norm([0.48, 0.82, 0.31])
+FIELD, ASPECT = 0.9 * np.tan(np.radians(27.5)), 1.3
+
+
+def distance(box: Box, aspect: float) -> float:
+    """How far from the middle of a box the eye must be to see all of it.
+
+    Args:
+        box: The box.
+        aspect: Width of the view over its height.
+
+    Returns:
+        Distance [m].
+    """
+    across = np.cross(SIGHT, (0.0, 0.0, -1.0))
+    across /= np.linalg.norm(across)
+    above = np.cross(across, SIGHT)
+    half = 0.5 * (box.high - box.low)
+    corners = half * np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
+    needed = np.maximum(np.abs(corners @ across) / (FIELD * aspect), np.abs(corners @ above) / FIELD)
+    return float((needed - corners @ SIGHT).max())
+
+
+def layout(runs: list[Drawn], box: Box, scale: int) -> Any:
+    """Lay out the views: the world on the left, curves and the run's facts on the right.
+
+    Args:
+        runs: The runs that are drawn.
+        box: What is in view.
+        scale: How many times their size hulls are drawn.
+
+    Returns:
+        A blueprint of the viewer.
+    """
+    import rerun.blueprint as rrb
+    from rerun.blueprint.encodings import TextLogColumn
+
+    time = runs[0].time
+    ends = [max(float(run.time[-1]) for run in runs), min(float(run.time[0]) for run in runs)]
+    played = ends[0] - ends[1]
+    worlds = [_world(run, box, scale, ASPECT / len(runs)) for run in runs]
+    below = rrb.Horizontal(
+        _curve("members", "Members by outcome [%]", _whole(time), (0.0, 102.0), True),
+        rrb.TextLogView(
+            origin="/log",
+            name="Outcomes: how many, and the first",
+            columns=rrb.TextLogColumns(text_log_columns=[TextLogColumn("Body")]),
+        ),
+    )
+    left = rrb.Vertical(worlds[0] if len(runs) == 1 else rrb.Horizontal(*worlds), below, row_shares=[4, 1.3])
+    panel = rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="playing", loop_mode="all",
+                          playback_speed=played / PLAYED if played > 0.0 else 1.0)  # fmt: skip
+    return rrb.Blueprint(
+        rrb.Horizontal(left, _right(runs), column_shares=[3, 2]), panel,
+        rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"), auto_views=False,
+    )  # fmt: skip
+
+
+def _right(runs: list[Drawn]) -> Any:
+    """Curves, and the run's facts below them."""
+    import rerun.blueprint as rrb
+
+    whole = _whole(runs[0].time)
+    names = [fan.name for fan in runs[0].fans]
+    fans = {name: [fan for run in runs for fan in run.fans if fan.name == name] for name in names}
+    views = {}
+    for name, group in fans.items():
+        limits = _limits(np.concatenate([fan.levels for fan in group], axis=1))
+        # All have the same legend; it would cover their curves.
+        views[name] = _curve(f"curves/{name}", group[0].title, whole, limits, name == "height")
+    height = views.pop("height")
+    energy = views.pop("energy", None)
+    motion = rrb.Tabs(views["speed"], *([energy] if energy else []), active_tab=0)
+    angles = rrb.Tabs(*(views[name] for name in ("pitch", "roll", "heading")), active_tab=0)
+    commands = [_curve_of_channels(whole)] if any(name in runs[0].few.samples for name in CHANNELS) else []
+    facts = rrb.Tabs(
+        *(rrb.TextDocumentView(origin=run.path("run/summary"), name=run.label or "Run") for run in runs),
+        rrb.BarChartView(origin="/histogram", name="Depths [m] at the cursor"),
+        *(
+            rrb.TextDocumentView(origin=run.path("run/provenance"), name=f"Provenance {run.label}".strip())
+            for run in runs
+        ),
+        active_tab=0,
+    )
+    shares = [2.6, 2.0, 2.0, *[2.0 for _ in commands], 4.0]
+    return rrb.Vertical(height, angles, motion, *commands, facts, row_shares=shares)
+
+
+def _curve(origin: str, name: str, whole: Any, limits: tuple[float, float] | None, legend: bool) -> Any:
+    """A view of curves over the whole time."""
+    import rerun.blueprint as rrb
+
+    return rrb.TimeSeriesView(
+        origin=f"/{origin}", name=name, axis_x=whole, axis_y=rrb.ScalarAxis(range=limits) if limits else None,
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
+    )  # fmt: skip
+
+
+def _curve_of_channels(whole: Any) -> Any:
+    """A view of commands, actuators and limits."""
+    import rerun.blueprint as rrb
+
+    return rrb.TimeSeriesView(
+        origin="/", contents=["+ /command/**", "+ /actuator/**", "+ /limit/**"], axis_x=whole,
+        name="Commands (thin) and actuators, medians", plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
+    )  # fmt: skip
+
+
+def _limits(levels: np.ndarray) -> tuple[float, float] | None:
+    """Limits of an axis around values, a little wider; None where none is finite."""
+    finite = levels[np.isfinite(levels)]
+    if not finite.size:
+        return None
+    low, high = float(finite.min()), float(finite.max())
+    wide = max(high - low, 1e-3 * max(abs(low), abs(high)), 1e-9)
+    return low - 0.05 * wide, high + 0.05 * wide
+
+
+def _whole(time: np.ndarray) -> Any:
+    """An axis of time from the first to the last."""
+    import rerun.blueprint as rrb
+
+    start, end = (rrb.TimeRangeBoundary.absolute(seconds=float(time[i])) for i in (0, -1))
+    return rrb.TimeAxis(view_range=rrb.TimeRange(start=start, end=end))
+
+
+def _world(run: Drawn, box: Box, scale: int, aspect: float) -> Any:
+    """The view of one run's world: across the fleet's way, from a little above; trails up to the cursor."""
+    import rerun.blueprint as rrb
+
+    middle = 0.5 * (box.low + box.high)
+    eye = middle - distance(box, aspect) * SIGHT
+    now = rrb.TimeRangeBoundary.cursor_relative(seconds=0)
+    past = rrb.VisibleTimeRange(TIMELINE, start=rrb.TimeRangeBoundary.infinite(), end=now)
+    hulls = f", hulls {scale} times their size" if scale > 1 else ""
+    name = f"{run.label}: {run.choice.text}" if run.label else run.choice.text
+    return rrb.Spatial3DView(
+        origin=run.path("world"), name=f"{name}{hulls}, grid {box.grid:g} m", background=BACKGROUND,
+        line_grid=rrb.LineGrid3D(visible=False),
+        eye_controls=rrb.EyeControls3D(position=eye, look_target=middle, eye_up=(0.0, 0.0, -1.0)),
+        overrides={run.path("world", "trails"): [rrb.VisibleTimeRanges([past])]},
+        time_ranges=[rrb.VisibleTimeRange(TIMELINE, start=now, end=now)],
+    )  # fmt: skip

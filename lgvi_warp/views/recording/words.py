@@ -1,0 +1,124 @@
+"""The words of a recording: a summary of ten lines, and the provenance."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.physics import energy as invariants
+from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.views.choice import of_members
+from lgvi_warp.views.recording.drawn import Drawn
+from lgvi_warp.views.recording.hull import shape_of
+from lgvi_warp.views.recording.world import Box, chosen_member
+
+
+def log_words(recording: Any, runs: list[Drawn], box: Box, scale: int) -> None:
+    """Log the summary of the runs, and their provenance.
+
+    Args:
+        recording: The stream.
+        runs: What is drawn.
+        box: What is in view.
+        scale: How many times their size hulls are drawn.
+    """
+    import rerun as rr
+
+    for run in runs:
+        provenance = f"```json\n{json.dumps(run.result.provenance, indent=2)}\n```"
+        rows = [f"| {key} | {text} |" for key, text in lines(run, box, scale).items()]
+        texts = {"summary": "\n".join(["| | |", "|---|---|", *rows]), "provenance": provenance}
+        for name, text in texts.items():
+            document = rr.TextDocument(text, media_type="text/markdown")
+            recording.log(run.path(f"run/{name}"), document, static=True, strict=True)
+
+
+def lines(run: Drawn, box: Box, scale: int) -> dict[str, str]:
+    """Say of a run in ten lines what it is, what became of it, and what is drawn.
+
+    Args:
+        run: The run.
+        box: What is in view.
+        scale: How many times its size a hull is drawn.
+
+    Returns:
+        Texts by heading.
+    """
+    result, settings = run.result, run.result.provenance
+    counts = ", ".join(f"{name} {number:,}" for name, number in result.status.counts().items())
+    few = len(run.choice.members) < result.members
+    drawn = f"{len(run.choice.members):,} of {result.members:,} drawn" if few else f"{result.members:,}, all drawn"
+    ranked = of_members(len(run.choice.ranked), result.members)
+    one = result.members == 1
+    bands = f", quantiles of {ranked}" if len(run.choice.ranked) < result.members else ", all in the curves"
+    versions = {**settings.get("versions", {}), **{"rerun": _rerun_version()}}
+    method = settings["method"]["name"]
+    times = f"{run.time[0]:g} to {run.time[-1]:g} s, {len(run.time)} of {len(result.time)} samples drawn"
+    if len(result.time) < 3:
+        times += "; for the motion between them give SaveAt(every=...), or save_every in [run]"
+    _, source = shape_of(settings["scene"], run.few.parameters)
+    size = f"{source}, drawn " + (f"{scale} times their size" if scale > 1 else "at their size")
+    member = int(run.choice.members[chosen_member(run)])
+    seed = settings.get("ensemble", {}).get("seed", "none")
+    return {
+        "members": drawn + ("" if one else bands),
+        "outcome": counts,
+        "method": f"{method}, step {settings['step']:g} s, {settings['dtype']}",
+        "time": times,
+        "seed": f"{seed}",
+        "water": water_text(run, box),
+        "energy": energy_text(run),
+        "hulls": size,
+        "arrows and wires": f"forces on member {member}, the last as means between times drawn"
+        + ("" if one else "; ellipsoid: 95 % of those under way along each of its axes"),
+        "versions": ", ".join(f"{name} {version}" for name, version in versions.items()),
+    }
+
+
+def _rerun_version() -> str:
+    import rerun as rr
+
+    return str(rr.__version__)
+
+
+def water_text(run: Drawn, box: Box) -> str:
+    """Say where the water ends, and whether members leave it.
+
+    Args:
+        run: The run.
+        box: What is in view.
+
+    Returns:
+        One sentence.
+    """
+    kinds = {event["type"] for event in run.result.provenance["scene"].get("events", ())}
+    floor = f"floor at {box.floor:g} m" if "floor" in kinds and box.floor is not None else "no floor"
+    grid = f"grid of {box.grid:g} m"
+    if "surface" in kinds:
+        return f"surface and {floor}; {grid}"
+    if not run.above:
+        return f"no event at the surface, {floor}; {grid}"
+    many = of_members(run.above, run.result.members)
+    return f"unbounded water: {many} pass{'es' * (run.above == 1 == run.result.members)} above depth 0; {floor}; {grid}"
+
+
+def energy_text(run: Drawn) -> str:
+    """Say how well energy is kept, or what does work.
+
+    Args:
+        run: The run.
+
+    Returns:
+        One sentence.
+    """
+    few = run.few
+    if not set(FIELDS) <= set(few.samples):
+        return "not known: not all of the motion was kept"
+    drift = invariants.drift(few)["energy"]
+    if np.isnan(drift):
+        return "not known: every member drawn failed"
+    if "energy" in invariants.conserved(few):
+        return f"drift {drift:.2g} J, the largest of the members drawn"
+    return f"not conserved: {', '.join(invariants.at_work(few))} do work"

@@ -1,0 +1,389 @@
+"""The world of a recording: hulls, trails, spread, forces, water, surface and floor; x north, y east, z down."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.physics import energy as invariants
+from lgvi_warp.physics import vehicle
+from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.views.choice import finite_rows
+from lgvi_warp.views.recording.drawn import Drawn, quaternion_xyzw
+from lgvi_warp.views.recording.hull import Mesh, hull_of, mesh_of, shape_of
+
+TIMELINE = "sim_time"
+TRAILS = 40
+# Frames per chunk of columns: large enough to be quick to write, small enough to seek in.
+CHUNK = 20
+# Scale of a hidden body: an entity without any pose would show a body at the origin.
+UNSEEN = 1e-6
+# A hull is drawn at least this share of the scene long.
+SEEN = 0.025
+TRAIL, WATER, SAND, CURRENT = (150, 165, 180, 150), (90, 170, 230, 40), (150, 120, 80, 90), (0, 200, 200)
+# Axes are labelled at the corner of the grid.
+AXES = (("north", (230, 90, 90)), ("east", (90, 200, 90)), ("down", (110, 140, 255)))
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """The part of the world that is in view.
+
+    Attributes:
+        low: Smallest coordinates [m], shape (3,).
+        high: Largest coordinates [m], shape (3,).
+        floor: Depth of the floor [m]; None without one.
+        surface: Whether the surface is in view.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    floor: float | None
+    surface: bool
+
+    @property
+    def size(self) -> float:
+        """Length of its diagonal [m]."""
+        return float(np.linalg.norm(self.high - self.low))
+
+    @property
+    def grid(self) -> float:
+        """Distance between lines of the grid [m], a power of ten."""
+        return float(10.0 ** np.floor(np.log10(max(self.high[:2] - self.low[:2]) / 2.0)))
+
+
+def box_of(runs: list[Drawn]) -> Box:
+    """Find the box around all paths, with the floor and the surface where they are near.
+
+    Args:
+        runs: The runs that are drawn.
+
+    Returns:
+        The box, at least as large as a few hulls along each axis.
+    """
+    ends = [(run.position[mask].min(axis=0), run.position[mask].max(axis=0)) for run in runs for mask in [_whole(run)]]
+    low, high = (
+        np.min([end[0] for end in ends], axis=0).astype(float),
+        np.max([end[1] for end in ends], axis=0).astype(float),
+    )
+    least = max(4.0 * _length(runs[0])[1], 0.05 * float((high - low).max()))
+    narrow = np.maximum(least - (high - low), 0.0)
+    low, high = low - 0.5 * narrow, high + 0.5 * narrow
+    floors = [float(event["depth"]) for run in runs for event in _events(run) if event["type"] == "floor"]
+    floor = max(floors) if floors else None
+    if floor is not None:
+        high[2] = max(high[2], floor)
+    reach = float(np.linalg.norm(high - low))
+    surface = bool(low[2] < 0.5 * reach)
+    if surface:
+        low[2], high[2] = min(low[2], 0.0), max(high[2], 0.0)
+    return Box(low, high, floor, surface)
+
+
+def _whole(run: Drawn) -> np.ndarray:
+    """Mask (f, m) of the finite positions."""
+    return finite_rows(run.position)
+
+
+def _events(run: Drawn) -> list[dict[str, Any]]:
+    """Tables of the scene's events."""
+    return list(run.result.provenance["scene"].get("events", ()))
+
+
+def _length(run: Drawn) -> tuple[Mesh | tuple[float, float], float]:
+    """The user's mesh, or length and diameter [m] of the hull; and the length [m]."""
+    shape, _ = shape_of(run.result.provenance["scene"], run.few.parameters)
+    if shape.mesh is not None:
+        mesh = mesh_of(shape.mesh)
+        return mesh, mesh.length
+    assert shape.length is not None and shape.diameter is not None
+    return (shape.length, shape.diameter), max(shape.length, shape.diameter)
+
+
+def scale_of(run: Drawn, box: Box) -> int:
+    """How many times its size a hull is drawn, so that it is seen in the box.
+
+    Args:
+        run: The run.
+        box: What is in view.
+
+    Returns:
+        A whole number from 1.
+    """
+    return max(1, int(np.ceil(SEEN * box.size / _length(run)[1])))
+
+
+def log_world(recording: Any, run: Drawn, box: Box, scale: int) -> None:
+    """Log all of one run that stands in its world.
+
+    Args:
+        recording: The stream.
+        run: What is drawn.
+        box: What is in view.
+        scale: How many times their size hulls are drawn.
+    """
+    import rerun as rr
+
+    recording.log(run.path("world"), rr.ViewCoordinates.FRD, static=True, strict=True)
+    _bodies(recording, run, scale)
+    _trails(recording, run)
+    _spread(recording, run)
+    _planes(recording, run, box)
+    _axes(recording, run, box)
+    _current(recording, run, box)
+    _forces(recording, run, box, scale)
+
+
+def _static(recording: Any, entity: str, archetype: Any) -> None:
+    recording.log(entity, archetype, static=True, strict=True)
+
+
+def _columns(recording: Any, entity: str, time: np.ndarray, columns: Any) -> None:
+    import rerun as rr
+
+    recording.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=time)], columns, strict=True)
+
+
+def _bodies(recording: Any, run: Drawn, scale: int) -> None:
+    """Log a hull for each outcome, and the poses of the members that have had it so far."""
+    import rerun as rr
+
+    form, _ = _length(run)
+    quaternion = quaternion_xyzw(run.few.attitude)
+    for code, visible in run.groups():
+        if not visible.any():
+            continue
+        entity, color = run.path("world", "bodies", code.name.lower()), run.color(code)
+        if isinstance(form, Mesh):
+            asset = rr.Asset3D(contents=form.content, media_type="model/gltf-binary", albedo_factor=color)
+            _static(recording, entity, asset)
+        else:
+            hull = hull_of(scale * form[0], scale * form[1])
+            body = rr.Mesh3D(vertex_positions=hull.points, triangle_indices=hull.triangles,
+                             vertex_normals=hull.normals, vertex_colors=hull.colors(color))  # fmt: skip
+            _static(recording, entity, body)
+        size = float(scale) if isinstance(form, Mesh) else 1.0
+        _poses(recording, entity, run.time, run.position, quaternion, visible, size)
+
+
+def _poses(
+    recording: Any, entity: str, time: np.ndarray, position: np.ndarray, quaternion: np.ndarray, visible: np.ndarray,
+    size: float,
+) -> None:  # fmt: skip
+    """Send the poses (f, m) of the bodies that are visible at each time (f, m), in chunks of frames."""
+    import rerun as rr
+
+    empty = ~visible.any(axis=1)
+    posed = visible.copy()
+    posed[empty, 0] = True
+    position, quaternion = (np.nan_to_num(values) for values in (position, quaternion))
+    for first in range(0, len(time), CHUNK):
+        frames = slice(first, first + CHUNK)
+        at = posed[frames]
+        scales = np.where(visible[frames][at], np.float32(size), np.float32(UNSEEN))
+        columns = rr.InstancePoses3D.columns(
+            translations=position[frames][at],
+            quaternions=quaternion[frames][at],
+            # Send scales at every time or never: one that is not sent again stays in force.
+            scales=np.repeat(scales[:, None], 3, axis=1) if empty.any() or size != 1.0 else None,
+        ).partition(at.sum(axis=1))
+        _columns(recording, entity, time[frames], columns)
+
+
+def _trails(recording: Any, run: Drawn) -> None:
+    """Log the way of some members piece by piece: the view shows the pieces up to its time."""
+    import rerun as rr
+
+    if len(run.time) < 2:
+        return
+    members = np.unique(np.linspace(0, len(run.choice.members) - 1, min(TRAILS, len(run.choice.members))).astype(int))
+    path, entity = run.position[:, members], run.path("world", "trails")
+    moving = run.counted[:-1, members] & finite_rows(path[:-1]) & finite_rows(path[1:])
+    color = (*run.rgb, TRAIL[3]) if run.rgb else TRAIL
+    _static(recording, entity, rr.LineStrips3D.from_fields(colors=[color], radii=rr.Radius.ui_points(0.7)))
+    strips = np.stack([path[:-1], path[1:]], axis=2)[moving]
+    columns = rr.LineStrips3D.columns(strips=list(strips)).partition(moving.sum(axis=1))
+    _columns(recording, entity, run.time[1:], columns)
+
+
+def _spread(recording: Any, run: Drawn) -> None:
+    """Log the ellipsoids of the members under way; none is left where there are too few."""
+    import rerun as rr
+
+    spread, entity = run.spread, run.path("world", "spread")
+    if not len(spread.at):
+        return
+    color = (*(run.rgb or (255, 255, 255)), 120)
+    style = {"fill_mode": "majorwireframe", "line_radii": [rr.Radius.ui_points(0.8)]}
+    _static(recording, entity, rr.Ellipsoids3D.from_fields(colors=[color], **style))
+    has_one = np.zeros(len(run.time), int)
+    has_one[spread.at] = 1
+    columns = rr.Ellipsoids3D.columns(
+        centers=spread.center, half_sizes=spread.half, quaternions=quaternion_xyzw(spread.axes)
+    )
+    _columns(recording, entity, run.time, columns.partition(has_one))
+
+
+def _planes(recording: Any, run: Drawn, box: Box) -> None:
+    """Log the surface and the floor where they are in view, with a grid in metres."""
+    import rerun as rr
+
+    margin = 0.08 * box.size
+    low, high = box.low - margin, box.high + margin
+    planes = [("surface", 0.0, WATER)] * box.surface + ([("floor", box.floor, SAND)] if box.floor is not None else [])
+    for name, depth, color in planes:
+        corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
+        both_sides = [(0, 1, 2), (0, 2, 3), (0, 2, 1), (0, 3, 2)]
+        points = [(*corner, depth) for corner in corners]
+        sheet = rr.Mesh3D(vertex_positions=points, triangle_indices=both_sides, albedo_factor=color)
+        _static(recording, run.path("world", "water", name), sheet)
+    # Without a floor, a grid below the fleet tells sizes.
+    below = [("depth", high[2], TRAIL)] if box.floor is None else []
+    for name, depth, color in [*planes, *below]:
+        lines = _grid(low[:2], high[:2], float(depth), box.grid)
+        grid = rr.LineStrips3D(lines, colors=[(*color[:3], 120)], radii=rr.Radius.ui_points(0.5))
+        _static(recording, run.path("world", "water", f"{name}_grid"), grid)
+
+
+def _grid(low: np.ndarray, high: np.ndarray, depth: float, step: float) -> list[np.ndarray]:
+    """Lines of a horizontal grid at whole multiples of a step [m]."""
+    lines = []
+    for axis in (0, 1):
+        for value in np.arange(np.ceil(low[axis] / step), np.floor(high[axis] / step) + 1) * step:
+            line = np.array([[*low, depth], [*high, depth]])
+            line[:, axis] = value
+            lines.append(line)
+    return lines
+
+
+def _axes(recording: Any, run: Drawn, box: Box) -> None:
+    """Log arrows to the north, to the east and down, at a corner of the box."""
+    import rerun as rr
+
+    # At the left of what the eye sees, where they hide little.
+    corner = np.array([box.high[0], box.low[1], box.low[2]])
+    labels, colors = zip(*AXES, strict=True)
+    arrows = rr.Arrows3D(origins=[corner] * 3, vectors=0.12 * box.size * np.eye(3), colors=colors, labels=labels,
+                         radii=rr.Radius.ui_points(1.5))  # fmt: skip
+    _static(recording, run.path("world", "axes"), arrows)
+
+
+def water_at(run: Drawn, points: np.ndarray) -> np.ndarray:
+    """Compute how the water moves, by the numbers of the first member drawn.
+
+    Args:
+        run: The run.
+        points: Places, shape (g, 3) [m].
+
+    Returns:
+        Velocity in inertial axes, shape (f, g, 3) [m/s]; zero for water whose motion is not known after the run.
+    """
+    places = np.broadcast_to(points, (len(run.time), *points.shape))
+    total = np.zeros(places.shape)
+    shared = {name: values[:1] for name, values in run.few.parameters.items()}
+    for term in run.few.terms:
+        numbers = {name: values[:1] for name, values in run.few.own(term).items()}
+        velocity = term.water(numbers, places, run.time, shared)
+        total = total if velocity is None else total + velocity
+    return total
+
+
+def _current(recording: Any, run: Drawn, box: Box) -> None:
+    """Log arrows of the water's motion at the side of the box, where it moves."""
+    import rerun as rr
+
+    middle = 0.5 * (box.low + box.high)
+    top = max(box.low[2], 0.0)
+    depths = top + (box.high[2] - top) * np.array([0.1, 0.5, 0.9])
+    norths = np.linspace(box.low[0], box.high[0], 3)
+    points = np.array([(north, box.high[1], depth) for depth in depths for north in norths])
+    velocity = water_at(run, points)
+    fastest = float(np.linalg.norm(velocity, axis=-1).max())
+    if fastest == 0.0:
+        return
+    # Arrows begin where the water comes from, so that they point at the fleet.
+    if (velocity.mean(axis=(0, 1)) @ (middle - points.mean(axis=0))) < 0.0:
+        points[:, 1] = box.low[1]
+        velocity = water_at(run, points)
+    vectors = (velocity * (0.14 * box.size / fastest)).astype(np.float32)
+    labels = [f"current, up to {fastest:.2g} m/s", *[""] * (len(points) - 1)]
+    style = {"colors": [CURRENT], "radii": rr.Radius.ui_points(1.5), "labels": labels}
+    entity = run.path("world", "current")
+    if (vectors == vectors[0]).all():
+        _static(recording, entity, rr.Arrows3D(origins=points, vectors=vectors[0], **style))
+        return
+    _static(recording, entity, rr.Arrows3D.from_fields(origins=points, **style))
+    columns = rr.Arrows3D.columns(vectors=vectors.reshape(-1, 3)).partition([len(points)] * len(run.time))
+    _columns(recording, entity, run.time, columns)
+
+
+def chosen_member(run: Drawn) -> int:
+    """Choose the member whose forces are drawn: of those drawn the first that goes on longest.
+
+    Args:
+        run: The run.
+
+    Returns:
+        Its place among the members drawn.
+    """
+    return int(run.counted.sum(axis=0).argmax())
+
+
+FORCES = (("weight", (230, 160, 60)), ("buoyancy", (90, 200, 250)), ("other forces", (250, 120, 200)))
+# Other forces below this share of the weight are round-off of differences between samples.
+LITTLE = 1e-3
+
+
+def forces_on(run: Drawn) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the forces on the chosen member: weight, buoyancy, and all others together.
+
+    The last follow from the balance of momentum, as means between the times drawn.
+
+    Args:
+        run: The run.
+
+    Returns:
+        Forces in inertial axes, shape (f, 3, 3) [N], and where they act in body axes, shape (3, 3) [m].
+    """
+    member = np.array([chosen_member(run)])
+    few = run.few.part(member)
+    numbers, down = few.parameters, np.array([0.0, 0.0, 1.0])
+    weight, buoyancy = float(vehicle.weight(numbers)[0]), float(numbers["vehicle.buoyancy"][0])
+    center = numbers.get("vehicle.center_of_gravity", vehicle.center_of_mass(numbers))
+    steady = np.stack([weight * down, -buoyancy * down])
+    others = np.zeros((len(run.time), 1, 3))
+    if len(run.time) > 1 and set(FIELDS) <= set(few.samples):
+        others = np.gradient(invariants.linear_momentum(few), run.time, axis=0) - steady.sum(axis=0)
+    forces = np.concatenate([np.broadcast_to(steady, (len(run.time), 2, 3)), others], axis=1)
+    # A member that has ended stands still, held by nothing that is computed.
+    forces[~run.counted[:, member[0]], 2] = 0.0
+    return forces, np.stack([center[0], numbers["vehicle.center_of_buoyancy"][0], np.zeros(3)])
+
+
+def _forces(recording: Any, run: Drawn, box: Box, scale: int) -> None:
+    """Log the forces on the chosen member as arrows; the viewer tells their sizes where the cursor is on them."""
+    import rerun as rr
+
+    forces, points = forces_on(run)
+    size = np.linalg.norm(forces, axis=-1)
+    largest = float(size.max())
+    if not (np.isfinite(largest) and largest > 0.0):
+        return
+    member = chosen_member(run)
+    shown_ones = [i for i in range(3) if size[:, i].max() > LITTLE * largest]
+    names, colors = zip(*(FORCES[i] for i in shown_ones), strict=True)
+    arms = np.einsum("fij,aj->fai", run.few.attitude[:, member], scale * points[shown_ones])
+    origins = run.few.position[:, member, None] + arms
+    vectors = forces[:, shown_ones] * (0.06 * box.size / largest)
+    labels = [f"{name} {value:.3g} N" for row in size[:, shown_ones] for name, value in zip(names, row, strict=True)]
+    entity, many = run.path("world", "forces"), len(shown_ones)
+    style = rr.Arrows3D.from_fields(colors=colors, radii=rr.Radius.ui_points(1.2), show_labels=False)
+    _static(recording, entity, style)
+    columns = rr.Arrows3D.columns(
+        vectors=vectors.reshape(-1, 3).astype(np.float32),
+        origins=origins.reshape(-1, 3).astype(np.float32),
+        labels=labels,
+    )
+    _columns(recording, entity, run.time, columns.partition([many] * len(run.time)))

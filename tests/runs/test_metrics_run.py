@@ -1,0 +1,168 @@
+"""Metrics in whole runs: those of the twin on kept paths, at all looks whatever is kept, in stores, of members that end."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp.common.status import stop_time
+from lgvi_warp.reference import metrics as twin
+from tests.conftest import ROOT
+
+pytestmark = pytest.mark.kernel
+
+FIELDS = ("position", "attitude", "velocity", "angular_velocity", "command", "actuator", "demand", "unmet")
+FIELDS += tuple(f"reference_{name}" for name in ("depth", "heading", "speed", "position", "velocity", "attitude"))
+FIELDS += tuple(f"measured_{name}" for name in ("depth", "water_velocity"))
+T1, LOOK = 12.0, 0.1
+BOTH = ("depth", "heading")
+COARSE = {"t1": T1, "save": lw.SaveAt(every=4.0)}
+
+
+def deepest(state, look):
+    depth = look["position"][:, 2]
+    return depth if state is None else np.maximum(state, depth)
+
+
+def metrics():
+    each = {"then": [lw.Mean(), lw.Each()]}
+    return [
+        *(kind(of, **each) for of in BOTH for kind in (lw.Overshoot, lw.Undershoot, lw.Peak, lw.PeakTime, lw.RiseTime)),
+        lw.SettlingTime("heading", within=0.2, **each), lw.SettlingTime("depth", **each), lw.SteadyStateError("depth", **each),
+        *(kind(of, **each) for of in BOTH for kind in (lw.IAE, lw.ISE, lw.ITAE, lw.RMSError, lw.MaxError)),
+        lw.IAE("depth", measured=True, name="measured", **each), lw.MaxError("speed", **each), lw.MaxError("position", **each),
+        lw.MaxError("attitude", **each), lw.CrossTrack(**each), lw.Effort(**each), lw.Effort("command[1]", **each),
+        lw.Travel(**each), lw.SaturationShare(**each), lw.Energy(**each), lw.TimeToFailure(),
+        lw.OwnMetric(deepest, fields=("position",), **each),
+    ]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def fleet():
+    """300 vehicles in two blocks, of which some come to the floor: an event stops them."""
+    path = ROOT / "examples" / "scenes" / "remus_100_autopilot.toml"
+    scene = lw.Scene.load(path, {"start.position": [0.0, 0.0, 3.0], "run.save_every": 4.0})
+    scene = replace(scene, events=[lw.Floor(depth=8.5)])
+    vary = {"vehicle.buoyancy": lw.Uniform(low=297.0, high=310.0), "start.position[2]": lw.Uniform(low=7.8, high=8.45)}
+    return lw.Ensemble(scene, 300, seed=1, vary=vary | {"heading_pid.kp": lw.Uniform(low=0.7, high=60.0)})
+
+
+@pytest.fixture(scope="module")
+def coarse(fleet):
+    return lw.solve(fleet, **COARSE, statistics=metrics())
+
+
+@pytest.fixture(scope="module")
+def paths(fleet):
+    return lw.solve(fleet, t1=T1, save=lw.SaveAt(every=LOOK, fields=FIELDS), statistics=metrics())
+
+
+def by_twin(paths, limit):
+    """The number of each metric and member, from the kept paths."""
+    s, time = paths.samples, paths.time
+    goals = {"depth": 10.0, "heading": 0.5}
+    heading = np.arctan2(s["attitude"][..., 1, 0], s["attitude"][..., 0, 0])
+    y = {"depth": s["position"][..., 2], "heading": heading}
+    wrap = lambda a: (a + np.pi) % (2.0 * np.pi) - np.pi  # noqa: E731
+    away = s["reference_position"] - s["position"]
+    v = s["reference_velocity"][..., :2]
+    pace = np.linalg.norm(v, axis=-1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        aside = np.abs(away[..., 1] * v[..., 0] - away[..., 0] * v[..., 1]) / pace
+    cross = np.where(pace > 0.0, aside, np.linalg.norm(away[..., :2], axis=-1))
+    between = np.einsum("knji,knjl->knil", s["reference_attitude"], s["attitude"])
+    angle = np.arccos(np.clip((np.trace(between, axis1=2, axis2=3) - 1.0) / 2.0, -1.0, 1.0))
+    errors = {of: wrap(s[f"reference_{of}"] - y[of]) for of in y}
+    expected, ends = {}, stop_time(paths)
+    for m in range(paths.members):
+        end = ends[m]
+        k = int(np.sum(time <= end * (1.0 + 1e-12)))
+        t, numbers = time[:k], {}
+        for of, goal in goals.items():
+            for kind in (twin.overshoot, twin.undershoot, twin.peak, twin.peak_time, twin.rise_time):
+                numbers[f"{kind.__name__} {of}"] = kind(t, y[of][:k, m], goal)
+            for kind in (twin.iae, twin.ise, twin.itae, twin.rms, twin.max_error):
+                numbers[f"{kind.__name__} {of}"] = kind(t, errors[of][:k, m])
+        step = abs(10.0 - y["depth"][0, m])
+        numbers["settling_time depth"] = twin.settling_time(t, y["depth"][:k, m], 10.0, 0.02 * step)
+        numbers["settling_time heading"] = twin.settling_time(t, heading[:k, m], 0.5, 0.2)
+        numbers["steady_state_error depth"] = twin.steady_state_error(t, errors["depth"][:k, m], T1)
+        numbers["measured"] = twin.iae(t, (s["reference_depth"] - s["measured_depth"])[:k, m])
+        numbers["max_error speed"] = twin.max_error(
+            t, (s["reference_speed"] - s["measured_water_velocity"][..., 0])[:k, m]
+        )
+        numbers["max_error position"] = twin.max_error(t, np.linalg.norm(away, axis=-1)[:k, m])
+        numbers["max_error attitude"] = twin.max_error(t, angle[:k, m])
+        numbers["cross_track"] = twin.max_error(t, cross[:k, m])
+        numbers["effort"] = twin.effort(t, s["command"][:k, m])
+        numbers["effort command[1]"] = twin.effort(t, s["command"][:k, m, 1:2])
+        numbers["travel"] = twin.travel(t, s["actuator"][:k, m])
+        numbers["saturation_share"] = twin.saturation_share(t, s["command"][:k, m], limit)
+        wrench = (s["demand"] - s["unmet"])[:k, m]
+        numbers["energy"] = twin.energy(t, wrench, s["velocity"][:k, m], s["angular_velocity"][:k, m])
+        numbers["time_to_failure"] = end
+        numbers["deepest"] = np.max(y["depth"][:k, m])
+        for name, value in numbers.items():
+            expected.setdefault(name, []).append(value)
+    return expected
+
+
+def test_metrics_are_the_twins(fleet, paths):
+    limit = next(term.limit for term in fleet.scene.terms if term.key == "control_fins")
+    expected = by_twin(paths, limit)
+    assert 20 < np.count_nonzero(paths.status) < 280
+    share = np.array(expected["saturation_share"])
+    assert np.any(share > 0.0) and np.isinf(expected["settling_time heading"]).any()
+    for name, numbers in expected.items():
+        found = paths.statistics[f"each {name}"].value[0, 0]
+        # Sums of 120 terms in another order; a settled angle of 1e-3 rad by the trace has 1e-13 / 1e-3 of round-off.
+        tolerance = 1e-9 if name == "max_error attitude" else 1e-11
+        np.testing.assert_allclose(found, numbers, rtol=tolerance, atol=tolerance, err_msg=name)
+    assert {name.removeprefix("each ") for name in paths.statistics if name.startswith("each ")} == expected.keys()
+    finite = np.array(expected["iae depth"])
+    assert paths.statistics["mean iae depth"].value[0, 0] == pytest.approx(finite.mean(), rel=1e-12)
+
+
+def test_looks_do_not_depend_on_what_is_kept(coarse, paths):
+    assert coarse.time.tolist() == [0.0, 4.0, 8.0, 12.0]
+    assert coarse.position.tobytes() == np.ascontiguousarray(paths.position[::40]).tobytes()
+    for name, estimate in paths.statistics.items():
+        assert estimate.value.tobytes() == coarse.statistics[name].value.tobytes(), name
+
+
+def test_other_statistics_are_of_the_samples_that_are_kept(fleet, coarse):
+    asked = [lw.Mean("depth"), lw.PathMaximum("depth"), *metrics()]
+    both = lw.solve(fleet, **COARSE, keep="none", statistics=asked)
+    alone = coarse.position[..., 2]
+    np.testing.assert_allclose(both.statistics["mean depth"].value[:, 0], alone.mean(axis=1), rtol=1e-13)
+    assert both.statistics["mean path_maximum depth"].value[0, 0] == pytest.approx(alone.max(axis=0).mean(), rel=1e-13)
+    assert both.statistics["mean iae depth"].value == coarse.statistics["mean iae depth"].value
+
+
+def test_a_store_that_goes_on_has_the_same_numbers(fleet, coarse, tmp_path):
+    asked = [lw.Overshoot("depth", then=[lw.Mean(), lw.Each()]), lw.Overshoot("heading"), lw.Travel()]
+    with pytest.raises(RuntimeError):
+        lw.solve(fleet, **COARSE, statistics=asked, store=tmp_path / "run.zarr", threads=1, progress=stop)
+    result = lw.resume(tmp_path / "run.zarr")
+    assert len(result.time) == 4
+    assert {"mean overshoot depth", "mean travel"} <= result.statistics.keys()
+    for name in result.statistics:
+        assert result.statistics[name].value.tobytes() == coarse.statistics[name].value.tobytes()
+    again = lw.open_run(tmp_path / "run.zarr").statistics
+    assert again["each overshoot depth"].value.tobytes() == coarse.statistics["each overshoot depth"].value.tobytes()
+
+
+def stop(share):
+    if share > 0.6:
+        raise RuntimeError("enough")
+
+
+def test_predict_and_prepare_take_looks(fleet):
+    assert lw.predict(fleet, t1=T1, statistics=metrics(), keep="none").memory > 0
+
+
+def test_a_scene_without_a_controller_is_told(fleet):
+    scene = lw.Scene.named("remus_100", run={"step": 0.01, "duration": 1.0, "method": "psi_x"})
+    with pytest.raises(lw.SceneError, match="signal of a controller"):
+        lw.solve(scene, statistics=[lw.IAE("depth")])

@@ -1,0 +1,89 @@
+"""The snippets of the pages on metrics and sweeps run as they stand, and so do the examples of sweeps, with fewer members."""
+
+import random
+import re
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp.studies.sweeps.file import arguments_of_file
+from lgvi_warp.studies.sweeps.setup import made
+from lgvi_warp.studies.sweeps.success import success_of
+from tests.conftest import ROOT
+
+pytestmark = pytest.mark.kernel
+
+SCENE = ROOT / "examples" / "scenes" / "remus_100_autopilot.toml"
+PAGES = {
+    "metrics": ROOT / "docs" / "controllers" / "metrics.md",
+    "guide": ROOT / "docs" / "guide" / "is_my_controller_robust.md",
+}
+
+
+def snippets(page, language):
+    return re.findall(rf"```{language}\n(.*?)```", PAGES[page].read_text(), re.DOTALL)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", PAGES)
+def test_python(page):
+    scene = lw.Scene.load(SCENE)
+    fleet = lw.Ensemble(scene, 50, seed=1, vary=scene.ensemble_settings.vary)
+    names = {"lw": lw, "np": np, "scene": scene, "fleet": fleet}
+    for text in snippets(page, "python"):
+        exec(text, names)
+    assert "found" in names or names["metric"].unit == "rad"
+
+
+def test_toml(tmp_path):
+    (text,) = snippets("guide", "toml")
+    (tmp_path / "sweep.toml").write_text(text)
+    (tmp_path / "remus_100_autopilot.toml").write_text(SCENE.read_text())
+    arguments = arguments_of_file(tmp_path / "sweep.toml")
+    assert [case["name"] for case in arguments["cases"]] == ["pid", "stiff"] and arguments["t1"] == 60.0
+    (text,) = snippets("metrics", "toml")
+    (tmp_path / "scene.toml").write_text(SCENE.read_text() + text)
+    assert lw.Scene.load(tmp_path / "scene.toml").run.statistics[0].key == "settling_time depth"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", sorted((ROOT / "examples" / "sweeps").glob("*.toml")), ids=lambda path: path.stem)
+def test_examples(path):
+    arguments = arguments_of_file(path)
+    found = lw.sweep(**{**arguments, "members": 8})
+    assert not any(row["refused"] for row in found.rows()) and len(str(found)) > 100
+
+
+@pytest.mark.slow
+def test_mutated_files_are_refused_in_words(tmp_path):
+    """Lines dropped, keys misspelt and values replaced: a sweep, or a SceneError, and nothing else."""
+    rng = random.Random(1)
+    junk = ["1", "-1", '"x"', "[]", "{}", "true", "nan", "inf", "[[1]]", '""', "{ a = 1 }", '["a", "b"]', "2020-01-01"]
+    path = ROOT / "examples" / "sweeps" / "heading_laws.toml"
+    lines = path.read_text().replace("../scenes", str(SCENE.parent)).splitlines()
+    refused = 0
+    for _ in range(400):
+        mutated = list(lines)
+        for _ in range(rng.choice([1, 1, 2])):
+            i, how = rng.randrange(len(mutated)), rng.random()
+            if how < 0.3:
+                del mutated[i]
+            elif how < 0.9 and "=" in mutated[i]:
+                mutated[i] = mutated[i].split("=")[0] + "= " + rng.choice(junk)
+            else:
+                mutated[i] = mutated[i].replace("e", "q", 1)
+        (tmp_path / "sweep.toml").write_text("\n".join(mutated))
+        try:
+            arguments = arguments_of_file(tmp_path / "sweep.toml")
+            about = {
+                name: arguments.pop(name, None) for name in ("cases", "grid", "vary", "members", "seed", "sampling")
+            }
+            success = arguments.pop("success", None)
+            setup = made(arguments["scene"], metrics=arguments.get("metrics", ()), settings={}, **about)
+            success_of(success, tuple(setup.metrics))
+            for case, point in setup.cells:
+                setup.fleet(case, point)
+        except lw.SceneError:
+            refused += 1
+    assert 100 < refused < 400

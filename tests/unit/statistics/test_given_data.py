@@ -1,0 +1,59 @@
+"""Indices from members at hand: against functions whose indices are known, and how often the intervals cover."""
+
+import numpy as np
+import pytest
+
+from lgvi_warp.statistics.given_data import explained
+
+
+def test_indices_of_ishigami():
+    """sin x + 7 sin^2 y + 0.1 z^4 sin x has the first-order indices 0.3139, 0.4424 and 0 (Saltelli et al. 2008)."""
+    x, y, z = np.random.default_rng(1).uniform(-np.pi, np.pi, (3, 40_000))
+    found = explained({"x": x, "y": y, "z": z}, np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x), 0.95)
+    for name, index in (("x", 0.3139), ("y", 0.4424), ("z", 0.0)):
+        # Bins of a 64th leave (2 pi / 64)^2 / 12 of the slope's variance, half a percent; chance adds about as much.
+        assert found[name].share == pytest.approx(index, abs=0.012)
+        assert found[name].lower - 0.005 <= index <= found[name].upper + 0.005
+    assert found["x"].p < 1e-6 and found["y"].p < 1e-6 and found["z"].p > 1e-3
+    # A linear regression sees x, whose slope is 3 / pi^2 of a standard deviation's worth, and neither of the others.
+    assert found["x"].slope > 0.3 and abs(found["y"].slope) < 0.02 and abs(found["z"].slope) < 0.02
+
+
+def test_slopes_are_those_of_the_regression():
+    x, y, noise = np.random.default_rng(2).normal(size=(3, 5000))
+    out = 2.0 * x - y + 0.5 * noise
+    found = explained({"x": x, "y": 10.0 * y}, out, 0.95)
+    size = out.std()
+    np.testing.assert_allclose([found["x"].slope, found["y"].slope], [2.0 / size, -1.0 / size], atol=0.03)
+
+
+def test_what_decides_success_is_found_and_a_step_is_seen():
+    x, y = np.random.default_rng(3).normal(size=(2, 4000))
+    found = explained({"ballast": x, "bias": y}, x > -1.0, 0.95)
+    # A bin of 32 holds the limit: it alone is mixed.
+    assert found["ballast"].share > 0.95 and abs(found["bias"].share) < 0.02 and found["ballast"].slope > 0.3
+
+
+def test_choices_and_constants():
+    rng = np.random.default_rng(4)
+    choice = rng.choice([1.0, 2.0, 5.0], 3000)
+    found = explained({"choice": choice, "constant": np.ones(3000)}, choice == 2.0, 0.95)
+    assert found["choice"].share == 1.0 and np.isnan(found["constant"].share) and np.isnan(found["constant"].slope)
+    assert np.isnan(explained({"choice": choice}, np.ones(3000), 0.95)["choice"].share)
+    lost = np.where(rng.random(3000) < 0.1, np.nan, choice == 2.0)
+    assert explained({"choice": choice}, lost, 0.95)["choice"].share == 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("index", [0.0, 0.05, 0.5])
+def test_intervals_cover_95_percent(index):
+    # With 1,000 members there are 20 bins, which leave a 20th squared of a slope's variance: it is in the truth here.
+    rng, hits = np.random.default_rng(5), 0
+    for _ in range(1000):
+        level = rng.integers(0, 10, 1000)
+        x = (level - 4.5) / np.sqrt(8.25)
+        y = np.sqrt(index) * x + np.sqrt(1.0 - index) * rng.normal(size=1000)
+        found = explained({"x": x}, y, 0.95)["x"]
+        hits += found.lower <= index <= found.upper
+    # At 0 only the upper end can miss.
+    assert (0.93 if index else 0.96) <= hits / 1000 <= (0.97 if index else 0.99)

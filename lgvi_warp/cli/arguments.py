@@ -22,6 +22,7 @@ EPILOG = """examples:
   lgvi-warp run examples/paper.toml --error 1e-3
   lgvi-warp run examples/paper.toml --members 1000000 --store zarr --out runs/large
   lgvi-warp resume runs/large
+  lgvi-warp view runs/paper
   lgvi-warp tradeoff examples/paper.toml --out runs/tradeoff
   lgvi-warp sensitivity examples/paper.toml --of "position[2]" --out runs/sensitivity
   lgvi-warp stability examples/paper.toml --out runs/stability
@@ -147,6 +148,10 @@ def parser() -> Parser:
     _add_sensitivity(verbs)
     _add_stability(verbs)
     _add_sweep(verbs)
+    view = _verb(verbs, "view", help="look at a run in the rerun viewer")
+    view.add_argument("dir", metavar="DIR", type=Path, help="the folder of a run, a store, or a result.npz")
+    view.add_argument("--members", metavar="LIST", help="draw these members, as 3,17 (default: a fair choice of 1,000)")
+    view.add_argument("--out", metavar="FILE", type=Path, help="write the recording there, and open no viewer")
     info = _verb(
         verbs, "info", help="what a folder of any verb holds; without one, the machine, versions, the core's peak"
     )

@@ -21,11 +21,12 @@ from lgvi_warp.cli.settings import RUN, out_of
 from lgvi_warp.cli.signals import Ended, Signals, Streams
 from lgvi_warp.cli.stores import export, merge, report
 from lgvi_warp.cli.studies import sensitivity, stability, sweep, tradeoff
+from lgvi_warp.cli.view import view
 from lgvi_warp.cli.warm import warm
 from lgvi_warp.common.errors import SceneError
 
 _VERBS = (run, check, resume, predict, merge, export, tradeoff, sensitivity, stability, sweep, info, bench, tune, warm,
-          new, schema, plot, report, completion)  # fmt: skip
+          new, schema, view, plot, report, completion)  # fmt: skip
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {verb.__name__: verb for verb in _VERBS}
 # The second is the name of predict before.
 VERBS |= {"list": list_names, "plan": predict}

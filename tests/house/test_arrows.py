@@ -12,6 +12,7 @@ OPTIONAL = {
     "SALib",
     "matplotlib",
     "rerun",
+    "rerun_cli",
     "xarray",
     "zarr",
     "google_crc32c",

@@ -51,7 +51,7 @@ def _fan(recording: Any, run: Drawn, fan: Fan) -> None:
     """Log the bands of a fan and its median; of one member, its curve."""
     import rerun as rr
 
-    rgb, one = run.rgb or LOOKS[Status.OK].rgb, run.result.members == 1
+    rgb, one = run.rgb or LOOKS[Status.OK].rgb, run.source.members == 1
     bands = BANDS[1:2] if run.label else BANDS
     for name, low, high, opacity in () if one else bands:
         entity = run.path(f"curves/{fan.name}", name.replace(" %", "_percent"))

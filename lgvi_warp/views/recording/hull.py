@@ -77,7 +77,7 @@ def hull_of(length: float, diameter: float) -> Hull:
     here, beside = first + i, first + (i + 1) % AROUND
     sides = np.stack([here, here + AROUND, beside, beside, here + AROUND, beside + AROUND], axis=-1).reshape(-1, 3)
     back = -0.5 * length
-    fin = np.array([(back + end, 0.0, -0.8 * radius), (back, 0.0, -0.6 * radius), (back, 0.0, -1.9 * radius)])
+    fin = np.array([(back + end, 0.0, -0.8 * radius), (back, 0.0, -0.6 * radius), (back, 0.0, -1.6 * radius)])
     total = rows * AROUND
     faces = np.array([(0, 1, 2), (0, 2, 1)]) + total
     parts = np.repeat((np.arange(rows) < ALONG).astype(int), AROUND)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.physics.control.signals import CHANNELS
-from lgvi_warp.views.recording.drawn import Drawn
+from lgvi_warp.views.recording.drawn import Drawn, Fan
 from lgvi_warp.views.recording.world import TIMELINE, Box
 
 # The whole run is played in this time [s].
@@ -84,7 +84,7 @@ def _right(runs: list[Drawn]) -> Any:
     for name, group in fans.items():
         limits = _limits(np.concatenate([fan.levels for fan in group], axis=1))
         # All have the same legend; it would cover their curves.
-        views[name] = _curve(f"curves/{name}", group[0].title, whole, limits, name == "height")
+        views[name] = _curve(f"curves/{name}", group[0].title, whole, limits, name == "height", _high(group[0], limits))
     height = views.pop("height")
     energy = views.pop("energy", None)
     motion = rrb.Tabs(views["speed"], *([energy] if energy else []), active_tab=0)
@@ -103,13 +103,21 @@ def _right(runs: list[Drawn]) -> Any:
     return rrb.Vertical(height, angles, motion, *commands, facts, row_shares=shares)
 
 
-def _curve(origin: str, name: str, whole: Any, limits: tuple[float, float] | None, legend: bool) -> Any:
-    """A view of curves over the whole time."""
+def _high(fan: Fan, limits: tuple[float, float] | None) -> bool:
+    """Whether the median begins in the upper half of its axis."""
+    early = fan.levels[3, : max(1, fan.levels.shape[1] // 5)]
+    return limits is not None and bool(np.nanmean(early) > 0.5 * sum(limits)) if np.isfinite(early).any() else False
+
+
+def _curve(
+    origin: str, name: str, whole: Any, limits: tuple[float, float] | None, legend: bool, below: bool = False
+) -> Any:
+    """A view of curves over the whole time, with the legend above or below them."""
     import rerun.blueprint as rrb
 
     return rrb.TimeSeriesView(
         origin=f"/{origin}", name=name, axis_x=whole, axis_y=rrb.ScalarAxis(range=limits) if limits else None,
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftBottom if below else rrb.Corner2D.LeftTop, visible=legend),
     )  # fmt: skip
 
 
@@ -150,7 +158,7 @@ def _world(run: Drawn, box: Box, scale: int, aspect: float) -> Any:
     now = rrb.TimeRangeBoundary.cursor_relative(seconds=0)
     past = rrb.VisibleTimeRange(TIMELINE, start=rrb.TimeRangeBoundary.infinite(), end=now)
     hulls = f", hulls {scale} times their size" if scale > 1 else ""
-    name = f"{run.label}: {run.choice.text}" if run.label else run.choice.text
+    name = f"{run.label}: {run.text}" if run.label else run.text
     return rrb.Spatial3DView(
         origin=run.path("world"), name=f"{name}{hulls}, grid {box.grid:g} m", background=BACKGROUND,
         line_grid=rrb.LineGrid3D(visible=False),

@@ -50,9 +50,13 @@ def lines(run: Drawn, box: Box, scale: int) -> dict[str, str]:
     counts = ", ".join(f"{name} {number:,}" for name, number in result.status.counts().items())
     few = len(run.choice.members) < result.members
     drawn = f"{len(run.choice.members):,} of {result.members:,} drawn" if few else f"{result.members:,}, all drawn"
-    ranked = of_members(len(run.choice.ranked), result.members)
-    one = result.members == 1
-    bands = f", quantiles of {ranked}" if len(run.choice.ranked) < result.members else ", all in the curves"
+    one = run.source.members == 1
+    if run.source is not result:
+        bands = f", curves of the {run.source.members:,} whose samples were kept"
+    elif len(run.choice.ranked) < result.members:
+        bands = f", quantiles of {of_members(len(run.choice.ranked), result.members)}"
+    else:
+        bands = ", all in the curves"
     versions = {**settings.get("versions", {}), **{"rerun": _rerun_version()}}
     method = settings["method"]["name"]
     times = f"{run.time[0]:g} to {run.time[-1]:g} s, {len(run.time)} of {len(result.time)} samples drawn"
@@ -60,7 +64,7 @@ def lines(run: Drawn, box: Box, scale: int) -> dict[str, str]:
         times += "; for the motion between them give SaveAt(every=...), or save_every in [run]"
     _, source = shape_of(settings["scene"], run.few.parameters)
     size = f"{source}, drawn " + (f"{scale} times their size" if scale > 1 else "at their size")
-    member = int(run.choice.members[chosen_member(run)])
+    member = int(run.members[chosen_member(run)])
     seed = settings.get("ensemble", {}).get("seed", "none")
     return {
         "members": drawn + ("" if one else bands),
@@ -100,8 +104,8 @@ def water_text(run: Drawn, box: Box) -> str:
         return f"surface and {floor}; {grid}"
     if not run.above:
         return f"no event at the surface, {floor}; {grid}"
-    many = of_members(run.above, run.result.members)
-    return f"unbounded water: {many} pass{'es' * (run.above == 1 == run.result.members)} above depth 0; {floor}; {grid}"
+    many = of_members(run.above, run.source.members)
+    return f"unbounded water: {many} pass{'es' * (run.source.members == 1)} above depth 0"
 
 
 def energy_text(run: Drawn) -> str:

@@ -21,7 +21,7 @@ CHUNK = 20
 # Scale of a hidden body: an entity without any pose would show a body at the origin.
 UNSEEN = 1e-6
 # A hull is drawn at least this share of the scene long.
-SEEN = 0.025
+SEEN = 0.02
 TRAIL, WATER, SAND, CURRENT = (150, 165, 180, 150), (90, 170, 230, 40), (150, 120, 80, 90), (0, 200, 200)
 # Axes are labelled at the corner of the grid.
 AXES = (("north", (230, 90, 90)), ("east", (90, 200, 90)), ("down", (110, 140, 255)))
@@ -227,7 +227,7 @@ def _spread(recording: Any, run: Drawn) -> None:
 
 
 def _planes(recording: Any, run: Drawn, box: Box) -> None:
-    """Log the surface and the floor where they are in view, with a grid in metres."""
+    """Log the surface and the floor where they are in view, with a grid in metres; unbounded water has no sheet at depth 0."""
     import rerun as rr
 
     margin = 0.08 * box.size
@@ -236,6 +236,8 @@ def _planes(recording: Any, run: Drawn, box: Box) -> None:
     for name, depth, color in planes:
         corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
         both_sides = [(0, 1, 2), (0, 2, 3), (0, 2, 1), (0, 3, 2)]
+        if name == "surface" and not run.watered:
+            continue
         points = [(*corner, depth) for corner in corners]
         sheet = rr.Mesh3D(vertex_positions=points, triangle_indices=both_sides, albedo_factor=color)
         _static(recording, run.path("world", "water", name), sheet)

@@ -120,6 +120,7 @@ def test_every_verb_is_of_those_that_write_or_of_those_that_do_not():
         "new",
         "plot",
         "report",
+        "view",
     }
     assert writing | set(command.READING) == set(command.VERBS) == set(cli.parser().verbs)
     assert not writing & set(command.READING)

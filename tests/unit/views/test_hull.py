@@ -50,23 +50,26 @@ def test_without_a_shape_the_hull_holds_the_displaced_water():
 
 
 def glb(path, size=2.0, **changes):
-    """A binary glTF file of one triangle, seen from both sides."""
-    corners = np.array([[0, 0, 0], [size, 0, 0], [0, 0.5, 0]], np.float32)
+    """A binary glTF file of a pyramid, seen from both sides."""
+    w = 0.25 * size
+    corners = np.array([[2 * w, 0, 0], [-2 * w, w, w], [-2 * w, -w, w], [-2 * w, 0, -w]], np.float32)
+    faces = [(0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)]
+    indices = np.array([*faces, *(face[::-1] for face in faces)], np.uint32)
     tables = {
         "asset": {"version": "2.0"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"mesh": 0}],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
-        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
                        "min": corners.min(axis=0).tolist(), "max": corners.max(axis=0).tolist()},
-                      {"bufferView": 1, "componentType": 5125, "count": 6, "type": "SCALAR"}],
-        "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 24}],
-        "buffers": [{"byteLength": 60}],
+                      {"bufferView": 1, "componentType": 5125, "count": 24, "type": "SCALAR"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 96}],
+        "buffers": [{"byteLength": 144}],
     } | changes  # fmt: skip
     text = json.dumps(tables).encode()
     text += b" " * (-len(text) % 4)
-    data = corners.tobytes() + np.array([0, 1, 2, 0, 2, 1], np.uint32).tobytes()
+    data = corners.tobytes() + indices.tobytes()
     parts = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(data), 0x004E4942) + data
     path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(parts)) + parts)
     return path

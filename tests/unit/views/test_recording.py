@@ -14,6 +14,7 @@ from rerun.chunk import RrdReader
 import lgvi_warp as lw
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import Status, stop_time, under_way
+from lgvi_warp.statistics.estimate import Estimate, Estimates
 from lgvi_warp.views.recording import drawn, layout, world
 from lgvi_warp.views.recording.graphs import channel_names
 from tests.support.made import made
@@ -223,11 +224,14 @@ def test_extremes_are_of_all_members_and_quantiles_of_many(monkeypatch):
 
 
 def test_the_water_is_said_to_be_unbounded_where_members_leave_it(tmp_path):
-    up = np.linspace(5.0, -1.0, 5)[:, None, None] * np.ones((1, 4, 3))
+    up = np.linspace(5.0, -0.5, 5)[:, None, None] * np.ones((1, 4, 3))
     up[:, 0, 2] = 5.0
     path = lw.log_rerun(made(up), tmp_path / "up.rrd")
-    assert "unbounded water: 3 of 4 members pass above depth 0; no floor" in text_of(path, "/run/summary")
-    assert "/world/water/surface" in entities(path) and "/world/water/floor" not in entities(path)
+    assert "| unbounded water: 3 of 4 members pass above depth 0 |" in text_of(path, "/run/summary")
+    # Half a metre above the surface a vehicle floats; beyond, there is no surface, but a grid at depth 0.
+    names = [entities(path), entities(lw.log_rerun(made(3.0 * up), tmp_path / "far.rrd"))]
+    assert ["/world/water/surface" in one for one in names] == [True, False]
+    assert all("/world/water/surface_grid" in one and "/world/water/floor" not in one for one in names)
 
 
 def test_forces_balance_the_momentum():
@@ -314,11 +318,44 @@ def test_members_asked_for_are_drawn(mixed, tmp_path):
     assert rows(path, "/members/under_way", "scalars")[0.0] == [100.0]
 
 
+def lean(mixed, **named):
+    """The same run, of which samples of the members 3, 5 and 9 were kept alone."""
+    kept = np.array([3, 5, 9])
+    return dataclasses.replace(mixed, samples={}, kept=mixed.part(kept), kept_members=kept, **named)
+
+
 def test_kept_members_are_drawn_where_no_others_were_kept(mixed, tmp_path):
-    few = mixed.part(np.array([3, 5]))
-    lean = dataclasses.replace(mixed, samples={}, kept=few, kept_members=np.array([3, 5]))
-    path = lw.log_rerun(lean, tmp_path / "kept.rrd")
-    assert len(rows(path, "/world/bodies/ok", "translations")[0.0]) == 2
+    path = lw.log_rerun(lean(mixed), tmp_path / "kept.rrd")
+    assert len(rows(path, "/world/bodies/ok", "translations")[0.0]) == 3
+    summary, counts = text_of(path, "/run/summary"), mixed.status.counts()
+    assert "| 3 of 40 drawn, curves of the 3 whose samples were kept |" in summary
+    # Outcomes are those of all.
+    assert f"| outcome | {', '.join(f'{name} {number}' for name, number in counts.items())} |" in summary
+    assert rows(path, "/members/floor", "scalars")[60.0] == pytest.approx([100.0 * counts["floor"] / 40])
+    assert drawn.drawn_of(lean(mixed), [9, 3]).members.tolist() == [3, 9]
+    with pytest.raises(lw.SceneError, match=r"members = 4: has no samples; keep them: keep=\[4\]"):
+        lw.log_rerun(lean(mixed), tmp_path / "kept.rrd", members=[4])
+
+
+def test_the_runs_own_statistics_make_the_fan_where_no_samples_of_all_were_kept(mixed):
+    depth = mixed.position[..., 2]
+    names = ("component",)
+
+    def estimate(kind, arrays, **coordinates):
+        settings = {"type": kind, "of": "depth"}
+        return Estimate(
+            kind, settings, "m", 0.95, "", {}, arrays, {"time": mixed.time, "component": names} | coordinates
+        )
+
+    levels = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
+    quantiles = np.moveaxis(np.quantile(depth, levels, axis=1), 0, 1)[..., None]
+    extremes = {"minimum": depth.min(axis=1, keepdims=True), "maximum": depth.max(axis=1, keepdims=True)}
+    statistics = Estimates([estimate("quantiles", {"value": quantiles}, level=levels), estimate("extremes", extremes)])
+    height, *others = drawn.drawn_of(lean(mixed, statistics=statistics)).fans
+    expected = np.quantile(-depth, drawn.LEVELS, axis=1)
+    np.testing.assert_allclose(height.levels, expected, rtol=1e-6)
+    assert height.title.endswith("by the run's statistics") and not any("by the run" in fan.title for fan in others)
+    assert np.abs(drawn.drawn_of(lean(mixed)).fans[0].levels - expected).max() > 0.1
 
 
 def test_runs_are_compared_side_by_side(mixed, tmp_path):
@@ -346,8 +383,12 @@ def test_a_mesh_is_drawn_times_a_whole_number(tmp_path):
     result = made(np.array([[[0.0, 0, 5]], [[100.0, 0, 5]], [[200.0, 0, 5]]]), scene=lw.Scene(vehicle))
     path = lw.log_rerun(result, tmp_path / "mesh.rrd")
     run = drawn.drawn_of(result)
-    scale = world.scale_of(run, world.box_of([run]))
-    assert scale >= 10 and rows(path, "/world/bodies/ok", "scales")[1.0][0] == [scale] * 3
+    box = world.box_of([run])
+    scale = world.scale_of(run, box)
+    assert (
+        scale == np.ceil(world.SEEN * box.size / 0.5) > 5.0
+        and rows(path, "/world/bodies/ok", "scales")[1.0][0] == [scale] * 3
+    )
     assert f"drawn {scale} times their size" in text_of(path, "/run/summary")
     mesh.unlink()
     with pytest.raises(lw.SceneError, match=r"vehicle\.shape\.mesh = 'hull\.glb': cannot be read"):
@@ -411,11 +452,32 @@ def test_nothing_to_draw_is_said(mixed, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_show_starts_a_viewer(mixed, monkeypatch):
-    started = []
-    monkeypatch.setattr(rr.RecordingStream, "spawn", lambda self, **named: started.append(named))
-    lw.show(mixed)
-    assert list(started[0]) == ["default_blueprint"]
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("exec sleep 0.5", None),
+        ("exec sleep 30", None),
+        ("echo no display >&2; exit 1", r"did not start \(no display\); the recording is .*fleet.rrd: open it"),
+        (None, "cannot be started .* the recording is"),
+    ],
+)
+def test_show_starts_a_viewer(mixed, tmp_path, monkeypatch, text, words):
+    from lgvi_warp.views import rerun as recordings
+
+    program = tmp_path / "viewer"
+    if text is not None:
+        program.write_text(f'#!/bin/sh\necho "$1" > "{tmp_path}/opened"\n{text}\n')
+        program.chmod(0o755)
+    monkeypatch.setattr(recordings, "_program", lambda: program)
+    monkeypatch.setattr(recordings, "STARTED", 0.7)
+    monkeypatch.setattr(recordings.tempfile, "mkdtemp", lambda prefix: str(tmp_path))
+    if words is None:
+        lw.show(mixed, members=[3])
+        opened = Path((tmp_path / "opened").read_text().strip())
+        assert "1 of 40 drawn" in text_of(opened, "/run/summary")
+    else:
+        with pytest.raises(OSError, match=words):
+            lw.show(mixed)
 
 
 def test_no_viewer_is_loaded_before_it_is_needed():

@@ -1,4 +1,4 @@
-"""Pages of the reference that the build of the site writes: public names, types of the scene file, the help of the command."""
+"""Pages of the reference that the build of the site writes: public names, keys of the scene file, the help of the command."""
 
 import argparse
 import inspect
@@ -13,15 +13,28 @@ import lgvi_warp as lw
 from lgvi_warp.cli import parser
 from lgvi_warp.physics import terms
 from lgvi_warp.physics.control.controller import SECTIONS as CONTROLLER
+from lgvi_warp.physics.shape import Shape
 from lgvi_warp.physics.terms import events
 from lgvi_warp.physics.terms.base import word_of
 from lgvi_warp.sampling.designs import KINDS as SAMPLINGS
 from lgvi_warp.sampling.distributions.named import KINDS as DISTRIBUTIONS
+from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
 from lgvi_warp.statistics import TYPES as STATISTICS
 
 from . import documented
 
 DOCS = Path(__file__).parents[1]
+# Section of scene files -> the class whose parameters are its keys.
+SECTIONS: dict[str, Any] = {
+    "[vehicle]": lw.Vehicle,
+    "[vehicle.shape]": Shape,
+    "[environment]": lw.Environment,
+    "[start]": lw.Start,
+    "[controller]": lw.Controller,
+    "[ensemble]": EnsembleSettings,
+    "[run]": RunSettings,
+    "[run.until]": lw.Until,
+}
 # Heading -> the classes by type that the loader of scene files knows there.
 TYPES: dict[str, Mapping[str, Any]] = {
     "[[terms]]": terms.TYPES,
@@ -36,7 +49,7 @@ TYPES: dict[str, Mapping[str, Any]] = {
 def write(folder: Path) -> None:
     """Write all pages into a folder; what has not changed is left alone, so that it is not built again."""
     folder.mkdir(exist_ok=True)
-    texts = {"scene_file_types.rst": types_page(), "command_help.rst": command_page(), "changelog.md": changelog()}
+    texts = {"scene_file_keys.rst": scene_file_page(), "command_help.rst": command_page(), "changelog.md": changelog()}
     texts |= {f"{slug(title)}.rst": names_page(title, names) for title, names in groups().items()}
     for old in folder.iterdir():
         if old.name not in texts:
@@ -99,10 +112,12 @@ def _directive(path: str, subject: Any) -> Iterator[str]:
     yield ""
 
 
-def types_page() -> str:
-    """The page on the types of the scene file: every key with shape, unit, default and meaning."""
-    lines = [heading("Scene file: every type, key by key", "=")]
-    lines += ["Sections and their keys are in :doc:`/start/scene_file`.", ""]
+def scene_file_page() -> str:
+    """The page on the scene file: every key of every section and type, with shape, unit, default and meaning."""
+    lines = [heading("The scene file, key by key", "=")]
+    lines += ["How sections work together: :doc:`/start/scene_file`.", ""]
+    for title, kind in SECTIONS.items():
+        lines += [heading(title, "-"), escaped(documented.first_line(kind)), "", *_table(kind)]
     for title, kinds in TYPES.items():
         lines += [heading(title, "-")]
         for word, kind in sorted(kinds.items()):

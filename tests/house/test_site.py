@@ -1,5 +1,6 @@
 """The site: its reference has every public name with each parameter, its pages are whole, its links lead somewhere."""
 
+import dataclasses
 import functools
 import html.parser
 import inspect
@@ -15,6 +16,7 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.cli.command import VERBS
 from lgvi_warp.physics.terms.base import word_of
+from lgvi_warp.scene.scene import SECTIONS
 from tests.conftest import ROOT
 
 sys.path.append(str(ROOT / "docs"))
@@ -101,19 +103,24 @@ def test_text_is_shown_as_it_stands():
     assert pages.linked("Scene | Scenes") == "\\ :py:obj:`Scene <lgvi_warp.Scene>`\\  \\| Scenes"
 
 
-def test_each_type_of_the_scene_file_has_its_keys():
-    parts = re.split(r"^(\[.*)\n-+\n", pages.types_page(), flags=re.MULTILINE)
+def keys_of(text):
+    """First cells of the rows of a table, without its head."""
+    return sorted(re.findall(r"^   \* - ``(\w+)``", text, re.MULTILINE))
+
+
+def test_each_section_and_type_of_the_scene_file_has_its_keys():
+    parts = re.split(r"^(\[.*)\n-+\n", pages.scene_file_page(), flags=re.MULTILINE)
     sections = dict(zip(parts[1::2], parts[2::2], strict=True))
-    assert sections.keys() == pages.TYPES.keys()
+    assert sections.keys() == pages.SECTIONS.keys() | pages.TYPES.keys()
+    named = {name.strip("[]").partition(".")[0].partition("]")[0] for name in sections}
+    assert named == set(SECTIONS) - {"source"}  # which is not read
+    for title, kind in pages.SECTIONS.items():
+        assert keys_of(sections[title]) == sorted(item.name for item in dataclasses.fields(kind) if item.init)
     for title, kinds in pages.TYPES.items():
         types = re.split(r"^``(\w+)``\n~+\n", sections[title], flags=re.MULTILINE)
-        keys = {
-            word: re.findall(r"^   \* - ``(\w+)``", text, re.MULTILINE) for word, text in zip(types[1::2], types[2::2])
-        }
+        keys = {word: keys_of(text) for word, text in zip(types[1::2], types[2::2], strict=True)}
         fields = {word: documented.fields_of(kind) for word, kind in kinds.items() if "lgvi_warp" in kind.__module__}
-        assert {word: sorted(found) for word, found in keys.items()} == {
-            word: sorted(word_of(item) for item in found.values()) for word, found in fields.items()
-        }
+        assert keys == {word: sorted(word_of(item) for item in found.values()) for word, found in fields.items()}
 
 
 def test_each_verb_has_its_help():

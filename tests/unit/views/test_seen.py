@@ -68,6 +68,7 @@ RUNS = {
 }
 
 
+@pytest.mark.slow
 def test_two_recordings_are_seen(tmp_path):
     paths = [lw.log_rerun(fleet(30, seed=seed), tmp_path / f"{seed}.rrd") for seed in (1, 2)]
     assert faults_of(paths, (0.0, 30.0, 60.0), tmp_path) == []

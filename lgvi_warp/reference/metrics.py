@@ -3,8 +3,6 @@
 t: times of the looks under way (k,) [s]; y: actual numbers (k,), goal: one number; e: errors (k,), wanted less actual.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -70,6 +70,7 @@ def test_a_current_drives_off_the_way_and_the_integral_comes_back():
     assert ends["ilos"] < 0.02 and ends["alos"] < 0.02
 
 
+@pytest.mark.slow
 def test_it_stops_at_the_last_point_or_goes_on():
     end = []
     for at_end in ("stop", "go_on"):

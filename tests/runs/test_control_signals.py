@@ -324,6 +324,7 @@ def test_a_recording_shows_commands_and_actuators(whole, tmp_path):
     assert not rows(path, "/demand/5", "scalars") and not rows(path, "/command/6", "scalars")
 
 
+@pytest.mark.slow
 def test_statistics_and_quantities_of_interest(whole):
     statistics = [lw.Mean("command[5]"), lw.Mean("measured_depth"), lw.Mean("max(norm(demand))")]
     statistics += [lw.Quantiles("actuator[2]"), lw.Mean("reference_speed")]

@@ -14,7 +14,7 @@ from lgvi_warp.common.status import failed
 from lgvi_warp.studies.sweeps.found import SUCCESS
 from lgvi_warp.studies.sweeps.output import Sweep, against_baseline
 from lgvi_warp.studies.sweeps.setup import END, Cell
-from lgvi_warp.views.plots import figure_class, save_figure
+from lgvi_warp.views.plots.canvas import figure_class, save_figure
 
 # Most boxes of one panel, and most members that are drawn as points.
 MOST_BOXES, MOST_POINTS = 40, 4000

@@ -14,9 +14,9 @@ from lgvi_warp.common.status import Status, stop_time, under_way
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.control.signals import CHANNELS
 from lgvi_warp.physics.fields import FIELDS
-from lgvi_warp.runs import member_fields
 from lgvi_warp.runs.outcomes import outcomes
-from lgvi_warp.views.choice import Shown, finite_rows, pieces, samples_of, shown
+from lgvi_warp.views import choice as choices
+from lgvi_warp.views.choice import Shown, finite_rows, pieces, shown
 from lgvi_warp.views.fleet import LOOKS, energy_curve
 
 if TYPE_CHECKING:
@@ -165,7 +165,7 @@ def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[in
     choice = shown(result)
     if members is not None:
         choice = dataclasses.replace(choice, members=_of(members, result.members))
-    few = _few(result, choice)
+    few = choices.few(result, choice.members, (*FIELDS, *CHANNELS), choice.frames)
     counted = under_way(few)
     fans, ranked, above = _survey(result, choice, _directions(few, counted))
     position, count = ranked["position"], ranked["counted"]
@@ -193,20 +193,6 @@ def _of(members: Any, total: int) -> np.ndarray:
                 "members", int(index), f"is none of the {total:,} members", f"give indices from 0 to {total - 1}"
             )
     return np.unique(indices)
-
-
-def _few(result: Result, choice: Shown) -> Result:
-    """The members drawn at the times drawn, in memory."""
-    fields = tuple(name for name in (*FIELDS, *CHANNELS) if name in result.samples)
-    samples = samples_of(result, fields, choice.members, choice.frames)
-    of_members = {item.name: getattr(result, item.name)[choice.members] for item in member_fields.EVERY}
-    parameters = {
-        name: values[choice.members] if len(values) > 1 else values for name, values in result.parameters.items()
-    }
-    time = result.time[choice.frames]
-    return dataclasses.replace(
-        result, time=time, samples=samples, parameters=parameters, store=None, kept=None, **of_members
-    )
 
 
 def roll_pitch_heading(attitude: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
